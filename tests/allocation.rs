@@ -135,7 +135,7 @@ fn steps_samples_and_peaks_allocate_nothing() {
                     let (mut frame, mut peaks) = (Frame::default(), Vec::new());
                     simulation.sample(0.0, &mut frame);
                     simulation.take_peaks(&mut peaks);
-                    simulation.keep_wear();
+                    simulation.track_wear();
                     let end = if form == "tree" { 0.02 } else { 0.0125 };
                     let found = allocations(|| {
                         while simulation.time() < end {

@@ -1,7 +1,7 @@
 //! A run from t = 0 with rows at equal intervals, as `jointplay run` makes it.
 
 use jointplay_analysis::row_times::RowTimes;
-use jointplay_physics::simulate::{Frame, Impact, Listed, Stopped, matching};
+use jointplay_physics::simulate::{ChannelInfo, Frame, Impact, Stopped, matching};
 use jointplay_scene::LiveScene;
 use numpy::ndarray::Array2;
 use pyo3::exceptions::PyMemoryError;
@@ -40,7 +40,7 @@ struct Recorder {
     live: LiveScene,
     duration: f64,
     times: RowTimes,
-    channels: Vec<Listed>,
+    channels: Vec<ChannelInfo>,
     frame: Frame,
     /// One column after another, each of `capacity` values.
     values: Vec<f64>,
@@ -109,7 +109,7 @@ pub fn run<'py>(
     let capacity = usize::try_from(times.last()).unwrap_or(usize::MAX).saturating_add(1);
     let values = allocate(capacity, chosen.len())?;
     if live.load_peaks().is_none() {
-        live.keep_load_peaks();
+        live.track_load_peaks();
     }
     chosen.iter().for_each(|channel| channel.reading().ask(&mut frame));
     let mut run =
@@ -126,13 +126,13 @@ pub fn run<'py>(
 }
 
 /// The channels that match one of `patterns`, and the time; without patterns, those that are written unasked.
-fn chosen(py: Python<'_>, all: Vec<Listed>, patterns: &[String]) -> PyResult<Vec<Listed>> {
+fn chosen(py: Python<'_>, all: Vec<ChannelInfo>, patterns: &[String]) -> PyResult<Vec<ChannelInfo>> {
     for pattern in patterns {
         let failed = |error| option_error(py, &format!("channels: {error}; Scene.channels() lists them"));
         matching(&all, pattern).map_err(failed)?;
     }
-    let is_chosen = |channel: &Listed| {
-        let named = patterns.iter().any(|pattern| channel.is_chosen_by(pattern));
+    let is_chosen = |channel: &ChannelInfo| {
+        let named = patterns.iter().any(|pattern| channel.is_matched_by(pattern));
         channel.name == "time" || named || (patterns.is_empty() && channel.unasked)
     };
     Ok(all.into_iter().filter(is_chosen).collect())

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use jointplay_analysis::assembly::StartReport;
 use jointplay_analysis::ideal_fault::ideal_fault;
-use jointplay_physics::simulate::{Frame, Listed, Simulation, channels_of};
+use jointplay_physics::simulate::{ChannelInfo, Frame, Simulation, channels_of};
 use jointplay_scene::{BENCHMARKS, BUILT_IN, Kind, LiveScene, Scene, SceneError, Texts, contact_parts};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -49,7 +49,7 @@ impl PyScene {
 }
 
 /// The channels of a simulation that has just started, and its first instant.
-pub fn channels_at_start(simulation: &mut Simulation) -> (Vec<Listed>, Frame) {
+pub fn channels_at_start(simulation: &mut Simulation) -> (Vec<ChannelInfo>, Frame) {
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     (channels_of(simulation.machine(), &frame), frame)
@@ -189,7 +189,7 @@ impl PyScene {
         let warnings = detached(py, || {
             let singular = ideal_fault(scene).map(|near| near.to_string());
             let start = StartReport::of(&mut live);
-            (start.warnings_of(scene).into_iter().chain(singular).collect::<Vec<_>>(), start.not_unique())
+            (start.warnings_of(scene).into_iter().chain(singular).collect::<Vec<_>>(), start.indeterminate_forces())
         })?;
         all.set_item("warnings", warnings.0)?;
         all.set_item("not_unique", warnings.1)?;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use jointplay_physics::machine::{Mat3, Vec3};
-use jointplay_physics::simulate::{Effect, Frame, Listed, Stopped, matching};
+use jointplay_physics::simulate::{ChannelInfo, Effect, Frame, Stopped, matching};
 use jointplay_scene::{LiveScene, SavedState, Scene, SceneError, SceneSnapshot};
 use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{PyArray1, PyArray2, PyArray3};
@@ -30,7 +30,7 @@ type Pickled<'a> = (String, [&'a Changes; 3]);
 struct Layout {
     /// The changes of its scene at the start.
     changes: Changes,
-    channels: Vec<Listed>,
+    channels: Vec<ChannelInfo>,
     /// Index of each channel by name and by column.
     places: HashMap<String, usize>,
     /// The first instant.

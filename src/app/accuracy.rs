@@ -232,7 +232,7 @@ pub fn preset_of(player: &Player) -> Option<Preset> {
     let machine = &player.pending().machine;
     let solver = &machine.solver;
     let is = |preset: &Preset| {
-        let own = preset.solver(machine.loose_joints());
+        let own = preset.solver(machine.joints_with_clearance());
         own.method == solver.method
             && match own.method.control() {
                 StepControl::Fixed => own.step == solver.step,

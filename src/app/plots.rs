@@ -16,7 +16,7 @@ use super::{curve, layout, opening};
 use super::{spoken, theme, value};
 use crate::scene::Scene;
 use crate::session::link::shown::PlotWindow;
-use crate::simulate::{Bin, Listed, MOST_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
+use crate::simulate::{Bin, ChannelInfo, MAX_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
 
 #[cfg(not(target_arch = "wasm32"))]
 mod sheet;
@@ -117,7 +117,7 @@ impl<'a> Panel<'a> {
     fn of_pick(name: &'a str, player: &'a Player) -> Vec<Self> {
         let mut panels: Vec<Self> = Vec::new();
         let picked = player.channels().picked().iter().zip(player.picked());
-        for (channel, index) in picked.filter(|(channel, _)| channel.is_chosen_by(name)) {
+        for (channel, index) in picked.filter(|(channel, _)| channel.is_matched_by(name)) {
             let rest = channel.name.strip_prefix(name);
             let member = rest.and_then(|rest| rest.strip_prefix('.'));
             let member = (index, member.unwrap_or(&channel.name));
@@ -152,7 +152,7 @@ impl<'a> Panel<'a> {
 }
 
 /// Axis unit of a channel, and its value in SI units.
-fn axis_unit(channel: &Listed) -> (&'static str, f64) {
+fn axis_unit(channel: &ChannelInfo) -> (&'static str, f64) {
     match channel.unit {
         "m" => ("mm", 1e-3),
         "m/s2" => ("m/s²", 1.0),
@@ -181,7 +181,7 @@ fn find(player: &Player, search: &str) -> Vec<Entry> {
     let pattern = search.contains(['*', '?']);
     for channel in &list {
         let unit = axis_unit(channel).0;
-        if pattern && channel.is_chosen_by(search) {
+        if pattern && channel.is_matched_by(search) {
             add(search, unit);
         } else if channel.group().to_lowercase().contains(&wanted) {
             add(channel.group(), unit);
@@ -331,8 +331,8 @@ impl Plots {
                 ui.label(RichText::new("No such channel").small().weak());
             }
         });
-        if player.channels().picked().len() == MOST_PICKED {
-            let note = format!("At most {MOST_PICKED} channels are recorded");
+        if player.channels().picked().len() == MAX_PICKED {
+            let note = format!("At most {MAX_PICKED} channels are recorded");
             ui.label(RichText::new(note).small().weak());
         }
         if let Some((name, on)) = toggled {
@@ -340,7 +340,7 @@ impl Plots {
             let first = player.picked().start;
             self.hidden.retain(|channel| *channel < first);
             self.picked.retain(|picked| *picked != name);
-            if on && self.picked.len() < MOST_PICKED {
+            if on && self.picked.len() < MAX_PICKED {
                 self.picked.push(name);
             }
         }

@@ -27,7 +27,7 @@ impl Grip {
         let motion = player.frame().bodies.get(body)?;
         let point = Exact::from(hit.point.to_array().map(f64::from));
         let inside = motion.rotation.tr_mul(&(point - motion.position));
-        Some(Self { pull: Pull::softly(&scene.machine, body, inside, point), hand: hit.point })
+        Some(Self { pull: Pull::with_soft_spring(&scene.machine, body, inside, point), hand: hit.point })
     }
 
     /// Moves the hand to `pixel`: parallel to the picture plane or, with `depth`, along the line of sight (up is away).

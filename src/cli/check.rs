@@ -14,7 +14,7 @@ use crate::integrate::{Method, StepControl};
 use crate::machine::{BallJoint, Body, Element, Joint, JointKind};
 use crate::mechanism::{ElementReport, Summary};
 use crate::scene::Scene;
-use crate::simulate::{Frame, Listed, Peak, channels_of};
+use crate::simulate::{ChannelInfo, Frame, Peak, channels_of};
 use crate::units::{format_quantity, format_quantity_digits, to_display};
 
 /// Runs `check`.
@@ -37,8 +37,8 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
 }
 
 /// The channels of a scene, one per line: name, unit, column, description.
-fn channels(all: &[Listed]) -> String {
-    let width = |of: fn(&Listed) -> usize| all.iter().map(of).max().unwrap_or_default();
+fn channels(all: &[ChannelInfo]) -> String {
+    let width = |of: fn(&ChannelInfo) -> usize| all.iter().map(of).max().unwrap_or_default();
     let name = width(|channel| channel.name.len());
     let column = width(|channel| channel.column.len());
     let mut out = String::new();
@@ -46,7 +46,7 @@ fn channels(all: &[Listed]) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "{title}:");
         for channel in all.iter().filter(|channel| channel.unasked == unasked) {
-            let Listed { unit, help, .. } = channel;
+            let ChannelInfo { unit, help, .. } = channel;
             let _ = writeln!(out, "  {:<name$}  {unit:<6}  {:<column$}  {help}", channel.name, channel.column);
         }
     }
@@ -125,7 +125,7 @@ fn report(
     }
     line("Degrees of freedom", &freedoms(contents));
     line("Constraint rows", &rows(contents));
-    begun.not_unique().iter().for_each(|words| line("Not unique", words));
+    begun.indeterminate_forces().iter().for_each(|words| line("Not unique", words));
     line(
         "Equations",
         &format!(

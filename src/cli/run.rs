@@ -85,11 +85,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         impacts.begin_at(from);
     }
     if simulation.load_peaks().is_none() {
-        simulation.keep_load_peaks();
+        simulation.track_load_peaks();
     }
     let wear_begins = wear.is_some() && simulation.wear().is_none();
     if wear_begins {
-        simulation.keep_wear();
+        simulation.track_wear();
     }
     let mut table = if arguments.channels.is_empty() {
         Table::new(&scene, &frame)

@@ -35,7 +35,7 @@ impl StateFile {
     /// To be called before every step of a run that ends at `end`, s. Saves the state before the first step that `end`
     /// truncates, because a longer run would not truncate it.
     pub fn watch(&mut self, simulation: &LiveScene, end: f64) {
-        if self.saved.is_none() && simulation.is_cut_by(end) {
+        if self.saved.is_none() && simulation.is_truncated_by(end) {
             self.saved = Some(simulation.state().clone());
         }
     }

@@ -220,7 +220,7 @@ pub fn start(facts: &mut Map<String, Json>, text: &mut String, found: &StartRepo
     facts.insert("assembly".into(), found.assembly.clone());
     let loose = json!({"reactions": found.reactions, "actuators": found.actuators});
     facts.insert("not_unique".into(), loose);
-    let loose = found.not_unique().map(|words| ("Not unique".to_owned(), words));
+    let loose = found.indeterminate_forces().map(|words| ("Not unique".to_owned(), words));
     for (label, words) in found.lines.iter().chain(&loose) {
         line(text, label, words);
     }

@@ -667,7 +667,7 @@ impl eframe::App for OnlyViewport {
 fn struck_cells_have_the_colour_of_their_value_and_others_none() {
     let scene = Scene::load("pendulum", &[]).expect("built in");
     let mut simulation = Simulation::new(&scene.machine).expect("starts");
-    simulation.keep_wear();
+    simulation.track_wear();
     simulation.advance_to(0.3).expect("steps");
     simulation.commit_wear();
     let mut frame = Frame::default();

@@ -21,8 +21,8 @@ use crate::analysis::presets::too_slow;
 use crate::machine::Warning;
 use crate::scene::{LiveScene, SOLVER_KEYS, Scene, SetError, Value};
 use crate::simulate::{
-    Channels, ContactMode, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, Simulation, StartError, Stopped,
-    Wear,
+    ChannelInfo, Channels, ContactMode, Effect, Frame, History, Limit, Pacer, Peak, Pull, Simulation, StartError,
+    Stopped, Wear,
 };
 use before_change::BeforeChange;
 use keyframes::Keyframes;
@@ -207,8 +207,8 @@ impl Player {
         let (first, channels) = (self.clearances().end, self.record.history.channels());
         let old = self.record.channels.clone();
         self.record.channels.pick(&self.simulation.running().machine, &self.frame, patterns);
-        let place = |new: &Listed| {
-            let same = |old: &Listed| old.column == new.column;
+        let place = |new: &ChannelInfo| {
+            let same = |old: &ChannelInfo| old.column == new.column;
             old.picked().iter().position(same).map(|at| first + at)
         };
         let picked = self.record.channels.picked().iter().map(place);
@@ -779,7 +779,7 @@ impl Player {
 
     /// Records and displays the start of the run.
     fn start(&mut self) {
-        self.simulation.keep_wear();
+        self.simulation.track_wear();
         self.record.contact_history.begin(0.0);
         // Forces at the start belong to the first frame: there has been no impact yet.
         self.simulation.take_peaks(&mut self.record.coming);

@@ -77,7 +77,7 @@ fn one_arm_in_two_formats_is_one_machine() {
             Some(Path::new(FOLDER)),
             &[("contact.clearance".to_owned(), "0.2mm".to_owned())],
         );
-        assert_eq!(loose.unwrap().machine.loose_joints(), 1);
+        assert_eq!(loose.unwrap().machine.joints_with_clearance(), 1);
     }
 }
 

@@ -17,7 +17,7 @@ fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
                 let memory = simulation.contact_state(j);
                 assert!(memory.active && memory.friction_branch != FrictionBranch::Unfrozen, "{method}");
                 let c = simulation.mechanism().contacts.coefficients(j);
-                let beyond = c.beyond(memory.friction_branch, joint.slip_speed);
+                let beyond = c.excess_over_branch(memory.friction_branch, joint.slip_speed);
                 assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
             }
         }
@@ -81,7 +81,7 @@ fn methods_agree_where_friction_reads_a_part_of_the_velocity() {
                 let memory = simulation.contact_state(j);
                 let c = simulation.mechanism().contacts.coefficients(j);
                 if memory.active && memory.friction_branch != FrictionBranch::Unfrozen && joint.slip_speed > 0.0 {
-                    let beyond = c.beyond(memory.friction_branch, joint.slip_speed);
+                    let beyond = c.excess_over_branch(memory.friction_branch, joint.slip_speed);
                     assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
                 }
             }

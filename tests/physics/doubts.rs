@@ -48,7 +48,7 @@ fn energy_that_is_wrong_is_marked() {
     let heavy = [("solver.method", "rk4"), ("gravity.x", "981 m/s^2")];
     let energy = |doubt: &Doubt| matches!(doubt, Doubt::Energy { share, .. } if *share > 5e-3);
     let short = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { steps: 5, .. });
-    let held = |doubt: &Doubt| matches!(doubt, Doubt::Held { share, .. } if *share > 0.1);
+    let held = |doubt: &Doubt| matches!(doubt, Doubt::StabilityLimited { share, .. } if *share > 0.1);
     let work =
         |doubt: &Doubt| matches!(doubt, Doubt::Work { value, residual, .. } if residual.abs() > 0.1 * value.abs());
     let looser = [("solver.method", "dopri5"), ("solver.tolerance", "4e-4")];

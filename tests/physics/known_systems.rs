@@ -58,7 +58,7 @@ impl<F: Fn(f64, f64, f64) -> f64> System for Force<F> {
     fn positions(&self) -> usize {
         1
     }
-    fn moving(&self) -> &[Range<usize>] {
+    fn active_ranges(&self) -> &[Range<usize>] {
         std::slice::from_ref(&(0..2))
     }
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {

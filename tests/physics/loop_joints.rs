@@ -119,7 +119,7 @@ fn a_body_held_by_a_closing_joint_moves_as_if_it_hung_on_it() {
                 let free = pair.freedoms + usize::from(!driven);
                 assert_eq!(summary.degrees_of_freedom, free, "{label}");
                 assert_eq!((summary.closing_joints, summary.dependent_rows), (1, 0), "{label}");
-                assert_eq!(simulation.not_unique(), Default::default(), "{label}");
+                assert_eq!(simulation.indeterminate_forces(), Default::default(), "{label}");
                 let frame = at(&mut simulation, 0.25);
                 for (a, b) in frame.bodies.iter().zip(&end.bodies) {
                     let off = (a.position - b.position).norm();
@@ -249,7 +249,7 @@ fn a_planar_four_bar_closed_by_a_hinge_moves_as_one_closed_by_a_ball() {
         let summary = simulation.mechanism().summary();
         // Two rows close a loop in the plane.
         assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (3, 1));
-        assert_eq!(simulation.not_unique().reactions, [0]);
+        assert_eq!(simulation.indeterminate_forces().reactions, [0]);
         let frame = at(&mut simulation, 0.3);
         let bound = if formulation == "tree" { 1e-9 } else { 1e-6 };
         assert!(open(&frame) < bound, "{formulation}: {:e}", open(&frame));
@@ -360,7 +360,7 @@ fn a_scotch_yoke_moves_as_its_closed_form() {
         let torque = 1.5 * YOKE * YOKE * 81.0 * angle.sin() * angle.cos();
         let off = frame.actuators[0] - torque;
         assert!(off.abs() < 1e-5 * torque.abs().max(1.0), "{formulation}: {off:e}");
-        assert_eq!(simulation.not_unique().actuators, [0; 0]);
+        assert_eq!(simulation.indeterminate_forces().actuators, [0; 0]);
     }
 }
 

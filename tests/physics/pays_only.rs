@@ -100,12 +100,12 @@ fn links_of_a_chain_are_blocks_of_their_own() {
     for links in ["1", "8", "64"] {
         let count: usize = links.parse().unwrap();
         let chain = summary("chain", &[("chain.links", links)]);
-        assert_eq!(chain.lone_bodies, count);
+        assert_eq!(chain.single_body_blocks, count);
         assert_eq!(chain.velocity_coordinates, 6 * count);
     }
-    assert_eq!(summary("pendulum", &[]).lone_bodies, 1);
+    assert_eq!(summary("pendulum", &[]).single_body_blocks, 1);
     // The platform carries its rods.
-    assert_eq!(summary("spcmm", &[]).lone_bodies, 0);
+    assert_eq!(summary("spcmm", &[]).single_body_blocks, 0);
 }
 
 #[test]

@@ -229,7 +229,7 @@ fn a_four_bar_closed_by_an_ideal_ball_joint_moves_as_its_geometry_and_energy_say
         let mut simulation = Simulation::new(&scene.machine).unwrap();
         let summary = simulation.mechanism().summary();
         assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (1, 1));
-        assert_eq!(simulation.not_unique().reactions, [0]);
+        assert_eq!(simulation.indeterminate_forces().reactions, [0]);
         let mut turned = 0.0;
         let mut last = bar.angle;
         for k in 1..=12 {
@@ -363,14 +363,14 @@ fn two_drives_of_a_parallelogram_share_the_load_or_are_refused() {
         let both = Extras { driven: &[0, 2], ..PLAIN };
         let scene = bar.scene(Quat::identity(), both, &[("formulation", form)]);
         let mut simulation = Simulation::new(&scene.machine).unwrap();
-        let loose = simulation.not_unique();
+        let loose = simulation.indeterminate_forces();
         assert_eq!((loose.reactions, loose.actuators), (vec![0], vec![0, 1]));
         run_until(&mut simulation, 0.1);
         let frame = frame_now(&mut simulation);
         // One motor alone would need the same work from it.
         let alone = Extras { driven: &[0], ..PLAIN };
         let mut single = Simulation::new(&bar.scene(Quat::identity(), alone, &[]).machine).unwrap();
-        assert_eq!(single.not_unique().actuators, [0; 0]);
+        assert_eq!(single.indeterminate_forces().actuators, [0; 0]);
         run_until(&mut single, 0.1);
         let work = frame_now(&mut single).actuators[0];
         let sum: f64 = frame.actuators.iter().sum();
@@ -426,7 +426,7 @@ fn two_ball_joints_make_a_hinge() {
         let [low, high] = [0, 1].map(|j| frame.joints[j].normal_force);
         assert!((low + high - weight).norm() < 1e-5, "{form}: {}", low + high);
         assert!((low - high).dot(&axis).abs() < 1e-6, "{form}: {low} {high}");
-        assert_eq!(simulation.not_unique().reactions, [0, 1]);
+        assert_eq!(simulation.indeterminate_forces().reactions, [0, 1]);
     }
 }
 

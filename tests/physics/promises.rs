@@ -100,7 +100,7 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
     watched.reset().unwrap();
     assert_eq!((watched.time(), watched.state_hash()), (0.0, start));
     assert_eq!(watched.ledger(), Some(&Ledger::default()));
-    watched.keep_wear();
+    watched.track_wear();
     (0..steps).for_each(|_| watched_step(&mut watched, way));
     assert!(look(&mut watched) == here, "watched");
     change(&mut watched);

@@ -8,7 +8,7 @@ use jointplay::simulate::{Cell, Frame, Simulation, Wear};
 /// A run over `duration` with its map; the last step is cut.
 fn after(name: &str, changes: &Changes, duration: f64) -> LiveScene {
     let mut simulation = live(name, changes);
-    simulation.keep_wear();
+    simulation.track_wear();
     run_until(&mut simulation, duration);
     simulation.commit_wear();
     simulation
@@ -76,7 +76,7 @@ fn friction_work_and_contacts_are_those_of_ledger_and_counters() {
 fn impulses_are_time_integrals_of_the_normal_force() {
     for method in ["automatic", "radau5"] {
         let mut simulation = simulation("spcmm", &[("solver.method", method)]);
-        simulation.keep_wear();
+        simulation.track_wear();
         let (mut frame, mut expected) = (Frame::default(), [0.0; 3]);
         while simulation.time() < 0.05 {
             simulation.step().unwrap();
@@ -117,7 +117,7 @@ fn a_cell_lies_where_the_ball_touches() {
     for name in ["spcmm", "pendulum", "slider-crank"] {
         let mut simulation = simulation(name, &[]);
         simulation.advance_to(0.5).unwrap();
-        simulation.keep_wear();
+        simulation.track_wear();
         let (empty, mut frame) = (wear(&simulation).clone(), Frame::default());
         let joints = simulation.machine().ball_joints.len();
         let mut expected = vec![vec![0.0; empty.grid().cells()]; joints];

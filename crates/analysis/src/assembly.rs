@@ -118,7 +118,7 @@ pub struct StartReport {
 impl StartReport {
     /// From a simulation at its start.
     pub fn of(simulation: &mut Simulation) -> Self {
-        let loose = simulation.not_unique();
+        let loose = simulation.indeterminate_forces();
         let machine = simulation.machine();
         let driven: Vec<&String> = machine.driven().map(|(joint, _)| &joint.name).collect();
         let reactions = loose.reactions.iter();
@@ -132,7 +132,7 @@ impl StartReport {
     }
 
     /// Message about forces that are not unique, if there are any.
-    pub fn not_unique(&self) -> Option<String> {
+    pub fn indeterminate_forces(&self) -> Option<String> {
         if self.reactions.is_empty() {
             return None;
         }

@@ -428,7 +428,7 @@ impl Axis {
         };
         let ends = at(0).zip(at(self.count() - 1));
         ends.is_some_and(|((waits, first), (_, last))| {
-            waits && !first.machine.differs_in_conditions_alone(&last.machine)
+            waits && !first.machine.differs_only_in_conditions(&last.machine)
         })
     }
 

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::drive::{OBSERVABLES, ObservedError, ObservedRun, observed};
 use super::statistic::channels;
-use jointplay_physics::simulate::{Frame, NoChannel, Reading, Simulation, StartError, matching};
+use jointplay_physics::simulate::{Frame, Reading, Simulation, StartError, UnknownChannel, matching};
 use jointplay_physics::units::{Dimension, QuantityError, all_units, parse_quantity};
 use jointplay_scene::Scene;
 
@@ -28,7 +28,7 @@ pub enum CrossingError {
         /// As written.
         text: String,
         /// What is wrong.
-        error: NoChannel,
+        error: UnknownChannel,
     },
     /// A pattern of several channels.
     #[error("{text}: the section needs one channel, and these match: {}", .names.join(", "))]

@@ -141,8 +141,8 @@ impl Orbit for Simulation {
         self.step_until(end)
     }
 
-    fn step_beside(&mut self, other: &Self) -> Result<(), Stopped> {
-        self.step_beside(other)
+    fn reproduce_step(&mut self, other: &Self) -> Result<(), Stopped> {
+        self.reproduce_step(other)
     }
 
     fn state(&self) -> &[f64] {
@@ -161,12 +161,12 @@ impl Orbit for Simulation {
         self.displace(offset);
     }
 
-    fn remember_like(&mut self, other: &Self, part: f64) {
-        self.remember_like(other, part);
+    fn blend_approach_speeds(&mut self, other: &Self, part: f64) {
+        self.blend_approach_speeds(other, part);
     }
 
-    fn step_like(&mut self, other: &Self) {
-        self.step_like(other);
+    fn adopt_step_control(&mut self, other: &Self) {
+        self.adopt_step_control(other);
     }
 
     /// True only while the same balls touch: otherwise one run is in an impact that the other has not reached or has left.
@@ -197,8 +197,8 @@ impl Orbit for ObservedRun {
         Ok(self.simulation.step_until(end)?)
     }
 
-    fn step_beside(&mut self, other: &Self) -> Result<(), ObservedError> {
-        Ok(self.simulation.step_beside(&other.simulation)?)
+    fn reproduce_step(&mut self, other: &Self) -> Result<(), ObservedError> {
+        Ok(self.simulation.reproduce_step(&other.simulation)?)
     }
 
     fn state(&self) -> &[f64] {
@@ -217,12 +217,12 @@ impl Orbit for ObservedRun {
         self.simulation.displace(offset);
     }
 
-    fn remember_like(&mut self, other: &Self, part: f64) {
-        self.simulation.remember_like(&other.simulation, part);
+    fn blend_approach_speeds(&mut self, other: &Self, part: f64) {
+        self.simulation.blend_approach_speeds(&other.simulation, part);
     }
 
-    fn step_like(&mut self, other: &Self) {
-        self.simulation.step_like(&other.simulation);
+    fn adopt_step_control(&mut self, other: &Self) {
+        self.simulation.adopt_step_control(&other.simulation);
     }
 
     fn comparable(&self, twin: &Self) -> bool {

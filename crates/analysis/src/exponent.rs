@@ -88,7 +88,7 @@ impl Benettin {
     /// # Errors
     /// The twin cannot continue.
     pub fn follow<O: Orbit>(&mut self, orbit: &O, twin: &mut O, at_section: bool) -> Result<(), O::Stop> {
-        twin.step_beside(orbit)?;
+        twin.reproduce_step(orbit)?;
         self.open += usize::from(at_section);
         let off = distance(orbit, twin) / self.separation;
         if !orbit.comparable(twin) {
@@ -99,7 +99,7 @@ impl Benettin {
             }
             return Ok(());
         }
-        twin.step_like(orbit);
+        twin.adopt_step_control(orbit);
         if at_section || !(off < RENORMALISE_AT && off * RENORMALISE_AT > 1.0) {
             self.renormalise(orbit, twin, off);
         }
@@ -123,7 +123,7 @@ impl Benettin {
             let pairs = orbit.state().iter().zip(twin.state());
             self.difference.extend(pairs.map(|(a, b)| (b - a) / off));
             // The onset history of a settled contact has no effect and does not decay, so it must not be amplified.
-            twin.remember_like(orbit, (1.0 - 1.0 / off).max(0.0));
+            twin.blend_approach_speeds(orbit, (1.0 - 1.0 / off).max(0.0));
         }
         self.place(orbit, twin);
     }

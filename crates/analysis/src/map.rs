@@ -1,5 +1,5 @@
-//! The tip's error over the workspace: at every point of a grid over drive positions and parameters, the error at rest and the set
-//! of errors that are reachable with all balls anywhere in their play.
+//! The tip's error over the workspace: at every point of a grid over drive positions and parameters, the error at rest and the
+//! set of errors that are reachable with all balls anywhere in their play.
 
 use super::axis::{Axis, RangeError};
 use super::design::{Design, Start};

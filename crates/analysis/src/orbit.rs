@@ -21,7 +21,7 @@ pub trait Orbit: Sized {
     ///
     /// # Errors
     /// As [`Self::step_until`].
-    fn step_beside(&mut self, other: &Self) -> Result<(), Self::Stop> {
+    fn reproduce_step(&mut self, other: &Self) -> Result<(), Self::Stop> {
         while self.time() < other.time() {
             self.step_until(other.time())?;
         }
@@ -42,7 +42,7 @@ pub trait Orbit: Sized {
 
     /// Moves history variables, which are not part of the state, towards those of `other` by the fraction `part` of their
     /// difference.
-    fn remember_like(&mut self, _other: &Self, _part: f64) {}
+    fn blend_approach_speeds(&mut self, _other: &Self, _part: f64) {}
 
     /// Whether the two states differ in continuous variables alone: while only one of them is in contact, a small difference is
     /// about to jump.
@@ -52,7 +52,7 @@ pub trait Orbit: Sized {
 
     /// Adopts the step control of `other`, a comparable run at the same time, so that the two runs differ by their motion and not
     /// by their errors.
-    fn step_like(&mut self, _other: &Self) {}
+    fn adopt_step_control(&mut self, _other: &Self) {}
 
     /// Number of values that [`Self::observe`] writes.
     fn observables(&self) -> usize;

@@ -77,7 +77,7 @@ pub struct TooSlow {
 /// Returns the measurement of a built-in `scene` that requests the preset `real-time` but ran slower than real time.
 pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
     let record = record();
-    let own = Preset::RealTime.solver(scene.machine.loose_joints());
+    let own = Preset::RealTime.solver(scene.machine.joints_with_clearance());
     let settings = |solver: &Solver| (solver.preset, solver.method, solver.tolerance, solver.steps_per_impact);
     let asks = settings(&scene.machine.solver) == settings(&own) && scene.source.file.is_none();
     let pace = record.pace.get(&scene.name).copied();

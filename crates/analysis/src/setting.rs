@@ -41,7 +41,7 @@ impl Setting {
 
     /// The setting of a preset on `machine`.
     pub fn of_preset(preset: Preset, machine: &Machine) -> Self {
-        Self::of(&preset.solver(machine.loose_joints()))
+        Self::of(&preset.solver(machine.joints_with_clearance()))
     }
 
     /// Runge-Kutta 4 at 10 microseconds, the baseline of speed ratios.

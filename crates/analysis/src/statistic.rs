@@ -3,7 +3,9 @@
 use std::fmt::{self, Display, Formatter};
 
 use jointplay_physics::machine::Machine;
-use jointplay_physics::simulate::{Frame, Listed, NoChannel, Reading, Simulation, StartError, channels_of, matching};
+use jointplay_physics::simulate::{
+    ChannelInfo, Frame, Reading, Simulation, StartError, UnknownChannel, channels_of, matching,
+};
 use jointplay_physics::suggest::nearest;
 use jointplay_physics::words::{Words, words};
 use jointplay_scene::Scene;
@@ -62,7 +64,7 @@ pub enum StatisticError {
         /// As written.
         text: String,
         /// What is wrong.
-        error: NoChannel,
+        error: UnknownChannel,
     },
     /// The scene whose channels are needed does not start.
     #[error("the scene does not start, so its channels are unknown: {0}")]
@@ -145,7 +147,7 @@ impl ChannelStatistic {
 }
 
 /// All channels of a simulation at its start.
-pub(super) fn channels(machine: &Machine, simulation: &mut Simulation) -> Vec<Listed> {
+pub(super) fn channels(machine: &Machine, simulation: &mut Simulation) -> Vec<ChannelInfo> {
     let mut first = Frame { reactions: Some(Vec::new()), ..Frame::default() };
     simulation.sample(simulation.time(), &mut first);
     channels_of(machine, &first)
@@ -232,7 +234,7 @@ impl Accumulator {
         let machine = simulation.machine().clone();
         let list = if wanted.is_empty() { Vec::new() } else { channels(&machine, simulation) };
         let tally = |of: &ChannelStatistic| {
-            Tally::new(list.iter().find(|channel| channel.name == of.channel).map(Listed::reading))
+            Tally::new(list.iter().find(|channel| channel.name == of.channel).map(ChannelInfo::reading))
         };
         let tallies: Vec<Tally> = wanted.iter().map(tally).collect();
         let mut frame = Frame::default();

@@ -57,7 +57,7 @@ impl WorkBudget {
     /// Budget for `scene`: runs of many loose joints are capped earlier, at the same settings.
     #[must_use]
     pub fn of(self, scene: &Scene) -> Self {
-        if scene.machine.loose_joints() <= Self::MANY {
+        if scene.machine.joints_with_clearance() <= Self::MANY {
             return self;
         }
         Self {

@@ -6,7 +6,9 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use jointplay_physics::simulate::{Frame, Impact, NoChannel, Reading, Simulation, StartError, Stopped, chosen_columns};
+use jointplay_physics::simulate::{
+    Frame, Impact, Reading, Simulation, StartError, Stopped, UnknownChannel, chosen_columns,
+};
 use jointplay_scene::{Scene, SceneError, evaluate};
 
 /// A run of a scene with known results.
@@ -169,7 +171,7 @@ pub enum ValidationError {
     Stopped(#[from] Stopped),
     /// The scene has no such channel.
     #[error(transparent)]
-    Channel(#[from] NoChannel),
+    Channel(#[from] UnknownChannel),
 }
 
 /// Reference value of a check, and this program's result.
@@ -237,7 +239,7 @@ impl Run {
         reading.read(&self.frame).unwrap_or(f64::NAN)
     }
 
-    fn reading(&mut self, channel: &str) -> Result<Reading, NoChannel> {
+    fn reading(&mut self, channel: &str) -> Result<Reading, UnknownChannel> {
         self.simulation.sample(self.simulation.time(), &mut self.frame);
         let (_, readings) = chosen_columns(self.simulation.machine(), &self.frame, &[channel.to_owned()])?;
         // The first reading is the time.
@@ -255,7 +257,7 @@ enum Watch {
 }
 
 impl Watch {
-    fn new(measure: &Measure, duration: f64, run: &mut Run) -> Result<Self, NoChannel> {
+    fn new(measure: &Measure, duration: f64, run: &mut Run) -> Result<Self, UnknownChannel> {
         let at = |reading, time, run: &mut Run| {
             let value = if time == 0.0 { run.read(reading, 0.0) } else { f64::NAN };
             Self::At { reading, time, value }

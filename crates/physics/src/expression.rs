@@ -13,9 +13,9 @@ use crate::suggest::{brief, did_you_mean, nearest_name};
 use std::fmt;
 
 /// Longest expression, bytes.
-pub const LONGEST_EXPRESSION: usize = 4000;
+pub const MAX_EXPRESSION_LENGTH: usize = 4000;
 /// Maximum nesting of parentheses, calls, signs and powers.
-const DEEPEST: usize = 60;
+const MAX_DEPTH: usize = 60;
 /// Maximum number of intermediate results on the stack.
 const STACK: usize = 32;
 
@@ -125,7 +125,7 @@ impl Number for f64 {
     }
 }
 
-/// Several numbers at once, each as if alone.
+/// Several numbers at once; each has the bits that it has alone.
 impl<N: Number, const COUNT: usize> Number for [N; COUNT] {
     fn constant(value: f64) -> Self {
         [N::constant(value); COUNT]
@@ -211,13 +211,13 @@ enum Step {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
     steps: Vec<Step>,
-    /// Most intermediate results at once.
-    held: usize,
+    /// Largest number of intermediate results on the stack.
+    stack_depth: usize,
     kink: Option<&'static str>,
 }
 
 impl Program {
-    /// Indices of the variables that it reads, some perhaps twice.
+    /// Indices of the variables that the program uses; some may occur twice.
     pub fn variables(&self) -> impl Iterator<Item = usize> + '_ {
         self.steps.iter().filter_map(|step| match step {
             Step::Variable(index) => Some(*index),
@@ -259,15 +259,15 @@ impl Program {
         unit: impl Fn(&str) -> Option<(usize, usize)>,
         angles: bool,
     ) -> Result<Self, ExpressionError> {
-        if text.len() > LONGEST_EXPRESSION {
+        if text.len() > MAX_EXPRESSION_LENGTH {
             return Err(ExpressionError { at: 0, fault: Fault::TooLong });
         }
         let mut parser = Parser {
             text,
             at: 0,
             steps: Vec::new(),
-            held: 0,
-            most_held: 0,
+            stack_depth: 0,
+            max_stack_depth: 0,
             depth: 0,
             kink: None,
             variable: &variable,
@@ -277,7 +277,7 @@ impl Program {
         };
         parser.sum()?;
         match parser.peek() {
-            None => Ok(Self { steps: parser.steps, held: parser.most_held, kink: parser.kink }),
+            None => Ok(Self { steps: parser.steps, stack_depth: parser.max_stack_depth, kink: parser.kink }),
             Some(_) => Err(parser.unexpected("an operator")),
         }
     }
@@ -288,7 +288,7 @@ impl Program {
     /// If `variables` lacks one that the text uses.
     pub fn eval<N: Number>(&self, variables: &[N]) -> N {
         // To clear the whole stack would take longer than a short program.
-        match self.held {
+        match self.stack_depth {
             0..=4 => self.eval_on::<N, 4>(variables),
             5..=8 => self.eval_on::<N, 8>(variables),
             _ => self.eval_on::<N, STACK>(variables),
@@ -319,15 +319,15 @@ impl Program {
         stack[0]
     }
 
-    /// The same program with `values` bound to all variables but the first `kept`, and constants folded.
+    /// The same program with `values` bound to all variables but the first `free`, and constants folded.
     ///
     /// # Panics
     /// As [`Self::eval`].
-    pub fn bound(&self, kept: usize, values: &[f64]) -> Self {
+    pub fn with_bound_variables(&self, free: usize, values: &[f64]) -> Self {
         let mut steps: Vec<Step> = Vec::new();
         for &step in &self.steps {
             let step = match step {
-                Step::Variable(index) if index >= kept => Step::Constant(values[index - kept]),
+                Step::Variable(index) if index >= free => Step::Constant(values[index - free]),
                 step => step,
             };
             match (step, &mut steps[..]) {
@@ -339,7 +339,7 @@ impl Program {
                 _ => steps.push(step),
             }
         }
-        Self { steps, held: self.held, kink: self.kink }
+        Self { steps, stack_depth: self.stack_depth, kink: self.kink }
     }
 
     /// A function in the program whose derivatives jump, if any.
@@ -373,7 +373,7 @@ pub enum Fault {
     /// Unexpected text.
     Expected {
         /// Expected text.
-        wanted: &'static str,
+        expected: &'static str,
         /// Character found; `None` at the end.
         found: Option<char>,
     },
@@ -382,7 +382,7 @@ pub enum Fault {
         /// The name.
         name: String,
         /// Nearest known name.
-        near: Option<String>,
+        nearest: Option<String>,
         /// Whether it is called like a function.
         called: bool,
     },
@@ -391,7 +391,7 @@ pub enum Fault {
         /// The function.
         function: &'static str,
         /// Required number.
-        wanted: usize,
+        expected: usize,
     },
     /// A function without its arguments.
     NotCalled(&'static str),
@@ -399,7 +399,7 @@ pub enum Fault {
     NoNumber,
     /// Nested too deeply.
     TooDeep,
-    /// Longer than [`LONGEST_EXPRESSION`].
+    /// Longer than [`MAX_EXPRESSION_LENGTH`].
     TooLong,
 }
 
@@ -408,20 +408,20 @@ impl std::error::Error for ExpressionError {}
 impl fmt::Display for ExpressionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.fault {
-            Fault::Expected { wanted, found: None } => write!(f, "ends where {wanted} is expected"),
-            Fault::Expected { wanted, found: Some(found) } => write!(f, "`{found}` where {wanted} is expected"),
-            Fault::Unknown { name, near, called } => {
+            Fault::Expected { expected, found: None } => write!(f, "ends where {expected} is expected"),
+            Fault::Expected { expected, found: Some(found) } => write!(f, "`{found}` where {expected} is expected"),
+            Fault::Unknown { name, nearest, called } => {
                 let what = if *called { "function" } else { "variable" };
-                let near = did_you_mean(near.as_deref());
-                write!(f, "no {what} `{}`{near}", brief(name))?;
+                let nearest = did_you_mean(nearest.as_deref());
+                write!(f, "no {what} `{}`{nearest}", brief(name))?;
                 if *called {
                     write!(f, "; functions: {}", FUNCTIONS.map(|row| row.0).join(", "))?;
                 }
                 Ok(())
             }
-            Fault::Arguments { function, wanted } => match wanted {
+            Fault::Arguments { function, expected } => match expected {
                 1 => write!(f, "`{function}` takes one argument"),
-                _ => write!(f, "`{function}` takes {wanted} arguments"),
+                _ => write!(f, "`{function}` takes {expected} arguments"),
             },
             Fault::NotCalled(function) => {
                 write!(f, "`{function}` is a function: its argument follows in parentheses")
@@ -429,7 +429,7 @@ impl fmt::Display for ExpressionError {
             Fault::NoNumber => f.write_str("no finite number"),
             Fault::TooDeep => f.write_str("nested too deeply"),
             Fault::TooLong => {
-                write!(f, "too long; allowed at most {LONGEST_EXPRESSION} bytes")
+                write!(f, "too long; allowed at most {MAX_EXPRESSION_LENGTH} bytes")
             }
         }
     }
@@ -440,8 +440,8 @@ struct Parser<'t> {
     at: usize,
     steps: Vec<Step>,
     /// Depth of the stack after `steps`.
-    held: usize,
-    most_held: usize,
+    stack_depth: usize,
+    max_stack_depth: usize,
     depth: usize,
     kink: Option<&'static str>,
     variable: &'t dyn Fn(&str) -> Option<usize>,
@@ -451,7 +451,7 @@ struct Parser<'t> {
     angles: bool,
 }
 
-type Parsed = Result<(), ExpressionError>;
+type ParseResult = Result<(), ExpressionError>;
 
 impl<'t> Parser<'t> {
     /// Next character that is not a space.
@@ -461,12 +461,12 @@ impl<'t> Parser<'t> {
         self.text[self.at..].chars().next()
     }
 
-    /// Consumes `wanted` if it is next.
-    fn take(&mut self, wanted: &str) -> bool {
+    /// Consumes `expected` if it is next.
+    fn consume(&mut self, expected: &str) -> bool {
         self.peek();
-        let found = self.text[self.at..].starts_with(wanted);
+        let found = self.text[self.at..].starts_with(expected);
         if found {
-            self.at += wanted.len();
+            self.at += expected.len();
         }
         found
     }
@@ -475,41 +475,41 @@ impl<'t> Parser<'t> {
         ExpressionError { at, fault }
     }
 
-    fn unexpected(&mut self, wanted: &'static str) -> ExpressionError {
+    fn unexpected(&mut self, expected: &'static str) -> ExpressionError {
         let found = self.peek();
-        self.error(self.at, Fault::Expected { wanted, found })
+        self.error(self.at, Fault::Expected { expected, found })
     }
 
     /// Adds a step, or folds it if its operands are constant.
-    fn push(&mut self, step: Step) -> Parsed {
-        let gives_angle =
+    fn push(&mut self, step: Step) -> ParseResult {
+        let returns_angle =
             matches!(step, Step::Unary(Unary::Asin | Unary::Acos | Unary::Atan) | Step::Binary(Binary::Atan2));
-        let folds = !(self.angles && gives_angle);
+        let folds = !(self.angles && returns_angle);
         match (step, &mut self.steps[..]) {
             (Step::Unary(operation), [.., Step::Constant(x)]) if folds => *x = x.unary(operation),
             (Step::Binary(operation), [.., Step::Constant(x), Step::Constant(y)]) if folds => {
                 *x = x.binary(operation, *y);
                 self.steps.pop();
-                self.held -= 1;
+                self.stack_depth -= 1;
             }
             _ => {
                 match step {
-                    Step::Constant(_) | Step::Variable(_) => self.held += 1,
+                    Step::Constant(_) | Step::Variable(_) => self.stack_depth += 1,
                     Step::Unary(_) => {}
-                    Step::Binary(_) => self.held -= 1,
+                    Step::Binary(_) => self.stack_depth -= 1,
                 }
                 self.steps.push(step);
             }
         }
-        self.most_held = self.most_held.max(self.held);
-        if self.held > STACK {
+        self.max_stack_depth = self.max_stack_depth.max(self.stack_depth);
+        if self.stack_depth > STACK {
             return Err(self.error(self.at, Fault::TooDeep));
         }
         Ok(())
     }
 
     /// Terms with `+` and `-` between them.
-    fn sum(&mut self) -> Parsed {
+    fn sum(&mut self) -> ParseResult {
         self.product()?;
         loop {
             let operation = match self.peek() {
@@ -524,7 +524,7 @@ impl<'t> Parser<'t> {
     }
 
     /// Factors with `*` and `/` between them.
-    fn product(&mut self) -> Parsed {
+    fn product(&mut self) -> ParseResult {
         self.signed()?;
         loop {
             let operation = match self.peek() {
@@ -539,20 +539,20 @@ impl<'t> Parser<'t> {
     }
 
     /// A power with its sign, which binds weaker: -x^2 = -(x^2). Every nesting passes through here.
-    fn signed(&mut self) -> Parsed {
+    fn signed(&mut self) -> ParseResult {
         self.depth += 1;
-        if self.depth > DEEPEST {
+        if self.depth > MAX_DEPTH {
             return Err(self.error(self.at, Fault::TooDeep));
         }
-        if self.take("-") {
+        if self.consume("-") {
             self.signed()?;
             self.push(Step::Unary(Unary::Negate))?;
-        } else if self.take("+") {
+        } else if self.consume("+") {
             self.signed()?;
         } else {
             self.atom()?;
             // Right-associative: x^y^z = x^(y^z).
-            if self.take("^") || self.take("**") {
+            if self.consume("^") || self.consume("**") {
                 self.signed()?;
                 self.push(Step::Binary(Binary::Power))?;
             }
@@ -561,7 +561,7 @@ impl<'t> Parser<'t> {
         Ok(())
     }
 
-    fn atom(&mut self) -> Parsed {
+    fn atom(&mut self) -> ParseResult {
         match self.peek() {
             Some('(') => {
                 self.at += 1;
@@ -574,14 +574,14 @@ impl<'t> Parser<'t> {
         }
     }
 
-    fn close(&mut self) -> Parsed {
-        match self.take(")") {
+    fn close(&mut self) -> ParseResult {
+        match self.consume(")") {
             true => Ok(()),
             false => Err(self.unexpected("an operator or `)`")),
         }
     }
 
-    fn number(&mut self) -> Parsed {
+    fn number(&mut self) -> ParseResult {
         let rest = &self.text[self.at..];
         let digits = |from: usize| {
             let tail = rest[from..].bytes();
@@ -594,7 +594,7 @@ impl<'t> Parser<'t> {
         if rest[end..].starts_with(['e', 'E']) {
             let sign = usize::from(rest[end + 1..].starts_with(['+', '-']));
             let exponent = digits(end + 1 + sign);
-            // Without digits it is no exponent.
+            // An `e` without digits does not begin an exponent.
             if exponent > end + 1 + sign {
                 end = exponent;
             }
@@ -610,7 +610,7 @@ impl<'t> Parser<'t> {
     }
 
     /// The unit after a number, if any.
-    fn unit(&mut self) -> Parsed {
+    fn unit(&mut self) -> ParseResult {
         self.peek();
         let Some((length, size)) = (self.unit)(&self.text[self.at..]) else {
             return Ok(());
@@ -642,13 +642,13 @@ impl<'t> Parser<'t> {
     }
 
     /// A variable, a constant or a call. A name may contain dots.
-    fn name(&mut self) -> Parsed {
+    fn name(&mut self) -> ParseResult {
         let (start, rest) = (self.at, &self.text[self.at..]);
         let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.')).unwrap_or(rest.len());
         let name = &rest[..end];
         self.at += end;
         let row = FUNCTIONS.iter().find(|row| row.0 == name);
-        if self.take("(") {
+        if self.consume("(") {
             let Some(&(function, call, smooth)) = row else {
                 return Err(self.unknown(start, name, true));
             };
@@ -669,28 +669,28 @@ impl<'t> Parser<'t> {
 
     fn unknown(&self, at: usize, name: &str, called: bool) -> ExpressionError {
         let functions = FUNCTIONS.iter().map(|row| row.0);
-        let near = if called {
+        let nearest = if called {
             nearest_name(name, functions)
         } else {
             let constants = CONSTANTS.iter().map(|row| row.0);
             nearest_name(name, self.names.iter().copied().chain(constants))
         };
-        let (name, near) = (name.to_owned(), near.map(str::to_owned));
-        self.error(at, Fault::Unknown { name, near, called })
+        let (name, nearest) = (name.to_owned(), nearest.map(str::to_owned));
+        self.error(at, Fault::Unknown { name, nearest, called })
     }
 
-    fn arguments(&mut self, start: usize, function: &'static str, call: Call) -> Parsed {
-        let (wanted, step) = match call {
+    fn arguments(&mut self, start: usize, function: &'static str, call: Call) -> ParseResult {
+        let (expected, step) = match call {
             Call::One(operation) => (1, Step::Unary(operation)),
             Call::Two(operation) => (2, Step::Binary(operation)),
         };
-        let wrong = self.error(start, Fault::Arguments { function, wanted });
+        let wrong = self.error(start, Fault::Arguments { function, expected });
         if self.peek() == Some(')') {
             return Err(wrong);
         }
         self.sum()?;
-        for _ in 1..wanted {
-            if !self.take(",") {
+        for _ in 1..expected {
+            if !self.consume(",") {
                 return Err(match self.peek() {
                     Some(')') => wrong,
                     _ => self.unexpected("an operator or `,`"),
@@ -748,13 +748,13 @@ mod tests {
     }
 
     #[test]
-    fn constants_are_evaluated_beforehand() {
+    fn constant_subexpressions_are_folded() {
         assert_eq!(parse("2*pi*3 * t").unwrap().steps.len(), 3);
         assert!(parse("t").unwrap().uses(0) && !parse("1 + arm.length").unwrap().uses(0));
     }
 
     #[test]
-    fn every_function_runs_and_kinks_are_known() {
+    fn every_function_has_a_value_and_kinks_are_reported() {
         for (name, call, smooth) in FUNCTIONS {
             let text = match call {
                 Call::One(_) => format!("{name}(t)"),
@@ -767,7 +767,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_its_byte() {
+    fn errors_state_their_cause_and_byte() {
         for (text, at, message) in [
             ("", 0, "ends where a number, a name or `(` is expected"),
             ("1 +", 3, "ends where a number, a name or `(` is expected"),

@@ -10,11 +10,11 @@ pub fn brief(text: &str) -> String {
 }
 
 /// Longest text, bytes, that is compared with the names: the comparison takes quadratic time.
-const LONGEST_SLIP: usize = 100;
+const MAX_LENGTH: usize = 100;
 
 /// The name nearest to `wrong`; `None` if none is near.
 pub fn nearest_name<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    if wrong.len() > LONGEST_SLIP {
+    if wrong.len() > MAX_LENGTH {
         return None;
     }
     let wrong_lower = wrong.to_lowercase();

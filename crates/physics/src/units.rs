@@ -62,7 +62,7 @@ pub enum QuantityError {
     #[error("has a decimal comma; write a point, as in 0.5")]
     Comma,
     /// A unit of another dimension, or an unknown one.
-    #[error("wrong unit `{unit}`{}{}", foreign(unit), example(*.dimension))]
+    #[error("wrong unit `{unit}`{}{}", dimension_of_unit(unit), example(*.dimension))]
     WrongUnit {
         /// The unit as written.
         unit: String,
@@ -237,7 +237,7 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
             .find(|(name, _)| same_unit(name, unit))
             .map(|(_, scale)| *scale)
             .ok_or_else(|| QuantityError::WrongUnit { unit: unit.to_owned(), dimension })?;
-        apply(number, bare, scale)
+        to_si(number, bare, scale)
     };
     if !value.is_finite() {
         return Err(QuantityError::NotFinite(dimension));
@@ -273,7 +273,7 @@ pub fn powers(dimension: Dimension) -> [i8; 4] {
 /// Every unit with its dimension and its size in SI units.
 pub fn all_units() -> impl Iterator<Item = (&'static str, Dimension, f64)> {
     UNITS.iter().flat_map(|(dimension, _, units)| {
-        let size = |&(name, scale): &Unit| (name, *dimension, apply("1", 1.0, scale));
+        let size = |&(name, scale): &Unit| (name, *dimension, to_si("1", 1.0, scale));
         units.iter().map(size)
     })
 }
@@ -284,7 +284,7 @@ pub fn unit_at_start(text: &str) -> Option<(usize, usize)> {
     // Names alone: computing the sizes would dominate the time to read a scene.
     let names = UNITS.iter().flat_map(|(_, _, units)| units.iter().map(|(name, _)| *name));
     let begins =
-        |(place, name): (usize, &str)| (text.starts_with(name) && ends(name.len())).then_some((name.len(), place));
+        |(index, name): (usize, &str)| (text.starts_with(name) && ends(name.len())).then_some((name.len(), index));
     names.enumerate().filter_map(begins).max_by_key(|(length, _)| *length)
 }
 
@@ -295,11 +295,11 @@ pub fn split_unit(text: &str) -> &str {
 
 /// Whether `written` is a spelling of `unit`.
 pub fn same_unit(unit: &str, written: &str) -> bool {
-    letters(unit).eq(letters(written))
+    normalised(unit).eq(normalised(written))
 }
 
 /// The unit of `dimension` in which the quantity `text` is written.
-pub fn unit_within(text: &str, dimension: Dimension) -> Option<&'static str> {
+pub fn unit_of_quantity(text: &str, dimension: Dimension) -> Option<&'static str> {
     let same = |(name, _): &&Unit| same_unit(name, split_unit(text));
     units(dimension).iter().find(same).map(|(name, _)| *name)
 }
@@ -307,7 +307,7 @@ pub fn unit_within(text: &str, dimension: Dimension) -> Option<&'static str> {
 /// An SI value in `unit`; unchanged if `unit` is unknown or "".
 pub fn to_display(si: f64, unit: &str) -> f64 {
     match scale_of(unit) {
-        Some(Decimal(exponent)) => shift(&format!("{si:e}"), -exponent).unwrap_or(f64::NAN),
+        Some(Decimal(exponent)) => scale_by_power_of_ten(&format!("{si:e}"), -exponent).unwrap_or(f64::NAN),
         Some(Ratio(numerator, denominator)) => si * denominator / numerator,
         None => si,
     }
@@ -315,7 +315,7 @@ pub fn to_display(si: f64, unit: &str) -> f64 {
 
 /// A value in `unit` as SI; unchanged if `unit` is unknown or "".
 pub fn from_display(value: f64, unit: &str) -> f64 {
-    scale_of(unit).map_or(value, |scale| apply(&format!("{value:e}"), value, scale))
+    scale_of(unit).map_or(value, |scale| to_si(&format!("{value:e}"), value, scale))
 }
 
 /// An SI value with its unit, at most `digits` significant digits, no trailing zeros: `0.3 mm`.
@@ -357,15 +357,15 @@ fn scale_of(unit: &str) -> Option<Scale> {
     UNITS.iter().flat_map(|(_, _, units)| units.iter()).find(|(name, _)| *name == unit).map(|(_, scale)| *scale)
 }
 
-fn apply(number: &str, bare: f64, scale: Scale) -> f64 {
+fn to_si(number: &str, bare: f64, scale: Scale) -> f64 {
     match scale {
-        Decimal(exponent) => shift(number, exponent).unwrap_or(f64::NAN),
+        Decimal(exponent) => scale_by_power_of_ten(number, exponent).unwrap_or(f64::NAN),
         Ratio(numerator, denominator) => bare * numerator / denominator,
     }
 }
 
 /// The decimal number `text` times 10^`by`, rounded once.
-fn shift(text: &str, by: i32) -> Option<f64> {
+fn scale_by_power_of_ten(text: &str, by: i32) -> Option<f64> {
     let (mantissa, exponent) = match text.find(['e', 'E']) {
         Some(at) => (&text[..at], text[at + 1..].parse::<i64>().ok()?),
         None => (text, 0),
@@ -405,7 +405,7 @@ fn split_number(text: &str) -> (&str, &str) {
 }
 
 /// The letters by which units are compared: "kg·m²", "kg m^2" and "kg m2" are one unit, and so are the two signs for micro.
-fn letters(unit: &str) -> impl Iterator<Item = char> {
+fn normalised(unit: &str) -> impl Iterator<Item = char> {
     let plain = unit.chars().filter(|c| !c.is_whitespace() && !matches!(c, '^' | '*' | '·' | '⋅'));
     plain.flat_map(|c| {
         let (letter, rest) = match c {
@@ -428,7 +428,7 @@ fn example(dimension: Dimension) -> String {
 }
 
 /// Names the quantity that a unit measures, if any.
-fn foreign(unit: &str) -> String {
+fn dimension_of_unit(unit: &str) -> String {
     UNITS
         .iter()
         .find(|(_, _, units)| units.iter().any(|(name, _)| same_unit(name, unit)))
@@ -440,7 +440,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_quantity_in_three_spellings_has_the_same_bits() {
+    fn all_spellings_of_a_quantity_have_the_same_bits() {
         for text in ["0.3 mm", "0.3mm", "3e-4 m", "300 µm", "300μm", "300 um", "  0.3  mm "] {
             assert_eq!(parse_quantity(text, Dimension::Length).map(f64::to_bits), Ok(3e-4_f64.to_bits()), "{text}");
         }
@@ -478,7 +478,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_quantity_is_refused_with_the_reason() {
+    fn invalid_quantities_are_refused_with_the_reason() {
         let cases = [
             ("0.3", Dimension::Length, "needs a unit"),
             ("0.3 s", Dimension::Length, "wrong unit `s` (a unit of time)"),
@@ -502,7 +502,7 @@ mod tests {
     }
 
     #[test]
-    fn display_goes_there_and_back() {
+    fn displayed_values_convert_back_to_the_same_bits() {
         for (si, unit, shown) in [
             (3e-4, "mm", "0.3 mm"),
             (206e9, "GPa", "206 GPa"),
@@ -517,7 +517,7 @@ mod tests {
     }
 
     #[test]
-    fn exact_text_keeps_every_bit() {
+    fn exact_text_parses_to_the_same_bits() {
         let mut x = 1.234_567_890_123_456_7e-4_f64;
         for _ in 0..200 {
             let text = exact_quantity(x, "mm", Dimension::Length);

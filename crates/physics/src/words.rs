@@ -12,7 +12,7 @@ pub trait Words: Copy + 'static {
     fn of_word(word: &str) -> Option<Self>;
 }
 
-/// Implements `ALL`, `word` and [`Words`] for an enum, and prints and serialises each variant as its word, from which it is read. A variant without a
+/// Implements `ALL`, `word` and [`Words`] for an enum, and `Display`, `Serialize` and `Deserialize` by word. A variant without a
 /// word does not compile.
 #[macro_export]
 macro_rules! named_by_words {

@@ -3,7 +3,7 @@
 use super::error::{line_text, place_of};
 use super::*;
 use jointplay_physics::machine::ContactConflict;
-use jointplay_physics::mechanism::{CostOf, MechanismError};
+use jointplay_physics::mechanism::{CostlyTask, MechanismError};
 use jointplay_physics::simulate::StartError;
 
 impl Scene {
@@ -29,7 +29,7 @@ impl Scene {
             | MechanismError::InconsistentDrives { rate: gap } => one(&gap.joint, &["clearance"]),
             MechanismError::OutsideSocket { joint, .. } => one(joint, &["clearance", "ball_radius"]),
             MechanismError::TooLarge { .. } | MechanismError::TooCostly { .. } => {
-                let of_form = matches!(error.0, MechanismError::TooCostly { of: CostOf::Formulation(_), .. });
+                let of_form = matches!(error.0, MechanismError::TooCostly { of: CostlyTask::Formulation(_), .. });
                 let title = if of_form { "formulation" } else { "solver.method" };
                 let keys = ["solver.method", "formulation"].into_iter().chain(counts.map(|own| own.key));
                 (title.to_owned(), keys.map(str::to_owned).collect())

@@ -428,7 +428,7 @@ fn read_spring(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
         elastic: place.elastic([("length", D::Length), ("tension", D::Force)])?,
         side: place.word("side")?,
     };
-    place.must_act(spring.damping != 0.0 || spring.elastic.acts(), "stiffness, damping, preload")?;
+    place.must_act(spring.damping != 0.0 || spring.elastic.has_effect(), "stiffness, damping, preload")?;
     Ok(ElementKind::Spring(spring))
 }
 
@@ -471,7 +471,7 @@ fn read_joint_spring(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
         damping: place.number("damping")?,
         elastic: place.elastic(axes)?,
     };
-    place.must_act(spring.damping != 0.0 || spring.elastic.acts(), "stiffness, damping, preload")?;
+    place.must_act(spring.damping != 0.0 || spring.elastic.has_effect(), "stiffness, damping, preload")?;
     Ok(ElementKind::JointSpring(spring))
 }
 

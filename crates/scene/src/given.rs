@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use jointplay_physics::units::{Dimension, si_unit, unit_within};
+use jointplay_physics::units::{Dimension, si_unit, unit_of_quantity};
 
 /// A number parsed from the scene file.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +34,6 @@ pub(super) enum Place {
 impl FileNumber {
     /// A number in `range`, written as `text` at `place`.
     pub(super) fn new(value: f64, dimension: Dimension, range: (f64, f64), place: Place, text: &str) -> Self {
-        Self { value, dimension, range, place, unit: unit_within(text, dimension).unwrap_or(si_unit(dimension)) }
+        Self { value, dimension, range, place, unit: unit_of_quantity(text, dimension).unwrap_or(si_unit(dimension)) }
     }
 }

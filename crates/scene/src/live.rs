@@ -139,7 +139,7 @@ impl LiveScene {
     /// A state that cannot belong to this scene, or that has other conditions than `running`; `self` is then unchanged.
     pub fn resume_changed(&mut self, state: &State, running: Scene, pending: Scene) -> Result<(), StateMismatch> {
         let machine = self.simulation.machine();
-        if !machine.differs_in_conditions_alone(&running.machine) || *state.conditions() != running.machine.conditions()
+        if !machine.differs_only_in_conditions(&running.machine) || *state.conditions() != running.machine.conditions()
         {
             return Err(StateMismatch);
         }
@@ -164,7 +164,7 @@ impl LiveScene {
         if Arc::ptr_eq(self.simulation.model(), &snapshot.model) {
             self.simulation.restore(&snapshot.state);
         } else {
-            self.simulation = Simulation::of(snapshot.model.clone(), snapshot.state.clone());
+            self.simulation = Simulation::from_state(snapshot.model.clone(), snapshot.state.clone());
         }
         self.pending = snapshot.pending.clone();
         self.running = snapshot.running.clone();

@@ -6,7 +6,7 @@ use super::instance::Instance;
 use super::mesh::{Fault, Format};
 use super::placement::read_rotation;
 use super::*;
-use jointplay_physics::machine::{Solid, fill};
+use jointplay_physics::machine::{Solid, triangulate};
 use jointplay_physics::units::format_quantity_digits;
 use jointplay_physics::words::words;
 
@@ -170,7 +170,7 @@ pub(super) fn read_shape(node: &Node<'_>, fixed: bool) -> Result<Shape, SceneErr
         Form::Plate => {
             let node = section.require("corners")?;
             let corners = node.entries()?.iter().map(Node::vector).collect::<Result<Vec<_>, SceneError>>()?;
-            let triangles = fill(&corners).map_err(|fault| node.error(fault.to_string()))?;
+            let triangles = triangulate(&corners).map_err(|fault| node.error(fault.to_string()))?;
             Geometry::Plate { corners, triangles, thickness: size("thickness")? }
         }
         Form::Capsule | Form::Cylinder | Form::Cone => {

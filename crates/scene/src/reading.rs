@@ -159,7 +159,7 @@ impl<'d> Reading<'d> {
             && !has_unit(program)
         {
             let start: Vec<f64> = values.iter().map(Quantity::value).collect();
-            return Ok((program.bound(kept, &numbers), Quantity::constant(program.eval(&start)), false));
+            return Ok((program.with_bound_variables(kept, &numbers), Quantity::constant(program.eval(&start)), false));
         }
         let spelt = plain(text);
         let unit = |rest: &str| {
@@ -167,7 +167,7 @@ impl<'d> Reading<'d> {
             Some((length, first_unit + place))
         };
         match Program::parse_with_units(&spelt, variable, &names, unit) {
-            Ok(program) => Ok((program.bound(kept, &numbers), program.eval(&values), true)),
+            Ok(program) => Ok((program.with_bound_variables(kept, &numbers), program.eval(&values), true)),
             // The error of the parse without units is more specific.
             Err(wrong) => Err(bare.err().unwrap_or(wrong).into()),
         }

@@ -179,7 +179,7 @@ fn a_drive_is_asked_for_in_the_unit_of_its_joint() {
 fn presets_say_in_their_help_what_they_are() {
     let help = table().iter().find(|p| p.key == "solver.preset").unwrap().help;
     for preset in Preset::ALL {
-        for loose in [1, Preset::MANY_LOOSE] {
+        for loose in [1, Preset::MANY_JOINTS] {
             let solver = preset.solver(loose);
             let value = match solver.method.control() {
                 StepControl::PerImpact => format!("{}, {}", solver.method, solver.steps_per_impact),

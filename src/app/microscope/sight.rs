@@ -73,8 +73,8 @@ impl Sight {
         let sliding = normal.filter(|_| touches).map(|normal| {
             let law = Coefficients::new(&spec.contact, report.clearance);
             let gap = law.separation(&report.eccentricity, &velocity);
-            let read = law.slip_velocity(&normal, &velocity, &ball_spin, &socket_spin);
-            law.sliding(&gap, &read)
+            let slip_velocity = law.slip_velocity(&normal, &velocity, &ball_spin, &socket_spin);
+            law.sliding_velocity(&gap, &slip_velocity)
         });
         let mut begun = player.impact_record().latest(Some(joint), shown);
         let impact = begun.next().copied();

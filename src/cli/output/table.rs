@@ -5,7 +5,7 @@ use std::io;
 use super::rows::Rows;
 use crate::files::OutputFile;
 use crate::scene::Scene;
-use crate::simulate::{Frame, NoChannel, Reading, chosen_columns, run_columns};
+use crate::simulate::{Frame, Reading, UnknownChannel, chosen_columns, run_columns};
 
 /// Rows of one run, row after row.
 #[derive(Debug)]
@@ -46,7 +46,7 @@ impl Table {
     ///
     /// # Errors
     /// A pattern without a match.
-    pub fn of_channels(scene: &Scene, first: &Frame, patterns: &[String]) -> Result<Self, NoChannel> {
+    pub fn of_channels(scene: &Scene, first: &Frame, patterns: &[String]) -> Result<Self, UnknownChannel> {
         chosen_columns(&scene.machine, first, patterns).map(Self::of_columns)
     }
 

@@ -79,7 +79,7 @@ impl SceneStudio {
         let size = [arguments.size.0, arguments.size.1];
         let wear = options.wear != WearMap::Off;
         if wear {
-            simulation.keep_wear();
+            simulation.track_wear();
         }
         // Magnified play and wear colours are never shown unlabelled.
         let screen = if arguments.overlay || options.magnification != 1.0 || wear {

@@ -78,8 +78,9 @@ pub fn skeleton(scenes: &[&str]) -> String {
 fn page(machine: &str, found: &[WorkPrecision], paces: &[(&str, f64)], scenes: String, costs: &[CaseCost]) -> String {
     let choices = Preset::ALL.map(|preset| {
         [false, true].map(|many| {
-            let is_of =
-                |found: &&WorkPrecision| many == (found.reference.scene().machine.loose_joints() >= Preset::MANY_LOOSE);
+            let is_of = |found: &&WorkPrecision| {
+                many == (found.reference.scene().machine.joints_with_clearance() >= Preset::MANY_JOINTS)
+            };
             let found: Vec<&WorkPrecision> = found.iter().filter(is_of).collect();
             let words = |setting: &Setting| format!("{} {}", setting.method, value(setting));
             let own = found.first().and_then(|found| found.preset(preset)).map(|point| words(&point.setting));

@@ -1,7 +1,7 @@
 //! The settings of plots, view and instruments that a link carries, as words.
 
 use crate::scene::Scene;
-use crate::simulate::{MOST_PICKED, Quantity};
+use crate::simulate::{MAX_PICKED, Quantity};
 use crate::units::{Dimension, parse_quantity};
 use crate::view::{Picked, WearMap};
 
@@ -120,8 +120,8 @@ pub fn read_channels(text: &str) -> Result<Vec<String>, String> {
         }
     }
     match names.len() {
-        0..=MOST_PICKED => Ok(names),
-        many => Err(format!("{many} names of channels; allowed at most {MOST_PICKED}")),
+        0..=MAX_PICKED => Ok(names),
+        many => Err(format!("{many} names of channels; allowed at most {MAX_PICKED}")),
     }
 }
 

@@ -377,7 +377,7 @@ fn only_so_many_picked_channels_are_recorded() {
     let mut player = player("chain");
     let before = player.history().channels();
     player.pick(&names(&["*"]));
-    let most = crate::simulate::MOST_PICKED;
+    let most = crate::simulate::MAX_PICKED;
     assert_eq!(player.channels().picked().len(), most);
     assert_eq!(player.history().channels(), before + most);
     assert_eq!(player.clearances().len(), 8);

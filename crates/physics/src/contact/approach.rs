@@ -23,34 +23,34 @@ pub enum ApproachBranch {
 impl Coefficients {
     /// Approach speed without a contact state, m/s: `rate`, but not below the floor.
     #[inline]
-    pub(super) fn floored(&self, rate: f64) -> f64 {
+    pub(super) fn with_floor(&self, rate: f64) -> f64 {
         rate.max(self.speed_floor)
     }
 
-    /// Approach speed, m/s, for a stored value `remembered` (m/s) and the penetration rate `rate` (m/s).
+    /// Approach speed, m/s, for a stored value `stored` (m/s) and the penetration rate `rate` (m/s).
     #[inline]
-    pub(super) fn approach(&self, pace: ApproachBranch, remembered: f64, rate: f64) -> f64 {
-        match pace {
-            ApproachBranch::Unfrozen if self.largest => remembered.max(rate),
-            ApproachBranch::Unfrozen | ApproachBranch::Held => remembered,
-            ApproachBranch::Rising => self.floored(rate),
+    pub(super) fn approach(&self, branch: ApproachBranch, stored: f64, rate: f64) -> f64 {
+        match branch {
+            ApproachBranch::Unfrozen if self.uses_largest_rate => stored.max(rate),
+            ApproachBranch::Unfrozen | ApproachBranch::Held => stored,
+            ApproachBranch::Rising => self.with_floor(rate),
         }
     }
 
     /// Whether that speed is the rate itself, so that the damping term does not depend on it.
-    pub(super) fn approach_follows(&self, pace: ApproachBranch, remembered: f64, rate: f64) -> bool {
-        match pace {
-            ApproachBranch::Unfrozen => self.largest && rate > remembered,
+    pub(super) fn approach_follows_rate(&self, branch: ApproachBranch, stored: f64, rate: f64) -> bool {
+        match branch {
+            ApproachBranch::Unfrozen => self.uses_largest_rate && rate > stored,
             ApproachBranch::Held => false,
             ApproachBranch::Rising => rate > self.speed_floor,
         }
     }
 
-    /// Active branch for a stored approach speed `remembered` and the penetration rate `rate`, m/s.
-    pub(super) fn approach_branch_at(&self, remembered: f64, rate: f64) -> ApproachBranch {
-        if !self.largest {
+    /// Active branch for a stored approach speed `stored` and the penetration rate `rate`, m/s.
+    pub(super) fn approach_branch_at(&self, stored: f64, rate: f64) -> ApproachBranch {
+        if !self.uses_largest_rate {
             ApproachBranch::Unfrozen
-        } else if rate >= remembered {
+        } else if rate >= stored {
             ApproachBranch::Rising
         } else {
             ApproachBranch::Held
@@ -64,21 +64,21 @@ mod tests {
     use crate::contact::{ApproachSpeed, Parameters};
 
     #[test]
-    fn branches_are_the_rule_and_damping_stays_below_chi() {
+    fn branches_equal_the_rule_and_the_damping_term_is_at_most_chi() {
         let parameters = Parameters { approach_speed: ApproachSpeed::Largest, ..Parameters::default() };
         let c = Coefficients::new(&parameters, 3e-4);
-        let remembered = 0.05;
+        let stored = 0.05;
         for rate in [-0.2, 0.0, 0.01, 0.05, 0.0501, 0.4] {
-            let whole = c.approach(ApproachBranch::Unfrozen, remembered, rate);
-            let branch = c.approach_branch_at(remembered, rate);
-            assert_eq!(c.approach(branch, remembered, rate), whole, "{rate}");
-            assert!(c.damping * rate / whole <= c.damping * (1.0 + 1e-15));
+            let full = c.approach(ApproachBranch::Unfrozen, stored, rate);
+            let branch = c.approach_branch_at(stored, rate);
+            assert_eq!(c.approach(branch, stored, rate), full, "{rate}");
+            assert!(c.damping * rate / full <= c.damping * (1.0 + 1e-15));
             let elastic = c.stiffness * libm::pow(1e-6, 1.5);
-            let force = c.normal_force(1e-6, rate, whole);
+            let force = c.normal_force(1e-6, rate, full);
             assert!(force <= elastic * (1.0 + c.damping) * (1.0 + 1e-12));
         }
         let start = Coefficients::new(&Parameters::default(), 3e-4);
-        assert_eq!(start.approach_branch_at(remembered, 0.4), ApproachBranch::Unfrozen);
-        assert_eq!(start.approach(ApproachBranch::Unfrozen, remembered, 0.4), remembered);
+        assert_eq!(start.approach_branch_at(stored, 0.4), ApproachBranch::Unfrozen);
+        assert_eq!(start.approach(ApproachBranch::Unfrozen, stored, 0.4), stored);
     }
 }

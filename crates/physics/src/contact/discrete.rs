@@ -1,15 +1,16 @@
 //! The contact force over a whole step: the discrete gradient of the elastic potential, the law's damping, and friction at the
 //! velocity with which the step ends.
 //!
-//! With F_el = (U(d1) - U(d0)) / (d1 - d0), U = 2/5 K delta^2.5, the elastic work over the step is the change of U exactly, whatever
-//! the step, and a contact that begins or ends within the step is in U (Gonzalez 1996; McLachlan, Quispel & Robidoux 1999).
+//! With F_el = (U(d1) - U(d0)) / (d1 - d0), U = 2/5 K delta^2.5, the elastic work over the step is the change of U exactly,
+//! whatever the step, and a contact that begins or ends within the step is in U (Gonzalez 1996; McLachlan, Quispel & Robidoux
+//! 1999).
 
 use super::{Coefficients, FrictionBranch, FrictionVelocity, Mat3, Vec3};
 
 /// Change of penetration, relative to the larger one, below which Simpson's rule replaces the quotient.
 const NEARLY_EQUAL: f64 = 1e-3;
 
-/// A contact over one step: what does not change while its force is sought.
+/// A contact over one step: the quantities that stay constant while its force is solved for.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ContactStep {
     /// Step size, s.
@@ -18,13 +19,13 @@ pub struct ContactStep {
     pub start: Vec3,
     /// Clearance at the start and at the end, m.
     pub clearances: [f64; 2],
-    /// Sliding velocity by friction's rule at the start, m/s, not yet tangential.
+    /// Velocity used by friction at the start, m/s, not yet projected onto the tangent plane.
     pub slip: Vec3,
     /// Approach speed in the damping term so far, m/s.
     pub approach: f64,
 }
 
-/// The force of a contact over one step, its derivatives, and what it does.
+/// The force of a contact over one step, and its derivatives.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepForce {
     /// Force on the ball, N.
@@ -54,8 +55,8 @@ impl StepForce {
 }
 
 impl Coefficients {
-    /// Force over `step` for the mean velocity `velocity` of the centres (m/s), so that e1 = e0 + h u, and the mean velocity `slip`
-    /// used by friction (m/s).
+    /// Force over `step` for the mean velocity `velocity` of the centres (m/s), so that e1 = e0 + h u, and the mean velocity
+    /// `slip` used by friction (m/s).
     pub fn step_force(&self, step: &ContactStep, velocity: &Vec3, slip: &Vec3) -> StepForce {
         let ContactStep { h, start, clearances, .. } = *step;
         let end = start + velocity * h;
@@ -71,7 +72,7 @@ impl Coefficients {
         }
         let (elastic, stiffness) = self.elastic_force(d0, d1);
         let rate = (d1 - d0) / h;
-        let rising = self.largest && rate > step.approach;
+        let rising = self.uses_largest_rate && rate > step.approach;
         let approach = if rising { rate } else { step.approach };
         let damping = 1.0 + self.damping * rate / approach;
         if elastic <= 0.0 || damping <= 0.0 {
@@ -83,17 +84,17 @@ impl Coefficients {
         let mut direction = -normal;
         let mut by_slip = Mat3::zeros();
         if self.friction > 0.0 {
-            let share = match self.friction_velocity {
+            let slip_ratio = match self.friction_velocity {
                 FrictionVelocity::Centres | FrictionVelocity::Surface => 1.0,
                 FrictionVelocity::Printed => (d0 + d1) / sum,
             };
-            // At the end: a mean that follows a parabola from the start.
-            let sliding = tangent * (slip * 2.0 - step.slip) * share;
+            // The sliding velocity at the end: twice the mean less that at the start, as on a parabola.
+            let sliding = tangent * (slip * 2.0 - step.slip) * slip_ratio;
             let speed = sliding.norm();
             let per_speed = self.friction_per_speed(FrictionBranch::Unfrozen, speed);
             direction -= sliding * per_speed;
-            // Secants where friction is full, so that a correction stops the sliding but cannot reverse it; below the dead band
-            // the slope of the ramp.
+            // Where friction is full, the secant: a correction can stop the sliding but not reverse it. Within the dead band, the
+            // slope of the ramp.
             let full = per_speed.max(0.0);
             let mut resistance = tangent * full;
             if speed < self.slip_low {
@@ -102,7 +103,7 @@ impl Coefficients {
                 let along = sliding / speed;
                 resistance += along * along.transpose() * (self.friction_slope(speed) - full);
             }
-            by_slip = resistance * (-2.0 * share * force);
+            by_slip = resistance * (-2.0 * slip_ratio * force);
         }
         let by_velocity = direction * (end / after).transpose() * by_rate - tangent * (force * h / sum);
         StepForce { force: direction * force, normal, by_velocity, by_slip }
@@ -150,10 +151,10 @@ mod tests {
         for (depth, speed) in [(-1e-6, 0.1), (2e-6, -0.2), (2e-6, -0.05), (3e-6, 0.02), (3e-6, 1e-6)] {
             let step = step(2e-5, depth);
             let velocity = step.start.normalize() * speed + Vec3::new(0.01, 0.02, 0.0);
-            let found = elastic.step_force(&step, &velocity, &Vec3::zeros());
+            let result = elastic.step_force(&step, &velocity, &Vec3::zeros());
             let end = (step.start + velocity * step.h).norm() - 3e-4;
             let gain = elastic.elastic_energy(end) - elastic.elastic_energy(depth);
-            let work = found.force.dot(&velocity) * step.h;
+            let work = result.force.dot(&velocity) * step.h;
             assert!((work + gain).abs() < 1e-9 * elastic.elastic_energy(3e-6), "{depth} {speed}: {work:e} {gain:e}");
         }
     }
@@ -170,16 +171,16 @@ mod tests {
                     let step = step(2e-5, depth);
                     let velocity = step.start.normalize() * speed + Vec3::new(0.01, 0.02, 0.0);
                     let slip = Vec3::new(0.05, -0.1, 0.2);
-                    let found = law.step_force(&step, &velocity, &slip);
-                    assert!(found.force.norm() > 0.1);
+                    let result = law.step_force(&step, &velocity, &slip);
+                    assert!(result.force.norm() > 0.1);
                     for k in 0..3 {
                         let d = Vec3::ith(k, 1e-7);
                         let force = |u: Vec3, s: Vec3| law.step_force(&step, &u, &s).force;
                         let by_velocity = (force(velocity + d, slip) - force(velocity - d, slip)) / 2e-7;
                         let by_slip = (force(velocity, slip + d) - force(velocity, slip - d)) / 2e-7;
-                        let off = (by_velocity - found.by_velocity.column(k)).norm() / found.by_velocity.norm();
+                        let off = (by_velocity - result.by_velocity.column(k)).norm() / result.by_velocity.norm();
                         assert!(off < 2e-3, "{friction_velocity} {approach_speed} {depth} {speed} u{k}: {off:e}");
-                        let off = (by_slip - found.by_slip.column(k)).norm() / found.by_slip.norm();
+                        let off = (by_slip - result.by_slip.column(k)).norm() / result.by_slip.norm();
                         assert!(off < 1e-4, "{friction_velocity} {approach_speed} {depth} {speed} s{k}: {off:e}");
                     }
                 }

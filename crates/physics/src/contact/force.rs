@@ -103,7 +103,7 @@ impl Coefficients {
 
     /// Ratio of v_t to the projected friction velocity: 1, or (1 - c/|e|) with (13) as printed.
     #[inline]
-    fn share(&self, gap: &Separation) -> f64 {
+    fn slip_ratio(&self, gap: &Separation) -> f64 {
         match self.friction_velocity {
             FrictionVelocity::Centres | FrictionVelocity::Surface => 1.0,
             FrictionVelocity::Printed => gap.penetration / gap.distance,
@@ -112,17 +112,17 @@ impl Coefficients {
 
     /// Sliding velocity v_t, m/s, from the velocity used by friction.
     #[inline]
-    pub fn sliding(&self, gap: &Separation, read: &Vec3) -> Vec3 {
-        let tangential = read - gap.normal * gap.normal.dot(read);
+    pub fn sliding_velocity(&self, gap: &Separation, slip_velocity: &Vec3) -> Vec3 {
+        let tangential = slip_velocity - gap.normal * gap.normal.dot(slip_velocity);
         match self.friction_velocity {
             FrictionVelocity::Centres | FrictionVelocity::Surface => tangential,
-            FrictionVelocity::Printed => tangential * self.share(gap),
+            FrictionVelocity::Printed => tangential * self.slip_ratio(gap),
         }
     }
 
-    /// Force on a ball in contact; `read` returns the velocity used by friction and is called only if there is friction.
+    /// Force on a ball in contact; `slip_velocity` returns the velocity used by friction and is called only if there is friction.
     #[inline]
-    pub fn force(&self, contact_state: &ContactState, gap: &Separation, read: impl FnOnce() -> Vec3) -> Force {
+    pub fn force(&self, contact_state: &ContactState, gap: &Separation, slip_velocity: impl FnOnce() -> Vec3) -> Force {
         let approach = contact_state.approach(self, gap.rate);
         let mut force = Force {
             normal: self.normal_force(gap.penetration, gap.rate, approach),
@@ -130,75 +130,81 @@ impl Coefficients {
             slip_speed: 0.0,
         };
         if force.normal > 0.0 && self.friction > 0.0 {
-            let sliding = self.sliding(gap, &read());
-            force.slip_speed = sliding.norm();
+            let sliding_velocity = self.sliding_velocity(gap, &slip_velocity());
+            force.slip_speed = sliding_velocity.norm();
             let per_speed = self.friction_per_speed(contact_state.friction_branch, force.slip_speed);
             if per_speed != 0.0 {
-                force.friction = sliding * (-per_speed * force.normal);
+                force.friction = sliding_velocity * (-per_speed * force.normal);
             }
         }
         force
     }
 
-    /// Derivatives of `force` (the result of [`Self::force`], > 0) at the fixed friction velocity `read`.
+    /// Derivatives of `force` (the result of [`Self::force`], > 0) at the fixed friction velocity `slip_velocity`.
     pub fn linearise(
         &self,
         contact_state: &ContactState,
         gap: &Separation,
         velocity: &Vec3,
-        read: &Vec3,
+        slip_velocity: &Vec3,
         force: &Force,
     ) -> Stiffness {
         let Separation { distance, normal: n, penetration, rate } = *gap;
         let approach = contact_state.approach(self, rate);
         let tangent = Mat3::identity() - n * n.transpose();
-        let turning = tangent / distance;
+        let normal_by_displacement = tangent / distance;
         let root = penetration.sqrt();
         let by_penetration = 1.5 * self.stiffness * root * (1.0 + self.damping * rate / approach);
-        let by_rate = if contact_state.follows(self, rate) {
+        let by_rate = if contact_state.approach_follows_rate(self, rate) {
             0.0
         } else {
             self.stiffness * penetration * root * self.damping / approach
         };
         // F = -F_N (n + p v_t), p the friction per normal force and speed.
         let mut along = -n;
-        let mut by_displacement = turning * -force.normal;
+        let mut by_displacement = normal_by_displacement * -force.normal;
         let mut by_slip = Mat3::zeros();
         if self.friction > 0.0 {
             let speed = force.slip_speed;
             let per_speed = self.friction_per_speed(contact_state.friction_branch, speed);
-            let sliding = self.sliding(gap, read);
-            along -= sliding * per_speed;
+            let sliding_velocity = self.sliding_velocity(gap, slip_velocity);
+            along -= sliding_velocity * per_speed;
             // dF/dv_t
             let mut resistance = Mat3::identity() * (-per_speed * force.normal);
             if speed > 0.0 {
                 let slope = self.friction_per_speed_slope(contact_state.friction_branch, speed) / speed;
-                resistance -= sliding * sliding.transpose() * (slope * force.normal);
+                resistance -= sliding_velocity * sliding_velocity.transpose() * (slope * force.normal);
             }
             // v_t = s (1 - n n') w, and the tangent plane turns with n: dv_t = -s ((n . w) dn + n (w . dn)).
-            let share = self.share(gap);
-            let turned = turning * n.dot(read) + n * (turning * read).transpose();
-            by_displacement -= resistance * turned * share;
-            by_slip = resistance * tangent * share;
+            let slip_ratio = self.slip_ratio(gap);
+            let turned = normal_by_displacement * n.dot(slip_velocity)
+                + n * (normal_by_displacement * slip_velocity).transpose();
+            by_displacement -= resistance * turned * slip_ratio;
+            by_slip = resistance * tangent * slip_ratio;
             if self.friction_velocity == FrictionVelocity::Printed {
                 // s = 1 - c/|e|.
-                let swept = resistance * (tangent * read) / distance;
+                let swept = resistance * (tangent * slip_velocity) / distance;
                 by_displacement += swept * n.transpose() * (self.clearance / distance);
             }
         }
         // d(delta_dot)/de = (1 - n n') e_dot / |e|.
-        by_displacement += along * (n * by_penetration + turning * velocity * by_rate).transpose();
-        Stiffness { by_displacement, by_rate: along * (n * by_rate).transpose(), by_slip, normal: turning }
+        by_displacement += along * (n * by_penetration + normal_by_displacement * velocity * by_rate).transpose();
+        Stiffness {
+            by_displacement,
+            by_rate: along * (n * by_rate).transpose(),
+            by_slip,
+            normal: normal_by_displacement,
+        }
     }
 
     /// Whether a contact may have left its frozen branches of the laws: the step is then searched for corners.
     #[inline]
     pub fn leaves_branch(&self, contact_state: &ContactState, gap: &Separation, force: &Force) -> bool {
-        contact_state.may_turn(gap.rate)
+        contact_state.may_leave_approach_branch(gap.rate)
             || (force.normal > 0.0
                 && self.friction > 0.0
                 && contact_state.friction_branch != FrictionBranch::Unfrozen
-                && self.beyond(contact_state.friction_branch, force.slip_speed) > 0.0)
+                && self.excess_over_branch(contact_state.friction_branch, force.slip_speed) > 0.0)
     }
 
     /// Energy stored by the elastic part, 2/5 K delta^2.5, J.
@@ -239,23 +245,17 @@ mod tests {
         [FrictionVelocity::Centres, FrictionVelocity::Surface, FrictionVelocity::Printed];
 
     /// A ball pressed 2 µm into its wall that slides at `speed` m/s and sinks further at 5 mm/s while its clearance ramps.
-    fn pressed(friction_velocity: FrictionVelocity, speed: f64) -> (Coefficients, Vec3, Vec3) {
+    fn penetrating_ball(friction_velocity: FrictionVelocity, speed: f64) -> (Coefficients, Vec3, Vec3) {
         let parameters = Parameters { friction_velocity, ..Parameters::default() };
         let mut c = Coefficients::new(&parameters, 3e-4);
-        c.move_clearance(&parameters, 3e-4, -2e-3);
+        c.set_clearance(&parameters, 3e-4, -2e-3);
         let n = Vec3::new(2.0, -1.0, 2.0) / 3.0;
         let t = Vec3::new(1.0, 2.0, 0.0) / libm::sqrt(5.0);
         (c, n * (3e-4 + 2e-6), n * 5e-3 + t * speed)
     }
 
-    fn contact_state(slip: FrictionBranch, pace: ApproachBranch) -> ContactState {
-        ContactState {
-            active: true,
-            approach_speed: 4e-3,
-            friction_branch: slip,
-            approach_branch: pace,
-            ..ContactState::default()
-        }
+    fn contact_state(friction_branch: FrictionBranch, approach_branch: ApproachBranch) -> ContactState {
+        ContactState { active: true, approach_speed: 4e-3, friction_branch, approach_branch, ..ContactState::default() }
     }
 
     const BALL: Vec3 = Vec3::new(0.3, -0.2, 0.5);
@@ -264,30 +264,30 @@ mod tests {
     /// Force on the ball.
     fn on_ball(c: &Coefficients, contact_state: &ContactState, e: &Vec3, v: &Vec3) -> Vec3 {
         let at = c.separation(e, v);
-        let read = || c.slip_velocity(&at.normal, v, &BALL, &SOCKET);
-        let force = c.force(contact_state, &at, read);
+        let slip_velocity = || c.slip_velocity(&at.normal, v, &BALL, &SOCKET);
+        let force = c.force(contact_state, &at, slip_velocity);
         at.normal * -force.normal + force.friction
     }
 
     #[test]
     fn derivatives_are_those_of_central_differences() {
         for friction_velocity in VELOCITIES {
-            for (slip, speed) in
+            for (friction_branch, speed) in
                 [(FrictionBranch::Ramp, 3e-5), (FrictionBranch::Full, 0.04), (FrictionBranch::Unfrozen, 0.04)]
             {
-                for pace in [ApproachBranch::Held, ApproachBranch::Rising] {
+                for approach_branch in [ApproachBranch::Held, ApproachBranch::Rising] {
                     // The printed velocity is so much smaller that this branch takes a higher speed.
                     let speed = match friction_velocity {
                         FrictionVelocity::Printed => speed * 150.0,
                         _ => speed,
                     };
-                    let (c, e, v) = pressed(friction_velocity, speed);
-                    let contact_state = contact_state(slip, pace);
+                    let (c, e, v) = penetrating_ball(friction_velocity, speed);
+                    let contact_state = contact_state(friction_branch, approach_branch);
                     let at = c.separation(&e, &v);
-                    let read = c.slip_velocity(&at.normal, &v, &BALL, &SOCKET);
-                    let force = c.force(&contact_state, &at, || read);
+                    let slip_velocity = c.slip_velocity(&at.normal, &v, &BALL, &SOCKET);
+                    let force = c.force(&contact_state, &at, || slip_velocity);
                     assert!(force.normal > 1.0 && force.friction.norm() > 0.01 * force.normal);
-                    let mut s = c.linearise(&contact_state, &at, &v, &read, &force);
+                    let mut s = c.linearise(&contact_state, &at, &v, &slip_velocity, &force);
                     s.add_normal_rotation(&c.slip_velocity_by_normal(&BALL, &SOCKET));
                     let by_velocity = s.by_rate + s.by_slip;
                     for k in 0..3 {
@@ -298,14 +298,20 @@ mod tests {
                             / (2.0 * d);
                         let got: Vec3 = s.by_displacement.column(k).into();
                         let off = (got - difference).norm() / s.by_displacement.norm();
-                        assert!(off < 1e-5, "{friction_velocity:?} {slip:?} {pace:?} e{k}: {off:e}");
+                        assert!(
+                            off < 1e-5,
+                            "{friction_velocity:?} {friction_branch:?} {approach_branch:?} e{k}: {off:e}"
+                        );
                         let d = 1e-8 * speed;
                         let difference = (on_ball(&c, &contact_state, &e, &(v + unit * d))
                             - on_ball(&c, &contact_state, &e, &(v - unit * d)))
                             / (2.0 * d);
                         let got: Vec3 = by_velocity.column(k).into();
                         let off = (got - difference).norm() / by_velocity.norm();
-                        assert!(off < 1e-5, "{friction_velocity:?} {slip:?} {pace:?} v{k}: {off:e}");
+                        assert!(
+                            off < 1e-5,
+                            "{friction_velocity:?} {friction_branch:?} {approach_branch:?} v{k}: {off:e}"
+                        );
                     }
                 }
             }
@@ -313,15 +319,15 @@ mod tests {
     }
 
     #[test]
-    fn the_printed_velocity_is_that_of_the_points_that_follow_the_normal() {
-        let (c, e, v) = pressed(FrictionVelocity::Printed, 0.2);
+    fn the_printed_velocity_is_that_of_the_geometric_points_of_contact() {
+        let (c, e, v) = penetrating_ball(FrictionVelocity::Printed, 0.2);
         let at = c.separation(&e, &v);
         // (13): V_j + r dn/dt against V_i + R dn/dt.
-        let turning = (v - at.normal * at.normal.dot(&v)) / at.distance;
+        let normal_rate = (v - at.normal * at.normal.dot(&v)) / at.distance;
         let (r, socket) = (c.ball_radius, c.ball_radius + c.clearance);
-        let printed = v + turning * r - turning * socket;
+        let printed = v + normal_rate * r - normal_rate * socket;
         let tangential = printed - at.normal * at.normal.dot(&printed);
-        let got = c.sliding(&at, &c.slip_velocity(&at.normal, &v, &BALL, &SOCKET));
+        let got = c.sliding_velocity(&at, &c.slip_velocity(&at.normal, &v, &BALL, &SOCKET));
         assert!((got - tangential).norm() < 1e-12 * 0.2);
         // The dead band ends where the centres move at v_a |e| / delta.
         let ends = c.slip_low * at.distance / at.penetration;

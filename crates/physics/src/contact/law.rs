@@ -119,7 +119,7 @@ pub struct Coefficients {
     /// Rate of the clearance while it ramps, m/s.
     pub clearance_rate: f64,
     /// Whether the damping term divides by the contact's largest rate so far instead of its rate at the start.
-    pub largest: bool,
+    pub uses_largest_rate: bool,
 }
 
 impl Coefficients {
@@ -139,12 +139,12 @@ impl Coefficients {
             friction_velocity: parameters.friction_velocity,
             clearance,
             clearance_rate: 0.0,
-            largest: parameters.approach_speed == ApproachSpeed::Largest,
+            uses_largest_rate: parameters.approach_speed == ApproachSpeed::Largest,
         }
     }
 
     /// Sets the current clearance of a ramp (m), its rate (m/s), and the corresponding stiffness.
-    pub fn move_clearance(&mut self, parameters: &Parameters, clearance: f64, rate: f64) {
+    pub fn set_clearance(&mut self, parameters: &Parameters, clearance: f64, rate: f64) {
         self.stiffness = hertz_stiffness(parameters, clearance);
         (self.clearance, self.clearance_rate) = (clearance, rate);
     }
@@ -215,13 +215,13 @@ mod tests {
     }
 
     #[test]
-    fn stiffness_is_the_contract_s_at_three_tenths_of_a_millimetre() {
+    fn hertz_stiffness_at_a_clearance_of_0_3_mm_has_its_reference_value() {
         let k = hertz_stiffness(&Parameters::default(), 0.3e-3);
         assert!((k / 8.84e10 - 1.0).abs() < 1e-3, "{k:e}");
     }
 
     #[test]
-    fn closed_integral_agrees_with_simulating_the_impact() {
+    fn the_closed_integral_agrees_with_a_simulated_impact() {
         for law in LAWS {
             for ce in [0.3, 0.6, 0.9] {
                 let chi = damping_factor(law, ce);
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn gonthier_gives_the_restitution_asked_for() {
+    fn the_law_of_gonthier_gives_the_requested_restitution() {
         for ce in [0.05, 0.2, 0.5, 0.8, 0.99] {
             let given = undisturbed_restitution(damping_factor(NormalLaw::Gonthier, ce));
             assert!((given - ce).abs() < 1e-9, "{ce}: {given}");
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn lankarani_nikravesh_asked_for_zero_rebounds_with_two_thirds() {
+    fn the_law_of_lankarani_and_nikravesh_rebounds_with_two_thirds_if_zero_is_requested() {
         let given = undisturbed_restitution(damping_factor(NormalLaw::LankaraniNikravesh, 0.0));
         assert!((given - 0.66).abs() < 5e-3, "{given}");
     }
@@ -257,7 +257,6 @@ mod tests {
 
     #[test]
     fn an_elastic_impact_lasts_as_long_as_estimated() {
-        // Deepest at half the time: x from m v dv = -K x^1.5 dx.
         let (stiffness, mass, speed) = (8.84e10, 0.3, 0.077);
         let estimate = impact_duration(stiffness, 0.0, mass, speed);
         let (mut x, mut v, mut t, h) = (0.0_f64, speed, 0.0, 1e-9);
@@ -270,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn force_never_pulls() {
+    fn the_normal_force_is_never_negative() {
         let c = Coefficients::new(&Parameters { restitution: 0.0, ..Parameters::default() }, 3e-4);
         assert_eq!(c.normal_force(1e-6, -1.0, 1e-3), 0.0);
         assert_eq!(c.normal_force(-1e-6, 1.0, 1e-3), 0.0);

@@ -33,9 +33,9 @@ impl Coefficients {
         }
     }
 
-    /// Distance of a sliding speed beyond the corners of the branch `slip`, m/s; negative inside.
-    pub fn beyond(&self, slip: FrictionBranch, speed: f64) -> f64 {
-        match slip {
+    /// Distance of a sliding speed beyond the corners of `branch`, m/s; negative inside.
+    pub fn excess_over_branch(&self, branch: FrictionBranch, speed: f64) -> f64 {
+        match branch {
             FrictionBranch::Unfrozen => f64::NEG_INFINITY,
             FrictionBranch::DeadBand => speed - self.slip_low,
             // Without a dead band the ramp is smooth through zero speed.
@@ -47,8 +47,8 @@ impl Coefficients {
 
     /// Friction force divided by normal force and sliding velocity, s/m, for a branch continued beyond its corners: twice
     /// continuously differentiable, even through zero velocity.
-    pub fn friction_per_speed(&self, slip: FrictionBranch, speed: f64) -> f64 {
-        match slip {
+    pub fn friction_per_speed(&self, branch: FrictionBranch, speed: f64) -> f64 {
+        match branch {
             FrictionBranch::Unfrozen => {
                 let ratio = self.friction_ratio(speed);
                 if ratio > 0.0 { ratio / speed } else { 0.0 }
@@ -64,8 +64,8 @@ impl Coefficients {
     }
 
     /// Derivative of [`Self::friction_per_speed`] with respect to the sliding speed, s^2/m^2.
-    pub fn friction_per_speed_slope(&self, slip: FrictionBranch, speed: f64) -> f64 {
-        match slip {
+    pub fn friction_per_speed_slope(&self, branch: FrictionBranch, speed: f64) -> f64 {
+        match branch {
             FrictionBranch::Unfrozen => {
                 let (ratio, slope) = (self.friction_ratio(speed), self.friction_slope(speed));
                 if speed > 0.0 { (slope - ratio / speed) / speed } else { 0.0 }
@@ -103,48 +103,50 @@ mod tests {
     }
 
     #[test]
-    fn branches_are_the_law_between_their_corners_and_meet_there() {
+    fn branches_equal_the_law_between_their_corners_and_meet_there() {
         let c = coefficients();
         for speed in [1e-7, 1e-6, 2e-6, 5e-5, 9.99e-5, 1e-4, 3e-4, 1.0] {
-            let slip = c.friction_branch_at(speed);
-            let got = c.friction_per_speed(slip, speed) * speed;
+            let branch = c.friction_branch_at(speed);
+            let got = c.friction_per_speed(branch, speed) * speed;
             let want = c.friction_ratio(speed);
             assert!((got - want).abs() < 1e-15, "{speed}: {got} {want}");
-            assert!(c.beyond(slip, speed) <= 0.0, "{speed}");
+            assert!(c.excess_over_branch(branch, speed) <= 0.0, "{speed}");
         }
         for (below, above, corner) in [
             (FrictionBranch::DeadBand, FrictionBranch::Ramp, c.slip_low),
             (FrictionBranch::Ramp, FrictionBranch::Full, c.slip_high),
         ] {
-            let force = |slip| c.friction_per_speed(slip, corner) * corner;
+            let force = |branch| c.friction_per_speed(branch, corner) * corner;
             assert!((force(below) - force(above)).abs() < 1e-15);
-            assert!(c.beyond(below, 1.01 * corner) > 0.0 && c.beyond(above, 0.99 * corner) > 0.0);
+            assert!(
+                c.excess_over_branch(below, 1.01 * corner) > 0.0 && c.excess_over_branch(above, 0.99 * corner) > 0.0
+            );
         }
     }
 
     #[test]
-    fn continued_branches_are_smooth_and_their_slopes_are_right() {
+    fn slopes_of_continued_branches_match_differences() {
         let c = coefficients();
-        for slip in [FrictionBranch::Ramp, FrictionBranch::Full] {
+        for branch in [FrictionBranch::Ramp, FrictionBranch::Full] {
             for n in 1..400 {
                 let speed = f64::from(n) * 0.5e-6;
                 let d = 1e-4 * speed;
                 let difference =
-                    (c.friction_per_speed(slip, speed + d) - c.friction_per_speed(slip, speed - d)) / (2.0 * d);
-                let slope = c.friction_per_speed_slope(slip, speed);
+                    (c.friction_per_speed(branch, speed + d) - c.friction_per_speed(branch, speed - d)) / (2.0 * d);
+                let slope = c.friction_per_speed_slope(branch, speed);
                 assert!(
                     (slope - difference).abs() <= 1e-3 * slope.abs() + 1.0,
-                    "{slip:?} {speed}: {slope} {difference}"
+                    "{branch:?} {speed}: {slope} {difference}"
                 );
             }
         }
     }
 
     #[test]
-    fn no_dead_band_leaves_a_ramp_that_is_smooth_through_rest() {
+    fn without_a_dead_band_the_ramp_includes_zero_speed() {
         let c = Coefficients { slip_low: 0.0, ..coefficients() };
         assert_eq!(c.friction_branch_at(0.0), FrictionBranch::Ramp);
-        assert!(c.beyond(FrictionBranch::Ramp, 0.0) < 0.0);
+        assert!(c.excess_over_branch(FrictionBranch::Ramp, 0.0) < 0.0);
         assert!(c.friction_per_speed(FrictionBranch::Ramp, 0.0).is_finite());
     }
 }

@@ -7,12 +7,12 @@ use super::{ApproachBranch, Coefficients, FrictionBranch};
 /// Contact state of one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ContactState {
-    /// In contact.
+    /// Whether ball and socket are in contact.
     pub active: bool,
     /// Approach speed in the damping term, m/s: delta_dot0 of this contact, or its largest rate so far, not below the scene's
     /// floor; 0 while free.
     pub approach_speed: f64,
-    /// The floor applied: this contact rebounds higher than requested.
+    /// Whether the floor applied: this contact then rebounds higher than requested.
     pub floored: bool,
     /// Active branch of the friction law.
     pub friction_branch: FrictionBranch,
@@ -26,9 +26,9 @@ pub enum ContactPhase {
     /// The penetration grows for the first time.
     #[default]
     Compression,
-    /// It falls for the first time.
+    /// The penetration falls for the first time.
     Restitution,
-    /// It has grown again: the contact lasts.
+    /// The penetration has grown again: the contact lasts.
     Lasting,
 }
 
@@ -46,11 +46,11 @@ impl ContactPhase {
 impl ContactState {
     /// State of a contact that begins at the penetration rate `rate` (m/s).
     pub fn at_onset(c: &Coefficients, rate: f64) -> Self {
-        Self { active: true, approach_speed: c.floored(rate), floored: rate < c.speed_floor, ..Self::default() }
+        Self { active: true, approach_speed: c.with_floor(rate), floored: rate < c.speed_floor, ..Self::default() }
     }
 
     /// State of a contact that begins and ends within a step: its approach speed is the current rate.
-    pub fn passing(c: &Coefficients) -> Self {
+    pub fn within_step(c: &Coefficients) -> Self {
         Self { approach_branch: ApproachBranch::Rising, ..Self::at_onset(c, c.speed_floor) }
     }
 
@@ -61,14 +61,14 @@ impl ContactState {
 
     /// Updates the largest rate, if the law uses it, after a step that ends at the rate `end`; `fastest` gives the largest rate
     /// within the step. Returns whether the update changes the force at the end of the step.
-    pub fn rise(&mut self, c: &Coefficients, end: f64, fastest: impl FnOnce() -> f64) -> bool {
-        if !c.largest {
+    pub fn update_largest_rate(&mut self, c: &Coefficients, end: f64, fastest: impl FnOnce() -> f64) -> bool {
+        if !c.uses_largest_rate {
             return false;
         }
         // With located corners, a step ends where the rate is largest.
-        let whole = self.approach_branch == ApproachBranch::Unfrozen;
-        let fastest = if whole { fastest() } else { end };
-        let changes = whole && fastest > self.approach_speed.max(end);
+        let is_unfrozen = self.approach_branch == ApproachBranch::Unfrozen;
+        let fastest = if is_unfrozen { fastest() } else { end };
+        let changes = is_unfrozen && fastest > self.approach_speed.max(end);
         self.approach_speed = self.approach_speed.max(fastest);
         changes
     }
@@ -86,17 +86,17 @@ impl ContactState {
     /// Approach speed in the damping term, m/s, at the penetration rate `rate`; while the joint is free, the rate itself.
     #[inline]
     pub fn approach(&self, c: &Coefficients, rate: f64) -> f64 {
-        if self.active { c.approach(self.approach_branch, self.approach_speed, rate) } else { c.floored(rate) }
+        if self.active { c.approach(self.approach_branch, self.approach_speed, rate) } else { c.with_floor(rate) }
     }
 
     /// Whether the approach speed is the rate itself, so that the damping term does not depend on it.
-    pub fn follows(&self, c: &Coefficients, rate: f64) -> bool {
-        self.active && c.approach_follows(self.approach_branch, self.approach_speed, rate)
+    pub fn approach_follows_rate(&self, c: &Coefficients, rate: f64) -> bool {
+        self.active && c.approach_follows_rate(self.approach_branch, self.approach_speed, rate)
     }
 
     /// Whether the rate may cross into another branch of the rule. A rising rate may pass its maximum in any step.
     #[inline]
-    pub(super) fn may_turn(&self, rate: f64) -> bool {
+    pub(super) fn may_leave_approach_branch(&self, rate: f64) -> bool {
         match self.approach_branch {
             ApproachBranch::Unfrozen => false,
             ApproachBranch::Held => rate > self.approach_speed,

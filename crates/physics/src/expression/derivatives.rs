@@ -61,7 +61,7 @@ impl Number for Jet {
             Binary::Add => self + other,
             Binary::Subtract => self - other,
             Binary::Multiply => self * other,
-            // With fewer roundings.
+            // The reciprocal has fewer roundings.
             Binary::Divide if self == Self::constant(1.0) => other.recip(),
             Binary::Divide => self / other,
             Binary::Power => power(self, other),
@@ -104,7 +104,7 @@ mod tests {
     use crate::expression::Program;
 
     #[test]
-    fn every_operation_carries_its_derivatives() {
+    fn every_operation_has_the_derivatives_of_its_value() {
         for text in [
             "t + 1/t",
             "-t*t - 3",

@@ -1,8 +1,8 @@
-//! Several programs as one list of operations on numbered values, for those that are evaluated at every instant.
+//! Several programs as one list of operations on numbered values, for programs that are evaluated at every instant.
 
 use super::{Binary, Number, Program, Step, Unary};
 
-/// Programs of which each may use the variables, of which there is one, and the results of the programs before it.
+/// Programs with one common variable. Each may also use the results of the programs before it.
 #[derive(Clone, Debug, Default)]
 pub struct Tape {
     operations: Vec<(usize, Operation)>,
@@ -19,15 +19,15 @@ enum Operation {
     Product(usize, usize),
     Scale(f64, usize),
     Shift(f64, usize),
-    /// The value subtracted from the constant.
-    From(f64, usize),
+    /// The constant minus the value.
+    ConstantMinus(f64, usize),
     /// The sine, and the cosine as the value at the second index.
     SinCos(usize, usize),
     Unary(Unary, usize),
     Binary(Binary, usize, usize),
     /// A constant on the left, or on the right.
-    OfConstant(Binary, f64, usize),
-    ByConstant(Binary, usize, f64),
+    ConstantLeft(Binary, f64, usize),
+    ConstantRight(Binary, usize, f64),
 }
 
 /// An operand: a value, or a constant.
@@ -65,7 +65,7 @@ impl Tape {
                 Some(Operand::Constant(x)) => Operation::Constant(x),
                 None => Operation::Constant(0.0),
             };
-            // The last operation of a program gives its result at once.
+            // The last operation of a program writes its result directly.
             match (result, tape.operations.last_mut()) {
                 (Operation::Copy(x), Some((to, _))) if *to == x && x > count && x == tape.length - 1 => {
                     *to = i + 1;
@@ -77,7 +77,7 @@ impl Tape {
         tape
     }
 
-    /// Adds an operation, or finds the same one.
+    /// Adds an operation, unless there is an equal one; returns its value.
     fn push(&mut self, operation: Operation) -> Operand {
         if let Some((to, _)) = self.operations.iter().find(|(_, own)| *own == operation) {
             return Operand::Value(*to);
@@ -116,10 +116,10 @@ impl Tape {
             }
             (Binary::Add, Constant(c), Value(x)) | (Binary::Add, Value(x), Constant(c)) => Operation::Shift(c, x),
             (Binary::Subtract, Value(x), Constant(c)) => Operation::Shift(-c, x),
-            (Binary::Subtract, Constant(c), Value(x)) => Operation::From(c, x),
+            (Binary::Subtract, Constant(c), Value(x)) => Operation::ConstantMinus(c, x),
             (_, Value(x), Value(y)) => Operation::Binary(binary, x, y),
-            (_, Constant(c), Value(x)) => Operation::OfConstant(binary, c, x),
-            (_, Value(x), Constant(c)) => Operation::ByConstant(binary, x, c),
+            (_, Constant(c), Value(x)) => Operation::ConstantLeft(binary, c, x),
+            (_, Value(x), Constant(c)) => Operation::ConstantRight(binary, x, c),
         })
     }
 
@@ -143,17 +143,17 @@ impl Tape {
                 Operation::Product(x, y) => values[to] = values[x].binary(Binary::Multiply, values[y]),
                 Operation::Scale(c, x) => values[to] = values[x].scaled(c),
                 Operation::Shift(c, x) => values[to] = values[x].shifted(c),
-                Operation::From(c, x) => values[to] = N::constant(c).binary(Binary::Subtract, values[x]),
+                Operation::ConstantMinus(c, x) => values[to] = N::constant(c).binary(Binary::Subtract, values[x]),
                 Operation::SinCos(x, cosine) => (values[to], values[cosine]) = N::sin_cos(values[x]),
-                // Inlined.
+                // Kept separate so that the square root is inlined.
                 Operation::Unary(Unary::Sqrt, x) => values[to] = values[x].unary(Unary::Sqrt),
                 Operation::Unary(unary, x) => values[to] = values[x].unary(unary),
                 Operation::Binary(binary, x, y) => values[to] = values[x].binary(binary, values[y]),
-                Operation::OfConstant(Binary::Divide, c, x) => {
+                Operation::ConstantLeft(Binary::Divide, c, x) => {
                     values[to] = N::constant(c).binary(Binary::Divide, values[x])
                 }
-                Operation::OfConstant(binary, c, x) => values[to] = N::constant(c).binary(binary, values[x]),
-                Operation::ByConstant(binary, x, c) => values[to] = values[x].binary(binary, N::constant(c)),
+                Operation::ConstantLeft(binary, c, x) => values[to] = N::constant(c).binary(binary, values[x]),
+                Operation::ConstantRight(binary, x, c) => values[to] = values[x].binary(binary, N::constant(c)),
             }
         }
     }
@@ -165,7 +165,7 @@ mod tests {
     use crate::jet::Jet;
 
     #[test]
-    fn a_tape_computes_what_its_programs_do() {
+    fn a_tape_has_the_bits_of_its_programs() {
         let texts = [
             "2*t",
             "a",

@@ -38,7 +38,7 @@ pub struct DormandPrince {
     raw_end: Vec<f64>,
     raw_k_end: Vec<f64>,
     /// Fraction of the latest attempt that remains after truncation.
-    kept: f64,
+    remaining_fraction: f64,
 }
 
 impl DormandPrince {
@@ -54,19 +54,19 @@ impl DormandPrince {
             stage: zeros(),
             raw_end: zeros(),
             raw_k_end: zeros(),
-            kept: 1.0,
+            remaining_fraction: 1.0,
         }
     }
 
     /// Truncates the latest attempt to the fraction `theta` of its length, with the same interpolant.
     pub fn truncate(&mut self, theta: f64) {
-        self.kept *= theta;
+        self.remaining_fraction *= theta;
     }
 
     /// Interpolates components `part` of the state at `t + theta h` of the latest attempt, 0 <= theta <= 1, from the state and
     /// derivative at its start.
     pub fn interpolate(&self, part: Range<usize>, theta: f64, h: f64, y: &[f64], k: &[f64], out: &mut [f64]) {
-        let (theta, h) = (theta * self.kept, h / self.kept);
+        let (theta, h) = (theta * self.remaining_fraction, h / self.remaining_fraction);
         let s = 1.0 - theta;
         let Self { k3, k4, k5, k6, raw_end: y_end, raw_k_end: k_end, .. } = self;
         let [y, k, k3, k4, k5, k6, y_end, k_end] = [y, k, k3, k4, k5, k6, y_end, k_end].map(|x| &x[part.clone()]);
@@ -80,16 +80,16 @@ impl DormandPrince {
         }
     }
 
-    /// Estimate of h |lambda| for the latest attempt, from the two evaluations at its end, in the `moving` components; 0 if it
-    /// was truncated. Beyond about 3.25 the step is limited by stability, not accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
-    pub fn stiffness(&self, moving: &[Range<usize>], h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
+    /// Estimate of h |lambda| for the latest attempt, from the two evaluations at its end, in the components of `active_ranges`; 0 if
+    /// it was truncated. Beyond about 3.25 the step is limited by stability, not accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
+    pub fn stiffness(&self, active_ranges: &[Range<usize>], h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         let (mut rate, mut distance) = (0.0, 0.0);
-        for i in moving.iter().flat_map(Range::clone) {
+        for i in active_ranges.iter().flat_map(Range::clone) {
             let (dk, dy) = (k_end[i] - self.k6[i], y_end[i] - self.stage[i]);
             rate += dk * dk;
             distance += dy * dy;
         }
-        if distance > 0.0 && self.kept == 1.0 { h * (rate / distance).sqrt() } else { 0.0 }
+        if distance > 0.0 && self.remaining_fraction == 1.0 { h * (rate / distance).sqrt() } else { 0.0 }
     }
 }
 
@@ -104,30 +104,30 @@ impl Stepper for DormandPrince {
         y_end: &mut [f64],
         k_end: &mut [f64],
     ) -> f64 {
-        let Self { k2, k3, k4, k5, k6, stage, raw_end, raw_k_end, kept } = self;
-        *kept = 1.0;
-        system.announce(&C.map(|c| t + c * h));
+        let Self { k2, k3, k4, k5, k6, stage, raw_end, raw_k_end, remaining_fraction } = self;
+        *remaining_fraction = 1.0;
+        system.prepare_times(&C.map(|c| t + c * h));
         let [a2, a3, a4, a5, a6] = &A;
-        combine(system.moving(), stage, y, h, [(a2[0], k)]);
+        combine(system.active_ranges(), stage, y, h, [(a2[0], k)]);
         system.derivative(t + C[0] * h, stage, k2);
-        combine(system.moving(), stage, y, h, [(a3[0], k), (a3[1], k2)]);
+        combine(system.active_ranges(), stage, y, h, [(a3[0], k), (a3[1], k2)]);
         system.derivative(t + C[1] * h, stage, k3);
         let terms = [(a4[0], k), (a4[1], k2), (a4[2], k3)];
-        combine(system.moving(), stage, y, h, terms);
+        combine(system.active_ranges(), stage, y, h, terms);
         system.derivative(t + C[2] * h, stage, k4);
         let terms = [(a5[0], k), (a5[1], k2), (a5[2], k3), (a5[3], k4)];
-        combine(system.moving(), stage, y, h, terms);
+        combine(system.active_ranges(), stage, y, h, terms);
         system.derivative(t + C[3] * h, stage, k5);
         let terms = [(a6[0], k), (a6[1], k2), (a6[2], k3), (a6[3], k4), (a6[4], k5)];
-        combine(system.moving(), stage, y, h, terms);
+        combine(system.active_ranges(), stage, y, h, terms);
         system.derivative(t + C[4] * h, stage, k6);
         let terms = [(B[0], k), (B[1], k3), (B[2], k4), (B[3], k5), (B[4], k6)];
-        combine(system.moving(), y_end, y, h, terms);
+        combine(system.active_ranges(), y_end, y, h, terms);
         system.derivative(t + h, y_end, k_end);
-        copy(system.moving(), raw_end, y_end);
-        copy(system.moving(), raw_k_end, k_end);
+        copy(system.active_ranges(), raw_end, y_end);
+        copy(system.active_ranges(), raw_k_end, k_end);
         let mut error = 0.0;
-        for part in system.moving() {
+        for part in system.active_ranges() {
             let [k, k3, k4, k5, k6, k_end, scale] =
                 [k, k3, k4, k5, k6, k_end, system.scale()].map(|x| &x[part.clone()]);
             for i in 0..part.len() {

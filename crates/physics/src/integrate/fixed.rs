@@ -67,11 +67,11 @@ impl Stepper for RungeKutta4 {
     ) -> f64 {
         let n = y.len();
         let Self { k2, k3, k4, stage } = self;
-        combine(system.moving(), stage, y, 0.5 * h, [(1.0, k)]);
+        combine(system.active_ranges(), stage, y, 0.5 * h, [(1.0, k)]);
         system.derivative(t + 0.5 * h, stage, k2);
-        combine(system.moving(), stage, y, 0.5 * h, [(1.0, k2)]);
+        combine(system.active_ranges(), stage, y, 0.5 * h, [(1.0, k2)]);
         system.derivative(t + 0.5 * h, stage, k3);
-        combine(system.moving(), stage, y, h, [(1.0, k3)]);
+        combine(system.active_ranges(), stage, y, h, [(1.0, k3)]);
         system.derivative(t + h, stage, k4);
         let [k, k2, k3, k4] = [k, k2, k3, k4].map(|k| &k[..n]);
         let y_end = &mut y_end[..n];

@@ -46,7 +46,7 @@ words!(Method {
     Automatic => "automatic",
 });
 
-/// What sets the size of a method's steps.
+/// Rule for the size of a method's steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepControl {
     /// `solver.step` is the step.
@@ -63,7 +63,7 @@ impl Method {
         self == Self::Radau5
     }
 
-    /// What sets the size of its steps.
+    /// Rule for the size of its steps.
     pub fn control(self) -> StepControl {
         match self {
             Self::SemiImplicitEuler | Self::RungeKutta4 => StepControl::Fixed,
@@ -86,10 +86,10 @@ pub trait System {
     fn positions(&self) -> usize;
     /// Components that steps advance, in order. All other components are frozen and must not be touched; their derivatives are
     /// zero.
-    fn moving(&self) -> &[Range<usize>];
-    /// Announces instants for which [`Self::derivative`] will be asked, so that what depends on time alone can be computed for all
-    /// of them together.
-    fn announce(&mut self, _times: &[f64]) {}
+    fn active_ranges(&self) -> &[Range<usize>];
+    /// Prepares for calls of [`Self::derivative`] at `times`, s: quantities that depend on time alone can then be computed for
+    /// all of them together.
+    fn prepare_times(&mut self, _times: &[f64]) {}
     /// Writes f(t, y) to `dy`.
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
     /// Writes the position part of f alone to the first [`System::positions`] components of `dy`; evaluates no force.
@@ -210,7 +210,7 @@ mod tests {
         fn positions(&self) -> usize {
             1
         }
-        fn moving(&self) -> &[Range<usize>] {
+        fn active_ranges(&self) -> &[Range<usize>] {
             std::slice::from_ref(&(0..2))
         }
         fn derivative(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn each_stepper_shows_its_order() {
+    fn each_stepper_has_its_order() {
         let euler = observed_order(&mut SemiImplicitEuler::new(2), 400);
         let rk4 = observed_order(&mut RungeKutta4::new(2), 40);
         let dopri = observed_order(&mut DormandPrince::new(2), 20);
@@ -252,17 +252,17 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_move_is_not_looked_at() {
+    fn frozen_components_are_not_read() {
         let step = |y: &[f64], k: &mut [f64], end: &mut [f64], k_end: &mut [f64]| {
             Oscillator.derivative(0.0, y, k);
             DormandPrince::new(y.len()).attempt(&mut Oscillator, 0.0, 0.3, y, k, end, k_end)
         };
-        let (mut alone, mut beside) = ([0.0; 2], [0.0; 3]);
+        let (mut alone, mut with_frozen) = ([0.0; 2], [0.0; 3]);
         let error = step(&[1.0, 0.2], &mut [0.0; 2], &mut alone, &mut [0.0; 2]);
         let unknown = f64::NAN;
         let y = [1.0, 0.2, unknown];
-        let same = step(&y, &mut [0.0, 0.0, unknown], &mut beside, &mut [0.0; 3]);
-        assert_eq!((error, &alone[..]), (same, &beside[..2]));
+        let same = step(&y, &mut [0.0, 0.0, unknown], &mut with_frozen, &mut [0.0; 3]);
+        assert_eq!((error, &alone[..]), (same, &with_frozen[..2]));
     }
 
     fn interpolation_error(h: f64) -> f64 {

@@ -1,35 +1,35 @@
 //! Order conditions of every method, main and embedded, and of its interpolant, by rooted trees (Hairer, Nørsett & Wanner,
 //! *Solving Ordinary Differential Equations I*, 2nd ed., II.2 and II.6).
 //!
-//! Butcher tableaux are read out of the running code: a system whose stage derivatives are unit vectors reveals them in the
-//! states at which the method evaluates and in its end state.
+//! The Butcher tableaux are read from the running code: if the stage derivatives of a system are unit vectors, the states at
+//! which the method evaluates, and its end state, are the rows of its tableau.
 
 use super::*;
 
 /// A rooted tree.
 #[derive(Clone, Debug)]
 struct Tree {
-    sons: Vec<Tree>,
+    children: Vec<Tree>,
 }
 
 impl Tree {
     fn order(&self) -> usize {
-        1 + self.sons.iter().map(Tree::order).sum::<usize>()
+        1 + self.children.iter().map(Tree::order).sum::<usize>()
     }
 
     /// gamma(t): in the exact solution, its elementary differential has the factor 1 / gamma.
     fn density(&self) -> f64 {
-        let sons: f64 = self.sons.iter().map(Tree::density).product();
-        self.order() as f64 * sons
+        let children: f64 = self.children.iter().map(Tree::density).product();
+        self.order() as f64 * children
     }
 
     /// Elementary weight of each stage.
     fn stages(&self, matrix: &[Vec<f64>]) -> Vec<f64> {
         let mut product = vec![1.0; matrix.len()];
-        for son in &self.sons {
-            let son = son.stages(matrix);
+        for child in &self.children {
+            let child = child.stages(matrix);
             for (weight, row) in product.iter_mut().zip(matrix) {
-                *weight *= dot(row, &son);
+                *weight *= dot(row, &child);
             }
         }
         product
@@ -45,8 +45,8 @@ fn trees(order: usize) -> Vec<Tree> {
     let mut all: Vec<Tree> = Vec::new();
     for n in 1..=order {
         let mut new = Vec::new();
-        for sons in forests(&all, n - 1, 0) {
-            new.push(Tree { sons });
+        for children in forests(&all, n - 1, 0) {
+            new.push(Tree { children });
         }
         all.extend(new);
     }
@@ -58,16 +58,16 @@ fn forests(all: &[Tree], vertices: usize, from: usize) -> Vec<Vec<Tree>> {
     if vertices == 0 {
         return vec![Vec::new()];
     }
-    let mut found = Vec::new();
+    let mut multisets = Vec::new();
     for (i, tree) in all.iter().enumerate().skip(from) {
         if tree.order() <= vertices {
             for mut rest in forests(all, vertices - tree.order(), i) {
                 rest.push(tree.clone());
-                found.push(rest);
+                multisets.push(rest);
             }
         }
     }
-    found
+    multisets
 }
 
 /// k_i = f(y + h sum a_ij k_j).
@@ -79,9 +79,9 @@ impl Tableau {
         let mut worst = vec![0.0_f64; order];
         for tree in trees(order) {
             let n = tree.order();
-            let wanted = theta.powi(n as i32) / tree.density();
+            let expected = theta.powi(n as i32) / tree.density();
             let got = dot(weights, &tree.stages(&self.0));
-            worst[n - 1] = worst[n - 1].max((got - wanted).abs());
+            worst[n - 1] = worst[n - 1].max((got - expected).abs());
         }
         worst
     }
@@ -104,7 +104,7 @@ struct Probe {
     slopes: Vec<Vec<f64>>,
     calls: usize,
     /// Times and states of the evaluations.
-    asked: Vec<(f64, Vec<f64>)>,
+    evaluations: Vec<(f64, Vec<f64>)>,
     scale: Vec<f64>,
     all: Range<usize>,
 }
@@ -116,7 +116,7 @@ impl Probe {
             slopes,
             // The first slope is passed in as the derivative at the start.
             calls: 1,
-            asked: vec![(0.0, vec![0.0; n])],
+            evaluations: vec![(0.0, vec![0.0; n])],
             scale: vec![1.0; n],
             all: 0..n,
         }
@@ -130,8 +130,8 @@ impl Probe {
 
     /// Rows of the coefficient matrix, whose sums are the times of the evaluations.
     fn rows(&self, stages: usize) -> Vec<Vec<f64>> {
-        let rows: Vec<Vec<f64>> = self.asked.iter().map(|(_, y)| y[..stages].to_vec()).collect();
-        for ((time, _), row) in self.asked.iter().zip(&rows) {
+        let rows: Vec<Vec<f64>> = self.evaluations.iter().map(|(_, y)| y[..stages].to_vec()).collect();
+        for ((time, _), row) in self.evaluations.iter().zip(&rows) {
             let sum: f64 = row.iter().sum();
             assert!((time - sum).abs() < ROUNDING, "{time} {row:?}");
         }
@@ -146,11 +146,11 @@ impl System for Probe {
     fn positions(&self) -> usize {
         0
     }
-    fn moving(&self) -> &[Range<usize>] {
+    fn active_ranges(&self) -> &[Range<usize>] {
         std::slice::from_ref(&self.all)
     }
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
-        self.asked.push((t, y.to_vec()));
+        self.evaluations.push((t, y.to_vec()));
         dy.copy_from_slice(&self.slopes[self.calls]);
         self.calls += 1;
     }
@@ -182,7 +182,7 @@ fn estimate(tree: &Tree, tableau: &Tableau, attempt: impl FnOnce(&mut Probe, &[f
 }
 
 #[test]
-fn there_are_as_many_trees_as_the_books_count() {
+fn the_numbers_of_trees_are_those_of_the_literature() {
     let count = |n: usize| {
         let all = trees(n);
         all.iter().filter(|t| t.order() == n).count()
@@ -191,7 +191,7 @@ fn there_are_as_many_trees_as_the_books_count() {
 }
 
 #[test]
-fn kutta_has_order_four_and_the_cubic_through_its_ends_three() {
+fn the_classical_runge_kutta_method_has_order_four_and_its_hermite_cubic_three() {
     let (tableau, weights) = explicit(&mut RungeKutta4::new(5), 5);
     tableau.assert_order("rk4", &weights, 1.0, 4);
     // The fifth stage is the derivative at the end.
@@ -205,7 +205,7 @@ fn kutta_has_order_four_and_the_cubic_through_its_ends_three() {
 }
 
 #[test]
-fn dormand_and_prince_have_order_five_four_inside_and_four_embedded() {
+fn dormand_prince_has_order_five_and_its_interpolant_and_embedded_method_four() {
     let mut stepper = DormandPrince::new(7);
     let (tableau, weights) = explicit(&mut stepper, 7);
     tableau.assert_order("dopri5", &weights, 1.0, 5);
@@ -230,7 +230,7 @@ fn dormand_and_prince_have_order_five_four_inside_and_four_embedded() {
 }
 
 #[test]
-fn radau_has_order_five_three_inside_and_three_embedded() {
+fn radau_has_order_five_and_its_interpolant_and_embedded_method_three() {
     let (a, embedded) = radau::tableau();
     let tableau = Tableau(a.to_vec());
     for (c, row) in radau::C.iter().zip(&a) {
@@ -258,7 +258,7 @@ impl System for Falling {
     fn positions(&self) -> usize {
         1
     }
-    fn moving(&self) -> &[Range<usize>] {
+    fn active_ranges(&self) -> &[Range<usize>] {
         std::slice::from_ref(&(0..2))
     }
     fn derivative(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
@@ -273,7 +273,7 @@ impl System for Falling {
 }
 
 #[test]
-fn semi_implicit_euler_meets_the_conditions_of_order_one_and_no_more() {
+fn semi_implicit_euler_has_order_one_exactly() {
     let h = 0.25;
     for (v, a) in [(1.0, 0.0), (0.0, 1.0)] {
         let (y, k) = ([0.0, v], [v, a]);

@@ -27,22 +27,22 @@ const T_INVERSE: [[f64; 3]; 3] = [
     [-4.178_718_591_551_905, -0.327_682_820_761_062_4, 0.476_623_554_500_550_45],
     [-0.502_872_634_945_786_9, 2.571_926_949_855_605, -0.596_039_204_828_224_9],
 ];
-const MOST_ITERATIONS: u32 = 7;
+const MAX_ITERATIONS: u32 = 7;
 /// Largest step ratio at which the previous step's polynomial still predicts the next step.
-const FURTHEST: f64 = 10.0;
+const MAX_STEP_RATIO: f64 = 10.0;
 /// Contraction rate targeted by the step size (Gustafsson & Söderlind, SIAM J. Sci. Comput. 18, 1997): the rate is about
 /// proportional to the step, and steps chosen by their error alone grow until every other iteration fails.
-const AIMED_CONTRACTION: f64 = 0.5;
-/// After a failed iteration, steps are limited to the fraction `HELD` of the failed one. The limit grows by the factor `RELEASE`
-/// per step until an iteration contracts faster than `FAST`.
-const HELD: f64 = 0.5;
-const RELEASE: f64 = 1.3;
-const FAST: f64 = 0.05;
+const TARGET_CONTRACTION: f64 = 0.5;
+/// After a failed iteration, steps are limited to the fraction `STEP_AFTER_FAILURE` of the failed one. The limit grows by the
+/// factor `LIMIT_GROWTH` per step until an iteration contracts faster than `FAST_CONTRACTION`.
+const STEP_AFTER_FAILURE: f64 = 0.5;
+const LIMIT_GROWTH: f64 = 1.3;
+const FAST_CONTRACTION: f64 = 0.05;
 /// Fraction of the allowed error that the iteration may leave (Hairer & Wanner II, IV.8).
-const LEFT: f64 = 0.03;
+const ITERATION_ERROR: f64 = 0.03;
 
-/// Collocation polynomial of the latest attempt: its interpolant, and the starting guess for the next one. It belongs to the state
-/// of a run.
+/// Collocation polynomial of the latest attempt: its interpolant, and the starting guess for the next one. It belongs to the
+/// state of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Polynomial {
     /// Step size, s; 0 if there is none.
@@ -80,9 +80,9 @@ impl Polynomial {
     pub fn truncate(&mut self, theta: f64) {
         let n = self.z[0].len();
         for i in 0..n {
-            let course = DenseOutput::of(&std::array::from_fn(|j| self.z[j][i]));
+            let dense_output = DenseOutput::of(&std::array::from_fn(|j| self.z[j][i]));
             for j in 0..3 {
-                self.z[j][i] = course.at(C[j] * theta - 1.0);
+                self.z[j][i] = dense_output.at(C[j] * theta - 1.0);
             }
         }
         self.end -= (1.0 - theta) * self.h;
@@ -98,10 +98,10 @@ impl Polynomial {
         }
     }
 
-    /// Remembers the attempt of size `h` from `t` with the stage increments `z`.
-    fn remember(&mut self, moving: &[Range<usize>], t: f64, h: f64, z: &[Vec<f64>; 3]) {
+    /// Stores the attempt of size `h` from `t` with the stage increments `z`.
+    fn store(&mut self, active_ranges: &[Range<usize>], t: f64, h: f64, z: &[Vec<f64>; 3]) {
         for (to, z) in self.z.iter_mut().zip(z) {
-            copy(moving, to, z);
+            copy(active_ranges, to, z);
         }
         self.h = h;
         self.end = t + h;
@@ -164,7 +164,7 @@ impl Radau {
         previous: &mut Polynomial,
     ) -> f64 {
         self.factorisations = 0;
-        if self.begin(system.moving(), t, h, previous) {
+        if self.set_initial_guess(system.active_ranges(), t, h, previous) {
             self.linearise_within(system, t, h, y);
         } else {
             if self.linearised_at != Some(t) {
@@ -174,23 +174,23 @@ impl Radau {
             self.factor(system, h);
         }
         let converged = self.iterate(system, t, h, y, tolerance, previous);
-        self.growth = AIMED_CONTRACTION / self.contraction;
+        self.growth = TARGET_CONTRACTION / self.contraction;
         if !converged {
-            previous.held = Some(HELD * h);
+            previous.held = Some(STEP_AFTER_FAILURE * h);
             return f64::INFINITY;
         }
-        if (f64::MIN_POSITIVE..FAST).contains(&self.contraction) {
+        if (f64::MIN_POSITIVE..FAST_CONTRACTION).contains(&self.contraction) {
             previous.held = None;
         } else if let Some(held) = &mut previous.held {
-            *held *= RELEASE;
+            *held *= LIMIT_GROWTH;
             self.growth = self.growth.min(*held / h);
         }
-        add(system.moving(), y_end, y, &self.z[2]);
+        add(system.active_ranges(), y_end, y, &self.z[2]);
         let error = self.estimate(system, t, h, y, k, tolerance);
         system.derivative(t + h, y_end, k_end);
         // A diverged attempt is no guess for the next one.
         if error.is_finite() {
-            previous.remember(system.moving(), t, h, &self.z);
+            previous.store(system.active_ranges(), t, h, &self.z);
         }
         error
     }
@@ -207,10 +207,10 @@ impl Radau {
 
     /// Starting guess for the stages: the extrapolated polynomial of the previous step, or that of a longer attempt from the same
     /// point. Returns true for the former; an earlier attempt may have failed by diverging.
-    fn begin(&mut self, moving: &[Range<usize>], t: f64, h: f64, previous: &Polynomial) -> bool {
-        let again = previous.h > 0.0 && (previous.end - previous.h - t).abs() <= 1e-9 * h;
-        let follows = previous.h > 0.0 && (previous.end - t).abs() <= 1e-9 * h && h <= FURTHEST * previous.h;
-        if !again && !follows {
+    fn set_initial_guess(&mut self, active_ranges: &[Range<usize>], t: f64, h: f64, previous: &Polynomial) -> bool {
+        let repeats = previous.h > 0.0 && (previous.end - previous.h - t).abs() <= 1e-9 * h;
+        let continues = previous.h > 0.0 && (previous.end - t).abs() <= 1e-9 * h && h <= MAX_STEP_RATIO * previous.h;
+        if !repeats && !continues {
             for j in 0..3 {
                 self.z[j].fill(0.0);
                 self.w[j].fill(0.0);
@@ -219,28 +219,28 @@ impl Radau {
         }
         let ratio = h / previous.h;
         // The polynomial is in s = (time - step's end) / h_previous and gives increments from its own start.
-        let from = if again { -1.0 } else { 0.0 };
+        let from = if repeats { -1.0 } else { 0.0 };
         let at = C.map(|c| from + c * ratio);
-        for part in moving {
-            let before = previous.z.each_ref().map(|z| &z[part.clone()]);
+        for part in active_ranges {
+            let increments = previous.z.each_ref().map(|z| &z[part.clone()]);
             let [z1, z2, z3] = self.z.each_mut().map(|z| &mut z[part.clone()]);
             let [w1, w2, w3] = self.w.each_mut().map(|w| &mut w[part.clone()]);
             for i in 0..part.len() {
-                let course = DenseOutput::of(&before.map(|z| z[i]));
-                let start = course.at(from);
-                let z = at.map(|s| course.at(s) - start);
+                let dense_output = DenseOutput::of(&increments.map(|z| z[i]));
+                let start = dense_output.at(from);
+                let z = at.map(|s| dense_output.at(s) - start);
                 [z1[i], z2[i], z3[i]] = z;
-                [w1[i], w2[i], w3[i]] = times(&T_INVERSE, &z);
+                [w1[i], w2[i], w3[i]] = multiply(&T_INVERSE, &z);
             }
         }
-        !again
+        !repeats
     }
 
     /// Evaluates the Jacobian at the current estimate of the second stage. Where a contact normal turns within the step, a
     /// Jacobian from the start fits the end badly. This one serves all three stages, and the order of the method does not depend
     /// on it.
     fn linearise_within<S: StiffSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64]) {
-        add(system.moving(), &mut self.stage, y, &self.z[1]);
+        add(system.active_ranges(), &mut self.stage, y, &self.z[1]);
         system.linearise(t + C[1] * h, &self.stage);
         self.linearised_at = None;
         self.factor(system, h);
@@ -263,26 +263,26 @@ impl Radau {
         tolerance: f64,
         previous: &mut Polynomial,
     ) -> bool {
-        // The iteration error stays well below the step error.
-        let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(LEFT));
+        // The iteration error must be well below the step error.
+        let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(ITERATION_ERROR));
         let (real, alpha, beta) = (REAL / h, PAIR.0 / h, PAIR.1 / h);
         // After fast convergence in previous steps, one iteration may be enough; that trust decays (Hairer & Wanner II, IV.8).
-        let trusted = libm::pow(previous.contraction.max(f64::EPSILON), 0.8);
-        previous.contraction = trusted;
+        let expected = libm::pow(previous.contraction.max(f64::EPSILON), 0.8);
+        previous.contraction = expected;
         self.contraction = 0.0;
-        let mut before = 0.0;
-        let mut renewed = false;
-        system.announce(&C.map(|c| t + c * h));
-        for iteration in 0..MOST_ITERATIONS {
+        let mut previous_size = 0.0;
+        let mut has_new_jacobian = false;
+        system.prepare_times(&C.map(|c| t + c * h));
+        for iteration in 0..MAX_ITERATIONS {
             for j in 0..3 {
-                add(system.moving(), &mut self.stage, y, &self.z[j]);
+                add(system.active_ranges(), &mut self.stage, y, &self.z[j]);
                 system.derivative(t + C[j] * h, &self.stage, &mut self.f[j]);
             }
-            for part in system.moving() {
+            for part in system.active_ranges() {
                 let [f1, f2, f3] = self.f.each_mut().map(|f| &mut f[part.clone()]);
                 let [w1, w2, w3] = self.w.each_ref().map(|w| &w[part.clone()]);
                 for i in 0..part.len() {
-                    let a = times(&T_INVERSE, &[f1[i], f2[i], f3[i]]);
+                    let a = multiply(&T_INVERSE, &[f1[i], f2[i], f3[i]]);
                     f1[i] = a[0] - real * w1[i];
                     f2[i] = a[1] - alpha * w2[i] + beta * w3[i];
                     f3[i] = a[2] - alpha * w3[i] - beta * w2[i];
@@ -292,7 +292,7 @@ impl Radau {
             system.solve_shifted(f1);
             system.solve_shifted_pair(f2, f3);
             let mut size: f64 = 0.0;
-            for part in system.moving() {
+            for part in system.active_ranges() {
                 let scale = &system.scale()[part.clone()];
                 let [f1, f2, f3] = self.f.each_ref().map(|f| &f[part.clone()]);
                 let [w1, w2, w3] = self.w.each_mut().map(|w| &mut w[part.clone()]);
@@ -301,7 +301,7 @@ impl Radau {
                     let f = [f1[i], f2[i], f3[i]];
                     let w = [w1[i] + f[0], w2[i] + f[1], w3[i] + f[2]];
                     [w1[i], w2[i], w3[i]] = w;
-                    [z1[i], z2[i], z3[i]] = times(&T, &w);
+                    [z1[i], z2[i], z3[i]] = multiply(&T, &w);
                     let largest = 0.0_f64.max(f[0].abs()).max(f[1].abs()).max(f[2].abs());
                     let relative = largest / (tolerance * scale[i]);
                     if relative > size || relative.is_nan() {
@@ -313,12 +313,12 @@ impl Radau {
                 return false;
             }
             if iteration == 0 {
-                if trusted * size <= target {
+                if expected * size <= target {
                     return true;
                 }
             } else {
-                let theta = size / before;
-                // Rounding keeps the last corrections from shrinking further.
+                let theta = size / previous_size;
+                // Corrections at rounding level do not shrink further.
                 if size <= 0.1 * target {
                     return true;
                 }
@@ -326,24 +326,24 @@ impl Radau {
                 let mut fails = theta >= 0.99;
                 if !fails {
                     previous.contraction = theta / (1.0 - theta);
-                    let left = previous.contraction * size;
-                    if left <= target {
+                    let remaining_error = previous.contraction * size;
+                    if remaining_error <= target {
                         return true;
                     }
-                    let remaining = (MOST_ITERATIONS - 1 - iteration) as i32;
-                    fails = left * theta.powi(remaining) > target;
+                    let remaining_iterations = (MAX_ITERATIONS - 1 - iteration) as i32;
+                    fails = remaining_error * theta.powi(remaining_iterations) > target;
                 }
                 if fails {
                     // A contracting iteration is closer to the solution: with a new Jacobian there it usually converges, at less
                     // cost than another attempt.
-                    if renewed || theta > 1.0 {
+                    if has_new_jacobian || theta > 1.0 {
                         return false;
                     }
-                    renewed = true;
+                    has_new_jacobian = true;
                     self.linearise_within(system, t, h, y);
                 }
             }
-            before = size;
+            previous_size = size;
         }
         false
     }
@@ -358,23 +358,23 @@ impl Radau {
         k: &[f64],
         tolerance: f64,
     ) -> f64 {
-        copy(system.moving(), &mut self.error, k);
-        self.add_weighted(system.moving(), h);
+        copy(system.active_ranges(), &mut self.error, k);
+        self.add_weighted(system.active_ranges(), h);
         system.solve_shifted(&mut self.error);
-        let mut error = largest(system.moving(), &self.error, system.scale());
+        let mut error = largest(system.active_ranges(), &self.error, system.scale());
         if error > tolerance {
-            add(system.moving(), &mut self.stage, y, &self.error);
+            add(system.active_ranges(), &mut self.stage, y, &self.error);
             system.derivative(t, &self.stage, &mut self.error);
-            self.add_weighted(system.moving(), h);
+            self.add_weighted(system.active_ranges(), h);
             system.solve_shifted(&mut self.error);
-            error = largest(system.moving(), &self.error, system.scale());
+            error = largest(system.active_ranges(), &self.error, system.scale());
         }
         error
     }
 
     /// Adds the stages' part of the estimate to the derivative in `error`.
-    fn add_weighted(&mut self, moving: &[Range<usize>], h: f64) {
-        for part in moving {
+    fn add_weighted(&mut self, active_ranges: &[Range<usize>], h: f64) {
+        for part in active_ranges {
             let [z1, z2, z3] = self.z.each_ref().map(|z| &z[part.clone()]);
             for (i, error) in self.error[part.clone()].iter_mut().enumerate() {
                 *error += (ERROR[0] * z1[i] + ERROR[1] * z2[i] + ERROR[2] * z3[i]) / h;
@@ -395,7 +395,7 @@ fn add(parts: &[Range<usize>], out: &mut [f64], y: &[f64], z: &[f64]) {
 
 /// m x.
 #[inline(always)]
-fn times(m: &[[f64; 3]; 3], x: &[f64; 3]) -> [f64; 3] {
+fn multiply(m: &[[f64; 3]; 3], x: &[f64; 3]) -> [f64; 3] {
     m.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
 }
 
@@ -483,7 +483,7 @@ mod tests {
         fn positions(&self) -> usize {
             0
         }
-        fn moving(&self) -> &[Range<usize>] {
+        fn active_ranges(&self) -> &[Range<usize>] {
             std::slice::from_ref(&(0..2))
         }
         fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
@@ -537,7 +537,7 @@ mod tests {
     }
 
     #[test]
-    fn order_is_five_on_a_smooth_problem() {
+    fn the_order_is_five_on_a_smooth_problem() {
         let fine = end(1.0, 512);
         let error = |steps: u32| {
             let y = end(1.0, steps);
@@ -548,7 +548,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_move_is_not_looked_at() {
+    fn frozen_components_are_not_read() {
         // Two steps: the second starts from the polynomial of the first.
         let steps = |y: &[f64], k: &[f64]| {
             let (mut y, mut k) = (y.to_vec(), k.to_vec());
@@ -573,7 +573,7 @@ mod tests {
     }
 
     #[test]
-    fn transformation_and_its_inverse_belong_together() {
+    fn the_transformation_times_its_inverse_is_the_identity() {
         for i in 0..3 {
             for j in 0..3 {
                 let product: f64 = (0..3).map(|k| T[i][k] * T_INVERSE[k][j]).sum();
@@ -584,12 +584,12 @@ mod tests {
     }
 
     #[test]
-    fn polynomial_passes_through_its_stages() {
+    fn the_polynomial_passes_through_its_stages() {
         let z = [0.3, -0.7, 1.1];
-        let course = DenseOutput::of(&z);
-        assert!(course.at(-1.0).abs() < 1e-15);
+        let dense_output = DenseOutput::of(&z);
+        assert!(dense_output.at(-1.0).abs() < 1e-15);
         for j in 0..3 {
-            assert!((course.at(C[j] - 1.0) - z[j]).abs() < 1e-14);
+            assert!((dense_output.at(C[j] - 1.0) - z[j]).abs() < 1e-14);
         }
     }
 }

@@ -16,7 +16,7 @@ pub fn find_root(
     if fb == 0.0 {
         return b;
     }
-    // Which end moved last: Illinois halves the value at an end retained twice in a row.
+    // The end that moved last: the Illinois method halves the value at an end that is retained twice in a row.
     let mut moved = 0_i8;
     for _ in 0..80 {
         if (b - a).abs() <= width {
@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn finds_the_crossing_and_ends_on_its_far_side() {
+    fn the_root_is_found_and_lies_on_the_far_side_of_the_crossing() {
         let f = |x: f64| x * x * x - 0.3;
         let root = find_root(0.0, f(0.0), 1.0, f(1.0), 1e-14, 0.0, f);
         assert!((root - libm::cbrt(0.3)).abs() < 1e-13);

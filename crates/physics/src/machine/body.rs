@@ -120,7 +120,7 @@ pub enum Geometry {
     Plate {
         /// Corners in order, in one plane.
         corners: Vec<Vec3>,
-        /// Triangulation, as indices of corners ([`super::fill`]).
+        /// Triangulation, as indices of corners ([`super::triangulate`]).
         triangles: Vec<[usize; 3]>,
         /// Thickness.
         thickness: f64,

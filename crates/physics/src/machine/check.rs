@@ -9,20 +9,20 @@ use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::StepControl;
 use crate::units::{Dimension, format_quantity, unit_names};
 
-/// Fewest fixed steps per impact: with fewer, much of it is lost; twice as many resolve it.
-pub const LEAST_IMPACT_STEPS: u64 = 5;
+/// Minimum number of fixed steps per impact. With fewer, much of the impact is lost; twice as many resolve it.
+pub const MIN_IMPACT_STEPS: u64 = 5;
 
 /// Loosest tolerance at which impacts conserve energy to a few per cent.
-const LOOSEST: f64 = 1e-3;
+const LOOSEST_TOLERANCE: f64 = 1e-3;
 
-/// Most sentences about ball joints; one more stands for the rest.
-const MOST_LISTED: usize = 40;
+/// Maximum number of sentences about ball joints; one more stands for the rest.
+const MAX_LISTED: usize = 40;
 
 /// Largest accepted error of a law's restitution. The paper's 0.9, which its law turns into 0.913, is within it.
 const RESTITUTION_ERROR: f64 = 0.02;
 
-/// A slide's stop counts as a ball of this many times its depth.
-const OF_A_DEPTH: f64 = 50.0;
+/// A stop of a slide counts as a ball with a radius of this many times its depth.
+const DEPTH_FACTOR: f64 = 50.0;
 
 /// Allowed asymmetry of an inertia, as a fraction of its largest component.
 const ROUNDING: f64 = 1e-9;
@@ -102,8 +102,9 @@ pub enum MachineFault {
     },
 }
 
-/// Why a body needs a mass. One without mass and inertia that carries another body on a slide or a hinge only connects their
-/// joints, as the cross of a universal joint does: the mass matrix has the mass of all bodies beyond a joint on its diagonal.
+/// Why a body needs a mass. A body without mass and inertia may only connect joints, as the cross of a universal joint does: the
+/// mass matrix has the mass of all bodies beyond a joint on its diagonal, so that it must carry another body on a slide or a
+/// hinge.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MasslessFault {
     /// Nothing bounds its motion.
@@ -168,8 +169,8 @@ impl Machine {
         }
         self.check_massless()
             .map_err(|(index, why)| MachineFault::Massless { body: self.bodies[index].name.clone(), why })?;
-        let late = self.joints.iter().find(|joint| joint.parent.is_some_and(|parent| parent >= joint.child));
-        late.map_or(Ok(()), |joint| Err(MachineFault::Order { body: joint.child }))?;
+        let misplaced = self.joints.iter().find(|joint| joint.parent.is_some_and(|parent| parent >= joint.child));
+        misplaced.map_or(Ok(()), |joint| Err(MachineFault::Order { body: joint.child }))?;
         for joint in &self.closing_joints {
             exists(&joint.name, joint.parent.max(Some(joint.child)))?;
         }
@@ -230,7 +231,7 @@ impl Machine {
         let radii = self.ball_joints.iter().map(|joint| joint.contact.ball_radius);
         let closing = self.closing_joints.iter().map(|_| self.contact.ball_radius);
         let depths = self.elements.iter().filter_map(|element| match &element.kind {
-            ElementKind::Stop(stop) if !element.is_on_hinge() => Some(OF_A_DEPTH * stop.depth),
+            ElementKind::Stop(stop) if !element.is_on_hinge() => Some(DEPTH_FACTOR * stop.depth),
             ElementKind::Stop(_)
             | ElementKind::Spring(_)
             | ElementKind::Load(_)
@@ -258,7 +259,7 @@ impl Machine {
         let mut warnings: Vec<Warning> = doubts.map(Warning::Doubt).collect();
         let doubts = warnings.len();
         for (joints, contact) in self.contact_groups() {
-            if warnings.len() - doubts >= MOST_LISTED {
+            if warnings.len() - doubts >= MAX_LISTED {
                 warnings.push(Warning::Doubt(Doubt::MoreJoints));
                 break;
             }
@@ -277,14 +278,14 @@ impl Machine {
     pub fn doubts(&self) -> Vec<Doubt> {
         let mut doubts = Vec::new();
         for (joints, contact) in self.contact_groups() {
-            if doubts.len() >= MOST_LISTED {
+            if doubts.len() >= MAX_LISTED {
                 doubts.push(Doubt::MoreJoints);
                 break;
             }
-            let (law, asked) = (contact.normal_law, contact.restitution);
-            let given = contact::undisturbed_restitution(contact::damping_factor(law, asked));
-            if contact.clearance > 0.0 && (given - asked).abs() > RESTITUTION_ERROR {
-                doubts.push(Doubt::Restitution { joints: joints.clone(), law, asked, given });
+            let (law, requested) = (contact.normal_law, contact.restitution);
+            let achieved = contact::undisturbed_restitution(contact::damping_factor(law, requested));
+            if contact.clearance > 0.0 && (achieved - requested).abs() > RESTITUTION_ERROR {
+                doubts.push(Doubt::Restitution { joints: joints.clone(), law, requested, achieved });
             }
             if contact.clearance > 0.0
                 && contact.friction_velocity == FrictionVelocity::Printed
@@ -308,9 +309,10 @@ impl Machine {
 
     /// Warns of a tolerance too loose for impacts.
     fn tolerance_warning(&self) -> Option<Doubt> {
-        let rattles = self.ball_joints.iter().any(|j| j.contact.clearance > 0.0);
-        let loose = self.solver.method.is_adaptive() && self.solver.tolerance > LOOSEST;
-        (rattles && loose).then_some(Doubt::Tolerance { tolerance: self.solver.tolerance, loosest: LOOSEST })
+        let has_clearance = self.ball_joints.iter().any(|j| j.contact.clearance > 0.0);
+        let loose = self.solver.method.is_adaptive() && self.solver.tolerance > LOOSEST_TOLERANCE;
+        (has_clearance && loose)
+            .then_some(Doubt::Tolerance { tolerance: self.solver.tolerance, loosest: LOOSEST_TOLERANCE })
     }
 
     /// Warns of a fixed step too long for the shortest expected impact, and recommends a shorter one.
@@ -319,13 +321,13 @@ impl Machine {
             return None;
         }
         let clearances = self.ball_joints.iter().filter(|j| j.contact.clearance > 0.0);
-        let pushes = self.pushes();
+        let element_forces = self.element_forces();
         let (joint, duration) = clearances
-            .map(|joint| (joint, self.impact_duration(joint, &pushes)))
+            .map(|joint| (joint, self.impact_duration(joint, &element_forces)))
             .min_by(|a, b| (a.1.0 / a.1.1).total_cmp(&(b.1.0 / b.1.1)))?;
         let (impact, friction) = duration;
         let duration = impact / friction;
-        let steps = LEAST_IMPACT_STEPS as f64;
+        let steps = MIN_IMPACT_STEPS as f64;
         if self.solver.step <= duration / steps {
             return None;
         }
@@ -344,40 +346,40 @@ impl Machine {
     }
 
     /// Number of ball joints with clearance.
-    pub fn loose_joints(&self) -> usize {
+    pub fn joints_with_clearance(&self) -> usize {
         self.ball_joints.iter().filter(|joint| joint.contact.clearance > 0.0).count()
     }
 
     /// Sum of the magnitudes of the element forces on each body, N, without the stretch of springs, which needs the start poses.
-    fn pushes(&self) -> Vec<f64> {
-        let mut pushes = vec![0.0; self.bodies.len()];
+    fn element_forces(&self) -> Vec<f64> {
+        let mut element_forces = vec![0.0; self.bodies.len()];
         for element in &self.elements {
             for body in element.points(self).iter().filter_map(|point| point.body) {
-                pushes[body] += element.own_force();
+                element_forces[body] += element.own_force();
             }
         }
-        pushes
+        element_forces
     }
 
     /// Bound on the relative acceleration of bodies under gravity and forces, given as pairs of N and kg, m/s^2.
-    pub fn most_acceleration(&self, pushes: impl IntoIterator<Item = (f64, f64)>) -> f64 {
-        let pushes = pushes.into_iter().map(|(force, mass)| force / mass);
-        pushes.fold(self.gravity.norm(), |sum, push| sum + push)
+    pub fn max_acceleration(&self, element_forces: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+        let element_forces = element_forces.into_iter().map(|(force, mass)| force / mass);
+        element_forces.fold(self.gravity.norm(), |sum, push| sum + push)
     }
 
-    /// Estimated duration of the first impact of a joint with clearance, s, when gravity and the forces `pushes` (N, by body)
-    /// drive its bodies through the gap, or of the oscillation under those forces, if shorter. The second value is how many times
-    /// within it friction could reverse sliding at the approach speed, at least 1.
-    fn impact_duration(&self, joint: &BallJoint, pushes: &[f64]) -> (f64, f64) {
+    /// Estimated duration of the first impact of a joint with clearance, s, when gravity and the forces `element_forces` (N, by
+    /// body) drive its bodies through the gap, or of the oscillation under those forces, if shorter. The second value is how many
+    /// times within it friction could reverse sliding at the approach speed, at least 1.
+    fn impact_duration(&self, joint: &BallJoint, element_forces: &[f64]) -> (f64, f64) {
         let c = &joint.contact;
         let coefficients = contact::Coefficients::new(c, c.clearance);
         // Inverse effective masses at the ball's centre, normal and in sliding: a force there also rotates the body.
         let (mut normal, mut sliding) = (0.0, 0.0);
-        let mut pushed = Vec::new();
+        let mut forces = Vec::new();
         for attachment in [&joint.ball, &joint.socket] {
             let Some(b) = attachment.body else { continue };
-            let (body, hung) = (&self.bodies[b], &self.joints[b]);
-            if hung.is_prescribed() {
+            let (body, joint) = (&self.bodies[b], &self.joints[b]);
+            if joint.is_prescribed() {
                 continue;
             }
             let arm = (attachment.point - body.centre).norm_squared();
@@ -389,13 +391,13 @@ impl Machine {
                 contact::FrictionVelocity::Centres | contact::FrictionVelocity::Printed => 0.0,
             };
             sliding += at_centre + turning;
-            pushed.push((pushes[b], body.mass));
+            forces.push((element_forces[b], body.mass));
         }
         if normal == 0.0 {
             return (f64::INFINITY, 1.0);
         }
-        let load = pushed.iter().map(|(force, _)| force).sum();
-        let fall = (2.0 * self.most_acceleration(pushed) * c.clearance).sqrt();
+        let load = forces.iter().map(|(force, _)| force).sum();
+        let fall = (2.0 * self.max_acceleration(forces) * c.clearance).sqrt();
         let speed = fall.max(c.impact_speed_floor);
         let (stiffness, damping) = (coefficients.stiffness, coefficients.damping);
         let duration = contact::impact_duration(stiffness, damping, 1.0 / normal, speed)
@@ -539,7 +541,7 @@ mod tests {
     }
 
     /// Estimated duration of the pendulum's impacts with these sections added, s, if a step of 10 us does not resolve it.
-    fn doubted(sections: &str) -> Option<f64> {
+    fn doubted_duration(sections: &str) -> Option<f64> {
         let text = format!("{}\n{sections}", built_in_text("pendulum").expect("built in"));
         let method = ("solver.method".to_owned(), "rk4".to_owned());
         let step = ("solver.step".to_owned(), "10 us".to_owned());
@@ -556,8 +558,8 @@ mod tests {
             let on = "{ body = \"rod\", at = [0, 0, 0] }";
             format!("[[load]]\nname = \"l\"\non = {on}\nforce = \"0 0 {force}\"\n")
         };
-        assert_eq!(doubted(&load("1 N")), None);
-        let [less, more] = ["-1e4 N", "-1e8 N"].map(|force| doubted(&load(force)).expect("short"));
+        assert_eq!(doubted_duration(&load("1 N")), None);
+        let [less, more] = ["-1e4 N", "-1e8 N"].map(|force| doubted_duration(&load(force)).expect("short"));
         assert!(less < 5e-5 && more < 0.5 * less, "{less:e} {more:e}");
     }
 }

@@ -10,7 +10,7 @@ pub struct ClosedForm {
     pub frequency: f64,
     /// Seconds of the functions' time per second: 1, unless the motion is to run slower or faster.
     pub pace: f64,
-    /// The functions, each of the time and of those before it.
+    /// The functions; each depends on the time and on the functions before it.
     pub functions: Vec<Function>,
     /// Motion of the output body where no joint has play, if known.
     pub path: Option<Path>,
@@ -25,7 +25,7 @@ pub struct Function {
     pub program: Program,
     /// Its unit in the base units, for messages; empty for a pure number.
     pub unit: String,
-    /// For a value that must be above 0, such as what is left of a rod's length: what is wrong where it is not.
+    /// For a value that must be above 0, such as the rest of a rod's length: description of the fault where it is not.
     pub positive: Option<String>,
 }
 
@@ -34,8 +34,8 @@ pub struct Function {
 pub struct Path {
     /// Its origin, world axes, m.
     pub position: [Program; 3],
-    /// Turns about unit vectors in the axes that the turns before have reached, with their angles, rad.
+    /// Successive rotations: unit axis, in the axes rotated so far, and angle, rad.
     pub turns: Vec<(Vec3, Program)>,
-    /// Where the machine was put as a whole: by which rotation about the world's origin, and then by which shift, m.
+    /// Placement of the whole machine: rotation about the world's origin, then shift, m.
     pub place: Option<(Mat3, Vec3)>,
 }

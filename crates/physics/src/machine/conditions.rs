@@ -1,4 +1,4 @@
-//! What may change while a machine runs.
+//! Parameters that may change while a machine runs.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +30,7 @@ impl Machine {
     }
 
     /// This machine under other conditions, given for as many ball joints.
-    pub fn under(&self, conditions: &Conditions) -> Self {
+    pub fn with_conditions(&self, conditions: &Conditions) -> Self {
         let mut machine = self.clone();
         machine.gravity = conditions.gravity;
         machine.contact = conditions.contact;
@@ -43,8 +43,8 @@ impl Machine {
 
     /// Whether `next` differs from this machine only in its conditions. The energy ledger does not count as one: it begins with
     /// the run.
-    pub fn differs_in_conditions_alone(&self, next: &Self) -> bool {
-        let mut like_next = self.under(&next.conditions());
+    pub fn differs_only_in_conditions(&self, next: &Self) -> bool {
+        let mut like_next = self.with_conditions(&next.conditions());
         like_next.solver.energy_ledger = self.solver.energy_ledger;
         like_next == *next
     }

@@ -15,9 +15,9 @@ pub enum Doubt {
         /// Their law.
         law: NormalLaw,
         /// Requested restitution.
-        asked: f64,
+        requested: f64,
         /// Restitution of an undisturbed impact.
-        given: f64,
+        achieved: f64,
     },
     /// A clearance so small that the contact patch is not small compared with the ball.
     Clearance {
@@ -63,12 +63,12 @@ impl fmt::Display for Doubt {
             Self::MoreJoints => {
                 f.write_str("Further ball joints have settings of their own; warnings about them are not listed.")
             }
-            Self::Restitution { joints, law, asked, given } => write!(
+            Self::Restitution { joints, law, requested, achieved } => write!(
                 f,
-                "{joints}: restitution {asked} with {} gives {given:.3} in an undisturbed impact; normal_law = \
+                "{joints}: restitution {requested} with {} gives {achieved:.3} in an undisturbed impact; normal_law = \
                  gonthier gives the restitution asked for{}.",
                 law.word(),
-                if *asked > 0.0 { "" } else { ", above 0" }
+                if *requested > 0.0 { "" } else { ", above 0" }
             ),
             Self::Clearance { joints, clearance, ball_radius } => write!(
                 f,
@@ -131,9 +131,9 @@ pub enum Warning {
         /// The same distance for the rest of its body or of the machine, m.
         rest: f64,
         /// A unit that fits.
-        better: &'static str,
+        suggested_unit: &'static str,
         /// `reach` in that unit, m.
-        at_better: f64,
+        suggested_reach: f64,
     },
 }
 
@@ -179,17 +179,17 @@ impl fmt::Display for Warning {
                 "{joints}: slip_speed_high {} makes friction very stiff; expect small steps.",
                 format_quantity(*slip_speed_high, "mm/s")
             ),
-            Self::MeshUnit { shape, others, unit, reach, rest, better, at_better } => {
+            Self::MeshUnit { shape, others, unit, reach, rest, suggested_unit, suggested_reach } => {
                 let length = |m: f64| format_quantity_digits(m, if m < 1.0 { "mm" } else { "m" }, 3);
                 let more = if *others > 0 { format!(" (and {others} more)") } else { String::new() };
                 write!(
                     f,
-                    "{shape}{more}: with the unit {} this mesh reaches {}, the rest of the machine {}; unit = \"{better}\" would \
+                    "{shape}{more}: with the unit {} this mesh reaches {}, the rest of the machine {}; unit = \"{suggested_unit}\" would \
                      make it {}.",
                     length(*unit),
                     length(*reach),
                     length(*rest),
-                    length(*at_better)
+                    length(*suggested_reach)
                 )
             }
         }

@@ -222,7 +222,7 @@ impl SpringSide {
 
 impl Elastic {
     /// Whether the tension is ever nonzero.
-    pub fn acts(&self) -> bool {
+    pub fn has_effect(&self) -> bool {
         match self {
             Self::Line { preload, stiffness } => *preload != 0.0 || *stiffness != 0.0,
             Self::Curve(points) => points.iter().any(|point| point[1] != 0.0),

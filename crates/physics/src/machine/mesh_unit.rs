@@ -5,12 +5,12 @@ use super::*;
 
 /// A mesh that extends this many times as far as the rest of the machine has the wrong unit: attachment points so close together
 /// are rare, and the error is a factor of 1000.
-const LARGE: f64 = 30.0;
+const MAX_RELATIVE_EXTENT: f64 = 30.0;
 
-/// Smallest plausible extent of a mesh, as a fraction of the extent of the rest of its body,
-const SMALL_ON_BODY: f64 = 0.01;
-/// and of the machine, which may have screws.
-const SMALL_IN_MACHINE: f64 = 0.001;
+/// Smallest plausible extent of a mesh, as a fraction of the extent of the rest of its body.
+const MIN_EXTENT_ON_BODY: f64 = 0.01;
+/// The same as a fraction of the extent of the machine, which may have screws.
+const MIN_EXTENT_IN_MACHINE: f64 = 0.001;
 
 /// Likely units of a file: value of the key `unit`, and length in m.
 const UNITS: [(&str, f64); 2] = [("mm", 1e-3), ("m", 1.0)];
@@ -22,9 +22,9 @@ impl Machine {
         if !self.bodies.iter().any(|body| body.shapes.iter().any(is_mesh)) {
             return None;
         }
-        let bodies = self.reaches_without_meshes();
+        let bodies = self.extents_without_meshes();
         let machine = bodies.iter().copied().fold(self.span_of_world_points(), f64::max);
-        let mut odd = Vec::new();
+        let mut implausible = Vec::new();
         for (body, own) in self.bodies.iter().zip(bodies) {
             for (index, shape) in body.shapes.iter().enumerate() {
                 let Geometry::Mesh { mesh, unit, .. } = &shape.geometry else { continue };
@@ -33,34 +33,40 @@ impl Machine {
                 let of_unit = Vec3::from(corner).norm();
                 let fault = |unit: f64| {
                     let reach = of_unit * unit;
-                    let large = reach / (LARGE * machine);
-                    let small = (SMALL_ON_BODY * own / reach).max(SMALL_IN_MACHINE * machine / reach);
+                    let large = reach / (MAX_RELATIVE_EXTENT * machine);
+                    let small = (MIN_EXTENT_ON_BODY * own / reach).max(MIN_EXTENT_IN_MACHINE * machine / reach);
                     large.max(small)
                 };
-                let better = UNITS.into_iter().find(|(_, other)| other != unit && fault(*other) <= 1.0);
-                if let (true, Some((better, other))) = (machine > 0.0 && fault(*unit) > 1.0, better) {
+                let suggested_unit = UNITS.into_iter().find(|(_, other)| other != unit && fault(*other) <= 1.0);
+                if let (true, Some((suggested_unit, other))) = (machine > 0.0 && fault(*unit) > 1.0, suggested_unit) {
                     let shape = format!("body.{}.shapes[{index}]", body.name);
-                    let rest = if of_unit * unit < SMALL_ON_BODY * own { own } else { machine };
-                    odd.push((fault(*unit), shape, [of_unit * unit, of_unit * other, rest], *unit, better));
+                    let rest = if of_unit * unit < MIN_EXTENT_ON_BODY * own { own } else { machine };
+                    implausible.push((
+                        fault(*unit),
+                        shape,
+                        [of_unit * unit, of_unit * other, rest],
+                        *unit,
+                        suggested_unit,
+                    ));
                 }
             }
         }
-        let others = odd.len().saturating_sub(1);
-        let worst = odd.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
-        worst.map(|(_, shape, [reach, at_better, rest], unit, better)| Warning::MeshUnit {
+        let others = implausible.len().saturating_sub(1);
+        let worst = implausible.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        worst.map(|(_, shape, [reach, suggested_reach, rest], unit, suggested_unit)| Warning::MeshUnit {
             shape,
             others,
             unit,
             reach,
             rest,
-            better,
-            at_better,
+            suggested_unit,
+            suggested_reach,
         })
     }
 
     /// Largest distance from each body's origin, m, of its attachment points, its shapes other than meshes, and its mass if the
     /// file gives that.
-    fn reaches_without_meshes(&self) -> Vec<f64> {
+    fn extents_without_meshes(&self) -> Vec<f64> {
         let mut reaches: Vec<f64> = vec![0.0; self.bodies.len()];
         for point in self.points() {
             if let Some(body) = point.body {

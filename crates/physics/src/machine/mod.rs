@@ -16,7 +16,7 @@ mod settings;
 mod solid;
 
 pub use body::*;
-pub use check::{ContactConflict, ContactFault, LEAST_IMPACT_STEPS, MachineFault, MasslessFault};
+pub use check::{ContactConflict, ContactFault, MIN_IMPACT_STEPS, MachineFault, MasslessFault};
 pub use closed_form::{ClosedForm, Function, Path};
 pub use conditions::Conditions;
 pub use doubts::*;
@@ -24,7 +24,7 @@ pub use drive::*;
 pub use element::*;
 pub use joint::*;
 pub use mesh::Mesh;
-pub use outline::{OutlineFault, fill};
+pub use outline::{OutlineFault, triangulate};
 pub use settings::*;
 pub use solid::Solid;
 

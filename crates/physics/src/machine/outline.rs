@@ -35,7 +35,7 @@ pub enum OutlineFault {
 ///
 /// # Errors
 /// The corners bound no area or are not in a plane, or edges cross.
-pub fn fill(corners: &[Vec3]) -> Result<Vec<[usize; 3]>, OutlineFault> {
+pub fn triangulate(corners: &[Vec3]) -> Result<Vec<[usize; 3]>, OutlineFault> {
     let n = corners.len();
     if n < 3 {
         return Err(OutlineFault::TooFew(n));
@@ -44,15 +44,15 @@ pub fn fill(corners: &[Vec3]) -> Result<Vec<[usize; 3]>, OutlineFault> {
         return Err(OutlineFault::Same(i + 1, (i + 1) % n + 1));
     }
     let middle = corners.iter().sum::<Vec3>() / n as f64;
-    let off = |i: usize| corners[i % n] - middle;
+    let from_middle = |i: usize| corners[i % n] - middle;
     // Newell's normal; its length is twice the area, whatever the shape.
-    let normal = (0..n).map(|i| off(i).cross(&off(i + 1))).sum::<Vec3>();
-    let extent = (0..n).map(|i| off(i).norm()).fold(0.0, f64::max);
+    let normal = (0..n).map(|i| from_middle(i).cross(&from_middle(i + 1))).sum::<Vec3>();
+    let extent = (0..n).map(|i| from_middle(i).norm()).fold(0.0, f64::max);
     if normal.norm() <= 1e-9 * extent * extent {
         return Err(OutlineFault::Line);
     }
     let normal = normal.normalize();
-    let height = |i: usize| off(i).dot(&normal).abs();
+    let height = |i: usize| from_middle(i).dot(&normal).abs();
     if let Some(corner) = (0..n).max_by(|&i, &j| height(i).total_cmp(&height(j)))
         && height(corner) > FLAT * extent
     {
@@ -72,23 +72,23 @@ pub fn fill(corners: &[Vec3]) -> Result<Vec<[usize; 3]>, OutlineFault> {
             }
         }
     }
-    let mut left: Vec<usize> = (0..n).collect();
+    let mut remaining: Vec<usize> = (0..n).collect();
     let mut triangles = Vec::with_capacity(n - 2);
-    while left.len() > 2 {
-        let m = left.len();
-        let at = |k: usize| [left[(k + m - 1) % m], left[k], left[(k + 1) % m]];
+    while remaining.len() > 2 {
+        let m = remaining.len();
+        let at = |k: usize| [remaining[(k + m - 1) % m], remaining[k], remaining[(k + 1) % m]];
         let is_ear = |k: usize| {
             let [i, j, l] = at(k);
-            let holds = |p: usize| area(i, j, p) >= 0.0 && area(j, l, p) >= 0.0 && area(l, i, p) >= 0.0;
-            let others = || left.iter().copied().filter(|&p| ![i, j, l].iter().any(|&q| corners[p] == corners[q]));
-            area(i, j, l) > 0.0 && !others().any(holds)
+            let contains = |p: usize| area(i, j, p) >= 0.0 && area(j, l, p) >= 0.0 && area(l, i, p) >= 0.0;
+            let others = || remaining.iter().copied().filter(|&p| ![i, j, l].iter().any(|&q| corners[p] == corners[q]));
+            area(i, j, l) > 0.0 && !others().any(contains)
         };
         // Starting at the second corner turns a convex outline into a fan. If there is no ear, rounding made the rest flat.
         let ear = (1..m).chain([0]).find(|&k| is_ear(k));
         if let Some(k) = ear {
             triangles.push(at(k));
         }
-        left.remove(ear.unwrap_or(0));
+        remaining.remove(ear.unwrap_or(0));
     }
     Ok(triangles)
 }
@@ -132,7 +132,7 @@ mod tests {
         for (points, expected) in cases {
             let mut corners = flat(points);
             for _ in 0..2 {
-                let triangles = fill(&corners).unwrap();
+                let triangles = triangulate(&corners).unwrap();
                 let got = area(&corners, &triangles) / stretch;
                 assert!((got - expected).abs() < 1e-12 * expected, "{points:?}: {got}");
                 corners.reverse();
@@ -142,13 +142,13 @@ mod tests {
 
     #[test]
     fn corners_that_bound_no_area_are_refused() {
-        let fault = |points: &[[f64; 2]]| fill(&flat(points)).unwrap_err();
+        let fault = |points: &[[f64; 2]]| triangulate(&flat(points)).unwrap_err();
         assert_eq!(fault(&[[0.0, 0.0], [1.0, 0.0]]), OutlineFault::TooFew(2));
         assert_eq!(fault(&[[0.0, 0.0], [1.0, 1.0], [3.0, 3.0]]), OutlineFault::Line);
         assert_eq!(fault(&[[0.0, 0.0], [1.0, 1.0], [1.0, 1.0], [0.0, 2.0]]), OutlineFault::Same(2, 3));
         assert_eq!(fault(&[[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]]), OutlineFault::Crosses(1, 3));
         let mut bent = flat(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
         bent[2].x += 0.1;
-        assert!(matches!(fill(&bent), Err(OutlineFault::NotFlat { .. })));
+        assert!(matches!(triangulate(&bent), Err(OutlineFault::NotFlat { .. })));
     }
 }

@@ -95,13 +95,13 @@ impl Default for Solver {
 }
 
 impl Preset {
-    /// Loose ball joints from which on the fast presets take steps per impact in place of error-controlled ones.
-    pub const MANY_LOOSE: usize = 8;
+    /// Number of ball joints with clearance from which the fast presets take steps per impact instead of error-controlled ones.
+    pub const MANY_JOINTS: usize = 8;
 
-    /// Stepper settings of the preset for a machine with `loose` ball joints with clearance, chosen by measurement
-    /// (`docs/tradeoff.md`).
-    pub fn solver(self, loose: usize) -> Solver {
-        let many = loose >= Self::MANY_LOOSE;
+    /// Stepper settings of the preset for a machine with `joints_with_clearance` ball joints with clearance, chosen by
+    /// measurement (`docs/tradeoff.md`).
+    pub fn solver(self, joints_with_clearance: usize) -> Solver {
+        let many = joints_with_clearance >= Self::MANY_JOINTS;
         let (method, tolerance, steps_per_impact) = match self {
             Self::Preview if many => (Method::DiscreteGradient, Solver::default().tolerance, 4),
             Self::RealTime if many => (Method::DiscreteGradient, Solver::default().tolerance, 16),

@@ -34,7 +34,7 @@ impl Solid {
                 let volume = PI * radius * radius * height / 3.0;
                 let square = [0.15 * radius * radius, 0.0375 * height * height];
                 let centre = from + axis * (0.25 * height);
-                Self::new(volume, centre, round(&axis, square) * volume)
+                Self::new(volume, centre, moments_of_revolution(&axis, square) * volume)
             }
             Geometry::Capsule { from, to, radius } => {
                 let (axis, _) = direction(from, to);
@@ -43,14 +43,14 @@ impl Solid {
                 let out = axis * (0.375 * radius);
                 let fifth = radius * radius / 5.0;
                 let square = [fifth, fifth - 0.140_625 * radius * radius];
-                let cap = |centre| Self::new(volume, centre, round(&axis, square) * volume);
+                let cap = |centre| Self::new(volume, centre, moments_of_revolution(&axis, square) * volume);
                 let ends = [cap(from - out), cap(to + out)];
                 let bar = (from != to).then(|| Self::cylinder(from, to, *radius));
-                Self::together(ends.into_iter().chain(bar))
+                Self::sum(ends.into_iter().chain(bar))
             }
             Geometry::Plate { corners, triangles, thickness } => Self::plate(corners, triangles, *thickness),
             Geometry::Mesh { mesh, unit, position, rotation } => {
-                let Self { volume, centre, second } = Self::inside(mesh);
+                let Self { volume, centre, second } = Self::of_mesh(mesh);
                 let turn = rotation.to_rotation_matrix().into_inner();
                 let area = unit * unit;
                 Self::new(
@@ -63,7 +63,7 @@ impl Solid {
     }
 
     /// Sum of several solids; overlapping volume counts twice.
-    pub fn together(parts: impl IntoIterator<Item = Self>) -> Self {
+    pub fn sum(parts: impl IntoIterator<Item = Self>) -> Self {
         let (mut volume, mut first, mut second) = (0.0, Vec3::zeros(), Mat3::zeros());
         for part in parts {
             volume += part.volume;
@@ -76,7 +76,7 @@ impl Solid {
 
     /// Sum over all shapes of a body.
     pub fn of_shapes(shapes: &[Shape]) -> Self {
-        Self::together(shapes.iter().map(|shape| Self::of(&shape.geometry)))
+        Self::sum(shapes.iter().map(|shape| Self::of(&shape.geometry)))
     }
 
     /// Inertia about the centroid at unit density, m^5.
@@ -97,11 +97,11 @@ impl Solid {
         let (axis, height) = direction(from, to);
         let volume = PI * radius * radius * height;
         let square = [0.25 * radius * radius, height * height / 12.0];
-        Self::new(volume, 0.5 * (from + to), round(&axis, square) * volume)
+        Self::new(volume, 0.5 * (from + to), moments_of_revolution(&axis, square) * volume)
     }
 
     /// Interior of a closed mesh: tetrahedra with a common vertex and signed volumes.
-    fn inside(mesh: &Mesh) -> Self {
+    fn of_mesh(mesh: &Mesh) -> Self {
         let origin = mesh.middle();
         Self::of_tetrahedra(mesh.tetrahedra(origin)).moved(Vec3::from(origin.map(f64::from)))
     }
@@ -117,8 +117,8 @@ impl Solid {
         Self::new(self.volume, point, self.second + off * off.transpose() * self.volume)
     }
 
-    /// Tetrahedra between the origin and each of these triangles, m, with signed volumes: for the triangles of a closed surface, seen
-    /// counter-clockwise from outside, what it encloses, by the divergence theorem.
+    /// Tetrahedra between the origin and each of these triangles, m, with signed volumes: for the triangles of a closed surface,
+    /// seen counter-clockwise from outside, the solid that it encloses, by the divergence theorem.
     pub fn of_tetrahedra(triangles: impl Iterator<Item = [Vec3; 3]>) -> Self {
         Self::of_simplices(triangles.map(|[a, b, c]| (a.dot(&b.cross(&c)) / 6.0, [a, b, c])), 4.0)
     }
@@ -128,8 +128,8 @@ impl Solid {
         Self::of_simplices(triangles.map(|[a, b, c]| (0.5 * (b - a).cross(&(c - a)).norm(), [a, b, c])), 3.0)
     }
 
-    /// Simplices of signed sizes with `corners` corners, of which a fourth is the origin. Over a simplex, the mean of r is s / n and that
-    /// of r r' is (sum of v v' + s s') / (n (n + 1)), with s the sum of its n corners v.
+    /// Simplices of signed sizes with `corners` corners, of which a fourth is the origin. Over a simplex, the mean of r is s / n
+    /// and that of r r' is (sum of v v' + s s') / (n (n + 1)), with s the sum of its n corners v.
     fn of_simplices(parts: impl Iterator<Item = (f64, [Vec3; 3])>, corners: f64) -> Self {
         let (mut volume, mut first, mut second) = (0.0, Vec3::zeros(), Mat3::zeros());
         for (part, [a, b, c]) in parts {
@@ -160,7 +160,7 @@ impl Solid {
             let square = if area > 0.0 { flat + across * (thickness * thickness / 12.0) } else { Mat3::zeros() };
             Self::new(volume, origin + centre, square * volume)
         });
-        Self::together(triangles)
+        Self::sum(triangles)
     }
 }
 
@@ -171,7 +171,7 @@ fn direction(from: &Vec3, to: &Vec3) -> (Vec3, f64) {
 }
 
 /// Mean of r r' of a solid of revolution, from its mean squares across and along the axis, m^2.
-fn round(axis: &Vec3, [across, along]: [f64; 2]) -> Mat3 {
+fn moments_of_revolution(axis: &Vec3, [across, along]: [f64; 2]) -> Mat3 {
     let axial = axis * axis.transpose();
     (Mat3::identity() - axial) * across + axial * along
 }
@@ -183,7 +183,7 @@ mod tests {
     use crate::scene::mesh::Format;
 
     /// Whether `point` lies in the shape, from the shape's definition.
-    fn holds(geometry: &Geometry, point: &Vec3) -> bool {
+    fn contains(geometry: &Geometry, point: &Vec3) -> bool {
         let on_axis = |from: &Vec3, to: &Vec3| {
             let (axis, length) = direction(from, to);
             let along = (point - from).dot(&axis);
@@ -209,18 +209,18 @@ mod tests {
             }
             Geometry::Plate { corners, thickness, .. } => {
                 let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
-                let inside = |i: usize| {
+                let of_mesh = |i: usize| {
                     let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);
                     normal.dot(&(b - a).cross(&(point - a))) >= 0.0
                 };
-                (point - corners[0]).dot(&normal).abs() <= 0.5 * thickness && (0..corners.len()).all(inside)
+                (point - corners[0]).dot(&normal).abs() <= 0.5 * thickness && (0..corners.len()).all(of_mesh)
             }
             Geometry::Mesh { .. } => unreachable!("tested against forms"),
         }
     }
 
     #[test]
-    fn moments_are_those_of_the_points_inside() {
+    fn moments_agree_with_sums_over_interior_points() {
         let (a, b) = (Vec3::new(-0.3, 0.1, -0.2), Vec3::new(0.4, 0.3, 0.25));
         let forms = [
             Geometry::Sphere { centre: a, radius: 0.4 },
@@ -249,7 +249,7 @@ mod tests {
                 for j in 0..CELLS {
                     for k in 0..CELLS {
                         let point = Vec3::new(at(i), at(j), at(k));
-                        if holds(form, &point) {
+                        if contains(form, &point) {
                             volume += size.powi(3);
                             first += point * size.powi(3);
                             second += point * point.transpose() * size.powi(3);
@@ -280,7 +280,7 @@ mod tests {
             Solid::of(&Geometry::Box { centre: Vec3::new(x, 0.0, 0.0), size })
         };
         let whole = Solid::of(&Geometry::Box { centre: Vec3::zeros(), size: Vec3::new(0.2, 0.3, 0.4) });
-        let both = Solid::together([half(-0.05), half(0.05)]);
+        let both = Solid::sum([half(-0.05), half(0.05)]);
         assert!((whole.inertia() - both.inertia()).amax() < 1e-16 && both.centre.norm() < 1e-16);
     }
 
@@ -298,20 +298,20 @@ mod tests {
     }
 
     /// Relative errors of volume and inertia against those of the form, and distance of the centroid from `position`, m.
-    fn off(mesh: &Geometry, form: &Geometry) -> [f64; 3] {
+    fn errors_against(mesh: &Geometry, form: &Geometry) -> [f64; 3] {
         let Geometry::Mesh { position, rotation, .. } = mesh else { panic!("a mesh") };
-        let (found, wanted) = (Solid::of(mesh), Solid::of(form));
+        let (computed, expected) = (Solid::of(mesh), Solid::of(form));
         let turn = rotation.to_rotation_matrix().into_inner();
-        let inertia = turn * wanted.inertia() * turn.transpose();
+        let inertia = turn * expected.inertia() * turn.transpose();
         [
-            (found.volume / wanted.volume - 1.0).abs(),
-            (found.centre - position).norm(),
-            (found.inertia() - inertia).amax() / inertia.amax(),
+            (computed.volume / expected.volume - 1.0).abs(),
+            (computed.centre - position).norm(),
+            (computed.inertia() - inertia).amax() / inertia.amax(),
         ]
     }
 
     #[test]
-    fn a_mesh_of_a_box_weighs_what_the_box_does() {
+    fn a_mesh_of_a_box_has_the_mass_properties_of_the_box() {
         let mut text = String::new();
         for i in 0..8 {
             let side = |bit: i32, size: f64| if i >> bit & 1 == 1 { size } else { -size };
@@ -320,12 +320,12 @@ mod tests {
         text += "f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
         let size = Vec3::new(0.02, 0.04, 0.07);
         let centre = Vec3::zeros();
-        let [volume, centroid, inertia] = off(&of_file(&text), &Geometry::Box { centre, size });
+        let [volume, centroid, inertia] = errors_against(&of_file(&text), &Geometry::Box { centre, size });
         assert!(volume < 1e-12 && centroid < 1e-12 && inertia < 1e-12);
     }
 
     #[test]
-    fn a_mesh_of_a_ball_weighs_what_the_ball_does() {
+    fn a_mesh_of_a_ball_has_nearly_the_mass_properties_of_the_ball() {
         let centre = Vec3::zeros();
         let ball = Geometry::Sphere { centre, radius: 0.05 };
         let errors = [40_usize, 80].map(|n| {
@@ -347,7 +347,7 @@ mod tests {
                     text += &format!("f {a} {b} {c} {d}\n");
                 }
             }
-            off(&of_file(&text), &ball)
+            errors_against(&of_file(&text), &ball)
         });
         // The polyhedron is inscribed in the ball; its error falls with the square of the edge length.
         assert!(errors[1][0] < 2e-3 && errors[1][1] < 1e-8 && errors[1][2] < 3e-3, "{errors:?}");

@@ -7,21 +7,21 @@ use std::ops::Range;
 #[derive(Default)]
 pub struct Band {
     size: usize,
-    reach: usize,
-    /// Of the band right of the diagonal, whether a block may be nonzero.
+    bandwidth: usize,
+    /// Whether a block may be nonzero, for the diagonal and the band to its right.
     filled: Vec<bool>,
-    /// Column of each stored block, where each row starts, and where its diagonal block is.
+    /// Column of each stored block; index of the first block of each row, and of its diagonal block.
     columns: Vec<usize>,
     starts: Vec<usize>,
     diagonal: Vec<usize>,
 }
 
 impl Band {
-    /// With capacity for `size` block rows of bandwidth `reach`.
-    pub fn with_room(size: usize, reach: usize) -> Self {
+    /// With capacity for `size` block rows of bandwidth `bandwidth`.
+    pub fn with_capacity(size: usize, bandwidth: usize) -> Self {
         Self {
-            filled: Vec::with_capacity(size * (reach + 1)),
-            columns: Vec::with_capacity(Self::most(size, reach)),
+            filled: Vec::with_capacity(size * (bandwidth + 1)),
+            columns: Vec::with_capacity(Self::max_blocks(size, bandwidth)),
             starts: Vec::with_capacity(size + 1),
             diagonal: Vec::with_capacity(size),
             ..Self::default()
@@ -29,21 +29,21 @@ impl Band {
     }
 
     /// Largest number of blocks of `size` rows.
-    pub fn most(size: usize, reach: usize) -> usize {
-        size * (2 * reach + 1)
+    pub fn max_blocks(size: usize, bandwidth: usize) -> usize {
+        size * (2 * bandwidth + 1)
     }
 
     /// Sets the pattern of a matrix with `size` block rows: block (i, j) may be nonzero on the diagonal and, within bandwidth
-    /// `reach`, where `coupled(i, j)`, which is symmetric. Two legs of a platform, for example, couple only through it.
-    pub fn arrange(&mut self, size: usize, reach: usize, coupled: impl Fn(usize, usize) -> bool) {
-        (self.size, self.reach) = (size, reach);
+    /// `bandwidth`, where `coupled(i, j)`, which is symmetric. Two legs of a platform, for example, couple only through it.
+    pub fn set_pattern(&mut self, size: usize, bandwidth: usize, coupled: impl Fn(usize, usize) -> bool) {
+        (self.size, self.bandwidth) = (size, bandwidth);
         self.filled.clear();
         for i in 0..size {
-            self.filled.extend((i..=i + reach).map(|j| i == j || (j < size && coupled(i, j))));
+            self.filled.extend((i..=i + bandwidth).map(|j| i == j || (j < size && coupled(i, j))));
         }
-        let at = |i: usize, j: usize| i * (reach + 1) + j - i;
+        let at = |i: usize, j: usize| i * (bandwidth + 1) + j - i;
         for k in 0..size {
-            let end = (k + reach + 1).min(size);
+            let end = (k + bandwidth + 1).min(size);
             for i in k + 1..end {
                 if self.filled[at(k, i)] {
                     for j in i + 1..end {
@@ -57,27 +57,27 @@ impl Band {
         self.diagonal.clear();
         for i in 0..size {
             self.starts.push(self.columns.len());
-            let before = (i.saturating_sub(reach)..i).filter(|&j| self.filled[at(j, i)]);
+            let before = (i.saturating_sub(bandwidth)..i).filter(|&j| self.filled[at(j, i)]);
             self.columns.extend(before);
             self.diagonal.push(self.columns.len());
-            let after = (i..(i + reach + 1).min(size)).filter(|&j| self.filled[at(i, j)]);
+            let after = (i..(i + bandwidth + 1).min(size)).filter(|&j| self.filled[at(i, j)]);
             self.columns.extend(after);
         }
         self.starts.push(self.columns.len());
     }
 
-    /// Where the blocks of row `i` are stored.
+    /// Indices of the stored blocks of row `i`.
     pub fn row(&self, i: usize) -> Range<usize> {
         self.starts[i]..self.starts[i + 1]
     }
 
-    /// Where its diagonal block is stored.
+    /// Index of its diagonal block.
     pub fn diagonal(&self, i: usize) -> usize {
         self.diagonal[i]
     }
 
-    /// Where block (`i`, `j`) of the pattern is stored.
-    pub fn place(&self, i: usize, j: usize) -> usize {
+    /// Index of block (`i`, `j`) of the pattern.
+    pub fn position(&self, i: usize, j: usize) -> usize {
         self.starts[i] + self.columns[self.row(i)].partition_point(|&column| column < j)
     }
 
@@ -91,7 +91,8 @@ impl Band {
         self.diagonal[k] + 1..self.starts[k + 1]
     }
 
-    /// Factors `blocks` in place; they become NaN if a diagonal block is singular. `is_unit(i)`: row i is that of the unit matrix.
+    /// Factors `blocks` in place; they become NaN if a diagonal block is singular. `is_unit(i)`: row i is that of the unit
+    /// matrix.
     pub fn factor(&self, blocks: &mut [Mat3], is_unit: impl Fn(usize) -> bool) {
         for k in 0..self.size {
             if is_unit(k) {
@@ -157,14 +158,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_solves_what_it_was_given() {
-        for (size, reach) in [(0, 0), (1, 0), (5, 1), (6, 5)] {
+    fn a_factored_matrix_solves_its_system() {
+        for (size, bandwidth) in [(0, 0), (1, 0), (5, 1), (6, 5)] {
             let number = |n: usize| libm::sin(1.0 + n as f64);
             // Some blocks are zero, and a few of those fill in. One row is that of the unit matrix.
             let coupled = |i, j| (i + j) % 3 != 0;
             let is_unit = |i| i == 2;
-            let mut band = Band::with_room(size, reach);
-            band.arrange(size, reach, coupled);
+            let mut band = Band::with_capacity(size, bandwidth);
+            band.set_pattern(size, bandwidth, coupled);
             let mut blocks = vec![Mat3::zeros(); band.columns().len()];
             for i in 0..size {
                 for at in band.row(i) {
@@ -184,7 +185,7 @@ mod tests {
             band.solve(&factors, &mut x, is_unit);
             for i in 0..size {
                 let row = band.row(i).map(|at| blocks[at] * x[band.columns()[at]]);
-                assert!((row.sum::<Vec3>() - b[i]).norm() < 1e-13, "{size} {reach}");
+                assert!((row.sum::<Vec3>() - b[i]).norm() < 1e-13, "{size} {bandwidth}");
             }
         }
     }

@@ -12,17 +12,17 @@ use crate::integrate::Method;
 use crate::machine::{Formulation, Machine, StartRule};
 
 /// Maximum number of matrix entries of one scene: 32 MiB.
-pub const MOST_ENTRIES: u64 = 1 << 22;
+pub const MAX_ENTRIES: u64 = 1 << 22;
 /// Approximate maximum number of multiplications per evaluation: about 40 ms on a 2020 processor.
-pub const MOST_PRODUCTS: u64 = 1 << 25;
+pub const MAX_PRODUCTS: u64 = 1 << 25;
 
 /// Multiplications per ancestor of a body, and per pair of constraint rows on a body.
-const OF_AN_ANCESTOR: u64 = 20;
-const OF_A_PAIR: u64 = 25;
+const PRODUCTS_PER_ANCESTOR: u64 = 20;
+const PRODUCTS_PER_PAIR: u64 = 25;
 
 /// The task whose cost exceeds a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum CostOf {
+pub enum CostlyTask {
     /// Evaluating the equations.
     #[error("formulation {0}")]
     Formulation(Formulation),
@@ -36,7 +36,7 @@ pub enum CostOf {
 
 /// The quantity limited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Counted {
+pub enum LimitedQuantity {
     /// Matrix entries.
     #[error("numbers in its matrices")]
     Entries,
@@ -79,7 +79,7 @@ impl Cost {
         for (i, f) in (0_u64..).zip(first) {
             self.entries += i - f + 1;
         }
-        if self.entries > MOST_ENTRIES {
+        if self.entries > MAX_ENTRIES {
             return;
         }
         for (i, &f) in (0_u64..).zip(first) {
@@ -89,7 +89,7 @@ impl Cost {
     }
 
     fn fits(&self) -> bool {
-        self.entries <= MOST_ENTRIES && self.products <= MOST_PRODUCTS
+        self.entries <= MAX_ENTRIES && self.products <= MAX_PRODUCTS
     }
 
     /// Cost of the equations in formulation `form`; in tree coordinates, with the joints `closed` as constraints.
@@ -107,7 +107,7 @@ impl Cost {
         let mut solution = Vec::with_capacity(model.blocks.len());
         for block in &model.blocks {
             let n = block.n as u64;
-            if block.lone.is_some() {
+            if block.single_free_body.is_some() {
                 solution.push(2 * n);
                 continue;
             }
@@ -128,7 +128,7 @@ impl Cost {
             let above = depth.get(body.parent).copied().unwrap_or(0);
             depth[b] = if body.driven_only { 0 } else { above + 1 };
             if !matches!(body.motion, Motion::Fixed | Motion::Driven { .. }) {
-                cost.add(0, OF_AN_ANCESTOR * above);
+                cost.add(0, PRODUCTS_PER_ANCESTOR * above);
             }
         }
         let block_of = |b: BodyIndex| {
@@ -159,14 +159,14 @@ impl Cost {
                 cost.add(6 * n, 3 * solution[block] + sides_on[block] * 9 * n);
             }
             for b in bodies {
-                cost.add(0, 3 * OF_AN_ANCESTOR * depth.get(b).copied().unwrap_or(0));
+                cost.add(0, 3 * PRODUCTS_PER_ANCESTOR * depth.get(b).copied().unwrap_or(0));
             }
             rows.extend(std::iter::repeat_n(first, count));
         }
         cost.add_envelope(&rows);
         let n = model.nv as u64;
         if n > 0 && rows.len() as u64 == n {
-            // The determinant, whose sign tells the side of a singular pose.
+            // The determinant, whose sign changes across a singular pose.
             cost.add(n * n, n.saturating_pow(3) / 3);
         }
         cost
@@ -189,7 +189,7 @@ impl Cost {
                     rows_on[body] += rows;
                     // Two indices are stored per pair.
                     let pairs = rows * rows_on[body];
-                    cost.add(2 * pairs, OF_A_PAIR * pairs);
+                    cost.add(2 * pairs, PRODUCTS_PER_PAIR * pairs);
                 }
             }
             first_of.extend((0..rows).map(|_| first));
@@ -198,25 +198,25 @@ impl Cost {
         cost
     }
 
-    /// Cost of solving for the forces of coupled contacts: `joints` contacts, each coupled with `reach` joints before and after it, with
-    /// columns of `width` numbers in total.
-    pub fn of_coupled_contacts(joints: usize, reach: usize, width: usize) -> Self {
-        let (joints, reach, width) = (joints as u64, reach as u64, width as u64);
-        let band = joints * (2 * reach + 1);
+    /// Cost of solving for the forces of coupled contacts: `joints` contacts, each coupled with `bandwidth` joints before and
+    /// after it, with columns of `width` numbers in total.
+    pub fn of_coupled_contacts(joints: usize, bandwidth: usize, width: usize) -> Self {
+        let (joints, bandwidth, width) = (joints as u64, bandwidth as u64, width as u64);
+        let band = joints * (2 * bandwidth + 1);
         // Entries: three 3 x 3 blocks; three columns, and ten numbers per Jacobian column. Products: one elimination, and the
         // blocks.
-        Self { entries: 27 * band + 13 * width, products: 40 * joints * (reach + 1) * (reach + 1) + 250 * band }
+        Self { entries: 27 * band + 13 * width, products: 40 * joints * (bandwidth + 1) * (bandwidth + 1) + 250 * band }
     }
 
     /// Rejects a cost beyond a limit; `of` names the task.
     ///
     /// # Errors
     /// The amount needed, and the limit.
-    pub fn check(&self, of: CostOf, advice: Advice) -> Result<(), MechanismError> {
-        let (what, needed, most) = if self.entries > MOST_ENTRIES {
-            (Counted::Entries, self.entries, MOST_ENTRIES)
-        } else if self.products > MOST_PRODUCTS {
-            (Counted::Products, self.products, MOST_PRODUCTS)
+    pub fn check(&self, of: CostlyTask, advice: Advice) -> Result<(), MechanismError> {
+        let (what, needed, most) = if self.entries > MAX_ENTRIES {
+            (LimitedQuantity::Entries, self.entries, MAX_ENTRIES)
+        } else if self.products > MAX_PRODUCTS {
+            (LimitedQuantity::Products, self.products, MAX_PRODUCTS)
         } else {
             return Ok(());
         };
@@ -240,10 +240,10 @@ pub fn implicit_time(coordinates: usize, products: usize) -> f64 {
 }
 
 /// Maximum number of velocity coordinates of the implicit methods, which hold dense matrices.
-pub const LARGEST_DENSE: usize = 1024;
+pub const MAX_DENSE: usize = 1024;
 /// If all coordinates are coupled, an implicit step with more of them than this costs more than many explicit steps, and the
 /// automatic choice stays explicit.
-pub const LARGEST_COUPLED: usize = 96;
+pub const MAX_COUPLED: usize = 96;
 
 /// Rejects a scene whose equations, or whose assembly at the start, exceed the limits.
 ///
@@ -267,8 +267,8 @@ pub fn check(machine: &Machine, model: &Model) -> Result<(), MechanismError> {
     let helps = |form: &Formulation| *form != machine.formulation && cost(*form).fits();
     let other = Formulation::ALL.into_iter().find(helps);
     let advice = other.filter(|_| assembly.fits()).map_or(Advice::Smaller, Advice::Formulation);
-    own.check(CostOf::Formulation(machine.formulation), advice)?;
-    assembly.check(CostOf::Assembly, advice)
+    own.check(CostlyTask::Formulation(machine.formulation), advice)?;
+    assembly.check(CostlyTask::Assembly, advice)
 }
 
 #[cfg(test)]
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn sparse_scenes_grow_linearly_and_dense_ones_are_known_to_be_dense() {
+    fn costs_of_sparse_scenes_grow_linearly_and_those_of_dense_ones_by_their_powers() {
         // Growth of (entries, multiplications) from n to 2n parts, for tree and lagrange: 2 is linear.
         for (kind, tree, lagrange) in [
             ("free bodies", [1.0, 1.0], [1.0, 1.0]),
@@ -311,7 +311,7 @@ mod tests {
     }
 
     /// Whether `kind` with `n` parts is accepted, or the error message.
-    fn taken(kind: &str, n: usize, formulation: &str) -> Result<(), String> {
+    fn acceptance(kind: &str, n: usize, formulation: &str) -> Result<(), String> {
         let changes = [("formulation".to_owned(), formulation.to_owned())];
         let scene = Scene::parse(&scene_text(kind, n, "0 m"), None, &changes).expect("a scene");
         match Mechanism::new(&scene.machine) {
@@ -333,23 +333,23 @@ mod tests {
         ] {
             let line = page.lines().find(|line| line.starts_with(&format!("| {row}")));
             let column = 2 + usize::from(formulation == "lagrange");
-            let said = line.expect(row).split('|').nth(column).map(str::trim);
-            let said: usize = said.and_then(|most| most.parse().ok()).expect("a number");
+            let stated = line.expect(row).split('|').nth(column).map(str::trim);
+            let stated: usize = stated.and_then(|most| most.parse().ok()).expect("a number");
             // One more for the body that carries them.
-            let most = said + usize::from(kind.ends_with("one body"));
-            assert_eq!(taken(kind, most, formulation), Ok(()), "{kind}");
-            let words = taken(kind, most + 1, formulation).expect_err("beyond the limit");
-            assert!(words.contains("allowed at most"), "{kind}: {words}");
+            let most = stated + usize::from(kind.ends_with("one body"));
+            assert_eq!(acceptance(kind, most, formulation), Ok(()), "{kind}");
+            let message = acceptance(kind, most + 1, formulation).expect_err("beyond the limit");
+            assert!(message.contains("allowed at most"), "{kind}: {message}");
         }
     }
 
     #[test]
-    fn where_the_other_form_would_do_it_is_the_advice() {
-        let words = taken("hinges in a row", 5000, "tree").expect_err("too deep");
-        assert!(words.ends_with("choose formulation = lagrange"), "{words}");
-        assert_eq!(taken("hinges in a row", 5000, "lagrange"), Ok(()));
-        let words = taken("hinges on one body", 1000, "lagrange").expect_err("too wide");
-        assert!(words.ends_with("choose formulation = tree"), "{words}");
-        assert_eq!(taken("hinges on one body", 1000, "tree"), Ok(()));
+    fn the_other_formulation_is_advised_if_it_is_within_the_limits() {
+        let message = acceptance("hinges in a row", 5000, "tree").expect_err("too deep");
+        assert!(message.ends_with("choose formulation = lagrange"), "{message}");
+        assert_eq!(acceptance("hinges in a row", 5000, "lagrange"), Ok(()));
+        let message = acceptance("hinges on one body", 1000, "lagrange").expect_err("too wide");
+        assert!(message.ends_with("choose formulation = tree"), "{message}");
+        assert_eq!(acceptance("hinges on one body", 1000, "tree"), Ok(()));
     }
 }

@@ -19,18 +19,18 @@ pub struct ClosedMotion {
 
 /// A motion that the machine cannot follow at some instant.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{what} at t = {time:.4} s: {function} = {value}, and must be {wanted}")]
+#[error("{what} at t = {time:.4} s: {function} = {value}, and must be {requirement}")]
 pub struct Unreachable {
-    /// What is wrong.
+    /// Description of the fault.
     pub what: String,
-    /// Name of the function that shows it.
+    /// Name of the function with the invalid value.
     pub function: String,
     /// Instant at which its value is lowest, or the first at which it is not finite, s.
     pub time: f64,
     /// Its value there, with its unit.
     pub value: String,
-    /// What the value must be.
-    pub wanted: &'static str,
+    /// Requirement on the value.
+    pub requirement: &'static str,
 }
 
 impl ClosedForm {
@@ -64,31 +64,31 @@ impl ClosedForm {
         values
     }
 
-    /// Period of the `followed` functions, s; infinite if none of them moves.
-    pub(super) fn period(&self, followed: &[usize]) -> f64 {
-        // No divisor of the period, at which a function could be at rest each time.
+    /// Period of the functions with the indices `driving_functions`, s; infinite if none of them moves.
+    pub(super) fn period(&self, driving_functions: &[usize]) -> f64 {
+        // Sampling at seven instants misses the symmetries of a period: no function that moves is at rest at all of them.
         const INSTANTS: u32 = 7;
-        let period = self.repetition();
+        let period = self.base_period();
         let moves = |instant| {
             let values = self.at(period * f64::from(instant) / f64::from(INSTANTS));
-            followed.iter().map(|i| values[i + 1]).any(|value| value.rate != 0.0 || value.acceleration != 0.0)
+            driving_functions.iter().map(|i| values[i + 1]).any(|value| value.rate != 0.0 || value.acceleration != 0.0)
         };
         if period.is_finite() && (0..INSTANTS).any(moves) { period } else { f64::INFINITY }
     }
 
     /// Time after which the functions repeat, s; infinite if they stand still.
-    fn repetition(&self) -> f64 {
+    fn base_period(&self) -> f64 {
         1.0 / (self.frequency * self.pace)
     }
 
-    /// Samples one period, or the start if the functions stand still, and reports the function that is the lowest below what it must be.
+    /// Samples one period, or the start alone if the functions stand still.
     ///
     /// # Errors
-    /// A function is not above 0 that must be, or has no finite value.
+    /// A function that must be positive is not, or a function has no finite value. The error names the lowest of them.
     pub(super) fn check(&self) -> Result<(), MechanismError> {
         const SAMPLES: u32 = 4000;
         const AT_ONCE: usize = 8;
-        let period = Some(self.repetition()).filter(|period| period.is_finite()).unwrap_or(0.0);
+        let period = Some(self.base_period()).filter(|period| period.is_finite()).unwrap_or(0.0);
         let tape = self.tape();
         let mut values = vec![[0.0; AT_ONCE]; tape.length()];
         // Index of a function, instant and value.
@@ -97,13 +97,13 @@ impl ClosedForm {
         for first in (0..=samples).step_by(AT_ONCE) {
             let times =
                 std::array::from_fn(|n| period * f64::from((first + n as u32).min(samples)) / f64::from(SAMPLES));
-            // Values alone, which are those of the jets.
+            // The values equal those of the jets.
             values[0] = times.map(|time| self.time(time).value);
             tape.run(&mut values);
             for (n, time) in times.into_iter().enumerate() {
                 for (i, function) in self.functions.iter().enumerate() {
                     let value = values[i + 1][n];
-                    // Not a number, too, is not above 0.
+                    // True for NaN, too.
                     if function.positive.is_some() && !(value > 0.0) {
                         if lowest.is_none_or(|(.., lowest)| !(value >= lowest)) {
                             lowest = Some((i, time, value));
@@ -114,11 +114,11 @@ impl ClosedForm {
                 }
             }
         }
-        let fault = |(i, time, value): (usize, f64, f64), wanted| {
+        let fault = |(i, time, value): (usize, f64, f64), requirement| {
             let Function { name, unit, positive, .. } = &self.functions[i];
             let what = positive.clone().unwrap_or_else(|| "a function has no value".to_owned());
             let value = format!("{value:.4e} {unit}").trim_end().to_owned();
-            MechanismError::from(Unreachable { what, function: name.clone(), time, value, wanted })
+            MechanismError::from(Unreachable { what, function: name.clone(), time, value, requirement })
         };
         match (lowest, infinite) {
             (Some(lowest), _) => Err(fault(lowest, "above 0")),
@@ -128,34 +128,35 @@ impl ClosedForm {
     }
 }
 
-/// Maximum number of instants announced at once: the stages of Dormand-Prince.
-const ANNOUNCED: usize = 5;
+/// Maximum number of instants prepared at once: the stages of Dormand-Prince.
+const MAX_PREPARED: usize = 5;
 
-/// Values of the functions at the latest instant, and at instants announced.
+/// Values of the functions at the latest instant, and at instants prepared ahead.
 pub struct Values {
-    /// As the tape leaves them, or only those in [`Model::read`] where they were announced; empty without a closed form.
+    /// As the tape leaves them, or only those in [`Model::required_values`] where they were announced; empty without a closed
+    /// form.
     pub latest: Vec<Jet>,
-    announced: Vec<[Jet; ANNOUNCED]>,
+    prepared: Vec<[Jet; MAX_PREPARED]>,
 }
 
 impl Values {
-    /// For `model`, at no instant.
+    /// For `model`; no instant has been evaluated.
     pub(super) fn new(model: &Model) -> Self {
         let never = Jet::constant(f64::NAN);
         let length = model.functions.length();
-        Self { latest: vec![never; length], announced: vec![[never; ANNOUNCED]; length] }
+        Self { latest: vec![never; length], prepared: vec![[never; MAX_PREPARED]; length] }
     }
 
-    /// Evaluates the functions at `times`, of which there are at most [`ANNOUNCED`].
-    pub(super) fn announce(&mut self, model: &Model, times: &[f64]) {
+    /// Evaluates the functions at `times`, of which there are at most [`MAX_PREPARED`].
+    pub(super) fn prepare(&mut self, model: &Model, times: &[f64]) {
         let (Some(form), Some(last)) = (&model.closed_form, times.len().checked_sub(1)) else {
             return;
         };
-        self.announced[0] = std::array::from_fn(|i| form.time(times[i.min(last)]));
-        model.functions.run(&mut self.announced);
+        self.prepared[0] = std::array::from_fn(|i| form.time(times[i.min(last)]));
+        model.functions.run(&mut self.prepared);
     }
 
-    /// Evaluates them at `t`, unless that is done.
+    /// Makes `t` the latest instant.
     pub(super) fn evaluate(&mut self, model: &Model, t: f64) {
         let Some(form) = &model.closed_form else {
             return;
@@ -165,8 +166,8 @@ impl Values {
             return;
         }
         self.latest[0] = time;
-        match self.announced[0].iter().position(|announced| *announced == time) {
-            Some(instant) => model.read.iter().for_each(|&i| self.latest[i] = self.announced[i][instant]),
+        match self.prepared[0].iter().position(|prepared| *prepared == time) {
+            Some(instant) => model.required_values.iter().for_each(|&i| self.latest[i] = self.prepared[i][instant]),
             None => model.functions.run(&mut self.latest),
         }
     }
@@ -179,7 +180,7 @@ impl Path {
         self.position.iter().chain(turns).flat_map(Program::variables)
     }
 
-    /// The motion for these `values` of [`ClosedForm::evaluate`].
+    /// The motion for the `values` of [`ClosedForm::evaluate`].
     pub(super) fn at(&self, values: &[Jet]) -> ClosedMotion {
         let mut rotation = Mat3::identity();
         let mut angular_velocity = Vec3::zeros();
@@ -225,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn sliders_of_the_paper_have_the_values_of_the_contract() {
+    fn sliders_of_the_paper_have_the_reference_values() {
         let form = paper(&[]);
         let expected = [
             (0.1364935480, -0.11575599, -0.13201567),
@@ -246,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn roots_stay_real_in_the_range_that_the_contract_gives() {
+    fn roots_are_real_in_the_stated_range_of_the_socket_plane() {
         for (socket_plane, reachable) in [(0.041518, true), (0.041516, false), (0.364482, true), (0.364484, false)] {
             let form = paper(&[("spcmm.slider_plane", format!("{} m", socket_plane - 0.028))]);
             assert_eq!(form.check().is_ok(), reachable, "x_s = {socket_plane}");
@@ -254,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn the_function_that_is_lowest_below_0_is_named() {
+    fn the_error_names_the_function_with_the_lowest_negative_value() {
         let Err(MechanismError::Unreachable(error)) = paper(&[("spcmm.slider_plane", "0 m".to_owned())]).check() else {
             panic!("the rod is long enough");
         };
@@ -266,7 +267,7 @@ mod tests {
             panic!("roots of negative numbers are values")
         };
         assert!(error.to_string().starts_with("a function has no value at t = 0."), "{error}");
-        assert!(error.function == "f1" && error.value == "NaN m" && error.wanted == "finite", "{error}");
+        assert!(error.function == "f1" && error.value == "NaN m" && error.requirement == "finite", "{error}");
     }
 
     #[test]

@@ -96,7 +96,7 @@ pub struct Constraints {
     scratch: Vec<f64>,
     step: Vec<f64>,
     square: Vec<f64>,
-    /// StepEnd and positions of the latest factorisation.
+    /// Time and positions of the latest factorisation.
     time: Option<f64>,
     positions: Vec<f64>,
     /// Smallest pivot ratio of the latest factorisation.
@@ -409,9 +409,9 @@ impl Constraints {
         let balls = self.joints.len();
         let world = [Vec3::x(), Vec3::y(), Vec3::z()];
         for unit in &self.units {
-            self.matrix.refer(unit.first, 0.0);
+            self.matrix.set_reference(unit.first, 0.0);
         }
-        let mut referred = (usize::MAX, 0.0);
+        let mut diagonal_sum = (usize::MAX, 0.0);
         for &(i, j, si, sj) in &self.unit_pairs {
             let (a, b) = (&self.sides[i][si], &self.sides[j][sj]);
             let (left, right) = (a.rows(&self.jacobian), b.rows(&self.weighted));
@@ -420,9 +420,9 @@ impl Constraints {
             let unit = &self.units[i - balls];
             if i == j {
                 // Sum over both sides, if there are two.
-                let before = if referred.0 == i { referred.1 } else { 0.0 };
-                referred = (i, before + block.trace());
-                self.matrix.refer(unit.first, referred.1);
+                let before = if diagonal_sum.0 == i { diagonal_sum.1 } else { 0.0 };
+                diagonal_sum = (i, before + block.trace());
+                self.matrix.set_reference(unit.first, diagonal_sum.1);
             }
             let (first, others) = match j.checked_sub(balls) {
                 None => (3 * j, &world[..]),
@@ -480,7 +480,7 @@ impl Constraints {
 
     /// Sets each unit's multipliers to the negative of its violation (`order` 0), its rate (1) or its second derivative (2) at
     /// `motion`. Returns the largest magnitude.
-    fn put_unit_residuals(&mut self, model: &Model, motion: &[Kinematics], order: usize) -> f64 {
+    fn set_unit_residuals(&mut self, model: &Model, motion: &[Kinematics], order: usize) -> f64 {
         let mut largest: f64 = 0.0;
         for unit in &mut self.units {
             unit.measure(model, motion);
@@ -493,7 +493,7 @@ impl Constraints {
     }
 
     /// Sets the multipliers of all rows to their negative openings at `motion`. Returns the largest distance or angle.
-    fn put_residuals(&mut self, model: &Model, motion: &[Kinematics]) -> f64 {
+    fn set_residuals(&mut self, model: &Model, motion: &[Kinematics]) -> f64 {
         let mut largest: f64 = 0.0;
         for (k, &j) in self.joints.iter().enumerate() {
             let e = model.joints[j].eccentricity(motion);
@@ -502,7 +502,7 @@ impl Constraints {
                 self.multipliers[3 * k + i] = -e[i];
             }
         }
-        largest.max(self.put_unit_residuals(model, motion, 0))
+        largest.max(self.set_unit_residuals(model, motion, 0))
     }
 
     /// Corrects the unconstrained accelerations `vdot` so that the joints stay closed, and stores the multipliers. Bias
@@ -516,7 +516,7 @@ impl Constraints {
                 self.multipliers[3 * k + i] = -residual[i];
             }
         }
-        self.put_unit_residuals(model, &tree.motion, 2);
+        self.set_unit_residuals(model, &tree.motion, 2);
         for (u, unit) in self.units.iter().enumerate() {
             let moved = self.apply(model, self.joints.len() + u, vdot);
             let own = self.multipliers[unit.range()].iter_mut();
@@ -536,11 +536,11 @@ impl Constraints {
         let mut error = f64::INFINITY;
         for _ in 0..30 {
             tree.update_kinematics(model, t, y);
-            let largest = self.put_residuals(model, &tree.motion);
+            let largest = self.set_residuals(model, &tree.motion);
             // Newton converges quadratically: stop once another step would only change rounding errors. Dependent rows leave a
             // residual, the inconsistency of the dimensions.
-            let stirred = if self.is_dependent() { 1e-8 } else { 1e-13 };
-            if largest <= 1e-15 || (largest < stirred && largest >= 0.5 * error) || largest.is_nan() {
+            let stagnation_limit = if self.is_dependent() { 1e-8 } else { 1e-13 };
+            if largest <= 1e-15 || (largest < stagnation_limit && largest >= 0.5 * error) || largest.is_nan() {
                 error = largest;
                 break;
             }
@@ -563,7 +563,7 @@ impl Constraints {
                 self.multipliers[3 * k + i] = -rate[i];
             }
         }
-        self.put_unit_residuals(model, &tree.motion, 1);
+        self.set_unit_residuals(model, &tree.motion, 1);
         self.matrix.solve(&mut self.multipliers);
         let mut step = std::mem::take(&mut self.step);
         step.fill(0.0);

@@ -35,10 +35,10 @@ pub struct Contacts {
     joints: Vec<Contact>,
     parameters: Vec<Parameters>,
     ramps: Vec<Option<Ramp>>,
-    any_ramp: bool,
-    any_contact: bool,
+    has_ramps: bool,
+    has_contacts: bool,
     /// Evaluations skip joints without contact, because some of their bodies are suspended.
-    pub(super) only_touching: bool,
+    pub(super) skips_inactive_joints: bool,
 }
 
 impl Contacts {
@@ -53,12 +53,12 @@ impl Contacts {
             .map(|(i, (&joint, p))| Contact::new(i, joint, Coefficients::new(p, p.clearance)))
             .collect();
         Self {
-            any_contact: joints.iter().any(Contact::is_loose),
+            has_contacts: joints.iter().any(Contact::has_clearance),
             ramps: vec![None; joints.len()],
             joints,
             parameters,
-            any_ramp: false,
-            only_touching: false,
+            has_ramps: false,
+            skips_inactive_joints: false,
         }
     }
 
@@ -74,12 +74,12 @@ impl Contacts {
 
     /// Whether joint `i` has a clearance.
     pub fn has_clearance(&self, i: usize) -> bool {
-        self.joints[i].is_loose()
+        self.joints[i].has_clearance()
     }
 
     /// Joints with clearance.
-    pub(super) fn loose(&self) -> impl Iterator<Item = &Contact> {
-        self.joints.iter().filter(|contact| contact.is_loose())
+    pub(super) fn with_clearance(&self) -> impl Iterator<Item = &Contact> {
+        self.joints.iter().filter(|contact| contact.has_clearance())
     }
 
     /// Gaps of all joints at the latest evaluation.
@@ -115,7 +115,7 @@ impl Contacts {
     /// Starts, ends or restores the ramp of joint `i`.
     pub fn set_ramp(&mut self, i: usize, ramp: Option<Ramp>) {
         self.ramps[i] = ramp;
-        self.any_ramp = self.ramps.iter().any(Option::is_some);
+        self.has_ramps = self.ramps.iter().any(Option::is_some);
     }
 
     /// Sets parameters of joint `i`; `clearance`, m, is its current clearance.
@@ -127,27 +127,27 @@ impl Contacts {
     /// Updates ramped clearances to `t`.
     #[inline]
     fn update_ramps(&mut self, t: f64) {
-        if !self.any_ramp {
+        if !self.has_ramps {
             return;
         }
         for i in 0..self.joints.len() {
             if let Some(ramp) = self.ramps[i] {
                 let (clearance, rate) = ramp.at(t);
                 let law = &mut self.joints[i].law;
-                law.move_clearance(&self.parameters[i], clearance, rate);
+                law.set_clearance(&self.parameters[i], clearance, rate);
             }
         }
     }
 
     /// Adds contact forces and updates gaps, if any contact may carry a force.
     pub(super) fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        if !self.any_contact || matches!(at.touching, ActiveSet::Nothing) {
+        if !self.has_contacts || matches!(at.active_set, ActiveSet::Nothing) {
             return;
         }
         self.update_ramps(at.t);
         loads.counts.contacts += 1;
-        for contact in self.joints.iter_mut().filter(|contact| contact.is_loose()) {
-            if self.only_touching && !contact.may_press(at.touching) {
+        for contact in self.joints.iter_mut().filter(|contact| contact.has_clearance()) {
+            if self.skips_inactive_joints && !contact.may_carry_force(at.active_set) {
                 contact.gap = Gap::default();
             } else {
                 contact.load(at, loads);
@@ -155,13 +155,13 @@ impl Contacts {
         }
     }
 
-    /// Completes the gaps of the latest evaluation, with `touching`, and measures those it skipped.
-    pub(super) fn finish_all(&mut self, touching: ActiveSet<'_>, motion: &[Kinematics]) {
+    /// Completes the gaps of the latest evaluation, with `active_set`, and measures those it skipped.
+    pub(super) fn complete_separations(&mut self, active_set: ActiveSet<'_>, motion: &[Kinematics]) {
         for contact in &mut self.joints {
-            if self.only_touching && !contact.may_press(touching) {
+            if self.skips_inactive_joints && !contact.may_carry_force(active_set) {
                 contact.measure(motion);
             } else {
-                contact.finish();
+                contact.complete_separation();
             }
         }
     }
@@ -189,7 +189,7 @@ impl Contacts {
     pub fn slip_speed(&self, i: usize, motion: &[Kinematics]) -> f64 {
         let contact = &self.joints[i];
         let at = &contact.gap.separation;
-        let read = contact.slip_velocity(&at.normal, motion);
-        contact.law.sliding(at, &read).norm()
+        let slip_velocity = contact.slip_velocity(&at.normal, motion);
+        contact.law.sliding_velocity(at, &slip_velocity).norm()
     }
 }

@@ -1,7 +1,7 @@
-//! Rows of three force components whose effect on one another is solved for: ball joints, and force elements between two bodies.
+//! Rows of three force components that are solved for together: ball joints, and force elements between two bodies.
 
 use super::MechanismError;
-use super::bounds::{Advice, Cost, CostOf};
+use super::bounds::{Advice, Cost, CostlyTask};
 use super::columns::Column;
 use super::equations::Equations;
 use super::model::Model;
@@ -23,8 +23,8 @@ impl Spans {
         self.0.iter().map(|&[start, end]| start..end).filter(|range| !range.is_empty())
     }
 
-    /// Number of `coordinate` among its coordinates, if it is one of them.
-    fn place(&self, coordinate: usize) -> Option<usize> {
+    /// Index of `coordinate` among its coordinates, if it is one of them.
+    fn index_of(&self, coordinate: usize) -> Option<usize> {
         let [[start, end], [other, last]] = self.0;
         if (start..end).contains(&coordinate) {
             Some(coordinate - start)
@@ -34,7 +34,7 @@ impl Spans {
     }
 
     /// Whether it shares coordinates with `other`.
-    pub fn meet(&self, other: &Self) -> bool {
+    pub fn overlaps(&self, other: &Self) -> bool {
         self.ranges().any(|a| other.ranges().any(|b| a.start < b.end && b.start < a.end))
     }
 }
@@ -44,12 +44,12 @@ pub struct CoupledRows {
     /// What a force at each row may accelerate.
     pub spans: Vec<Spans>,
     /// Bandwidth: rows further apart are not coupled.
-    pub reach: usize,
+    pub bandwidth: usize,
 }
 
 impl CoupledRows {
-    /// For `n` velocity coordinates and rows between these pairs of bodies. With `within`, a force accelerates only the trees it acts
-    /// on; otherwise all coordinates.
+    /// For `n` velocity coordinates and rows between these pairs of bodies. With `within`, a force accelerates only the trees it
+    /// acts on; otherwise all coordinates.
     ///
     /// # Errors
     /// The rows are coupled too widely.
@@ -78,22 +78,22 @@ impl CoupledRows {
         let spans: Vec<Spans> = blocks.iter().map(spans).collect();
         // Rows that act on the same tree are coupled.
         let mut first_on = vec![usize::MAX; model.blocks.len()];
-        let mut reach = if within { 0 } else { blocks.len().saturating_sub(1) };
+        let mut bandwidth = if within { 0 } else { blocks.len().saturating_sub(1) };
         for (row, of) in blocks.iter().enumerate() {
             for &block in of.iter().flatten() {
                 first_on[block] = first_on[block].min(row);
-                reach = reach.max(row - first_on[block]);
+                bandwidth = bandwidth.max(row - first_on[block]);
             }
         }
-        let cost = Cost::of_coupled_contacts(blocks.len(), reach, spans.iter().map(Spans::len).sum());
-        cost.check(CostOf::CoupledContacts, Advice::Method(Method::Automatic))?;
-        Ok(Self { spans, reach })
+        let cost = Cost::of_coupled_contacts(blocks.len(), bandwidth, spans.iter().map(Spans::len).sum());
+        cost.check(CostlyTask::CoupledContacts, Advice::Method(Method::Automatic))?;
+        Ok(Self { spans, bandwidth })
     }
 }
 
-/// M^-1 S^T of one row over its `spans`, as three interleaved columns, into `out`; `columns` has S, and `scratch` room for all velocity
-/// coordinates.
-pub fn weigh(
+/// M^-1 S^T of one row over its `spans`, as three interleaved columns, into `out`; `columns` has S, and `scratch` room for all
+/// velocity coordinates.
+pub fn apply_inverse_mass(
     model: &Model,
     equations: &mut dyn Equations,
     spans: &Spans,
@@ -105,8 +105,8 @@ pub fn weigh(
     for range in spans.ranges() {
         let (own, after) = rest.split_at_mut(3 * range.len());
         rest = after;
-        let Some((inverse_mass, inverse_inertia)) = equations.lone_body(model, range.start) else {
-            weigh_within(model, equations, &range, columns, scratch, own);
+        let Some((inverse_mass, inverse_inertia)) = equations.free_body_inverse_mass(model, range.start) else {
+            apply_inverse_mass_within(model, equations, &range, columns, scratch, own);
             continue;
         };
         let first = columns.iter().position(|column| column.coordinate == range.start);
@@ -125,7 +125,7 @@ pub fn weigh(
 }
 
 /// The same for one `range` of its spans.
-fn weigh_within(
+fn apply_inverse_mass_within(
     model: &Model,
     equations: &mut dyn Equations,
     range: &Range<usize>,
@@ -150,7 +150,7 @@ fn weigh_within(
 }
 
 /// Adds to `velocities` the effect of `impulse` (N s) at the row with `weighted` over its `spans`.
-pub fn push(velocities: &mut [f64], weighted: &[f64], spans: &Spans, impulse: &Vec3) {
+pub fn add_impulse(velocities: &mut [f64], weighted: &[f64], spans: &Spans, impulse: &Vec3) {
     let mut weighted = weighted.chunks_exact(3);
     for range in spans.ranges() {
         for (v, w) in velocities[range].iter_mut().zip(&mut weighted) {
@@ -164,8 +164,8 @@ pub fn push(velocities: &mut [f64], weighted: &[f64], spans: &Spans, impulse: &V
 pub fn mobility_between(columns: &[Column], weighted: &[f64], spans: &Spans, centres: bool) -> Mat3 {
     let mut mobility = Mat3::zeros();
     for c in columns {
-        if let Some(place) = spans.place(c.coordinate) {
-            let x = &weighted[3 * place..][..3];
+        if let Some(index_of) = spans.index_of(c.coordinate) {
+            let x = &weighted[3 * index_of..][..3];
             let velocity = if centres { &c.centre } else { &c.surface };
             for (j, x) in x.iter().enumerate() {
                 for i in 0..3 {

@@ -1,17 +1,17 @@
 //! A step that solves the contacts: the discrete-gradient rule in velocities, reduced to the contact forces.
 //!
-//! The unknown is the mean velocity V of the step: v1 = 2 V - v0, and the positions move by h V. Forces other than contact forces are
-//! those of the midpoint, at a guess of V, with the mass matrix there: V = v0 + h/2 (a + M^-1 sum S^T F). A contact force depends on
-//! its joint's mean relative velocities u of the centres and s of the points in contact alone ([`Coefficients::step_force`]), so that
-//! Newton's method needs three rows per contact in place of one per coordinate:
-//! F = f(u + h/2 W M^-1 sum S^T F, s + h/2 S M^-1 sum S^T F).
+//! The unknown is the mean velocity V of the step: v1 = 2 V - v0, and the positions move by h V. Forces other than contact forces
+//! are those of the midpoint, at a guess of V, with the mass matrix there: V = v0 + h/2 (a + M^-1 sum S^T F). A contact force
+//! depends on its joint's mean relative velocities u of the centres and s of the points in contact alone
+//! ([`Coefficients::step_force`]), so that Newton's method needs three rows per contact in place of one per coordinate: F = f(u +
+//! h/2 W M^-1 sum S^T F, s + h/2 S M^-1 sum S^T F).
 //!
 //! No event is located. The eccentricity at the end is that of the guessed motion, plus h W times the change of V.
 
 use super::band::Band;
 use super::columns::{Column, collect_columns, collect_relative_columns, contact_sides};
 use super::contacts::Contacts;
-use super::coupled::{CoupledRows, mobility_between, push, weigh};
+use super::coupled::{CoupledRows, add_impulse, apply_inverse_mass, mobility_between};
 use super::elements::{ActiveSet, At, Counts, Powers, SceneElement};
 use super::equations::Equations;
 use super::kinematics::Kinematics;
@@ -27,14 +27,14 @@ const ITERATIONS: u32 = 15;
 const CUTS: u32 = 4;
 /// Factor of a cut.
 const CUT: f64 = 0.4;
-/// Change of a velocity at which the iteration ends where no friction asks for less, m/s or rad/s.
-const STILL: f64 = 1e-4;
-/// An element whose force changes by less than this fraction of what moves it, over half a step, is as good as constant.
-const SOFT: f64 = 0.05;
+/// Change of a velocity at which the iteration ends, unless friction requires a smaller one, m/s or rad/s.
+const VELOCITY_TOLERANCE: f64 = 1e-4;
+/// An element is stepped implicitly if its force changes its own relative motion by at least this fraction over half a step.
+const MIN_RELATIVE_CHANGE: f64 = 0.05;
 /// Distance of the end from the guessed one, over the scales, beyond which the step is repeated from there.
-const FAR_OFF: f64 = 1e-5;
+const GUESS_TOLERANCE: f64 = 1e-5;
 /// Speed at which other contacts may push a ball towards its wall within a step, m/s.
-const PUSH: f64 = 0.05;
+const SPEED_MARGIN: f64 = 0.05;
 
 /// How the force of a row of three depends on its mean velocities.
 enum Law {
@@ -44,10 +44,11 @@ enum Law {
     Element(Mat3),
 }
 
-/// A ball joint that touches in the step, or may, or an element that is stepped implicitly.
-struct Touch {
+/// A row that is solved for: a ball joint that is or may come into contact within the step, or an element that is stepped
+/// implicitly.
+struct SolvedRow {
     /// Ball joints by index, then two rows per element, for its force and its torque.
-    row: usize,
+    index: usize,
     law: Law,
     step: ContactStep,
     /// Mean normal of the guessed motion, for the lever arms.
@@ -58,12 +59,13 @@ struct Touch {
     guessed: [Vec3; 3],
     /// The first two without contact forces.
     free: [Vec3; 2],
-    /// What contact forces add to them: now, before the latest iteration, and after it without a cut.
+    /// Change of these by the contact forces: at present, before the latest iteration, and after it without a cut.
     added: [Vec3; 2],
     before: [Vec3; 2],
     full: [Vec3; 2],
-    found: StepForce,
-    /// The same of the force on the ball, N.
+    /// Force and derivatives by the law at the present velocities.
+    law_force: StepForce,
+    /// Force on the ball at present, before the latest iteration, and after it without a cut, N.
     force: Vec3,
     force_before: Vec3,
     full_force: Vec3,
@@ -72,11 +74,11 @@ struct Touch {
     friction_power: f64,
 }
 
-impl Touch {
-    fn new(row: usize, law: Law) -> Self {
+impl SolvedRow {
+    fn new(index: usize, law: Law) -> Self {
         let zero = [Vec3::zeros(); 2];
         Self {
-            row,
+            index,
             law,
             step: ContactStep::default(),
             normal: Vec3::zeros(),
@@ -86,7 +88,7 @@ impl Touch {
             added: zero,
             before: zero,
             full: zero,
-            found: StepForce::default(),
+            law_force: StepForce::default(),
             force: Vec3::zeros(),
             force_before: Vec3::zeros(),
             full_force: Vec3::zeros(),
@@ -98,14 +100,14 @@ impl Touch {
     /// The law of a ball joint, with its row's number.
     fn contact(&self) -> Option<(usize, &Coefficients)> {
         match &self.law {
-            Law::Contact(law) => Some((self.row, law)),
+            Law::Contact(law) => Some((self.index, law)),
             Law::Element(_) => None,
         }
     }
 
     /// Whether the force found is zero, with its derivatives.
     fn is_open(&self) -> bool {
-        self.found.force == Vec3::zeros() && self.contact().is_some()
+        self.law_force.force == Vec3::zeros() && self.contact().is_some()
     }
 
     /// Velocities of the centres, and those used by friction, of [velocities of the centres and of the surfaces](moved_by).
@@ -123,19 +125,19 @@ impl Touch {
 pub struct DiscreteGradient {
     joints: usize,
     /// Upper bounds on the effect of a force and a torque of each element on its relative motion, 1/kg and 1/(kg m^2).
-    ease: Vec<[f64; 2]>,
+    max_mobility: Vec<[f64; 2]>,
     coupled: CoupledRows,
     band: Band,
-    /// Rows for which it is arranged.
+    /// Rows for which the pattern of the band is set.
     arranged: Vec<usize>,
-    touches: Vec<Touch>,
+    rows: Vec<SolvedRow>,
     columns: Vec<Vec<Column>>,
     /// M^-1 S^T: three interleaved columns per row over its spans.
     weighted: Vec<Vec<f64>>,
     blocks: Vec<Mat3>,
     right: Vec<Vec3>,
-    /// Effect of the forces on the velocities used by friction in the same band, 1/kg: S M^-1 S^T, or W M^-1 S^T where friction uses
-    /// the centres.
+    /// Effect of the forces on the velocities used by friction in the same band, 1/kg: S M^-1 S^T, or W M^-1 S^T where friction
+    /// uses the centres.
     mobility: Vec<Mat3>,
     /// State at the middle and at the end, with the guessed velocities; derivative at the middle.
     middle: Vec<f64>,
@@ -200,18 +202,18 @@ impl DiscreteGradient {
         let of_joints = model.joints.iter().map(|joint| [joint.ball.body, joint.socket.body]);
         let of_elements = elements.iter().flat_map(|ends| [ends.map(|end| end.body); 2]);
         let coupled = CoupledRows::new(model, n, within, of_joints.chain(of_elements))?;
-        let (rows, reach) = (coupled.spans.len(), coupled.reach);
+        let (rows, bandwidth) = (coupled.spans.len(), coupled.bandwidth);
         Ok(Self {
             joints,
-            ease: elements.iter().map(|ends| ease(model, ends)).collect(),
-            band: Band::with_room(rows, reach),
-            touches: Vec::with_capacity(rows),
+            max_mobility: elements.iter().map(|ends| max_mobility(model, ends)).collect(),
+            band: Band::with_capacity(rows, bandwidth),
+            rows: Vec::with_capacity(rows),
             arranged: Vec::with_capacity(rows),
             columns: coupled.spans.iter().map(|spans| Vec::with_capacity(spans.len())).collect(),
             weighted: coupled.spans.iter().map(|spans| vec![0.0; 3 * spans.len()]).collect(),
-            blocks: vec![Mat3::zeros(); Band::most(rows, reach)],
+            blocks: vec![Mat3::zeros(); Band::max_blocks(rows, bandwidth)],
             right: Vec::with_capacity(rows),
-            mobility: vec![Mat3::zeros(); Band::most(rows, reach)],
+            mobility: vec![Mat3::zeros(); Band::max_blocks(rows, bandwidth)],
             middle: vec![0.0; dimension],
             end: vec![0.0; dimension],
             rate: vec![0.0; dimension],
@@ -250,7 +252,7 @@ impl DiscreteGradient {
             start.clearances[1] = contacts.clearance(j);
             let end = contacts.gap(j).eccentricity;
             let deepest = (start.eccentricity.norm() - start.clearances[0]).max(end.norm() - start.clearances[1]);
-            if !all && deepest + PUSH * from.h <= 0.0 {
+            if !all && deepest + SPEED_MARGIN * from.h <= 0.0 {
                 continue;
             }
             let law = *contacts.coefficients(j);
@@ -268,7 +270,7 @@ impl DiscreteGradient {
             };
             let mean = (end - start.eccentricity) / from.h;
             let normal = step.mean_normal(&mean);
-            self.touches.push(Touch { step, normal, guessed: [mean; 3], ..Touch::new(j, Law::Contact(law)) });
+            self.rows.push(SolvedRow { step, normal, guessed: [mean; 3], ..SolvedRow::new(j, Law::Contact(law)) });
         }
     }
 
@@ -285,16 +287,18 @@ impl DiscreteGradient {
             let Some(coupling) = element.coupling(at) else {
                 continue;
             };
-            let [ease, turning_ease] = self.ease[i];
+            let [max_mobility, max_turning_mobility] = self.max_mobility[i];
             let gain = coupling.stiffness.by_displacement * (0.5 * h) + coupling.stiffness.by_rate;
-            let turning = coupling.turning.map(|turning| turning.by_turn * (0.5 * h) + turning.by_spin);
-            let change = gain.norm() * ease + turning.map_or(0.0, |gain| gain.norm() * turning_ease);
-            if 0.5 * h * change < SOFT {
+            let torque_gain =
+                coupling.torque_derivatives.map(|torque| torque.by_rotation * (0.5 * h) + torque.by_angular_velocity);
+            let change =
+                gain.norm() * max_mobility + torque_gain.map_or(0.0, |gain| gain.norm() * max_turning_mobility);
+            if 0.5 * h * change < MIN_RELATIVE_CHANGE {
                 continue;
             }
             let row = self.joints + 2 * i;
             let columns = &mut self.columns[row];
-            match turning {
+            match torque_gain {
                 Some(gain) => {
                     collect_relative_columns(columns, model, equations, &coupling.sides);
                     let Ok([forces, torques]) = self.columns.get_disjoint_mut([row, row + 1]) else {
@@ -303,141 +307,141 @@ impl DiscreteGradient {
                     torques.clear();
                     let turns = |column: &Column| Column { centre: column.turn, surface: column.turn, ..*column };
                     torques.extend(forces.iter().map(turns));
-                    self.touches.push(Touch::new(row + 1, Law::Element(gain)));
+                    self.rows.push(SolvedRow::new(row + 1, Law::Element(gain)));
                 }
                 None => collect_columns(columns, model, equations, &coupling.sides, &coupling.normal),
             }
-            self.touches.push(Touch::new(row, Law::Element(gain)));
+            self.rows.push(SolvedRow::new(row, Law::Element(gain)));
         }
-        self.touches.sort_unstable_by_key(|touch| touch.row);
+        self.rows.sort_unstable_by_key(|row| row.index);
     }
 
     /// Jacobian columns of the contacts, and the mean velocities, from the motion at the middle with the guessed velocities.
-    fn arrange(&mut self, model: &Model, equations: &dyn Equations) {
-        for touch in &mut self.touches {
-            let columns = &mut self.columns[touch.row];
-            if let Law::Contact(law) = &touch.law {
-                let (joint, n) = (&model.joints[touch.row], touch.normal);
+    fn linearise_rows(&mut self, model: &Model, equations: &dyn Equations) {
+        for row in &mut self.rows {
+            let columns = &mut self.columns[row.index];
+            if let Law::Contact(law) = &row.law {
+                let (joint, n) = (&model.joints[row.index], row.normal);
                 let motion = equations.motion();
                 let spin = |body: usize| &motion[body].angular_velocity;
                 let (ball, socket) = (spin(joint.ball.body), spin(joint.socket.body));
-                let mean = touch.guessed[0];
-                touch.guessed[1] = law.slip_velocity(&n, &mean, ball, socket);
-                touch.guessed[2] = law.surface_velocity(&n, &mean, ball, socket);
+                let mean = row.guessed[0];
+                row.guessed[1] = law.slip_velocity(&n, &mean, ball, socket);
+                row.guessed[2] = law.surface_velocity(&n, &mean, ball, socket);
                 collect_columns(columns, model, equations, &contact_sides(joint, law), &n);
             }
-            let [centres, slip] = touch.of_motion(moved_by(columns, |i| self.mean[i] - self.guess[i]));
-            touch.free = [touch.guessed[0] + centres, touch.guessed[1] + slip];
-            touch.added = [-centres, -slip];
+            let [centres, slip] = row.of_motion(moved_by(columns, |i| self.mean[i] - self.guess[i]));
+            row.free = [row.guessed[0] + centres, row.guessed[1] + slip];
+            row.added = [-centres, -slip];
         }
     }
 
     /// M^-1 S^T of every touch, and the mobility that couples the touches.
-    fn couple(&mut self, model: &Model, equations: &mut dyn Equations) {
-        for touch in &self.touches {
-            let (row, spans) = (touch.row, &self.coupled.spans[touch.row]);
-            weigh(model, equations, spans, &self.columns[row], &mut self.scratch, &mut self.weighted[row]);
+    fn compute_mobilities(&mut self, model: &Model, equations: &mut dyn Equations) {
+        for row in &self.rows {
+            let (row, spans) = (row.index, &self.coupled.spans[row.index]);
+            apply_inverse_mass(model, equations, spans, &self.columns[row], &mut self.scratch, &mut self.weighted[row]);
         }
-        let Self { band, arranged, touches, coupled, columns, weighted, mobility, .. } = self;
-        if !touches.iter().map(|touch| touch.row).eq(arranged.iter().copied()) {
-            let CoupledRows { spans, reach } = &*coupled;
-            band.arrange(touches.len(), *reach, |i, j| spans[touches[i].row].meet(&spans[touches[j].row]));
+        let Self { band, arranged, rows, coupled, columns, weighted, mobility, .. } = self;
+        if !rows.iter().map(|row| row.index).eq(arranged.iter().copied()) {
+            let CoupledRows { spans, bandwidth } = &*coupled;
+            band.set_pattern(rows.len(), *bandwidth, |i, j| spans[rows[i].index].overlaps(&spans[rows[j].index]));
             arranged.clear();
-            arranged.extend(touches.iter().map(|touch| touch.row));
+            arranged.extend(rows.iter().map(|row| row.index));
         }
-        for (i, touch) in touches.iter().enumerate() {
-            let (own, centres) = (&columns[touch.row], touch.follows_centres());
+        for (i, row) in rows.iter().enumerate() {
+            let (own, centres) = (&columns[row.index], row.follows_centres());
             for at in band.row(i) {
                 let j = band.columns()[at];
-                let other = &touches[j];
+                let other = &rows[j];
                 let mirrored = j < i && !centres && !other.follows_centres();
                 mobility[at] = if mirrored {
-                    mobility[band.place(j, i)].transpose()
+                    mobility[band.position(j, i)].transpose()
                 } else {
-                    mobility_between(own, &weighted[other.row], &coupled.spans[other.row], centres)
+                    mobility_between(own, &weighted[other.index], &coupled.spans[other.index], centres)
                 };
             }
         }
-        for (i, touch) in touches.iter_mut().enumerate() {
-            touch.mobility = touch.normal.dot(&(mobility[band.diagonal(i)] * touch.normal));
+        for (i, row) in rows.iter_mut().enumerate() {
+            row.mobility = row.normal.dot(&(mobility[band.diagonal(i)] * row.normal));
         }
     }
 
     /// Contact forces over the step. Returns whether the iteration converged.
     fn solve(&mut self, h: f64, model: &Model, equations: &mut dyn Equations, counts: &mut Counts) -> bool {
         let half = 0.5 * h;
-        let laws = self.touches.iter().filter_map(Touch::contact);
-        let still = laws.map(|(_, law)| law.slip_high).fold(STILL, f64::min);
+        let laws = self.rows.iter().filter_map(SolvedRow::contact);
+        let tolerance = laws.map(|(_, law)| law.slip_high).fold(VELOCITY_TOLERANCE, f64::min);
         let (mut merit, mut cuts, mut part) = (f64::INFINITY, 0, 1.0);
-        let mut through_centres = false;
+        let mut has_moved_normal_forces = false;
         for iteration in 0..ITERATIONS {
             counts.contacts += 1;
-            for touch in &mut self.touches {
-                let [u, s] = [touch.free[0] + touch.added[0], touch.free[1] + touch.added[1]];
-                touch.found = match &touch.law {
+            for row in &mut self.rows {
+                let [u, s] = [row.free[0] + row.added[0], row.free[1] + row.added[1]];
+                row.law_force = match &row.law {
                     Law::Contact(law) => {
-                        let found = law.step_force(&touch.step, &u, &s);
-                        counts.friction += u64::from(found.force != Vec3::zeros() && law.friction > 0.0);
-                        found
+                        let step_force = law.step_force(&row.step, &u, &s);
+                        counts.friction += u64::from(step_force.force != Vec3::zeros() && law.friction > 0.0);
+                        step_force
                     }
                     Law::Element(gain) => {
-                        StepForce { force: gain * (u - touch.guessed[0]), by_velocity: *gain, ..StepForce::default() }
+                        StepForce { force: gain * (u - row.guessed[0]), by_velocity: *gain, ..StepForce::default() }
                     }
                 };
             }
             if iteration > 0 {
                 // Work of each missing force on the velocity that it would cause.
-                let missing = |(i, touch): (usize, &Touch)| {
-                    let force = touch.found.force - touch.force;
+                let mismatch = |(i, row): (usize, &SolvedRow)| {
+                    let force = row.law_force.force - row.force;
                     force.dot(&(self.mobility[self.band.diagonal(i)] * force))
                 };
-                let now: f64 = self.touches.iter().enumerate().map(missing).sum();
+                let now: f64 = self.rows.iter().enumerate().map(mismatch).sum();
                 if !(now <= merit) && cuts < CUTS {
                     cuts += 1;
                     part *= CUT;
-                    for touch in &mut self.touches {
-                        touch.force = touch.force_before + (touch.full_force - touch.force_before) * part;
-                        touch.added = [0, 1].map(|q| touch.before[q] + (touch.full[q] - touch.before[q]) * part);
+                    for row in &mut self.rows {
+                        row.force = row.force_before + (row.full_force - row.force_before) * part;
+                        row.added = [0, 1].map(|q| row.before[q] + (row.full[q] - row.before[q]) * part);
                     }
                     continue;
                 }
                 (merit, cuts, part) = (now, 0, 1.0);
             }
             self.eliminate(half);
-            let change = self.take_forces(half);
+            let change = self.apply_forces(half);
             if !change.is_finite() {
                 return false;
             }
-            if change < still {
-                if through_centres || self.move_normal_forces(half, model, equations) < still {
+            if change < tolerance {
+                if has_moved_normal_forces || self.move_normal_forces(half, model, equations) < tolerance {
                     return true;
                 }
-                through_centres = true;
+                has_moved_normal_forces = true;
                 merit = f64::INFINITY;
             }
         }
         false
     }
 
-    /// Moves the normal forces from the guessed points of contact to the centres, where they have no lever arm, by a change of the
-    /// velocities without contact forces: with the arms of a guess they would do work that is not in the elastic energy. Returns the
-    /// largest change of a relative velocity, m/s or rad/s.
+    /// Moves the normal forces from the guessed points of contact to the centres, where they have no lever arm, by changing the
+    /// velocities without contact forces. With the guessed arms they would do work that is not part of the elastic energy.
+    /// Returns the largest change of a relative velocity, m/s or rad/s.
     fn move_normal_forces(&mut self, half: f64, model: &Model, equations: &mut dyn Equations) -> f64 {
         let change = &mut self.scratch;
         change.fill(0.0);
-        for touch in self.touches.iter().filter(|touch| touch.contact().is_some() && !touch.is_open()) {
-            let n = touch.step.mean_normal(&(touch.free[0] + touch.added[0]));
-            let normal_force = n * touch.force.dot(&n);
-            for column in &self.columns[touch.row] {
+        for row in self.rows.iter().filter(|row| row.contact().is_some() && !row.is_open()) {
+            let n = row.step.mean_normal(&(row.free[0] + row.added[0]));
+            let normal_force = n * row.force.dot(&n);
+            for column in &self.columns[row.index] {
                 change[column.coordinate] += half * (column.centre - column.surface).dot(&normal_force);
             }
         }
         equations.apply_inverse_mass(model, change);
         let mut largest = 0.0_f64;
-        for touch in &mut self.touches {
-            let [centres, slip] = touch.of_motion(moved_by(&self.columns[touch.row], |i| change[i]));
-            touch.free[0] += centres;
-            touch.free[1] += slip;
+        for row in &mut self.rows {
+            let [centres, slip] = row.of_motion(moved_by(&self.columns[row.index], |i| change[i]));
+            row.free[0] += centres;
+            row.free[1] += slip;
             largest = largest.max(centres.norm()).max(slip.norm());
         }
         for (mean, change) in self.mean.iter_mut().zip(change) {
@@ -446,86 +450,86 @@ impl DiscreteGradient {
         largest
     }
 
-    /// Takes the forces in `right`, and what they add to the velocities over `half` a step (s). Returns the largest change of a
+    /// Applies the forces in `right` over `half` a step (s). Returns the largest change of a
     /// relative velocity, m/s or rad/s.
-    fn take_forces(&mut self, half: f64) -> f64 {
-        let Self { touches, coupled, weighted, columns, right, scratch, .. } = self;
+    fn apply_forces(&mut self, half: f64) -> f64 {
+        let Self { rows, coupled, weighted, columns, right, scratch, .. } = self;
         scratch.fill(0.0);
-        for (touch, force) in touches.iter_mut().zip(&*right) {
-            (touch.before, touch.force_before) = (touch.added, touch.force);
-            (touch.force, touch.full_force) = (*force, *force);
+        for (row, force) in rows.iter_mut().zip(&*right) {
+            (row.before, row.force_before) = (row.added, row.force);
+            (row.force, row.full_force) = (*force, *force);
             if *force != Vec3::zeros() {
-                push(scratch, &weighted[touch.row], &coupled.spans[touch.row], &(force * half));
+                add_impulse(scratch, &weighted[row.index], &coupled.spans[row.index], &(force * half));
             }
         }
         let mut change = 0.0_f64;
-        for touch in touches {
-            touch.added = touch.of_motion(moved_by(&columns[touch.row], |i| scratch[i]));
-            touch.full = touch.added;
-            change = change.max((touch.added[0] - touch.before[0]).norm());
-            change = change.max((touch.added[1] - touch.before[1]).norm());
+        for row in rows {
+            row.added = row.of_motion(moved_by(&columns[row.index], |i| scratch[i]));
+            row.full = row.added;
+            change = change.max((row.added[0] - row.before[0]).norm());
+            change = change.max((row.added[1] - row.before[1]).norm());
         }
         change
     }
 
     /// Forces of the next Newton iteration into `right`; `half` a step, s.
     ///
-    /// A contact's normal force depends on the velocity of the centres, friction on that of the surfaces. The derivatives take both
-    /// from the latter: the two differ by the lever arms, along which the normal force does not act. Then each row of a contact can be
-    /// divided by its derivative, and only the diagonal blocks change from one iteration to the next.
+    /// A contact's normal force depends on the velocity of the centres, friction on that of the surfaces. The derivatives take
+    /// both from the latter: the two differ by the lever arms, along which the normal force does not act. Then each row of a
+    /// contact can be divided by its derivative, and only the diagonal blocks change from one iteration to the next.
     fn eliminate(&mut self, half: f64) {
         let band = &self.band;
         self.right.clear();
-        for (i, touch) in self.touches.iter().enumerate() {
-            if touch.is_open() {
+        for (i, row) in self.rows.iter().enumerate() {
+            if row.is_open() {
                 self.right.push(Vec3::zeros());
                 continue;
             }
-            let StepForce { force, by_velocity, by_slip, .. } = &touch.found;
+            let StepForce { force, by_velocity, by_slip, .. } = &row.law_force;
             let slope = (by_velocity + by_slip) * half;
-            match slope.try_inverse().filter(|_| touch.contact().is_some()) {
+            match slope.try_inverse().filter(|_| row.contact().is_some()) {
                 Some(inverse) => {
                     self.blocks[band.row(i)].copy_from_slice(&self.mobility[band.row(i)]);
                     self.blocks[band.diagonal(i)] -= inverse;
-                    self.right.push(touch.added[1] / half - inverse * force);
+                    self.right.push(row.added[1] / half - inverse * force);
                 }
                 None => {
                     for (block, mobility) in self.blocks[band.row(i)].iter_mut().zip(&self.mobility[band.row(i)]) {
                         *block = -slope * mobility;
                     }
                     self.blocks[band.diagonal(i)] += Mat3::identity();
-                    self.right.push(force - slope * touch.added[1] / half);
+                    self.right.push(force - slope * row.added[1] / half);
                 }
             }
         }
-        let touches = &self.touches;
-        let is_open = |i: usize| touches[i].is_open();
+        let rows = &self.rows;
+        let is_open = |i: usize| rows[i].is_open();
         band.factor(&mut self.blocks, is_open);
         band.solve(&self.blocks, &mut self.right, is_open);
     }
 
-    /// Adds to the mean velocity what the contact forces add, over half a step `half`, s.
-    fn push(&mut self, half: f64) {
-        for touch in &self.touches {
-            let spans = &self.coupled.spans[touch.row];
-            push(&mut self.mean, &self.weighted[touch.row], spans, &(touch.force * half));
+    /// Adds the effect of the contact forces over half a step `half`, s, to the mean velocity.
+    fn add_impulses(&mut self, half: f64) {
+        for row in &self.rows {
+            let spans = &self.coupled.spans[row.index];
+            add_impulse(&mut self.mean, &self.weighted[row.index], spans, &(row.force * half));
         }
     }
 }
 
-/// Upper bounds on the effect of a force, 1/kg, and of a torque, 1/(kg m^2), between two points on their relative motion: joints can
-/// only lessen those of free bodies.
-fn ease(model: &Model, ends: &[Anchor; 2]) -> [f64; 2] {
-    let mut ease = [0.0; 2];
+/// Upper bounds on the effect of a force, 1/kg, and of a torque, 1/(kg m^2), between two points on their relative motion. They
+/// hold for free bodies; joints only reduce the effect.
+fn max_mobility(model: &Model, ends: &[Anchor; 2]) -> [f64; 2] {
+    let mut max_mobility = [0.0; 2];
     for end in ends {
         let Some(body) = model.bodies.get(end.body).filter(|body| !body.driven_only) else {
             continue;
         };
         let turns = body.inertia_inverse.norm();
-        ease[0] += 1.0 / body.mass + end.offset.norm_squared() * turns;
-        ease[1] += turns;
+        max_mobility[0] += 1.0 / body.mass + end.offset.norm_squared() * turns;
+        max_mobility[1] += turns;
     }
-    ease
+    max_mobility
 }
 
 /// Relative velocities of centres and of surfaces for the `change` of the mean velocity along each coordinate.
@@ -559,7 +563,7 @@ impl Mechanism {
         Ok(())
     }
 
-    /// Measures the end of such a step, from which the next one goes on.
+    /// Measures the end of such a step, at which the next one starts.
     pub fn measure_step_end(&mut self, t: f64, y: &[f64]) {
         self.measure(t, y);
         if let Some(discrete) = &mut self.discrete {
@@ -568,16 +572,16 @@ impl Mechanism {
     }
 
     /// Upper bound on the effect of a force at ball joint `j` on its opening, 1/kg.
-    pub fn most_contact_mobility(&self, j: usize) -> f64 {
+    pub fn max_contact_mobility(&self, j: usize) -> f64 {
         let joint = &self.model.joints[j];
-        ease(&self.model, &[joint.ball, joint.socket])[0]
+        max_mobility(&self.model, &[joint.ball, joint.socket])[0]
     }
 
     /// n . W M^-1 W^T n of ball joint `j` in the latest step, 1/kg; `None` if it did not touch.
     pub fn contact_mobility(&self, j: usize) -> Option<f64> {
-        let touches = &self.discrete.as_ref()?.touches;
-        let touch = touches.binary_search_by_key(&j, |touch| touch.row).ok()?;
-        Some(touches[touch].mobility)
+        let rows = &self.discrete.as_ref()?.rows;
+        let row = rows.binary_search_by_key(&j, |row| row.index).ok()?;
+        Some(rows[row].mobility)
     }
 
     /// Derivative of the velocities without contact forces at the middle of the latest such step.
@@ -586,13 +590,14 @@ impl Mechanism {
         self.discrete.as_ref().map_or(&[], |discrete| &discrete.rate[positions..])
     }
 
-    /// The ball joints that touched in the latest such step, with the means over it; directions are those of the latest evaluation.
-    pub fn discrete_touches(&self) -> impl Iterator<Item = (usize, elements::Touch)> {
-        let touches = self.discrete.iter().flat_map(|discrete| &discrete.touches);
-        let contacts = touches.filter_map(|touch| Some((touch.contact()?.0, touch)));
-        contacts.filter(|(_, touch)| touch.normal_force > 0.0).map(|(joint, touch)| {
-            let (normal_force, friction_power) = (touch.normal_force, touch.friction_power);
-            (joint, elements::Touch { direction: self.wall_direction(joint), normal_force, friction_power })
+    /// The ball joints that touched in the latest such step, with the means over it; directions are those of the latest
+    /// evaluation.
+    pub fn discrete_contacts(&self) -> impl Iterator<Item = (usize, elements::WallContact)> {
+        let rows = self.discrete.iter().flat_map(|discrete| &discrete.rows);
+        let contacts = rows.filter_map(|row| Some((row.contact()?.0, row)));
+        contacts.filter(|(_, row)| row.normal_force > 0.0).map(|(joint, row)| {
+            let (normal_force, friction_power) = (row.normal_force, row.friction_power);
+            (joint, elements::WallContact { direction: self.wall_direction(joint), normal_force, friction_power })
         })
     }
 
@@ -623,7 +628,7 @@ impl Evaluator<'_> {
     ) -> bool {
         let StepStart { t, h, y, k, .. } = *from;
         let positions = self.positions();
-        // The step before ended with this measurement, unless something has happened since.
+        // The previous step ended with this measurement, unless the state has changed since.
         if self.mechanism.latest != Latest::Measured(t) || discrete.result != y {
             self.mechanism.measure(t, y);
         }
@@ -636,7 +641,7 @@ impl Evaluator<'_> {
                 let scale = &self.mechanism.scale()[positions..];
                 let moved = discrete.mean.iter().zip(&discrete.guess).zip(scale);
                 let moved = moved.map(|((mean, guess), scale)| (mean - guess).abs() / scale).fold(0.0, f64::max) * h;
-                if moved < FAR_OFF {
+                if moved < GUESS_TOLERANCE {
                     break;
                 }
                 discrete.guess.copy_from_slice(&discrete.mean);
@@ -650,27 +655,27 @@ impl Evaluator<'_> {
                 self.mechanism.equations.displace(&self.mechanism.model, at, &discrete.displacement);
             }
             self.mechanism.measure(t + h, &discrete.end);
-            discrete.touches.clear();
-            if !matches!(self.touching, ActiveSet::Nothing) {
+            discrete.rows.clear();
+            if !matches!(self.active_set, ActiveSet::Nothing) {
                 discrete.gather(&self.mechanism.model, &self.mechanism.contacts, from, all);
             }
-            // Everything but the contacts, at the middle.
-            let touching = std::mem::replace(&mut self.touching, ActiveSet::Nothing);
+            // All forces except those of contacts, at the middle.
+            let active_set = std::mem::replace(&mut self.active_set, ActiveSet::Nothing);
             self.derivative(t + 0.5 * h, &discrete.middle, &mut discrete.rate);
-            self.touching = touching;
+            self.active_set = active_set;
             for (i, mean) in discrete.mean.iter_mut().enumerate() {
                 *mean = y[positions + i] + 0.5 * h * discrete.rate[positions + i];
             }
             let Mechanism { model, equations, elements, .. } = &mut *self.mechanism;
-            let at = At { t: t + 0.5 * h, motion: equations.motion(), touching: ActiveSet::Nothing };
+            let at = At { t: t + 0.5 * h, motion: equations.motion(), active_set: ActiveSet::Nothing };
             discrete.gather_elements(model, elements, &**equations, &at, h);
-            if !discrete.touches.is_empty() {
-                discrete.arrange(model, &**equations);
-                discrete.couple(model, &mut **equations);
+            if !discrete.rows.is_empty() {
+                discrete.linearise_rows(model, &**equations);
+                discrete.compute_mobilities(model, &mut **equations);
                 if !discrete.solve(h, model, &mut **equations, &mut self.counts) {
                     return false;
                 }
-                discrete.push(0.5 * h);
+                discrete.add_impulses(0.5 * h);
             }
         }
         y_end.copy_from_slice(y);
@@ -682,35 +687,35 @@ impl Evaluator<'_> {
         for (i, mean) in discrete.mean.iter().enumerate() {
             y_end[positions + i] = 2.0 * mean - y[positions + i];
         }
-        self.find_discrete_powers(discrete, from);
+        self.compute_discrete_powers(discrete, from);
         true
     }
 
     /// Powers over the step: of the contacts from the work of their forces, of everything else at the middle.
-    fn find_discrete_powers(&mut self, discrete: &mut DiscreteGradient, from: &StepStart<'_>) {
+    fn compute_discrete_powers(&mut self, discrete: &mut DiscreteGradient, from: &StepStart<'_>) {
         let (t, h) = (from.t + 0.5 * from.h, from.h);
         let Mechanism { model, equations, elements, sources, gravity, contacts, .. } = &mut *self.mechanism;
         let positions = equations.positions(model);
         let mut powers = Powers::default();
-        for touch in &mut discrete.touches {
-            let Some((joint, _)) = touch.contact() else {
+        for row in &mut discrete.rows {
+            let Some((joint, _)) = row.contact() else {
                 continue;
             };
-            let [centres, surfaces] = moved_by(&discrete.columns[touch.row], |i| discrete.mean[i] - discrete.guess[i]);
-            let (u, s) = (touch.guessed[0] + centres, touch.guessed[2] + surfaces);
-            let n = touch.found.normal;
-            let normal = -touch.force.dot(&n);
-            let end = (touch.step.start + u * h).norm() - touch.step.clearances[1];
-            let start = touch.step.start.norm() - touch.step.clearances[0];
+            let [centres, surfaces] = moved_by(&discrete.columns[row.index], |i| discrete.mean[i] - discrete.guess[i]);
+            let (u, s) = (row.guessed[0] + centres, row.guessed[2] + surfaces);
+            let n = row.law_force.normal;
+            let normal = -row.force.dot(&n);
+            let end = (row.step.start + u * h).norm() - row.step.clearances[1];
+            let start = row.step.start.norm() - row.step.clearances[0];
             let law = contacts.coefficients(joint);
             let stored = law.elastic_energy(end) - law.elastic_energy(start);
-            touch.normal_force = normal;
-            touch.friction_power = -(touch.force + n * normal).dot(&s);
+            row.normal_force = normal;
+            row.friction_power = -(row.force + n * normal).dot(&s);
             powers.restitution += (normal * (end - start) - stored) / h;
-            powers.friction += touch.friction_power;
+            powers.friction += row.friction_power;
             // A clearance that shrinks also stiffens the contact.
             let stiffened = law.elastic_energy(start) - discrete.starts[joint].stored;
-            powers.clearance += (stiffened - normal * (touch.step.clearances[1] - touch.step.clearances[0])) / h;
+            powers.clearance += (stiffened - normal * (row.step.clearances[1] - row.step.clearances[0])) / h;
         }
         if sources.none {
             discrete.powers = powers;
@@ -721,25 +726,25 @@ impl Evaluator<'_> {
         }
         if !model.drives.is_empty() {
             let (motion, wrench) = equations.loads();
-            for touch in &discrete.touches {
-                let Some((joint, law)) = touch.contact() else {
+            for row in &discrete.rows {
+                let Some((joint, law)) = row.contact() else {
                     continue;
                 };
                 let joint = &model.joints[joint];
                 let [arm_ball, arm_socket] = joint.arms(motion);
                 // Only friction has a lever arm about the centres.
-                let n = touch.found.normal;
-                let turning = touch.normal.cross(&(touch.force - n * touch.force.dot(&n)));
+                let n = row.law_force.normal;
+                let turning = row.normal.cross(&(row.force - n * row.force.dot(&n)));
                 let ball = &mut wrench[joint.ball.body];
-                ball.force += touch.force;
-                ball.torque += arm_ball.cross(&touch.force) + turning * law.ball_radius;
+                ball.force += row.force;
+                ball.torque += arm_ball.cross(&row.force) + turning * law.ball_radius;
                 let socket = &mut wrench[joint.socket.body];
-                socket.force -= touch.force;
-                socket.torque -= arm_socket.cross(&touch.force) + turning * (law.ball_radius + law.clearance);
+                socket.force -= row.force;
+                socket.torque -= arm_socket.cross(&row.force) + turning * (law.ball_radius + law.clearance);
             }
             let rates = &mut discrete.end[positions..];
             if equations.rows() > 0 {
-                // The reactions of the ideal joints to the contact forces, too.
+                // Includes the reactions of the ideal joints to the contact forces.
                 equations.accelerate(model, gravity, t, &discrete.middle, rates);
             } else {
                 for (i, rate) in rates.iter_mut().enumerate() {
@@ -778,7 +783,7 @@ mod tests {
         machine
     }
 
-    /// A mechanism at its start, stepped by hand.
+    /// A mechanism stepped without a simulation.
     struct Run {
         mechanism: Mechanism,
         t: f64,
@@ -835,7 +840,8 @@ mod tests {
         }
     }
 
-    /// Restitution of that ball's impact with `n` steps per Hertz time, averaged over the instant within a step at which it begins.
+    /// Restitution of that ball's impact with `n` steps per Hertz time, averaged over the instant within a step at which it
+    /// begins.
     fn impact(contact: Parameters, n: f64) -> f64 {
         const STARTS: u32 = 8;
         let law = Coefficients::new(&contact, contact.clearance);
@@ -855,7 +861,7 @@ mod tests {
     }
 
     #[test]
-    fn an_undamped_ball_rebounds_with_its_speed_however_long_the_step() {
+    fn an_undamped_ball_rebounds_with_its_approach_speed_at_any_step_size() {
         let elastic = Parameters { normal_law: NormalLaw::Hertz, ..Parameters::DEFAULT };
         for n in [1.0, 2.0, 4.0, 8.0] {
             let restitution = impact(elastic, n);
@@ -887,7 +893,7 @@ mod tests {
     }
 
     #[test]
-    fn contacts_keep_the_momentum_and_account_for_the_energy() {
+    fn contacts_conserve_momentum_and_their_powers_account_for_the_energy() {
         for formulation in Formulation::ALL {
             let mut run = Run::new(&pair(formulation));
             let momentum = |run: &Run| run.mechanism.motion()[..2].iter().map(|m| m.velocity * 0.2).sum::<Vec3>();

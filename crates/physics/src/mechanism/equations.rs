@@ -33,7 +33,7 @@ pub(super) trait Equations: Send + Sync {
     /// Motion prescribed as a function of time.
     fn driven(&self) -> &Driven;
 
-    /// The same, to be told of later instants.
+    /// The same, to prepare later instants.
     fn driven_mut(&mut self) -> &mut Driven;
 
     /// Coordinate and rate of the joint above body `b`, after an evaluation at `y`: m and m/s, or rad and rad/s; `None` if the
@@ -43,18 +43,18 @@ pub(super) trait Equations: Send + Sync {
     /// Poses and velocities at (t, y).
     fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]);
 
-    /// Lets evaluations skip the bodies for which `asleep` holds, if [`Self::is_block_diagonal`]: free bodies that are trees of
-    /// their own. Their components of derivatives are left unchanged, and their motion is that of the latest
-    /// [`Self::update_kinematics`] or [`Self::update_asleep`].
+    /// Lets evaluations skip the bodies for which `suspended` holds, if [`Self::is_block_diagonal`]: free bodies that are trees
+    /// of their own. Their components of derivatives are left unchanged, and their motion is that of the latest
+    /// [`Self::update_kinematics`] or [`Self::update_suspended`].
     fn suspend(&mut self, _asleep: &dyn Fn(BodyIndex) -> bool) {}
 
     /// [`Self::update_kinematics`] for the active bodies.
-    fn update_awake(&mut self, model: &Model, t: f64, y: &[f64]) {
+    fn update_active(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.update_kinematics(model, t, y);
     }
 
-    /// The same for the suspended bodies, after [`Self::update_awake`] at this instant.
-    fn update_asleep(&mut self, _model: &Model, _y: &[f64]) {}
+    /// The same for the suspended bodies, after [`Self::update_active`] at this instant.
+    fn update_suspended(&mut self, _model: &Model, _y: &[f64]) {}
 
     /// Bodies that determine the gap of `joint`; `None` if they are nearly all that [`Self::update_kinematics`] moves.
     fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path>;
@@ -94,9 +94,9 @@ pub(super) trait Equations: Send + Sync {
     /// Applies the constrained inverse mass matrix: generalised forces to accelerations, in place.
     fn apply_inverse_mass(&mut self, model: &Model, x: &mut [f64]);
 
-    /// Inverse mass, 1/kg, and inverse inertia in world axes, 1/(kg m^2), of the free body with six coordinates from `first` on, if its
-    /// accelerations depend on the forces on it alone.
-    fn lone_body(&self, model: &Model, first: usize) -> Option<(f64, Mat3)>;
+    /// Inverse mass, 1/kg, and inverse inertia in world axes, 1/(kg m^2), of the free body with six coordinates from `first` on,
+    /// if its accelerations depend on the forces on it alone.
+    fn free_body_inverse_mass(&self, model: &Model, first: usize) -> Option<(f64, Mat3)>;
 
     /// The same for forces on the coordinates `range` only, if [`Self::is_block_diagonal`].
     fn apply_inverse_mass_within(&mut self, model: &Model, range: (usize, usize), x: &mut [f64]);
@@ -140,10 +140,10 @@ pub(super) trait Equations: Send + Sync {
     fn is_closure_unique(&self, c: usize) -> bool;
 
     /// Force (N) or torque (N m) of every actuator, given the true accelerations in [`Self::motion`].
-    fn actuators(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]);
+    fn actuator_forces(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]);
 
     /// The motion, and the force and torque about each body's centroid exerted on it by the joint above it, actuators included,
-    /// after [`Self::actuators`].
+    /// after [`Self::actuator_forces`].
     fn joint_loads(&mut self) -> (&[Kinematics], &[Wrench]);
 
     /// Whether the force or torque of actuator `i` is unique.

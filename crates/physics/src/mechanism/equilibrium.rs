@@ -1,10 +1,10 @@
-//! Start in static equilibrium: every force of springs, bushings, tyres, stops, contacts and gravity in balance, at the values that
-//! drives, targets, grounds and load factors have at t = 0. Friction carries nothing there, because nothing slides.
+//! Start in static equilibrium: every force of springs, bushings, tyres, stops, contacts and gravity in balance, at the values
+//! that drives, targets, grounds and load factors have at t = 0. Friction is zero, because nothing slides.
 //!
 //! The rest position is a zero of the accelerations a(q) of the machine without velocities. It is found along the flow
-//! dq/ds = a(q), which leads downhill in the potential energy (dV/ds = -a' M a), by implicit Euler steps d / tau = a(q + d), solved
-//! by Newton's method. While the forces fall, tau grows, and the steps become those of Newton's method for a = 0: pseudo-transient
-//! continuation (Kelley & Keyes, SIAM J. Numer. Anal. 35, 1998, pp. 508-523).
+//! dq/ds = a(q), which leads downhill in the potential energy (dV/ds = -a' M a), by implicit Euler steps d / tau = a(q + d),
+//! solved by Newton's method. While the forces fall, tau grows, and the steps become those of Newton's method for a = 0:
+//! pseudo-transient continuation (Kelley & Keyes, SIAM J. Numer. Anal. 35, 1998, pp. 508-523).
 
 use std::sync::Arc;
 
@@ -22,80 +22,82 @@ use crate::integrate::System as _;
 use crate::machine::{BallJoint, Drive, ElementKind, Formulation, Machine, StartRule};
 
 /// Maximum number of velocity coordinates: the derivative of the accelerations is taken by differences and is dense.
-const MOST_COORDINATES: usize = 400;
-/// Maximum number of iterations of all steps, those that are repeated with a smaller tau included, and of evaluations, one for each
-/// coordinate in an iteration: some seconds.
-const MOST_STEPS: usize = 1000;
-const MOST_EVALUATIONS: usize = 50_000;
+const MAX_COORDINATES: usize = 400;
+/// Maximum number of iterations of all steps, those that are repeated with a smaller tau included, and of evaluations, one for
+/// each coordinate in an iteration: some seconds.
+const MAX_STEPS: usize = 1000;
+const MAX_EVALUATIONS: usize = 50_000;
 /// Maximum number of iterations of a step: bodies that move along a wall leave it by the curvature of their path, and each
 /// iteration takes two thirds of a penetration back. Steps with more than a few are not made longer.
-const MOST_CORRECTIONS: usize = 12;
-const FEW: usize = 6;
+const MAX_CORRECTIONS: usize = 12;
+const FEW_CORRECTIONS: usize = 6;
 /// Displacement for differences, as a time at the scales' speeds, s: 1e-9 m with balls of 10 mm, 1e-8 rad.
 const DIFFERENCE: f64 = 1e-8;
-/// Largest turn in one iteration, rad, and largest shift over the length scale and over the size of the machine, whichever is more.
-const LARGEST_TURN: f64 = 0.3;
-const LARGEST_SHIFT: (f64, f64) = (3.0, 0.1);
+/// Largest turn in one iteration, rad, and largest shift over the length scale and over the size of the machine, whichever is
+/// more.
+const MAX_TURN: f64 = 0.3;
+const MAX_SHIFT: (f64, f64) = (3.0, 0.1);
 /// First tau, the bounds within which it changes, s^2, and the factors by which it does.
 const FIRST_TAU: f64 = 1e-4;
 const TAU: (f64, f64) = (1e-20, 1e3);
 const GROWTH: (f64, f64) = (2.0, 100.0);
 const CUT: f64 = 0.25;
-/// Least tau, s^2, at which the length of a step tells the distance from rest: parts that swing more slowly than 1 rad/s come
-/// closer with a larger one.
-const TELLING_TAU: f64 = 1.0;
+/// Smallest tau, s^2, at which the length of a step measures the distance from rest. Parts that oscillate more slowly than 1
+/// rad/s need a larger one.
+const CONVERGENCE_TAU: f64 = 1.0;
 /// Factor by which the accelerations may grow in a step, and the fraction of those of gravity that may be rounding.
 const RISE: f64 = 2.0;
 const NOISE: f64 = 1e-5;
-/// Displacement of the last step, as a time at the scales' speeds, s: 1e-12 of the length scale; that below which steps that no
-/// longer become shorter are rounding; and the same with the largest tau, where parts without a place of their own drift.
+/// Displacements of a step at which the search ends, as times at the scales' speeds, s: that of the last step, which is 1e-12 of
+/// the length scale; the largest one of steps that no longer become shorter because of rounding; and the same with the largest
+/// tau, at which parts without a restoring force drift.
 const AT_REST: f64 = 1e-13;
 const ROUNDING: f64 = 2e-9;
 const DRIFT: f64 = 1e-8;
 
-/// Start in equilibrium of `machine` at t = 0, assembled from the tree coordinates `near` it, if given, in place of its start values.
+/// Start in equilibrium of `machine` at t = 0. The tree coordinates `near`, if given, replace its start values.
 ///
-/// The machine without play rests first. Its balls are then laid on their walls where it presses them, and the search continues
-/// from there: on the long way, walls that a ball must follow would allow short steps only.
+/// First finds the rest of the machine without play. Then places the balls on their walls where its reactions press them, and
+/// continues the search from there: far from rest, balls that slide along their walls would limit the steps.
 ///
 /// # Errors
-/// The machine does not start settled, has too many coordinates, or comes to rest nowhere.
-pub(super) fn rest(machine: &Machine, near: Option<&[f64]>) -> Result<Settled, MechanismError> {
+/// The machine has no settled start, has too many coordinates, or no position of rest is found.
+pub(super) fn rest_state(machine: &Machine, near: Option<&[f64]>) -> Result<Settled, MechanismError> {
     let Settled { mut state, assembly } = settle(machine, near)?;
-    let mut still = at_start(machine);
-    still.formulation = Formulation::Tree;
+    let mut constant = with_constant_laws(machine);
+    constant.formulation = Formulation::Tree;
     let play = |joint: &BallJoint| joint.contact.clearance > 0.0;
-    if still.ball_joints.iter().any(play) {
-        let ideal = without_play(&still);
-        // If it does not rest without play, the search with play says where it ended.
-        if let Ok(rests) = rest_near(&ideal, state.clone()) {
-            state = settle(&still, Some(&rests))?.state;
+    if constant.ball_joints.iter().any(play) {
+        let ideal = without_play(&constant);
+        // If there is no rest without play, the search with play reports where it ended.
+        if let Ok(rests) = rest_state_near(&ideal, state.clone()) {
+            state = settle(&constant, Some(&rests))?.state;
         }
     }
-    still.start = StartRule::AsGiven;
-    Ok(Settled { state: rest_near(&still, state)?, assembly })
+    constant.start = StartRule::AsGiven;
+    Ok(Settled { state: rest_state_near(&constant, state)?, assembly })
 }
 
 /// State of rest of `machine`, whose laws are constant, near the tree coordinates `state`.
-pub(super) fn rest_near(machine: &Machine, mut state: Vec<f64>) -> Result<Vec<f64>, MechanismError> {
+pub(super) fn rest_state_near(machine: &Machine, mut state: Vec<f64>) -> Result<Vec<f64>, MechanismError> {
     let Model { nq, nv, .. } = Model::new(machine);
-    if nv > MOST_COORDINATES {
-        return Err(MechanismError::TooLargeForRest { velocities: nv, most: MOST_COORDINATES });
+    if nv > MAX_COORDINATES {
+        return Err(MechanismError::TooLargeForRest { velocities: nv, most: MAX_COORDINATES });
     }
     state[nq..].fill(0.0);
-    let mut mechanism = Mechanism::near(machine, Some(&state))?;
+    let mut mechanism = Mechanism::with_guess(machine, Some(&state))?;
     let state = mechanism.start_off_path()?;
     let found = Search::new(&mut mechanism).find(state);
-    found.map_err(|moves| MechanismError::NoRest {
-        body: machine.bodies[moves.body].name.clone(),
-        acceleration: moves.acceleration,
-        angular_acceleration: moves.angular_acceleration,
+    found.map_err(|fastest_body| MechanismError::NoRest {
+        body: machine.bodies[fastest_body.body].name.clone(),
+        acceleration: fastest_body.acceleration,
+        angular_acceleration: fastest_body.angular_acceleration,
     })
 }
 
 /// `machine` with the values that every law has at t = 0.
-pub(super) fn at_start(machine: &Machine) -> Machine {
-    let mut still = machine.clone();
+pub(super) fn with_constant_laws(machine: &Machine) -> Machine {
+    let mut constant = machine.clone();
     let functions = machine.closed_form.as_ref().map_or(Vec::new(), |form| form.at(0.0));
     let hold = |drive: &mut Drive, turns: bool| {
         let trajectory = trajectory_of(drive, turns);
@@ -105,15 +107,15 @@ pub(super) fn at_start(machine: &Machine) -> Machine {
         };
         *drive = Drive::Constant { position, velocity: 0.0 };
     };
-    still.closed_form = None;
-    for joint in &mut still.joints {
+    constant.closed_form = None;
+    for joint in &mut constant.joints {
         let freedoms = joint.kind.freedoms();
         let drives = [&mut joint.drive, &mut joint.second_drive];
         for (drive, freedom) in drives.into_iter().zip(freedoms) {
             drive.iter_mut().for_each(|drive| hold(drive, freedom.turns()));
         }
     }
-    for element in &mut still.elements {
+    for element in &mut constant.elements {
         let turns = element.is_on_hinge();
         let law = match &mut element.kind {
             ElementKind::Load(load) => &mut load.factor,
@@ -125,11 +127,11 @@ pub(super) fn at_start(machine: &Machine) -> Machine {
         };
         law.iter_mut().for_each(|law| hold(law, turns));
     }
-    still
+    constant
 }
 
-/// The body that moves most where no rest was found, with its accelerations, m/s^2 and rad/s^2.
-struct Moves {
+/// The body with the largest accelerations, m/s^2 and rad/s^2, where no position of rest was found.
+struct FastestBody {
     body: usize,
     acceleration: f64,
     angular_acceleration: f64,
@@ -173,7 +175,7 @@ impl<'a> Search<'a> {
     }
 
     /// The state of rest near `y`.
-    fn find(&mut self, mut y: Vec<f64>) -> Result<Vec<f64>, Moves> {
+    fn find(&mut self, mut y: Vec<f64>) -> Result<Vec<f64>, FastestBody> {
         let nv = self.model.nv;
         if nv == 0 {
             return Ok(y);
@@ -181,57 +183,57 @@ impl<'a> Search<'a> {
         let mut start = vec![0.0; nv];
         self.accelerate(&y, &mut start);
         let mut size = self.size(&start);
-        let largest_shift = (LARGEST_SHIFT.0 * self.model.length_scale).max(LARGEST_SHIFT.1 * self.extent());
+        let largest_shift = (MAX_SHIFT.0 * self.model.length_scale).max(MAX_SHIFT.1 * self.extent());
         let fall = self.mechanism.gravity.norm() / self.model.speed_scale();
         let noise = NOISE * size.max(fall);
         let (mut tau, mut last) = (FIRST_TAU, f64::INFINITY);
-        // Within a step: where it has come to, by which displacement, and the accelerations there.
-        let (mut z, mut moved, mut here) = (y.clone(), vec![0.0; nv], start.clone());
+        // Within a step: the current iterate, its displacement from the start of the step, and the accelerations there.
+        let (mut trial, mut moved, mut accelerations) = (y.clone(), vec![0.0; nv], start.clone());
         let mut iterations = 0;
-        for _ in 0..MOST_STEPS.min(MOST_EVALUATIONS / nv) {
-            self.linearise(&z, &here);
-            let mut step: Vec<f64> = here.iter().zip(&moved).map(|(a, moved)| a - moved / tau).collect();
+        for _ in 0..MAX_STEPS.min(MAX_EVALUATIONS / nv) {
+            self.linearise(&trial, &accelerations);
+            let mut step: Vec<f64> = accelerations.iter().zip(&moved).map(|(a, moved)| a - moved / tau).collect();
             self.solve(tau, &mut step);
-            self.project_step(&z, &mut step);
+            self.project_step(&trial, &mut step);
             let length = self.size(&step);
-            let stirs = length <= if tau >= TAU.1 { DRIFT } else { ROUNDING } && length >= 0.5 * last;
-            if iterations == 0 && tau >= TELLING_TAU && (length <= AT_REST || stirs) {
+            let stagnates = length <= if tau >= TAU.1 { DRIFT } else { ROUNDING } && length >= 0.5 * last;
+            if iterations == 0 && tau >= CONVERGENCE_TAU && (length <= AT_REST || stagnates) {
                 return Ok(y);
             }
             let cut = (1.0 / self.excess(&step, largest_shift)).min(1.0);
             step.iter_mut().for_each(|part| *part *= cut);
-            let closes = length.is_finite() && self.displace(&mut z, &step);
+            let is_closed = length.is_finite() && self.displace(&mut trial, &step);
             moved.iter_mut().zip(&step).for_each(|(moved, part)| *moved += part);
-            self.accelerate(&z, &mut here);
-            let now = self.size(&here);
+            self.accelerate(&trial, &mut accelerations);
+            let new_size = self.size(&accelerations);
             iterations += 1;
-            // On the way, a ball may leave its wall, and then falls.
-            let slack = if tau >= TELLING_TAU { noise } else { fall };
-            let lost = iterations > 1 && length > self.size(&moved);
-            if closes && now <= RISE * size + slack {
-                // A step that needed corrections, or that the accelerations rose in, was long enough.
-                let growth = match size / now.max(f64::MIN_POSITIVE) {
-                    _ if iterations > FEW => 1.0,
-                    _ if now == 0.0 => GROWTH.1,
+            // Far from rest, a ball may leave its wall and fall freely.
+            let slack = if tau >= CONVERGENCE_TAU { noise } else { fall };
+            let diverges = iterations > 1 && length > self.size(&moved);
+            if is_closed && new_size <= RISE * size + slack {
+                // A step that needed many corrections, or in which the accelerations grew, is not made longer.
+                let growth = match size / new_size.max(f64::MIN_POSITIVE) {
+                    _ if iterations > FEW_CORRECTIONS => 1.0,
+                    _ if new_size == 0.0 => GROWTH.1,
                     fall if fall > 0.8 => fall.clamp(GROWTH.0, GROWTH.1),
                     fall if fall * RISE > 1.0 => 1.0,
                     _ => CUT,
                 };
                 tau = (growth * tau).clamp(TAU.0, TAU.1);
-                (size, last) = (now, self.size(&moved));
-                y.clone_from(&z);
-                start.clone_from(&here);
-            } else if closes && now.is_finite() && !lost && iterations < MOST_CORRECTIONS {
+                (size, last) = (new_size, self.size(&moved));
+                y.clone_from(&trial);
+                start.clone_from(&accelerations);
+            } else if is_closed && new_size.is_finite() && !diverges && iterations < MAX_CORRECTIONS {
                 continue;
             } else {
                 tau = (CUT * tau).max(TAU.0);
-                z.clone_from(&y);
-                here.clone_from(&start);
+                trial.clone_from(&y);
+                accelerations.clone_from(&start);
             }
             moved.fill(0.0);
             iterations = 0;
         }
-        Err(self.moves(&y))
+        Err(self.fastest_body(&y))
     }
 
     /// Solves (I / tau - da/dq) x = b in place.
@@ -250,10 +252,10 @@ impl<'a> Search<'a> {
         (most - least).norm()
     }
 
-    /// Largest part of the displacement `step` over what one iteration may take, with shifts up to `largest_shift`, m.
+    /// Largest ratio of a component of the displacement `step` to the limit of one iteration; `largest_shift`, m, limits shifts.
     fn excess(&self, step: &[f64], largest_shift: f64) -> f64 {
         let shift = |part: &f64| part.abs() / largest_shift;
-        let turn = |part: &f64| part.abs() / LARGEST_TURN;
+        let turn = |part: &f64| part.abs() / MAX_TURN;
         let most = |parts: &[f64], over: &dyn Fn(&f64) -> f64| parts.iter().map(over).fold(0.0, f64::max);
         let of_body = |body: &Body| match body.motion {
             Motion::Free { v, .. } => most(&step[v..v + 3], &shift).max(most(&step[v + 3..v + 6], &turn)),
@@ -268,7 +270,7 @@ impl<'a> Search<'a> {
     fn size(&self, parts: &[f64]) -> f64 {
         let scales = &self.model.scale[self.model.nq..];
         let sizes = parts.iter().zip(scales).map(|(part, scale)| (part / scale).abs());
-        // Unlike `max`, this keeps what is not a number.
+        // Unlike `max`, this propagates NaN.
         sizes.fold(0.0, |most, size| if size <= most { most } else { size })
     }
 
@@ -288,11 +290,11 @@ impl<'a> Search<'a> {
             let mut step = vec![0.0; nv];
             step[j] = size;
             self.project_step(y, &mut step);
-            // So small a step along the joints opens them by less than rounding does.
-            let mut beside = y.to_vec();
-            Tree::displace(&self.model, &mut beside, &step);
+            // The step is so small that it opens the joints by less than rounding errors.
+            let mut displaced = y.to_vec();
+            Tree::displace(&self.model, &mut displaced, &step);
             let mut column = vec![0.0; nv];
-            self.accelerate(&beside, &mut column);
+            self.accelerate(&displaced, &mut column);
             for (slope, at) in column.iter_mut().zip(accelerations) {
                 *slope = (*slope - at) / size;
             }
@@ -320,19 +322,20 @@ impl<'a> Search<'a> {
         error <= CLOSED
     }
 
-    /// The body that moves most at `y`.
-    fn moves(&mut self, y: &[f64]) -> Moves {
+    /// The body with the largest accelerations at `y`.
+    fn fastest_body(&mut self, y: &[f64]) -> FastestBody {
         let mut evaluator = self.mechanism.evaluator(ActiveSet::Immediate(&self.contact_states));
         evaluator.evaluate_fully(0.0, y, &mut self.derivative);
         let scale = self.model.length_scale;
         let motion = self.mechanism.motion()[..self.model.massive].iter().enumerate();
-        let moves = motion.map(|(body, motion)| Moves {
+        let fastest_body = motion.map(|(body, motion)| FastestBody {
             body,
             acceleration: motion.acceleration.norm(),
             angular_acceleration: motion.angular_acceleration.norm(),
         });
-        let size = |moves: &Moves| moves.acceleration + scale * moves.angular_acceleration;
-        let none = Moves { body: 0, acceleration: 0.0, angular_acceleration: 0.0 };
-        moves.fold(none, |most, moves| if size(&moves) > size(&most) { moves } else { most })
+        let size = |fastest_body: &FastestBody| fastest_body.acceleration + scale * fastest_body.angular_acceleration;
+        let none = FastestBody { body: 0, acceleration: 0.0, angular_acceleration: 0.0 };
+        fastest_body
+            .fold(none, |most, fastest_body| if size(&fastest_body) > size(&most) { fastest_body } else { most })
     }
 }

@@ -49,12 +49,12 @@ impl FreeFlightBody {
             }
         }
         // In order of body index, like the blocks.
-        let lone = model.blocks.iter().filter_map(|block| block.lone);
-        let flyer = |body: BodyIndex| match model.bodies[body].motion {
+        let single = model.blocks.iter().filter_map(|block| block.single_free_body);
+        let free_flight_body = |body: BodyIndex| match model.bodies[body].motion {
             Motion::Free { q, v } => Some(Self { body, joints: std::mem::take(&mut joints[body]), q, v: model.nq + v }),
             _ => None,
         };
-        lone.filter(|&b| !loaded[b]).filter_map(flyer).collect()
+        single.filter(|&b| !loaded[b]).filter_map(free_flight_body).collect()
     }
 
     /// Its components of the state: positions, then velocities.
@@ -69,27 +69,27 @@ pub(super) struct ActiveRanges {
     /// Ranges in ascending order, positions first.
     pub parts: Vec<Range<usize>>,
     /// Number of ranges that are positions.
-    of_positions: usize,
+    position_ranges: usize,
 }
 
 impl ActiveRanges {
     /// With capacity to exclude this number of bodies.
-    pub fn with_room(free_flight_bodies: usize) -> Self {
-        Self { parts: Vec::with_capacity(2 * (free_flight_bodies + 1)), of_positions: 0 }
+    pub fn with_capacity(free_flight_bodies: usize) -> Self {
+        Self { parts: Vec::with_capacity(2 * (free_flight_bodies + 1)), position_ranges: 0 }
     }
 
     /// Ranges of positions.
     pub fn positions(&self) -> &[Range<usize>] {
-        &self.parts[..self.of_positions]
+        &self.parts[..self.position_ranges]
     }
 
     /// Ranges of velocities.
     pub fn velocities(&self) -> &[Range<usize>] {
-        &self.parts[self.of_positions..]
+        &self.parts[self.position_ranges..]
     }
 
     /// Excludes `free_flight_bodies` from a state of `dimension` components, the first `positions` of which are positions.
-    fn leave_out<'a>(
+    fn exclude<'a>(
         &mut self,
         positions: usize,
         dimension: usize,
@@ -98,8 +98,8 @@ impl ActiveRanges {
         self.parts.clear();
         for (kind, all) in [0..positions, positions..dimension].into_iter().enumerate() {
             let mut from = all.start;
-            for flyer in free_flight_bodies.clone() {
-                let part = &flyer.parts()[kind];
+            for body in free_flight_bodies.clone() {
+                let part = &body.parts()[kind];
                 if from < part.start {
                     self.parts.push(from..part.start);
                 }
@@ -109,7 +109,7 @@ impl ActiveRanges {
                 self.parts.push(from..all.end);
             }
             if kind == 0 {
-                self.of_positions = self.parts.len();
+                self.position_ranges = self.parts.len();
             }
         }
     }
@@ -177,12 +177,12 @@ impl Flight {
     }
 
     /// Whether the series are valid at `t`.
-    pub fn lasts_until(&self, t: f64) -> bool {
+    pub fn is_valid_at(&self, t: f64) -> bool {
         t <= self.end
     }
 
-    /// Writes the coordinates of `flyer` at `t` to the state `y`.
-    pub fn put(&self, flyer: &FreeFlightBody, t: f64, y: &mut [f64]) {
+    /// Writes the coordinates of `body` at `t` to the state `y`.
+    pub fn write_state(&self, body: &FreeFlightBody, t: f64, y: &mut [f64]) {
         let s = t - self.start;
         let mut turn = self.turn[ORDER];
         let mut spin = self.spin[ORDER];
@@ -195,7 +195,7 @@ impl Flight {
         let position = self.position + (self.velocity + self.gravity * (0.5 * s)) * s;
         let velocity = self.velocity + self.gravity * s;
         let spin = rotation_of(&turn) * spin;
-        let [q, v] = flyer.parts();
+        let [q, v] = body.parts();
         y[q.start..q.start + 3].copy_from_slice(position.as_slice());
         y[q.start + 3..q.end].copy_from_slice(&turn);
         y[v.start..v.start + 3].copy_from_slice(velocity.as_slice());
@@ -210,44 +210,44 @@ impl Mechanism {
     }
 
     /// Ball and socket bodies of joint `j` that are capable of free flight.
-    pub fn flyers_of(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
+    pub fn free_flight_bodies_of(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
         let joint = &self.model.joints[j];
-        let of = |b: BodyIndex| self.free_flight_bodies.binary_search_by_key(&b, |flyer| flyer.body).ok();
+        let of = |b: BodyIndex| self.free_flight_bodies.binary_search_by_key(&b, |body| body.body).ok();
         [of(joint.ball.body), of(joint.socket.body)].into_iter().flatten()
     }
 
-    /// Free flight of `flyer` from the state `y` at `t`.
-    pub fn flight(&self, flyer: &FreeFlightBody, t: f64, y: &[f64]) -> Flight {
-        let body = &self.model.bodies[flyer.body];
-        Flight::new(body, &self.gravity, t, part(y, flyer.q), part(y, flyer.v))
+    /// Free flight of `body` from the state `y` at `t`.
+    pub fn flight(&self, body: &FreeFlightBody, t: f64, y: &[f64]) -> Flight {
+        let compiled = &self.model.bodies[body.body];
+        Flight::new(compiled, &self.gravity, t, part(y, body.q), part(y, body.v))
     }
 
-    /// Lets evaluations skip the free-flight bodies for whose index `asleep` holds.
-    pub fn suspend(&mut self, asleep: impl Fn(usize) -> bool) {
+    /// Lets evaluations skip the free-flight bodies for whose index `suspended` holds.
+    pub fn suspend(&mut self, suspended: impl Fn(usize) -> bool) {
         let free_flight_bodies = &self.free_flight_bodies;
-        let sleeps = |b: BodyIndex| {
-            let flyer = free_flight_bodies.binary_search_by_key(&b, |flyer| flyer.body);
-            flyer.is_ok_and(&asleep)
+        let is_suspended = |b: BodyIndex| {
+            let index = free_flight_bodies.binary_search_by_key(&b, |body| body.body);
+            index.is_ok_and(&suspended)
         };
-        self.equations.suspend(&sleeps);
-        self.contacts.only_touching = (0..free_flight_bodies.len()).any(&asleep);
-        let left_out = free_flight_bodies.iter().enumerate().filter(|(i, _)| asleep(*i));
+        self.equations.suspend(&is_suspended);
+        self.contacts.skips_inactive_joints = (0..free_flight_bodies.len()).any(&suspended);
+        let excluded = free_flight_bodies.iter().enumerate().filter(|(i, _)| suspended(*i));
         let (positions, dimension) = (self.positions(), self.dimension());
-        let left_out = left_out.map(|(_, flyer)| flyer);
-        self.moving.leave_out(positions, dimension, left_out);
+        let excluded = excluded.map(|(_, body)| body);
+        self.active_ranges.exclude(positions, dimension, excluded);
     }
 
     /// Components of the state advanced by steps.
-    pub fn moving(&self) -> &[Range<usize>] {
-        &self.moving.parts
+    pub fn active_ranges(&self) -> &[Range<usize>] {
+        &self.active_ranges.parts
     }
 
-    /// Completes an evaluation at (t, y), with `touching`: adds the motion of the skipped bodies and all gaps.
-    pub fn complete_gaps(&mut self, touching: ActiveSet<'_>, y: &[f64]) {
-        if self.contacts.only_touching {
-            self.equations.update_asleep(&self.model, y);
+    /// Completes an evaluation at (t, y), with `active_set`: adds the motion of the skipped bodies and all gaps.
+    pub fn complete_gaps(&mut self, active_set: ActiveSet<'_>, y: &[f64]) {
+        if self.contacts.skips_inactive_joints {
+            self.equations.update_suspended(&self.model, y);
         }
-        self.contacts.finish_all(touching, self.equations.motion());
+        self.contacts.complete_separations(active_set, self.equations.motion());
     }
 }
 
@@ -290,13 +290,13 @@ mod tests {
     }
 
     #[test]
-    fn a_flight_is_the_motion_that_the_equations_give() {
+    fn a_flight_agrees_with_the_integrated_equations() {
         let (mut mechanism, mut y) = tumbling();
-        let flyer = mechanism.free_flight_bodies()[0].clone();
-        let flight = mechanism.flight(&flyer, 0.25, &y);
+        let body = mechanism.free_flight_bodies()[0].clone();
+        let flight = mechanism.flight(&body, 0.25, &y);
         let length = flight.end - flight.start;
         assert!((1e-3..0.1).contains(&length), "{length}");
-        assert!(flight.lasts_until(0.25 + length) && !flight.lasts_until(0.25 + 1.01 * length));
+        assert!(flight.is_valid_at(0.25 + length) && !flight.is_valid_at(0.25 + 1.01 * length));
         // 400 steps of order 5 leave only rounding errors.
         let (n, mut t) = (400, 0.25);
         let mut stepper = DormandPrince::new(y.len());
@@ -312,8 +312,8 @@ mod tests {
             t += h;
         }
         let mut flown = vec![f64::NAN; y.len()];
-        flight.put(&flyer, 0.25 + length, &mut flown);
-        for part in flyer.parts() {
+        flight.write_state(&body, 0.25 + length, &mut flown);
+        for part in body.parts() {
             for i in part {
                 assert!((flown[i] - y[i]).abs() < 3e-14 * (1.0 + y[i].abs()), "{i}: {} {}", flown[i], y[i]);
             }
@@ -321,56 +321,56 @@ mod tests {
     }
 
     #[test]
-    fn what_flies_is_left_out_of_what_moves() {
+    fn bodies_in_flight_are_excluded_from_the_active_ranges() {
         let links = [("chain.links".to_owned(), "4".to_owned())];
         let scene = Scene::load("chain", &links).expect("a scene");
         let mut mechanism = Mechanism::new(&scene.machine).expect("equations");
         let dimension = mechanism.dimension();
         for flying in [&[][..], &[1], &[0, 1, 3], &[0, 1, 2, 3]] {
-            mechanism.suspend(|flyer| flying.contains(&flyer));
+            mechanism.suspend(|index| flying.contains(&index));
             let mut moves = vec![false; dimension];
-            for part in mechanism.moving().iter().cloned() {
+            for part in mechanism.active_ranges().iter().cloned() {
                 assert!(!part.is_empty());
                 for i in part {
                     assert!(!std::mem::replace(&mut moves[i], true), "{i} twice");
                 }
             }
-            for (i, flyer) in mechanism.free_flight_bodies().iter().enumerate() {
-                for component in flyer.parts().into_iter().flatten() {
+            for (i, body) in mechanism.free_flight_bodies().iter().enumerate() {
+                for component in body.parts().into_iter().flatten() {
                     assert_eq!(moves[component], !flying.contains(&i), "{flying:?}");
                 }
             }
-            let left_out = moves.iter().filter(|moves| !**moves).count();
-            assert_eq!(left_out, 13 * flying.len());
-            let of_positions = mechanism.moving.positions().last();
-            assert!(of_positions.is_none_or(|part| part.end <= mechanism.positions()));
-            let of_velocities = mechanism.moving.velocities().first();
+            let excluded = moves.iter().filter(|moves| !**moves).count();
+            assert_eq!(excluded, 13 * flying.len());
+            let position_ranges = mechanism.active_ranges.positions().last();
+            assert!(position_ranges.is_none_or(|part| part.end <= mechanism.positions()));
+            let of_velocities = mechanism.active_ranges.velocities().first();
             assert!(of_velocities.is_none_or(|part| part.start >= mechanism.positions()));
         }
     }
 
     #[test]
-    fn a_flight_starts_where_it_is_and_keeps_energy_and_angular_momentum() {
+    fn a_flight_starts_at_its_state_and_conserves_energy_and_angular_momentum() {
         let (mechanism, y) = tumbling();
-        let flyer = &mechanism.free_flight_bodies()[0];
-        let flight = mechanism.flight(flyer, 0.0, &y);
-        let body = &mechanism.model.bodies[flyer.body];
+        let body = &mechanism.free_flight_bodies()[0];
+        let flight = mechanism.flight(body, 0.0, &y);
+        let compiled = &mechanism.model.bodies[body.body];
         let invariants = |y: &[f64]| {
-            let [q, v] = flyer.parts();
+            let [q, v] = body.parts();
             let turn: &[f64; 4] = part(y, q.start + 3);
             let r = rotation_of(turn);
             let w = r.tr_mul(&Vec3::new(y[v.start + 3], y[v.start + 4], y[v.start + 5]));
-            let energy = 0.5 * w.dot(&(body.inertia * w));
+            let energy = 0.5 * w.dot(&(compiled.inertia * w));
             let length: f64 = turn.iter().map(|c| c * c).sum();
-            (r * (body.inertia * w), energy, length)
+            (r * (compiled.inertia * w), energy, length)
         };
         let mut flown = y.clone();
-        flight.put(flyer, 0.0, &mut flown);
+        flight.write_state(body, 0.0, &mut flown);
         for (a, b) in flown.iter().zip(&y) {
             assert!((a - b).abs() < 1e-15 * (1.0 + b.abs()), "{a} {b}");
         }
         let (momentum, energy, _) = invariants(&y);
-        flight.put(flyer, flight.end, &mut flown);
+        flight.write_state(body, flight.end, &mut flown);
         let (momentum_end, energy_end, length) = invariants(&flown);
         assert!((momentum_end - momentum).norm() < 1e-14 * momentum.norm());
         assert!((energy_end - energy).abs() < 1e-14 * energy);
@@ -378,23 +378,23 @@ mod tests {
         // A parabola.
         let s = flight.end;
         let expected = Vec3::new(0.1 + s, 0.2 + 2.0 * s - 0.5 * 9.81 * s * s, 0.3 - 0.5 * s);
-        let got = Vec3::from_column_slice(&flown[flyer.q..flyer.q + 3]);
+        let got = Vec3::from_column_slice(&flown[body.q..body.q + 3]);
         assert!((got - expected).norm() < 1e-15, "{got}");
     }
 
     #[test]
-    fn faster_spin_makes_flights_shorter_and_none_longest() {
+    fn series_are_valid_for_a_shorter_time_at_higher_spin() {
         let (mechanism, mut y) = tumbling();
-        let flyer = &mechanism.free_flight_bodies()[0];
-        let spin = flyer.v + 3..flyer.v + 6;
+        let body = &mechanism.free_flight_bodies()[0];
+        let spin = body.v + 3..body.v + 6;
         let length = |factor: f64| {
             let mut y = y.clone();
             y[spin.clone()].iter_mut().for_each(|w| *w *= factor);
-            mechanism.flight(flyer, 0.0, &y).end
+            mechanism.flight(body, 0.0, &y).end
         };
         let (slow, fast) = (length(1.0), length(4.0));
         assert!((slow / fast - 4.0).abs() < 0.5, "{slow} {fast}");
         y[spin].fill(0.0);
-        assert_eq!(mechanism.flight(flyer, 0.0, &y).end, LONGEST);
+        assert_eq!(mechanism.flight(body, 0.0, &y).end, LONGEST);
     }
 }

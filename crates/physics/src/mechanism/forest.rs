@@ -13,9 +13,9 @@ use crate::machine::{Mat3, Vec3};
 pub(super) struct Forest {
     tree: Tree,
     constraints: Option<Constraints>,
-    /// Wrench transmitted by the joint above each body at the latest [`Self::find_drive_forces`], about the body's centroid; then
-    /// the world's.
-    borne: Vec<Wrench>,
+    /// Wrench transmitted by the joint above each body at the latest [`Self::find_drive_forces`], about the body's centroid. The
+    /// last entry is the world's.
+    transmitted: Vec<Wrench>,
 }
 
 impl Forest {
@@ -24,7 +24,7 @@ impl Forest {
         let constraints = || Constraints::new(model, &model.ideal_joints);
         let tree = Tree::new(model);
         Self {
-            borne: vec![Wrench::zero(); tree.wrench.len()],
+            transmitted: vec![Wrench::zero(); tree.wrench.len()],
             tree,
             constraints: model.closes_loops().then(constraints),
         }
@@ -38,14 +38,14 @@ impl Forest {
         gravity: &Vec3,
         closed: bool,
         moved: impl Fn(usize) -> bool,
-        mut found: impl FnMut(&Driven, usize, f64),
+        mut visit: impl FnMut(&Driven, usize, f64),
     ) {
-        let Self { tree: Tree { motion, wrench, driven, .. }, constraints, borne } = self;
-        borne.copy_from_slice(wrench);
+        let Self { tree: Tree { motion, wrench, driven, .. }, constraints, transmitted } = self;
+        transmitted.copy_from_slice(wrench);
         if let Some(constraints) = constraints.as_ref().filter(|_| closed) {
-            constraints.load(model, constraints.multipliers(), motion, borne);
+            constraints.load(model, constraints.multipliers(), motion, transmitted);
         }
-        inverse_dynamics(model, motion, borne, gravity, moved, |drive, force| found(driven, drive, force));
+        inverse_dynamics(model, motion, transmitted, gravity, moved, |drive, force| visit(driven, drive, force));
     }
 }
 
@@ -96,16 +96,16 @@ impl Equations for Forest {
         self.tree.update_kinematics(model, t, y);
     }
 
-    fn suspend(&mut self, asleep: &dyn Fn(BodyIndex) -> bool) {
-        self.tree.suspend(asleep);
+    fn suspend(&mut self, suspended: &dyn Fn(BodyIndex) -> bool) {
+        self.tree.suspend(suspended);
     }
 
-    fn update_awake(&mut self, model: &Model, t: f64, y: &[f64]) {
-        self.tree.update_awake(model, t, y);
+    fn update_active(&mut self, model: &Model, t: f64, y: &[f64]) {
+        self.tree.update_active(model, t, y);
     }
 
-    fn update_asleep(&mut self, model: &Model, y: &[f64]) {
-        self.tree.update_asleep(model, y);
+    fn update_suspended(&mut self, model: &Model, y: &[f64]) {
+        self.tree.update_suspended(model, y);
     }
 
     fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path> {
@@ -172,12 +172,12 @@ impl Equations for Forest {
         }
     }
 
-    fn lone_body(&self, model: &Model, first: usize) -> Option<(f64, Mat3)> {
+    fn free_body_inverse_mass(&self, model: &Model, first: usize) -> Option<(f64, Mat3)> {
         if self.constraints.is_some() {
             return None;
         }
         let block = model.blocks.partition_point(|block| block.v < first);
-        let b = model.blocks.get(block)?.lone?;
+        let b = model.blocks.get(block)?.single_free_body?;
         let (body, rotation) = (&model.bodies[b], &self.tree.motion[b].rotation);
         Some((1.0 / body.mass, rotation * body.inertia_inverse * rotation.transpose()))
     }
@@ -242,12 +242,12 @@ impl Equations for Forest {
         constraints.is_none_or(|own| own.is_unique(own.joints().len() + c))
     }
 
-    fn actuators(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
+    fn actuator_forces(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
         self.find_drive_forces(model, gravity, true, |_| true, |_, drive, force| out[drive] = force);
     }
 
     fn joint_loads(&mut self) -> (&[Kinematics], &[Wrench]) {
-        (&self.tree.motion, &self.borne)
+        (&self.tree.motion, &self.transmitted)
     }
 
     fn is_actuator_unique(&mut self, model: &Model, gravity: &Vec3, i: usize) -> bool {
@@ -255,19 +255,19 @@ impl Equations for Forest {
             return true;
         };
         let motion = &self.tree.motion;
-        let mut wrench = vec![Wrench::zero(); self.borne.len()];
+        let mut wrench = vec![Wrench::zero(); self.transmitted.len()];
         let mut force_under = |multipliers: Option<&[f64]>| {
             wrench.fill(Wrench::zero());
             if let Some(multipliers) = multipliers {
                 constraints.load(model, multipliers, motion, &mut wrench);
             }
             let mut force = 0.0;
-            let found = |drive, value| {
+            let visit = |drive, value| {
                 if drive == i {
                     force = value;
                 }
             };
-            inverse_dynamics(model, motion, &mut wrench, gravity, |_| true, found);
+            inverse_dynamics(model, motion, &mut wrench, gravity, |_| true, visit);
             force
         };
         let without = force_under(None);
@@ -303,7 +303,7 @@ mod tests {
     use crate::scene::{BUILT_IN, Scene};
 
     #[test]
-    fn asking_for_the_forces_of_drives_again_changes_no_load() {
+    fn computing_the_actuator_forces_again_changes_no_load() {
         let mut driven = 0;
         for (name, formulation) in BUILT_IN.iter().flat_map(|name| Formulation::ALL.map(|form| (name, form))) {
             let change = ("formulation".to_owned(), formulation.to_string());
@@ -313,14 +313,14 @@ mod tests {
             };
             let start = mechanism.start().unwrap();
             mechanism.evaluator(ActiveSet::Nothing).evaluate_fully(0.0, &start, &mut vec![0.0; start.len()]);
-            let mut ask = || {
+            let mut compute = || {
                 let mut forces = vec![0.0; mechanism.drives()];
-                mechanism.actuators(&mut forces);
+                mechanism.actuator_forces(&mut forces);
                 let loads: Vec<[Vec3; 2]> = mechanism.joint_reactions().collect();
                 (forces, loads)
             };
-            let first = ask();
-            assert!((0..3).all(|_| ask() == first), "{name} {formulation}");
+            let first = compute();
+            assert!((0..3).all(|_| compute() == first), "{name} {formulation}");
             driven += usize::from(first.0.iter().any(|force| *force != 0.0));
         }
         assert!(driven > 5, "{driven}");

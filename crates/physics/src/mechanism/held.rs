@@ -1,8 +1,8 @@
-//! A machine whose drives stand still: its pose without play, and where it rests with play.
+//! A machine whose drives stand still: its pose without play, and its position of rest with play.
 
 use super::assembly::Settled;
 use super::constraints::Constraints;
-use super::equilibrium::{at_start, rest, rest_near};
+use super::equilibrium::{rest_state, rest_state_near, with_constant_laws};
 use super::model::Model;
 use super::settled::without_play;
 use super::start::{CLOSED, factor_at};
@@ -11,32 +11,32 @@ use super::{Mechanism, MechanismError};
 use crate::machine::{Drive, Machine, Mat3, StartRule, Vec3};
 
 /// Time at which the drives have reached their positions; they move from those at t = 0 at constant rates.
-pub(super) const HELD: f64 = 1.0;
-/// Largest part of a displacement on the way, over the length scale or 0.1 rad, and largest correction of it.
-const LARGEST_STEP: f64 = 2.0;
-const LARGEST_CORRECTION: f64 = 0.5;
-/// Shortest step, of the whole way.
-const SHORTEST: f64 = 1e-6;
+pub(super) const DRIVE_END: f64 = 1.0;
+/// Largest component of the displacement in one step, over the length scale or 0.1 rad, and of its correction.
+const MAX_STEP: f64 = 2.0;
+const MAX_CORRECTION: f64 = 0.5;
+/// Shortest step, as a fraction of the drives' whole path.
+const MIN_STEP: f64 = 1e-6;
 /// Smallest ratio of a pivot of the rows to the largest of its joint at which loads are determined to some digits.
 const SINGULAR: f64 = 1e-10;
-/// Mobility of the tip, over that without any joint that can open, that is rounding.
+/// Ratio of a mobility of the tip to that without any constraint below which it is rounding.
 pub(super) const IMMOBILE: f64 = 1e-9;
 
-/// Why there is no pose of the machine without play.
+/// Error in finding the pose of a machine without play.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HeldError {
-    /// It does not start, or nothing holds it.
+    /// The machine does not start, or has no position of rest.
     #[error(transparent)]
     Mechanism(#[from] MechanismError),
-    /// Its drives do not get there.
+    /// The drives do not reach their positions.
     #[error(
         "without play the loops close only up to {:.1} % of the way from the drives' positions at t = 0 to these", 100.0 * .part
     )]
     Unreached {
-        /// Part of the straight way, 0 to 1.
+        /// Fraction of the straight path of the drives, 0 to 1.
         part: f64,
     },
-    /// Its loops do not determine the pose.
+    /// The loops do not determine the pose.
     #[error("singular pose: without play the loops no longer determine it")]
     Singular,
 }
@@ -57,23 +57,27 @@ pub struct HeldMachine {
 }
 
 impl HeldMachine {
-    /// `machine` with its driven coordinates, in the order of [`Machine::driven`], at `held`, m or rad, or where they are at t = 0.
+    /// `machine` with its driven coordinates, in the order of [`Machine::driven`], at `held`, m or rad, or where they are at t =
+    /// 0.
     ///
     /// The machine without play is assembled at t = 0 as its own start, and followed from there while all drives move at constant
     /// rates. If the tip still moves with the drives held, its pose is the static equilibrium nearby.
     ///
     /// # Errors
-    /// It does not start, its drives do not get there, the pose is singular, or it comes to rest nowhere.
+    /// The machine does not start, the drives do not reach their positions, the pose is singular, or no position of rest is
+    /// found.
     pub fn new(machine: &Machine, held: &[Option<f64>]) -> Result<Self, HeldError> {
         let mut mechanism = Mechanism::new(&without_play(machine))?;
         // The pose is assembled from the joints; a path in closed form is no more than a first guess.
         let mut y = mechanism.start_off_path()?;
         let rank = mechanism.model.assembled.get().and_then(|assembled| assembled.rank);
-        let mut moving = at_start(&without_play(machine));
-        let mut still = moving.clone();
+        let mut moving = with_constant_laws(&without_play(machine));
+        let mut stationary = moving.clone();
         let positions = held.iter().copied().chain(std::iter::repeat(None));
-        for ((way, end), held) in drives(&mut moving).zip(drives(&mut still)).zip(positions) {
-            if let (Drive::Constant { position: from, velocity }, Drive::Constant { position: to, .. }) = (way, end) {
+        for ((moving_drive, final_drive), held) in drives(&mut moving).zip(drives(&mut stationary)).zip(positions) {
+            if let (Drive::Constant { position: from, velocity }, Drive::Constant { position: to, .. }) =
+                (moving_drive, final_drive)
+            {
                 *to = held.unwrap_or(*to);
                 *velocity = *to - *from;
             }
@@ -86,9 +90,9 @@ impl HeldMachine {
             constraints.treat_as_dependent(rank);
         }
         y[model.nq..].fill(0.0);
-        follow(&model, &mut constraints, &mut tree, &mut y)?;
+        follow_drives(&model, &mut constraints, &mut tree, &mut y)?;
         y[model.nq..].fill(0.0);
-        factor_at(&model, &mut constraints, &mut tree, HELD, &y);
+        factor_at(&model, &mut constraints, &mut tree, DRIVE_END, &y);
         if !constraints.is_dependent() && !(constraints.least_joint_pivot() >= SINGULAR) {
             return Err(HeldError::Singular);
         }
@@ -96,7 +100,7 @@ impl HeldMachine {
             machine: Machine {
                 ball_joints: machine.ball_joints.clone(),
                 start: StartRule::Equilibrium,
-                ..still.clone()
+                ..stationary.clone()
             },
             play: machine.ball_joints.iter().map(|joint| joint.contact.clearance).collect(),
             model,
@@ -106,7 +110,7 @@ impl HeldMachine {
             ideal_tip: Vec3::zeros(),
         };
         if own.closed_mobility().trace() > IMMOBILE * own.mobility(|_| {}).trace() {
-            own.ideal = rest_near(&still, own.ideal.clone())?;
+            own.ideal = rest_state_near(&stationary, own.ideal.clone())?;
         }
         own.ideal_tip = own.tip_at_ideal();
         Ok(own)
@@ -120,10 +124,10 @@ impl HeldMachine {
     /// Tip at rest with play, under gravity, springs and loads, minus the tip without, world axes, m.
     ///
     /// # Errors
-    /// It comes to rest nowhere, or has too many coordinates for the search.
+    /// No position of rest is found, or the machine has too many coordinates for the search.
     pub fn settled_error(&mut self) -> Result<Vec3, MechanismError> {
-        let Settled { state, .. } = rest(&self.machine, Some(&self.ideal))?;
-        self.tree.update_kinematics(&self.model, HELD, &state);
+        let Settled { state, .. } = rest_state(&self.machine, Some(&self.ideal))?;
+        self.tree.update_kinematics(&self.model, DRIVE_END, &state);
         Ok(self.tip() - self.ideal_tip)
     }
 
@@ -142,7 +146,7 @@ impl HeldMachine {
     }
 
     fn tip_at_ideal(&mut self) -> Vec3 {
-        self.tree.update_kinematics(&self.model, HELD, &self.ideal);
+        self.tree.update_kinematics(&self.model, DRIVE_END, &self.ideal);
         self.tip()
     }
 
@@ -175,7 +179,7 @@ impl HeldMachine {
         mobility
     }
 
-    /// The same with the mechanism without play, whose matrices are those of that pose.
+    /// The same for the mechanism without play, with the constraint matrices of that pose.
     pub(super) fn closed_mobility(&mut self) -> Mat3 {
         let spare = Constraints::new(&self.model, &[]);
         let mut constraints = std::mem::replace(&mut self.constraints, spare);
@@ -188,7 +192,7 @@ impl HeldMachine {
 /// Driven coordinates of `machine` at t = 0, in the order of [`Machine::driven`], m or rad.
 pub fn drive_positions(machine: &Machine) -> Vec<f64> {
     let position = |drive: &mut Drive| if let Drive::Constant { position, .. } = drive { *position } else { 0.0 };
-    drives(&mut at_start(machine)).map(position).collect()
+    drives(&mut with_constant_laws(machine)).map(position).collect()
 }
 
 /// Drives of the tree joints, in the order of [`Machine::driven`].
@@ -196,20 +200,25 @@ fn drives(machine: &mut Machine) -> impl Iterator<Item = &mut Drive> {
     machine.joints.iter_mut().flat_map(|joint| joint.drive.iter_mut().chain(&mut joint.second_drive))
 }
 
-/// Follows the closed pose `y` from t = 0 to [`HELD`]: predicted by the velocities, corrected by Newton's method, with steps short
-/// enough to stay on the branch.
-fn follow(model: &Model, constraints: &mut Constraints, tree: &mut Tree, y: &mut Vec<f64>) -> Result<(), HeldError> {
+/// Follows the closed pose `y` from t = 0 to [`DRIVE_END`]: predicted by the velocities, corrected by Newton's method, with steps
+/// short enough to stay on the branch.
+fn follow_drives(
+    model: &Model,
+    constraints: &mut Constraints,
+    tree: &mut Tree,
+    y: &mut Vec<f64>,
+) -> Result<(), HeldError> {
     constraints.project(model, tree, 0.0, y);
-    let (mut t, mut longest) = (0.0, HELD);
-    while t < HELD {
+    let (mut t, mut longest) = (0.0, DRIVE_END);
+    while t < DRIVE_END {
         let speeds = y[model.nq..].iter().zip(&model.scale[model.nq..]);
         // Scales of speeds are those of coordinates per 0.1 s.
         let rate = speeds.map(|(v, scale)| (v / scale).abs() / 0.1).fold(0.0, f64::max);
-        let step = longest.min(LARGEST_STEP / rate);
-        if !(step > SHORTEST) {
+        let step = longest.min(MAX_STEP / rate);
+        if !(step > MIN_STEP) {
             return Err(HeldError::Unreached { part: t });
         }
-        let next = if t + step > HELD - SHORTEST { HELD } else { t + step };
+        let next = if t + step > DRIVE_END - MIN_STEP { DRIVE_END } else { t + step };
         let moved: Vec<f64> = y[model.nq..].iter().map(|v| v * (next - t)).collect();
         let mut predicted = y.clone();
         Tree::displace(model, &mut predicted, &moved);
@@ -217,7 +226,7 @@ fn follow(model: &Model, constraints: &mut Constraints, tree: &mut Tree, y: &mut
         let error = constraints.project(model, tree, next, &mut closed);
         let corrections = closed.iter().zip(&predicted).zip(&model.scale).take(model.nq);
         let correction = corrections.map(|((a, b), scale)| (a - b).abs() / scale).fold(0.0, f64::max);
-        if error <= CLOSED && correction <= LARGEST_CORRECTION {
+        if error <= CLOSED && correction <= MAX_CORRECTION {
             (t, *y) = (next, closed);
             longest = 2.0 * step;
         } else {

@@ -28,7 +28,7 @@ pub struct Kinematics {
 }
 
 impl Kinematics {
-    /// At rest at the origin.
+    /// A body at rest at the origin.
     pub fn rest() -> Self {
         let zero = Vec3::zeros();
         Self {
@@ -77,7 +77,7 @@ pub fn part<const N: usize>(of: &[f64], at: usize) -> &[f64; N] {
 }
 
 /// omega = 2 vec(q' q*) for a quaternion of about unit length, rad/s.
-pub fn spin_of(q: &[f64], d: &[f64]) -> [f64; 3] {
+pub fn angular_velocity_of(q: &[f64], d: &[f64]) -> [f64; 3] {
     let (w, x, y, z) = (q[0], q[1], q[2], q[3]);
     [
         2.0 * (-d[0] * x + d[1] * w - d[2] * z + d[3] * y),
@@ -155,7 +155,7 @@ pub fn free_rate(&[.., w, x, y, z]: &[f64; 7], &[vx, vy, vz, wx, wy, wz]: &[f64;
 }
 
 /// Rotates the quaternion `q` by the small world rotation vector `turn` and normalises it.
-pub fn turn_quaternion(q: &mut [f64], turn: &Vec3) {
+pub fn rotate_quaternion(q: &mut [f64], turn: &Vec3) {
     let angle = turn.norm();
     let (s, c) = libm::sincos(0.5 * angle);
     let k = if angle > 1e-9 { s / angle } else { 0.5 };
@@ -179,9 +179,9 @@ pub fn quaternion_of(rotation: &Mat3) -> Quat {
     Quat::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(*rotation))
 }
 
-/// Moves body `b`, a child of another body, to its joint coordinate `q`.
+/// Sets the motion of body `b` from that of its parent and its joint coordinate `q`, which is an angle if `revolute`.
 #[inline]
-pub fn follow(motion: &mut [Kinematics], b: BodyIndex, body: &Body, revolute: bool, q: Jet) {
+pub fn move_child(motion: &mut [Kinematics], b: BodyIndex, body: &Body, revolute: bool, q: Jet) {
     let Ok([child, parent]) = motion.get_disjoint_mut([b, body.parent]) else {
         unreachable!("a body hangs from another body or from the world");
     };
@@ -252,8 +252,8 @@ pub fn distance_from(ideal: &ClosedMotion, model: &Model, motion: &[Kinematics])
 /// Motion prescribed by time alone, computed once per instant.
 pub struct Driven {
     time: Option<f64>,
-    /// Time, coordinates, motion of the bodies and functions at the instant before, to which the end of a step often returns.
-    earlier: (Option<f64>, Vec<Jet>, Vec<Kinematics>, Vec<Jet>),
+    /// Time, coordinates, motion of the bodies and functions at the previous instant, to which the end of a step often returns.
+    previous: (Option<f64>, Vec<Jet>, Vec<Kinematics>, Vec<Jet>),
     /// Driven coordinates.
     pub coordinates: Vec<Jet>,
     /// Values of the closed form.
@@ -270,7 +270,7 @@ impl Driven {
         let functions = Values::new(model);
         Self {
             time: None,
-            earlier: (None, coordinates.clone(), vec![Kinematics::rest(); bodies.len()], functions.latest.clone()),
+            previous: (None, coordinates.clone(), vec![Kinematics::rest(); bodies.len()], functions.latest.clone()),
             coordinates,
             functions,
             bodies,
@@ -283,10 +283,10 @@ impl Driven {
         [value, rate]
     }
 
-    /// From now on moves no bodies: their motion is part of the state.
-    pub fn only_coordinates(&mut self) {
+    /// Excludes bodies from all further updates, because their motion is part of the state.
+    pub fn exclude_bodies(&mut self) {
         self.bodies.clear();
-        self.earlier.2.clear();
+        self.previous.2.clear();
     }
 
     /// Moves the bodies that depend on time alone to `t`.
@@ -311,24 +311,24 @@ impl Driven {
         }
     }
 
-    /// Exchanges the latest instant with the one before, or moves it there if `t` is not that one.
+    /// Swaps the latest instant with the previous one if that is `t`; otherwise stores the latest as the previous.
     fn exchange(&mut self, t: f64, motion: &mut [Kinematics]) {
-        let (time, coordinates, bodies, functions) = &mut self.earlier;
-        let returns = *time == Some(t);
+        let (time, coordinates, bodies, functions) = &mut self.previous;
+        let is_previous = *time == Some(t);
         std::mem::swap(&mut self.functions.latest, functions);
         std::mem::swap(&mut self.time, time);
         std::mem::swap(&mut self.coordinates, coordinates);
         for (&b, body) in self.bodies.iter().zip(bodies) {
-            match returns {
+            match is_previous {
                 true => std::mem::swap(&mut motion[b], body),
                 false => *body = motion[b],
             }
         }
     }
 
-    /// Prepares the motion at instants of which each will soon be the latest.
-    pub fn announce(&mut self, model: &Model, times: &[f64]) {
-        self.functions.announce(model, times);
+    /// Evaluates the closed form at `times`, s, ahead of the evaluations at these instants.
+    pub fn prepare(&mut self, model: &Model, times: &[f64]) {
+        self.functions.prepare(model, times);
     }
 
     /// The same for the bodies on `path` alone.
@@ -336,7 +336,7 @@ impl Driven {
         if self.time == Some(t) || path.drives.is_empty() {
             return;
         }
-        // Only part of the coordinates now belong to this instant.
+        // Only some of the coordinates belong to this instant now.
         self.time = None;
         self.functions.evaluate(model, t);
         for &i in &path.drives {
@@ -364,9 +364,9 @@ impl Driven {
                 child.arm = arm;
             }
             Motion::Driven { drive, revolute } => {
-                follow(motion, b, body, revolute, self.coordinates[drive]);
+                move_child(motion, b, body, revolute, self.coordinates[drive]);
             }
-            _ => follow(motion, b, body, false, Jet::default()),
+            _ => move_child(motion, b, body, false, Jet::default()),
         }
     }
 }

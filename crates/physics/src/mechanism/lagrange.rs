@@ -43,7 +43,7 @@ impl Group {
 struct Row {
     j: JacobianRow,
     /// Inverse inertias of child and parent times the angular parts; zero for the world.
-    turned: [Vec3; 2],
+    inertia_weighted: [Vec3; 2],
 }
 
 /// Equations of motion with multipliers.
@@ -74,9 +74,10 @@ pub struct Lagrange {
     drift: f64,
     /// Smallest pivot ratio of the latest factorisation.
     least_pivot: f64,
-    /// Whether the latest step was projected onto the constraints, and the state before the latest correction.
+    /// Whether the latest step was projected onto the constraints.
     projected: bool,
-    kept: Vec<f64>,
+    /// State before the latest correction.
+    state_before: Vec<f64>,
 }
 
 /// The constraint rows of a scene.
@@ -103,7 +104,7 @@ impl Layout {
             first
         };
         for (b, (body, joint)) in model.bodies.iter().zip(&machine.joints).enumerate() {
-            let pair = match model.linked_at(b) {
+            let pair = match model.two_degree_joint_at(b) {
                 Some((pair, _)) => *pair,
                 None => {
                     let child = Anchor { body: b, offset: -body.to_centroid };
@@ -116,7 +117,7 @@ impl Layout {
                 add(rows, b, parent);
             }
             // The first of two coordinates belongs to the link.
-            let link = model.linked_at(b).map(|_| body.parent);
+            let link = model.two_degree_joint_at(b).map(|_| body.parent);
             for (part, of) in link.into_iter().chain([b]).enumerate() {
                 if let Motion::Driven { drive, .. } = model.bodies[of].motion {
                     driver_row[drive] = add(pair.driven_row(part, drive), b, parent);
@@ -160,7 +161,7 @@ impl Lagrange {
         let n = model.massive;
         // Here, bodies that depend on time alone are part of the state, too.
         let mut driven = Driven::new(model);
-        driven.only_coordinates();
+        driven.exclude_bodies();
         Self {
             motion: vec![Kinematics::rest(); model.world() + 1],
             wrench: vec![Wrench::zero(); model.world() + 1],
@@ -180,7 +181,7 @@ impl Lagrange {
             drift: 0.0,
             least_pivot: f64::INFINITY,
             projected: false,
-            kept: vec![0.0; 13 * n],
+            state_before: vec![0.0; 13 * n],
         }
     }
 
@@ -190,14 +191,17 @@ impl Lagrange {
         let (gi, gj) = (&self.groups[self.group_of[i]], &self.groups[self.group_of[j]]);
         let (ri, rj) = (&self.rows[i].j, &self.rows[j]);
         let mut sum = 0.0;
-        let others = [(gj.child, &rj.j.child[0], &rj.turned[0]), (gj.parent, &rj.j.parent[0], &rj.turned[1])];
+        let others = [
+            (gj.child, &rj.j.child[0], &rj.inertia_weighted[0]),
+            (gj.parent, &rj.j.parent[0], &rj.inertia_weighted[1]),
+        ];
         for (bi, ji) in [(gi.child, &ri.child), (gi.parent, &ri.parent)] {
             if bi == model.bodies.len() {
                 continue;
             }
-            for (bj, moved, turned) in others {
+            for (bj, moved, inertia_weighted) in others {
                 if bi == bj {
-                    sum += ji[0].dot(moved) / model.bodies[bi].mass + ji[1].dot(turned);
+                    sum += ji[0].dot(moved) / model.bodies[bi].mass + ji[1].dot(inertia_weighted);
                 }
             }
         }
@@ -206,12 +210,14 @@ impl Lagrange {
 
     /// Factors J M^-1 J^T of the rows last linearised.
     fn factor(&mut self, model: &Model) {
-        for (Row { j, turned }, &group) in self.rows.iter_mut().zip(&self.group_of) {
+        for (Row { j, inertia_weighted }, &group) in self.rows.iter_mut().zip(&self.group_of) {
             let group = &self.groups[group];
-            let [of_child, of_parent] = turned;
-            for (b, turned, j) in [(group.child, of_child, j.child[1]), (group.parent, of_parent, j.parent[1])] {
+            let [of_child, of_parent] = inertia_weighted;
+            for (b, inertia_weighted, j) in
+                [(group.child, of_child, j.child[1]), (group.parent, of_parent, j.parent[1])]
+            {
                 if b < model.bodies.len() {
-                    *turned = self.inverse_inertia[b] * j;
+                    *inertia_weighted = self.inverse_inertia[b] * j;
                 }
             }
         }
@@ -224,41 +230,41 @@ impl Lagrange {
     }
 
     /// Projects positions, then velocities, onto the constraints in the metric of the mass matrix.
-    fn take_back(&mut self, model: &Model, t: f64, y: &mut [f64]) {
+    fn project_onto_constraints(&mut self, model: &Model, t: f64, y: &mut [f64]) {
         let nq = 7 * model.massive;
         let mut before = f64::INFINITY;
         for _ in 0..CORRECTIONS {
-            self.violate(model, t, y, |[phi, _, _]| -phi);
+            self.evaluate_violations(model, t, y, |[phi, _, _]| -phi);
             // In the singular pose itself, no correction closes the rows; elsewhere, dependent rows retain the inconsistency of
             // the dimensions.
             if self.drift > before {
-                y.copy_from_slice(&self.kept);
+                y.copy_from_slice(&self.state_before);
             }
             if self.drift <= CLOSED || self.drift >= 0.5 * before {
                 break;
             }
             before = self.drift;
-            self.kept.copy_from_slice(y);
+            self.state_before.copy_from_slice(y);
             self.matrix.solve(&mut self.residual);
-            self.visit_corrections(model, |b, moved, turned| {
+            self.visit_corrections(model, |b, moved, inertia_weighted| {
                 for i in 0..3 {
                     y[7 * b + i] += moved[i];
                 }
-                kinematics::turn_quaternion(&mut y[7 * b + 3..7 * b + 7], &turned);
+                kinematics::rotate_quaternion(&mut y[7 * b + 3..7 * b + 7], &inertia_weighted);
             });
         }
-        self.violate(model, t, y, |[_, rate, _]| -rate);
+        self.evaluate_violations(model, t, y, |[_, rate, _]| -rate);
         self.matrix.solve(&mut self.residual);
-        self.visit_corrections(model, |b, moved, turned| {
+        self.visit_corrections(model, |b, moved, inertia_weighted| {
             for i in 0..3 {
                 y[nq + 6 * b + i] += moved[i];
-                y[nq + 6 * b + 3 + i] += turned[i];
+                y[nq + 6 * b + 3 + i] += inertia_weighted[i];
             }
         });
     }
 
     /// Factors the rows at (t, y). The residual of each row is `of` its violation with first and second derivatives.
-    fn violate(&mut self, model: &Model, t: f64, y: &[f64], of: impl Fn([f64; 3]) -> f64) {
+    fn evaluate_violations(&mut self, model: &Model, t: f64, y: &[f64], of: impl Fn([f64; 3]) -> f64) {
         self.update_kinematics(model, t, y);
         for (b, body) in model.bodies[..model.massive].iter().enumerate() {
             let rotation = &self.motion[b].rotation;
@@ -272,11 +278,12 @@ impl Lagrange {
     fn visit_corrections(&self, model: &Model, mut visit: impl FnMut(BodyIndex, Vec3, Vec3)) {
         for (row, (group, x)) in self.rows.iter().zip(self.group_of.iter().zip(&self.residual)) {
             let group = &self.groups[*group];
-            for (b, j, turned) in
-                [(group.child, &row.j.child, &row.turned[0]), (group.parent, &row.j.parent, &row.turned[1])]
-            {
+            for (b, j, inertia_weighted) in [
+                (group.child, &row.j.child, &row.inertia_weighted[0]),
+                (group.parent, &row.j.parent, &row.inertia_weighted[1]),
+            ] {
                 if b < model.bodies.len() {
-                    visit(b, j[0] * (x / model.bodies[b].mass), turned * *x);
+                    visit(b, j[0] * (x / model.bodies[b].mass), inertia_weighted * *x);
                 }
             }
         }
@@ -292,12 +299,12 @@ impl Lagrange {
         self.drift = 0.0;
         for group in &self.groups {
             let (c, p) = (&self.motion[group.child], &self.motion[group.parent]);
-            let found = |i: usize, row, violation: [f64; 3]| {
+            let record = |i: usize, row, violation: [f64; 3]| {
                 self.rows[group.first + i].j = row;
                 self.residual[group.first + i] = of(violation);
                 self.drift = self.drift.max(violation[0].abs());
             };
-            group.rows.linearise(c, p, &self.driven.coordinates, found);
+            group.rows.linearise(c, p, &self.driven.coordinates, record);
         }
     }
 }
@@ -354,7 +361,7 @@ impl Equations for Lagrange {
     fn coordinate(&self, model: &Model, _: &[f64], b: BodyIndex) -> Option<[f64; 2]> {
         match model.bodies[b].motion {
             Motion::Driven { drive, .. } => Some(self.driven.coordinate(drive)),
-            Motion::Revolute { .. } | Motion::Prismatic { .. } => match model.linked_at(b) {
+            Motion::Revolute { .. } | Motion::Prismatic { .. } => match model.two_degree_joint_at(b) {
                 Some((pair, part)) => pair.coordinates(&self.motion).nth(part),
                 None => Some([position_of(model, &self.motion, b), rate_of(model, &self.motion, b)]),
             },
@@ -434,7 +441,7 @@ impl Equations for Lagrange {
         for b in 0..model.massive {
             out[6 * b..6 * b + 3].copy_from_slice(&rate[7 * b..7 * b + 3]);
             let turn = 7 * b + 3..7 * b + 7;
-            let spin = kinematics::spin_of(&y[turn.clone()], &rate[turn]);
+            let spin = kinematics::angular_velocity_of(&y[turn.clone()], &rate[turn]);
             out[6 * b + 3..6 * b + 6].copy_from_slice(&spin);
         }
     }
@@ -445,7 +452,7 @@ impl Equations for Lagrange {
             for (q, step) in out[7 * b..].iter_mut().zip([x, y, z]) {
                 *q += step;
             }
-            kinematics::turn_quaternion(&mut out[7 * b + 3..7 * b + 7], &Vec3::from(*turn));
+            kinematics::rotate_quaternion(&mut out[7 * b + 3..7 * b + 7], &Vec3::from(*turn));
         }
     }
 
@@ -455,7 +462,7 @@ impl Equations for Lagrange {
         }
         self.projected = self.least_pivot < NEAR_SINGULAR;
         if self.projected {
-            self.take_back(model, t, y);
+            self.project_onto_constraints(model, t, y);
         }
         0.0
     }
@@ -508,7 +515,7 @@ impl Equations for Lagrange {
         }
     }
 
-    fn lone_body(&self, _: &Model, _: usize) -> Option<(f64, Mat3)> {
+    fn free_body_inverse_mass(&self, _: &Model, _: usize) -> Option<(f64, Mat3)> {
         None
     }
 
@@ -570,7 +577,7 @@ impl Equations for Lagrange {
         self.matrix.is_unique(rows.start, rows.len())
     }
 
-    fn actuators(&mut self, _: &Model, _: &Vec3, out: &mut [f64]) {
+    fn actuator_forces(&mut self, _: &Model, _: &Vec3, out: &mut [f64]) {
         for (out, &row) in out.iter_mut().zip(&self.driver_row) {
             *out = self.multipliers[row];
         }
@@ -601,7 +608,7 @@ impl Equations for Lagrange {
 
     fn drive_power(&mut self, model: &Model, _: &Vec3, _: &[f64], _: &[f64], _: bool) -> f64 {
         let each = model.drives.iter().zip(&self.driver_row);
-        let rate = |b: BodyIndex| match model.linked_at(b) {
+        let rate = |b: BodyIndex| match model.two_degree_joint_at(b) {
             Some((pair, part)) => {
                 let own = pair.coordinates(&self.motion).nth(part);
                 own.map_or(0.0, |[_, rate]| rate)

@@ -4,13 +4,13 @@ use nalgebra::ComplexField;
 use std::ops::Range;
 
 /// Below this number of rows, dense elimination is faster than testing for zeros.
-const LEAST_SPARSE: usize = 16;
+const MIN_SPARSE: usize = 16;
 
 /// LU factorisation with partial pivoting, for real and complex numbers, that skips zeros. Its cost depends on the row order and
 /// is linear for banded and bordered matrices.
 pub struct Lu<X> {
     /// Maximum number of rows.
-    most: usize,
+    max_rows: usize,
     /// Rows in use.
     n: usize,
     rows: Vec<X>,
@@ -33,7 +33,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
     /// For at most `n` rows.
     pub fn new(n: usize) -> Self {
         Self {
-            most: n,
+            max_rows: n,
             n: 0,
             rows: vec![X::zero(); n * n],
             pivots: vec![0; n],
@@ -59,7 +59,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         }
         for (i, j, entry) in entries {
             a[i * stride + j] = entry;
-            if n >= LEAST_SPARSE {
+            if n >= MIN_SPARSE {
                 let extent = &mut extents[i];
                 *extent = extent.start.min(j)..extent.end.max(j + 1);
             }
@@ -67,10 +67,10 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         for i in 0..n {
             a[i * stride + i] += diagonal;
         }
-        if n < LEAST_SPARSE {
-            self.eliminate_all();
+        if n < MIN_SPARSE {
+            self.eliminate_dense();
         } else {
-            self.eliminate_filled();
+            self.eliminate_sparse();
             self.pack();
         }
     }
@@ -78,23 +78,23 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
     /// Distance between two rows.
     #[inline]
     fn stride(&self) -> usize {
-        if self.n < LEAST_SPARSE { self.n } else { self.most }
+        if self.n < MIN_SPARSE { self.n } else { self.max_rows }
     }
 
     /// Zeroes the entries of the latest matrix.
     fn clear(&mut self) {
         let n = self.n;
-        if n < LEAST_SPARSE {
+        if n < MIN_SPARSE {
             self.rows[..n * n].fill(X::zero());
             return;
         }
-        for (row, extent) in self.rows.chunks_exact_mut(self.most).zip(&self.extents[..n]) {
+        for (row, extent) in self.rows.chunks_exact_mut(self.max_rows).zip(&self.extents[..n]) {
             row[extent.clone()].fill(X::zero());
         }
     }
 
     /// Dense elimination that skips rows with a zero factor.
-    fn eliminate_all(&mut self) {
+    fn eliminate_dense(&mut self) {
         let n = self.n;
         let a = &mut self.rows[..n * n];
         for k in 0..n {
@@ -128,8 +128,8 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
     }
 
     /// Elimination restricted to the extents of the rows.
-    fn eliminate_filled(&mut self) {
-        let (n, stride) = (self.n, self.most);
+    fn eliminate_sparse(&mut self) {
+        let (n, stride) = (self.n, self.max_rows);
         let (a, extents) = (&mut self.rows[..], &mut self.extents[..n]);
         let lowest = &mut self.lowest[..n];
         lowest.fill(0);
@@ -166,8 +166,8 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             let filled = span.clone().filter(|&j| !pivot_row[j].is_zero());
             self.filled.extend(filled);
             // Contiguous ranges vectorise.
-            let together = span.len() < 2 * self.filled.len();
-            let width = if together { span.len() } else { self.filled.len() };
+            let is_contiguous = span.len() < 2 * self.filled.len();
+            let width = if is_contiguous { span.len() } else { self.filled.len() };
             for i in below {
                 let extent = &mut extents[i];
                 if !extent.contains(&k) {
@@ -181,7 +181,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
                 self.products += 1 + width;
                 let factor = row[k] * inverse;
                 row[k] = factor;
-                if together {
+                if is_contiguous {
                     let pairs = row[span.clone()].iter_mut().zip(&pivot_row[span.clone()]);
                     pairs.for_each(|(a, pivot)| *a -= factor * *pivot);
                 } else {
@@ -199,7 +199,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         self.starts.clear();
         self.columns.clear();
         self.factors.clear();
-        let rows = self.rows.chunks_exact(self.most);
+        let rows = self.rows.chunks_exact(self.max_rows);
         for (i, (row, extent)) in rows.zip(&self.extents).take(n).enumerate() {
             for part in [extent.start..i, i + 1..extent.end] {
                 self.starts.push(self.columns.len());
@@ -218,7 +218,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
     #[inline]
     fn reduced(&self, i: usize, right: usize, b: &[X]) -> X {
         let mut x = b[i];
-        if self.n < LEAST_SPARSE {
+        if self.n < MIN_SPARSE {
             let part = [0..i, i + 1..self.n][right].clone();
             let row = &self.rows[i * self.n..][..self.n];
             for (a, b) in row[part.clone()].iter().zip(&b[part]) {
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn solutions_solve_and_a_border_in_the_end_stays_a_border() {
+    fn solutions_satisfy_the_system_and_a_border_at_the_end_causes_no_fill_in() {
         let mut filled = Vec::new();
         for (blocks, border) in [(3, 2), (8, 7), (16, 15), (16, 0)] {
             let n = 3 * blocks;

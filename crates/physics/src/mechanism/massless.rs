@@ -27,7 +27,7 @@ pub fn check(machine: &Machine, model: &Model) -> Result<(), MechanismError> {
         Motion::Free { v, .. } => (v..v + 6).contains(&dependent),
         Motion::Fixed | Motion::Driven { .. } => false,
     };
-    let found = model.bodies.iter().position(|body| moves(body.motion)).unwrap_or_default();
-    let child = model.linked_at(found).map_or(found, |(pair, _)| pair.child.body);
+    let dependent_body = model.bodies.iter().position(|body| moves(body.motion)).unwrap_or_default();
+    let child = model.two_degree_joint_at(dependent_body).map_or(dependent_body, |(pair, _)| pair.child.body);
     Err(MechanismError::Undetermined { joint: machine.joints[child].name.clone() })
 }

@@ -43,12 +43,12 @@ mod tree;
 pub use crate::jet::Jet;
 use assembly::Settled;
 pub use assembly::{Assembly, Placement};
-pub use bounds::{Advice, CostOf, Counted, LARGEST_DENSE};
+pub use bounds::{Advice, CostlyTask, LimitedQuantity, MAX_DENSE};
 pub use closed_form::{ClosedMotion, Unreachable};
 pub use contacts::{Contacts, Ramp};
 pub use discrete_gradient::StepStart;
 pub use drives::periods_of;
-pub use elements::{ActiveSet, Counts, ElementReport, Gap, Powers, Pull, Touch};
+pub use elements::{ActiveSet, Counts, ElementReport, Gap, Powers, Pull, WallContact};
 use flight::ActiveRanges;
 pub use flight::{Flight, FreeFlightBody};
 pub use held::{HeldError, HeldMachine, drive_positions};
@@ -85,25 +85,25 @@ pub enum MechanismError {
     /// A loop-closing joint that is open although the start values are to be used as given.
     #[error(
         "{given} as given, and {} may be open by at most {}: correct the start values, or let start = \"ideal\" close it",
-        .given.kind(), .given.most()
+        .given.kind(), .given.limit()
     )]
     Open {
         /// Its opening.
         given: OpenJoint,
     },
     /// Loops that cannot be closed near the initial guess.
-    #[error("{given} as given and cannot be closed{}", unclosed(.stays))]
+    #[error("{given} as given and cannot be closed{}", unclosed(.remaining))]
     NoClosure {
         /// Widest gap as given.
         given: OpenJoint,
         /// Joints still open where assembly converged: no admissible motion of the mechanism reduces these gaps. Empty if
         /// assembly did not converge.
-        stays: Vec<OpenJoint>,
+        remaining: Vec<OpenJoint>,
     },
     /// Loops that close but that the drives open again immediately.
     #[error(
         "{}: at the speeds of the drives it {}; no motion of the mechanism satisfies both",
-        .rate.title(), .rate.opens()
+        .rate.title(), .rate.rate_text()
     )]
     InconsistentDrives {
         /// The joint, with opening rates in m/s and rad/s.
@@ -199,9 +199,9 @@ pub enum MechanismError {
     #[error("too large for {of}: {needed} {what}; allowed at most {most}: {advice}")]
     TooCostly {
         /// The task that is too costly.
-        of: CostOf,
+        of: CostlyTask,
         /// The quantity limited.
-        what: Counted,
+        what: LimitedQuantity,
         /// Amount needed.
         needed: u64,
         /// Maximum allowed.
@@ -222,8 +222,8 @@ pub enum MechanismError {
 }
 
 /// Maximum gap of a loop-closing joint if start values are used as given, m, and maximum angular misalignment of its bodies, rad.
-const OPEN_AS_GIVEN: f64 = 1e-5;
-const TURNED_AS_GIVEN: f64 = 1e-4;
+const MAX_GIVEN_GAP: f64 = 1e-5;
+const MAX_GIVEN_ANGLE: f64 = 1e-4;
 
 /// Opening of a cut joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -243,21 +243,22 @@ impl OpenJoint {
         format!("{kind} {}", self.joint)
     }
 
-    /// Kind of joint to which the limit [`Self::most`] applies.
+    /// Kind of joint to which the limit [`Self::limit`] applies.
     fn kind(&self) -> &'static str {
         if self.ball { "an ideal joint" } else { "a joint that closes a loop" }
     }
 
-    fn most(&self) -> String {
-        let apart = length(OPEN_AS_GIVEN);
+    /// Maximum opening of the joint as given, as text.
+    fn limit(&self) -> String {
+        let apart = length(MAX_GIVEN_GAP);
         if self.ball {
             return apart;
         }
-        format!("{apart} and {}", angle(TURNED_AS_GIVEN))
+        format!("{apart} and {}", angle(MAX_GIVEN_ANGLE))
     }
 
-    /// `B by 5 mm along y and by 3 deg`.
-    fn stays(&self) -> String {
+    /// The gap as text: `B by 5 mm along y and by 3 deg`.
+    fn gap_text(&self) -> String {
         let Opening { apart, turned } = &self.opening;
         let apart =
             (apart.norm() > start::CLOSED).then(|| format!(" by {} along {}", length(apart.norm()), axes(apart)));
@@ -266,10 +267,10 @@ impl OpenJoint {
         format!("{}{}", self.joint, parts.join(" and"))
     }
 
-    /// `opens at 1 m/s along y`.
-    fn opens(&self) -> String {
+    /// The opening rate as text: `opens at 1 m/s along y`.
+    fn rate_text(&self) -> String {
         let Opening { apart, turned } = &self.opening;
-        if apart.norm() > start::HELD {
+        if apart.norm() > start::MAX_OPENING_RATE {
             let speed = format_quantity_digits(apart.norm(), "m/s", 4);
             return format!("opens at {speed} along {}", axes(apart));
         }
@@ -304,11 +305,11 @@ fn axes(vector: &Vec3) -> String {
     named.map(|(axis, _)| axis).collect::<Vec<_>>().join(" and ")
 }
 
-fn unclosed(stays: &[OpenJoint]) -> String {
-    if stays.is_empty() {
+fn unclosed(remaining: &[OpenJoint]) -> String {
+    if remaining.is_empty() {
         return ": the parts do not reach, or the guess is too far off".to_owned();
     }
-    let each: Vec<String> = stays.iter().map(OpenJoint::stays).collect();
+    let each: Vec<String> = remaining.iter().map(OpenJoint::gap_text).collect();
     format!(": remaining gaps: {} (no joint can move that way)", each.join(", "))
 }
 
@@ -322,7 +323,8 @@ pub struct Mechanism {
     paths: Vec<Option<Path>>,
     /// The scene's elements in its order, then the pulling hand, if any.
     elements: Vec<Box<dyn SceneElement>>,
-    of_scene: usize,
+    /// Number of the scene's elements.
+    scene_elements: usize,
     pull: Option<Pull>,
     /// World gravity, m/s^2.
     pub gravity: Vec3,
@@ -332,24 +334,24 @@ pub struct Mechanism {
     /// Linearisation, allocated if an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
     sources: power::Sources,
-    /// What motion and forces belong to.
+    /// Origin of the motion and the forces.
     latest: Latest,
     /// Workspace of the discrete-gradient step, allocated if that method is chosen.
     discrete: Option<Box<discrete_gradient::DiscreteGradient>>,
     /// Time of one evaluation, ns, from [`bounds::evaluation_time`].
     evaluation_time: f64,
     free_flight_bodies: Vec<FreeFlightBody>,
-    moving: ActiveRanges,
+    active_ranges: ActiveRanges,
 }
 
-/// What the motion and the forces in a mechanism belong to.
+/// Origin of the motion and the forces in a mechanism.
 #[derive(Clone, Copy, PartialEq)]
 enum Latest {
     /// An evaluation at this time, s.
     Evaluated(f64),
     /// The motion and the gaps alone, at this time, s.
     Measured(f64),
-    /// Neither: they have been overwritten.
+    /// Unknown, because they have been overwritten.
     Unknown,
 }
 
@@ -357,14 +359,15 @@ impl Mechanism {
     /// Sets up the equations of `machine`.
     ///
     /// # Errors
-    /// The rods cannot reach the trajectory, the equations would be too costly, for a start that is settled or in equilibrium the
-    /// machine does not start without play, or it comes to rest nowhere.
+    /// The machine is inconsistent or cannot follow its closed form, the equations would be too costly, or no start that is
+    /// settled or in equilibrium is found.
     pub fn new(machine: &Machine) -> Result<Self, MechanismError> {
-        Self::near(machine, None)
+        Self::with_guess(machine, None)
     }
 
-    /// The same, with the guess of an assembled start in tree coordinates and velocities, if not that of the machine.
-    fn near(machine: &Machine, guess: Option<&[f64]>) -> Result<Self, MechanismError> {
+    /// The same. `guess`, if any, replaces the machine's start values as the initial guess of assembly, in tree coordinates and
+    /// velocities.
+    fn with_guess(machine: &Machine, guess: Option<&[f64]>) -> Result<Self, MechanismError> {
         machine.check()?;
         let mut model = Model::new(machine);
         if let Some(form) = &model.closed_form {
@@ -377,7 +380,7 @@ impl Mechanism {
                 guess.map(|guess| Settled { state: guess.to_vec(), assembly: Assembly::default() })
             }
             StartRule::Settled => Some(settled::settle(machine, None)?),
-            StartRule::Equilibrium => Some(equilibrium::rest(machine, None)?),
+            StartRule::Equilibrium => Some(equilibrium::rest_state(machine, None)?),
         };
         Ok(Self::with_model(machine, Arc::new(model)))
     }
@@ -394,7 +397,7 @@ impl Mechanism {
             evaluation_time: bounds::evaluation_time(machine, &model),
             sources: power::Sources::new(&model, &*equations, machine.elements.len()),
             elements: elements_of(machine, &model),
-            of_scene: machine.elements.len(),
+            scene_elements: machine.elements.len(),
             pull: None,
             latest: Latest::Unknown,
             model,
@@ -406,16 +409,16 @@ impl Mechanism {
             stiff: None,
             discrete: None,
             free_flight_bodies: Vec::new(),
-            moving: ActiveRanges::default(),
+            active_ranges: ActiveRanges::default(),
         };
         mechanism.free_flight_bodies = FreeFlightBody::all(&mechanism, machine);
-        mechanism.moving = ActiveRanges::with_room(mechanism.free_flight_bodies.len());
+        mechanism.active_ranges = ActiveRanges::with_capacity(mechanism.free_flight_bodies.len());
         mechanism.suspend(|_| false);
         mechanism
     }
 
-    /// The equations of `model` once more: `machine` compiled, and assembled by [`Self::start`], before.
-    pub(crate) fn of(machine: &Machine, model: Arc<Model>) -> Self {
+    /// Further equations of `model`, which is `machine` compiled and assembled by [`Self::start`].
+    pub(crate) fn from_model(machine: &Machine, model: Arc<Model>) -> Self {
         let rank = model.assembled.get().and_then(|assembled| assembled.rank);
         let mut mechanism = Self::with_model(machine, model);
         if let Some(rank) = rank {
@@ -430,7 +433,7 @@ impl Mechanism {
     }
 
     /// Whether these are equations of `model`.
-    pub(crate) fn is_of(&self, model: &Arc<Model>) -> bool {
+    pub(crate) fn belongs_to(&self, model: &Arc<Model>) -> bool {
         Arc::ptr_eq(&self.model, model)
     }
 
@@ -447,7 +450,7 @@ impl Mechanism {
     /// Maximum step if the motion is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
     pub fn kinematic_step(&self) -> f64 {
         let laws = self.elements.iter().filter_map(|element| element.law());
-        laws.map(|law| law.swing()).fold(self.model.shortest_period, f64::min) / 50.0
+        laws.map(|law| law.shortest_period()).fold(self.model.shortest_period, f64::min) / 50.0
     }
 
     /// Whether derivatives of prescribed motions jump at ends of steps.
@@ -499,7 +502,7 @@ impl Mechanism {
     }
 
     /// Components of the state read by [`Self::measure_one`] for ball joint `j`; `None` if it reads all.
-    pub fn measured(&self, j: usize) -> Option<&[Range<usize>]> {
+    pub fn gap_components(&self, j: usize) -> Option<&[Range<usize>]> {
         self.paths[j].as_ref().map(|path| &path.parts[..])
     }
 
@@ -615,12 +618,12 @@ impl Mechanism {
     }
 
     /// Force (N) or torque (N m) of every actuator after [`Evaluator::evaluate_fully`], positive along the joint's axis.
-    pub fn actuators(&mut self, out: &mut [f64]) {
-        self.equations.actuators(&self.model, &self.gravity, out);
+    pub fn actuator_forces(&mut self, out: &mut [f64]) {
+        self.equations.actuator_forces(&self.model, &self.gravity, out);
     }
 
     /// Force, N, and torque about the child's joint point, N m, exerted on its child by every fixed, sliding or turning joint,
-    /// drive included, in scene order, after [`Self::actuators`]. World axes.
+    /// drive included, in scene order, after [`Self::actuator_forces`]. World axes.
     pub fn joint_reactions(&mut self) -> impl Iterator<Item = [Vec3; 2]> {
         let (motion, loads) = self.equations.joint_loads();
         // Massless links only transmit the loads of their parents.
@@ -657,7 +660,7 @@ impl Mechanism {
     pub fn elastic_energy(&self, t: f64) -> f64 {
         let motion = self.equations.motion();
         let mut energy = 0.0;
-        for contact in self.contacts.loose() {
+        for contact in self.contacts.with_clearance() {
             energy += contact.stored(t, motion);
         }
         energy + self.energy_in_elements(t)
@@ -672,36 +675,40 @@ impl Mechanism {
     /// Reports of the force elements in scene order; `t`, s, is the time of the latest evaluation.
     pub fn element_reports(&self, t: f64) -> impl Iterator<Item = ElementReport> {
         let motion = self.equations.motion();
-        let of_scene = self.elements[..self.of_scene].iter();
-        of_scene.map(move |e| e.report(t, motion))
+        let scene_elements = self.elements[..self.scene_elements].iter();
+        scene_elements.map(move |e| e.report(t, motion))
     }
 
     /// Two numbers per one-sided element, in any unit: depth of contact, and the smaller of that and an indicator that falls to 0
     /// when contact is lost while compressed. `t`, s, is the time of the motion last measured.
-    pub fn pressed(&self, t: f64) -> impl Iterator<Item = f64> {
+    pub fn contact_indicators(&self, t: f64) -> impl Iterator<Item = f64> {
         let motion = self.equations.motion();
-        self.elements.iter().filter_map(move |e| e.pressed(t, motion)).flatten()
+        self.elements.iter().filter_map(move |e| e.contact_indicators(t, motion)).flatten()
     }
 
     /// Whether any element is one-sided.
     pub fn has_edges(&self) -> bool {
-        self.pressed(0.0).next().is_some()
+        self.contact_indicators(0.0).next().is_some()
     }
 
-    /// Whether the force of any element in contact, by `pressed` from [`Self::pressed`], has a vertical slope at first contact.
-    pub fn presses_vertically(&self, pressed: &[f64]) -> bool {
+    /// Whether the force of any element in contact, by `contact_indicators` from [`Self::contact_indicators`], has a vertical
+    /// slope at first contact.
+    pub fn has_vertical_onset(&self, contact_indicators: &[f64]) -> bool {
         let motion = self.equations.motion();
-        let with_edges = self.elements.iter().filter(|e| e.pressed(0.0, motion).is_some());
-        pressed.chunks_exact(2).zip(with_edges).any(|(own, element)| own[1] > 0.0 && element.begins_vertically())
+        let with_edges = self.elements.iter().filter(|e| e.contact_indicators(0.0, motion).is_some());
+        contact_indicators
+            .chunks_exact(2)
+            .zip(with_edges)
+            .any(|(own, element)| own[1] > 0.0 && element.has_vertical_onset())
     }
 
-    /// Freezes the contact state of the one-sided elements according to `pressed` from [`Self::pressed`], regardless of the
-    /// motion; unfreezes it if `pressed` is empty.
-    pub fn hold_elements(&mut self, pressed: &[f64]) {
+    /// Freezes the contact state of the one-sided elements according to `contact_indicators` from [`Self::contact_indicators`],
+    /// regardless of the motion; unfreezes it if `contact_indicators` is empty.
+    pub fn freeze_elements(&mut self, contact_indicators: &[f64]) {
         let motion = self.equations.motion();
-        let with_edges = self.elements.iter_mut().filter(|e| e.pressed(0.0, motion).is_some());
+        let with_edges = self.elements.iter_mut().filter(|e| e.contact_indicators(0.0, motion).is_some());
         for (i, element) in with_edges.enumerate() {
-            element.hold(pressed.get(2 * i + 1).map(|pressed| *pressed > 0.0));
+            element.freeze_contact(contact_indicators.get(2 * i + 1).map(|indicator| *indicator > 0.0));
         }
     }
 
@@ -712,7 +719,7 @@ impl Mechanism {
 
     /// Sets or removes the hand's pull on a body of `machine`, which these equations must belong to.
     pub fn set_pull(&mut self, machine: &Machine, pull: Option<Pull>) {
-        self.elements.truncate(self.of_scene);
+        self.elements.truncate(self.scene_elements);
         self.pull = pull;
         if let Some(pull) = pull {
             let hand = elements::hand(machine, &self.model, pull);
@@ -755,7 +762,7 @@ impl Mechanism {
 
     /// Maximum number of velocity coordinates for which the automatic choice considers implicit steps.
     pub fn largest_implicit(&self) -> usize {
-        if self.equations.is_block_diagonal() { LARGEST_DENSE } else { bounds::LARGEST_COUPLED }
+        if self.equations.is_block_diagonal() { MAX_DENSE } else { bounds::MAX_COUPLED }
     }
 
     /// Contents of the scene, and the computations it needs.

@@ -42,7 +42,7 @@ pub struct Body {
     /// Whether its motion depends on time alone.
     pub driven_only: bool,
     /// Whether it has a child whose motion does not depend on time alone.
-    pub carries: bool,
+    pub has_moving_child: bool,
     /// Whether the inertia is diagonal in body axes.
     pub diagonal: bool,
 }
@@ -83,7 +83,7 @@ pub struct TreeBlock {
     /// Which of its coordinates couple.
     pub pattern: Pattern,
     /// The free body of this block if it is the only one: the mass matrix is then block diagonal.
-    pub lone: Option<BodyIndex>,
+    pub single_free_body: Option<BodyIndex>,
 }
 
 /// A point fixed to a body.
@@ -110,10 +110,10 @@ pub struct Pair {
     /// Joint points.
     pub child: Anchor,
     pub parent: Anchor,
-    /// Joint axis and two directions perpendicular to it, in the parent's axes, and the same at zero coordinates in the child's
-    /// axes.
+    /// Joint axis and two directions perpendicular to it, in the parent's axes.
     pub axes: [Vec3; 3],
-    pub seen: [Vec3; 3],
+    /// The same directions at zero coordinates, in the child's axes.
+    pub child_axes: [Vec3; 3],
     /// Second axis of a universal joint, child axes.
     pub second: Vec3,
 }
@@ -130,7 +130,7 @@ impl Pair {
             child,
             parent,
             axes,
-            seen: axes.map(|axis| joint.rotation.inverse() * axis),
+            child_axes: axes.map(|axis| joint.rotation.inverse() * axis),
             second: joint.child_axis,
         }
     }
@@ -151,9 +151,9 @@ pub struct Model {
     pub massive: usize,
     /// All bodies, parents before children, and the position of each in that order.
     pub order: Vec<BodyIndex>,
-    pub place: Vec<usize>,
+    pub order_index: Vec<usize>,
     /// Joints of two degrees of freedom, by link.
-    pub linked: Vec<Pair>,
+    pub two_degree_joints: Vec<Pair>,
     /// Joints that close loops.
     pub closures: Vec<Pair>,
     /// Number of position coordinates.
@@ -169,8 +169,8 @@ pub struct Model {
     pub closed_form: Option<ClosedForm>,
     /// Functions of the closed form, for evaluation at every instant.
     pub functions: Tape,
-    /// Values of the closed form that drives and the path of the output body read.
-    pub read: Vec<usize>,
+    /// Indices of the closed form's values that the drives and the path of the output body use.
+    pub required_values: Vec<usize>,
     pub start: StartRule,
     /// Position and velocity coordinates at t = 0 as specified in the scene.
     pub start_state: Vec<f64>,
@@ -185,9 +185,9 @@ pub struct Model {
     pub shortest_period: f64,
     /// Drive laws that bound steps.
     pub bounding: Vec<Arc<dyn Law>>,
-    /// The settled start, if the machine asks for one.
+    /// State and assembly of a settled start or one in equilibrium, if the machine has such a rule.
     pub(super) settled: Option<Settled>,
-    /// What assembly found, once [`start`](super::Mechanism::start) has been called.
+    /// Result of assembly, once [`start`](super::Mechanism::start) has been called.
     pub(super) assembled: OnceLock<Assembled>,
 }
 
@@ -195,18 +195,18 @@ impl Model {
     /// Compiles `machine`.
     pub fn new(machine: &Machine) -> Self {
         let massive = machine.bodies.len();
-        let of_two = |joint: &&Joint| joint.kind.freedoms().len() == 2;
-        let world = massive + machine.joints.iter().filter(of_two).count();
+        let has_two_degrees = |joint: &&Joint| joint.kind.freedoms().len() == 2;
+        let world = massive + machine.joints.iter().filter(has_two_degrees).count();
         let mut drives = Vec::new();
         let mut bodies: Vec<Body> = Vec::new();
         let mut links: Vec<Body> = Vec::new();
-        let mut linked = Vec::new();
+        let mut two_degree_joints = Vec::new();
         let mut order = Vec::with_capacity(world);
         let mut root = vec![usize::MAX; world];
         for (index, (body, joint)) in machine.bodies.iter().zip(&machine.joints).enumerate() {
             let parent = joint.parent.unwrap_or(world);
             let parent_centre = joint.parent.map_or(Vec3::zeros(), |p| machine.bodies[p].centre);
-            let mut moves = |freedom: Freedom, drive: &Option<Drive>, body| {
+            let mut motion_of = |freedom: Freedom, drive: &Option<Drive>, body| {
                 let revolute = freedom.turns();
                 match drive {
                     Some(drive) => {
@@ -220,12 +220,12 @@ impl Model {
                     None => Motion::Prismatic { q: 0, v: 0 },
                 }
             };
-            let (mut of_link, link) = (None, massive + links.len());
+            let (mut link_motion, link) = (None, massive + links.len());
             let motion = match *joint.kind.freedoms() {
-                [only] => moves(only, &joint.drive, index),
+                [only] => motion_of(only, &joint.drive, index),
                 [first, second] => {
-                    of_link = Some(moves(first, &joint.drive, link));
-                    moves(second, &joint.second_drive, index)
+                    link_motion = Some(motion_of(first, &joint.drive, link));
+                    motion_of(second, &joint.second_drive, index)
                 }
                 _ if joint.kind == JointKind::Fixed => Motion::Fixed,
                 _ => Motion::Free { q: 0, v: 0 },
@@ -236,30 +236,30 @@ impl Model {
                 _ => body,
             };
             let mut above = if parent == world { usize::MAX } else { root[parent] };
-            if let Some(motion) = &of_link {
+            if let Some(motion) = &link_motion {
                 above = root_below(above, link, motion);
                 root[link] = above;
             }
             root[index] = root_below(above, index, &motion);
             let moves_freely = root[index] != usize::MAX;
             if parent != world && moves_freely {
-                bodies[parent].carries = true;
+                bodies[parent].has_moving_child = true;
             }
             let rest = joint.rotation.to_rotation_matrix().into_inner();
             let from_parent = joint.parent_point - parent_centre;
             let to_centroid = body.centre - joint.child_point;
-            let (mut hangs_on, mut from, mut axis) = (parent, from_parent, joint.axis);
-            if let Some(motion) = of_link {
+            let (mut parent_or_link, mut from, mut axis) = (parent, from_parent, joint.axis);
+            if let Some(motion) = link_motion {
                 let child = Anchor { body: index, offset: -to_centroid };
                 let of_parent = Anchor { body: parent, offset: from_parent };
-                linked.push(Pair::new(joint, child, of_parent));
+                two_degree_joints.push(Pair::new(joint, child, of_parent));
                 links.push(Body {
                     driven_only: root[link] == usize::MAX,
-                    carries: moves_freely,
+                    has_moving_child: moves_freely,
                     ..link_of(joint, motion, parent, from_parent)
                 });
                 order.push(link);
-                (hangs_on, from) = (link, Vec3::zeros());
+                (parent_or_link, from) = (link, Vec3::zeros());
                 if joint.kind == JointKind::Universal {
                     axis = joint.rotation * joint.child_axis;
                 }
@@ -269,13 +269,13 @@ impl Model {
                 Motion::Driven { revolute, .. } => revolute,
                 _ => matches!(motion, Motion::Revolute { .. }),
             };
-            let [fixed, cosine, sine] = turning(&axis, rest, turns);
+            let [fixed, cosine, sine] = rotation_parts(&axis, rest, turns);
             let inertia = body.inertia;
             bodies.push(Body {
                 mass: body.mass,
                 inertia,
                 inertia_inverse: inertia.try_inverse().unwrap_or_else(Mat3::zeros),
-                parent: hangs_on,
+                parent: parent_or_link,
                 motion,
                 from_parent: from,
                 to_centroid,
@@ -285,34 +285,35 @@ impl Model {
                 sine,
                 origin: -body.centre,
                 driven_only: root[index] == usize::MAX,
-                carries: false,
+                has_moving_child: false,
                 diagonal: inertia == Mat3::from_diagonal(&inertia.diagonal()),
             });
         }
         bodies.append(&mut links);
-        let mut place = vec![0; world];
+        let mut order_index = vec![0; world];
         for (at, &body) in order.iter().enumerate() {
-            place[body] = at;
+            order_index[body] = at;
         }
 
-        let swings = drives.iter().map(|driven| driven.trajectory.swing(machine));
-        let shortest_period = swings.fold(f64::INFINITY, f64::min);
+        let periods = drives.iter().map(|driven| driven.trajectory.shortest_period(machine));
+        let shortest_period = periods.fold(f64::INFINITY, f64::min);
         let laws = drives.iter().filter_map(|driven| driven.trajectory.law());
-        let followed = drives.iter().filter_map(|driven| match driven.trajectory {
+        let driving_functions = drives.iter().filter_map(|driven| match driven.trajectory {
             Trajectory::Function(function) => Some(function + 1),
             Trajectory::Own(_) => None,
         });
         let path = machine.closed_form.as_ref().and_then(|form| form.path.as_ref());
-        let mut read: Vec<usize> = followed.chain(path.into_iter().flat_map(Path::variables)).collect();
-        read.sort_unstable();
-        read.dedup();
+        let mut required_values: Vec<usize> =
+            driving_functions.chain(path.into_iter().flat_map(Path::variables)).collect();
+        required_values.sort_unstable();
+        required_values.dedup();
         let bounding = laws.filter(|law| law.bounds_steps()).cloned().collect();
         let mut model = Self {
             bodies,
             massive,
             order,
-            place,
-            linked,
+            order_index,
+            two_degree_joints,
             closures: Vec::new(),
             nq: 0,
             nv: 0,
@@ -322,7 +323,7 @@ impl Model {
             ideal_joints: Vec::new(),
             drives,
             closed_form: machine.closed_form.clone(),
-            read,
+            required_values,
             functions: machine.closed_form.as_ref().map_or_else(Tape::default, ClosedForm::tape),
             start: machine.start,
             start_state: Vec::new(),
@@ -355,15 +356,15 @@ impl Model {
     }
 
     /// The two-degree joint whose link or child is body `b`, and which of its coordinates moves `b`.
-    pub fn linked_at(&self, b: BodyIndex) -> Option<(&Pair, usize)> {
-        let link = |b: BodyIndex| self.linked.get(b.checked_sub(self.massive)?);
+    pub fn two_degree_joint_at(&self, b: BodyIndex) -> Option<(&Pair, usize)> {
+        let link = |b: BodyIndex| self.two_degree_joints.get(b.checked_sub(self.massive)?);
         let own = link(b).map(|pair| (pair, 0));
         own.or_else(|| Some((link(self.bodies[b].parent)?, 1)))
     }
 
     /// Coordinate and rate at t = 0 of the one-degree joint above body `b`, as specified in the scene.
     fn start_of(&self, machine: &Machine, b: BodyIndex) -> [f64; 2] {
-        let (joint, part) = match self.linked_at(b) {
+        let (joint, part) = match self.two_degree_joint_at(b) {
             Some((pair, part)) => (pair.child.body, part),
             None => (b, 0),
         };
@@ -411,7 +412,7 @@ impl Model {
                 last[b] = above;
                 let (q, v) = (start_q.len(), start_v.len());
                 let [position, velocity] = self.start_of(machine, b);
-                let mut one = |length: f64, speed: f64| {
+                let mut push_coordinate = |length: f64, speed: f64| {
                     start_q.push(position);
                     start_v.push(velocity);
                     scale_q.push(length);
@@ -421,12 +422,12 @@ impl Model {
                 match &mut self.bodies[b].motion {
                     Motion::Prismatic { q: at_q, v: at_v } => {
                         (*at_q, *at_v) = (q, v);
-                        one(scales.length, scales.speed);
+                        push_coordinate(scales.length, scales.speed);
                         last[b] = v - first;
                     }
                     Motion::Revolute { q: at_q, v: at_v } => {
                         (*at_q, *at_v) = (q, v);
-                        one(scales.angle, scales.angular_speed);
+                        push_coordinate(scales.angle, scales.angular_speed);
                         last[b] = v - first;
                     }
                     Motion::Free { q: at_q, v: at_v } => {
@@ -450,12 +451,13 @@ impl Model {
                     Motion::Fixed | Motion::Driven { .. } => {}
                 }
             }
-            let lone = (count == 1 && matches!(self.bodies[tree].motion, Motion::Free { .. })).then_some(tree);
+            let single_free_body =
+                (count == 1 && matches!(self.bodies[tree].motion, Motion::Free { .. })).then_some(tree);
             self.blocks.push(TreeBlock {
                 v: first,
                 n: parent_coordinate.len(),
                 pattern: Pattern::new(parent_coordinate),
-                lone,
+                single_free_body,
             });
         }
         self.nq = start_q.len();
@@ -504,7 +506,7 @@ impl Model {
 
 /// Relative rotation of a joint for coordinate q in constant, cosine and sine parts: Rot(axis, q) R0 =
 /// (a a^T + cos q (1 - a a^T) + sin q [a]x) R0 if it `turns`, else R0.
-fn turning(axis: &Vec3, rest: Mat3, turns: bool) -> [Mat3; 3] {
+fn rotation_parts(axis: &Vec3, rest: Mat3, turns: bool) -> [Mat3; 3] {
     if !turns {
         return [rest, Mat3::zeros(), Mat3::zeros()];
     }
@@ -516,7 +518,7 @@ fn turning(axis: &Vec3, rest: Mat3, turns: bool) -> [Mat3; 3] {
 /// motion is `motion`.
 fn link_of(joint: &Joint, motion: Motion, parent: BodyIndex, from_parent: Vec3) -> Body {
     let slides = joint.kind == JointKind::Cylindrical;
-    let [fixed, cosine, sine] = turning(&joint.axis, Mat3::identity(), !slides);
+    let [fixed, cosine, sine] = rotation_parts(&joint.axis, Mat3::identity(), !slides);
     Body {
         mass: 0.0,
         inertia: Mat3::zeros(),
@@ -531,7 +533,7 @@ fn link_of(joint: &Joint, motion: Motion, parent: BodyIndex, from_parent: Vec3) 
         sine,
         origin: Vec3::zeros(),
         driven_only: false,
-        carries: true,
+        has_moving_child: true,
         diagonal: true,
     }
 }
@@ -547,7 +549,7 @@ fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {
     }
 }
 
-/// Time in which a body moves by the length scale at that of speeds, s.
+/// Time in which a body moves by the length scale at the speed scale, s.
 const SPEED_TIME: f64 = 0.1;
 
 /// Scales multiplied by the relative tolerance; see `docs/numerics.md`.

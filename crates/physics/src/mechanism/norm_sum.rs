@@ -1,5 +1,5 @@
 //! Weighted sum of norms, minimised over the solutions of a linear system: the smallest virtual work with which joints with play
-//! can bear a load that they share.
+//! can balance a load that they share.
 
 use super::lu::Lu;
 
@@ -7,20 +7,20 @@ use super::lu::Lu;
 /// rounding of x would show in the gradients of terms that vanish.
 const SMOOTHING: (f64, f64, f64) = (0.1, 1e-9, 0.1);
 /// Maximum number of Newton steps at one smoothing, and of halvings of one step.
-const MOST_STEPS: usize = 40;
-const MOST_HALVINGS: usize = 40;
-/// Decrease of the sum that a step promises, over all weights times the largest norm: below the first it may be rounding, and steps
-/// end when it no longer halves; below the second they end.
-const SMALL: f64 = 1e-13;
-const DONE: f64 = 1e-26;
-/// Part of the promised decrease that a step has to reach, and rounding of the sum, in the same measure.
-const REACHED: f64 = 1e-4;
+const MAX_STEPS: usize = 40;
+const MAX_HALVINGS: usize = 40;
+/// Decrease of the sum that a step predicts, over the sum of the weights times the largest norm. Below the first it may be
+/// rounding, and the iteration ends once it no longer halves; below the second the iteration has converged.
+const STAGNANT: f64 = 1e-13;
+const CONVERGED: f64 = 1e-26;
+/// Fraction of the predicted decrease that a step must achieve, and rounding of the sum, in the same measure.
+const SUFFICIENT: f64 = 1e-4;
 const NOISE: f64 = 1e-15;
-/// Diagonal added to the second derivatives, over all weights divided by the largest norm: where the sum has no curvature, any
-/// solution is as good.
-const FLAT: f64 = 1e-12;
+/// Diagonal added to the second derivatives, over the sum of the weights divided by the largest norm: where the sum has no
+/// curvature, all solutions are equivalent.
+const REGULARISATION: f64 = 1e-12;
 /// Part of a null vector on rows with weight, over the whole, below which it is rounding.
-const NO_PART: f64 = 1e-9;
+const NEGLIGIBLE: f64 = 1e-9;
 
 /// A term c |x| of the sum with the gradient c x / |x|, smoothed by `width`: sqrt(|x|^2 + width^2) in place of |x|.
 #[derive(Clone, Copy)]
@@ -36,12 +36,12 @@ impl Norm<'_> {
     }
 }
 
-/// Minimises sum(c_k |x_k|) - `slope` . x over x + any combination of the vectors `null`; x_k are the components 3 k to 3 k + 2 of x,
-/// and the weights c_k belong to the leading ones. Returns the gradients c_k x_k / |x_k| of the terms: where x_k is 0, one between
+/// Minimises sum(c_k |x_k|) - `slope` . x over x + any combination of the vectors `null`; x_k are the components 3 k to 3 k + 2 of
+/// x, and the weights c_k belong to the leading ones. Returns the gradients c_k x_k / |x_k| of the terms: where x_k is 0, one between
 /// them, such that no combination of null vectors changes the sum.
 ///
-/// Newton's method on smoothed norms whose smoothing shrinks (Qi & Zhou, SIAM J. Optim. 11, 2000, pp. 389-410). With smoothing w the
-/// sum is at most 0.31 w c_k for each term that vanishes above the least, with w = 1e-9 of the largest norm at the end.
+/// Newton's method on smoothed norms whose smoothing shrinks (Qi & Zhou, SIAM J. Optim. 11, 2000, pp. 389-410). With smoothing w
+/// the sum is at most 0.31 w c_k for each term that vanishes above the least, with w = 1e-9 of the largest norm at the end.
 pub(super) fn minimise(weights: &[f64], null: &[Vec<f64>], slope: &[f64], x: &mut [f64]) -> Vec<f64> {
     let basis = independent(weights, null);
     let parts = x.chunks_exact(3).zip(weights).filter(|(_, weight)| **weight > 0.0);
@@ -76,7 +76,7 @@ fn descend(weights: &[f64], basis: &[Vec<f64>], slope: &[f64], width: f64, large
     let scale = all * largest;
     let mut lu = Lu::new(n);
     let mut before = f64::INFINITY;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let value = sum(weights, slope, width, x);
         let mut gradient: Vec<f64> = basis.iter().map(|null| -dot(slope, null)).collect();
         let mut curvature = vec![0.0; n * n];
@@ -93,21 +93,21 @@ fn descend(weights: &[f64], basis: &[Vec<f64>], slope: &[f64], width: f64, large
             }
         }
         let entries = (0..n * n).map(|e| (e / n, e % n, curvature[e]));
-        lu.factor(n, entries, FLAT * all / largest);
+        lu.factor(n, entries, REGULARISATION * all / largest);
         let mut step: Vec<f64> = gradient.iter().map(|slope| -slope).collect();
         lu.solve(&mut step);
-        let promised = -dot(&gradient, &step);
-        if !(promised > DONE * scale) || (promised <= SMALL * scale && promised >= 0.5 * before) {
+        let predicted = -dot(&gradient, &step);
+        if !(predicted > CONVERGED * scale) || (predicted <= STAGNANT * scale && predicted >= 0.5 * before) {
             return;
         }
-        before = promised;
+        before = predicted;
         let mut part = 1.0;
-        for _ in 0..MOST_HALVINGS {
+        for _ in 0..MAX_HALVINGS {
             let mut trial = x.to_vec();
             for (null, step) in basis.iter().zip(&step) {
                 trial.iter_mut().zip(null).for_each(|(x, null)| *x += part * step * null);
             }
-            if sum(weights, slope, width, &trial) <= value - REACHED * part * promised + NOISE * scale {
+            if sum(weights, slope, width, &trial) <= value - SUFFICIENT * part * predicted + NOISE * scale {
                 x.copy_from_slice(&trial);
                 break;
             }
@@ -134,7 +134,7 @@ fn independent(weights: &[f64], null: &[Vec<f64>]) -> Vec<Vec<f64>> {
             }
         }
         let size = weighted(&own, &own).sqrt();
-        if size > NO_PART * whole {
+        if size > NEGLIGIBLE * whole {
             own.iter_mut().for_each(|x| *x /= size);
             basis.push(own);
         }
@@ -156,7 +156,7 @@ mod tests {
 
     /// Three cities on a circle about the origin, 120 degrees apart, and one weight: the point nearest to all is the middle.
     #[test]
-    fn the_point_with_the_least_distance_to_three_is_fermats() {
+    fn the_point_with_the_least_total_distance_to_three_is_that_of_fermat() {
         let corner = |i: usize| {
             let angle = std::f64::consts::TAU * i as f64 / 3.0;
             [libm::cos(angle), libm::sin(angle), 0.0]
@@ -175,7 +175,7 @@ mod tests {
 
     /// |1 - z| + 3 |z| is least at z = 0, where the second term's gradient is 1 and not 3.
     #[test]
-    fn a_term_that_vanishes_has_the_gradient_that_balances_the_others() {
+    fn a_vanishing_term_has_the_gradient_that_balances_the_others() {
         let mut x = vec![1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         x[3] = 0.7;
         x[0] = 0.3;
@@ -188,7 +188,7 @@ mod tests {
 
     /// |1 - z| + |z| is 1 for all z from 0 to 1.
     #[test]
-    fn where_any_solution_is_as_good_one_of_them_is_found() {
+    fn one_of_several_equivalent_solutions_is_found() {
         for first in [0.5, 0.9, -0.3, 4.0] {
             let mut x = vec![1.0 - first, 0.0, 0.0, first, 0.0, 0.0];
             let null = vec![vec![-1.0, 0.0, 0.0, 1.0, 0.0, 0.0]];
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn terms_without_weight_bear_what_they_can() {
+    fn terms_without_weight_reduce_the_others_to_zero() {
         let mut x = vec![1.0, 0.0, 0.0, 0.5, 0.0, 0.0, 7.0];
         let null = vec![vec![1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 2.0], vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]];
         let gradients = minimise(&[1.0, 0.0], &null, &[], &mut x);

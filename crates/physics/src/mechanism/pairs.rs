@@ -38,7 +38,7 @@ impl Rows {
         matches!(self, Self::Perpendicular { .. } | Self::Angle { .. })
     }
 
-    /// Calls `found` with each row's number, Jacobian, and violation with its first and second time derivatives, for the motion
+    /// Calls `visit` with each row's number, Jacobian, and violation with its first and second time derivatives, for the motion
     /// of child and parent and the driven coordinates.
     #[inline(always)]
     pub fn linearise(
@@ -46,7 +46,7 @@ impl Rows {
         c: &Kinematics,
         p: &Kinematics,
         driven: &[Jet],
-        mut found: impl FnMut(usize, JacobianRow, [f64; 3]),
+        mut visit: impl FnMut(usize, JacobianRow, [f64; 3]),
     ) {
         let zero = Vec3::zeros();
         let (wc, wp) = (c.angular_velocity, p.angular_velocity);
@@ -60,7 +60,7 @@ impl Rows {
                     let mut e = zero;
                     e[i] = 1.0;
                     let row = JacobianRow { child: [e, dc.cross(&e)], parent: [-e, e.cross(&dp)] };
-                    found(i, row, [phi[i], rate[i], acceleration[i]]);
+                    visit(i, row, [phi[i], rate[i], acceleration[i]]);
                 }
             }
             Self::Perpendicular { child, parent } => {
@@ -71,7 +71,7 @@ impl Rows {
                 let acceleration =
                     (c.angular_acceleration - p.angular_acceleration).dot(&cross) + relative.dot(&turning);
                 let row = JacobianRow { child: [zero, cross], parent: [zero, -cross] };
-                found(0, row, [a.dot(&b), relative.dot(&cross), acceleration]);
+                visit(0, row, [a.dot(&b), relative.dot(&cross), acceleration]);
             }
             Self::Offset { child, parent, along, drive } => {
                 let (dc, dp, b) = (c.rotation * child, p.rotation * parent, p.rotation * along);
@@ -85,7 +85,7 @@ impl Rows {
                 let rate = b1.dot(&d) + b.dot(&d1) - f.rate;
                 let acceleration = b2.dot(&d) + 2.0 * b1.dot(&d1) + b.dot(&d2) - f.acceleration;
                 let row = JacobianRow { child: [b, dc.cross(&b)], parent: [-b, b.cross(&dp) + b.cross(&d)] };
-                found(0, row, [phi, rate, acceleration]);
+                visit(0, row, [phi, rate, acceleration]);
             }
             Self::Angle { child, zero: reference, axis, in_child, drive } => {
                 let of_axis = if in_child { c } else { p };
@@ -100,7 +100,7 @@ impl Rows {
                     + relative.dot(&of_axis.angular_velocity.cross(&x))
                     - f.acceleration;
                 let row = JacobianRow { child: [zero, x], parent: [zero, -x] };
-                found(0, row, [phi, relative.dot(&x) - f.rate, acceleration]);
+                visit(0, row, [phi, relative.dot(&x) - f.rate, acceleration]);
             }
         }
     }
@@ -120,15 +120,15 @@ impl Pair {
     /// perpendicular.
     pub fn rows(&self) -> [Vec<Rows>; 2] {
         let [x, y, z] = self.axes;
-        let [seen_x, seen_y, _] = self.seen;
+        let [child_x, child_y, _] = self.child_axes;
         let slides = [self.offset(&y, None), self.offset(&z, None)];
-        let along = [(seen_x, y), (seen_x, z)];
+        let along = [(child_x, y), (child_x, z)];
         let (points, orientation): (&[Rows], &[(Vec3, Vec3)]) = match self.kind {
             JointKind::Free => (&[], &[]),
-            JointKind::Fixed => (&[self.point()], &[along[0], along[1], (seen_y, z)]),
+            JointKind::Fixed => (&[self.point()], &[along[0], along[1], (child_y, z)]),
             JointKind::Revolute => (&[self.point()], &along),
             JointKind::Universal => (&[self.point()], &[(self.second, x)]),
-            JointKind::Prismatic => (&slides, &[along[0], along[1], (seen_y, z)]),
+            JointKind::Prismatic => (&slides, &[along[0], along[1], (child_y, z)]),
             JointKind::Cylindrical => (&slides, &along),
         };
         let perpendicular = |&(child, parent): &(Vec3, Vec3)| Rows::Perpendicular { child, parent };
@@ -143,15 +143,15 @@ impl Pair {
             (JointKind::Prismatic | JointKind::Cylindrical, 0) => self.offset(&self.axes[0], Some(drive)),
             (JointKind::Universal, 0) => about_axis(self.second, self.second_at_zero()),
             (JointKind::Universal, _) => {
-                Rows::Angle { child: self.seen[0], zero: self.axes[0], axis: self.second, in_child: true, drive }
+                Rows::Angle { child: self.child_axes[0], zero: self.axes[0], axis: self.second, in_child: true, drive }
             }
-            _ => about_axis(self.seen[1], self.axes[1]),
+            _ => about_axis(self.child_axes[1], self.axes[1]),
         }
     }
 
     /// Second axis of a universal joint at zero angles, in the parent's axes.
     fn second_at_zero(&self) -> Vec3 {
-        let [x, y, z] = self.seen.map(|seen| seen.dot(&self.second));
+        let [x, y, z] = self.child_axes.map(|child_axes| child_axes.dot(&self.second));
         self.axes[0] * x + self.axes[1] * y + self.axes[2] * z
     }
 
@@ -198,7 +198,7 @@ impl Pair {
             let angle = libm::atan2(from.cross(to).dot(about), from.dot(to));
             [angle, about.dot(&spin)]
         };
-        let hinge = || turn(&axis, &(p.rotation * self.axes[1]), &(c.rotation * self.seen[1]));
+        let hinge = || turn(&axis, &(p.rotation * self.axes[1]), &(c.rotation * self.child_axes[1]));
         let both = match self.kind {
             JointKind::Fixed | JointKind::Free => [None, None],
             JointKind::Prismatic => [Some(slide()), None],
@@ -208,7 +208,7 @@ impl Pair {
                 let second = c.rotation * self.second;
                 let zero = p.rotation * self.second_at_zero();
                 let first = turn(&axis, &zero, &second);
-                [Some(first), Some(turn(&second, &axis, &(c.rotation * self.seen[0])))]
+                [Some(first), Some(turn(&second, &axis, &(c.rotation * self.child_axes[0])))]
             }
         };
         both.into_iter().flatten()
@@ -218,13 +218,13 @@ impl Pair {
     pub fn opening(&self, motion: &[Kinematics]) -> Opening {
         let [c, p] = self.ends(motion);
         let axes = self.axes.map(|axis| p.rotation * axis);
-        let seen = self.seen.map(|axis| c.rotation * axis);
+        let child_axes = self.child_axes.map(|axis| c.rotation * axis);
         let gap = (c.position + c.rotation * self.child.offset) - (p.position + p.rotation * self.parent.offset);
         let apart = if self.slides() { gap - axes[0] * axes[0].dot(&gap) } else { gap };
         let turned = match self.kind {
             JointKind::Free => 0.0,
             JointKind::Revolute | JointKind::Cylindrical => {
-                libm::atan2(axes[0].cross(&seen[0]).norm(), axes[0].dot(&seen[0]))
+                libm::atan2(axes[0].cross(&child_axes[0]).norm(), axes[0].dot(&child_axes[0]))
             }
             JointKind::Universal => {
                 let second = c.rotation * self.second;
@@ -233,7 +233,7 @@ impl Pair {
             }
             JointKind::Fixed | JointKind::Prismatic => {
                 // For a rotation by an angle about n, the sums are 2 sin n and 1 + 2 cos.
-                let pairs = || axes.iter().zip(&seen);
+                let pairs = || axes.iter().zip(&child_axes);
                 let sine = pairs().map(|(a, b)| a.cross(b)).sum::<Vec3>().norm();
                 let cosine = pairs().map(|(a, b)| a.dot(b)).sum::<f64>() - 1.0;
                 libm::atan2(sine, cosine)

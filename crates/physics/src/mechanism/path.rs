@@ -32,7 +32,7 @@ impl Path {
                 b = model.bodies[b].parent;
             }
         }
-        bodies.sort_unstable_by_key(|&b| model.place[b]);
+        bodies.sort_unstable_by_key(|&b| model.order_index[b]);
         bodies.dedup();
         let mut path = Self::default();
         for b in bodies {
@@ -105,7 +105,7 @@ mod tests {
                     for j in 0..scene.machine.ball_joints.len() {
                         // Components off the path must not be read.
                         let mut known = vec![f64::NAN; y.len()];
-                        for part in along.measured(j).unwrap() {
+                        for part in along.gap_components(j).unwrap() {
                             known[part.clone()].copy_from_slice(&y[part.clone()]);
                         }
                         along.measure_one(j, t, &known);

@@ -1,6 +1,6 @@
 //! Powers of all energy sources and sinks, each from a force and the velocity of its point of application. Allocates nothing.
 
-use super::elements::{ForceElement, Powers, Touch};
+use super::elements::{ForceElement, Powers, WallContact};
 use super::equations::Equations;
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Model, Motion};
@@ -9,9 +9,9 @@ use crate::machine::Vec3;
 
 /// Parts of a scene that can have power.
 pub(super) struct Sources {
-    /// Neither drives, nor contacts, nor force elements: every power is zero.
+    /// Whether there are neither drives nor contacts nor force elements: every power is zero.
     pub none: bool,
-    /// No drive force depends on an unknown acceleration, so that the loads alone suffice.
+    /// Whether the loads alone suffice, because no drive force depends on an unknown acceleration.
     pub forces_suffice: bool,
 }
 
@@ -23,13 +23,13 @@ impl Sources {
         let contacts = model.joints.iter().any(|joint| joint.ideal.is_none());
         // Parents come before children.
         let mut moved = vec![false; n + 1];
-        let mut free_rider = false;
+        let mut carries_free_body = false;
         for &b in &model.order {
             let body = &model.bodies[b];
             moved[b] = moved[body.parent] || matches!(body.motion, Motion::Driven { .. });
-            free_rider |= moved[b] && !body.driven_only;
+            carries_free_body |= moved[b] && !body.driven_only;
         }
-        let prescribed = equations.prescribes_drives() && !free_rider;
+        let prescribed = equations.prescribes_drives() && !carries_free_body;
         Self { none: !drives && !contacts && elements == 0, forces_suffice: !drives || prescribed }
     }
 }
@@ -59,7 +59,7 @@ impl Mechanism {
     pub(super) fn powers_of_latest(&mut self, t: f64, y: &[f64], dy: &[f64]) -> Powers {
         let mut powers = Powers::default();
         let motion = self.equations.motion();
-        for contact in self.contacts.loose() {
+        for contact in self.contacts.with_clearance() {
             contact.add_powers(t, motion, &mut powers);
         }
         for element in &self.elements {
@@ -77,8 +77,8 @@ impl Mechanism {
     }
 
     /// Contact between the ball of joint `j` and its socket wall at the latest evaluation; `None` without contact force.
-    pub fn touch(&self, j: usize) -> Option<Touch> {
-        self.contacts.joint(j).touch(self.motion())
+    pub fn wall_contact(&self, j: usize) -> Option<WallContact> {
+        self.contacts.joint(j).wall_contact(self.motion())
     }
 
     /// Unit vector from the socket centre of joint `j` to the ball centre at the latest evaluation, in the axes of the socket's
@@ -89,14 +89,14 @@ impl Mechanism {
 }
 
 /// Drive forces required for the accelerations in `motion` under the loads in `wrench` (overwritten), from the bodies selected by
-/// `moved`. Calls `found(drive, force)` for each.
+/// `moved`. Calls `visit(drive, force)` for each.
 pub(super) fn inverse_dynamics(
     model: &Model,
     motion: &[Kinematics],
     wrench: &mut [Wrench],
     gravity: &Vec3,
     moved: impl Fn(usize) -> bool,
-    mut found: impl FnMut(usize, f64),
+    mut visit: impl FnMut(usize, f64),
 ) {
     for (b, body) in model.bodies.iter().enumerate() {
         if !moved(b) {
@@ -123,7 +123,7 @@ pub(super) fn inverse_dynamics(
             } else {
                 m.axis.dot(&needed.force)
             };
-            found(drive, force);
+            visit(drive, force);
         }
         if body.parent < model.bodies.len() {
             let d = m.position - motion[body.parent].position;

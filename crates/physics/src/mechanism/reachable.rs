@@ -1,32 +1,32 @@
 //! The set of tip errors that are reachable with every ball anywhere in its play and the drives held: its farthest point in a
 //! direction. Contact between bodies, springs and inertia play no part.
 //!
-//! A unit force u at the tip of the mechanism without play presses its balls on their sockets with forces l_k, and does the virtual
-//! work u . e = sum(l_k . d_k) while the balls are displaced by d_k in the sockets. Every ball with play c_k therefore lies at
-//! c_k l_k / |l_k| where the tip is farthest along u (Venanzi & Parenti-Castelli, ASME J. Mech. Des. 127, 2005, pp. 446-455; the set
-//! itself: Voglewede & Ebert-Uphoff, ASME J. Mech. Des. 126, 2004, pp. 283-290), and to first order the largest u . e, the support of
-//! the set, is sum(c_k |l_k|). If joints share the load, the support is the least such sum over all l_k in balance, by duality: the
-//! d_k of a redundant mechanism have to agree.
+//! A unit force u at the tip of the mechanism without play presses its balls on their sockets with forces l_k, and does the
+//! virtual work u . e = sum(l_k . d_k) while the balls are displaced by d_k in the sockets. Every ball with play c_k therefore
+//! lies at c_k l_k / |l_k| where the tip is farthest along u (Venanzi & Parenti-Castelli, ASME J. Mech. Des. 127, 2005, pp.
+//! 446-455; the set itself: Voglewede & Ebert-Uphoff, ASME J. Mech. Des. 126, 2004, pp. 283-290), and to first order the largest
+//! u . e, the support of the set, is sum(c_k |l_k|). If joints share the load, the support is the least such sum over all l_k in
+//! balance, by duality: the d_k of a redundant mechanism have to agree.
 //!
-//! The same statement holds for small changes of any pose with displaced balls. Applied to the pose that it leads to, until nothing
-//! changes, it ends where no small change within the play takes the tip farther along u.
+//! The same statement holds for small changes of any pose with displaced balls. Applied to the pose that it leads to, until
+//! nothing changes, it ends where no small change within the play takes the tip farther along u.
 
 use super::constraints::Constraints;
-use super::held::{HELD, HeldMachine, IMMOBILE};
+use super::held::{DRIVE_END, HeldMachine, IMMOBILE};
 use super::norm_sum::minimise;
 use super::start::factor_at;
 use super::tree::Tree;
 use crate::machine::{Mat3, Vec3};
 
-/// Maximum number of poses; those after which displacements are averaged with the ones before, and fixed. In a direction
-/// perpendicular to a face of the set they may alternate between its ends.
-const MOST_POSES: usize = 40;
-const AVERAGED: usize = 12;
-const FIXED: usize = 24;
-/// Shift of the tip from one pose to the next, over the largest clearance, at which they agree, and error of the openings at which
-/// a pose counts as closed: a ball without load may lie anywhere.
-const AGREES: f64 = 1e-9;
-const CLOSES: f64 = 1e-6;
+/// Maximum number of poses, the first pose whose displacements are averaged with the previous ones, and the first whose
+/// displacements are fixed. In a direction perpendicular to a face of the set they may alternate between its ends.
+const MAX_POSES: usize = 40;
+const FIRST_AVERAGED: usize = 12;
+const FIRST_FIXED: usize = 24;
+/// Shift of the tip from one pose to the next, over the largest clearance, at which they agree, and error of the openings at
+/// which a pose counts as closed: a ball without load may lie anywhere.
+const TIP_TOLERANCE: f64 = 1e-9;
+const OPENING_TOLERANCE: f64 = 1e-6;
 /// Change that is rounding, m.
 const ROUNDING: f64 = 1e-14;
 
@@ -46,9 +46,9 @@ pub struct Farthest {
 /// Directions of the tip with the drives held, orthonormal, world axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TipFreedoms {
-    /// In which the tip moves without play: nothing bounds the error.
+    /// Directions in which the tip moves even without play: nothing bounds the error.
     pub unbounded: Vec<Vec3>,
-    /// Perpendicular to those, in which it moves by play alone. A planar mechanism has two.
+    /// Directions perpendicular to those, in which it moves by play alone. A planar mechanism has two.
     pub bounded: Vec<Vec3>,
 }
 
@@ -57,14 +57,14 @@ impl HeldMachine {
     pub fn freedoms(&mut self) -> TipFreedoms {
         self.factor(&self.ideal.clone());
         let unconstrained = self.mobility(|_| {}).trace();
-        let tight: Vec<usize> = (0..self.play.len()).filter(|&k| self.play[k] == 0.0).collect();
-        let mut without_loose = Constraints::new(&self.model, &tight);
-        if without_loose.rows() > 0 {
-            // Those of all joints may be dependent, and then some of these are, too.
-            without_loose.treat_as_dependent(without_loose.rows());
+        let without_play: Vec<usize> = (0..self.play.len()).filter(|&k| self.play[k] == 0.0).collect();
+        let mut constraints = Constraints::new(&self.model, &without_play);
+        if constraints.rows() > 0 {
+            // The rows of all joints may be dependent, and then some of these are, too.
+            constraints.treat_as_dependent(constraints.rows());
         }
-        factor_at(&self.model, &mut without_loose, &mut self.tree, HELD, &self.ideal);
-        let loose = self.mobility(|vdot| without_loose.project_accelerations(&self.model, vdot));
+        factor_at(&self.model, &mut constraints, &mut self.tree, DRIVE_END, &self.ideal);
+        let loose = self.mobility(|vdot| constraints.project_accelerations(&self.model, vdot));
         self.factor(&self.ideal.clone());
         let closed = self.closed_mobility();
         let least = IMMOBILE * unconstrained;
@@ -84,12 +84,12 @@ impl HeldMachine {
         let (mut openings, mut targets, mut step) = (vec![0.0; rows], vec![0.0; rows], vec![0.0; self.model.nv]);
         let (mut support, mut shares, mut error) = (0.0, vec![0.0; self.play.len()], None);
         let mut tip = self.ideal_tip;
-        for pose in 0..MOST_POSES {
+        for pose in 0..MAX_POSES {
             self.factor(&y);
             let mut loads = vec![0.0; rows];
             let mut vdot = self.tip_load(direction);
             self.tree.solve(&self.model, &mut vdot);
-            self.constraints.bear(&self.model, &mut vdot, &mut loads);
+            self.constraints.balance_loads(&self.model, &mut vdot, &mut loads);
             self.constraints.openings(&self.model, &self.tree.motion, &mut openings);
             let null: Vec<Vec<f64>> = self.constraints.system().null_multipliers().map(<[f64]>::to_vec).collect();
             let displaced = minimise(&self.play, &null, &openings, &mut loads);
@@ -99,24 +99,24 @@ impl HeldMachine {
                 }
                 support = shares.iter().sum();
             }
-            let taken = match pose {
-                ..AVERAGED => 1.0,
-                AVERAGED..FIXED => 0.5,
+            let weight = match pose {
+                ..FIRST_AVERAGED => 1.0,
+                FIRST_AVERAGED..FIRST_FIXED => 0.5,
                 _ => 0.0,
             };
             for (target, displaced) in targets.iter_mut().zip(&displaced) {
-                *target += taken * (displaced - *target);
+                *target += weight * (displaced - *target);
             }
             let change: Vec<f64> = targets.iter().zip(&openings).map(|(target, opening)| target - opening).collect();
             let size = change.iter().fold(0.0, |most: f64, part| if part.abs() <= most { most } else { part.abs() });
             let shifted = (self.tip() - tip).norm();
             tip = self.tip();
-            error = (size <= (CLOSES * most).max(ROUNDING)).then_some(tip - self.ideal_tip);
-            let agrees = shifted <= (AGREES * most).max(ROUNDING) && pose > 0;
-            if (agrees && error.is_some()) || !size.is_finite() {
+            error = (size <= (OPENING_TOLERANCE * most).max(ROUNDING)).then_some(tip - self.ideal_tip);
+            let has_converged = shifted <= (TIP_TOLERANCE * most).max(ROUNDING) && pose > 0;
+            if (has_converged && error.is_some()) || !size.is_finite() {
                 break;
             }
-            self.constraints.open_by(&self.model, &change, &mut step);
+            self.constraints.displacement_for_opening(&self.model, &change, &mut step);
             Tree::displace(&self.model, &mut y, &step);
         }
         Farthest { direction: *direction, support, shares, error }
@@ -124,23 +124,23 @@ impl HeldMachine {
 
     /// Matrices of the constraints at the pose `y`.
     fn factor(&mut self, y: &[f64]) {
-        factor_at(&self.model, &mut self.constraints, &mut self.tree, HELD, y);
+        factor_at(&self.model, &mut self.constraints, &mut self.tree, DRIVE_END, y);
     }
 }
 
-/// Orthonormal basis of the range of the symmetric, positive semidefinite matrix `m`, but for what is at most `least`: world axes in
-/// space, and as far as possible in a plane.
+/// Orthonormal basis of the range of the symmetric, positive semidefinite matrix `m`; diagonal elements up to `least` count as
+/// zero. The basis of space is the world axes, and that of a plane is aligned with them as far as possible.
 fn range(m: &Mat3, least: f64) -> Vec<Vec3> {
-    let mut left = *m;
+    let mut remainder = *m;
     let mut basis: Vec<Vec3> = Vec::new();
     while basis.len() < 3 {
-        let most = (0..3).max_by(|&a, &b| left[(a, a)].total_cmp(&left[(b, b)])).unwrap_or(0);
-        if !(left[(most, most)] > least) {
+        let most = (0..3).max_by(|&a, &b| remainder[(a, a)].total_cmp(&remainder[(b, b)])).unwrap_or(0);
+        if !(remainder[(most, most)] > least) {
             break;
         }
-        let axis: Vec3 = left.column(most).normalize();
+        let axis: Vec3 = remainder.column(most).normalize();
         let across = Mat3::identity() - axis * axis.transpose();
-        left = across * left * across;
+        remainder = across * remainder * across;
         basis.push(axis);
     }
     match basis[..] {

@@ -8,9 +8,9 @@ use std::ops::Range;
 const ROUNDING: f64 = 1e-12;
 /// Regularisation near a pose in which another row becomes dependent. For scaled pivots far below this, the multiplier shrinks
 /// instead of growing, so that finite steps pass through such a pose with an error of the order of its square.
-const WEAK: f64 = 1e-10;
+const REGULARISATION: f64 = 1e-10;
 /// Components of a null vector below this fraction of its largest count as zero.
-const NO_PART: f64 = 1e-7;
+const NEGLIGIBLE: f64 = 1e-7;
 
 /// The coupled constraint rows.
 pub struct RowSystem {
@@ -28,15 +28,15 @@ impl RowSystem {
     }
 
     /// Sets the reference diagonal entry of the rows from `first` on: its value if their sides could move freely.
-    pub fn refer(&mut self, first: usize, diagonal: f64) {
+    pub fn set_reference(&mut self, first: usize, diagonal: f64) {
         self.reference[first] = diagonal;
     }
 
     /// From now on treats the rows as dependent, with a rank of at most `rank`. Among the solutions, the multipliers from
-    /// `counted` on have the smallest sum of squares. Row i belongs to the group with the same unit that starts at row
+    /// `minimised_from` on have the smallest sum of squares. Row i belongs to the group with the same unit that starts at row
     /// `group[i]`.
-    pub fn treat_as_dependent(&mut self, rank: usize, counted: usize, group: Vec<usize>) {
-        self.dependent = Some(Box::new(Dependent::new(rank, counted, group)));
+    pub fn treat_as_dependent(&mut self, rank: usize, minimised_from: usize, group: Vec<usize>) {
+        self.dependent = Some(Box::new(Dependent::new(rank, minimised_from, group)));
     }
 
     /// Number of independent rows: that of the latest factorisation if rows are treated as dependent, else all.
@@ -55,9 +55,9 @@ impl RowSystem {
         match &self.dependent {
             None => (0..self.skyline.len()).collect(),
             Some(rows) => {
-                let mut kept = rows.order[..rows.rank].to_vec();
-                kept.sort_unstable();
-                kept
+                let mut independent = rows.order[..rows.rank].to_vec();
+                independent.sort_unstable();
+                independent
             }
         }
     }
@@ -71,9 +71,9 @@ impl RowSystem {
     /// Whether the multipliers of rows `first..first + count` are unique.
     pub fn is_unique(&self, first: usize, count: usize) -> bool {
         self.null_multipliers().all(|null| {
-            let largest = null.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let largest = null.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
             let own = null[first..first + count].iter();
-            own.fold(0.0_f64, |most, x| most.max(x.abs())) <= NO_PART * largest
+            own.fold(0.0_f64, |largest, x| largest.max(x.abs())) <= NEGLIGIBLE * largest
         })
     }
 
@@ -140,8 +140,8 @@ impl RowSystem {
 struct Dependent {
     n: usize,
     /// Upper bound on the rank: near the constraint manifold, but not on it, more rows appear independent.
-    most: usize,
-    counted: usize,
+    max_rank: usize,
+    minimised_from: usize,
     group: Vec<usize>,
     rank: usize,
     order: Vec<usize>,
@@ -156,12 +156,12 @@ struct Dependent {
 }
 
 impl Dependent {
-    fn new(most: usize, counted: usize, group: Vec<usize>) -> Self {
+    fn new(max_rank: usize, minimised_from: usize, group: Vec<usize>) -> Self {
         let n = group.len();
         Self {
             n,
-            most: most.min(n),
-            counted,
+            max_rank: max_rank.min(n),
+            minimised_from,
             group,
             rank: 0,
             order: (0..n).collect(),
@@ -200,12 +200,13 @@ impl Dependent {
         least
     }
 
-    /// Right-looking Cholesky with diagonal pivoting. Returns the smallest pivot; 0 if fewer rows than `most` are independent.
+    /// Right-looking Cholesky with diagonal pivoting. Returns the smallest pivot; 0 if fewer rows than `max_rank` are
+    /// independent.
     fn eliminate(&mut self) -> f64 {
         let (n, a) = (self.n, &mut self.factor);
         let mut least = f64::INFINITY;
-        self.rank = self.most;
-        for k in 0..self.most {
+        self.rank = self.max_rank;
+        for k in 0..self.max_rank {
             let mut best = k;
             for i in k + 1..n {
                 if a[i * n + i] > a[best * n + best] {
@@ -227,7 +228,7 @@ impl Dependent {
                     a.swap(i * n + k, i * n + best);
                 }
             }
-            let root = (pivot + WEAK * WEAK / pivot).sqrt();
+            let root = (pivot + REGULARISATION * REGULARISATION / pivot).sqrt();
             a[k * n + k] = root;
             for i in k + 1..n {
                 a[i * n + k] /= root;
@@ -263,7 +264,7 @@ impl Dependent {
         for i in 0..free {
             for j in 0..=i {
                 let (a, b) = (&self.null[i * n..][..n], &self.null[j * n..][..n]);
-                let pairs = a[self.counted..].iter().zip(&b[self.counted..]);
+                let pairs = a[self.minimised_from..].iter().zip(&b[self.minimised_from..]);
                 let mut sum: f64 = pairs.map(|(x, y)| x * y).sum();
                 for k in 0..j {
                     sum -= self.gram[i * n + k] * self.gram[j * n + k];
@@ -298,7 +299,7 @@ impl Dependent {
         let free = n - rank;
         for i in 0..free {
             let null = &self.null[i * n..][..n];
-            let pairs = null[self.counted..].iter().zip(&x[self.counted..]);
+            let pairs = null[self.minimised_from..].iter().zip(&x[self.minimised_from..]);
             let mut sum: f64 = pairs.map(|(a, b)| a * b).sum();
             for k in 0..i {
                 sum -= self.gram[i * n + k] * work[k];
@@ -348,15 +349,15 @@ mod tests {
     }
 
     #[test]
-    fn dependent_rows_get_the_least_multipliers() {
+    fn dependent_rows_have_the_multipliers_of_least_norm() {
         let b = rows();
         let a = &b * b.transpose();
         let right = &a * DVector::from_fn(5, |i, _| 1.0 + i as f64);
         let mut plain = system(&a);
         assert!(plain.factor() < 1e-12 || plain.least_joint_pivot(once(0..5)) < 1e-12);
-        for most in [3, 5] {
+        for max_rank in [3, 5] {
             let mut system = system(&a);
-            system.treat_as_dependent(most, 0, vec![0; 5]);
+            system.treat_as_dependent(max_rank, 0, vec![0; 5]);
             system.factor();
             assert_eq!(system.rank(), 3);
             let mut x = right.clone();
@@ -380,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_that_is_zero_drops_out_and_is_the_only_one_not_unique() {
+    fn a_zero_row_is_dropped_and_only_its_multiplier_is_not_unique() {
         let a = DMatrix::from_row_slice(3, 3, &[2.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 3.0]);
         let mut system = system(&a);
         assert_eq!(

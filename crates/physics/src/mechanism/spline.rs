@@ -6,11 +6,11 @@ use crate::jet::Jet;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
     /// Zero slope at both ends.
-    Level,
+    Clamped,
     /// Zero second derivative at both ends: a straight line continues it smoothly.
-    Straight,
+    Natural,
     /// Equal first and second derivatives at both ends: the points span one period.
-    Joined,
+    Periodic,
 }
 
 /// A spline, from its first point to its last.
@@ -70,19 +70,19 @@ fn curvatures(widths: &[f64], rises: &[f64], ends: Ends) -> Vec<f64> {
         right[i] = 6.0 * (slope(i) - slope(i - 1));
     }
     match ends {
-        Ends::Level => {
+        Ends::Clamped => {
             (on[0], above[0], right[0]) = (2.0 * widths[0], widths[0], 6.0 * slope(0));
             (below[n], on[n], right[n]) = (widths[n - 1], 2.0 * widths[n - 1], -6.0 * slope(n - 1));
         }
-        Ends::Straight => (on[0], on[n]) = (1.0, 1.0),
-        Ends::Joined => return joined(widths, slope, [below, on, above, right]),
+        Ends::Natural => (on[0], on[n]) = (1.0, 1.0),
+        Ends::Periodic => return periodic_curvatures(widths, slope, [below, on, above, right]),
     }
     solve(&below, &on, &above, &mut right);
     right
 }
 
 /// The same for a periodic spline, given the rows of its inner points.
-fn joined(
+fn periodic_curvatures(
     widths: &[f64],
     slope: impl Fn(usize) -> f64,
     [below, mut on, mut above, mut right]: [Vec<f64>; 4],
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn two_points_make_a_straight_line() {
-        let line = Spline::new(&[[-1.0, 3.0], [1.0, -1.0]], Ends::Straight);
+        let line = Spline::new(&[[-1.0, 3.0], [1.0, -1.0]], Ends::Natural);
         for x in [-1.0, -0.3, 0.0, 1.0] {
             assert_eq!(line.at(x), Jet::new(1.0 - 2.0 * x, -2.0, 0.0));
         }
@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn derivatives_join_at_the_points() {
         let points = [[-2.0, 0.0], [-0.5, 3.0], [0.1, 1.0], [4.0, -7.0]];
-        let spline = Spline::new(&points, Ends::Straight);
+        let spline = Spline::new(&points, Ends::Natural);
         for [x, value] in points {
             assert!((spline.at(x).value - value).abs() < 1e-12);
         }

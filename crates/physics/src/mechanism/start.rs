@@ -7,7 +7,7 @@ use super::kinematics::{self, Kinematics};
 use super::model::{self, Model, Motion};
 use super::pairs::Opening;
 use super::tree::Tree;
-use super::{Mechanism, MechanismError, OPEN_AS_GIVEN, OpenJoint, TURNED_AS_GIVEN};
+use super::{MAX_GIVEN_ANGLE, MAX_GIVEN_GAP, Mechanism, MechanismError, OpenJoint};
 use crate::machine::{StartRule, Vec3};
 
 /// Smallest pivot ratio at which the start velocities still have three correct digits.
@@ -15,10 +15,10 @@ const DEPENDENT_ROWS: f64 = 1e-13;
 /// Largest gap at which a loop counts as closed at the start, m or rad.
 pub(super) const CLOSED: f64 = 1e-9;
 /// With dependent rows, maximum speed at which a joint may open at the start, m/s or rad/s: rounding of the drives.
-pub(super) const HELD: f64 = 1e-8;
+pub(super) const MAX_OPENING_RATE: f64 = 1e-8;
 /// Displacement to the neighbouring poses at which the rank is checked, as a time at the scales' speeds, s: a tenth of the length
 /// scale, 0.01 rad.
-const BESIDE: f64 = 0.01;
+const NEIGHBOUR_STEP: f64 = 0.01;
 /// Distance of a motion without play from its closed form, m, beyond which the two differ.
 pub const OFF_PATH: f64 = 1e-6;
 /// Assembly has converged once it moves by less than this fraction of the scales.
@@ -74,7 +74,7 @@ impl Mechanism {
             let clearance = self.contacts.clearance(j);
             if all.contains(&j) {
                 // An assembled start needs only a rough guess, from which Newton's method closes the joints.
-                if d > OPEN_AS_GIVEN && !assembled {
+                if d > MAX_GIVEN_GAP && !assembled {
                     let given = self.gap_of(j, model.joints[j].eccentricity(&guess));
                     return Err(MechanismError::Open { given });
                 }
@@ -87,7 +87,7 @@ impl Mechanism {
         let openings: Vec<(usize, Opening)> = (balls..).zip(openings).collect();
         for &(joint, opening) in &openings {
             let Opening { apart, turned } = opening;
-            let closed = apart.norm() <= OPEN_AS_GIVEN && turned <= TURNED_AS_GIVEN;
+            let closed = apart.norm() <= MAX_GIVEN_GAP && turned <= MAX_GIVEN_ANGLE;
             if !assembled && !closed {
                 let given = self.gap(joint, opening);
                 return Err(MechanismError::Open { given });
@@ -115,9 +115,9 @@ impl Mechanism {
         assembly.bodies = bodies.map(|(body, (a, b))| placement(body, a, b)).collect();
         let rank = self.rank_of_closed_joints(&mut tree, &y)?;
         if rank.is_some() {
-            self.check_speeds(&mut tree, &y)?;
+            self.check_opening_rates(&mut tree, &y)?;
         }
-        // Otherwise the play may let it.
+        // With play, the output body may leave its path.
         if let Some((form, path)) = model.path().filter(|_| on_path && (assembled || self.is_kinematic())) {
             let distance = kinematics::distance_from(&path.at(&form.at(T)), model, &tree.motion);
             if distance > OFF_PATH {
@@ -125,7 +125,7 @@ impl Mechanism {
             }
         }
         let settled = model.settled.as_ref().map(|settled| settled.assembly.clone());
-        // A second call would find the same.
+        // A second call has the same result.
         model.assembled.get_or_init(|| Assembled { assembly: settled.unwrap_or(assembly), rank });
         if let Some(rank) = rank {
             self.equations.treat_as_dependent(rank);
@@ -141,7 +141,7 @@ impl Mechanism {
         let error = constraints.project(model, tree, T, y);
         tree.update_kinematics(model, T, y);
         if error <= CLOSED && constraints.least_joint_pivot() >= DEPENDENT_ROWS {
-            return self.check_sides(constraints, tree, &guess, y);
+            return self.check_axis_directions(constraints, tree, &guess, y);
         }
         // Rows are dependent here or were on the way: retry with the independent rows.
         constraints.treat_as_dependent(constraints.rows());
@@ -155,11 +155,11 @@ impl Mechanism {
         if model.path().is_some() && rank_around(model, constraints, tree, y).is_none() {
             return Err(MechanismError::Singular);
         }
-        self.check_sides(constraints, tree, &guess, y)
+        self.check_axis_directions(constraints, tree, &guess, y)
     }
 
     /// Checks that no joint closed with its axis reversed: its rows do not distinguish an axis from its opposite.
-    fn check_sides(
+    fn check_axis_directions(
         &self,
         constraints: &mut Constraints,
         tree: &mut Tree,
@@ -196,19 +196,19 @@ impl Mechanism {
 
     /// Checks that no ideal joint opens at the velocities in `y`: redundant constraints, for example by drives, may contradict
     /// one another.
-    fn check_speeds(&self, tree: &mut Tree, y: &[f64]) -> Result<(), MechanismError> {
+    fn check_opening_rates(&self, tree: &mut Tree, y: &[f64]) -> Result<(), MechanismError> {
         tree.update_kinematics(&self.model, 0.0, y);
         for &j in &self.model.ideal_joints {
             let rate = self.model.joints[j].opening_rate(&tree.motion);
-            if !(rate.norm() <= HELD) {
+            if !(rate.norm() <= MAX_OPENING_RATE) {
                 let rate = self.gap_of(j, rate);
                 return Err(MechanismError::InconsistentDrives { rate });
             }
         }
         for (j, pair) in (self.model.joints.len()..).zip(&self.model.closures) {
             let rate = pair.opening_rate(&tree.motion);
-            let held = rate.apart.norm() <= HELD && rate.turned <= HELD;
-            if !held {
+            let stays_closed = rate.apart.norm() <= MAX_OPENING_RATE && rate.turned <= MAX_OPENING_RATE;
+            if !stays_closed {
                 let rate = self.gap(j, rate);
                 return Err(MechanismError::InconsistentDrives { rate });
             }
@@ -220,22 +220,22 @@ impl Mechanism {
     fn no_closure(&self, constraints: &mut Constraints, tree: &mut Tree, guess: &[f64], y: &[f64]) -> MechanismError {
         const T: f64 = 0.0;
         let model = &self.model;
-        let mut again = y.to_vec();
-        constraints.project(model, tree, T, &mut again);
-        let steps = again.iter().zip(y).zip(&model.scale).take(model.nq);
+        let mut projected = y.to_vec();
+        constraints.project(model, tree, T, &mut projected);
+        let steps = projected.iter().zip(y).zip(&model.scale).take(model.nq);
         let at_rest = steps.map(|((a, b), scale)| (a - b).abs() / scale).all(|moved| moved <= AT_REST);
-        tree.update_kinematics(model, T, &again);
-        let mut stays = Vec::new();
+        tree.update_kinematics(model, T, &projected);
+        let mut remaining = Vec::new();
         if at_rest {
-            stays = self.gaps(constraints, &tree.motion);
-            stays.retain(|OpenJoint { opening, .. }| opening.apart.norm() > CLOSED || opening.turned > CLOSED);
+            remaining = self.gaps(constraints, &tree.motion);
+            remaining.retain(|OpenJoint { opening, .. }| opening.apart.norm() > CLOSED || opening.turned > CLOSED);
         }
         tree.update_kinematics(model, T, guess);
         let given = self.gaps(constraints, &tree.motion);
         let size = |gap: &OpenJoint| gap.opening.apart.norm() + gap.opening.turned * model.length_scale;
         let widest = given.into_iter().max_by(|a, b| size(a).total_cmp(&size(b)));
         let given = widest.unwrap_or_else(|| unreachable!("something did not close"));
-        MechanismError::NoClosure { given, stays }
+        MechanismError::NoClosure { given, remaining }
     }
 
     /// Rank of the closed joints' rows in the assembled pose `y` and around it; `None` if all are independent.
@@ -284,10 +284,10 @@ fn rank_around(model: &Model, constraints: &mut Constraints, tree: &mut Tree, y:
         return None;
     }
     let period = (0.002 * model.shortest_period).min(1e-3);
-    let mut beside = Vec::new();
+    let mut neighbours = Vec::new();
     for sign in [1.0, -1.0] {
         if !model.drives.is_empty() {
-            beside.push((sign * period, y[model.nq..].iter().map(|v| v * sign * period).collect()));
+            neighbours.push((sign * period, y[model.nq..].iter().map(|v| v * sign * period).collect()));
         }
         for direction in 1..=2 {
             factor_at(model, constraints, tree, T, y);
@@ -297,15 +297,15 @@ fn rank_around(model: &Model, constraints: &mut Constraints, tree: &mut Tree, y:
             constraints.project_accelerations(model, &mut free);
             let sizes = free.iter().zip(&model.scale[model.nq..]);
             let largest = sizes.fold(0.0_f64, |most, (v, scale)| most.max(v.abs() / scale));
-            let step: Vec<f64> = free.iter().map(|v| sign * BESIDE * v / largest).collect();
-            beside.push((0.0, step));
+            let step: Vec<f64> = free.iter().map(|v| sign * NEIGHBOUR_STEP * v / largest).collect();
+            neighbours.push((0.0, step));
         }
     }
-    let grows = beside.iter().any(|(t, step): &(f64, Vec<f64>)| {
-        let mut near = y.to_vec();
-        Tree::displace(model, &mut near, step);
-        let error = constraints.project(model, tree, T + t, &mut near);
-        factor_at(model, constraints, tree, T + t, &near);
+    let grows = neighbours.iter().any(|(t, step): &(f64, Vec<f64>)| {
+        let mut neighbour = y.to_vec();
+        Tree::displace(model, &mut neighbour, step);
+        let error = constraints.project(model, tree, T + t, &mut neighbour);
+        factor_at(model, constraints, tree, T + t, &neighbour);
         !(error <= CLOSED) || constraints.rank() > rank
     });
     (!grows).then_some(rank)
@@ -320,13 +320,13 @@ pub(super) fn factor_at(model: &Model, constraints: &mut Constraints, tree: &mut
 /// Whether closed joints leave no degree of freedom and a singular pose lies between the guess and the assembled state `y`: the
 /// determinant of a full set of independent rows then differs in sign.
 fn is_other_mode(model: &Model, constraints: &mut Constraints, tree: &mut Tree, guess: &[f64], y: &[f64]) -> bool {
-    let mut sign_at = |y: &[f64], places: Option<&[usize]>| {
+    let mut sign_at = |y: &[f64], rows_in_minor: Option<&[usize]>| {
         factor_at(model, constraints, tree, 0.0, y);
-        let rows = places.map_or_else(|| constraints.system().independent(), <[usize]>::to_vec);
+        let rows = rows_in_minor.map_or_else(|| constraints.system().independent(), <[usize]>::to_vec);
         if rows.len() != model.nv {
             return None;
         }
-        let place = |row: usize| rows.iter().position(|&kept| kept == row);
+        let place = |row: usize| rows.iter().position(|&independent| independent == row);
         let sign = constraints.is_minor_positive(model, place);
         Some((sign, rows))
     };

@@ -1,14 +1,14 @@
 //! The stiff part of the equations of motion, linearised analytically: derivatives of the forces of contacts and force
 //! elements with respect to displacement and velocity.
 //!
-//! An iteration that solves with an approximate Jacobian still converges, so non-stiff terms (gravity, gyroscopic terms, rotation of
-//! lever arms) are left out. With a = M^-1 (Q + ...), K = dQ/dq and D = dQ/dv in velocity space,
-//! (s I - J) (x_q, x_v) = (b_q, b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s, x_q = (b_q + T x_v) / s,
-//! where T maps velocities to position rates.
+//! An iteration that solves with an approximate Jacobian still converges, so non-stiff terms (gravity, gyroscopic terms, rotation
+//! of lever arms) are left out. With a = M^-1 (Q + ...), K = dQ/dq and D = dQ/dv in velocity space, (s I - J) (x_q, x_v) = (b_q,
+//! b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s, x_q = (b_q + T x_v) / s, where T maps velocities to
+//! position rates.
 
 use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
-use super::elements::{ActiveSet, At, Coupling, ForceElement, SceneElement, Turning};
+use super::elements::{ActiveSet, At, Coupling, ForceElement, SceneElement, TorqueDerivatives};
 use super::equations::Equations;
 use super::flight::ActiveRanges;
 use super::lu::Lu;
@@ -26,7 +26,7 @@ pub struct Stiff {
     /// Index in `trees` for each coordinate.
     tree_of: Vec<usize>,
     /// Whether a coupling acts on both trees of a pair, row by row; and scratch for the trees coupled with one.
-    linked: Vec<bool>,
+    is_coupled_pair: Vec<bool>,
     partners: Vec<usize>,
     /// Elimination index of each coupled tree's first coordinate.
     first: Vec<usize>,
@@ -58,18 +58,18 @@ pub struct Stiff {
 }
 
 impl Stiff {
-    /// For `velocities` velocity coordinates in a state of `dimension`. With `separate`, a force accelerates only the trees it acts
-    /// on.
+    /// For `velocities` velocity coordinates in a state of `dimension`. With `separate`, a force accelerates only the trees it
+    /// acts on.
     pub fn new(model: &Model, velocities: usize, dimension: usize, separate: bool) -> Self {
         let n = velocities;
         let trees = if separate { trees_of(model) } else { std::iter::once(0..n).collect() };
         let mut tree_of = vec![0; n];
-        for (place, tree) in trees.iter().enumerate() {
-            tree_of[tree.clone()].fill(place);
+        for (tree_index, tree) in trees.iter().enumerate() {
+            tree_of[tree.clone()].fill(tree_index);
         }
         Self {
             n,
-            linked: vec![false; trees.len() * trees.len()],
+            is_coupled_pair: vec![false; trees.len() * trees.len()],
             partners: Vec::with_capacity(trees.len()),
             first: vec![0; trees.len()],
             trees,
@@ -103,7 +103,7 @@ impl Stiff {
         model: &Model,
         contacts: &Contacts,
         elements: &[Box<dyn SceneElement>],
-        touching: ActiveSet<'_>,
+        active_set: ActiveSet<'_>,
         equations: &dyn Equations,
         (t, y): (f64, &[f64]),
     ) {
@@ -112,39 +112,39 @@ impl Stiff {
         for [.., at] in self.entries.iter().map(|entry| entry.map(|x| x as usize)) {
             (self.by_position[at], self.by_velocity[at]) = (0.0, 0.0);
         }
-        self.linked.fill(false);
+        self.is_coupled_pair.fill(false);
         self.empty = true;
-        let at = At { t, motion, touching };
-        let of_contacts = contacts.loose().map(|contact| contact.coupling(&at));
+        let at = At { t, motion, active_set };
+        let of_contacts = contacts.with_clearance().map(|contact| contact.coupling(&at));
         let of_elements = elements.iter().map(|element| element.coupling(&at));
         for coupling in of_contacts.chain(of_elements).flatten() {
             self.empty = false;
             let (sides, n) = (&coupling.sides, &coupling.normal);
-            if let Some(turning) = &coupling.turning {
+            if let Some(torque_derivatives) = &coupling.torque_derivatives {
                 collect_relative_columns(&mut self.columns, model, equations, sides);
-                self.add_turning(turning);
+                self.add_torque_derivatives(torque_derivatives);
             } else {
                 collect_columns(&mut self.columns, model, equations, sides, n);
             }
             self.add(&coupling);
-            self.link();
+            self.record_coupled_trees();
         }
         self.coordinates.clear();
-        for (place, tree) in self.trees.iter().enumerate() {
-            if self.is_coupled(place) {
-                self.first[place] = self.coordinates.len();
+        for (tree_index, tree) in self.trees.iter().enumerate() {
+            if self.is_coupled(tree_index) {
+                self.first[tree_index] = self.coordinates.len();
                 self.coordinates.extend(tree.clone());
             }
         }
     }
 
-    /// Whether a coupling acts on tree `place`.
-    fn is_coupled(&self, place: usize) -> bool {
-        self.linked[place * (self.trees.len() + 1)]
+    /// Whether a coupling acts on tree `tree_index`.
+    fn is_coupled(&self, tree_index: usize) -> bool {
+        self.is_coupled_pair[tree_index * (self.trees.len() + 1)]
     }
 
     /// Records the trees that the coupling in `columns` acts on.
-    fn link(&mut self) {
+    fn record_coupled_trees(&mut self) {
         self.partners.clear();
         for column in &self.columns {
             let tree = self.tree_of[column.coordinate];
@@ -154,17 +154,17 @@ impl Stiff {
         }
         for &one in &self.partners {
             for &other in &self.partners {
-                self.linked[one * self.trees.len() + other] = true;
+                self.is_coupled_pair[one * self.trees.len() + other] = true;
             }
         }
     }
 
     /// Adds the torque of one coupling: dQ_k = turn_k . dT.
-    fn add_turning(&mut self, turning: &Turning) {
+    fn add_torque_derivatives(&mut self, torque_derivatives: &TorqueDerivatives) {
         let n = self.n;
         for l in &self.columns {
-            let torque_q = turning.by_turn * l.turn;
-            let torque_v = turning.by_spin * l.turn;
+            let torque_q = torque_derivatives.by_rotation * l.turn;
+            let torque_v = torque_derivatives.by_angular_velocity * l.turn;
             for k in &self.columns {
                 let at = l.coordinate * n + k.coordinate;
                 self.by_position[at] += k.turn.dot(&torque_q);
@@ -198,14 +198,14 @@ impl Stiff {
         let n = self.n;
         let count = self.trees.len();
         self.entries.clear();
-        for (place, tree) in self.trees.iter().enumerate() {
-            if !self.is_coupled(place) {
+        for (tree_index, tree) in self.trees.iter().enumerate() {
+            if !self.is_coupled(tree_index) {
                 continue;
             }
-            let linked = &self.linked[place * count..][..count];
+            let is_coupled_pair = &self.is_coupled_pair[tree_index * count..][..count];
             self.partners.clear();
-            self.partners.extend((0..count).filter(|&other| linked[other]));
-            for (column, j) in tree.clone().zip(self.first[place]..) {
+            self.partners.extend((0..count).filter(|&other| is_coupled_pair[other]));
+            for (column, j) in tree.clone().zip(self.first[tree_index]..) {
                 for matrix in [&mut self.by_position, &mut self.by_velocity] {
                     let forces = &mut matrix[column * n..][..n];
                     for &other in &self.partners {
@@ -268,11 +268,11 @@ impl Stiff {
     }
 
     /// Solves (s I - J) x = b in place for the active components.
-    pub fn solve(&mut self, b: &mut [f64], moving: &ActiveRanges, equations: &dyn Equations, model: &Model) {
+    pub fn solve(&mut self, b: &mut [f64], active_ranges: &ActiveRanges, equations: &dyn Equations, model: &Model) {
         let positions = b.len() - self.n;
         let s = self.shift;
         if self.empty {
-            divide(moving.velocities(), b, s);
+            divide(active_ranges.velocities(), b, s);
         } else {
             let (b_q, b_v) = b.split_at_mut(positions);
             equations.velocities_of(model, &self.y, b_q, &mut self.scratch);
@@ -286,16 +286,16 @@ impl Stiff {
             }
             self.lu.solve(&mut self.packed);
             if self.coordinates.len() < self.n {
-                divide(moving.velocities(), b, s);
+                divide(active_ranges.velocities(), b, s);
             }
             for (&c, x) in self.coordinates.iter().zip(&self.packed) {
                 b[positions + c] = *x;
             }
         }
-        copy(moving.velocities(), &mut self.y, b);
+        copy(active_ranges.velocities(), &mut self.y, b);
         equations.position_rate(model, &self.y, &mut self.rate);
-        add_scaled(moving.positions(), b, 1.0, &self.rate);
-        divide(moving.positions(), b, s);
+        add_scaled(active_ranges.positions(), b, 1.0, &self.rate);
+        divide(active_ranges.positions(), b, s);
     }
 
     /// As [`Self::solve`] with the complex shift, for `re` + i `im`.
@@ -303,7 +303,7 @@ impl Stiff {
         &mut self,
         re: &mut [f64],
         im: &mut [f64],
-        moving: &ActiveRanges,
+        active_ranges: &ActiveRanges,
         equations: &dyn Equations,
         model: &Model,
     ) {
@@ -327,7 +327,7 @@ impl Stiff {
             self.lu_pair.solve(&mut self.pair);
         }
         if self.empty || self.coordinates.len() < self.n {
-            multiply(moving.velocities(), re, im, inverse);
+            multiply(active_ranges.velocities(), re, im, inverse);
         }
         if !self.empty {
             for (&c, x) in self.coordinates.iter().zip(&self.pair) {
@@ -335,11 +335,11 @@ impl Stiff {
             }
         }
         for (part, rate) in [(&mut *re, &mut self.rate), (&mut *im, &mut self.rate_im)] {
-            copy(moving.velocities(), &mut self.y, part);
+            copy(active_ranges.velocities(), &mut self.y, part);
             equations.position_rate(model, &self.y, rate);
-            add_scaled(moving.positions(), part, 1.0, rate);
+            add_scaled(active_ranges.positions(), part, 1.0, rate);
         }
-        multiply(moving.positions(), re, im, inverse);
+        multiply(active_ranges.positions(), re, im, inverse);
     }
 }
 
@@ -378,8 +378,8 @@ mod tests {
     use crate::scene::Scene;
 
     /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
-    /// `remembered` is the approach speed of each contact state, m/s.
-    fn resting(changes: &[(&str, &str)], remembered: f64) -> (Mechanism, Vec<f64>, [ContactState; 3]) {
+    /// `approach_speed` is the approach speed of each contact state, m/s.
+    fn resting(changes: &[(&str, &str)], approach_speed: f64) -> (Mechanism, Vec<f64>, [ContactState; 3]) {
         let changes: Vec<(String, String)> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         let scene = Scene::load("spcmm", &changes).unwrap();
         let mut mechanism = Mechanism::new(&scene.machine).unwrap();
@@ -391,14 +391,14 @@ mod tests {
             y[v + i] += slip;
         }
         let contact_state =
-            ContactState { active: true, approach_speed: remembered, floored: true, ..ContactState::default() };
+            ContactState { active: true, approach_speed: approach_speed, floored: true, ..ContactState::default() };
         (mechanism, y, [contact_state; 3])
     }
 
     #[test]
-    fn jacobian_is_that_of_central_differences_in_everything_stiff() {
+    fn the_stiff_part_of_the_jacobian_agrees_with_central_differences() {
         // In the last case the rate is the largest so far, so that the damping term does not depend on it.
-        for (surface, approach, remembered) in [
+        for (surface, approach, approach_speed) in [
             ("centres", "start", 1e-3),
             ("printed", "start", 1e-3),
             ("surface", "start", 1e-3),
@@ -406,13 +406,13 @@ mod tests {
             ("surface", "largest", 1e-9),
         ] {
             let changes = [("contact.friction_velocity", surface), ("contact.approach_speed", approach)];
-            let (mut m, y, contact_state) = resting(&changes, remembered);
+            let (mut m, y, contact_state) = resting(&changes, approach_speed);
             let (t, nq) = (0.0, m.positions());
             m.measure(t, &y);
-            let rises = m.contacts.gaps().all(|gap| gap.separation.rate > remembered);
-            assert_eq!(rises, remembered < 1e-6);
-            let touching = ActiveSet::Located(&contact_state);
-            m.evaluator(touching).linearise(t, &y);
+            let rises = m.contacts.gaps().all(|gap| gap.separation.rate > approach_speed);
+            assert_eq!(rises, approach_speed < 1e-6);
+            let active_set = ActiveSet::Located(&contact_state);
+            m.evaluator(active_set).linearise(t, &y);
             let stiff = m.stiff.take().unwrap();
             let n = stiff.n;
             let (mut plus, mut minus) = (vec![0.0; y.len()], vec![0.0; y.len()]);
@@ -436,7 +436,7 @@ mod tests {
                     let mut step = vec![0.0; n];
                     step[l] = sign * 1e-10;
                     crate::mechanism::Tree::displace(&m.model, &mut z, &step);
-                    m.evaluator(touching).derivative(t, &z, out);
+                    m.evaluator(active_set).derivative(t, &z, out);
                 };
                 moved(1.0, &mut plus);
                 moved(-1.0, &mut minus);
@@ -444,7 +444,7 @@ mod tests {
                 let mut faster = |sign: f64, out: &mut [f64]| {
                     let mut z = y.clone();
                     z[nq + l] += sign * 1e-8;
-                    m.evaluator(touching).derivative(t, &z, out);
+                    m.evaluator(active_set).derivative(t, &z, out);
                 };
                 faster(1.0, &mut plus);
                 faster(-1.0, &mut minus);
@@ -455,7 +455,7 @@ mod tests {
 
     /// A serial chain from a free body, with a hinge, a slide, a fixed joint, and a hinge on a driven slide; moving, and loaded
     /// by `elements`.
-    fn linked(elements: &str, formulation: &str) -> (Mechanism, Vec<f64>) {
+    fn is_coupled_pair(elements: &str, formulation: &str) -> (Mechanism, Vec<f64>) {
         let body =
             |name: &str| format!("[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"2e-2 3e-2 4e-2 kg m^2\"\n");
         let joint = |kind: &str, parent: &str, child: &str, more: &str| {
@@ -497,15 +497,15 @@ mod tests {
             y[at + i] += by;
         } else {
             let turn = Vec3::ith(i - 3, by);
-            crate::mechanism::kinematics::turn_quaternion(&mut y[at + 3..at + 7], &turn);
+            crate::mechanism::kinematics::rotate_quaternion(&mut y[at + 3..at + 7], &turn);
         }
     }
 
     #[test]
-    fn elements_are_linearised_as_by_central_differences_in_both_forms() {
-        for (name, elements) in LINKED {
+    fn derivatives_of_elements_agree_with_central_differences_in_both_formulations() {
+        for (name, elements) in ELEMENT_CASES {
             for formulation in ["tree", "lagrange"] {
-                let (mut m, y) = linked(elements, formulation);
+                let (mut m, y) = is_coupled_pair(elements, formulation);
                 let (t, nq) = (0.1, m.positions());
                 m.evaluator(ActiveSet::Nothing).linearise(t, &y);
                 let stiff = m.stiff.take().unwrap();
@@ -545,7 +545,7 @@ mod tests {
         }
     }
 
-    const LINKED: [(&str, &str); 7] = [
+    const ELEMENT_CASES: [(&str, &str); 7] = [
         (
             "coordinates of two degrees",
             "[[body]]\nname = \"ring\"\nmass = \"1 kg\"\ninertia = \"2e-2 3e-2 4e-2 kg m^2\"\n\

@@ -30,7 +30,7 @@ pub struct Summary {
     /// Contacts with friction.
     pub frictional_contacts: usize,
     /// Blocks of the mass matrix that consist of a single free body.
-    pub lone_bodies: usize,
+    pub single_body_blocks: usize,
     /// Maximum number of velocity coordinates for which the method `automatic` also considers implicit steps.
     pub largest_implicit: usize,
     /// Whether a differential equation is solved at all.
@@ -60,7 +60,7 @@ impl Summary {
                 .filter(|&&j| mechanism.contacts.coefficients(j).friction > 0.0)
                 .count(),
             contacts: contacts.len(),
-            lone_bodies: model.blocks.iter().filter(|b| b.lone.is_some()).count(),
+            single_body_blocks: model.blocks.iter().filter(|b| b.single_free_body.is_some()).count(),
             largest_implicit: mechanism.largest_implicit(),
             solves_differential_equation: !mechanism.is_kinematic(),
         }

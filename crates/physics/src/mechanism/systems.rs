@@ -10,22 +10,26 @@ use std::ops::Range;
 /// The equations of motion, with the contacts that may carry a force during a step.
 pub struct Evaluator<'a> {
     pub(super) mechanism: &'a mut Mechanism,
-    pub(super) touching: ActiveSet<'a>,
+    pub(super) active_set: ActiveSet<'a>,
     /// Evaluations made through it.
     pub counts: Counts,
-    left: &'a mut [bool],
+    has_left_branch: &'a mut [bool],
 }
 
 impl Mechanism {
-    /// Evaluator with `touching` as the active contacts.
-    pub fn evaluator<'a>(&'a mut self, touching: ActiveSet<'a>) -> Evaluator<'a> {
-        self.evaluator_watching(touching, &mut [])
+    /// Evaluator with `active_set` as the active contacts.
+    pub fn evaluator<'a>(&'a mut self, active_set: ActiveSet<'a>) -> Evaluator<'a> {
+        self.evaluator_with_branches(active_set, &mut [])
     }
 
-    /// The same; it sets the entry in `left` of each ball joint whose contact leaves the frozen branches of its laws in an
-    /// evaluation.
-    pub fn evaluator_watching<'a>(&'a mut self, touching: ActiveSet<'a>, left: &'a mut [bool]) -> Evaluator<'a> {
-        Evaluator { mechanism: self, touching, counts: Counts::default(), left }
+    /// The same; it sets the entry in `has_left_branch` of each ball joint whose contact leaves the frozen branches of its laws
+    /// in an evaluation.
+    pub fn evaluator_with_branches<'a>(
+        &'a mut self,
+        active_set: ActiveSet<'a>,
+        has_left_branch: &'a mut [bool],
+    ) -> Evaluator<'a> {
+        Evaluator { mechanism: self, active_set, counts: Counts::default(), has_left_branch }
     }
 }
 
@@ -45,11 +49,11 @@ impl Evaluator<'_> {
     fn load(&mut self, t: f64, y: &[f64]) {
         let Mechanism { model, equations, contacts, elements, latest, .. } = &mut *self.mechanism;
         *latest = Latest::Unknown;
-        equations.update_awake(model, t, y);
+        equations.update_active(model, t, y);
         let (motion, wrench) = equations.loads();
         wrench.fill(Wrench::zero());
-        let at = At { t, motion, touching: self.touching };
-        let mut loads = Loads { wrench, counts: &mut self.counts, left: &mut *self.left };
+        let at = At { t, motion, active_set: self.active_set };
+        let mut loads = Loads { wrench, counts: &mut self.counts, has_left_branch: &mut *self.has_left_branch };
         contacts.load(&at, &mut loads);
         for element in elements {
             element.load(&at, &mut loads);
@@ -83,9 +87,9 @@ impl System for Evaluator<'_> {
         self.mechanism.positions()
     }
 
-    fn announce(&mut self, times: &[f64]) {
+    fn prepare_times(&mut self, times: &[f64]) {
         let Mechanism { model, equations, .. } = &mut *self.mechanism;
-        equations.driven_mut().announce(model, times);
+        equations.driven_mut().prepare(model, times);
     }
 
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
@@ -98,8 +102,8 @@ impl System for Evaluator<'_> {
         *latest = Latest::Evaluated(t);
     }
 
-    fn moving(&self) -> &[Range<usize>] {
-        self.mechanism.moving()
+    fn active_ranges(&self) -> &[Range<usize>] {
+        self.mechanism.active_ranges()
     }
 
     fn position_rate(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
@@ -121,8 +125,8 @@ impl StiffSystem for Evaluator<'_> {
         self.derivative(t, y, &mut scratch);
         stiff.derivative = scratch;
         let Mechanism { model, equations, contacts, elements, .. } = &mut *self.mechanism;
-        let touching = self.touching;
-        stiff.gather(model, contacts, elements, touching, &**equations, (t, y));
+        let active_set = self.active_set;
+        stiff.gather(model, contacts, elements, active_set, &**equations, (t, y));
         stiff.apply_inverse_mass(model, &mut **equations);
         self.mechanism.stiff = Some(stiff);
     }
@@ -134,9 +138,9 @@ impl StiffSystem for Evaluator<'_> {
     }
 
     fn solve_shifted(&mut self, b: &mut [f64]) {
-        let Mechanism { model, equations, stiff, moving, .. } = &mut *self.mechanism;
+        let Mechanism { model, equations, stiff, active_ranges, .. } = &mut *self.mechanism;
         if let Some(stiff) = stiff {
-            stiff.solve(b, moving, &**equations, model);
+            stiff.solve(b, active_ranges, &**equations, model);
         }
     }
 
@@ -147,9 +151,9 @@ impl StiffSystem for Evaluator<'_> {
     }
 
     fn solve_shifted_pair(&mut self, b_real: &mut [f64], b_imaginary: &mut [f64]) {
-        let Mechanism { model, equations, stiff, moving, .. } = &mut *self.mechanism;
+        let Mechanism { model, equations, stiff, active_ranges, .. } = &mut *self.mechanism;
         if let Some(stiff) = stiff {
-            stiff.solve_pair(b_real, b_imaginary, moving, &**equations, model);
+            stiff.solve_pair(b_real, b_imaginary, active_ranges, &**equations, model);
         }
     }
 }

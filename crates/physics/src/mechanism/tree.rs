@@ -3,7 +3,7 @@
 //! Mass matrix by the composite-rigid-body algorithm, bias by one outward and one inward pass (Featherstone 2008,
 //! chapters 5 and 6), in world axes with each body's own centroid as reference. Allocates nothing after `new`.
 
-use super::kinematics::{self, Driven, Kinematics, Wrench, part, spin_of};
+use super::kinematics::{self, Driven, Kinematics, Wrench, angular_velocity_of, part};
 use super::model::{BodyIndex, Model, Motion};
 use super::path::Path;
 use crate::jet::Jet;
@@ -59,10 +59,10 @@ pub struct Tree {
     pub driven: Driven,
     composite: Vec<Composite>,
     dynamic: Vec<usize>,
-    /// Subsets of these: bodies that evaluations move and accelerate, and suspended bodies.
-    awake: Vec<usize>,
-    asleep: Vec<usize>,
-    sleeps: Vec<bool>,
+    /// The dynamic bodies that evaluations move and accelerate, those that they skip, and whether each body is skipped.
+    active: Vec<usize>,
+    suspended: Vec<usize>,
+    is_suspended: Vec<bool>,
     /// Mass matrices of the blocks, factored, row-major, one after the other.
     mass: Vec<f64>,
     mass_offset: Vec<usize>,
@@ -76,7 +76,7 @@ impl Tree {
         let mut total = 0;
         for block in &model.blocks {
             tree.mass_offset.push(total);
-            total += if block.lone.is_some() { 0 } else { block.n * block.n };
+            total += if block.single_free_body.is_some() { 0 } else { block.n * block.n };
         }
         tree.mass = vec![0.0; total];
         tree
@@ -92,9 +92,9 @@ impl Tree {
             wrench: vec![Wrench::zero(); n + 1],
             driven: Driven::new(model),
             composite: vec![Composite::EMPTY; n],
-            awake: dynamic.clone(),
-            asleep: Vec::with_capacity(dynamic.len()),
-            sleeps: vec![false; n],
+            active: dynamic.clone(),
+            suspended: Vec::with_capacity(dynamic.len()),
+            is_suspended: vec![false; n],
             dynamic,
             mass: Vec::new(),
             mass_offset: Vec::new(),
@@ -105,39 +105,39 @@ impl Tree {
     /// Poses, velocities and bias accelerations (for zero coordinate accelerations) at (t, y).
     #[inline]
     pub fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]) {
-        self.update_awake(model, t, y);
+        self.update_active(model, t, y);
         // Suspended bodies have no descendants, so that they may come last.
-        self.update_asleep(model, y);
+        self.update_suspended(model, y);
     }
 
-    /// Lets evaluations skip the bodies for which `asleep` holds: free bodies that are trees of their own.
-    pub fn suspend(&mut self, asleep: impl Fn(BodyIndex) -> bool) {
-        self.awake.clear();
-        self.asleep.clear();
+    /// Lets evaluations skip the bodies for which `suspended` holds: free bodies that are trees of their own.
+    pub fn suspend(&mut self, suspended: impl Fn(BodyIndex) -> bool) {
+        self.active.clear();
+        self.suspended.clear();
         for &b in &self.dynamic {
-            self.sleeps[b] = asleep(b);
-            if self.sleeps[b] {
-                self.asleep.push(b);
+            self.is_suspended[b] = suspended(b);
+            if self.is_suspended[b] {
+                self.suspended.push(b);
             } else {
-                self.awake.push(b);
+                self.active.push(b);
             }
         }
     }
 
     /// As [`Self::update_kinematics`] for the active bodies.
     #[inline]
-    pub fn update_awake(&mut self, model: &Model, t: f64, y: &[f64]) {
+    pub fn update_active(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.driven.update(model, t, &mut self.motion);
         let (motion, coordinates) = (&mut self.motion, &self.driven.coordinates);
-        for &b in &self.awake {
+        for &b in &self.active {
             move_body(model, b, y, coordinates, motion);
         }
     }
 
-    /// As [`Self::update_kinematics`] for the suspended bodies, after [`Self::update_awake`] at this instant.
-    pub fn update_asleep(&mut self, model: &Model, y: &[f64]) {
+    /// As [`Self::update_kinematics`] for the suspended bodies, after [`Self::update_active`] at this instant.
+    pub fn update_suspended(&mut self, model: &Model, y: &[f64]) {
         let (motion, coordinates) = (&mut self.motion, &self.driven.coordinates);
-        for &b in &self.asleep {
+        for &b in &self.suspended {
             move_body(model, b, y, coordinates, motion);
         }
     }
@@ -155,8 +155,8 @@ impl Tree {
     /// unchanged.
     #[inline]
     pub fn assemble(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
-        let Self { motion, wrench, composite, mass, mass_offset, awake, .. } = self;
-        for &b in awake.iter().rev() {
+        let Self { motion, wrench, composite, mass, mass_offset, active, .. } = self;
+        for &b in active.iter().rev() {
             let body = &model.bodies[b];
             let m = &motion[b];
             let inertia = world_inertia(&m.rotation, &body.inertia, body.diagonal);
@@ -164,8 +164,8 @@ impl Tree {
             let load = &wrench[b];
             let block_index = model.block_of[b];
             let block = &model.blocks[block_index];
-            if let (Motion::Free { v, .. }, Some(_)) = (body.motion, block.lone) {
-                // A lone body has no descendants, and its bias accelerations are zero.
+            if let (Motion::Free { v, .. }, Some(_)) = (body.motion, block.single_free_body) {
+                // A single free body has no descendants, and its bias accelerations are zero.
                 let force = load.force + gravity * body.mass;
                 let torque = load.torque - w.cross(&(inertia * w));
                 out[v..v + 6].copy_from_slice(&six_of(&force, &torque));
@@ -178,7 +178,7 @@ impl Tree {
                 force: load.force + (gravity - m.acceleration) * body.mass,
                 torque: load.torque - inertia * m.angular_acceleration - w.cross(&(inertia * w)),
             };
-            if body.carries {
+            if body.has_moving_child {
                 // All descendants of this body have been accumulated.
                 c.add(&composite[b]);
                 composite[b] = Composite::EMPTY;
@@ -213,12 +213,12 @@ impl Tree {
                 Motion::Fixed | Motion::Driven { .. } => {}
             }
             let parent = body.parent;
-            if parent < model.bodies.len() && model.bodies[parent].carries {
+            if parent < model.bodies.len() && model.bodies[parent].has_moving_child {
                 composite[parent].add_shifted(&c, &(m.position - motion[parent].position));
             }
         }
         for (index, block) in model.blocks.iter().enumerate() {
-            if block.lone.is_none() {
+            if block.single_free_body.is_none() {
                 let h = &mut self.mass[self.mass_offset[index]..][..block.n * block.n];
                 let d = &mut self.inverse_diagonal[block.v..][..block.n];
                 block.pattern.factor(h, d);
@@ -230,7 +230,7 @@ impl Tree {
     #[inline]
     pub fn solve_block(&self, model: &Model, index: usize, x: &mut [f64]) {
         let block = &model.blocks[index];
-        if let Some(b) = block.lone {
+        if let Some(b) = block.single_free_body {
             let body = &model.bodies[b];
             let rotation = &self.motion[b].rotation;
             let [fx, fy, fz, tx, ty, tz] = *part(x, 0);
@@ -248,7 +248,7 @@ impl Tree {
     #[inline]
     pub fn solve(&self, model: &Model, x: &mut [f64]) {
         for (index, block) in model.blocks.iter().enumerate() {
-            if !block.lone.is_some_and(|b| self.sleeps[b]) {
+            if !block.single_free_body.is_some_and(|b| self.is_suspended[b]) {
                 self.solve_block(model, index, &mut x[block.v..][..block.n]);
             }
         }
@@ -292,7 +292,7 @@ impl Tree {
     #[inline]
     pub fn position_rate(&self, model: &Model, y: &[f64], dq: &mut [f64]) {
         let (qs, vs) = y.split_at(model.nq);
-        for &b in &self.awake {
+        for &b in &self.active {
             match model.bodies[b].motion {
                 Motion::Free { q, v } => {
                     let rate = kinematics::free_rate(part(qs, q), part(vs, v));
@@ -306,11 +306,11 @@ impl Tree {
 
     /// Velocities of the active bodies for the position rates `rate` at the positions in `y`.
     pub fn velocities_of(&self, model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]) {
-        for &b in &self.awake {
+        for &b in &self.active {
             match model.bodies[b].motion {
                 Motion::Free { q, v } => {
                     out[v..v + 3].copy_from_slice(&rate[q..q + 3]);
-                    out[v + 3..v + 6].copy_from_slice(&spin_of(&y[q + 3..q + 7], &rate[q + 3..q + 7]));
+                    out[v + 3..v + 6].copy_from_slice(&angular_velocity_of(&y[q + 3..q + 7], &rate[q + 3..q + 7]));
                 }
                 Motion::Revolute { q, v } | Motion::Prismatic { q, v } => out[v] = rate[q],
                 Motion::Fixed | Motion::Driven { .. } => {}
@@ -327,7 +327,7 @@ impl Tree {
                         y[q + i] += step[v + i];
                     }
                     let turn = Vec3::new(step[v + 3], step[v + 4], step[v + 5]);
-                    kinematics::turn_quaternion(&mut y[q + 3..q + 7], &turn);
+                    kinematics::rotate_quaternion(&mut y[q + 3..q + 7], &turn);
                 }
                 Motion::Revolute { q, v } | Motion::Prismatic { q, v } => y[q] += step[v],
                 Motion::Fixed | Motion::Driven { .. } => {}
@@ -346,19 +346,20 @@ impl Tree {
     }
 }
 
-/// Smallest part of a diagonal element of the mass matrix that elimination may leave: less is rounding.
+/// Smallest ratio of a pivot to its diagonal element of the mass matrix; a smaller one is rounding.
 const LEAST_INDEPENDENT: f64 = 1e-12;
 
 impl Tree {
-    /// The velocity coordinate farthest from the root of a tree whose unit rate moves all mass as rates of the coordinates beyond it do, after
-    /// [`Self::assemble`]: with H = L^T D L, D is 0 there and the element of H is not.
+    /// After [`Self::assemble`], the velocity coordinate farthest from its root that moves all mass in the same way as a
+    /// combination of the coordinates beyond it: with H = L^T D L, D is 0 there and the diagonal element of H is not. `None` if
+    /// there is none.
     pub fn dependent_coordinate(&self, model: &Model) -> Option<usize> {
         model.blocks.iter().zip(&self.mass_offset).find_map(|(block, &offset)| {
             let pivot = |k: usize| 1.0 / self.inverse_diagonal[block.v + k];
             let factor = |j: usize, k: usize| self.mass[offset + j * block.n + k];
             let eliminated = |k: usize| (k + 1..block.n).map(|j| factor(j, k) * factor(j, k) * pivot(j)).sum::<f64>();
             let depends = |&k: &usize| !(pivot(k) > LEAST_INDEPENDENT * (pivot(k) + eliminated(k)));
-            let last = block.lone.is_none().then(|| (0..block.n).rev().find(depends)).flatten();
+            let last = block.single_free_body.is_none().then(|| (0..block.n).rev().find(depends)).flatten();
             last.map(|k| block.v + k)
         })
     }
@@ -378,23 +379,23 @@ fn move_body(model: &Model, b: BodyIndex, y: &[f64], driven: &[Jet], motion: &mu
         }
         Motion::Revolute { q, v } => {
             let q = Jet::new(qs[q], vs[v], 0.0);
-            kinematics::follow(motion, b, body, true, q);
+            kinematics::move_child(motion, b, body, true, q);
         }
         Motion::Prismatic { q, v } => {
             let q = Jet::new(qs[q], vs[v], 0.0);
-            kinematics::follow(motion, b, body, false, q);
+            kinematics::move_child(motion, b, body, false, q);
         }
         Motion::Driven { drive, revolute } => {
             let q = driven[drive];
-            kinematics::follow(motion, b, body, revolute, q);
+            kinematics::move_child(motion, b, body, revolute, q);
         }
         Motion::Fixed => {
-            kinematics::follow(motion, b, body, false, Jet::default());
+            kinematics::move_child(motion, b, body, false, Jet::default());
         }
     }
 }
 
-/// Concatenates both vectors.
+/// Components of both vectors, linear before angular.
 #[inline(always)]
 fn six_of(linear: &Vec3, angular: &Vec3) -> [f64; 6] {
     let (l, a) = (linear, angular);

@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_come_back() {
+    fn angles_survive_conversion_to_a_matrix_and_back() {
         for a in [Vec3::new(0.1, -0.4, 0.26), Vec3::new(-3.0, 1.5, 3.1), Vec3::new(0.0, 0.0, 0.0)] {
             assert!((angles_of(&rotation(&a)) - a).norm() < 1e-13, "{a}");
         }

@@ -1,26 +1,26 @@
-//! Values recorded for a scene: plot channels and columns of `run`, all laid out from one table.
+//! Values recorded for a scene: plot channels and columns of `run`, all derived from one table.
 
 mod choice;
 mod table;
 
-pub use choice::{Listed, NoChannel, channels_of, chosen_columns, matches_pattern, matching};
+pub use choice::{ChannelInfo, UnknownChannel, channels_of, chosen_columns, matches_pattern, matching};
 use table::TIME;
 pub use table::{PLOT_WORDS, PlotKind, Quantity};
 
 use super::Frame;
 use crate::machine::{Freedom, Joint, JointKind, Machine};
-use table::{Each, Signal, TABLE, Take};
+use table::{Repetition, Signal, Source, TABLE};
 
 /// Largest number of ball joints and drives that are recorded: in a longer chain the rest is not worth the memory.
 pub const RECORDED_JOINTS: usize = 12;
 
 /// Largest number of channels picked by name: each costs as much memory as any other.
-pub const MOST_PICKED: usize = 32;
+pub const MAX_PICKED: usize = 32;
 
 /// Where a value is found in a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
-    take: Take,
+    source: Source,
     part: usize,
     component: usize,
 }
@@ -29,12 +29,12 @@ impl Reading {
     /// The value, SI units; `None` where `frame` does not have it.
     #[inline]
     pub fn read(&self, frame: &Frame) -> Option<f64> {
-        self.take.value(frame, self.part, self.component)
+        self.source.value(frame, self.part, self.component)
     }
 
     /// Requests the value from `frame`, if frames contain it only on request.
     pub fn ask(&self, frame: &mut Frame) {
-        if matches!(self.take, Take::Reaction(_)) {
+        if matches!(self.source, Source::Reaction(_)) {
             frame.reactions.get_or_insert_default();
         }
     }
@@ -69,7 +69,7 @@ impl Channel {
 #[derive(Clone, Debug, Default)]
 pub struct Channels {
     list: Vec<Channel>,
-    picked: Vec<Listed>,
+    picked: Vec<ChannelInfo>,
 }
 
 impl Channels {
@@ -77,12 +77,12 @@ impl Channels {
     pub fn of(machine: &Machine) -> Self {
         let mut list = Vec::new();
         let in_plots = |signal: &Signal| signal.plot.map(|_| 0);
-        lay_out(machine, None, RECORDED_JOINTS, in_plots, |found| {
-            list.extend(found.signal.plot.map(|quantity| Channel {
+        lay_out(machine, None, RECORDED_JOINTS, in_plots, |value| {
+            list.extend(value.signal.plot.map(|quantity| Channel {
                 quantity,
-                member: found.member.to_owned(),
-                column: found.column,
-                reading: found.reading,
+                member: value.member.to_owned(),
+                column: value.column,
+                reading: value.reading,
             }));
         });
         Self { list, picked: Vec::new() }
@@ -95,13 +95,13 @@ impl Channels {
             return;
         }
         self.picked = channels_of(machine, first);
-        let matches = |channel: &Listed| patterns.iter().any(|p| channel.is_chosen_by(p));
+        let matches = |channel: &ChannelInfo| patterns.iter().any(|p| channel.is_matched_by(p));
         self.picked.retain(|channel| channel.name != TIME && matches(channel));
-        self.picked.truncate(MOST_PICKED);
+        self.picked.truncate(MAX_PICKED);
     }
 
     /// The channels picked by name.
-    pub fn picked(&self) -> &[Listed] {
+    pub fn picked(&self) -> &[ChannelInfo] {
         &self.picked
     }
 
@@ -140,7 +140,7 @@ impl Channels {
 
     /// Appends the values of the picked channels to `out`, in the manner of [`Self::read`].
     pub fn read_picked(&self, frame: &Frame, out: &mut Vec<f64>) {
-        let value = |channel: &Listed| channel.reading.read(frame).unwrap_or(f64::NAN);
+        let value = |channel: &ChannelInfo| channel.reading.read(frame).unwrap_or(f64::NAN);
         out.extend(self.picked.iter().map(value));
     }
 
@@ -157,15 +157,15 @@ impl Channels {
 pub fn run_columns(machine: &Machine, first: &Frame) -> (Vec<String>, Vec<Reading>) {
     let (mut names, mut readings) = (Vec::new(), Vec::new());
     let in_run = |signal: &Signal| signal.run;
-    lay_out(machine, Some(first), usize::MAX, in_run, |found| {
-        names.push(found.column);
-        readings.push(found.reading);
+    lay_out(machine, Some(first), usize::MAX, in_run, |value| {
+        names.push(value.column);
+        readings.push(value.reading);
     });
     (names, readings)
 }
 
 /// One value of a signal.
-struct Found<'a> {
+struct SignalValue<'a> {
     signal: &'a Signal,
     member: &'a str,
     name: String,
@@ -180,26 +180,26 @@ fn lay_out(
     first: Option<&Frame>,
     most: usize,
     place: impl Fn(&Signal) -> Option<u8>,
-    mut add: impl FnMut(Found<'_>),
+    mut add: impl FnMut(SignalValue<'_>),
 ) {
     let mut signals: Vec<&Signal> = TABLE.iter().filter(|s| place(s).is_some()).collect();
     signals.sort_by_key(|signal| place(signal));
-    let key = |signal: &Signal| (place(signal), signal.take.each());
+    let key = |signal: &Signal| (place(signal), signal.source.repetition());
     for group in signals.chunk_by(|a, b| key(a) == key(b)) {
-        let parts = parts_of(machine, group[0].take.each());
+        let parts = parts_of(machine, group[0].source.repetition());
         for (part, (name, freedom)) in parts.into_iter().take(most).enumerate() {
-            let here = |signal: &&&Signal| has(machine, first, signal, part, freedom);
+            let here = |signal: &&&Signal| has_signal(machine, first, signal, part, freedom);
             for signal in group.iter().filter(here) {
-                let take = signal.take;
-                for (component, &(symbol, word)) in take.components().iter().enumerate() {
-                    let members = [take.member(), symbol, name];
+                let source = signal.source;
+                for (component, &(symbol, word)) in source.components().iter().enumerate() {
+                    let members = [source.member(), symbol, name];
                     let named = |pattern: &str| pattern.replace('#', word).replace('@', name);
-                    add(Found {
+                    add(SignalValue {
                         signal,
                         name: named(signal.name),
                         member: members.into_iter().find(|m| !m.is_empty()).unwrap_or_default(),
                         column: named(signal.column),
-                        reading: Reading { take, part, component },
+                        reading: Reading { source, part, component },
                     });
                 }
             }
@@ -208,50 +208,56 @@ fn lay_out(
 }
 
 /// Names of the parts for which a signal is repeated; for a joint coordinate also the freedom that it measures.
-fn parts_of(machine: &Machine, each: Each) -> Vec<(&str, Option<Freedom>)> {
+fn parts_of(machine: &Machine, repetition: Repetition) -> Vec<(&str, Option<Freedom>)> {
     let joints = machine.ball_joints.iter().map(|joint| joint.name.as_str());
     let elements = machine.elements.iter().map(|element| element.name.as_str());
     let coordinates = |joint: &'_ Joint| joint.kind.freedoms().iter().map(|freedom| Some(*freedom));
     let holding = machine.joints.iter().filter(|j| j.kind != JointKind::Free);
     let bodies = machine.bodies.iter().map(|body| body.name.as_str());
-    match each {
-        Each::Once => vec![("", None)],
-        Each::Output => vec![(machine.bodies[machine.output.body].name.as_str(), None)],
-        Each::Body => bodies.map(|name| (name, None)).collect(),
-        Each::Coordinate => {
+    match repetition {
+        Repetition::Once => vec![("", None)],
+        Repetition::Output => vec![(machine.bodies[machine.output.body].name.as_str(), None)],
+        Repetition::Body => bodies.map(|name| (name, None)).collect(),
+        Repetition::Coordinate => {
             machine.kinematic_joints().flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom))).collect()
         }
-        Each::Holding => holding.map(|j| (j.name.as_str(), None)).collect(),
-        Each::Closing => {
+        Repetition::Reacting => holding.map(|j| (j.name.as_str(), None)).collect(),
+        Repetition::Closing => {
             let closing = machine.closing_joints.iter();
             closing.map(|joint| (joint.name.as_str(), None)).collect()
         }
-        Each::Joint => joints.map(|name| (name, None)).collect(),
-        Each::Drive => machine.driven().map(|(j, freedom)| (j.name.as_str(), Some(freedom))).collect(),
-        Each::Element => elements.map(|name| (name, None)).collect(),
+        Repetition::Joint => joints.map(|name| (name, None)).collect(),
+        Repetition::Drive => machine.driven().map(|(j, freedom)| (j.name.as_str(), Some(freedom))).collect(),
+        Repetition::Element => elements.map(|name| (name, None)).collect(),
     }
 }
 
 /// Whether `machine` has `signal` for part `part`; without a `first` frame, whether it may have it.
-fn has(machine: &Machine, first: Option<&Frame>, signal: &Signal, part: usize, freedom: Option<Freedom>) -> bool {
-    let take = signal.take;
-    let known = |may_have: bool| first.map_or(may_have, |f| take.value(f, part, 0).is_some());
-    match take {
-        Take::Slide | Take::SlideCoordinate(_) => freedom == Some(Freedom::Slide),
-        Take::HingeCoordinate(0) if freedom == Some(Freedom::TurnOfSlide) => true,
-        Take::Hinge | Take::HingeCoordinate(_) => freedom == Some(Freedom::Turn),
-        Take::TurnRate => freedom == Some(Freedom::TurnOfSlide),
-        Take::Turn => matches!(freedom, Some(Freedom::TurnOfSlide | Freedom::FirstTurn)),
-        Take::ChildTurn => freedom == Some(Freedom::SecondTurn),
-        Take::FirstTurn(_) => freedom == Some(Freedom::FirstTurn),
-        Take::SecondTurn(_) => freedom == Some(Freedom::SecondTurn),
-        Take::OtherAxes(_) | Take::OtherAngles(_) => part != machine.output.body,
-        Take::Given(..) | Take::Taken(..) => {
+fn has_signal(
+    machine: &Machine,
+    first: Option<&Frame>,
+    signal: &Signal,
+    part: usize,
+    freedom: Option<Freedom>,
+) -> bool {
+    let source = signal.source;
+    let known = |may_have: bool| first.map_or(may_have, |f| source.value(f, part, 0).is_some());
+    match source {
+        Source::Slide | Source::SlideCoordinate(_) => freedom == Some(Freedom::Slide),
+        Source::HingeCoordinate(0) if freedom == Some(Freedom::TurnOfSlide) => true,
+        Source::Hinge | Source::HingeCoordinate(_) => freedom == Some(Freedom::Turn),
+        Source::TurnRate => freedom == Some(Freedom::TurnOfSlide),
+        Source::Turn => matches!(freedom, Some(Freedom::TurnOfSlide | Freedom::FirstTurn)),
+        Source::ChildTurn => freedom == Some(Freedom::SecondTurn),
+        Source::FirstTurn(_) => freedom == Some(Freedom::FirstTurn),
+        Source::SecondTurn(_) => freedom == Some(Freedom::SecondTurn),
+        Source::OtherAxes(_) | Source::OtherAngles(_) => part != machine.output.body,
+        Source::Supplied(..) | Source::Consumed(..) => {
             known(machine.solver.energy_ledger) && (!signal.of_elements || !machine.elements.is_empty())
         }
-        Take::ProbeError | Take::ProbeDistance => known(machine.output.probe.is_some()),
-        Take::Element(_) => known(true),
-        Take::ElementValue(_) => machine.elements[part].is_between_points(),
+        Source::ProbeError | Source::ProbeDistance => known(machine.output.probe.is_some()),
+        Source::Element(_) => known(true),
+        Source::ElementValue(_) => machine.elements[part].is_between_points(),
         _ => true,
     }
 }
@@ -262,7 +268,7 @@ mod tests {
     use crate::scene::Scene;
 
     #[test]
-    fn every_plot_has_a_signal_and_no_two_signals_have_one_column() {
+    fn every_plot_has_a_signal_and_all_columns_differ() {
         for quantity in Quantity::ALL {
             let mut plots = TABLE.iter().filter_map(|signal| signal.plot);
             assert!(plots.any(|plot| plot == quantity), "{quantity:?}");
@@ -272,7 +278,7 @@ mod tests {
                 if in_run { signal.run.is_some() } else { signal.plot.is_some() }
             };
             let mut columns: Vec<(&str, usize)> =
-                TABLE.iter().filter(here).map(|signal| (signal.column, signal.take.each() as usize)).collect();
+                TABLE.iter().filter(here).map(|signal| (signal.column, signal.source.repetition() as usize)).collect();
             let all = columns.len();
             columns.sort_unstable();
             columns.dedup();
@@ -281,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn readers_that_know_columns_by_their_place_find_them() {
+    fn columns_at_the_end_of_a_row_keep_their_positions() {
         let text = crate::scene::built_in_text("slider-crank-driven").expect("built in");
         let load = "[[load]]\nname = \"wind\"\non = { body = \"rod\" }\nforce = \"1 0 0 N\"\n";
         let scene = Scene::parse(&format!("{text}\n{load}"), None, &[]).expect("reads");

@@ -7,14 +7,14 @@ use crate::units::format_quantity_digits;
 
 /// Ball joints that a doubt concerns.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joints {
+pub struct AffectedJoints {
     /// Name of the most affected one.
     pub worst: String,
     /// How many others are affected.
     pub others: usize,
 }
 
-impl fmt::Display for Joints {
+impl fmt::Display for AffectedJoints {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.worst)?;
         match self.others {
@@ -39,7 +39,7 @@ pub enum LedgerTerm {
 }
 
 impl LedgerTerm {
-    fn words(self) -> &'static str {
+    fn phrase(self) -> &'static str {
         match self {
             Self::Drives => "work of the drives",
             Self::Gravity => "work of gravity",
@@ -53,7 +53,7 @@ impl LedgerTerm {
     }
 }
 
-/// Why a result may be unreliable. Its `Display` is a sentence for the user.
+/// Reason why a result may be unreliable. Its `Display` is a sentence for the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Doubt {
     /// Follows from the machine's settings, whatever happened in the run.
@@ -61,7 +61,7 @@ pub enum Doubt {
     /// Contacts that lasted fewer fixed steps than needed to resolve their forces.
     Unresolved {
         /// Affected joints.
-        joints: Joints,
+        joints: AffectedJoints,
         /// Number of such contacts of the worst joint.
         short: u64,
         /// All contacts of the worst joint.
@@ -72,14 +72,14 @@ pub enum Doubt {
     /// A contact found only at the end of a step, by a method that should have located its beginning.
     Late {
         /// Affected joints.
-        joints: Joints,
+        joints: AffectedJoints,
         /// Penetration there, m.
         depth: f64,
     },
     /// An undisturbed impact that rebounded faster than its law predicts.
     Rebound {
         /// Affected joints.
-        joints: Joints,
+        joints: AffectedJoints,
         /// When it ended, s.
         time: f64,
         /// Separation speed over approach speed.
@@ -90,7 +90,7 @@ pub enum Doubt {
     /// Finished contacts that began slower than `impact_speed_floor` or existed at the start.
     Floored {
         /// Affected joints.
-        joints: Joints,
+        joints: AffectedJoints,
         /// Number of such contacts of the worst joint.
         slow: u64,
         /// All contacts of the worst joint.
@@ -112,14 +112,14 @@ pub enum Doubt {
     /// A contact patch that is not small compared with its ball.
     Patch {
         /// Affected joints.
-        joints: Joints,
+        joints: AffectedJoints,
         /// Radius of the patch over that of the ball.
         radii: f64,
     },
     /// More damping than in an undisturbed impact under the same law.
     Damping {
         /// Affected joints.
-        joints: Joints,
+        joints: AffectedJoints,
         /// When, s.
         time: f64,
         /// Damping over elastic force.
@@ -156,7 +156,7 @@ pub enum Doubt {
         residual: f64,
     },
     /// An explicit method whose step size was limited by stability, not by the tolerance.
-    Held {
+    StabilityLimited {
         /// Fraction of the simulated time.
         share: f64,
         /// `solver.tolerance`.
@@ -197,7 +197,7 @@ impl Doubt {
             Self::Drift { .. } => 8,
             Self::Energy { .. } => 9,
             Self::Gain { .. } | Self::Work { .. } => 10,
-            Self::Held { .. } => 11,
+            Self::StabilityLimited { .. } => 11,
         }
     }
 }
@@ -264,16 +264,16 @@ impl fmt::Display for Doubt {
                 f,
                 "energy: the {} is negative, {value:.2e} J, so that the integration created energy; use a smaller step or \
                  tolerance.",
-                work.words()
+                work.phrase()
             ),
             Self::Work { work, value, residual } => write!(
                 f,
                 "energy: the integration {} {:.2e} J, and the {} is {value:.2e} J; use a smaller step or tolerance.",
                 created(*residual),
                 residual.abs(),
-                work.words()
+                work.phrase()
             ),
-            Self::Held { share, tolerance, loosest } => write!(
+            Self::StabilityLimited { share, tolerance, loosest } => write!(
                 f,
                 "solver.method dopri5: stability limited its steps for {:.0} % of the time, and at solver.tolerance \
                  {tolerance:e} such steps create or destroy energy in settled contacts; use {loosest:e} or less, or \

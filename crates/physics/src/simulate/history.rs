@@ -7,7 +7,7 @@ const LEVELS: usize = 23;
 /// Empty slot.
 const EMPTY: i64 = i64::MIN;
 /// Range of a channel without values.
-const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
+const NO_VALUE: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
 
 /// Fixed-size record of `channels` quantities over time. Nothing is allocated after [`History::new`].
 #[derive(Clone, Debug)]
@@ -64,7 +64,7 @@ impl Mark {
 fn rearranged(ranges: &[(f32, f32)], channels: usize, from: &[Option<usize>]) -> Vec<(f32, f32)> {
     let slots = ranges.chunks_exact(channels.max(1));
     let slot = |slot: &[(f32, f32)]| {
-        let range = |channel: &Option<usize>| channel.map_or(NOTHING, |at| slot[at]);
+        let range = |channel: &Option<usize>| channel.map_or(NO_VALUE, |at| slot[at]);
         from.iter().map(range).collect::<Vec<_>>()
     };
     slots.flat_map(slot).collect()
@@ -135,7 +135,7 @@ impl History {
         };
         (self.start, self.end) = (Some(start), end);
         self.newest = mark.newest;
-        let mut kept = mark.ranges.chunks_exact(self.channels.max(1));
+        let mut stored = mark.ranges.chunks_exact(self.channels.max(1));
         for (level, &newest) in mark.newest.iter().enumerate() {
             for index in &mut self.indices[level * BINS..(level + 1) * BINS] {
                 if *index > newest {
@@ -143,7 +143,7 @@ impl History {
                 }
             }
             if newest != EMPTY
-                && let Some(ranges) = kept.next()
+                && let Some(ranges) = stored.next()
             {
                 self.indices[level * BINS + slot_of(newest)] = newest;
                 self.slot_mut(level, newest).copy_from_slice(ranges);
@@ -166,8 +166,8 @@ impl History {
         }
         self.end = time;
         let index = self.index(0, time);
-        let fresh = self.newest[0] != index;
-        if fresh {
+        let is_new = self.newest[0] != index;
+        if is_new {
             self.close(0);
             self.open(0, index);
         }
@@ -178,8 +178,8 @@ impl History {
                 *base = value;
             }
             let base = *base;
-            let kept = if value.is_nan() { NOTHING } else { ((value - base) as f32, (value - base) as f32) };
-            *range = if fresh { kept } else { join(*range, kept) };
+            let stored = if value.is_nan() { NO_VALUE } else { ((value - base) as f32, (value - base) as f32) };
+            *range = if is_new { stored } else { join(*range, stored) };
         }
     }
 
@@ -188,12 +188,12 @@ impl History {
         if channel >= self.channels || !time.is_finite() || !value.is_finite() {
             return;
         }
-        let kept = (value - self.base[channel]) as f32;
+        let stored = (value - self.base[channel]) as f32;
         for level in 0..LEVELS {
             let index = self.index(level, time);
             if self.indices[level * BINS + slot_of(index)] == index {
                 let range = &mut self.slot_mut(level, index)[channel];
-                *range = join(*range, (kept, kept));
+                *range = join(*range, (stored, stored));
             }
         }
     }
@@ -212,8 +212,8 @@ impl History {
         let (width, complete) = (self.width(level), self.complete(level));
         // If the first bin is empty, start from the last non-empty one before it.
         let (mut first, oldest) = (self.index(level, from), self.index(level, start));
-        let gone = self.reached[level].saturating_sub(BINS as i64);
-        while first > oldest.max(gone + 1) && self.range(level, first, complete, channel).is_none() {
+        let overwritten = self.reached[level].saturating_sub(BINS as i64);
+        while first > oldest.max(overwritten + 1) && self.range(level, first, complete, channel).is_none() {
             first -= 1;
         }
         for index in first..=self.index(level, to) {
@@ -290,7 +290,7 @@ impl History {
     /// Range of `channel` in one bin, including values of finer levels not yet merged into it; bins before `complete` have none
     /// of these.
     fn range(&self, level: usize, index: i64, complete: i64, channel: usize) -> Option<(f64, f64)> {
-        let mut found: Option<(f32, f32)> = None;
+        let mut merged: Option<(f32, f32)> = None;
         for below in if index < complete { level } else { 0 }..=level {
             let at = if below == level { index } else { self.newest[below] };
             if at == EMPTY || at >> (level - below) != index {
@@ -299,16 +299,16 @@ impl History {
             let slot = below * BINS + slot_of(at);
             if self.indices[slot] == at {
                 let range = self.ranges[slot * self.channels + channel];
-                found = Some(found.map_or(range, |f| join(f, range)));
+                merged = Some(merged.map_or(range, |other| join(other, range)));
             }
         }
         let base = self.base[channel];
-        let whole = |kept: f32| {
-            let value = base + f64::from(kept);
+        let absolute = |relative: f32| {
+            let value = base + f64::from(relative);
             // The base cancels this value to within f32 precision: report an exact zero.
             if value.abs() <= f64::from(f32::EPSILON) * base.abs() { 0.0 } else { value }
         };
-        found.map(|(least, greatest)| (whole(least), whole(greatest)))
+        merged.map(|(least, greatest)| (absolute(least), absolute(greatest)))
     }
 
     /// Merges the newest bin of `level` into the level above.
@@ -318,8 +318,8 @@ impl History {
             return;
         }
         let above = index >> 1;
-        let fresh = self.newest[level + 1] != above;
-        if fresh {
+        let is_new = self.newest[level + 1] != above;
+        if is_new {
             self.close(level + 1);
             self.open(level + 1, above);
         }
@@ -328,7 +328,7 @@ impl History {
         for channel in 0..self.channels {
             let range = self.ranges[from + channel];
             let target = &mut self.ranges[to + channel];
-            *target = if fresh { range } else { join(*target, range) };
+            *target = if is_new { range } else { join(*target, range) };
         }
     }
 
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn every_extreme_survives_at_every_width() {
+    fn every_extreme_is_retained_at_every_bin_width() {
         let mut history = History::new(2, 1e-5);
         for n in 0..200_000_u64 {
             let spike = if n == 123_456 { 50.0 } else { wave(n) };
@@ -381,30 +381,30 @@ mod tests {
     }
 
     #[test]
-    fn bins_come_in_order_inside_the_window_and_end_with_the_record() {
+    fn bins_are_in_order_within_the_window_and_end_with_the_record() {
         let mut history = History::new(1, 1e-6);
         for n in 0..50_000_u64 {
             history.push(n as f64 * 1e-5, &[wave(n)]);
         }
-        let found = bins(&history, 0, 0.2, 0.3, 300);
-        assert!(found.len() > 100, "{}", found.len());
-        assert!(found.windows(2).all(|w| w[0].to == w[1].from));
+        let range = bins(&history, 0, 0.2, 0.3, 300);
+        assert!(range.len() > 100, "{}", range.len());
+        assert!(range.windows(2).all(|w| w[0].to == w[1].from));
         let width = 0.1 / 150.0;
-        for bin in found {
+        for bin in range {
             assert!(bin.from > 0.2 - width && bin.to < 0.3 + width);
             let middle = libm::sin((bin.from + bin.to) * 50.0);
             assert!((bin.least - middle).abs() < 0.1 && (bin.greatest - middle).abs() < 0.1);
         }
         // The window has fewer entries than bins: it begins with the entry before it.
-        let found = bins(&history, 0, 0.499_953, 0.499_973, 300);
-        assert!(found[0].from < 0.499_952 && found.len() == 3, "{found:?}");
-        let found = bins(&history, 0, 0.0, 1.0, 300);
-        assert_eq!(found[0].from, 0.0);
-        assert_eq!(found[found.len() - 1].to, 49_999.0 * 1e-5);
+        let range = bins(&history, 0, 0.499_953, 0.499_973, 300);
+        assert!(range[0].from < 0.499_952 && range.len() == 3, "{range:?}");
+        let range = bins(&history, 0, 0.0, 1.0, 300);
+        assert_eq!(range[0].from, 0.0);
+        assert_eq!(range[range.len() - 1].to, 49_999.0 * 1e-5);
     }
 
     #[test]
-    fn the_latest_value_is_seen_at_once() {
+    fn the_latest_value_is_available_immediately() {
         let mut history = History::new(1, 1e-6);
         for n in 0..1000 {
             history.push(f64::from(n) * 1e-3, &[0.0]);
@@ -415,20 +415,20 @@ mod tests {
     }
 
     #[test]
-    fn a_small_motion_far_from_zero_keeps_its_digits_and_zero_is_zero() {
+    fn a_small_motion_far_from_zero_keeps_its_digits_and_zero_stays_exact() {
         let mut history = History::new(2, 1e-5);
         for n in 0..1000_u64 {
             let time = (n as f64 + 0.5) * 1e-5;
             history.push(time, &[0.203_441 + 1e-12 * wave(n), 1.6 * f64::from(n < 9)]);
         }
-        let found = bins(&history, 0, 0.0, 1e-2, 1000);
-        assert_eq!(found.len(), 1000);
-        for (n, bin) in found.iter().enumerate() {
+        let range = bins(&history, 0, 0.0, 1e-2, 1000);
+        assert_eq!(range.len(), 1000);
+        for (n, bin) in range.iter().enumerate() {
             let wanted = 0.203_441 + 1e-12 * wave(n as u64);
             assert!((bin.least - wanted).abs() < 1e-15, "{n}: {bin:?}");
         }
-        let found = bins(&history, 1, 0.0, 1e-2, 1000);
-        assert_eq!(found[found.len() - 1].greatest, 0.0);
+        let range = bins(&history, 1, 0.0, 1e-2, 1000);
+        assert_eq!(range[range.len() - 1].greatest, 0.0);
     }
 
     #[test]
@@ -439,9 +439,9 @@ mod tests {
         }
         history.widen(0.05, 0, 9.0);
         for most in [50, 500] {
-            let found = bins(&history, 0, 0.0, 0.1, most);
-            let peak = found.iter().find(|b| b.greatest == 9.0);
-            let peak = peak.expect("the peak is kept");
+            let range = bins(&history, 0, 0.0, 0.1, most);
+            let peak = range.iter().find(|b| b.greatest == 9.0);
+            let peak = peak.expect("the peak is stored");
             assert!(peak.from <= 0.05 && 0.05 < peak.to);
             let other = bins(&history, 1, 0.0, 0.1, most);
             assert!(other.iter().all(|b| (b.least, b.greatest) == (2.0, 2.0)));
@@ -449,7 +449,7 @@ mod tests {
     }
 
     #[test]
-    fn rewound_it_is_as_if_the_rest_had_never_been() {
+    fn rewinding_removes_everything_recorded_later() {
         let push = |history: &mut History, from: u64, to: u64| {
             for n in from..to {
                 history.push(n as f64 * 1e-5, &[wave(n), n as f64]);
@@ -480,20 +480,20 @@ mod tests {
     }
 
     #[test]
-    fn an_old_window_is_coarse_but_there_and_clear_empties() {
+    fn an_old_window_is_available_at_a_coarser_level_until_the_record_is_cleared() {
         let mut history = History::new(1, 1e-6);
         for n in 0..200_000_u64 {
             history.push(n as f64 * 1e-4, &[n as f64]);
         }
-        let found = bins(&history, 0, 0.0, 20.0, 400);
-        assert_eq!(found[0].least, 0.0);
-        assert_eq!(found[found.len() - 1].greatest, 199_999.0);
+        let range = bins(&history, 0, 0.0, 20.0, 400);
+        assert_eq!(range[0].least, 0.0);
+        assert_eq!(range[range.len() - 1].greatest, 199_999.0);
         history.clear();
         assert!(bins(&history, 0, 0.0, 20.0, 400).is_empty() && history.span().is_none());
     }
 
     #[test]
-    fn what_had_no_value_is_told_from_what_had() {
+    fn missing_values_are_distinguished_from_recorded_ones() {
         let mut history = History::new(2, 1e-5);
         for n in 0..3000_u64 {
             let late = if n < 1000 { f64::NAN } else { wave(n) };
@@ -501,9 +501,9 @@ mod tests {
         }
         assert!(history.rows(40) == history.clone().rows(40));
         for most in [40, 900] {
-            let found = bins(&history, 1, 0.0, 0.3, most);
-            assert!(found[0].to > 0.1 && found[0].from <= 0.1 + 1e-9);
-            assert!(found.iter().all(|b| b.least.is_finite() && b.greatest <= 1.0));
+            let range = bins(&history, 1, 0.0, 0.3, most);
+            assert!(range[0].to > 0.1 && range[0].from <= 0.1 + 1e-9);
+            assert!(range.iter().all(|b| b.least.is_finite() && b.greatest <= 1.0));
             assert_eq!(bins(&history, 0, 0.0, 0.3, most)[0].from, 0.0);
         }
         let rows = history.rows(40);
@@ -511,7 +511,7 @@ mod tests {
     }
 
     #[test]
-    fn a_channel_that_comes_later_has_no_past_and_the_others_keep_theirs() {
+    fn a_channel_added_later_has_no_past_and_the_others_keep_theirs() {
         let mut history = History::new(2, 1e-5);
         let mut straight = History::new(2, 1e-5);
         let at = |n: u64| n as f64 * 1e-4;
@@ -534,11 +534,11 @@ mod tests {
         };
         push(&mut history, &mut straight);
         for most in [40, 900] {
-            let found = bins(&history, 1, 0.0, 0.3, most);
-            assert!(found[0].from <= 0.1 && found[0].to > 0.1);
-            assert!(found.iter().all(|b| (b.least - 7.0).abs() < 1.1e-9));
-            assert!(found.iter().any(|b| b.least > 7.0 + 0.9e-9));
-            assert!(found.iter().any(|b| b.greatest < 7.0 + 0.5e-9));
+            let range = bins(&history, 1, 0.0, 0.3, most);
+            assert!(range[0].from <= 0.1 && range[0].to > 0.1);
+            assert!(range.iter().all(|b| (b.least - 7.0).abs() < 1.1e-9));
+            assert!(range.iter().any(|b| b.least > 7.0 + 0.9e-9));
+            assert!(range.iter().any(|b| b.greatest < 7.0 + 0.5e-9));
             let other = bins(&history, 0, 0.0, 0.3, most);
             assert!(other == bins(&straight, 1, 0.0, 0.3, most));
         }
@@ -550,7 +550,7 @@ mod tests {
     }
 
     #[test]
-    fn time_never_runs_backwards() {
+    fn values_at_earlier_times_are_ignored() {
         let mut history = History::new(1, 1e-6);
         history.push(1.0, &[1.0]);
         history.push(0.5, &[2.0]);

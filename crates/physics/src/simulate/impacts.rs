@@ -6,9 +6,9 @@ use super::peaks::PenetrationCubic;
 use crate::contact::{Coefficients, undisturbed_restitution};
 
 /// Number of latest impacts stored.
-const KEPT: usize = 64;
+const STORED_IMPACTS: usize = 64;
 /// Work of other forces during an impact, relative to its energy, beyond which its law alone does not determine its restitution.
-const SOFT: f64 = 0.01;
+const MAX_EXTERNAL_WORK: f64 = 0.01;
 
 /// A finished impact of one ball joint, from the start of an approaching contact to its end. A contact that existed at the
 /// start, or that a live change ended, does not count.
@@ -54,14 +54,14 @@ impl Impact {
 
     /// Excess of its restitution over its law's prediction, which friction and the motion it causes can only lower; 0 if the two
     /// cannot be compared, as in [`Self::has_own_restitution`].
-    pub fn astray(&self) -> f64 {
+    pub fn restitution_excess(&self) -> f64 {
         if self.has_own_restitution() { (self.achieved() - self.law).max(0.0) } else { 0.0 }
     }
 
     /// Whether other forces, such as weight and drives, do enough work during it to change its restitution.
     pub fn is_soft(&self) -> bool {
         let kinetic = self.approach_speed * self.approach_speed;
-        !(2.0 * self.push.abs() * self.deepest <= SOFT * kinetic)
+        !(2.0 * self.push.abs() * self.deepest <= MAX_EXTERNAL_WORK * kinetic)
     }
 
     /// Whether its restitution can be compared with its law's prediction: it was neither disturbed nor slow nor soft.
@@ -86,7 +86,7 @@ pub(super) struct Impacts {
 
 impl Impacts {
     /// Finished impacts still in the buffer.
-    pub(super) fn kept(&self) -> &[Impact] {
+    pub(super) fn stored(&self) -> &[Impact] {
         &self.finished
     }
 
@@ -96,7 +96,7 @@ impl Impacts {
         Self {
             under_way: vec![None; joints],
             laws: vec![(0.0, 1.0); joints],
-            finished: vec![Impact::default(); KEPT.max(joints)],
+            finished: vec![Impact::default(); STORED_IMPACTS.max(joints)],
             count: 0,
             handed_out: 0,
         }
@@ -114,7 +114,7 @@ impl Impacts {
     }
 
     /// Records that a contact of `joint` begins at `time` with penetration rate `speed` (m/s), which was changing at `push`
-    /// (m/s^2); `touching` if another joint is in contact.
+    /// (m/s^2); `in_contact` if another joint is in contact.
     pub(super) fn begin(
         &mut self,
         joint: usize,
@@ -123,7 +123,7 @@ impl Impacts {
         asked: f64,
         push: f64,
         coefficients: &Coefficients,
-        touching: bool,
+        in_contact: bool,
     ) {
         for other in self.under_way.iter_mut().flatten() {
             other.disturbed = true;
@@ -139,7 +139,7 @@ impl Impacts {
             asked,
             law: law.1,
             floored: speed < coefficients.speed_floor,
-            disturbed: touching,
+            disturbed: in_contact,
             push,
             ..Impact::default()
         });
@@ -147,11 +147,11 @@ impl Impacts {
 
     /// Updates the contact of `joint` over a step in which it was, or became, active, from its penetration, its largest normal
     /// force (N) and its largest ratio of damping to elastic force.
-    pub(super) fn follow(&mut self, joint: usize, course: &PenetrationCubic, force: f64, damping: f64) {
+    pub(super) fn update(&mut self, joint: usize, cubic: &PenetrationCubic, force: f64, damping: f64) {
         if let Some(impact) = &mut self.under_way[joint] {
             impact.steps += 1;
             impact.damping = impact.damping.max(damping);
-            impact.deepest = impact.deepest.max(course.deepest());
+            impact.deepest = impact.deepest.max(cubic.deepest());
             impact.peak = impact.peak.max(force);
         }
     }
@@ -173,10 +173,10 @@ impl Impacts {
         Some(impact)
     }
 
-    /// Records that a live change altered the contact of `joint`, or ended it if `touching` is false.
-    pub(super) fn change(&mut self, joint: usize, touching: bool) {
+    /// Records that a live change altered the contact of `joint`, or ended it if `in_contact` is false.
+    pub(super) fn change(&mut self, joint: usize, in_contact: bool) {
         let impact = &mut self.under_way[joint];
-        if touching {
+        if in_contact {
             if let Some(impact) = impact {
                 impact.disturbed = true;
             }
@@ -187,7 +187,7 @@ impl Impacts {
 
     /// The latest finished ones, at most 64, oldest first.
     pub(super) fn latest(&self) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
-        let first = self.count.saturating_sub(KEPT as u64);
+        let first = self.count.saturating_sub(STORED_IMPACTS as u64);
         self.since(first)
     }
 
@@ -198,7 +198,7 @@ impl Impacts {
     }
 
     /// Appends the impacts not yet handed out.
-    pub(super) fn hand_out(&mut self, out: &mut Vec<Impact>) {
+    pub(super) fn take_new(&mut self, out: &mut Vec<Impact>) {
         let oldest = self.count.saturating_sub(self.finished.len() as u64);
         out.extend(self.since(self.handed_out.max(oldest)));
         self.handed_out = self.count;

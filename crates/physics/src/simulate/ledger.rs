@@ -39,9 +39,10 @@ pub struct Ledger {
 impl Ledger {
     /// Unaccounted energy, J: positive if energy was created.
     pub fn residual(&self) -> f64 {
-        let given = self.drive_work + self.gravity_work + self.clearance_work + self.change_work + self.external_work;
-        let taken = self.restitution_loss + self.friction_loss + self.damping_loss;
-        self.kinetic_change + self.elastic_change - (given - taken)
+        let supplied =
+            self.drive_work + self.gravity_work + self.clearance_work + self.change_work + self.external_work;
+        let dissipated = self.restitution_loss + self.friction_loss + self.damping_loss;
+        self.kinetic_change + self.elastic_change - (supplied - dissipated)
     }
 
     /// Residual over the energy exchanged; 0 where none was.
@@ -84,10 +85,10 @@ impl Energies {
 const NODES: usize = 6;
 /// Weights of six equidistant instants for the interval between the last two: Adams-Moulton (Hairer, Nørsett & Wanner,
 /// *Solving Ordinary Differential Equations I*, III.1).
-const EVEN: [f64; NODES] =
+const EVEN_WEIGHTS: [f64; NODES] =
     [27.0 / 1440.0, -173.0 / 1440.0, 482.0 / 1440.0, -798.0 / 1440.0, 1427.0 / 1440.0, 475.0 / 1440.0];
 /// Relative tolerance for treating instants as equidistant: the weights are then accurate to the same order.
-const EVENLY: f64 = 1e-9;
+const EVEN_TOLERANCE: f64 = 1e-9;
 
 /// Powers at some instants, and their interpolating polynomial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -132,21 +133,21 @@ impl PowerInterpolant {
     }
 
     /// The same with times measured from `from` in units of `h`.
-    pub(super) fn seen_from(&self, from: f64, h: f64) -> Self {
-        let mut seen = *self;
-        for time in &mut seen.times[..self.count] {
+    pub(super) fn in_step_time(&self, from: f64, h: f64) -> Self {
+        let mut shifted = *self;
+        for time in &mut shifted.times[..self.count] {
             *time = (*time - from) / h;
         }
-        seen
+        shifted
     }
 
     /// Integral of the polynomial from 0 to `end`.
     pub(super) fn integral(&self, end: f64) -> Powers {
         let mut sum = Powers::default();
         let nodes = &self.times[..self.count];
-        let even = |(i, x): (usize, &f64)| (x - (i as f64 - 4.0)).abs() < EVENLY;
+        let even = |(i, x): (usize, &f64)| (x - (i as f64 - 4.0)).abs() < EVEN_TOLERANCE;
         if end == 1.0 && nodes.len() == NODES && nodes.iter().enumerate().all(even) {
-            for (weight, powers) in EVEN.iter().zip(&self.powers) {
+            for (weight, powers) in EVEN_WEIGHTS.iter().zip(&self.powers) {
                 sum.add(*weight, powers);
             }
             return sum;
@@ -208,7 +209,7 @@ impl Account {
     }
 
     /// Records a step of size `h` that ends with `energies`, from the powers in `course`.
-    pub(super) fn book(&mut self, h: f64, energies: Energies) {
+    pub(super) fn record_step(&mut self, h: f64, energies: Energies) {
         self.before = self.now;
         self.now = (self.within(1.0, h, energies), energies);
     }
@@ -243,12 +244,12 @@ impl Account {
         let (ledger, start) = &self.before;
         let mut works = Powers::default();
         works.add(h, &self.course.integral(theta));
-        entered(ledger, start, energies, &works)
+        with_exchanges(ledger, start, energies, &works)
     }
 }
 
 /// `ledger` plus the exchanges since the energies were `start`.
-fn entered(ledger: &Ledger, start: &Energies, end: Energies, works: &Powers) -> Ledger {
+fn with_exchanges(ledger: &Ledger, start: &Energies, end: Energies, works: &Powers) -> Ledger {
     let gravity = start.gravitational - end.gravitational;
     let kinetic = end.kinetic - start.kinetic;
     let elastic = end.elastic - start.elastic;
@@ -286,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn a_course_integrates_the_polynomial_through_its_instants() {
+    fn the_integral_of_powers_is_that_of_their_interpolating_polynomial() {
         // A polynomial of degree 5 through six non-equidistant instants, four of them before the interval.
         let p = |t: f64| 1.0 + t * (2.0 - t * (3.0 - t * (0.5 + t * (0.25 - t))));
         let integral = |t: f64| t + t * t - t.powi(3) + 0.125 * t.powi(4) + 0.05 * t.powi(5) - t.powi(6) / 6.0;
@@ -297,21 +298,21 @@ mod tests {
         course.push_apart(0.3, drive(p(0.3)), 1e-2);
         course.push_apart(1.0, drive(p(1.0)), 1e-2);
         assert_eq!(course.len(), NODES, "the oldest is forgotten");
-        let seen = course.seen_from(0.3, 0.7);
+        let shifted = course.in_step_time(0.3, 0.7);
         let expected = [-8.0 / 7.0, -5.0 / 7.0, -3.0 / 7.0, 0.0, 1.0];
-        for (time, expected) in seen.times[1..].iter().zip(expected) {
+        for (time, expected) in shifted.times[1..].iter().zip(expected) {
             assert!((time - expected).abs() < 1e-15);
         }
         for end in [1.0, 0.5, 0.0, -0.5] {
-            let got = 0.7 * seen.integral(end).drive;
+            let got = 0.7 * shifted.integral(end).drive;
             let expected = integral(0.3 + 0.7 * end) - integral(0.3);
             assert!((got - expected).abs() < 1e-13, "{got} {expected}");
         }
     }
 
     #[test]
-    fn even_instants_have_the_weights_of_the_polynomial_through_them() {
-        for (i, weight) in EVEN.into_iter().enumerate() {
+    fn weights_of_equidistant_instants_are_those_of_the_interpolating_polynomial() {
+        for (i, weight) in EVEN_WEIGHTS.into_iter().enumerate() {
             let (mut even, mut uneven) = (PowerInterpolant::default(), PowerInterpolant::default());
             for j in 0..NODES {
                 let (time, power) = (j as f64 - 4.0, if i == j { 1.0 } else { 0.0 });
@@ -326,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn simpson_and_radau_are_courses_through_their_own_instants() {
+    fn weights_at_the_nodes_of_simpson_and_radau_are_theirs() {
         let weight = |times: &[f64], which: usize| {
             let mut course = PowerInterpolant::default();
             for (i, &t) in times.iter().enumerate() {
@@ -347,12 +348,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_booked_is_the_residual() {
+    fn unrecorded_energy_is_the_residual() {
         let at = |kinetic: f64, gravitational: f64| Energies { kinetic, gravitational, ..Energies::default() };
         let mut account = Account::start(true, at(0.0, 1.0));
         account.course.push(0.0, drive(2.0));
         // 2 J from the drive and 1 J from gravity, of which 2.75 J arrive.
-        account.book(1.0, at(2.75, 0.0));
+        account.record_step(1.0, at(2.75, 0.0));
         let ledger = account.ledger();
         assert_eq!(ledger.residual(), -0.25);
         assert_eq!((ledger.exchanged, ledger.held, ledger.scale()), (0.5 * 5.75, 2.75, 2.75));

@@ -42,14 +42,14 @@ impl LoadPeaks {
     /// Records the loads at the step end `time`, where everything has just been evaluated.
     pub(super) fn evaluate(&mut self, mechanism: &mut Mechanism, time: f64) {
         self.seen = time;
-        mechanism.actuators(&mut self.actuators);
-        self.take(mechanism, time);
+        mechanism.actuator_forces(&mut self.actuators);
+        self.record(mechanism, time);
     }
 
-    /// Records the loads at `time` after [`Mechanism::actuators`].
-    pub(super) fn take(&mut self, mechanism: &mut Mechanism, time: f64) {
+    /// Records the loads at `time` after [`Mechanism::actuator_forces`].
+    pub(super) fn record(&mut self, mechanism: &mut Mechanism, time: f64) {
         let mut parts = self.parts.iter_mut();
-        let mut rise = |loads: [Option<Vec3>; 2]| {
+        let mut update = |loads: [Option<Vec3>; 2]| {
             let part = parts.next().expect("a peak for each part");
             for (peak, load) in part.iter_mut().zip(loads) {
                 let size = load.map(|load| load.norm());
@@ -58,8 +58,8 @@ impl LoadPeaks {
                 }
             }
         };
-        mechanism.element_reports(time).for_each(|element| rise([element.own_force(), element.torque]));
-        mechanism.joint_reactions().for_each(|load| rise(load.map(Some)));
-        mechanism.closing_loads().for_each(|load| rise(load.map(Some)));
+        mechanism.element_reports(time).for_each(|element| update([element.own_force(), element.torque]));
+        mechanism.joint_reactions().for_each(|load| update(load.map(Some)));
+        mechanism.closing_loads().for_each(|load| update(load.map(Some)));
     }
 }

@@ -1,4 +1,5 @@
-//! Simulation: a constant [`Model`], a [`State`] and a [`Workspace`]; stepping, live changes, recorded channels, divergence guard.
+//! Simulation: a constant [`Model`], a [`State`] and a [`Workspace`]; stepping, live changes, recorded channels, divergence
+//! guard.
 
 mod angles;
 mod channels;
@@ -18,7 +19,7 @@ mod wear;
 
 pub use angles::angles_of;
 pub use channels::*;
-pub use doubt::{Doubt, Joints, LedgerTerm};
+pub use doubt::{AffectedJoints, Doubt, LedgerTerm};
 pub use frame::*;
 pub use history::{Bin, History, Mark};
 pub use impacts::Impact;
@@ -39,7 +40,7 @@ use crate::mechanism::{Counts, MechanismError};
 /// The longest run, s: at its end a double still resolves 0.1 ns.
 pub const LONGEST_RUN: f64 = 1e6;
 
-/// Why a simulation could not start.
+/// Error in starting a simulation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct StartError(#[from] pub MechanismError);
@@ -150,7 +151,7 @@ mod tests {
     use crate::machine::{Attachment, BallJoint, Machine, MachineFault, Vec3};
 
     #[test]
-    fn a_machine_whose_parts_do_not_fit_does_not_start() {
+    fn an_inconsistent_machine_does_not_start() {
         let fault = |machine: &Machine| Simulation::new(machine).err().map(|error| error.0);
         assert_eq!(fault(&Machine::default()), Some(MechanismError::Machine(MachineFault::Empty)));
         let mut machine = crate::scene::Scene::load("pendulum", &[]).expect("built in").machine;

@@ -12,7 +12,7 @@ pub const REST: f64 = 2.0;
 pub const USUAL_BUDGET: f64 = 0.012;
 
 /// Largest stepping budget, s, however slow drawing is, so that the interface stays responsive.
-pub const LARGEST_BUDGET: f64 = 0.25;
+pub const MAX_BUDGET: f64 = 0.25;
 
 /// Longest spell of stepping between two frames, s: user input waits until it ends.
 pub const SPELL: f64 = 0.008;
@@ -24,7 +24,7 @@ const AVERAGE: f64 = 0.5;
 pub const SCALE_RANGE: (f64, f64) = (1e-4, 1.0);
 
 /// Fraction of the requested time scale below which the run does not keep up.
-const KEPT_UP: f64 = 0.97;
+const KEEPS_UP: f64 = 0.97;
 
 /// Bottleneck that keeps the run below the requested time scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ pub enum Limit {
 /// left in a frame of 1/60 s.
 fn budget(dt: f64, drawing: f64) -> f64 {
     let usual = (0.75 * dt).clamp(0.002, USUAL_BUDGET);
-    (drawing - (1.0 / 60.0 - USUAL_BUDGET)).clamp(usual, LARGEST_BUDGET)
+    (drawing - (1.0 / 60.0 - USUAL_BUDGET)).clamp(usual, MAX_BUDGET)
 }
 
 /// Keeps the displayed time in step with the wall clock as far as the machine can keep up.
@@ -189,7 +189,7 @@ impl Pacer {
         let reached = self.reached_scale()?;
         let slow = capacity.is_some_and(|capacity| capacity * capacity < self.scale * reached);
         let limit = if slow { Limit::Computing } else { Limit::Drawing };
-        (reached < KEPT_UP * self.scale).then_some(limit)
+        (reached < KEEPS_UP * self.scale).then_some(limit)
     }
 
     fn forget_average(&mut self) {
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fast_machine_reaches_the_asked_scale() {
+    fn a_fast_machine_reaches_the_requested_scale() {
         let mut pacer = Pacer::default();
         pacer.set_scale(0.5);
         run(&mut pacer, 120, 1.0 / 60.0, 10.0, 1e-5);
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_machine_slows_down_and_says_so() {
+    fn a_slow_machine_reports_the_scale_that_it_reaches() {
         let mut pacer = Pacer::default();
         pacer.set_scale(1.0);
         run(&mut pacer, 240, 1.0 / 60.0, 0.5, 1e-5);
@@ -297,15 +297,15 @@ mod tests {
     }
 
     #[test]
-    fn where_drawing_is_slow_stepping_gets_as_long() {
+    fn stepping_gets_as_much_time_as_slow_drawing() {
         // A chain that could run at 0.4 of real time, at three frames per second with the usual budget.
         let (drawing, speed, step) = (1.0 / 3.0 - USUAL_BUDGET, 0.4, 1e-4);
         let mut pacer = Pacer::default();
         pacer.set_scale(1.0);
         let longest = drawn(&mut pacer, 100, drawing, speed, step);
-        assert!(longest < drawing + LARGEST_BUDGET + step / speed, "{longest}");
+        assert!(longest < drawing + MAX_BUDGET + step / speed, "{longest}");
         let reached = pacer.reached_scale().expect("measured");
-        let share = LARGEST_BUDGET / (LARGEST_BUDGET + drawing);
+        let share = MAX_BUDGET / (MAX_BUDGET + drawing);
         assert!((reached / speed - share).abs() < 0.01, "{reached}");
         assert!(reached > 10.0 * speed * USUAL_BUDGET * 3.0, "{reached}");
         assert_eq!(pacer.limit(Some(speed)), Some(Limit::Computing));
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_frames_in_succession_are_caught_up_with_whole() {
+    fn successive_slow_frames_are_caught_up_with_completely() {
         let mut pacer = Pacer::default();
         pacer.set_scale(1.0);
         drawn(&mut pacer, 20, 0.6, 1000.0, 1e-4);
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hitch_gives_stepping_no_more_than_usual() {
+    fn a_hitch_does_not_raise_the_stepping_budget() {
         let mut pacer = Pacer::default();
         pacer.set_scale(1.0);
         for dt in [1.0 / 60.0, 1.0 / 60.0, 0.9, 1.0 / 60.0, 5.0, 5.0] {
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_of_an_ordinary_screen_is_shared_as_ever_and_a_faster_one_stays_fast() {
+    fn budgets_at_common_refresh_rates_have_their_stated_values() {
         // The wait for the screen counts as drawing.
         for (hertz, usual) in [(60.0, 0.012), (120.0, 0.00625), (30.0, 0.0286)] {
             let dt = 1.0 / hertz;
@@ -385,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn between_slow_frames_it_steps_in_short_spells_and_as_far_as_within_them() {
+    fn steps_between_slow_frames_come_in_short_spells_and_reach_the_requested_scale() {
         // At speed 0.5 at most half a second per second is possible, less the time for drawing.
         for (speed, wanted) in [(0.5, 0.1), (0.5, 1.0), (10.0, 1.0)] {
             let mut pacer = Pacer::default();
@@ -402,10 +402,10 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_is_what_takes_more_of_the_asked_scale() {
-        let limit = |asked, drawing, speed| {
+    fn the_limit_is_the_larger_of_the_two_slowdowns() {
+        let limit = |requested, drawing, speed| {
             let mut pacer = Pacer::default();
-            pacer.set_scale(asked);
+            pacer.set_scale(requested);
             drawn(&mut pacer, 200, drawing, speed, 1e-5);
             pacer.limit(Some(speed))
         };

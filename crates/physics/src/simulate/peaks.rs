@@ -15,7 +15,7 @@ pub(super) struct Approach {
 
 impl Approach {
     /// Whether the ball is exactly at the wall and moving into it.
-    pub(super) fn arrives(&self) -> bool {
+    pub(super) fn is_arriving(&self) -> bool {
         self.penetration == 0.0 && self.rate > 0.0
     }
 }
@@ -35,7 +35,7 @@ impl Recent {
     }
 
     /// Adds the value at a new instant; returns the largest value since the previous one, from the parabola through three.
-    pub(super) fn rise(&mut self, time: f64, value: f64) -> f64 {
+    pub(super) fn push_and_find_peak(&mut self, time: f64, value: f64) -> f64 {
         let [(t0, f0), (t1, f1)] = self.before;
         self.before = [(t1, f1), (time, value)];
         if f0 <= 0.0 || !(f1 >= f0 && f1 >= value) || t1 <= t0 || time <= t1 {
@@ -153,7 +153,7 @@ impl PenetrationCubic {
         // Sign of dF/dt, F = K p^1.5 (1 + chi v / v0): 1.5 v (1 + chi v / v0) + p chi a / v0; where v0 is v, the sign of v.
         let slope = |theta: f64| {
             let (p, v, a) = self.at(theta);
-            if p <= 0.0 || contact_state.follows(c, v) {
+            if p <= 0.0 || contact_state.approach_follows_rate(c, v) {
                 return v;
             }
             let chi = c.damping / contact_state.approach(c, v);
@@ -185,15 +185,15 @@ mod tests {
     use crate::contact::Parameters;
 
     #[test]
-    fn a_parabola_between_samples_has_its_vertex_found() {
+    fn the_peak_of_a_parabola_between_samples_is_found() {
         let f = |t: f64| 7.0 - 3.0 * (t - 0.42) * (t - 0.42);
         let mut recent = Recent::default();
-        let peak = [0.1, 0.35, 0.7].map(|t| recent.rise(t, f(t)))[2];
+        let peak = [0.1, 0.35, 0.7].map(|t| recent.push_and_find_peak(t, f(t)))[2];
         assert!((peak - 7.0).abs() < 1e-14, "{peak}");
     }
 
     #[test]
-    fn finds_the_peak_of_an_impact_between_coarse_samples() {
+    fn the_peak_of_an_impact_between_coarse_samples_is_found() {
         // penetration = a sin(pi t / T): undamped peak at T / 2.
         let c = Coefficients { damping: 0.0, ..Coefficients::new(&Parameters::default(), 3e-4) };
         let (a, t_end) = (4e-6, 1e-4);

@@ -45,7 +45,7 @@ pub(super) fn fill(
     out.coordinates.clear();
     out.coordinates.extend(mechanism.coordinates(y));
     out.actuators.resize(mechanism.drives(), 0.0);
-    mechanism.actuators(&mut out.actuators);
+    mechanism.actuator_forces(&mut out.actuators);
     if let Some(reactions) = &mut out.reactions {
         reactions.clear();
         reactions.extend(mechanism.joint_reactions());

@@ -1,5 +1,5 @@
-//! A running simulation: a constant model, the state of a run, and the workspace in which it is stepped. What each of them can do
-//! is in the files beside. Reads no clock.
+//! A running simulation: a constant model, the state of a run, and the workspace in which it is stepped. Their methods are
+//! in the files of this module's folder. Reads no clock.
 
 mod adaptive;
 mod automatic;
@@ -37,7 +37,7 @@ use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::{Controller, Polynomial};
 use crate::machine::{Conditions, Machine, Vec3};
 use crate::mechanism::{self, Counts, ElementReport, Flight, Mechanism, Pull, Ramp};
-use adaptive::Whole;
+use adaptive::FullStep;
 use automatic::SchemeSelector;
 use corners::LawBranch;
 use ideal::TipHistory;
@@ -65,8 +65,8 @@ fn shortest_step(t: f64) -> f64 {
     SHORTEST_STEP.max(4.0 * f64::EPSILON * t)
 }
 
-/// A machine compiled for simulation. It is constant, and threads may share it; what changes is a [`State`], which is stepped in a
-/// [`Workspace`].
+/// A machine compiled for simulation. It is constant, and threads may share it; what changes is a [`State`], which is stepped in
+/// a [`Workspace`].
 ///
 /// ```
 /// # use jointplay_physics::{machine::*, simulate::*};
@@ -94,8 +94,8 @@ pub struct Model {
     start: State,
 }
 
-/// The state of a run of a [`Model`]: all that changes, each fact once. A clone is a snapshot, and serialised it is a saved run;
-/// stepping on from either gives the same bits.
+/// The state of a run of a [`Model`]: everything that changes, each fact once. A clone is a snapshot, and a serialised state is a
+/// saved run; both continue with the same bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct State {
@@ -111,17 +111,17 @@ pub struct State {
     /// Flights of the bodies excluded from the latest step, indexed like the mechanism's free-flight bodies.
     flights: Vec<Option<Flight>>,
     control: Control,
-    /// Empty with a method that has none.
+    /// Latest collocation polynomial; empty unless the method has one.
     polynomial: Polynomial,
     record: Record,
-    /// Largest sampled force, N, and its time, s, by joint: kept apart from the record, which sampling does not change.
+    /// Largest sampled force, N, and its time, s, by joint: separate from the record, which sampling does not change.
     sampled: Vec<(f64, f64)>,
     /// Load peaks, if tracked; sampling changes them.
     loads: Option<LoadPeaks>,
-    /// The ideal motion, if it is simulated alongside; sampling takes it along.
+    /// The ideal motion, if it is simulated alongside; sampling advances it.
     ideal: Option<Box<IdealState>>,
     #[serde(skip)]
-    follows: Follows,
+    workspace_id: WorkspaceId,
 }
 
 /// State vector, derivative, gaps and contact state at one instant.
@@ -142,11 +142,11 @@ struct StepEnd {
 struct Control {
     /// Next step of an adaptive method.
     h_next: f64,
-    /// Step that worked after the latest contact began.
+    /// Step size that was accepted after the latest contact began.
     h_contact: f64,
-    /// A contact began at the latest event.
+    /// Whether a contact began at the latest event.
     contact_began: bool,
-    /// Measure of how often corners of the friction law occur, and whether that is too often to locate them.
+    /// Measure of how often corners of the friction law occur, and whether they occur too often to be located.
     chatter: u32,
     chatters: bool,
     /// Active scheme of the automatic method.
@@ -199,9 +199,9 @@ struct Record {
 #[error("these values do not describe a state of this scene")]
 pub struct StateMismatch;
 
-/// What stepping needs besides [`Model`] and [`State`]: matrices, stages, the latest step for samples within it, and forces of the
-/// latest evaluation. It follows one state at a time; given another, it is first brought to that state, which evaluates nothing.
-/// Steps then allocate nothing.
+/// Memory for stepping besides [`Model`] and [`State`]: matrices, stages, the latest step for samples within it, and forces of
+/// the latest evaluation. It is attached to one state at a time; given another, it is first attached to that one, which evaluates
+/// nothing. Steps then allocate nothing.
 pub struct Workspace {
     mechanism: Mechanism,
     stepper: AnyStepper,
@@ -213,15 +213,15 @@ pub struct Workspace {
     scratch_contacts: Vec<ContactState>,
     /// For the ideal motion alongside.
     ideal: Option<Box<IdealWorkspace>>,
-    follows: Follows,
+    workspace_id: WorkspaceId,
 }
 
-/// Ties a state to the workspace that follows it: both hold the same number, drawn anew whenever a workspace turns to a state. A
-/// clone of a state, and a state that was read, are followed by none. The numbers do not enter any computation.
+/// Identifies the workspace that a state is attached to: both hold the same number, a new one each time a workspace is attached
+/// to a state. A clone of a state, and a state that was read, are attached to none. The numbers do not enter any computation.
 #[derive(Debug, Default)]
-struct Follows(u64);
+struct WorkspaceId(u64);
 
-/// A state of a model being stepped in a workspace that follows it.
+/// A state of a model that is stepped in the workspace attached to it.
 struct Run<'a> {
     model: &'a Model,
     machine: &'a Machine,
@@ -241,27 +241,27 @@ struct Run<'a> {
 struct Attempt {
     end: StepEnd,
     /// Joint whose contact starts or ends at the step's end.
-    located: Option<usize>,
+    located_joint: Option<usize>,
     /// Joint that switches to another branch of a law there, and that branch.
     corner: Option<(usize, LawBranch)>,
-    /// Contact indicators that fix the side of each element during the step, as from [`Mechanism::pressed`]; empty if steps do
-    /// not end at edges of elements.
-    sides: Vec<f64>,
+    /// Contact indicators that fix the side of each element during the step, as from [`Mechanism::contact_indicators`]; empty if
+    /// steps do not end at edges of elements.
+    element_sides: Vec<f64>,
     /// Whether it ends at an edge.
     edge: bool,
     /// Contact indicators at both ends of a part of the step.
-    pressed: [Vec<f64>; 2],
-    /// Whether it was restarted on another branch.
-    turned: bool,
+    contact_indicators: [Vec<f64>; 2],
+    /// Whether it has been restarted on another branch.
+    has_switched_branch: bool,
     /// Joints whose contact left the frozen branches of its laws in an evaluation.
-    left: Vec<bool>,
-    /// The full step, if an event truncated it, and the full step that the next one must reproduce to follow another run.
-    whole: Option<Whole>,
-    beside: Option<Whole>,
+    has_left_branch: Vec<bool>,
+    /// The full step, if an event truncated it, and the full step of another run that the next step must reproduce.
+    full_step: Option<FullStep>,
+    step_to_reproduce: Option<FullStep>,
     /// Whether it may contain the largest force of a contact.
-    near_peak: bool,
+    may_contain_peak: bool,
     /// Largest normal force of each joint in contact, N, and the fraction of the step at which it occurs.
-    strongest: Vec<(f64, f64)>,
+    peak_forces: Vec<(f64, f64)>,
     /// Step size times the largest eigenvalue seen; 0 if unknown.
     stiffness: f64,
     /// Evaluations spent so far, and factorisations.
@@ -312,7 +312,7 @@ pub struct Simulation {
 
 impl Clone for Simulation {
     fn clone(&self) -> Self {
-        Self::of(self.model.clone(), self.state.clone())
+        Self::from_state(self.model.clone(), self.state.clone())
     }
 }
 
@@ -333,9 +333,9 @@ impl Simulation {
     }
 
     /// Continues from `state`, a state of `model`.
-    pub fn of(model: Arc<Model>, mut state: State) -> Self {
+    pub fn from_state(model: Arc<Model>, mut state: State) -> Self {
         let mut workspace = model.workspace(&state);
-        workspace.follow(&model, &mut state);
+        workspace.attach_to(&model, &mut state);
         Self { model, state, workspace }
     }
 
@@ -356,7 +356,7 @@ impl Simulation {
     /// Continues from another state of the same model, which costs a copy and evaluates nothing.
     pub fn restore(&mut self, state: &State) {
         self.state.clone_from(state);
-        self.workspace.follow(&self.model, &mut self.state);
+        self.workspace.attach_to(&self.model, &mut self.state);
     }
 
     /// Continues from a state that was read from a file.
@@ -381,7 +381,7 @@ impl Simulation {
 
     /// The machine with the live changes so far.
     pub fn changed_machine(&self) -> Machine {
-        self.machine().under(self.conditions())
+        self.machine().with_conditions(self.conditions())
     }
 
     /// Equations of motion at the latest evaluation.
@@ -490,8 +490,8 @@ impl Simulation {
     }
 
     /// Whether `end` would truncate the next step.
-    pub fn is_cut_by(&self, end: f64) -> bool {
-        step::is_cut_by(&self.state, &self.workspace.mechanism, end)
+    pub fn is_truncated_by(&self, end: f64) -> bool {
+        step::is_truncated_by(&self.state, &self.workspace.mechanism, end)
     }
 
     /// Samples the latest state.
@@ -505,8 +505,8 @@ impl Simulation {
     }
 
     /// Forces at the latest state that the motion does not determine uniquely.
-    pub fn not_unique(&mut self) -> Indeterminate {
-        self.run().not_unique()
+    pub fn indeterminate_forces(&mut self) -> Indeterminate {
+        self.run().indeterminate_forces()
     }
 
     /// Moves the peaks of each ball joint since the last call into `out`, in joint order.
@@ -520,7 +520,7 @@ impl Simulation {
     /// Appends to `out` the impacts that finished since the last call. None is lost if it is called after every step;
     /// otherwise only the latest 64 (more with more ball joints) are guaranteed.
     pub fn take_impacts(&mut self, out: &mut Vec<Impact>) {
-        self.state.record.impacts.hand_out(out);
+        self.state.record.impacts.take_new(out);
     }
 
     /// Adopts the gravity, contacts and stepper of `next`. Returns [`Effect::AtReset`] and changes nothing if `next` differs in
@@ -564,8 +564,8 @@ impl Simulation {
         Some(pull.report(motion.position + arm, velocity))
     }
 
-    /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state_vector`]) and continues from there. Quaternions are
-    /// renormalised, ideal joints closed again. A ball moved into its wall is now in contact, a ball lifted off is not; every
+    /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state_vector`]) and continues from there. Quaternions
+    /// are renormalised, ideal joints closed again. A ball moved into its wall is now in contact, a ball lifted off is not; every
     /// other contact retains its state. Counters are unchanged; a wear map is dropped.
     ///
     /// Components of `offset` beyond the state's are ignored, missing ones are 0.
@@ -575,7 +575,7 @@ impl Simulation {
 
     /// Moves the stored approach speeds of the contacts towards those of `other`, a run in nearly the same state, by the fraction
     /// `part` of their difference.
-    pub fn remember_like(&mut self, other: &Self, part: f64) {
+    pub fn blend_approach_speeds(&mut self, other: &Self, part: f64) {
         for (own, other) in self.state.now.contact_states.iter_mut().zip(&other.state.now.contact_states) {
             own.approach_speed += part * (other.approach_speed - own.approach_speed);
         }
@@ -586,7 +586,7 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::step`].
-    pub fn step_beside(&mut self, other: &Self) -> Result<(), Stopped> {
+    pub fn reproduce_step(&mut self, other: &Self) -> Result<(), Stopped> {
         if self.time() == other.step_start() {
             self.run().reproduce(&other.workspace.attempt);
         }
@@ -598,8 +598,8 @@ impl Simulation {
 
     /// Adopts the step control of `other`, a run in nearly the same state: its step size and its scheme of the automatic method.
     /// Two runs that choose their own have different errors and seem to diverge.
-    pub fn step_like(&mut self, other: &Self) {
-        self.run().step_like(&other.state.control);
+    pub fn adopt_step_control(&mut self, other: &Self) {
+        self.run().adopt_step_control(&other.state.control);
     }
 
     /// Scale of each component of [`Self::state_vector`]: the error scales of the tolerance.
@@ -609,20 +609,20 @@ impl Simulation {
 
     /// Starts a wear map, empty except for the current contacts, which count as begun. It belongs to the state, and a reset ends
     /// it. It does not affect the steps.
-    pub fn keep_wear(&mut self) {
-        self.run().keep_wear();
+    pub fn track_wear(&mut self) {
+        self.run().track_wear();
     }
 
     /// Adds the contributions of the latest step to the wear map, instead of leaving that to the next step.
     pub fn commit_wear(&mut self) {
         if let Some(wear) = &mut self.state.record.wear {
-            wear.pass();
+            wear.commit_step();
         }
     }
 
     /// Tracks load peaks from now on. This does not affect the steps.
-    pub fn keep_load_peaks(&mut self) {
-        self.run().keep_load_peaks();
+    pub fn track_load_peaks(&mut self) {
+        self.run().track_load_peaks();
     }
 }
 

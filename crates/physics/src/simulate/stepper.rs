@@ -18,7 +18,7 @@ pub(super) enum AnyStepper {
     Automatic {
         explicit: DormandPrince,
         stiff: Box<Radau>,
-        member: ActiveScheme,
+        scheme: ActiveScheme,
     },
 }
 
@@ -43,7 +43,7 @@ impl AnyStepper {
             Method::Automatic => Self::Automatic {
                 explicit: DormandPrince::new(dimension),
                 stiff: Box::new(Radau::new(dimension)),
-                member: ActiveScheme::Explicit,
+                scheme: ActiveScheme::Explicit,
             },
         }
     }
@@ -62,8 +62,8 @@ impl AnyStepper {
 
     /// Activates a scheme of the automatic method.
     pub(super) fn choose(&mut self, chosen: ActiveScheme) {
-        if let Self::Automatic { member, .. } = self {
-            *member = chosen;
+        if let Self::Automatic { scheme, .. } = self {
+            *scheme = chosen;
         }
     }
 
@@ -83,7 +83,7 @@ impl AnyStepper {
     /// Upper bound on the step-size factor after the latest attempt, in addition to the limit set by its error.
     pub(super) fn growth(&self) -> f64 {
         match self {
-            Self::Radau(s) | Self::Automatic { stiff: s, member: ActiveScheme::Implicit, .. } => s.growth(),
+            Self::Radau(s) | Self::Automatic { stiff: s, scheme: ActiveScheme::Implicit, .. } => s.growth(),
             _ => f64::INFINITY,
         }
     }
@@ -91,7 +91,7 @@ impl AnyStepper {
     /// Factorisations of the full matrices in the latest attempt by the automatic method's implicit scheme; otherwise 0.
     pub(super) fn factorisations(&self) -> u32 {
         match self {
-            Self::Automatic { stiff, member: ActiveScheme::Implicit, .. } => stiff.factorisations(),
+            Self::Automatic { stiff, scheme: ActiveScheme::Implicit, .. } => stiff.factorisations(),
             _ => 0,
         }
     }
@@ -99,8 +99,8 @@ impl AnyStepper {
     /// Step size times the largest eigenvalue seen in the step just attempted by an explicit adaptive method.
     pub(super) fn stiffness<S: System>(&self, system: &S, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         match self {
-            Self::DormandPrince(explicit) | Self::Automatic { explicit, member: ActiveScheme::Explicit, .. } => {
-                explicit.stiffness(system.moving(), h, y_end, k_end)
+            Self::DormandPrince(explicit) | Self::Automatic { explicit, scheme: ActiveScheme::Explicit, .. } => {
+                explicit.stiffness(system.active_ranges(), h, y_end, k_end)
             }
             _ => 0.0,
         }
@@ -122,7 +122,7 @@ impl AnyStepper {
             Self::SemiImplicitEuler(s) => s.attempt(system, t, h, y, k, y_end, k_end),
             Self::DiscreteGradient => unreachable!("the equations take this step"),
             Self::RungeKutta4(s) => s.attempt(system, t, h, y, k, y_end, k_end),
-            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: ActiveScheme::Explicit, .. } => {
+            Self::DormandPrince(s) | Self::Automatic { explicit: s, scheme: ActiveScheme::Explicit, .. } => {
                 s.attempt(system, t, h, y, k, y_end, k_end)
             }
             Self::Radau(s) | Self::Automatic { stiff: s, .. } => {
@@ -135,7 +135,7 @@ impl AnyStepper {
     /// own nodes, between which its polynomial departs from stiff contacts.
     pub(super) fn interior(&self) -> &'static [f64] {
         match self {
-            Self::Radau(_) | Self::Automatic { member: ActiveScheme::Implicit, .. } => &Radau::INTERIOR,
+            Self::Radau(_) | Self::Automatic { scheme: ActiveScheme::Implicit, .. } => &Radau::INTERIOR,
             _ => &[0.5],
         }
     }
@@ -144,7 +144,7 @@ impl AnyStepper {
     pub(super) fn quadrature(&self) -> &'static [f64] {
         const RADAU: [f64; 3] = [Radau::INTERIOR[0], Radau::INTERIOR[1], 1.0];
         match self {
-            Self::Radau(_) | Self::Automatic { member: ActiveScheme::Implicit, .. } => &RADAU,
+            Self::Radau(_) | Self::Automatic { scheme: ActiveScheme::Implicit, .. } => &RADAU,
             _ => &[0.0, 0.5, 1.0],
         }
     }
@@ -152,17 +152,17 @@ impl AnyStepper {
     /// Ends the latest attempt at fraction `theta` of it, on its interpolant.
     pub(super) fn truncate(&mut self, theta: f64, polynomial: &mut Polynomial) {
         match self {
-            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: ActiveScheme::Explicit, .. } => {
+            Self::DormandPrince(s) | Self::Automatic { explicit: s, scheme: ActiveScheme::Explicit, .. } => {
                 s.truncate(theta)
             }
-            Self::Radau(_) | Self::Automatic { member: ActiveScheme::Implicit, .. } => polynomial.truncate(theta),
+            Self::Radau(_) | Self::Automatic { scheme: ActiveScheme::Implicit, .. } => polynomial.truncate(theta),
             _ => {}
         }
     }
 
     /// Whether the interpolant is about as accurate as the step's error estimate.
     pub(super) fn ends_on_interpolant(&self) -> bool {
-        matches!(self, Self::DormandPrince(_) | Self::Automatic { member: ActiveScheme::Explicit, .. })
+        matches!(self, Self::DormandPrince(_) | Self::Automatic { scheme: ActiveScheme::Explicit, .. })
     }
 
     /// Whether `attempt` provides the derivative at the end.
@@ -193,7 +193,7 @@ impl AnyStepper {
                 let [y, k, y_end, k_end] = [y, k, y_end, k_end].map(|x| &x[part.clone()]);
                 hermite(theta, h, y, k, y_end, k_end, &mut out[part]);
             }
-            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: ActiveScheme::Explicit, .. } => {
+            Self::DormandPrince(s) | Self::Automatic { explicit: s, scheme: ActiveScheme::Explicit, .. } => {
                 s.interpolate(part, theta, h, y, k, out)
             }
             Self::Radau(_) | Self::Automatic { .. } => polynomial.interpolate(part, theta, y, out),

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::machine::{BallJoint, Machine, Mat3, Vec3};
-use crate::mechanism::{Mechanism, Touch};
+use crate::mechanism::{Mechanism, WallContact};
 
 /// Cells on each socket: about 14 degrees across.
 const CELLS: usize = 200;
@@ -134,7 +134,7 @@ struct Socket {
 
 /// A ball in contact at a quadrature node of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Press {
+struct ContactSample {
     /// Index among the quadrature nodes.
     instant: usize,
     joint: usize,
@@ -152,7 +152,7 @@ pub struct Wear {
     grid: Arc<Grid>,
     sockets: Vec<Socket>,
     /// Contacts at the nodes of the step being recorded; afterwards those at its end, reusable for the next step.
-    presses: Vec<Press>,
+    presses: Vec<ContactSample>,
     /// Contributions of the latest step, by joint and cell, not yet added to the cells.
     latest: Vec<(usize, usize, Cell)>,
 }
@@ -179,7 +179,7 @@ mod shared {
 }
 
 /// Largest number of entries per joint in one step: its nodes and one contact start.
-const MOST_ENTRIES: usize = 4;
+const MAX_ENTRIES: usize = 4;
 
 impl Wear {
     /// Approximate size in bytes, without the shared grid.
@@ -202,7 +202,7 @@ impl Wear {
             }
         };
         let sockets: Vec<Socket> = machine.ball_joints.iter().map(socket).collect();
-        let most = MOST_ENTRIES * sockets.len();
+        let most = MAX_ENTRIES * sockets.len();
         Self { presses: Vec::with_capacity(most), latest: Vec::with_capacity(most), sockets, grid }
     }
 
@@ -243,57 +243,57 @@ impl Wear {
     }
 
     /// Adds the contributions of the latest step to the cells.
-    pub(super) fn pass(&mut self) {
-        for (joint, cell, share) in self.latest.drain(..) {
+    pub(super) fn commit_step(&mut self) {
+        for (joint, cell, contribution) in self.latest.drain(..) {
             let cells = Arc::make_mut(&mut self.sockets[joint].cells);
-            cells[cell].add(&share);
+            cells[cell].add(&contribution);
         }
     }
 
-    /// Prepares to record a step. If `goes_on`, the forces at the end of the previous step are reused for its first node.
-    pub(super) fn begin_step(&mut self, goes_on: bool) {
-        self.pass();
-        if !goes_on {
+    /// Prepares to record a step. If `reuses_start`, the forces at the end of the previous step are reused for its first node.
+    pub(super) fn begin_step(&mut self, reuses_start: bool) {
+        self.commit_step();
+        if !reuses_start {
             self.presses.clear();
         }
     }
 
     /// Records the forces of the latest evaluation of `mechanism` at node `instant` of the step.
-    pub(super) fn read(&mut self, instant: usize, mechanism: &Mechanism) {
+    pub(super) fn record_forces(&mut self, instant: usize, mechanism: &Mechanism) {
         for joint in 0..self.sockets.len() {
-            if let Some(touch) = mechanism.touch(joint) {
-                self.press(instant, joint, &touch);
+            if let Some(contact) = mechanism.wall_contact(joint) {
+                self.record_contact(instant, joint, &contact);
             }
         }
     }
 
     /// Records the forces of ball joint `joint` at node `instant` of the step.
-    pub(super) fn press(&mut self, instant: usize, joint: usize, touch: &Touch) {
-        let cell = self.cell(joint, &touch.direction);
-        let Touch { normal_force, friction_power, .. } = *touch;
-        self.presses.push(Press { instant, joint, cell, normal_force, friction_power });
+    pub(super) fn record_contact(&mut self, instant: usize, joint: usize, contact: &WallContact) {
+        let cell = self.cell(joint, &contact.direction);
+        let WallContact { normal_force, friction_power, .. } = *contact;
+        self.presses.push(ContactSample { instant, joint, cell, normal_force, friction_power });
     }
 
     /// Records that a contact of `joint` begins in `direction`, in the axes of the socket's body.
     pub(super) fn begin_contact(&mut self, joint: usize, direction: &Vec3) {
-        let share = Cell { contacts: 1, ..Cell::default() };
-        self.latest.push((joint, self.cell(joint, direction), share));
+        let contribution = Cell { contacts: 1, ..Cell::default() };
+        self.latest.push((joint, self.cell(joint, direction), contribution));
     }
 
     /// Integrates the recorded forces over a step of size `h` with the quadrature weights `weights`.
-    pub(super) fn book(&mut self, h: f64, weights: &[f64]) {
-        for press in &self.presses {
-            let weight = h * weights[press.instant];
-            let share = Cell {
+    pub(super) fn integrate_step(&mut self, h: f64, weights: &[f64]) {
+        for sample in &self.presses {
+            let weight = h * weights[sample.instant];
+            let contribution = Cell {
                 contacts: 0,
-                impulse: weight * press.normal_force,
-                friction_work: weight * press.friction_power,
+                impulse: weight * sample.normal_force,
+                friction_work: weight * sample.friction_power,
             };
-            self.latest.push((press.joint, press.cell, share));
+            self.latest.push((sample.joint, sample.cell, contribution));
         }
         let last = weights.len() - 1;
-        self.presses.retain(|press| press.instant == last);
-        self.presses.iter_mut().for_each(|press| press.instant = 0);
+        self.presses.retain(|sample| sample.instant == last);
+        self.presses.iter_mut().for_each(|sample| sample.instant = 0);
     }
 
     fn cell(&self, joint: usize, direction: &Vec3) -> usize {
@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_are_of_equal_area_and_cover_the_sphere() {
+    fn cells_have_equal_area_and_cover_the_sphere() {
         for n in [2, 3, 4, 20, CELLS, 1001] {
             let grid = Grid::new(n);
             assert_eq!(grid.cells(), n);
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_of_a_map_are_about_as_wide_as_high() {
+    fn cells_are_about_as_wide_as_high() {
         let grid = Grid::new(CELLS);
         let zones: Vec<_> = (0..).map_while(|zone| grid.zone(zone)).collect();
         let counts: Vec<usize> = zones.iter().map(ExactSizeIterator::len).collect();
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn every_direction_has_its_cell() {
+    fn every_direction_lies_in_one_cell() {
         let grid = Grid::new(CELLS);
         assert_eq!(grid.cell(&Vec3::z()), 0);
         assert_eq!(grid.cell(&-Vec3::z()), CELLS - 1);

@@ -1,4 +1,4 @@
-//! Joints held open by given amounts, and the part of given loads that they bear.
+//! Joints that are open by given amounts, and the part of given loads that joints balance.
 
 use super::Constraints;
 use crate::mechanism::kinematics::Kinematics;
@@ -27,25 +27,25 @@ impl Constraints {
 
     /// Writes the opening of every row at `motion` to `out`: e of the ball joints, m, then the violations of the units, m or rad.
     pub fn openings(&mut self, model: &Model, motion: &[Kinematics], out: &mut [f64]) {
-        self.put_residuals(model, motion);
+        self.set_residuals(model, motion);
         for (out, x) in out.iter_mut().zip(&self.multipliers) {
             *out = -x;
         }
     }
 
-    /// Displacement of the coordinates, least in the metric of the mass matrix, that changes the openings of all rows by `change`,
-    /// to first order and with the latest matrices.
-    pub fn open_by(&mut self, model: &Model, change: &[f64], step: &mut [f64]) {
+    /// Displacement of the coordinates, least in the metric of the mass matrix, that changes the openings of all rows by
+    /// `change`, to first order and with the latest matrices.
+    pub fn displacement_for_opening(&mut self, model: &Model, change: &[f64], step: &mut [f64]) {
         self.multipliers.copy_from_slice(change);
         self.matrix.solve(&mut self.multipliers);
         step.fill(0.0);
         self.add_weighted(model, &self.multipliers, step);
     }
 
-    /// Loads x, N or N m, that the rows bear of generalised forces f, given f as the accelerations `vdot` = M^-1 f: J^T x = f except
-    /// for the part that the joints leave free, whose accelerations remain in `vdot`. If rows are dependent, any multiple of
-    /// [`Self::system`]'s null vectors may be added to x.
-    pub fn bear(&mut self, model: &Model, vdot: &mut [f64], x: &mut [f64]) {
+    /// Loads x, N or N m, of the rows that balance generalised forces f, given f as the accelerations `vdot` = M^-1 f. J^T x = f,
+    /// except for the part of f that moves the joints freely; its accelerations remain in `vdot`. If rows are dependent, any
+    /// multiple of [`Self::system`]'s null vectors may be added to x.
+    pub fn balance_loads(&mut self, model: &Model, vdot: &mut [f64], x: &mut [f64]) {
         self.project_accelerations(model, vdot);
         for (x, multiplier) in x.iter_mut().zip(&self.scratch) {
             *x = -multiplier;

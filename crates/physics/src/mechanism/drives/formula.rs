@@ -9,7 +9,7 @@ pub(super) struct Formula {
     pub program: Program,
     pub scale: f64,
     /// Longest step, s.
-    pub resolve: f64,
+    pub max_step: f64,
 }
 
 impl Law for Formula {
@@ -18,7 +18,7 @@ impl Law for Formula {
     }
 
     fn step_end(&self, t: f64) -> f64 {
-        t + self.resolve
+        t + self.max_step
     }
 
     fn bounds_steps(&self) -> bool {

@@ -5,9 +5,9 @@ use crate::jet::Jet;
 use crate::machine::Harmonic;
 
 /// Relative deviation from a ratio of integers beyond which two frequencies have no common period.
-const IN_STEP: f64 = 1e-6;
+const RATIO_TOLERANCE: f64 = 1e-6;
 /// Largest integer in such a ratio.
-const MOST_SWINGS: f64 = 1000.0;
+const MAX_PERIODS: f64 = 1000.0;
 
 /// A harmonic at `t`.
 fn at(term: &Harmonic, t: f64) -> Jet {
@@ -38,20 +38,20 @@ impl Law for Harmonics {
     fn period(&self) -> f64 {
         let frequencies = self.terms.iter().map(|term| term.frequency);
         let lowest = frequencies.clone().fold(f64::INFINITY, f64::min);
-        let base = frequencies.reduce(common).unwrap_or(0.0);
-        if base * MOST_SWINGS >= lowest { 1.0 / base } else { f64::INFINITY }
+        let base = frequencies.reduce(common_divisor).unwrap_or(0.0);
+        if base * MAX_PERIODS >= lowest { 1.0 / base } else { f64::INFINITY }
     }
 
-    fn swing(&self) -> f64 {
+    fn shortest_period(&self) -> f64 {
         let frequencies = self.terms.iter().map(|term| term.frequency);
         1.0 / frequencies.fold(0.0, f64::max)
     }
 }
 
 /// Greatest common divisor of two frequencies up to rounding, by Euclid's algorithm; 0 if there is none.
-fn common(a: f64, b: f64) -> f64 {
+fn common_divisor(a: f64, b: f64) -> f64 {
     let (mut high, mut low) = (a.max(b), a.min(b));
-    let least = IN_STEP * low;
+    let least = RATIO_TOLERANCE * low;
     while low > least {
         let rest = high % low;
         // A remainder just below the divisor is rounding, too.

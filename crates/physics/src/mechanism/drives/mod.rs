@@ -30,7 +30,7 @@ pub trait Law: Debug + Send + Sync {
     }
 
     /// Shortest period of oscillation in the motion, s. A mechanism that follows it exactly uses steps of a fiftieth of this.
-    fn swing(&self) -> f64 {
+    fn shortest_period(&self) -> f64 {
         self.period()
     }
 
@@ -55,7 +55,7 @@ pub enum Trajectory {
 }
 
 /// Shortest step that [`Law::step_end`] may impose, s. It prevents steps of rounding length.
-const NEAR: f64 = 1e-9;
+const MIN_STEP: f64 = 1e-9;
 /// Minimum number of steps over a single ramp or pulse.
 const PARTS: f64 = 50.0;
 
@@ -73,7 +73,7 @@ pub(super) fn trajectory_of(drive: &Drive, turns: bool) -> Trajectory {
         }
         Drive::Table { points, repeats } => Arc::new(Table::new(points, *repeats)),
         Drive::Formula { program, scale, resolve } => {
-            Arc::new(Formula { program: program.clone(), scale: *scale, resolve: *resolve })
+            Arc::new(Formula { program: program.clone(), scale: *scale, max_step: *resolve })
         }
     })
 }
@@ -101,27 +101,27 @@ impl Trajectory {
         }
     }
 
-    /// As [`Law::swing`].
-    pub(super) fn swing(&self, machine: &Machine) -> f64 {
-        self.law().map_or_else(|| closed_period(machine), |law| law.swing())
+    /// As [`Law::shortest_period`].
+    pub(super) fn shortest_period(&self, machine: &Machine) -> f64 {
+        self.law().map_or_else(|| closed_period(machine), |law| law.shortest_period())
     }
 }
 
 /// Period of the functions of the closed form of `machine` that drives follow, s; infinite if none moves.
 fn closed_period(machine: &Machine) -> f64 {
-    let followed = machine.joints.iter().flat_map(Joint::drives).filter_map(|(_, drive)| match drive {
+    let driving_functions = machine.joints.iter().flat_map(Joint::drives).filter_map(|(_, drive)| match drive {
         Drive::Function(function) => Some(*function),
         _ => None,
     });
-    let followed: Vec<usize> = followed.collect();
-    machine.closed_form.as_ref().map_or(f64::INFINITY, |form| form.period(&followed))
+    let driving_functions: Vec<usize> = driving_functions.collect();
+    machine.closed_form.as_ref().map_or(f64::INFINITY, |form| form.period(&driving_functions))
 }
 
 /// Latest end of a step from `t` for a motion that lasts from `start` to `end`.
 fn step_end_within(start: f64, end: f64, t: f64) -> f64 {
-    if t < start - NEAR {
+    if t < start - MIN_STEP {
         start
-    } else if t < end - NEAR {
+    } else if t < end - MIN_STEP {
         end.min(t + (end - start) / PARTS)
     } else {
         f64::INFINITY

@@ -1,13 +1,13 @@
 //! Cubic spline through points. The second derivative is continuous between the first and last point, and everywhere for a
 //! periodic table. Outside a table that does not repeat, the end values hold, and the rate is 0 at both ends.
 
-use super::{Law, NEAR};
+use super::{Law, MIN_STEP};
 use crate::jet::Jet;
 use crate::mechanism::spline::{Ends, Spline};
 
-/// Minimum number of steps per interval, unless they would be shorter than `FINE`, s.
+/// Minimum number of steps per interval, unless they would be shorter than `MIN_PART`, s.
 const PARTS: f64 = 8.0;
-const FINE: f64 = 1e-3;
+const MIN_PART: f64 = 1e-3;
 
 #[derive(Debug)]
 pub(super) struct Table {
@@ -21,8 +21,8 @@ impl Table {
     /// Spline through `points`, which span one period if it `repeats`.
     pub fn new(points: &[[f64; 2]], repeats: bool) -> Self {
         let ends = match repeats {
-            true => Ends::Joined,
-            false => Ends::Level,
+            true => Ends::Periodic,
+            false => Ends::Clamped,
         };
         Self { spline: Spline::new(points, ends), end: points[points.len() - 1][1], repeats }
     }
@@ -66,7 +66,7 @@ impl Law for Table {
     /// The next point, where the third derivative jumps, or an intermediate instant before it.
     fn step_end(&self, t: f64) -> f64 {
         let (now, times) = (self.within(t), &self.spline.knots);
-        let next = match self.spline.next(now + NEAR) {
+        let next = match self.spline.next(now + MIN_STEP) {
             next if next < times.len() => next,
             _ if self.repeats => return t + part(times[1] - times[0]),
             _ => return f64::INFINITY,
@@ -85,5 +85,5 @@ impl Law for Table {
 
 /// Longest step within an interval of this width, s.
 fn part(width: f64) -> f64 {
-    (width / PARTS).max(FINE).min(width)
+    (width / PARTS).max(MIN_PART).min(width)
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
-use super::{Law, NEAR, Trajectory, periods_of, trajectory_of};
+use super::{Law, MIN_STEP, Trajectory, periods_of, trajectory_of};
 use crate::scene::Scene;
 
 /// A body of 1 kg on a slide along x with this drive.
@@ -91,7 +91,7 @@ proptest! {
     ) {
         for text in every_law(a, d, s) {
             let law = law(&text);
-            let held = text.contains("table") && !text.contains("repeat");
+            let is_one_shot_table = text.contains("table") && !text.contains("repeat");
             let mut t = -1.0;
             while t < 4.0 {
                 // Either an instant at which the law changes, or any other.
@@ -103,7 +103,7 @@ proptest! {
                 prop_assert!((left.rate - right.rate).abs() < fast, "{text} at {next}");
                 let jump = (left.acceleration - right.acceleration).abs();
                 let end = next.abs() < eps || (next - 3.0 * d).abs() < eps;
-                prop_assert!(jump < fast || (held && end), "{text} at {next}: {jump}");
+                prop_assert!(jump < fast || (is_one_shot_table && end), "{text} at {next}: {jump}");
                 prop_assert!(next > t);
                 t = next;
             }
@@ -112,7 +112,7 @@ proptest! {
 }
 
 #[test]
-fn ramp_and_pulse_are_where_they_should_be() {
+fn a_ramp_and_a_pulse_have_their_stated_values() {
     let ramp = law("law = \"ramp\", from = \"1 m\", to = \"3 m\", start = \"1 s\", duration = \"2 s\"");
     for (t, value) in [(0.0, 1.0), (1.0, 1.0), (2.0, 2.0), (3.0, 3.0), (9.0, 3.0)] {
         assert_eq!(ramp.at(t).value, value, "{t}");
@@ -130,16 +130,16 @@ fn ramp_and_pulse_are_where_they_should_be() {
 }
 
 #[test]
-fn constant_and_harmonic_keep_their_arithmetic() {
+fn constant_and_harmonic_laws_have_the_bits_of_their_formulas() {
     let line = law("law = \"constant\", position = \"0.1 m\", velocity = \"0.3 m/s\"");
-    let swing =
+    let harmonic =
         law("law = \"harmonic\", mean = \"0.1 m\", amplitude = \"0.3 m\", frequency = \"1.7 Hz\", phase = \"0.2 rad\"");
     for t in [0.0, 0.123, 77.7] {
         let at = line.at(t);
         assert_eq!((at.value, at.rate, at.acceleration), (0.1 + 0.3 * t, 0.3, 0.0));
         let omega = TAU * 1.7;
         let (s, c) = libm::sincos(omega * t + 0.2);
-        let at = swing.at(t);
+        let at = harmonic.at(t);
         assert_eq!(at.value, 0.1 + 0.3 * s);
         assert_eq!(at.rate, 0.3 * (c * omega));
         assert_eq!(at.acceleration, 0.3 * (c * 0.0 + -s * omega * omega));
@@ -147,7 +147,7 @@ fn constant_and_harmonic_keep_their_arithmetic() {
 }
 
 #[test]
-fn one_harmonic_of_a_sum_is_that_harmonic() {
+fn a_sum_of_one_harmonic_equals_that_harmonic() {
     let one = law("law = \"harmonic\", mean = \"1 m\", amplitude = \"2 m\", frequency = \"3 Hz\", phase = \"1 rad\"");
     let sum = law(
         "law = \"harmonics\", mean = \"1 m\", terms = [{ amplitude = \"2 m\", frequency = \"3 Hz\", phase = \"1 rad\" }]",
@@ -176,14 +176,14 @@ fn the_period_of_a_law_is_the_time_after_which_it_repeats() {
         ("law = \"formula\", formula = \"sin(t)\"".into(), f64::INFINITY),
     ] {
         let scene = scene(&text);
-        let found = periods_of(&scene.machine).next().expect("driven");
-        assert!(found == period || (found - period).abs() < 1e-9, "{text}: {found}");
+        let computed = periods_of(&scene.machine).next().expect("driven");
+        assert!(computed == period || (computed - period).abs() < 1e-9, "{text}: {computed}");
         if period.is_finite() {
             let law = law(&text);
             assert!((law.at(0.3).value - law.at(0.3 + period).value).abs() < 1e-12);
         }
     }
-    assert!((law(&terms(&[2.0, 3.0])).swing() - 1.0 / 3.0).abs() < 1e-15);
+    assert!((law(&terms(&[2.0, 3.0])).shortest_period() - 1.0 / 3.0).abs() < 1e-15);
 }
 
 #[test]
@@ -237,7 +237,7 @@ fn a_periodic_table_repeats_on_both_sides_and_its_steps_end_at_its_points() {
     let (mut t, mut steps) = (0.0, 0);
     while t < 7.0 {
         let end = law.step_end(t);
-        assert!(end > t + NEAR, "{t} {end}");
+        assert!(end > t + MIN_STEP, "{t} {end}");
         let phase = (end - 0.2).rem_euclid(0.7);
         // At eighths of the intervals.
         let near = |from: f64, to: f64| {
@@ -251,7 +251,7 @@ fn a_periodic_table_repeats_on_both_sides_and_its_steps_end_at_its_points() {
 }
 
 #[test]
-fn steps_neither_pass_a_beginning_nor_stand_still() {
+fn steps_never_pass_the_start_of_a_feature_and_always_advance() {
     for text in every_law(0.1, 5e-3, 0.5) {
         let law = law(&text);
         let mut t = -0.5;
@@ -260,7 +260,7 @@ fn steps_neither_pass_a_beginning_nor_stand_still() {
             let end = law.step_end(t).min(t + 0.01);
             assert!(end > t, "{text}: {t}");
             if law.bounds_steps() && !text.contains("formula") && !text.contains("table") {
-                assert!(!(t < 0.5 - NEAR && end > 0.5), "{text}");
+                assert!(!(t < 0.5 - MIN_STEP && end > 0.5), "{text}");
             }
             (t, count) = (end, count + 1);
         }

@@ -5,7 +5,7 @@
 //! rotations up to half a turn. Both forces act at the second point, and the torque is -J^-T L theta, where J maps the rate of
 //! theta to the relative angular velocity. About one axis that is -L theta.
 
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Turning, push};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, TorqueDerivatives, push};
 use crate::machine::{self, Mat3, Quat, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::{Kinematics, quaternion_of};
@@ -131,13 +131,13 @@ impl ForceElement for Bushing {
         let world = |along: Mat3| s.axes * -along * s.axes.transpose();
         let across = |diagonal: &Vec3| world(Mat3::from_diagonal(diagonal));
         let to_torque = torque_matrix(&s.turn);
-        let turning = Turning {
-            by_turn: world(to_torque * Mat3::from_diagonal(&self.turning_stiffness) * to_torque.transpose()),
-            by_spin: across(&self.turning_damping),
+        let torque_derivatives = TorqueDerivatives {
+            by_rotation: world(to_torque * Mat3::from_diagonal(&self.turning_stiffness) * to_torque.transpose()),
+            by_angular_velocity: across(&self.turning_damping),
         };
         let along = [across(&self.stiffness), across(&self.damping)];
         let ends = self.ends_in(&s, at.motion);
-        Some(Coupling::at_one_point(ends, along, turning))
+        Some(Coupling::at_one_point(ends, along, torque_derivatives))
     }
 
     fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
@@ -167,7 +167,7 @@ mod tests {
     use nalgebra::Rotation3;
 
     #[test]
-    fn rotation_vectors_go_there_and_back() {
+    fn rotation_vectors_survive_conversion_to_a_matrix_and_back() {
         for turn in
             [Vec3::new(0.3, -0.2, 0.9), Vec3::new(1e-11, 2e-11, -1e-11), Vec3::new(0.0, -3.1, 0.1), Vec3::zeros()]
         {
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn the_torque_is_the_slope_of_the_energy() {
+    fn the_torque_is_the_gradient_of_the_energy() {
         let stiffness = Vec3::new(3.0, 7.0, 20.0);
         let energy = |rotation: &Rotation3<f64>| {
             let turn = rotation_vector(rotation.matrix());

@@ -6,7 +6,7 @@ use crate::machine::Vec3;
 use crate::mechanism::columns::contact_sides;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::{Anchor, BallJoint};
-use crate::mechanism::{Powers, Touch};
+use crate::mechanism::{Powers, WallContact};
 
 /// One ball joint at the latest evaluation.
 #[derive(Clone, Copy, Debug, Default)]
@@ -15,8 +15,8 @@ pub struct Gap {
     pub eccentricity: Vec3,
     /// de/dt, m/s.
     pub eccentricity_rate: Vec3,
-    /// Position of the ball in its socket. Every evaluation sets it for a ball beyond the wall, and `finish` completes it for the
-    /// others. An ideal joint has no penetration.
+    /// Position of the ball in its socket. Every evaluation sets it for a ball beyond the wall, and `complete_separation`
+    /// completes it for the others. An ideal joint has no penetration.
     pub separation: Separation,
     /// F_N, N (19).
     pub normal_force: f64,
@@ -42,14 +42,14 @@ impl Contact {
 
     /// Whether it has clearance.
     #[inline]
-    pub fn is_loose(&self) -> bool {
+    pub fn has_clearance(&self) -> bool {
         self.joint.ideal.is_none()
     }
 
     /// Whether it may carry a force.
     #[inline]
-    pub fn may_press(&self, touching: ActiveSet<'_>) -> bool {
-        touching.contact_state(self.index).is_some()
+    pub fn may_carry_force(&self, active_set: ActiveSet<'_>) -> bool {
+        active_set.contact_state(self.index).is_some()
     }
 
     /// Power dissipated by friction, W.
@@ -65,11 +65,11 @@ impl Contact {
     }
 
     /// Contact between the ball and its socket wall at the latest evaluation; `None` without contact force.
-    pub fn touch(&self, motion: &[Kinematics]) -> Option<Touch> {
-        if !self.is_loose() || self.gap.normal_force <= 0.0 {
+    pub fn wall_contact(&self, motion: &[Kinematics]) -> Option<WallContact> {
+        if !self.has_clearance() || self.gap.normal_force <= 0.0 {
             return None;
         }
-        Some(Touch {
+        Some(WallContact {
             direction: self.wall_direction(motion),
             normal_force: self.gap.normal_force,
             friction_power: self.friction_power(motion),
@@ -83,7 +83,7 @@ impl Contact {
         socket.rotation.tr_mul(&self.direction())
     }
 
-    /// e / |e| of a ball off centre, whether or not `finish` has been called.
+    /// e / |e| of a ball off centre, whether or not `complete_separation` has been called.
     pub fn direction(&self) -> Vec3 {
         self.gap.eccentricity.normalize()
     }
@@ -106,15 +106,15 @@ impl Contact {
         let joint = &self.joint;
         let (e, rate) = joint.opening(motion, &joint.arms(motion));
         (self.gap.eccentricity, self.gap.eccentricity_rate) = (e, rate);
-        self.finish();
+        self.complete_separation();
     }
 
     /// Completes the separation from the eccentricity of the latest evaluation.
-    pub fn finish(&mut self) {
-        let loose = self.is_loose();
+    pub fn complete_separation(&mut self) {
+        let has_clearance = self.has_clearance();
         let Self { law, gap, .. } = self;
         gap.separation = law.separation(&gap.eccentricity, &gap.eccentricity_rate);
-        if !loose {
+        if !has_clearance {
             (gap.separation.penetration, gap.separation.rate) = (0.0, 0.0);
         }
     }
@@ -134,7 +134,7 @@ impl ForceElement for Contact {
         }
         let separation = law.separation(&e, &velocity);
         gap.separation = separation;
-        let Some(contact_state) = at.touching.contact_state(self.index) else {
+        let Some(contact_state) = at.active_set.contact_state(self.index) else {
             return;
         };
         let counts = &mut *loads.counts;
@@ -144,8 +144,8 @@ impl ForceElement for Contact {
             let (ball, socket) = (spin(&joint.ball), spin(&joint.socket));
             law.slip_velocity(&separation.normal, &velocity, ball, socket)
         });
-        if let Some(left) = loads.left.get_mut(self.index) {
-            *left |= law.leaves_branch(contact_state, &separation, &force);
+        if let Some(has_left_branch) = loads.has_left_branch.get_mut(self.index) {
+            *has_left_branch |= law.leaves_branch(contact_state, &separation, &force);
         }
         gap.normal_force = force.normal;
         gap.friction = force.friction;
@@ -171,7 +171,7 @@ impl ForceElement for Contact {
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let gap = &self.gap;
-        let contact_state = at.touching.contact_state(self.index);
+        let contact_state = at.active_set.contact_state(self.index);
         let contact_state = contact_state.filter(|_| gap.normal_force > 0.0)?;
         let n = gap.separation.normal;
         let read = self.slip_velocity(&n, at.motion);
@@ -185,7 +185,7 @@ impl ForceElement for Contact {
             force: n * -gap.normal_force + gap.friction,
             stiffness,
             uses_surface_velocity: self.law.uses_surface_velocity(),
-            turning: None,
+            torque_derivatives: None,
         })
     }
 

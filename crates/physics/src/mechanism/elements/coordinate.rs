@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Coupling, ElementReport, Turning, push};
+use super::{Coupling, ElementReport, TorqueDerivatives, push};
 use crate::machine::{Freedom, JointCoordinate, Machine, Mat3, Vec3};
 use crate::mechanism::kinematics::{Kinematics, Wrench};
 use crate::mechanism::model::{Anchor, Model};
@@ -21,14 +21,14 @@ pub(super) struct Coordinate {
     /// For an angle: a direction perpendicular to the axis, in the parent's axes, and the direction in the child's axes that
     /// coincides with it at coordinate 0.
     across: Vec3,
-    seen: Vec3,
+    child_across: Vec3,
 }
 
 /// A coordinate at one instant.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct CoordinateState {
     /// Coordinate relative to the given position, m or rad; angles within half a turn.
-    pub off: f64,
+    pub deviation: f64,
     /// Rate, m/s or rad/s.
     pub rate: f64,
     /// Axis, world.
@@ -51,7 +51,7 @@ impl Coordinate {
         let joint = machine.kinematic_joints().nth(on.joint).expect("an element acts on a joint of its machine");
         let [parent, child] = joint.points().map(|point| model.anchor(machine, &point));
         let (axis, second, rest) = (joint.axis, joint.child_axis, joint.rotation);
-        let [across, seen] = match freedom {
+        let [across, child_across] = match freedom {
             Freedom::FirstTurn => [rest * second, second],
             Freedom::SecondTurn => [axis, rest.inverse() * axis],
             Freedom::Slide | Freedom::Turn | Freedom::TurnOfSlide => {
@@ -68,36 +68,36 @@ impl Coordinate {
             axis: if in_child { second } else { axis },
             in_child,
             across,
-            seen,
+            child_across,
         }
     }
 
     /// The coordinate relative to `position`, and its rate.
-    pub fn place(&self, position: f64, motion: &[Kinematics]) -> Place {
+    pub fn measure(&self, position: f64, motion: &[Kinematics]) -> CoordinateState {
         let (parent, child) = (&motion[self.parent.body], &motion[self.child.body]);
         let of_axis = if self.in_child { child } else { parent };
         let along = of_axis.rotation * self.axis;
         let arm = child.rotation * self.child.offset;
         let point = child.position + arm;
         let from_parent = point - parent.position;
-        let (off, rate) = if self.turns {
-            let (zero, now) = (parent.rotation * self.across, child.rotation * self.seen);
+        let (deviation, rate) = if self.turns {
+            let (zero, now) = (parent.rotation * self.across, child.rotation * self.child_across);
             let angle = libm::atan2(zero.cross(&now).dot(&along), zero.dot(&now));
-            let off = angle - position;
+            let deviation = angle - position;
             let spin = child.angular_velocity - parent.angular_velocity;
-            (off - TAU * libm::round(off / TAU), along.dot(&spin))
+            (deviation - TAU * libm::round(deviation / TAU), along.dot(&spin))
         } else {
             let slid = from_parent - parent.rotation * self.parent.offset;
             let velocity = child.point_velocity(&arm) - parent.point_velocity(&from_parent);
             (along.dot(&slid) - position, along.dot(&velocity))
         };
-        Place { off, rate, along, point, arms: [from_parent, arm] }
+        CoordinateState { deviation, rate, along, point, arms: [from_parent, arm] }
     }
 
     /// Adds `force` (N or N m) along the axis to the child, and its opposite to the parent.
-    pub fn press(&self, place: &Place, force: f64, wrench: &mut [Wrench]) {
-        let force = place.along * force;
-        let [from_parent, arm] = &place.arms;
+    pub fn apply_force(&self, state: &CoordinateState, force: f64, wrench: &mut [Wrench]) {
+        let force = state.along * force;
+        let [from_parent, arm] = &state.arms;
         if self.turns {
             wrench[self.child.body].torque += force;
             wrench[self.parent.body].torque -= force;
@@ -116,32 +116,32 @@ impl Coordinate {
     }
 
     /// Linearisation of a force along the axis.
-    pub fn coupling(&self, place: &Place, slopes: &Slopes, motion: &[Kinematics]) -> Coupling {
-        let along = place.along * place.along.transpose();
+    pub fn coupling(&self, state: &CoordinateState, slopes: &Slopes, motion: &[Kinematics]) -> Coupling {
+        let along = state.along * state.along.transpose();
         let (stiffness, damping) = (along * slopes.by_position, along * slopes.by_rate);
         let ends = self.ends(motion);
         if self.turns {
-            let turning = Turning { by_turn: stiffness, by_spin: damping };
-            return Coupling::at_one_point(ends, [Mat3::zeros(); 2], turning);
+            let torque_derivatives = TorqueDerivatives { by_rotation: stiffness, by_angular_velocity: damping };
+            return Coupling::at_one_point(ends, [Mat3::zeros(); 2], torque_derivatives);
         }
-        Coupling::at_one_point(ends, [stiffness, damping], Turning::default())
+        Coupling::at_one_point(ends, [stiffness, damping], TorqueDerivatives::default())
     }
 
     /// Report of a force along the axis.
-    pub fn report(&self, place: &Place, force: f64, motion: &[Kinematics]) -> ElementReport {
-        let force = place.along * force;
+    pub fn report(&self, state: &CoordinateState, force: f64, motion: &[Kinematics]) -> ElementReport {
+        let force = state.along * force;
         if self.turns {
             return ElementReport {
-                points: [place.point; 2],
+                points: [state.point; 2],
                 force: Vec3::zeros(),
                 torque: Some(force),
-                only_turns: true,
+                is_pure_torque: true,
                 depth: None,
             };
         }
         let parent = &motion[self.parent.body];
         ElementReport {
-            points: [parent.position + parent.rotation * self.parent.offset, place.point],
+            points: [parent.position + parent.rotation * self.parent.offset, state.point],
             force,
             ..ElementReport::default()
         }

@@ -5,8 +5,8 @@ use crate::jet::Jet;
 use crate::machine::{self, SpringSide};
 use crate::mechanism::spline::{Ends, Spline};
 
-/// Larger than any stretch, m or rad.
-const FARTHEST: f64 = 1e7;
+/// Upper bound on the magnitude of a stretch, m or rad.
+const MAX_STRETCH: f64 = 1e7;
 
 pub(super) enum Elastic {
     Line {
@@ -51,7 +51,7 @@ impl Elastic {
         match self {
             Self::Line { preload, stiffness, side } => {
                 let elastic = preload + stiffness * stretch;
-                // Once slack, the spring stores what it stored where it went slack.
+                // A slack spring stores the energy that it had where it went slack.
                 let stretch = match side.of(elastic) == elastic || *stiffness == 0.0 {
                     true => stretch,
                     false => -preload / stiffness,
@@ -68,37 +68,38 @@ pub(super) struct Curve {
     spline: Spline,
     /// Stretches at which the cubic changes or a one-sided spring starts or ceases to act, in ascending order, each with the
     /// energy stored there, J.
-    marks: Vec<[f64; 2]>,
-    /// Whether it acts before the first mark, between marks, after the last.
-    acts: Vec<bool>,
+    breakpoints: Vec<[f64; 2]>,
+    /// Whether the spring acts before the first breakpoint, between each two, and after the last.
+    is_active: Vec<bool>,
 }
 
 impl Curve {
     fn new(points: &[[f64; 2]], side: SpringSide) -> Self {
-        let mut curve = Self { spline: Spline::new(points, Ends::Straight), marks: Vec::new(), acts: Vec::new() };
-        let mut marks = curve.spline.knots.clone();
+        let mut curve =
+            Self { spline: Spline::new(points, Ends::Natural), breakpoints: Vec::new(), is_active: Vec::new() };
+        let mut breakpoints = curve.spline.knots.clone();
         if side != SpringSide::Both {
-            marks.extend(curve.roots());
-            marks.sort_by(f64::total_cmp);
-            marks.dedup();
+            breakpoints.extend(curve.roots());
+            breakpoints.sort_by(f64::total_cmp);
+            breakpoints.dedup();
         }
-        let acts = |stretch: f64| {
+        let is_active = |stretch: f64| {
             let tension = curve.at(stretch).value;
             side.of(tension) == tension
         };
-        let between = marks.windows(2).map(|ends| 0.5 * (ends[0] + ends[1]));
-        let [first, last] = [marks[0], marks[marks.len() - 1]];
+        let between = breakpoints.windows(2).map(|ends| 0.5 * (ends[0] + ends[1]));
+        let [first, last] = [breakpoints[0], breakpoints[breakpoints.len() - 1]];
         let width = last - first;
-        curve.acts = std::iter::once(first - width).chain(between).chain([last + width]).map(acts).collect();
+        curve.is_active = std::iter::once(first - width).chain(between).chain([last + width]).map(is_active).collect();
         let mut stored = 0.0;
-        for (i, &mark) in marks.iter().enumerate() {
-            if i > 0 && curve.acts[i] {
-                stored += curve.work(marks[i - 1], mark);
+        for (i, &breakpoint) in breakpoints.iter().enumerate() {
+            if i > 0 && curve.is_active[i] {
+                stored += curve.work(breakpoints[i - 1], breakpoint);
             }
-            curve.marks.push([mark, stored]);
+            curve.breakpoints.push([breakpoint, stored]);
         }
         let unstretched = curve.stored(0.0);
-        curve.marks.iter_mut().for_each(|mark| mark[1] -= unstretched);
+        curve.breakpoints.iter_mut().for_each(|breakpoint| breakpoint[1] -= unstretched);
         curve
     }
 
@@ -114,15 +115,15 @@ impl Curve {
     }
 
     fn stored(&self, stretch: f64) -> f64 {
-        let next = self.marks.partition_point(|mark| mark[0] <= stretch);
-        let [mark, stored] = self.marks[next.saturating_sub(1)];
-        match self.acts[next] {
-            true => stored + self.work(mark, stretch),
+        let next = self.breakpoints.partition_point(|breakpoint| breakpoint[0] <= stretch);
+        let [breakpoint, stored] = self.breakpoints[next.saturating_sub(1)];
+        match self.is_active[next] {
+            true => stored + self.work(breakpoint, stretch),
             false => stored,
         }
     }
 
-    /// Work of stretching from `a` to `b` without crossing a mark, J: Simpson's rule is exact for a cubic.
+    /// Work of stretching from `a` to `b` within one interval of the breakpoints, J. Simpson's rule is exact for a cubic.
     fn work(&self, a: f64, b: f64) -> f64 {
         let [at_a, middle, at_b] = [a, 0.5 * (a + b), b].map(|stretch| self.at(stretch).value);
         (b - a) * (at_a + 4.0 * middle + at_b) / 6.0
@@ -150,8 +151,8 @@ impl Curve {
         }
         // The straight extensions.
         let crossing = |knot: f64| knot - self.at(knot).value / self.at(knot).rate;
-        roots.extend(Some(crossing(first)).filter(|at| (-FARTHEST..first).contains(at)));
-        roots.extend(Some(crossing(last)).filter(|at| last < *at && *at < FARTHEST));
+        roots.extend(Some(crossing(first)).filter(|at| (-MAX_STRETCH..first).contains(at)));
+        roots.extend(Some(crossing(last)).filter(|at| last < *at && *at < MAX_STRETCH));
         roots
     }
 
@@ -183,7 +184,7 @@ mod tests {
     const POINTS: [[f64; 2]; 5] = [[-0.04, -90.0], [-0.02, 5.0], [-0.01, -8.0], [0.01, 6.0], [0.03, 70.0]];
 
     #[test]
-    fn the_energy_is_the_integral_of_what_acts() {
+    fn the_energy_is_the_integral_of_the_acting_tension() {
         for side in [SpringSide::Both, SpringSide::Push, SpringSide::Pull] {
             let curve = Curve::new(&POINTS, side);
             assert!(curve.stored(0.0).abs() < 1e-15);
@@ -199,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn it_goes_on_straight_beyond_its_points() {
+    fn a_curve_continues_straight_beyond_its_points() {
         let curve = Curve::new(&POINTS, SpringSide::Both);
         for (end, beyond) in [(-0.04, -0.1), (0.03, 0.2)] {
             let (at, there) = (curve.at(end), curve.at(beyond));
@@ -209,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn every_zero_is_found() {
+    fn all_zeros_of_the_tension_are_found() {
         let curve = Curve::new(&POINTS, SpringSide::Push);
         let mut roots = curve.roots();
         roots.sort_by(f64::total_cmp);
@@ -221,6 +222,6 @@ mod tests {
         // A zero beyond the points.
         let line = Curve::new(&[[0.0, 1.0], [1.0, 3.0]], SpringSide::Push);
         assert_eq!(line.roots(), [-0.5]);
-        assert_eq!(line.acts, [true, false, false, false]);
+        assert_eq!(line.is_active, [true, false, false, false]);
     }
 }

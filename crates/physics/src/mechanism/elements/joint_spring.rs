@@ -1,7 +1,7 @@
 //! Spring and damper on a slide or hinge. The force or torque on the child is -(preload + stiffness s + damping ds/dt), where s
 //! is the joint's coordinate measured from `position`; a curve over s may replace the first two terms.
 
-use super::coordinate::{Coordinate, Place, Slopes};
+use super::coordinate::{Coordinate, CoordinateState, Slopes};
 use super::elastic::Elastic;
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement};
 use crate::machine::{self, SpringSide};
@@ -27,17 +27,17 @@ pub(super) fn make(spring: &machine::JointSpring, on: Coordinate) -> Box<dyn Sce
 
 impl JointSpring {
     /// The coordinate, and the force or torque on the child, N or N m.
-    fn at(&self, motion: &[Kinematics]) -> (Place, f64) {
-        let place = self.on.place(self.position, motion);
-        let back = self.elastic.tension(place.off) + self.damping * place.rate;
-        (place, -back)
+    fn at(&self, motion: &[Kinematics]) -> (CoordinateState, f64) {
+        let state = self.on.measure(self.position, motion);
+        let back = self.elastic.tension(state.deviation) + self.damping * state.rate;
+        (state, -back)
     }
 }
 
 impl ForceElement for JointSpring {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        let (place, force) = self.at(at.motion);
-        self.on.press(&place, force, loads.wrench);
+        let (state, force) = self.at(at.motion);
+        self.on.apply_force(&state, force, loads.wrench);
     }
 
     fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
@@ -45,24 +45,24 @@ impl ForceElement for JointSpring {
     }
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
-        let (place, _) = self.at(at.motion);
-        let slopes = Slopes { by_position: -self.elastic.stiffness(place.off), by_rate: -self.damping };
-        Some(self.on.coupling(&place, &slopes, at.motion))
+        let (state, _) = self.at(at.motion);
+        let slopes = Slopes { by_position: -self.elastic.stiffness(state.deviation), by_rate: -self.damping };
+        Some(self.on.coupling(&state, &slopes, at.motion))
     }
 
     fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
-        self.elastic.stored(self.on.place(self.position, motion).off)
+        self.elastic.stored(self.on.measure(self.position, motion).deviation)
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
-        let rate = self.on.place(self.position, motion).rate;
+        let rate = self.on.measure(self.position, motion).rate;
         powers.damping += self.damping * rate * rate;
     }
 }
 
 impl SceneElement for JointSpring {
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
-        let (place, force) = self.at(motion);
-        self.on.report(&place, force, motion)
+        let (state, force) = self.at(motion);
+        self.on.report(&state, force, motion)
     }
 }

@@ -80,7 +80,7 @@ impl std::ops::AddAssign for Counts {
 pub(super) struct At<'a> {
     pub t: f64,
     pub motion: &'a [Kinematics],
-    pub touching: ActiveSet<'a>,
+    pub active_set: ActiveSet<'a>,
 }
 
 /// Accumulators of an evaluation.
@@ -88,8 +88,8 @@ pub(super) struct Loads<'a> {
     /// Loads on the bodies about their centroids; the last is the world's.
     pub wrench: &'a mut [Wrench],
     pub counts: &'a mut Counts,
-    /// By ball joint: set where a contact leaves the frozen branches of its laws. Empty if nobody asks.
-    pub left: &'a mut [bool],
+    /// By ball joint: set where a contact leaves the frozen branches of its laws. Empty if that is not recorded.
+    pub has_left_branch: &'a mut [bool],
 }
 
 /// Linearisation of the force between two points with respect to their relative motion.
@@ -107,15 +107,15 @@ pub(super) struct Coupling {
     pub uses_surface_velocity: bool,
     /// For an element between coincident points of two bodies, in axes fixed to the bodies: the dependence of its torque on their
     /// relative rotation. A common rotation of both bodies leaves force and torque unchanged.
-    pub turning: Option<Turning>,
+    pub torque_derivatives: Option<TorqueDerivatives>,
 }
 
 /// Linearisation of the torque on the first of two bodies (and its opposite on the second) with respect to their relative motion.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Turning {
+pub(super) struct TorqueDerivatives {
     /// Derivatives with respect to relative rotation, N m/rad, and to relative angular velocity, N m s/rad.
-    pub by_turn: Mat3,
-    pub by_spin: Mat3,
+    pub by_rotation: Mat3,
+    pub by_angular_velocity: Mat3,
 }
 
 impl Coupling {
@@ -127,16 +127,20 @@ impl Coupling {
             force: Vec3::zeros(),
             stiffness: Stiffness::between_points(by_displacement, by_rate),
             uses_surface_velocity: false,
-            turning: None,
+            torque_derivatives: None,
         }
     }
 
     /// For a force at the second of two coincident points, N/m and N s/m, and a torque on its body.
-    fn at_one_point([from, to]: [Anchor; 2], [by_displacement, by_rate]: [Mat3; 2], turning: Turning) -> Self {
+    fn at_one_point(
+        [from, to]: [Anchor; 2],
+        [by_displacement, by_rate]: [Mat3; 2],
+        torque_derivatives: TorqueDerivatives,
+    ) -> Self {
         let mut coupling = Self::between_points([from, to], by_displacement, by_rate);
         // With these distances, `Column::turn` is the relative angular velocity itself.
         coupling.sides = [(to, 1.0), (from, 1.0)];
-        coupling.turning = Some(turning);
+        coupling.torque_derivatives = Some(torque_derivatives);
         coupling
     }
 }
@@ -151,7 +155,7 @@ pub struct ElementReport {
     /// Torque on the body, N m, if any; for an element on a hinge, on the child.
     pub torque: Option<Vec3>,
     /// Whether the load is a pure torque pair.
-    pub only_turns: bool,
+    pub is_pure_torque: bool,
     /// For a stop in contact: its depth, and the depth at which it exerts the force given in the scene, m or rad.
     pub depth: Option<[f64; 2]>,
 }
@@ -159,7 +163,7 @@ pub struct ElementReport {
 impl ElementReport {
     /// [`Self::force`], unless the load is a pure torque pair.
     pub fn own_force(&self) -> Option<Vec3> {
-        (!self.only_turns).then_some(self.force)
+        (!self.is_pure_torque).then_some(self.force)
     }
 }
 
@@ -182,7 +186,7 @@ pub struct Powers {
 
 /// A ball that presses against the wall of its socket.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
+pub struct WallContact {
     /// Unit vector from the socket's centre to the point of contact, in the axes of the socket's body.
     pub direction: Vec3,
     /// F_N, N.
@@ -237,18 +241,18 @@ pub(super) trait SceneElement: ForceElement {
 
     /// Depth of contact, and the smaller of that and an indicator that falls to 0 when contact is lost while still compressed; in
     /// any unit. Explicit steps end where a sign changes. `None` if the element always exerts a force.
-    fn pressed(&self, _t: f64, _motion: &[Kinematics]) -> Option<[f64; 2]> {
+    fn contact_indicators(&self, _t: f64, _motion: &[Kinematics]) -> Option<[f64; 2]> {
         None
     }
 
     /// Whether the slope of the force has a vertical tangent at first contact.
-    fn begins_vertically(&self) -> bool {
+    fn has_vertical_onset(&self) -> bool {
         false
     }
 
     /// Freezes the contact state: the element follows its law as if it pressed, or as if it did not, regardless of the motion.
     /// `None` unfreezes it.
-    fn hold(&mut self, _presses: Option<bool>) {}
+    fn freeze_contact(&mut self, _in_contact: Option<bool>) {}
 
     /// Its report at `t`.
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport;

@@ -1,7 +1,7 @@
 //! Motor on a slide or hinge. Its force or torque is F + k (target - q) + d (target' - q'), clamped to a limit, where q is the
 //! joint's coordinate. Its work counts as drive work.
 
-use super::coordinate::{Coordinate, Place, Slopes};
+use super::coordinate::{Coordinate, CoordinateState, Slopes};
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, law_of};
 use crate::jet::Jet;
 use crate::machine;
@@ -39,43 +39,43 @@ impl Motor {
     }
 
     /// The coordinate relative to the target, and the unclamped force or torque on the child.
-    fn at(&self, t: f64, motion: &[Kinematics]) -> (Place, f64) {
+    fn at(&self, t: f64, motion: &[Kinematics]) -> (CoordinateState, f64) {
         let target = self.target(t);
-        let place = self.on.place(target.value, motion);
-        let ahead = self.stiffness * place.off + self.damping * (place.rate - target.rate);
-        (place, self.force - ahead)
+        let state = self.on.measure(target.value, motion);
+        let ahead = self.stiffness * state.deviation + self.damping * (state.rate - target.rate);
+        (state, self.force - ahead)
     }
 
     /// The same with the force or torque clamped.
-    fn limited(&self, t: f64, motion: &[Kinematics]) -> (Place, f64) {
-        let (place, force) = self.at(t, motion);
-        (place, force.clamp(-self.limit, self.limit))
+    fn clamped(&self, t: f64, motion: &[Kinematics]) -> (CoordinateState, f64) {
+        let (state, force) = self.at(t, motion);
+        (state, force.clamp(-self.limit, self.limit))
     }
 }
 
 impl ForceElement for Motor {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        let (place, force) = self.limited(at.t, at.motion);
-        self.on.press(&place, force, loads.wrench);
+        let (state, force) = self.clamped(at.t, at.motion);
+        self.on.apply_force(&state, force, loads.wrench);
     }
 
     fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
-        let follows = self.stiffness > 0.0 || self.damping > 0.0;
-        follows.then(|| self.on.ends(motion))
+        let is_stiff = self.stiffness > 0.0 || self.damping > 0.0;
+        is_stiff.then(|| self.on.ends(motion))
     }
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
-        let (place, force) = self.at(at.t, at.motion);
+        let (state, force) = self.at(at.t, at.motion);
         if force.abs() > self.limit || (self.stiffness == 0.0 && self.damping == 0.0) {
             return None;
         }
         let slopes = Slopes { by_position: -self.stiffness, by_rate: -self.damping };
-        Some(self.on.coupling(&place, &slopes, at.motion))
+        Some(self.on.coupling(&state, &slopes, at.motion))
     }
 
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
-        let (place, force) = self.limited(t, motion);
-        powers.drive += force * place.rate;
+        let (state, force) = self.clamped(t, motion);
+        powers.drive += force * state.rate;
     }
 }
 
@@ -85,7 +85,7 @@ impl SceneElement for Motor {
     }
 
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
-        let (place, force) = self.limited(t, motion);
-        self.on.report(&place, force, motion)
+        let (state, force) = self.clamped(t, motion);
+        self.on.report(&state, force, motion)
     }
 }

@@ -37,7 +37,7 @@ pub(super) struct Hand {
 impl Pull {
     /// A pull on `point` (m, scene frame) of body `body` by the hand at `hand` (m, world), with stiffness and damping from the
     /// total mass.
-    pub fn softly(machine: &Machine, body: usize, point: Vec3, hand: Vec3) -> Self {
+    pub fn with_soft_spring(machine: &Machine, body: usize, point: Vec3, hand: Vec3) -> Self {
         let mass: f64 = machine.bodies.iter().map(|body| body.mass).sum();
         let rate = std::f64::consts::TAU * FREQUENCY;
         Self { body, point, hand, stiffness: mass * rate * rate, damping: 2.0 * DAMPING * mass * rate }

@@ -16,7 +16,7 @@ struct Spring {
     damping: f64,
     side: SpringSide,
     /// State of a one-sided spring frozen over a step, if any.
-    held: Option<bool>,
+    frozen: Option<bool>,
 }
 
 /// State at one instant.
@@ -45,7 +45,7 @@ pub(super) fn make(spring: &machine::Spring, [from, to]: [Anchor; 2]) -> Box<dyn
         elastic: Elastic::new(&spring.elastic, spring.side),
         damping: spring.damping,
         side: spring.side,
-        held: None,
+        frozen: None,
     })
 }
 
@@ -59,11 +59,11 @@ impl Spring {
         let velocity = end_velocity - start_velocity;
         let rate = along.dot(&velocity);
         let elastic = self.elastic.tension(length - self.length);
-        let both = elastic + self.damping * rate;
-        let tension = match self.held {
-            Some(true) => both,
-            // When the spring is slack, its damper is, too.
-            None if self.side.of(elastic) == elastic => self.side.of(both),
+        let total = elastic + self.damping * rate;
+        let tension = match self.frozen {
+            Some(true) => total,
+            // A slack spring has no damping force either.
+            None if self.side.of(elastic) == elastic => self.side.of(total),
             _ => 0.0,
         };
         State {
@@ -75,7 +75,7 @@ impl Spring {
             rate,
             elastic,
             tension,
-            slack: tension != both,
+            slack: tension != total,
         }
     }
 }
@@ -100,15 +100,15 @@ impl ForceElement for Spring {
         let stiffness = self.elastic.stiffness(s.length - self.length);
         if s.length == 0.0 {
             // A bushing resists separation in any direction; otherwise the direction, and hence the force, is discontinuous here.
-            let bush = self.length == 0.0 && s.elastic == 0.0;
+            let is_bushing = self.length == 0.0 && s.elastic == 0.0;
             let by_displacement = Mat3::identity() * -stiffness;
-            return bush.then(|| Coupling::between_points(ends, by_displacement, Mat3::zeros()));
+            return is_bushing.then(|| Coupling::between_points(ends, by_displacement, Mat3::zeros()));
         }
         // F = -T u with u = e / |e|: dT = (k u + c P e_dot / l) . de + c u . de_dot, du = P de / l, P = 1 - u u'.
         let u = s.along;
         let turning = (Mat3::identity() - u * u.transpose()) / s.length;
-        let rise = u * stiffness + turning * s.velocity * self.damping;
-        let by_displacement = -u * rise.transpose() - turning * s.tension;
+        let gradient = u * stiffness + turning * s.velocity * self.damping;
+        let by_displacement = -u * gradient.transpose() - turning * s.tension;
         let by_rate = -u * (u * self.damping).transpose();
         Some(Coupling::between_points(ends, by_displacement, by_rate))
     }
@@ -128,7 +128,7 @@ impl ForceElement for Spring {
 
 impl SceneElement for Spring {
     /// For a one-sided spring: its elastic force, and the smaller of that and the total force with the damper.
-    fn pressed(&self, _: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
+    fn contact_indicators(&self, _: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
         let sign = match self.side {
             SpringSide::Both => return None,
             SpringSide::Pull => 1.0,
@@ -139,8 +139,8 @@ impl SceneElement for Spring {
         Some([elastic, elastic.min(both)])
     }
 
-    fn hold(&mut self, presses: Option<bool>) {
-        self.held = presses;
+    fn freeze_contact(&mut self, in_contact: Option<bool>) {
+        self.frozen = in_contact;
     }
 
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {

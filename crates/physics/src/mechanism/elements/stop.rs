@@ -4,7 +4,7 @@
 //! needs a contact state; here it divides by a given speed, a = chi / speed. An undisturbed impact at that speed rebounds with
 //! the requested restitution, whatever the masses; a slower one rebounds with more.
 
-use super::coordinate::{Coordinate, Place, Slopes};
+use super::coordinate::{Coordinate, CoordinateState, Slopes};
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement};
 use crate::contact::{NormalLaw, damping_factor};
 use crate::machine;
@@ -26,11 +26,11 @@ struct Stop {
     /// a, s/m or s/rad.
     damping: f64,
     /// Contact state frozen over a step, if any.
-    held: Option<bool>,
+    frozen: Option<bool>,
 }
 
 /// A stop in contact.
-struct Press {
+struct StopContact {
     /// 1 at the upper limit, -1 at the lower.
     side: f64,
     /// d, m or rad, and its rate.
@@ -57,37 +57,37 @@ pub(super) fn make(stop: &machine::Stop, on: Coordinate) -> Box<dyn SceneElement
         depth,
         stiffness: stop.force / (depth * depth.sqrt()),
         damping: if chi > 0.0 { chi / stop.speed } else { 0.0 },
-        held: None,
+        frozen: None,
     })
 }
 
 impl Stop {
     /// The coordinate, and the stop in contact, if any.
-    fn at(&self, motion: &[Kinematics]) -> (Place, Option<Press>) {
-        let place = self.on.place(self.middle, motion);
-        let press = self.nearest(&place);
-        let touches = self.held.unwrap_or(press.depth > 0.0);
-        (place, touches.then_some(press))
+    fn at(&self, motion: &[Kinematics]) -> (CoordinateState, Option<StopContact>) {
+        let state = self.on.measure(self.middle, motion);
+        let contact = self.nearest(&state);
+        let touches = self.frozen.unwrap_or(contact.depth > 0.0);
+        (state, touches.then_some(contact))
     }
 
     /// The nearer stop as if in contact.
-    fn nearest(&self, place: &Place) -> Press {
-        let [above, below] = [place.off - self.upper, self.lower - place.off];
+    fn nearest(&self, state: &CoordinateState) -> StopContact {
+        let [above, below] = [state.deviation - self.upper, self.lower - state.deviation];
         let (side, depth) = if above > below { (1.0, above) } else { (-1.0, below) };
-        let rate = side * place.rate;
+        let rate = side * state.rate;
         let elastic = self.stiffness * depth * depth.abs().sqrt();
         let force = elastic * (1.0 + self.damping * rate);
         // A frozen stop follows its law smoothly beyond the edge, where the step then ends.
-        let force = if self.held.is_some() { force } else { force.max(0.0) };
-        Press { side, depth, rate, elastic, force }
+        let force = if self.frozen.is_some() { force } else { force.max(0.0) };
+        StopContact { side, depth, rate, elastic, force }
     }
 }
 
 impl ForceElement for Stop {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        if let (place, Some(press)) = self.at(at.motion) {
-            let force = -press.side * press.force;
-            self.on.press(&place, force, loads.wrench);
+        if let (state, Some(contact)) = self.at(at.motion) {
+            let force = -contact.side * contact.force;
+            self.on.apply_force(&state, force, loads.wrench);
         }
     }
 
@@ -96,49 +96,49 @@ impl ForceElement for Stop {
     }
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
-        let (place, press) = self.at(at.motion);
-        let press = press.filter(|press| press.force > 0.0 || self.held.is_some())?;
+        let (state, contact) = self.at(at.motion);
+        let contact = contact.filter(|contact| contact.force > 0.0 || self.frozen.is_some())?;
         let slopes = Slopes {
-            by_position: -1.5 * self.stiffness * press.depth.abs().sqrt() * (1.0 + self.damping * press.rate),
-            by_rate: -press.elastic * self.damping,
+            by_position: -1.5 * self.stiffness * contact.depth.abs().sqrt() * (1.0 + self.damping * contact.rate),
+            by_rate: -contact.elastic * self.damping,
         };
-        Some(self.on.coupling(&place, &slopes, at.motion))
+        Some(self.on.coupling(&state, &slopes, at.motion))
     }
 
     fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
-        let press = self.at(motion).1;
-        press.map_or(0.0, |press| 0.4 * press.elastic * press.depth)
+        let contact = self.at(motion).1;
+        contact.map_or(0.0, |contact| 0.4 * contact.elastic * contact.depth)
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
-        let (place, press) = self.at(motion);
-        let nearest = self.nearest(&place);
+        let (state, contact) = self.at(motion);
+        let nearest = self.nearest(&state);
         // Energy stored when contact is lost is dissipated as the stop recovers.
-        let let_go = nearest.depth > 0.0 && 1.0 + self.damping * nearest.rate <= 0.0;
-        let elastic = if let_go || press.is_some() { nearest.elastic } else { 0.0 };
-        powers.damping += (press.map_or(0.0, |press| press.force) - elastic) * nearest.rate;
+        let separates = nearest.depth > 0.0 && 1.0 + self.damping * nearest.rate <= 0.0;
+        let elastic = if separates || contact.is_some() { nearest.elastic } else { 0.0 };
+        powers.damping += (contact.map_or(0.0, |contact| contact.force) - elastic) * nearest.rate;
     }
 }
 
 impl SceneElement for Stop {
     /// Contact is lost where d (1 + a dd/dt) falls to 0.
-    fn pressed(&self, _: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
-        let Press { depth, rate, .. } = self.nearest(&self.on.place(self.middle, motion));
+    fn contact_indicators(&self, _: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
+        let StopContact { depth, rate, .. } = self.nearest(&self.on.measure(self.middle, motion));
         Some([depth, depth.min(depth * (1.0 + self.damping * rate))])
     }
 
-    fn begins_vertically(&self) -> bool {
+    fn has_vertical_onset(&self) -> bool {
         true
     }
 
-    fn hold(&mut self, presses: Option<bool>) {
-        self.held = presses;
+    fn freeze_contact(&mut self, in_contact: Option<bool>) {
+        self.frozen = in_contact;
     }
 
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
-        let (place, press) = self.at(motion);
-        let force = press.as_ref().map_or(0.0, |press| -press.side * press.force);
-        let depth = press.map(|press| [press.depth, self.depth]);
-        ElementReport { depth, ..self.on.report(&place, force, motion) }
+        let (state, contact) = self.at(motion);
+        let force = contact.as_ref().map_or(0.0, |contact| -contact.side * contact.force);
+        let depth = contact.map(|contact| [contact.depth, self.depth]);
+        ElementReport { depth, ..self.on.report(&state, force, motion) }
     }
 }

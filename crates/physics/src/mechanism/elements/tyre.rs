@@ -22,7 +22,7 @@ struct Tyre {
     /// Coordinate along `up` at which `ground` is 0, m.
     height: f64,
     /// Contact state frozen over a step, if any.
-    held: Option<bool>,
+    frozen: Option<bool>,
 }
 
 /// State at one instant.
@@ -47,7 +47,7 @@ pub(super) fn make(tyre: &machine::Tyre, on: Anchor) -> Box<dyn SceneElement> {
         damping: tyre.damping,
         ground: law_of(tyre.ground.as_ref(), false),
         height: tyre.height,
-        held: None,
+        frozen: None,
     })
 }
 
@@ -58,9 +58,9 @@ impl Tyre {
         let ground = self.ground.as_ref().map_or_else(Jet::default, height) + Jet::constant(self.height);
         let depth = ground.value + self.radius - self.up.dot(&centre);
         let rate = ground.rate - self.up.dot(&velocity);
-        // Once the spring has lost contact, the damper has, too.
+        // A tyre off the ground has no damping force either.
         let force = self.stiffness * depth + self.damping * rate;
-        let force = match self.held {
+        let force = match self.frozen {
             Some(true) => force,
             None if depth > 0.0 => force.max(0.0),
             _ => 0.0,
@@ -84,7 +84,7 @@ impl ForceElement for Tyre {
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let s = self.at(at.t, at.motion);
-        if !self.held.unwrap_or(s.force > 0.0) {
+        if !self.frozen.unwrap_or(s.force > 0.0) {
             return None;
         }
         let along = self.up * self.up.transpose();
@@ -111,13 +111,13 @@ impl SceneElement for Tyre {
     }
 
     /// Contact is lost where k d + c dd/dt falls to 0.
-    fn pressed(&self, t: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
+    fn contact_indicators(&self, t: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
         let s = self.at(t, motion);
         Some([s.depth, s.depth.min(self.stiffness * s.depth + self.damping * s.rate)])
     }
 
-    fn hold(&mut self, presses: Option<bool>) {
-        self.held = presses;
+    fn freeze_contact(&mut self, in_contact: Option<bool>) {
+        self.frozen = in_contact;
     }
 
     /// From the ground below the wheel centre to the centre.

@@ -9,11 +9,11 @@ use crate::simulate::Frame;
 use crate::suggest::nearest;
 
 /// Place of the signals that `run` writes only on request: after all others.
-const ASKED: u8 = u8::MAX;
+const ON_REQUEST: u8 = u8::MAX;
 
 /// A channel available in the rows of a scene.
 #[derive(Clone, Debug)]
-pub struct Listed {
+pub struct ChannelInfo {
     /// Its name: parts separated by dots, such as `S1.force.x`.
     pub name: String,
     /// Name of its column in a file, with the SI unit.
@@ -27,7 +27,7 @@ pub struct Listed {
     pub(super) reading: Reading,
 }
 
-impl Listed {
+impl ChannelInfo {
     /// Its name without the component.
     pub fn group(&self) -> &str {
         match self.name.rsplit_once('.') {
@@ -48,7 +48,7 @@ impl Listed {
     }
 
     /// Whether `pattern` matches its name, a prefix of the name that ends before a dot, or its column.
-    pub fn is_chosen_by(&self, pattern: &str) -> bool {
+    pub fn is_matched_by(&self, pattern: &str) -> bool {
         self.names().any(|name| matches_pattern(pattern, name)) || matches_pattern(pattern, &self.column)
     }
 
@@ -62,7 +62,7 @@ impl Listed {
 /// A pattern that no channel matches.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{pattern}` is none of the scene's channels{near}")]
-pub struct NoChannel {
+pub struct UnknownChannel {
     /// The pattern.
     pub pattern: String,
     /// The nearest name, in brackets; or empty.
@@ -73,22 +73,22 @@ pub struct NoChannel {
 ///
 /// # Errors
 /// A pattern without a match.
-pub fn matching<'a>(list: &'a [Listed], pattern: &str) -> Result<Vec<&'a Listed>, NoChannel> {
-    let chosen: Vec<&Listed> = list.iter().filter(|channel| channel.is_chosen_by(pattern)).collect();
+pub fn matching<'a>(list: &'a [ChannelInfo], pattern: &str) -> Result<Vec<&'a ChannelInfo>, UnknownChannel> {
+    let chosen: Vec<&ChannelInfo> = list.iter().filter(|channel| channel.is_matched_by(pattern)).collect();
     if chosen.is_empty() {
-        let near = nearest(pattern, list.iter().flat_map(Listed::names));
-        return Err(NoChannel { pattern: pattern.to_owned(), near });
+        let near = nearest(pattern, list.iter().flat_map(ChannelInfo::names));
+        return Err(UnknownChannel { pattern: pattern.to_owned(), near });
     }
     Ok(chosen)
 }
 
 /// Every channel of `machine` in order: the columns that `run` writes by default, then the others. `first` as in
 /// [`run_columns`](super::run_columns).
-pub fn channels_of(machine: &Machine, first: &Frame) -> Vec<Listed> {
+pub fn channels_of(machine: &Machine, first: &Frame) -> Vec<ChannelInfo> {
     let (mut list, mut names, mut columns) = (Vec::new(), BTreeSet::new(), BTreeSet::new());
     let place = |signal: &super::Signal| {
         let known = !signal.name.is_empty();
-        known.then(|| signal.run.unwrap_or(ASKED))
+        known.then(|| signal.run.unwrap_or(ON_REQUEST))
     };
     lay_out(machine, Some(first), usize::MAX, place, |found| {
         // A term shown in every plot but only in the rows of some scenes has two signals.
@@ -98,7 +98,7 @@ pub fn channels_of(machine: &Machine, first: &Frame) -> Vec<Listed> {
             while !columns.insert(column.clone()) {
                 column.insert_str(0, "part_");
             }
-            list.push(Listed {
+            list.push(ChannelInfo {
                 name: found.name,
                 unit: unit_of(found.signal.column),
                 column,
@@ -120,12 +120,12 @@ pub fn chosen_columns(
     machine: &Machine,
     first: &Frame,
     patterns: &[String],
-) -> Result<(Vec<String>, Vec<Reading>), NoChannel> {
+) -> Result<(Vec<String>, Vec<Reading>), UnknownChannel> {
     let list = channels_of(machine, first);
     for pattern in patterns {
         matching(&list, pattern)?;
     }
-    let chosen = |channel: &&Listed| channel.name == TIME || patterns.iter().any(|p| channel.is_chosen_by(p));
+    let chosen = |channel: &&ChannelInfo| channel.name == TIME || patterns.iter().any(|p| channel.is_matched_by(p));
     Ok(list.iter().filter(chosen).map(|channel| (channel.column.clone(), channel.reading)).unzip())
 }
 
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn patterns_have_two_wildcards() {
+    fn patterns_match_with_two_wildcards() {
         for (pattern, name, matching) in [
             ("S1.force", "S1.force", true),
             ("S1.force", "S1.force.x", false),
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_begin_with_the_columns_of_a_run_and_differ() {
+    fn channels_begin_with_the_default_columns_and_have_distinct_names() {
         for text in ["", SPRING] {
             let scene = scene(text);
             let first = first(&scene);
@@ -251,12 +251,12 @@ mod tests {
             let all = chosen_columns(&scene.machine, &first, &["*".to_owned()]).expect("matches");
             assert_eq!(all.0.len(), list.len());
         }
-        let nameless = TABLE.iter().filter(|signal| signal.name.is_empty());
-        assert_eq!(nameless.count(), 1, "only what frames do not contain");
+        let unnamed = TABLE.iter().filter(|signal| signal.name.is_empty());
+        assert_eq!(unnamed.count(), 1, "only what frames do not contain");
     }
 
     #[test]
-    fn names_choose_in_the_order_of_the_scene() {
+    fn channels_chosen_by_name_are_in_the_order_of_the_scene() {
         let scene = scene(SPRING);
         let first = first(&scene);
         let columns = |patterns: &[&str]| {

@@ -2,10 +2,10 @@
 //! records and the rows of `run` are all derived from it.
 
 use Quantity as Q;
-use Take::{
-    Angles, Axes, BodyAxes, ChildTurn, Closing, Element, ElementValue, FirstTurn, Given, Hinge, HingeCoordinate, Joint,
-    JointAxes, OtherAngles, OtherAxes, ProbeDistance, ProbeError, Reaction, SecondTurn, Slide, SlideCoordinate, Taken,
-    Turn, TurnRate, Whole,
+use Source::{
+    Angles, Axes, BodyAxes, ChildTurn, Closing, Consumed, Element, ElementValue, FirstTurn, Hinge, HingeCoordinate,
+    Joint, JointAxes, OtherAngles, OtherAxes, ProbeDistance, ProbeError, Reaction, Scalar, SecondTurn, Slide,
+    SlideCoordinate, Supplied, Turn, TurnRate,
 };
 
 use crate::machine::Vec3;
@@ -240,15 +240,15 @@ impl Quantity {
 
     /// Whether this member of [`Self::EnergyBalance`] takes or stores energy; the others supply it. All members sum to zero.
     pub fn takes(member: &str) -> bool {
-        TABLE.iter().any(|signal| matches!(signal.take, Taken(own, _) if own == member))
+        TABLE.iter().any(|signal| matches!(signal.source, Consumed(own, _) if own == member))
     }
 }
 
 /// How a signal is read from a frame (SI units, world axes), and for which parts it is repeated.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Take {
+pub(super) enum Source {
     /// A single value, with its member name in the plot.
-    Whole(&'static str, fn(&Frame) -> f64),
+    Scalar(&'static str, fn(&Frame) -> f64),
     /// Vector of the output body: x, y, z.
     Axes(fn(&Pose) -> Vec3),
     /// Angles of the output body: alpha, beta, gamma.
@@ -284,9 +284,9 @@ pub(super) enum Take {
     Turn,
     ChildTurn,
     /// A term of the energy balance that supplies energy, with its member name.
-    Given(&'static str, fn(&Ledger) -> f64),
+    Supplied(&'static str, fn(&Ledger) -> f64),
     /// A term that takes or stores energy.
-    Taken(&'static str, fn(&Ledger) -> f64),
+    Consumed(&'static str, fn(&Ledger) -> f64),
     /// Error of the probe tip: x, y, z.
     ProbeError,
     /// Its size.
@@ -299,7 +299,7 @@ pub(super) enum Take {
 
 /// Parts for which a signal is repeated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Each {
+pub(super) enum Repetition {
     /// Not repeated.
     Once,
     /// The output body alone.
@@ -309,7 +309,7 @@ pub(super) enum Each {
     /// Coordinates of joints that slide or turn.
     Coordinate,
     /// Sliding, turning and fixed joints.
-    Holding,
+    Reacting,
     /// Joints that close loops.
     Closing,
     /// Ball joints.
@@ -323,18 +323,18 @@ pub(super) enum Each {
 /// Names of a signal's components, in plots and in columns.
 pub(super) type Components = &'static [(&'static str, &'static str)];
 
-impl Take {
-    pub(super) fn each(&self) -> Each {
+impl Source {
+    pub(super) fn repetition(&self) -> Repetition {
         match self {
-            Joint(_) | JointAxes(_) => Each::Joint,
-            Closing(_) => Each::Closing,
-            Slide | Hinge | Turn | ChildTurn => Each::Drive,
-            Element(_) | ElementValue(_) => Each::Element,
-            Axes(_) | Angles(_) => Each::Output,
-            BodyAxes(_) | OtherAxes(_) | OtherAngles(_) => Each::Body,
-            SlideCoordinate(_) | HingeCoordinate(_) | TurnRate | FirstTurn(_) | SecondTurn(_) => Each::Coordinate,
-            Reaction(_) => Each::Holding,
-            Whole(..) | Given(..) | Taken(..) | ProbeError | ProbeDistance => Each::Once,
+            Joint(_) | JointAxes(_) => Repetition::Joint,
+            Closing(_) => Repetition::Closing,
+            Slide | Hinge | Turn | ChildTurn => Repetition::Drive,
+            Element(_) | ElementValue(_) => Repetition::Element,
+            Axes(_) | Angles(_) => Repetition::Output,
+            BodyAxes(_) | OtherAxes(_) | OtherAngles(_) => Repetition::Body,
+            SlideCoordinate(_) | HingeCoordinate(_) | TurnRate | FirstTurn(_) | SecondTurn(_) => Repetition::Coordinate,
+            Reaction(_) => Repetition::Reacting,
+            Scalar(..) | Supplied(..) | Consumed(..) | ProbeError | ProbeDistance => Repetition::Once,
         }
     }
 
@@ -350,7 +350,7 @@ impl Take {
     /// Member name in its plot, where the signal has its own.
     pub(super) fn member(&self) -> &'static str {
         match *self {
-            Whole(member, _) | Given(member, _) | Taken(member, _) => member,
+            Scalar(member, _) | Supplied(member, _) | Consumed(member, _) => member,
             _ => "",
         }
     }
@@ -359,7 +359,7 @@ impl Take {
     #[inline]
     pub(super) fn value(&self, frame: &Frame, part: usize, component: usize) -> Option<f64> {
         match self {
-            Whole(_, of) => Some(of(frame)),
+            Scalar(_, of) => Some(of(frame)),
             Axes(of) | Angles(of) => Some(of(&frame.pose)[component]),
             BodyAxes(of) | OtherAxes(of) => frame.bodies.get(part).map(|body| of(body)[component]),
             OtherAngles(of) => {
@@ -378,7 +378,7 @@ impl Take {
             Joint(of) => frame.joints.get(part).map(of),
             JointAxes(of) => frame.joints.get(part).map(|joint| of(joint)[component]),
             Slide | Hinge | Turn | ChildTurn => frame.actuators.get(part).copied(),
-            Given(_, of) | Taken(_, of) => frame.ledger.as_ref().map(of),
+            Supplied(_, of) | Consumed(_, of) => frame.ledger.as_ref().map(of),
             ProbeError => frame.probe_error.map(|error| error[component]),
             ProbeDistance => frame.probe_error.map(|error| error.norm()),
             Element(of) => frame.elements.get(part).and_then(of).map(|v| v[component]),
@@ -404,28 +404,28 @@ pub(super) struct Signal {
     /// end.
     pub run: Option<u8>,
     /// How it is read.
-    pub take: Take,
+    pub source: Source,
     /// Whether it is absent in a scene without force elements.
     pub of_elements: bool,
 }
 
 /// A signal in no plot, written by `run` only on request.
-const fn asked(name: &'static str, column: &'static str, take: Take, help: &'static str) -> Signal {
-    Signal { name, column, help, plot: None, run: None, take, of_elements: false }
+const fn on_request(name: &'static str, column: &'static str, source: Source, help: &'static str) -> Signal {
+    Signal { name, column, help, plot: None, run: None, source, of_elements: false }
 }
 
 /// The same signal, shown in a plot.
-const fn plotted(plot: Quantity, signal: Signal) -> Signal {
+const fn in_plot(plot: Quantity, signal: Signal) -> Signal {
     Signal { plot: Some(plot), ..signal }
 }
 
 /// The same signal, among the default columns of `run`.
-const fn listed(place: u8, signal: Signal) -> Signal {
+const fn in_run(place: u8, signal: Signal) -> Signal {
     Signal { run: Some(place), ..signal }
 }
 
-const fn both(plot: Quantity, place: u8, signal: Signal) -> Signal {
-    plotted(plot, listed(place, signal))
+const fn in_plot_and_run(plot: Quantity, place: u8, signal: Signal) -> Signal {
+    in_plot(plot, in_run(place, signal))
 }
 
 const fn of_elements(signal: Signal) -> Signal {
@@ -435,85 +435,85 @@ const fn of_elements(signal: Signal) -> Signal {
 /// Every signal, in the order of saved records and of the members of a plot.
 #[rustfmt::skip]
 pub(super) const TABLE: &[Signal] = &[
-    both(Q::NormalForce, 2, asked("@.normal", "@_normal_N", Joint(|joint| joint.normal_force.norm()), "size of the normal force on the ball; of an ideal joint, of its reaction")),
-    plotted(Q::FrictionForce, asked("@.friction.size", "@_friction_N", Joint(|joint| joint.friction_force.norm()), "size of the friction force on the ball")),
-    both(Q::Eccentricity, 1, asked("@.eccentricity.size", "@_eccentricity_m", Joint(|joint| joint.eccentricity.norm()), "distance of the ball's centre from the socket's")),
-    listed(5, asked("@.eccentricity.#", "@_e#_m", JointAxes(|joint| joint.eccentricity), "ball's centre from the socket's")),
-    both(Q::Penetration, 5, asked("@.penetration", "@_penetration_m", Joint(|joint| joint.penetration), "depth of the ball in the socket wall; negative where there is a gap")),
-    listed(5, asked("@.penetration_rate", "@_penetration_rate_m_s", Joint(|joint| joint.penetration_rate), "rate of the penetration")),
-    listed(5, asked("@.force.#", "@_force_#_N", JointAxes(|joint| joint.normal_force + joint.friction_force), "force on the ball; of an ideal joint, its reaction")),
-    listed(5, asked("@.friction.#", "@_friction_#_N", JointAxes(|joint| joint.friction_force), "friction force on the ball")),
-    listed(5, asked("@.state", "@_state", Joint(|joint| state_code(joint.state)), "0 free, 1 creep (slower than slip_speed_high), 2 slip, 3 ideal")),
+    in_plot_and_run(Q::NormalForce, 2, on_request("@.normal", "@_normal_N", Joint(|joint| joint.normal_force.norm()), "size of the normal force on the ball; of an ideal joint, of its reaction")),
+    in_plot(Q::FrictionForce, on_request("@.friction.size", "@_friction_N", Joint(|joint| joint.friction_force.norm()), "size of the friction force on the ball")),
+    in_plot_and_run(Q::Eccentricity, 1, on_request("@.eccentricity.size", "@_eccentricity_m", Joint(|joint| joint.eccentricity.norm()), "distance of the ball's centre from the socket's")),
+    in_run(5, on_request("@.eccentricity.#", "@_e#_m", JointAxes(|joint| joint.eccentricity), "ball's centre from the socket's")),
+    in_plot_and_run(Q::Penetration, 5, on_request("@.penetration", "@_penetration_m", Joint(|joint| joint.penetration), "depth of the ball in the socket wall; negative where there is a gap")),
+    in_run(5, on_request("@.penetration_rate", "@_penetration_rate_m_s", Joint(|joint| joint.penetration_rate), "rate of the penetration")),
+    in_run(5, on_request("@.force.#", "@_force_#_N", JointAxes(|joint| joint.normal_force + joint.friction_force), "force on the ball; of an ideal joint, its reaction")),
+    in_run(5, on_request("@.friction.#", "@_friction_#_N", JointAxes(|joint| joint.friction_force), "friction force on the ball")),
+    in_run(5, on_request("@.state", "@_state", Joint(|joint| state_code(joint.state)), "0 free, 1 creep (slower than slip_speed_high), 2 slip, 3 ideal")),
 
-    listed(0, asked(TIME, "t_s", Whole("time", |frame| frame.time), "simulated time")),
-    both(Q::Position, 0, asked("@.pose.#", "#_m", Axes(|pose| pose.position), "origin of the output body")),
-    both(Q::Angles, 0, asked("@.pose.#", "#_rad", Angles(|pose| pose.angles), "orientation of the output body, Rx(alpha) Rz(beta) Ry(gamma)")),
-    both(Q::Velocity, 0, asked("@.velocity.#", "v#_m_s", Axes(|pose| pose.velocity), "velocity of the output body's origin")),
-    both(Q::AngleRates, 4, asked("@.velocity.#", "#_rate_rad_s", Angles(|pose| pose.angle_rates), "rate of the output body's angle")),
-    both(Q::Acceleration, 3, asked("@.acceleration.#", "a#_m_s2", Axes(|pose| pose.acceleration), "acceleration of the output body's origin")),
-    both(Q::AngleAccelerations, 8, asked("@.acceleration.#", "#_accel_rad_s2", Angles(|pose| pose.angle_accelerations), "second derivative of the output body's angle")),
+    in_run(0, on_request(TIME, "t_s", Scalar("time", |frame| frame.time), "simulated time")),
+    in_plot_and_run(Q::Position, 0, on_request("@.pose.#", "#_m", Axes(|pose| pose.position), "origin of the output body")),
+    in_plot_and_run(Q::Angles, 0, on_request("@.pose.#", "#_rad", Angles(|pose| pose.angles), "orientation of the output body, Rx(alpha) Rz(beta) Ry(gamma)")),
+    in_plot_and_run(Q::Velocity, 0, on_request("@.velocity.#", "v#_m_s", Axes(|pose| pose.velocity), "velocity of the output body's origin")),
+    in_plot_and_run(Q::AngleRates, 4, on_request("@.velocity.#", "#_rate_rad_s", Angles(|pose| pose.angle_rates), "rate of the output body's angle")),
+    in_plot_and_run(Q::Acceleration, 3, on_request("@.acceleration.#", "a#_m_s2", Axes(|pose| pose.acceleration), "acceleration of the output body's origin")),
+    in_plot_and_run(Q::AngleAccelerations, 8, on_request("@.acceleration.#", "#_accel_rad_s2", Angles(|pose| pose.angle_accelerations), "second derivative of the output body's angle")),
 
-    both(Q::Energy, 7, asked("energy.kinetic", "kinetic_J", Whole("kinetic", |frame| frame.kinetic), "kinetic energy of all bodies")),
-    both(Q::Energy, 7, asked("energy.potential", "potential_J", Whole("potential", |frame| frame.potential), "energy in gravity, 0 at the world's origin, and in contacts and springs")),
-    both(Q::Energy, 7, asked("energy.elastic", "elastic_J", Whole("elastic", |frame| frame.elastic), "energy in contacts and springs")),
+    in_plot_and_run(Q::Energy, 7, on_request("energy.kinetic", "kinetic_J", Scalar("kinetic", |frame| frame.kinetic), "kinetic energy of all bodies")),
+    in_plot_and_run(Q::Energy, 7, on_request("energy.potential", "potential_J", Scalar("potential", |frame| frame.potential), "energy in gravity, 0 at the world's origin, and in contacts and springs")),
+    in_plot_and_run(Q::Energy, 7, on_request("energy.elastic", "elastic_J", Scalar("elastic", |frame| frame.elastic), "energy in contacts and springs")),
 
-    both(Q::ActuatorForce, 6, asked("@.actuator", "@_actuator_N", Slide, "force of the drive, positive along the joint's axis")),
-    both(Q::ActuatorTorque, 6, asked("@.actuator", "@_actuator_Nm", Hinge, "torque of the drive, positive about the joint's axis")),
-    both(Q::ActuatorTorque, 6, asked("@.angle_actuator", "@_angle_actuator_Nm", Turn, "torque of the drive, positive about the joint's axis")),
-    both(Q::ActuatorTorque, 6, asked("@.child_angle_actuator", "@_child_angle_actuator_Nm", ChildTurn, "torque of the drive, positive about the joint's axis in the child")),
+    in_plot_and_run(Q::ActuatorForce, 6, on_request("@.actuator", "@_actuator_N", Slide, "force of the drive, positive along the joint's axis")),
+    in_plot_and_run(Q::ActuatorTorque, 6, on_request("@.actuator", "@_actuator_Nm", Hinge, "torque of the drive, positive about the joint's axis")),
+    in_plot_and_run(Q::ActuatorTorque, 6, on_request("@.angle_actuator", "@_angle_actuator_Nm", Turn, "torque of the drive, positive about the joint's axis")),
+    in_plot_and_run(Q::ActuatorTorque, 6, on_request("@.child_angle_actuator", "@_child_angle_actuator_Nm", ChildTurn, "torque of the drive, positive about the joint's axis in the child")),
 
-    both(Q::EnergyBalance, 10, asked("energy.drive_work", "drive_work_J", Given("drives", |ledger| ledger.drive_work), "supplied by the drives since the start")),
-    both(Q::EnergyBalance, 10, asked("energy.gravity_work", "gravity_work_J", Given("gravity", |ledger| ledger.gravity_work), "supplied by gravity since the start")),
-    both(Q::EnergyBalance, 11, asked("energy.clearance_work", "clearance_work_J", Given("clearance", |ledger| ledger.clearance_work), "supplied by moving clearances since the start")),
-    plotted(Q::EnergyBalance, asked("energy.change_work", "change_work_J", Given("changes", |ledger| ledger.change_work), "supplied by changed parameters since the start")),
+    in_plot_and_run(Q::EnergyBalance, 10, on_request("energy.drive_work", "drive_work_J", Supplied("drives", |ledger| ledger.drive_work), "supplied by the drives since the start")),
+    in_plot_and_run(Q::EnergyBalance, 10, on_request("energy.gravity_work", "gravity_work_J", Supplied("gravity", |ledger| ledger.gravity_work), "supplied by gravity since the start")),
+    in_plot_and_run(Q::EnergyBalance, 11, on_request("energy.clearance_work", "clearance_work_J", Supplied("clearance", |ledger| ledger.clearance_work), "supplied by moving clearances since the start")),
+    in_plot(Q::EnergyBalance, on_request("energy.change_work", "change_work_J", Supplied("changes", |ledger| ledger.change_work), "supplied by changed parameters since the start")),
     // Any scene can be pulled by hand.
-    plotted(Q::EnergyBalance, asked("energy.external_work", "external_work_J", Given("external", |ledger| ledger.external_work), "supplied by external loads since the start")),
-    of_elements(listed(14, asked("energy.external_work", "external_work_J", Given("external", |ledger| ledger.external_work), "supplied by external loads since the start"))),
-    both(Q::EnergyBalance, 10, asked("energy.restitution_loss", "restitution_loss_J", Taken("restitution", |ledger| ledger.restitution_loss), "lost to restitution since the start")),
-    both(Q::EnergyBalance, 10, asked("energy.friction_loss", "friction_loss_J", Taken("friction", |ledger| ledger.friction_loss), "lost to friction since the start")),
-    of_elements(both(Q::EnergyBalance, 13, asked("energy.damping_loss", "damping_loss_J", Taken("damping", |ledger| ledger.damping_loss), "lost to dampers since the start"))),
-    plotted(Q::EnergyBalance, asked("energy.kinetic_change", "kinetic_change_J", Taken("kinetic", |ledger| ledger.kinetic_change), "change of the kinetic energy since the start")),
-    plotted(Q::EnergyBalance, asked("energy.elastic_change", "elastic_change_J", Taken("elastic", |ledger| ledger.elastic_change), "change of the elastic energy since the start")),
-    both(Q::EnergyBalance, 11, asked("energy.residual", "energy_residual_J", Given("residual", Ledger::residual), "error of the integration: energy that came from nowhere since the start")),
+    in_plot(Q::EnergyBalance, on_request("energy.external_work", "external_work_J", Supplied("external", |ledger| ledger.external_work), "supplied by external loads since the start")),
+    of_elements(in_run(14, on_request("energy.external_work", "external_work_J", Supplied("external", |ledger| ledger.external_work), "supplied by external loads since the start"))),
+    in_plot_and_run(Q::EnergyBalance, 10, on_request("energy.restitution_loss", "restitution_loss_J", Consumed("restitution", |ledger| ledger.restitution_loss), "lost to restitution since the start")),
+    in_plot_and_run(Q::EnergyBalance, 10, on_request("energy.friction_loss", "friction_loss_J", Consumed("friction", |ledger| ledger.friction_loss), "lost to friction since the start")),
+    of_elements(in_plot_and_run(Q::EnergyBalance, 13, on_request("energy.damping_loss", "damping_loss_J", Consumed("damping", |ledger| ledger.damping_loss), "lost to dampers since the start"))),
+    in_plot(Q::EnergyBalance, on_request("energy.kinetic_change", "kinetic_change_J", Consumed("kinetic", |ledger| ledger.kinetic_change), "change of the kinetic energy since the start")),
+    in_plot(Q::EnergyBalance, on_request("energy.elastic_change", "elastic_change_J", Consumed("elastic", |ledger| ledger.elastic_change), "change of the elastic energy since the start")),
+    in_plot_and_run(Q::EnergyBalance, 11, on_request("energy.residual", "energy_residual_J", Supplied("residual", Ledger::residual), "error of the integration: energy that came from nowhere since the start")),
 
     // Supplied by the code that computes the ideal motion alongside the run.
-    plotted(Q::TipError, asked("", "tip_error_m", Whole("distance", |_| f64::NAN), "")),
-    both(Q::ProbeError, 9, asked("probe_error.#", "probe_error_#_m", ProbeError, "probe tip from where the ideal mechanism has it")),
+    in_plot(Q::TipError, on_request("", "tip_error_m", Scalar("distance", |_| f64::NAN), "")),
+    in_plot_and_run(Q::ProbeError, 9, on_request("probe_error.#", "probe_error_#_m", ProbeError, "probe tip from where the ideal mechanism has it")),
 
-    listed(12, asked("@.force.#", "@_force_#_N", Element(ElementReport::own_force), "force of the element on its second, or only, point")),
-    listed(12, asked("@.torque.#", "@_torque_#_Nm", Element(|element| element.torque), "torque of the element on the body")),
+    in_run(12, on_request("@.force.#", "@_force_#_N", Element(ElementReport::own_force), "force of the element on its second, or only, point")),
+    in_run(12, on_request("@.torque.#", "@_torque_#_Nm", Element(|element| element.torque), "torque of the element on the body")),
 
-    asked("@.pose.#", "@_#_m", OtherAxes(|body| body.position), "origin of the body"),
-    asked("@.pose.#", "@_#_rad", OtherAngles(|pose| pose.angles), "orientation of the body, Rx(alpha) Rz(beta) Ry(gamma)"),
-    asked("@.velocity.#", "@_v#_m_s", OtherAxes(|body| body.velocity), "velocity of the body's origin"),
-    asked("@.velocity.#", "@_#_rate_rad_s", OtherAngles(|pose| pose.angle_rates), "rate of the body's angle"),
-    asked("@.acceleration.#", "@_a#_m_s2", OtherAxes(|body| body.acceleration), "acceleration of the body's origin"),
-    asked("@.acceleration.#", "@_#_accel_rad_s2", OtherAngles(|pose| pose.angle_accelerations), "second derivative of the body's angle"),
-    asked("@.angular_velocity.#", "@_omega_#_rad_s", BodyAxes(|body| body.angular_velocity), "angular velocity of the body"),
-    asked("@.angular_acceleration.#", "@_omega_rate_#_rad_s2", BodyAxes(|body| body.angular_acceleration), "angular acceleration of the body"),
+    on_request("@.pose.#", "@_#_m", OtherAxes(|body| body.position), "origin of the body"),
+    on_request("@.pose.#", "@_#_rad", OtherAngles(|pose| pose.angles), "orientation of the body, Rx(alpha) Rz(beta) Ry(gamma)"),
+    on_request("@.velocity.#", "@_v#_m_s", OtherAxes(|body| body.velocity), "velocity of the body's origin"),
+    on_request("@.velocity.#", "@_#_rate_rad_s", OtherAngles(|pose| pose.angle_rates), "rate of the body's angle"),
+    on_request("@.acceleration.#", "@_a#_m_s2", OtherAxes(|body| body.acceleration), "acceleration of the body's origin"),
+    on_request("@.acceleration.#", "@_#_accel_rad_s2", OtherAngles(|pose| pose.angle_accelerations), "second derivative of the body's angle"),
+    on_request("@.angular_velocity.#", "@_omega_#_rad_s", BodyAxes(|body| body.angular_velocity), "angular velocity of the body"),
+    on_request("@.angular_acceleration.#", "@_omega_rate_#_rad_s2", BodyAxes(|body| body.angular_acceleration), "angular acceleration of the body"),
 
-    asked("@.position", "@_position_m", SlideCoordinate(0), "coordinate of the joint along its axis"),
-    asked("@.rate", "@_rate_m_s", SlideCoordinate(1), "rate of the joint's coordinate"),
-    asked("@.angle", "@_angle_rad", HingeCoordinate(0), "angle of the joint about its axis"),
-    asked("@.rate", "@_rate_rad_s", HingeCoordinate(1), "rate of the joint's angle"),
-    asked("@.angle_rate", "@_angle_rate_rad_s", TurnRate, "rate of the joint's angle"),
-    asked("@.angle", "@_angle_rad", FirstTurn(0), "angle of the joint about its axis in the parent"),
-    asked("@.angle_rate", "@_angle_rate_rad_s", FirstTurn(1), "rate of that angle"),
-    asked("@.child_angle", "@_child_angle_rad", SecondTurn(0), "angle of the joint about its axis in the child"),
-    asked("@.child_angle_rate", "@_child_angle_rate_rad_s", SecondTurn(1), "rate of that angle"),
+    on_request("@.position", "@_position_m", SlideCoordinate(0), "coordinate of the joint along its axis"),
+    on_request("@.rate", "@_rate_m_s", SlideCoordinate(1), "rate of the joint's coordinate"),
+    on_request("@.angle", "@_angle_rad", HingeCoordinate(0), "angle of the joint about its axis"),
+    on_request("@.rate", "@_rate_rad_s", HingeCoordinate(1), "rate of the joint's angle"),
+    on_request("@.angle_rate", "@_angle_rate_rad_s", TurnRate, "rate of the joint's angle"),
+    on_request("@.angle", "@_angle_rad", FirstTurn(0), "angle of the joint about its axis in the parent"),
+    on_request("@.angle_rate", "@_angle_rate_rad_s", FirstTurn(1), "rate of that angle"),
+    on_request("@.child_angle", "@_child_angle_rad", SecondTurn(0), "angle of the joint about its axis in the child"),
+    on_request("@.child_angle_rate", "@_child_angle_rate_rad_s", SecondTurn(1), "rate of that angle"),
 
-    asked("@.reaction.#", "@_reaction_#_N", Reaction(0), "force of the joint on its child, its drive's included"),
-    asked("@.reaction_torque.#", "@_reaction_torque_#_Nm", Reaction(1), "torque of the joint on its child about its joint point, its drive's included"),
-    asked("@.reaction.#", "@_reaction_#_N", Closing(|load| load[0]), "force of the joint on its child"),
-    asked("@.reaction_torque.#", "@_reaction_torque_#_Nm", Closing(|load| load[1]), "torque of the joint on its child about its joint point"),
+    on_request("@.reaction.#", "@_reaction_#_N", Reaction(0), "force of the joint on its child, its drive's included"),
+    on_request("@.reaction_torque.#", "@_reaction_torque_#_Nm", Reaction(1), "torque of the joint on its child about its joint point, its drive's included"),
+    on_request("@.reaction.#", "@_reaction_#_N", Closing(|load| load[0]), "force of the joint on its child"),
+    on_request("@.reaction_torque.#", "@_reaction_torque_#_Nm", Closing(|load| load[1]), "torque of the joint on its child about its joint point"),
 
-    asked("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap between ball and socket wall; negative in contact"),
-    asked("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),
-    asked("@.slip_speed", "@_slip_speed_m_s", Joint(|joint| joint.slip_speed), "sliding speed that the friction law uses"),
+    on_request("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap between ball and socket wall; negative in contact"),
+    on_request("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),
+    on_request("@.slip_speed", "@_slip_speed_m_s", Joint(|joint| joint.slip_speed), "sliding speed that the friction law uses"),
 
-    asked("@.length", "@_length_m", ElementValue(|element| (element.points[1] - element.points[0]).norm()), "distance of the element's points"),
+    on_request("@.length", "@_length_m", ElementValue(|element| (element.points[1] - element.points[0]).norm()), "distance of the element's points"),
 
-    asked("tip_error", "probe_error_m", ProbeDistance, "distance of the probe tip from where the ideal mechanism has it"),
+    on_request("tip_error", "probe_error_m", ProbeDistance, "distance of the probe tip from where the ideal mechanism has it"),
 ];
 
 /// Channel name of the time, the first column of every row.

@@ -10,23 +10,23 @@ use crate::simulate::stepper::ActiveScheme;
 use crate::simulate::{StopAdvice, StopFault, Stopped};
 
 /// Shortest first step after a contact begins, s.
-const SHORTEST_FIRST: f64 = 1e-9;
+const MIN_FIRST_STEP: f64 = 1e-9;
 /// At this tolerance or a looser one, a step truncated at an event ends on the interpolant, whose error is about the estimate. At
 /// tighter ones it is repeated, which adds little to their many steps.
 const END_ON_INTERPOLANT: f64 = 1e-5;
 /// Loosest tolerance of the automatic method's explicit scheme. It takes the steps through impacts, which determine all later
 /// motion and are few compared with those in lasting contact.
-const OF_IMPACTS: f64 = 1e-5;
+const IMPACT_TOLERANCE: f64 = 1e-5;
 /// Factor on the allowed error of an explicit step in which a stop presses: its force grows with d^1.5, whose slope begins with a
 /// vertical tangent. The sensitivity of the motion after an impact to the motion before it, which determines exponents, has a
 /// much larger error than the motion itself.
-const WHILE_PRESSED: f64 = 0.001;
+const STOP_ERROR_FACTOR: f64 = 0.001;
 /// Smallest and largest step-size factor after an attempt whose iteration failed.
 const AFTER_FAILURE: (f64, f64) = (0.1, 0.5);
 
 /// A step as it was before an event truncated it.
 #[derive(Clone, Copy)]
-pub(super) struct Whole {
+pub(super) struct FullStep {
     /// s.
     size: f64,
     /// Whether it was repeated to end at the event; otherwise it ended on its interpolant.
@@ -49,10 +49,10 @@ impl Run<'_> {
     pub(super) fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
         self.choose_flights(limit);
         self.stepper.choose(self.state.control.member);
-        self.attempt.turned = false;
+        self.attempt.has_switched_branch = false;
         self.attempt.counts = Counts::default();
         self.attempt.factorisations = 0;
-        self.hold_sides();
+        self.freeze_element_sides();
         let (t_end, h) = loop {
             if let Some(step) = self.attempt_adaptive(limit) {
                 break step;
@@ -77,7 +77,7 @@ impl Run<'_> {
             self.state.record.statistics.stability_limited_time += h;
         }
         if self.state.conditions.solver.method == Method::Automatic {
-            self.choose_member(h, stiffness, evaluations as f64);
+            self.choose_scheme(h, stiffness, evaluations as f64);
         }
         Ok(())
     }
@@ -86,11 +86,11 @@ impl Run<'_> {
     fn allowed_error(&self) -> f64 {
         let solver = &self.state.conditions.solver;
         let allowed = match (solver.method, self.state.control.member) {
-            (Method::Automatic, ActiveScheme::Explicit) => solver.tolerance.min(OF_IMPACTS),
+            (Method::Automatic, ActiveScheme::Explicit) => solver.tolerance.min(IMPACT_TOLERANCE),
             _ => solver.tolerance,
         };
-        let presses = self.mechanism.presses_vertically(&self.attempt.sides);
-        if presses { WHILE_PRESSED * allowed } else { allowed }
+        let presses = self.mechanism.has_vertical_onset(&self.attempt.element_sides);
+        if presses { STOP_ERROR_FACTOR * allowed } else { allowed }
     }
 
     /// Attempts a step and locates its first event. Returns its end and size, s, or `None` if it must be repeated with the new
@@ -98,17 +98,17 @@ impl Run<'_> {
     fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
         let t = self.state.now.t;
         let tolerance = self.state.conditions.solver.tolerance;
-        let asked = self.state.control.h_next;
-        let beside = self.attempt.beside.take();
-        self.attempt.whole = None;
+        let requested_step = self.state.control.h_next;
+        let to_reproduce = self.attempt.step_to_reproduce.take();
+        self.attempt.full_step = None;
         self.attempt.edge = false;
-        let mut h = asked.min(LONGEST_STEP);
+        let mut h = requested_step.min(LONGEST_STEP);
         let mut t_end = t + h;
-        let cut = t_end >= limit - NEARLY * h;
-        if let Some(whole) = beside {
-            h = whole.size;
+        let is_truncated = t_end >= limit - NEARLY * h;
+        if let Some(full_step) = to_reproduce {
+            h = full_step.size;
             t_end = t + h;
-        } else if cut {
+        } else if is_truncated {
             t_end = limit;
             h = limit - t;
         }
@@ -128,13 +128,13 @@ impl Run<'_> {
         let factor = state.control.controller.after_accept(error);
         let next = h * factor.min(growth.max(1.0));
         // A step cut short is no evidence against the longer one.
-        state.control.h_next = if cut { state.control.h_next.max(next) } else { next };
+        state.control.h_next = if is_truncated { state.control.h_next.max(next) } else { next };
         let contact_began = std::mem::take(&mut state.control.contact_began);
         self.finish_gaps(t_end);
         let event = self.first_event(h);
         let corner = self.first_corner(h);
         // A step that follows another run ends where and how that run's step did, unless an event of its own comes first.
-        let last = beside.map(|whole| ((limit - t) / h, whole.repeated));
+        let last = to_reproduce.map(|full_step| ((limit - t) / h, full_step.repeated));
         let before_last = |theta: f64| last.is_none_or(|(last, _)| theta < last);
         let event = event.filter(|theta| before_last(*theta));
         let corner = corner.filter(|corner| before_last(corner.theta));
@@ -142,13 +142,13 @@ impl Run<'_> {
         let corner = corner.filter(|corner| event.is_none_or(|theta| corner.theta < theta));
         if let Some(corner) = &corner
             && corner.is_at_start()
-            && !self.attempt.turned
+            && !self.attempt.has_switched_branch
         {
             // Retry once on the other branch; if that leads back here, either branch will do.
-            self.attempt.turned = true;
-            corner.next.put(&mut self.state.now.contact_states[corner.joint]);
+            self.attempt.has_switched_branch = true;
+            corner.next.apply_to(&mut self.state.now.contact_states[corner.joint]);
             self.invalidate();
-            self.state.control.h_next = asked;
+            self.state.control.h_next = requested_step;
             self.state.control.contact_began = contact_began;
             return None;
         }
@@ -156,48 +156,48 @@ impl Run<'_> {
         let edge = self.first_edge(h);
         if edge.is_some_and(|theta| theta < edges::AT_START) {
             // The edge was passed at the start: repeat the step on the other side.
-            self.state.control.h_next = asked;
+            self.state.control.h_next = requested_step;
             self.state.control.contact_began = contact_began;
             return None;
         }
         let edge = edge.filter(|theta| before_last(*theta));
         let first = event.into_iter().chain(corner.iter().map(|corner| corner.theta)).fold(f64::INFINITY, f64::min);
         if let Some(theta) = edge.filter(|theta| *theta < first) {
-            self.attempt.located = None;
+            self.attempt.located_joint = None;
             self.attempt.edge = true;
             t_end = t + theta * h;
-            self.end_at(theta, t_end, h);
-            self.attempt.whole = Some(Whole { size: h, repeated: false });
+            self.truncate_at(theta, t_end, h);
+            self.attempt.full_step = Some(FullStep { size: h, repeated: false });
             h *= theta;
         } else if let Some(corner) = corner {
             // The full step worked; a rate that stops rising soon after contact onset is no evidence against its size.
             if contact_began && matches!(corner.next, LawBranch::Approach(_)) {
-                self.state.control.h_contact = next.max(SHORTEST_FIRST);
+                self.state.control.h_contact = next.max(MIN_FIRST_STEP);
             }
-            self.attempt.located = None;
+            self.attempt.located_joint = None;
             self.attempt.corner = Some((corner.joint, corner.next));
             t_end = t + corner.theta * h;
-            self.end_at(corner.theta, t_end, h);
-            self.attempt.whole = Some(Whole { size: h, repeated: false });
+            self.truncate_at(corner.theta, t_end, h);
+            self.attempt.full_step = Some(FullStep { size: h, repeated: false });
             h *= corner.theta;
         } else if let Some((last, false)) = last
             && event.is_none()
         {
-            self.attempt.located = None;
-            self.end_at(last, limit, h);
+            self.attempt.located_joint = None;
+            self.truncate_at(last, limit, h);
             return Some((limit, limit - t));
         } else if let Some(theta) = event.or(last.map(|(last, _)| last)) {
             if event.is_none() {
-                self.attempt.located = None;
+                self.attempt.located_joint = None;
             }
             t_end = t + theta * h;
             if tolerance >= END_ON_INTERPOLANT && self.stepper.ends_on_interpolant() {
-                self.end_at(theta, t_end, h);
-                self.attempt.whole = Some(Whole { size: h, repeated: false });
+                self.truncate_at(theta, t_end, h);
+                self.attempt.full_step = Some(FullStep { size: h, repeated: false });
                 return Some((t_end, h * theta));
             }
             // Repeat the step, shortened, so that its end has the error of the method and not that of the interpolant.
-            self.attempt.whole = Some(Whole { size: h, repeated: true });
+            self.attempt.full_step = Some(FullStep { size: h, repeated: true });
             if event.is_some() {
                 h *= theta;
             } else {
@@ -210,16 +210,16 @@ impl Run<'_> {
             }
             self.finish_gaps(t_end);
         } else if contact_began {
-            self.state.control.h_contact = next.max(SHORTEST_FIRST);
+            self.state.control.h_contact = next.max(MIN_FIRST_STEP);
         }
         Some((t_end, h))
     }
 
     /// Fraction of the step just attempted at which the first contact starts or ends, if any; its joint is stored in
-    /// `located`.
+    /// `located_joint`.
     fn first_event(&mut self, h: f64) -> Option<f64> {
         let mut first: Option<f64> = None;
-        self.attempt.located = None;
+        self.attempt.located_joint = None;
         for j in 0..self.attempt.end.gaps.len() {
             if !self.mechanism.contacts.has_clearance(j) {
                 continue;
@@ -229,7 +229,7 @@ impl Run<'_> {
             };
             if first.is_none_or(|earliest| theta < earliest) {
                 first = Some(theta);
-                self.attempt.located = Some(j);
+                self.attempt.located_joint = Some(j);
             }
         }
         first
@@ -244,14 +244,14 @@ impl Run<'_> {
         // the play.
         let travel = h * start.speed.max(end.speed);
         let clearance = self.mechanism.contacts.clearance(j);
-        let pieces = (4.0 * travel / clearance).ceil().clamp(1.0, 64.0);
+        let intervals = (4.0 * travel / clearance).ceil().clamp(1.0, 64.0);
         let signed = |theta: f64, at: Approach| SignedGap { theta, gap: sign * at.penetration, rate: sign * at.rate };
         let mut left = signed(0.0, start);
-        for n in 1..=pieces as u32 {
-            let right = if f64::from(n) == pieces {
+        for n in 1..=intervals as u32 {
+            let right = if f64::from(n) == intervals {
                 signed(1.0, end)
             } else {
-                self.signed_gap(j, f64::from(n) / pieces, h, sign)
+                self.signed_gap(j, f64::from(n) / intervals, h, sign)
             };
             if let Some((a, b)) = self.crossing_within(j, h, sign, left, right) {
                 let width = (1e-15 / h).max(1e-12);

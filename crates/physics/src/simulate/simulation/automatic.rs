@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Run, shortest_step};
 use crate::integrate::{Controller, Method};
-use crate::mechanism::{LARGEST_DENSE, Mechanism, MechanismError};
+use crate::mechanism::{MAX_DENSE, Mechanism, MechanismError};
 use crate::simulate::stepper::ActiveScheme;
 
 /// h |lambda| beyond which an explicit step is limited by stability.
@@ -13,18 +13,18 @@ pub(super) const STABILITY_LIMIT: f64 = 3.0;
 const LIMITED_STEPS: u32 = 8;
 /// Steps since the latest contact began before the implicit scheme is tried.
 const SETTLED_STEPS: u32 = 60;
-/// The implicit scheme passes its trial if its progress per cost is at least `WORTH_IT` times that of the steps before. Otherwise it waits
-/// for explicit steps that cost `EXPLICIT_TURN` times as much as the trial; each consecutive failure doubles the wait, up to
-/// `MOST_DOUBLINGS` times.
-const WORTH_IT: f64 = 0.7;
-const EXPLICIT_TURN: f64 = 2.5;
-const MOST_DOUBLINGS: u32 = 3;
+/// The implicit scheme passes its trial if its progress per cost is at least `MIN_PROGRESS` times that of the steps before.
+/// Otherwise it waits for explicit steps that cost `WAIT_FACTOR` times as much as the trial; each consecutive failure doubles the
+/// wait, up to `MAX_DOUBLINGS` times.
+const MIN_PROGRESS: f64 = 0.7;
+const WAIT_FACTOR: f64 = 2.5;
+const MAX_DOUBLINGS: u32 = 3;
 /// Steps in a trial of the implicit scheme, unless an impact ends it.
 const TRIAL_STEPS: u32 = 24;
 /// Initial trial steps that do not count once they are complete, because the step size is still growing.
 const GROWING_STEPS: u32 = 4;
 /// Decay per step of the recorded progress and cost of the explicit scheme.
-const KEPT: f64 = 0.95;
+const DECAY: f64 = 0.95;
 /// Cost of a step besides evaluations and algebra (events, peaks, energies), and total cost of an explicit step, in evaluations.
 const STEP_COST: f64 = 6.0;
 const EXPLICIT_COST: f64 = STEP_COST + 6.0;
@@ -50,11 +50,11 @@ impl Trial {
     }
 
     /// Ends the trial; returns whether it failed against earlier steps with the progress per cost `before`.
-    fn conclude_trial(&mut self, before: f64) -> bool {
-        let fails = self.progress < WORTH_IT * before * self.cost;
+    fn conclude(&mut self, before: f64) -> bool {
+        let fails = self.progress < MIN_PROGRESS * before * self.cost;
         if fails {
-            let turn = EXPLICIT_TURN * self.cost / EXPLICIT_COST;
-            self.wait = (turn as u32) << self.failures.min(MOST_DOUBLINGS);
+            let turn = WAIT_FACTOR * self.cost / EXPLICIT_COST;
+            self.wait = (turn as u32) << self.failures.min(MAX_DOUBLINGS);
             self.failures += 1;
         } else {
             self.failures = 0;
@@ -92,47 +92,47 @@ impl SchemeSelector {
 impl Run<'_> {
     /// Starts with the implicit scheme if balls touch from the start and their laws have no damping: explicit steps would sustain
     /// the ringing at a multiple of the tolerance, and implicit ones would then have to resolve it.
-    pub(super) fn choose_first_member(&mut self) {
+    pub(super) fn choose_first_scheme(&mut self) {
         let Self { mechanism, state, .. } = self;
-        let touching = || state.now.contact_states.iter().enumerate().filter(|(_, m)| m.active).map(|(j, _)| j);
+        let active_joints = || state.now.contact_states.iter().enumerate().filter(|(_, m)| m.active).map(|(j, _)| j);
         let undamped = |j| mechanism.contacts.coefficients(j).damping == 0.0;
         let velocities = state.now.y.len() - mechanism.positions();
         if state.conditions.solver.method == Method::Automatic
             && velocities <= mechanism.largest_implicit()
-            && touching().next().is_some()
-            && touching().all(undamped)
+            && active_joints().next().is_some()
+            && active_joints().all(undamped)
             && !mechanism.is_kinematic()
         {
-            self.put_member(ActiveScheme::Implicit);
+            self.set_scheme(ActiveScheme::Implicit);
         }
     }
 
     /// Chooses the scheme of the next step, after one of size `h` that took `evaluations` evaluations.
-    pub(super) fn choose_member(&mut self, h: f64, stiffness: f64, evaluations: f64) {
-        let member = self.next_member(h, stiffness, evaluations);
-        if member != self.state.control.member {
-            self.put_member(member);
+    pub(super) fn choose_scheme(&mut self, h: f64, stiffness: f64, evaluations: f64) {
+        let scheme = self.next_scheme(h, stiffness, evaluations);
+        if scheme != self.state.control.member {
+            self.set_scheme(scheme);
         }
     }
 
-    fn put_member(&mut self, member: ActiveScheme) {
-        self.state.control.member = member;
-        self.state.control.controller = controller_of(Method::Automatic, member);
+    fn set_scheme(&mut self, scheme: ActiveScheme) {
+        self.state.control.member = scheme;
+        self.state.control.controller = controller_of(Method::Automatic, scheme);
         self.invalidate();
     }
 
-    fn next_member(&mut self, h: f64, stiffness: f64, evaluations: f64) -> ActiveScheme {
+    fn next_scheme(&mut self, h: f64, stiffness: f64, evaluations: f64) -> ActiveScheme {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
         let factorisations = f64::from(self.attempt.factorisations);
         let state = &mut self.state;
-        let member = state.control.member;
-        let algebra = match member {
+        let scheme = state.control.member;
+        let algebra = match scheme {
             ActiveScheme::Explicit => 0.0,
             ActiveScheme::Implicit => factorisations * self.mechanism.implicit_algebra(),
         };
         let cost = evaluations + algebra + STEP_COST;
         let choice = &mut state.control.choice;
-        if member == ActiveScheme::Implicit {
+        if scheme == ActiveScheme::Implicit {
             choice.implicit.add(h, cost);
         }
         if state.control.contact_began {
@@ -140,34 +140,34 @@ impl Run<'_> {
             choice.limited = 0;
             // An impact is short and not stiff: the explicit method resolves it at less cost.
             let strikes = state.now.contact_states.iter().any(|m| m.active && !m.floored);
-            let leaves = member == ActiveScheme::Implicit && strikes;
+            let leaves = scheme == ActiveScheme::Implicit && strikes;
             if leaves {
-                choice.implicit.conclude_trial(choice.explicit());
+                choice.implicit.conclude(choice.explicit());
             }
             (choice.explicit_progress, choice.explicit_cost) = (0.0, 0.0);
-            return if leaves { ActiveScheme::Explicit } else { member };
+            return if leaves { ActiveScheme::Explicit } else { scheme };
         }
-        if member == ActiveScheme::Implicit {
+        if scheme == ActiveScheme::Implicit {
             let before = choice.explicit();
             let trial = &mut choice.implicit;
             if trial.steps == GROWING_STEPS {
                 (trial.progress, trial.cost) = (0.0, 0.0);
             }
-            if trial.steps >= TRIAL_STEPS && trial.conclude_trial(before) {
+            if trial.steps >= TRIAL_STEPS && trial.conclude(before) {
                 // An event may have truncated that step to almost nothing.
                 state.control.h_next = choice.h_explicit.max(shortest_step(state.now.t));
                 return ActiveScheme::Explicit;
             }
-            return member;
+            return scheme;
         }
         choice.since_contact += 1;
-        choice.explicit_progress = KEPT * choice.explicit_progress + h;
-        choice.explicit_cost = KEPT * choice.explicit_cost + cost;
+        choice.explicit_progress = DECAY * choice.explicit_progress + h;
+        choice.explicit_cost = DECAY * choice.explicit_cost + cost;
         choice.limited =
             if stiffness > STABILITY_LIMIT { choice.limited + 1 } else { choice.limited.saturating_sub(1) };
         if choice.implicit.wait > 0 {
             choice.implicit.wait -= 1;
-            return member;
+            return scheme;
         }
         let touches = state.now.contact_states.iter().any(|m| m.active);
         let limited = choice.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
@@ -178,13 +178,13 @@ impl Run<'_> {
             choice.implicit.restart();
             return ActiveScheme::Implicit;
         }
-        member
+        scheme
     }
 }
 
 /// Step-size control for the order of the method's error estimate.
-pub(in crate::simulate) fn controller_of(method: Method, member: ActiveScheme) -> Controller {
-    Controller::new(match (method, member) {
+pub(in crate::simulate) fn controller_of(method: Method, scheme: ActiveScheme) -> Controller {
+    Controller::new(match (method, scheme) {
         (Method::Radau5, _) | (Method::Automatic, ActiveScheme::Implicit) => 3,
         _ => 4,
     })
@@ -199,8 +199,8 @@ pub(in crate::simulate) fn prepare_implicit(mechanism: &mut Mechanism, method: M
     if method == Method::DiscreteGradient {
         mechanism.prepare_discrete_gradient()?;
     }
-    if method.is_implicit() && velocities > LARGEST_DENSE {
-        return Err(MechanismError::TooLarge { velocities, most: LARGEST_DENSE });
+    if method.is_implicit() && velocities > MAX_DENSE {
+        return Err(MechanismError::TooLarge { velocities, most: MAX_DENSE });
     }
     let tries = method == Method::Automatic && velocities <= mechanism.largest_implicit();
     if method.is_implicit() || tries {
@@ -229,7 +229,7 @@ mod tests {
             implicit: Trial { steps: TRIAL_STEPS - 1, ..Trial::default() },
             ..SchemeSelector::default()
         };
-        Run::new(model, &mut state, &mut workspace).choose_member(1e-3, 0.0, 10.0);
+        Run::new(model, &mut state, &mut workspace).choose_scheme(1e-3, 0.0, 10.0);
         let (control, t) = (&state.control, state.now.t);
         assert_eq!(control.member, ActiveScheme::Explicit);
         assert!(t + control.h_next > t);

@@ -4,18 +4,18 @@ use super::search::NEAR_PEAK;
 use super::{Run, State};
 use crate::contact::{Coefficients, ContactState, Separation};
 use crate::integrate::StepControl;
-use crate::machine::LEAST_IMPACT_STEPS;
+use crate::machine::MIN_IMPACT_STEPS;
 use crate::simulate::peaks::PenetrationCubic;
 
 /// Largest penetration, as a fraction of the clearance, of a ball that is at its wall to within rounding.
 const AT_WALL: f64 = 1e-9;
 
 /// Push on a ball whose motion before the contact is unknown, m/s^2.
-const UNKNOWN: f64 = f64::MAX;
+const UNKNOWN_PUSH: f64 = f64::MAX;
 
 /// Changes in the contact state at the end of a step.
 #[derive(Clone, Copy)]
-pub(super) struct Switched {
+pub(super) struct ContactChanges {
     /// A contact began or ended.
     pub contacts: bool,
     /// The force at the step's end changes with the approach speed just found.
@@ -46,19 +46,20 @@ impl State {
         contact_state
     }
 
-    /// Records a step of contact `j` that began at `start` (s), from fraction `from` on, with the largest normal force `force` (N).
-    fn follow(
+    /// Records a step of contact `j` that began at `start` (s), from fraction `from` on, with the largest normal force `force`
+    /// (N).
+    fn record_contact_step(
         &mut self,
         j: usize,
         start: f64,
-        course: &PenetrationCubic,
+        cubic: &PenetrationCubic,
         c: &Coefficients,
         force: f64,
         contact_state: &ContactState,
         from: f64,
     ) {
-        let (damping, theta) = course.most_damped(c, contact_state, from);
-        self.record.impacts.follow(j, course, force, damping);
+        let (damping, theta) = cubic.most_damped(c, contact_state, from);
+        self.record.impacts.update(j, cubic, force, damping);
         if damping > self.record.statistics.damping[j] {
             self.record.statistics.damping[j] = damping;
             self.record.statistics.damping_time[j] = start + theta * (self.now.t - start);
@@ -83,7 +84,8 @@ impl Run<'_> {
                 continue;
             }
             if penetration <= AT_WALL * contact.clearance && rate > 0.0 {
-                state.now.contact_states[j] = state.begin(j, 0.0, rate, UNKNOWN, contact.restitution, coefficients);
+                state.now.contact_states[j] =
+                    state.begin(j, 0.0, rate, UNKNOWN_PUSH, contact.restitution, coefficients);
             } else {
                 state.now.contact_states[j] = ContactState::at_onset(coefficients, f64::NEG_INFINITY);
                 state.record.statistics.impacts[j] += 1;
@@ -98,10 +100,10 @@ impl Run<'_> {
         let mut begins = false;
         for j in 0..state.conditions.joints.len() {
             let gap = state.now.gaps[j];
-            if mechanism.contacts.has_clearance(j) && gap.arrives() && !state.now.contact_states[j].active {
+            if mechanism.contacts.has_clearance(j) && gap.is_arriving() && !state.now.contact_states[j].active {
                 let (asked, coefficients) =
                     (state.conditions.joints[j].restitution, mechanism.contacts.coefficients(j));
-                state.now.contact_states[j] = state.begin(j, state.now.t, gap.rate, UNKNOWN, asked, coefficients);
+                state.now.contact_states[j] = state.begin(j, state.now.t, gap.rate, UNKNOWN_PUSH, asked, coefficients);
                 state.record.contact_steps[j] = 0;
                 begins = true;
             }
@@ -112,13 +114,13 @@ impl Run<'_> {
     }
 
     /// Starts and ends contacts whose penetration changed sign over the step just accepted.
-    pub(super) fn switch_contacts(&mut self, h: f64) -> Switched {
-        let located = self.attempt.located.take();
+    pub(super) fn switch_contacts(&mut self, h: f64) -> ContactChanges {
+        let located = self.attempt.located_joint.take();
         let fixed = !self.locates();
         let Self { mechanism, state, before, attempt, .. } = self;
-        let strongest = &attempt.strongest;
+        let peak_forces = &attempt.peak_forces;
         let counts_steps = state.conditions.solver.method.control() == StepControl::Fixed;
-        let mut switched = Switched { contacts: false, forces: false };
+        let mut changes = ContactChanges { contacts: false, forces: false };
         for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
@@ -126,34 +128,34 @@ impl Run<'_> {
             let (start, end) = (before.gaps[j], state.now.gaps[j]);
             let coefficients = mechanism.contacts.coefficients(j);
             if state.now.contact_states[j].active {
-                let course = PenetrationCubic::new(start, end, h);
+                let cubic = PenetrationCubic::new(start, end, h);
                 let contact_state = state.now.contact_states[j].unfrozen();
-                state.follow(j, before.t, &course, coefficients, strongest[j].0, &contact_state, 0.0);
+                state.record_contact_step(j, before.t, &cubic, coefficients, peak_forces[j].0, &contact_state, 0.0);
             }
             // A located switch ends within rounding of the wall, on either side. The repeated step may still show that a ball
             // about to separate has turned back.
-            let turned = state.now.contact_states[j].active && end.penetration > 0.0 && end.rate > 0.0;
-            let touching = match located {
-                Some(located) if located == j => !state.now.contact_states[j].active || turned,
-                _ => end.penetration > 0.0 || end.arrives(),
+            let turned_back = state.now.contact_states[j].active && end.penetration > 0.0 && end.rate > 0.0;
+            let in_contact = match located {
+                Some(located) if located == j => !state.now.contact_states[j].active || turned_back,
+                _ => end.penetration > 0.0 || end.is_arriving(),
             };
             state.record.contact_steps[j] += 1;
-            if touching == state.now.contact_states[j].active {
-                if touching {
+            if in_contact == state.now.contact_states[j].active {
+                if in_contact {
                     let fastest = || PenetrationCubic::new(start, end, h).fastest(0.0).0;
                     let contact_state = &mut state.now.contact_states[j];
-                    switched.forces |= contact_state.rise(coefficients, end.rate, fastest);
+                    changes.forces |= contact_state.update_largest_rate(coefficients, end.rate, fastest);
                 }
                 continue;
             }
-            switched.contacts = true;
-            switched.forces |= fixed;
+            changes.contacts = true;
+            changes.forces |= fixed;
             let steps = std::mem::replace(&mut state.record.contact_steps[j], 0);
-            if touching {
-                let course = PenetrationCubic::new(start, end, h);
+            if in_contact {
+                let cubic = PenetrationCubic::new(start, end, h);
                 let crosses = start.penetration <= 0.0 && end.penetration > 0.0;
-                let theta = if crosses { course.crossing() } else { 1.0 };
-                let rate = if crosses { course.at(theta).1 } else { end.rate };
+                let theta = if crosses { cubic.crossing() } else { 1.0 };
+                let rate = if crosses { cubic.at(theta).1 } else { end.rate };
                 let time = before.t + theta * h;
                 let asked = state.conditions.joints[j].restitution;
                 let push = (rate - start.rate) / (theta * h);
@@ -164,35 +166,35 @@ impl Run<'_> {
                 }
                 // A located contact begins where the step ends.
                 if fixed {
-                    contact_state.rise(coefficients, end.rate, || course.fastest(theta).0);
-                    let (force, _) = course.strongest(coefficients, &contact_state);
-                    state.follow(j, before.t, &course, coefficients, force, &contact_state, theta);
+                    contact_state.update_largest_rate(coefficients, end.rate, || cubic.fastest(theta).0);
+                    let (force, _) = cubic.strongest(coefficients, &contact_state);
+                    state.record_contact_step(j, before.t, &cubic, coefficients, force, &contact_state, theta);
                 }
                 state.now.contact_states[j] = contact_state;
             } else {
                 let crosses = start.penetration > 0.0 && end.penetration < 0.0;
                 let (time, rate) = if crosses && located != Some(j) {
-                    let course = PenetrationCubic::new(start, end, h);
-                    let theta = course.crossing();
-                    (before.t + theta * h, course.at(theta).1)
+                    let cubic = PenetrationCubic::new(start, end, h);
+                    let theta = cubic.crossing();
+                    (before.t + theta * h, cubic.at(theta).1)
                 } else {
                     (state.now.t, end.rate)
                 };
                 let statistics = &mut state.record.statistics;
                 statistics.floored[j] += u64::from(state.now.contact_states[j].floored);
                 if let Some(impact) = state.record.impacts.end(j, time, rate) {
-                    let farthest = statistics.astray[j].map_or(0.0, |impact| impact.astray());
-                    if impact.astray() > farthest {
+                    let farthest = statistics.astray[j].map_or(0.0, |impact| impact.restitution_excess());
+                    if impact.restitution_excess() > farthest {
                         statistics.astray[j] = Some(impact);
                     }
                 }
-                let coarse = counts_steps && steps < LEAST_IMPACT_STEPS;
+                let coarse = counts_steps && steps < MIN_IMPACT_STEPS;
                 state.record.statistics.coarse[j] += u64::from(coarse);
                 state.now.contact_states[j] = ContactState::default();
                 state.record.statistics.last_separation[j] = Some(state.now.t);
             }
         }
-        switched
+        changes
     }
 
     /// Largest contact forces of the step just accepted, in continuous time.
@@ -209,16 +211,16 @@ impl Run<'_> {
                 continue;
             }
             let coefficients = mechanism.contacts.coefficients(j);
-            let course = PenetrationCubic::new(start, end, h);
+            let cubic = PenetrationCubic::new(start, end, h);
             let (force, theta) = if before.contact_states[j].active {
-                attempt.strongest[j]
+                attempt.peak_forces[j]
             } else if state.now.contact_states[j].active {
-                course.strongest(coefficients, &state.now.contact_states[j].unfrozen())
+                cubic.strongest(coefficients, &state.now.contact_states[j].unfrozen())
             } else {
-                course.strongest(coefficients, &ContactState::passing(coefficients))
+                cubic.strongest(coefficients, &ContactState::within_step(coefficients))
             };
             let time = before.t + theta * h;
-            attempt.near_peak |= force > NEAR_PEAK * state.record.statistics.peak_normal[j];
+            attempt.may_contain_peak |= force > NEAR_PEAK * state.record.statistics.peak_normal[j];
             if force > state.record.statistics.peak_normal[j] {
                 state.record.statistics.peak_normal[j] = force;
                 state.record.statistics.peak_time[j] = time;

@@ -1,5 +1,5 @@
-//! Corners of the contact laws as events. During a step each touching joint stays on one branch of the friction law and one of the
-//! approach-speed rule; the step ends where its sliding speed or penetration rate leaves that branch.
+//! Corners of the contact laws as events. During a step each touching joint stays on one branch of the friction law and one of
+//! the approach-speed rule; the step ends where its sliding speed or penetration rate leaves that branch.
 
 use super::{Run, State};
 use crate::contact::{ApproachBranch, ContactState, FrictionBranch};
@@ -10,17 +10,17 @@ const PARTS: u32 = 4;
 /// A corner earlier than this fraction of the step was passed at its start: the step is repeated on the next branch.
 const AT_START: f64 = 1e-9;
 /// The same limit where a rate stops rising: it is stationary there, and the forces of both branches agree to second order.
-const LEVEL_AT_START: f64 = 1e-3;
+const MAXIMUM_AT_START: f64 = 1e-3;
 /// A rate that falls over this last fraction of a step has passed its maximum inside the last part.
-const LAST: f64 = 1e-4;
+const LAST_PART: f64 = 1e-4;
 /// A rate that exceeds the largest so far by less than this fraction of it counts as equal.
-const NO_FASTER: f64 = 1e-6;
+const EQUAL_RATES: f64 = 1e-6;
 /// Golden-section iterations over the two quarters of a step in which a rate is largest: to 2e-4 of the step.
 const SECTIONS: u32 = 16;
 /// Chatter added by a step that ends at a corner; any other step subtracts one.
-const CORNER: u32 = 3;
+const CHATTER_PER_CORNER: u32 = 3;
 /// Chatter above which corners are no longer located, until it has died down.
-const MOST_CHATTER: u32 = 60;
+const MAX_CHATTER: u32 = 60;
 
 /// A corner inside the step just attempted.
 pub(super) struct Corner {
@@ -41,7 +41,7 @@ pub(super) enum LawBranch {
 
 impl LawBranch {
     /// Switches a contact to this branch.
-    pub(super) fn put(self, contact_state: &mut ContactState) {
+    pub(super) fn apply_to(self, contact_state: &mut ContactState) {
         match self {
             Self::Friction(branch) => contact_state.friction_branch = branch,
             Self::Approach(branch) => contact_state.approach_branch = branch,
@@ -57,36 +57,36 @@ impl Corner {
 }
 
 impl Run<'_> {
-    /// Assigns every touching joint its current branches of the laws; joints that already have branches retain them unless `anew`. If
-    /// corners are not located, all joints use the full laws.
-    pub(super) fn freeze_branches(&mut self, anew: bool) {
-        let holds = self.locates() && !self.state.control.chatters;
+    /// Assigns every touching joint its current branches of the laws; joints that already have branches retain them unless
+    /// `reset`. If corners are not located, all joints use the full laws.
+    pub(super) fn freeze_branches(&mut self, reset: bool) {
+        let freezes = self.locates() && !self.state.control.chatters;
         let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
-        if anew || !holds {
+        if reset || !freezes {
             for contact_state in &mut now.contact_states {
                 *contact_state = contact_state.unfrozen();
             }
         }
-        if !holds {
+        if !freezes {
             return;
         }
-        // With `anew`, the gaps may belong to another state until they are measured.
-        if !anew {
+        // With `reset`, the gaps may belong to another state until they are measured.
+        if !reset {
             for (j, contact_state) in now.contact_states.iter_mut().enumerate() {
                 contact_state.freeze_approach(mechanism.contacts.coefficients(j), now.gaps[j].rate);
             }
         }
-        let holds_none = |m: &ContactState| m.active && m.friction_branch == FrictionBranch::Unfrozen;
-        if !now.contact_states.iter().any(holds_none) {
+        let is_unfrozen = |m: &ContactState| m.active && m.friction_branch == FrictionBranch::Unfrozen;
+        if !now.contact_states.iter().any(is_unfrozen) {
             return;
         }
         mechanism.measure(now.t, &now.y);
         for (j, contact_state) in now.contact_states.iter_mut().enumerate() {
-            if holds_none(contact_state) {
+            if is_unfrozen(contact_state) {
                 let c = mechanism.contacts.coefficients(j);
                 contact_state.friction_branch = c.friction_branch_at(mechanism.slip_speed(j));
-                if anew {
+                if reset {
                     contact_state.freeze_approach(c, mechanism.contacts.gap(j).separation.rate);
                 }
             }
@@ -97,31 +97,31 @@ impl Run<'_> {
     pub(super) fn first_corner(&mut self, h: f64) -> Option<Corner> {
         let mut first: Option<Corner> = None;
         for j in 0..self.state.now.contact_states.len() {
-            if !self.attempt.left[j] {
+            if !self.attempt.has_left_branch[j] {
                 continue;
             }
             let contact_state = self.state.now.contact_states[j];
-            let mut take = |corner: Option<(f64, LawBranch)>| {
+            let mut consider = |corner: Option<(f64, LawBranch)>| {
                 let earliest = first.as_ref().map_or(f64::INFINITY, |corner| corner.theta);
                 if let Some((theta, next)) = corner.filter(|(theta, _)| *theta < earliest) {
                     first = Some(Corner { theta, joint: j, next });
                 }
             };
             if contact_state.friction_branch != FrictionBranch::Unfrozen {
-                take(self.corner_of(j, h));
+                consider(self.friction_corner_of(j, h));
             }
             match contact_state.approach_branch {
                 ApproachBranch::Unfrozen => {}
-                ApproachBranch::Held => take(self.overtaking(j, h)),
-                ApproachBranch::Rising => take(self.level(j, h)),
+                ApproachBranch::Held => consider(self.rising_corner_of(j, h)),
+                ApproachBranch::Rising => consider(self.maximum_corner_of(j, h)),
             }
         }
         first
     }
 
     /// Step fraction at which the penetration rate of joint `j` exceeds its largest value so far, and the next branch.
-    fn overtaking(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
-        let most = self.state.now.contact_states[j].approach_speed * (1.0 + NO_FASTER);
+    fn rising_corner_of(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
+        let most = self.state.now.contact_states[j].approach_speed * (1.0 + EQUAL_RATES);
         let mut left = (0.0, self.state.now.gaps[j].rate - most);
         for n in 1..=PARTS {
             let theta = f64::from(n) / f64::from(PARTS);
@@ -129,8 +129,8 @@ impl Run<'_> {
             if right.1 > 0.0 {
                 let at = if left.1 < 0.0 {
                     let (width, small) = ((1e-15 / h).max(1e-12), 1e-9 * most);
-                    let beyond = |theta: f64| self.rate_at(j, theta, h) - most;
-                    find_root(left.0, left.1, right.0, right.1, width, small, beyond)
+                    let excess = |theta: f64| self.rate_at(j, theta, h) - most;
+                    find_root(left.0, left.1, right.0, right.1, width, small, excess)
                 } else {
                     left.0
                 };
@@ -142,14 +142,14 @@ impl Run<'_> {
     }
 
     /// Step fraction at which the penetration rate of joint `j`, now at its largest, stops rising, and the next branch.
-    fn level(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
+    fn maximum_corner_of(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let mut before = self.state.now.gaps[j].rate;
         for n in 1..=PARTS {
             let end = f64::from(n) / f64::from(PARTS);
             let rate = self.rate_at(j, end, h);
             // Otherwise the next step would mistake the rate at its start for a maximum that this step has passed.
-            let passed = n == PARTS && self.rate_at(j, end - LAST, h) > rate;
+            let passed = n == PARTS && self.rate_at(j, end - LAST_PART, h) > rate;
             if rate >= before && !passed {
                 before = rate;
                 continue;
@@ -169,7 +169,7 @@ impl Run<'_> {
                 }
             }
             let at = 0.5 * (a + b);
-            let at = if at < LEVEL_AT_START { 0.0 } else { at };
+            let at = if at < MAXIMUM_AT_START { 0.0 } else { at };
             return Some((at, LawBranch::Approach(ApproachBranch::Held)));
         }
         None
@@ -186,35 +186,35 @@ impl Run<'_> {
         let Self { mechanism, stepper, state, attempt, scratch_y, .. } = self;
         let (now, end) = (&state.now, &attempt.end);
         let all = 0..now.y.len();
-        for part in mechanism.measured(j).unwrap_or(std::slice::from_ref(&all)) {
+        for part in mechanism.gap_components(j).unwrap_or(std::slice::from_ref(&all)) {
             let part = part.clone();
             stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, &state.polynomial, scratch_y);
         }
         let time = now.t + theta * h;
-        for flyer in mechanism.flyers_of(j) {
+        for flyer in mechanism.free_flight_bodies_of(j) {
             if let Some(flight) = &state.flights[flyer] {
-                flight.put(&mechanism.free_flight_bodies()[flyer], time, scratch_y);
+                flight.write_state(&mechanism.free_flight_bodies()[flyer], time, scratch_y);
             }
         }
         mechanism.measure_one(j, time, scratch_y);
     }
 
     /// Step fraction at which the sliding speed of joint `j` leaves its branch, and the next branch.
-    fn corner_of(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
-        let mut left = (0.0, self.beyond(j, 0.0, h).0);
+    fn friction_corner_of(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
+        let mut left = (0.0, self.slip_excess(j, 0.0, h).0);
         for n in 1..=PARTS {
             let theta = f64::from(n) / f64::from(PARTS);
-            let right = (theta, self.beyond(j, theta, h).0);
+            let right = (theta, self.slip_excess(j, theta, h).0);
             if right.1 > 0.0 {
                 let at = if left.1 < 0.0 {
                     let small = 1e-9 * self.mechanism.contacts.coefficients(j).slip_high;
                     let width = (1e-15 / h).max(1e-12);
-                    let beyond = |theta: f64| self.beyond(j, theta, h).0;
-                    find_root(left.0, left.1, right.0, right.1, width, small, beyond)
+                    let excess = |theta: f64| self.slip_excess(j, theta, h).0;
+                    find_root(left.0, left.1, right.0, right.1, width, small, excess)
                 } else {
                     left.0
                 };
-                let (_, speed) = self.beyond(j, at.max(AT_START), h);
+                let (_, speed) = self.slip_excess(j, at.max(AT_START), h);
                 let c = self.mechanism.contacts.coefficients(j);
                 let next = match self.state.now.contact_states[j].friction_branch {
                     FrictionBranch::Ramp if speed > 0.5 * (c.slip_low + c.slip_high) => FrictionBranch::Full,
@@ -230,13 +230,13 @@ impl Run<'_> {
 
     /// Ends the step just attempted at a corner. Unlike at the start of a contact, the step is not repeated: the new end would
     /// miss the corner by the tolerance, which is not small compared with the ramp, and slide back at once.
-    pub(super) fn end_at(&mut self, theta: f64, t_end: f64, h: f64) {
+    pub(super) fn truncate_at(&mut self, theta: f64, t_end: f64, h: f64) {
         let (now, end, scratch) = (&self.state.now, &mut self.attempt.end, &mut self.scratch_y);
-        for part in self.mechanism.moving() {
+        for part in self.mechanism.active_ranges() {
             let part = part.clone();
             self.stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, &self.state.polynomial, scratch);
         }
-        for part in self.mechanism.moving() {
+        for part in self.mechanism.active_ranges() {
             end.y[part.clone()].copy_from_slice(&scratch[part.clone()]);
         }
         self.stepper.truncate(theta, &mut self.state.polynomial);
@@ -245,25 +245,25 @@ impl Run<'_> {
     }
 
     /// Excess of joint `j`'s sliding speed over its branch, and that speed, m/s, on the interpolant of the attempted step.
-    fn beyond(&mut self, j: usize, theta: f64, h: f64) -> (f64, f64) {
+    fn slip_excess(&mut self, j: usize, theta: f64, h: f64) -> (f64, f64) {
         self.measure_at(j, theta, h);
         let speed = self.mechanism.slip_speed(j);
         let slip = self.state.now.contact_states[j].friction_branch;
         let c = self.mechanism.contacts.coefficients(j);
-        (c.beyond(slip, speed), speed)
+        (c.excess_over_branch(slip, speed), speed)
     }
 
     /// After an accepted step: switches to the branch beyond the corner at its end. Stops locating corners for a while if almost
     /// every step ends at one.
-    pub(super) fn pass_corner(&mut self) {
+    pub(super) fn switch_at_corner(&mut self) {
         let state = &mut self.state;
         if let Some((j, next)) = self.attempt.corner.take() {
             if state.now.contact_states[j].active {
-                next.put(&mut state.now.contact_states[j]);
+                next.apply_to(&mut state.now.contact_states[j]);
             }
             state.record.statistics.corners += 1;
-            state.control.chatter += CORNER;
-            state.control.chatters |= state.control.chatter >= MOST_CHATTER;
+            state.control.chatter += CHATTER_PER_CORNER;
+            state.control.chatters |= state.control.chatter >= MAX_CHATTER;
         } else {
             state.control.chatter = state.control.chatter.saturating_sub(1);
             state.control.chatters &= state.control.chatter > 0;

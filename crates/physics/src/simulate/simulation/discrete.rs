@@ -4,7 +4,8 @@
 //! - the Hertz time of an impact over `steps_per_impact`, while a ball strikes faster than [`SLOW`];
 //! - the arrival of such a ball at its wall, or that part of its Hertz time if it arrives sooner;
 //! - a period of the ringing of a ball on its wall ([`RINGING`]), as longer steps alternate instead of following it;
-//! - the step at which forces other than contact forces move the mechanism by [`SMOOTH`] of its scales more or less than the midpoint
+//! - the step at which forces other than contact forces move the mechanism by [`SMOOTH`] of its scales more or less than the
+//! midpoint
 //!   rule says, from their change since the step before;
 //! - [`LONGEST`].
 //!
@@ -45,7 +46,7 @@ impl DiscreteControl {
     pub(super) fn new(mechanism: &Mechanism) -> Self {
         let joints = mechanism.contacts.len();
         Self {
-            mobility: (0..joints).map(|j| mechanism.most_contact_mobility(j)).collect(),
+            mobility: (0..joints).map(|j| mechanism.max_contact_mobility(j)).collect(),
             phases: vec![ContactPhase::default(); joints],
             h: 0.0,
             acceleration: vec![0.0; mechanism.dimension() - mechanism.positions()],
@@ -175,8 +176,8 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// The part of the step of size `h` just attempted that must be taken in its place, if any: an impact began in it that it does not
-    /// resolve. Sets `all` if the step left out a joint that touches.
+    /// The part of the step of size `h` just attempted that must be taken in its place, if any: an impact began in it that it
+    /// does not resolve. Sets `all` if the step left out a joint that touches.
     fn part_to_repeat(&mut self, t_end: f64, h: f64, all: &mut bool) -> Option<f64> {
         let Self { mechanism, state, attempt, .. } = self;
         let end = &mut attempt.end;
@@ -191,9 +192,9 @@ impl Run<'_> {
                 *all = true;
                 return Some(1.0);
             }
-            let course = PenetrationCubic::new(*start, *end, h);
-            let theta = course.crossing();
-            let speed = course.at(theta).1;
+            let cubic = PenetrationCubic::new(*start, *end, h);
+            let theta = cubic.crossing();
+            let speed = cubic.at(theta).1;
             if speed > SLOW {
                 let longest = step_in_impact(state, j, speed);
                 if h - theta * h > longest {

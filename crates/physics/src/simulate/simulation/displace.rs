@@ -22,11 +22,11 @@ impl Run<'_> {
             // The offset may cross a corner of the laws.
             state.now.contact_states[j] = state.now.contact_states[j].unfrozen();
             let gap = *mechanism.contacts.gap(j);
-            let touching = gap.separation.penetration > 0.0;
-            if touching == state.now.contact_states[j].active {
+            let in_contact = gap.separation.penetration > 0.0;
+            if in_contact == state.now.contact_states[j].active {
                 continue;
             }
-            state.now.contact_states[j] = if touching {
+            state.now.contact_states[j] = if in_contact {
                 state.control.contact_began = true;
                 state.control.h_next = state.control.h_next.min(state.control.h_contact);
                 ContactState::at_onset(mechanism.contacts.coefficients(j), gap.separation.rate)
@@ -41,11 +41,11 @@ impl Run<'_> {
 
     /// Lets the next step end where and how the latest step of another run did, of which `attempt` is left.
     pub(in crate::simulate) fn reproduce(&mut self, attempt: &Attempt) {
-        self.attempt.beside = attempt.whole;
+        self.attempt.step_to_reproduce = attempt.full_step;
     }
 
     /// Adopts the step control of another run in nearly the same state.
-    pub(in crate::simulate) fn step_like(&mut self, control: &Control) {
+    pub(in crate::simulate) fn adopt_step_control(&mut self, control: &Control) {
         let turns = self.state.control.member != control.member;
         self.state.control.clone_from(control);
         if turns {
@@ -61,7 +61,7 @@ mod tests {
     use crate::simulate::Simulation;
 
     #[test]
-    fn a_twin_that_steps_like_its_run_takes_the_same_steps() {
+    fn a_twin_that_adopts_the_step_control_takes_the_same_steps() {
         let change = ("solver.preset".to_owned(), "preview".to_owned());
         let scene = Scene::load("four-bar", &[change]).expect("loads");
         let mut run = Simulation::new(&scene.machine).expect("starts");
@@ -80,7 +80,7 @@ mod tests {
                     other.step_until(run.time()).expect("runs");
                 }
             }
-            follower.step_like(&run);
+            follower.adopt_step_control(&run);
         }
         // Rounding splits some of the follower's steps in two; a twin that chooses its own is truncated at nearly every one of
         // the run's.

@@ -3,21 +3,21 @@
 use super::{Model, State};
 use crate::contact::{Coefficients, FrictionVelocity, settled_penetration};
 use crate::integrate::Method;
-use crate::machine::{BallJoint, LEAST_IMPACT_STEPS, Machine};
-use crate::simulate::{Doubt, Joints, Ledger, LedgerTerm};
+use crate::machine::{BallJoint, MIN_IMPACT_STEPS, Machine};
+use crate::simulate::{AffectedJoints, Doubt, Ledger, LedgerTerm};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
-const MOST_FLOORED: f64 = 0.5;
+const MAX_FLOORED: f64 = 0.5;
 /// Contact patch over ball radius beyond which Hertz theory, which treats the ball as a half-space, is far off.
-const LARGEST_PATCH: f64 = 1.0 / 3.0;
+const MAX_PATCH: f64 = 1.0 / 3.0;
 /// Constraint violations above this fraction of the smallest clearance blur the effect of the clearance.
 const DRIFT_OF_CLEARANCE: f64 = 0.1;
 /// Limit on constraint violations if every ball joint is ideal, m.
 const DRIFT: f64 = 1e-4;
 /// Excess of damping over elastic force, compared with an undisturbed impact, beyond which a force is an artefact of the law.
-const MOST_DAMPING: f64 = 1.0;
+const MAX_DAMPING: f64 = 1.0;
 /// Allowed excess of an undisturbed impact's restitution over its law's prediction.
-const MOST_ASTRAY: f64 = 0.1;
+const MAX_RESTITUTION_EXCESS: f64 = 0.1;
 /// Allowed residual as a fraction of the ledger's energy scale.
 const RESIDUAL: f64 = 5e-3;
 /// Allowed residual as a fraction of each work, and the smallest residual, as a fraction of the energy scale, for which this is
@@ -28,24 +28,24 @@ const NOTEWORTHY: f64 = 1e-3;
 const ROUNDING: f64 = 1e-9;
 /// Time to cross the smallest clearance at a negligible speed, s. A mechanism at rest has almost no energy: energies below those
 /// of all bodies at this speed do not count.
-const CREEP: f64 = 0.1;
+const CROSSING_TIME: f64 = 0.1;
 /// Allowed fraction of time in which stability limits an explicit method's steps, and the loosest tolerance at which such steps
 /// still conserve energy.
-const MOST_HELD: f64 = 0.1;
-const LOOSEST_HELD: f64 = 3e-5;
+const MAX_STABILITY_LIMITED: f64 = 0.1;
+const LOOSEST_TOLERANCE: f64 = 3e-5;
 
 /// A state and its machine under the state's conditions.
-struct Examined<'a> {
+struct DoubtContext<'a> {
     machine: Machine,
     state: &'a State,
 }
 
 /// As [`Model::doubts`].
 pub(super) fn doubts(model: &Model, state: &State) -> Vec<Doubt> {
-    Examined { machine: model.machine().under(&state.conditions), state }.doubts()
+    DoubtContext { machine: model.machine().with_conditions(&state.conditions), state }.doubts()
 }
 
-impl Examined<'_> {
+impl DoubtContext<'_> {
     /// Reasons not to trust the results since the last reset; empty if there are none. Begins with
     /// [`crate::machine::Machine::doubts`] of the machine as it is running.
     fn doubts(&self) -> Vec<Doubt> {
@@ -58,9 +58,9 @@ impl Examined<'_> {
             joints,
             short: statistics.coarse[j],
             contacts: statistics.impacts[j],
-            steps: LEAST_IMPACT_STEPS,
+            steps: MIN_IMPACT_STEPS,
         }));
-        let floored = self.worst(MOST_FLOORED, |j| part(&statistics.floored, j));
+        let floored = self.worst(MAX_FLOORED, |j| part(&statistics.floored, j));
         doubts.extend(floored.map(|(joints, j)| Doubt::Floored {
             joints,
             slow: statistics.floored[j],
@@ -68,15 +68,16 @@ impl Examined<'_> {
         }));
         let late = self.worst(0.0, |j| statistics.late[j]);
         doubts.extend(late.map(|(joints, j)| Doubt::Late { joints, depth: statistics.late[j] }));
-        let rebounds = self.worst(MOST_ASTRAY, |j| statistics.astray[j].map_or(0.0, |impact| impact.astray()));
+        let rebounds = self
+            .worst(MAX_RESTITUTION_EXCESS, |j| statistics.astray[j].map_or(0.0, |impact| impact.restitution_excess()));
         doubts.extend(rebounds.and_then(|(joints, j)| {
             let impact = statistics.astray[j]?;
             Some(Doubt::Rebound { joints, time: impact.end, achieved: impact.achieved(), law: impact.law })
         }));
-        let patch = self.worst(LARGEST_PATCH, |j| self.largest_patch(j));
+        let patch = self.worst(MAX_PATCH, |j| self.largest_patch(j));
         doubts.extend(patch.map(|(joints, j)| Doubt::Patch { joints, radii: self.largest_patch(j) }));
         let usual = |j: usize| self.coefficients(j).damping;
-        let damping = self.worst(MOST_DAMPING, |j| statistics.damping[j] - usual(j));
+        let damping = self.worst(MAX_DAMPING, |j| statistics.damping[j] - usual(j));
         doubts.extend(damping.map(|(joints, j)| Doubt::Damping {
             joints,
             time: statistics.damping_time[j],
@@ -106,7 +107,7 @@ impl Examined<'_> {
         let clearances = self.machine.ball_joints.iter().map(|j| j.contact.clearance);
         let least = clearances.filter(|c| *c > 0.0).fold(DRIFT, f64::min);
         let mass: f64 = self.machine.bodies.iter().map(|body| body.mass).sum();
-        let slow = mass * (least / CREEP) * (least / CREEP);
+        let slow = mass * (least / CROSSING_TIME) * (least / CROSSING_TIME);
         let scale = ledger.scale() + slow;
         let may_drive = |joint: &BallJoint| joint.contact.friction_velocity != FrictionVelocity::Surface;
         let losses = [
@@ -147,20 +148,20 @@ impl Examined<'_> {
     fn stability_doubt(&self) -> Option<Doubt> {
         let solver = &self.machine.solver;
         let share = self.state.statistics().stability_limited_time / self.state.now.t;
-        let loose = solver.method == Method::DormandPrince5 && solver.tolerance > LOOSEST_HELD;
-        (loose && share > MOST_HELD).then_some(Doubt::Held {
+        let loose = solver.method == Method::DormandPrince5 && solver.tolerance > LOOSEST_TOLERANCE;
+        (loose && share > MAX_STABILITY_LIMITED).then_some(Doubt::StabilityLimited {
             share,
             tolerance: solver.tolerance,
-            loosest: LOOSEST_HELD,
+            loosest: LOOSEST_TOLERANCE,
         })
     }
 
     /// The joint for which `measure` is largest and above `limit`, and how many others are above it.
-    fn worst(&self, limit: f64, measure: impl Fn(usize) -> f64) -> Option<(Joints, usize)> {
+    fn worst(&self, limit: f64, measure: impl Fn(usize) -> f64) -> Option<(AffectedJoints, usize)> {
         let joints = &self.machine.ball_joints;
         let beyond = || (0..joints.len()).filter(|&j| measure(j) > limit);
         let worst = beyond().max_by(|&a, &b| measure(a).total_cmp(&measure(b)))?;
-        let joints = Joints { worst: joints[worst].name.clone(), others: beyond().count() - 1 };
+        let joints = AffectedJoints { worst: joints[worst].name.clone(), others: beyond().count() - 1 };
         Some((joints, worst))
     }
 

@@ -2,7 +2,7 @@
 //! changes. The force has a kink or a jump there, and a step across it has an error that its estimate does not see.
 
 use super::Run;
-use super::flights::put_flights;
+use super::flights::write_flights;
 use crate::integrate::find_root;
 
 /// Parts of a step at whose ends elements are checked.
@@ -13,40 +13,42 @@ pub(super) const AT_START: f64 = 1e-9;
 impl Run<'_> {
     /// Fixes the side of each element that has edges for the next step, if the method ends steps there, which takes an
     /// interpolant as accurate as its steps.
-    pub(super) fn hold_sides(&mut self) {
+    pub(super) fn freeze_element_sides(&mut self) {
         if self.stepper.ends_on_interpolant() && self.mechanism.has_edges() {
             let Self { mechanism, state, attempt, .. } = self;
             mechanism.measure(state.now.t, &state.now.y);
-            attempt.sides.extend(mechanism.pressed(state.now.t));
+            attempt.element_sides.extend(mechanism.contact_indicators(state.now.t));
         }
     }
 
     /// Fraction of the step just attempted at which the first element begins or ceases to press, if any does; 0 if one did so at
     /// the start and has been switched to the other side.
     pub(super) fn first_edge(&mut self, h: f64) -> Option<f64> {
-        if self.attempt.sides.is_empty() {
+        if self.attempt.element_sides.is_empty() {
             return None;
         }
-        let [mut left, mut right] = std::mem::take(&mut self.attempt.pressed);
+        let [mut left, mut right] = std::mem::take(&mut self.attempt.contact_indicators);
         let mut from = AT_START;
-        self.look_at_elements(from, h, &mut left);
-        let turns = self.attempt.sides.iter().zip(&left).any(|(side, now)| (*side > 0.0) != (*now > 0.0));
+        self.measure_contact_indicators(from, h, &mut left);
+        let turns = self.attempt.element_sides.iter().zip(&left).any(|(side, now)| (*side > 0.0) != (*now > 0.0));
         // Only once: if that leads back here, either side will do.
-        if turns && !self.attempt.turned {
-            self.attempt.turned = true;
-            self.attempt.sides.copy_from_slice(&left);
-            self.attempt.pressed = [left, right];
+        if turns && !self.attempt.has_switched_branch {
+            self.attempt.has_switched_branch = true;
+            self.attempt.element_sides.copy_from_slice(&left);
+            self.attempt.contact_indicators = [left, right];
             return Some(0.0);
         }
         let mut first: Option<f64> = None;
         for n in 1..=PARTS {
             let to = f64::from(n) / f64::from(PARTS);
-            self.look_at_elements(to, h, &mut right);
+            self.measure_contact_indicators(to, h, &mut right);
             for (number, (&left, &right)) in left.iter().zip(&right).enumerate() {
                 if (left > 0.0) != (right > 0.0) {
                     let width = (1e-15 / h).max(1e-12);
                     // The root returned is just past the edge: before it the next step would start with the wrong force.
-                    let at = find_root(from, left, to, right, width, 0.0, |theta| self.pressed_at(number, theta, h));
+                    let at = find_root(from, left, to, right, width, 0.0, |theta| {
+                        self.contact_indicator_at(number, theta, h)
+                    });
                     first = Some(first.map_or(at, |first| first.min(at)));
                 }
             }
@@ -56,21 +58,21 @@ impl Run<'_> {
             std::mem::swap(&mut left, &mut right);
             from = to;
         }
-        self.attempt.pressed = [left, right];
+        self.attempt.contact_indicators = [left, right];
         first
     }
 
     /// Writes the contact indicators of every element that has edges, on the interpolant of the attempted step, to `out`.
-    fn look_at_elements(&mut self, theta: f64, h: f64, out: &mut Vec<f64>) {
+    fn measure_contact_indicators(&mut self, theta: f64, h: f64, out: &mut Vec<f64>) {
         let time = self.measure_all_at(theta, h);
         out.clear();
-        out.extend(self.mechanism.pressed(time));
+        out.extend(self.mechanism.contact_indicators(time));
     }
 
     /// One of these indicators.
-    fn pressed_at(&mut self, number: usize, theta: f64, h: f64) -> f64 {
+    fn contact_indicator_at(&mut self, number: usize, theta: f64, h: f64) -> f64 {
         let time = self.measure_all_at(theta, h);
-        self.mechanism.pressed(time).nth(number).unwrap_or_default()
+        self.mechanism.contact_indicators(time).nth(number).unwrap_or_default()
     }
 
     /// Measures all bodies on the interpolant of the attempted step; returns the time there, s.
@@ -80,7 +82,7 @@ impl Run<'_> {
         let all = 0..now.y.len();
         stepper.interpolate(all, theta, h, &now.y, &now.k, &end.y, &end.k, &state.polynomial, scratch_y);
         let time = now.t + theta * h;
-        put_flights(mechanism, &state.flights, time, scratch_y);
+        write_flights(mechanism, &state.flights, time, scratch_y);
         mechanism.measure(time, scratch_y);
         time
     }

@@ -37,8 +37,8 @@ impl Run<'_> {
     /// `switched` if that has changed at its end.
     pub(super) fn record_step(&mut self, h: f64, switched: bool) {
         let Record { account, wear, .. } = &self.state.record;
-        let keeps_ledger = account.on;
-        if !keeps_ledger && wear.is_none() {
+        let has_ledger = account.on;
+        if !has_ledger && wear.is_none() {
             return;
         }
         let located = self.locates();
@@ -56,15 +56,15 @@ impl Run<'_> {
             account.powers = None;
             self.begin_wear_of_step(false);
             if let Some(wear) = &mut self.state.record.wear {
-                for (joint, touch) in self.mechanism.discrete_touches() {
-                    wear.press(0, joint, &touch);
+                for (joint, contact) in self.mechanism.discrete_contacts() {
+                    wear.record_contact(0, joint, &contact);
                 }
-                wear.book(h, &[1.0]);
+                wear.integrate_step(h, &[1.0]);
             }
         } else if mechanism.has_powers() {
             // Powers may jump at an edge at the step's end: use those on the step's side.
             if self.attempt.edge {
-                mechanism.hold_elements(&self.attempt.sides);
+                mechanism.freeze_elements(&self.attempt.element_sides);
                 mechanism.forget_evaluation();
             }
             let now = &state.now;
@@ -72,38 +72,38 @@ impl Run<'_> {
             let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
             let end = evaluator.powers(now.t, &now.y, scratch_k);
             if self.state.record.wear.is_some() {
-                let touching = ActiveSet::by(located, &self.before.contact_states);
-                self.mechanism.complete_gaps(touching, &self.state.now.y);
+                let active_set = ActiveSet::by(located, &self.before.contact_states);
+                self.mechanism.complete_gaps(active_set, &self.state.now.y);
                 let (instants, known) = (self.stepper.quadrature(), self.state.record.account.powers.is_some());
                 self.begin_wear_of_step(instants[0] == 0.0 && known);
                 if let Some(wear) = &mut self.state.record.wear {
-                    wear.read(instants.len() - 1, self.mechanism);
+                    wear.record_forces(instants.len() - 1, self.mechanism);
                 }
             }
-            self.lay_out_course(h, end);
-            self.mechanism.hold_elements(&[]);
+            self.choose_quadrature_nodes(h, end);
+            self.mechanism.freeze_elements(&[]);
             let switched = switched || self.attempt.edge;
             let Record { account, wear, .. } = &mut self.state.record;
             account.powers = (!switched).then_some(end);
             if let Some(wear) = wear {
                 let instants = self.stepper.quadrature();
-                wear.book(h, &weights(instants, 1.0)[..instants.len()]);
+                wear.integrate_step(h, &weights(instants, 1.0)[..instants.len()]);
             }
         }
-        if keeps_ledger {
-            self.state.record.account.book(h, energies);
+        if has_ledger {
+            self.state.record.account.record_step(h, energies);
         }
     }
 
-    /// Starts recording the step just accepted in the wear map, with the contacts that began at its end. If `goes_on`, the forces at the
-    /// end of the previous step are reused.
-    fn begin_wear_of_step(&mut self, goes_on: bool) {
+    /// Starts recording the step just accepted in the wear map, with the contacts that began at its end. If `reuses_start`, the
+    /// forces at the end of the previous step are reused.
+    fn begin_wear_of_step(&mut self, reuses_start: bool) {
         let Self { before, state, mechanism, .. } = self;
         let State { now, record, .. } = &mut **state;
         let Some(wear) = &mut record.wear else {
             return;
         };
-        wear.begin_step(goes_on);
+        wear.begin_step(reuses_start);
         for (j, (before, now)) in before.contact_states.iter().zip(&now.contact_states).enumerate() {
             if now.active && !before.active {
                 wear.begin_contact(j, &mechanism.wall_direction(j));
@@ -112,7 +112,7 @@ impl Run<'_> {
     }
 
     /// Chooses the quadrature nodes for the works of the step just accepted; `end` are the powers at its end.
-    fn lay_out_course(&mut self, h: f64, end: Powers) {
+    fn choose_quadrature_nodes(&mut self, h: f64, end: Powers) {
         let (from, to) = (self.before.t, self.state.now.t);
         let kinematic = self.mechanism.is_kinematic();
         // Past ends are of no use across a jump of a derivative.
@@ -120,7 +120,7 @@ impl Run<'_> {
             let past = &mut self.state.record.account.past;
             past.push_apart(to, end, SHORTEST_PAST * h);
             if past.len() > PAST_ENDS {
-                self.state.record.account.course = past.seen_from(from, h);
+                self.state.record.account.course = past.in_step_time(from, h);
                 return;
             }
         }
@@ -151,7 +151,7 @@ impl Run<'_> {
         if let Some(wear) = &mut state.record.wear {
             // No quadrature node in a kinematic scene: no ball is in contact there.
             let instant = stepper.quadrature().iter().position(|at| *at == theta);
-            wear.read(instant.unwrap_or(0), mechanism);
+            wear.record_forces(instant.unwrap_or(0), mechanism);
         }
         powers
     }

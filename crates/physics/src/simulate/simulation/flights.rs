@@ -6,14 +6,14 @@ use crate::integrate::{Method, System as _};
 use crate::mechanism::{ActiveSet, Flight, Mechanism};
 
 /// With fewer free bodies than this, excluding some saves less than it costs.
-const FEWEST_FLYERS: usize = 3;
+const MIN_FREE_BODIES: usize = 3;
 
 impl Run<'_> {
     /// Chooses the bodies to exclude from a step that ends by `limit`: those that touch nothing and whose motion is known until
     /// then.
     pub(super) fn choose_flights(&mut self, limit: f64) {
         let free_flight_bodies = self.mechanism.free_flight_bodies().len();
-        if self.state.conditions.solver.method != Method::Automatic || free_flight_bodies < FEWEST_FLYERS {
+        if self.state.conditions.solver.method != Method::Automatic || free_flight_bodies < MIN_FREE_BODIES {
             return;
         }
         let Self { mechanism, state, .. } = self;
@@ -28,11 +28,11 @@ impl Run<'_> {
                 some_land |= flew;
                 continue;
             }
-            if flight.as_ref().is_some_and(|f| f.lasts_until(until)) {
+            if flight.as_ref().is_some_and(|f| f.is_valid_at(until)) {
                 continue;
             }
             let next = mechanism.flight(flyer, now.t, &now.y);
-            *flight = next.lasts_until(until).then_some(next);
+            *flight = next.is_valid_at(until).then_some(next);
             let flies = flight.is_some();
             some_start |= flies && !flew;
             some_land |= flew && !flies;
@@ -41,7 +41,7 @@ impl Run<'_> {
             return;
         }
         clear_flights(mechanism, &state.flights, &mut state.now.k);
-        self.leave_out_flights();
+        self.exclude_flights();
         self.invalidate();
         if some_land {
             // The derivative of a body that landed is still that of its flight.
@@ -56,13 +56,13 @@ impl Run<'_> {
     }
 
     /// Excludes bodies in flight from evaluations.
-    pub(super) fn leave_out_flights(&mut self) {
+    pub(super) fn exclude_flights(&mut self) {
         let flights = &self.state.flights;
         self.mechanism.suspend(|flyer| flights[flyer].is_some());
     }
 
-    /// Includes all bodies in evaluations until `leave_out_flights`; returns whether any is in flight.
-    pub(super) fn look_at_all(&mut self) -> bool {
+    /// Includes all bodies in evaluations until `exclude_flights`; returns whether any is in flight.
+    pub(super) fn include_all_bodies(&mut self) -> bool {
         let any = self.state.flights.iter().any(Option::is_some);
         if any {
             self.mechanism.suspend(|_| false);
@@ -72,7 +72,7 @@ impl Run<'_> {
 
     /// After a failed step: discards the previous step, because samples within it would miss the flights that ended with the
     /// failed step.
-    pub(super) fn forget_flown(&mut self) {
+    pub(super) fn discard_step_with_flights(&mut self) {
         if self.state.flights.iter().any(Option::is_some) {
             self.discard_previous_step();
         }
@@ -80,7 +80,7 @@ impl Run<'_> {
 
     /// Ends all flights, because the state from which they continue has changed.
     pub(super) fn end_flights(&mut self) {
-        self.look_at_all();
+        self.include_all_bodies();
         self.state.flights.fill(None);
     }
 }
@@ -97,10 +97,10 @@ pub(super) fn clear_flights(mechanism: &Mechanism, flights: &[Option<Flight>], k
 }
 
 /// Writes the motion of bodies in flight at `t` to the state `y`.
-pub(super) fn put_flights(mechanism: &Mechanism, flights: &[Option<Flight>], t: f64, y: &mut [f64]) {
+pub(super) fn write_flights(mechanism: &Mechanism, flights: &[Option<Flight>], t: f64, y: &mut [f64]) {
     for (flyer, flight) in mechanism.free_flight_bodies().iter().zip(flights) {
         if let Some(flight) = flight {
-            flight.put(flyer, t, y);
+            flight.write_state(flyer, t, y);
         }
     }
 }

@@ -9,9 +9,9 @@ const ABSURD_SPEED: f64 = 1e6;
 /// Penetration in ball radii beyond which a ball has left its socket and its contact patch is no longer small.
 const LEFT_SOCKET: f64 = 0.1;
 /// Energy stored by an impact's first step, over that of the approach, beyond which the step, not the motion, created it.
-const MOST_OVERSHOOT: f64 = 4.0;
+const MAX_OVERSHOOT: f64 = 4.0;
 /// Violation beyond which stabilised constraints no longer hold the mechanism together, m.
-const MOST_DRIFT: f64 = 1e-3;
+const MAX_DRIFT: f64 = 1e-3;
 
 impl Run<'_> {
     /// Fault of the step of size `h` just attempted, if any.
@@ -20,7 +20,7 @@ impl Run<'_> {
             return Some(StopFault::OpenLoops { open });
         }
         let drift = self.mechanism.constraint_drift();
-        if !(drift <= MOST_DRIFT) {
+        if !(drift <= MAX_DRIFT) {
             return Some(StopFault::Drift { drift });
         }
         if self.mechanism.is_undetermined() {
@@ -36,7 +36,7 @@ impl Run<'_> {
                 return Some(StopFault::LeftSocket { joint: self.machine.ball_joints[j].name.clone(), penetration });
             }
             if self.state.conditions.solver.method.control() == StepControl::Fixed
-                && let Some(times) = self.energy_of_overshoot(j, h)
+                && let Some(times) = self.overshoot_energy_ratio(j, h)
             {
                 return Some(StopFault::Overshoot {
                     joint: self.machine.ball_joints[j].name.clone(),
@@ -54,8 +54,8 @@ impl Run<'_> {
         }
         // All other components follow from the motion, checked above.
         let end = &self.attempt.end;
-        let moving = self.mechanism.moving().iter();
-        let sane = moving.fold(true, |sane, part| {
+        let active_ranges = self.mechanism.active_ranges().iter();
+        let sane = active_ranges.fold(true, |sane, part| {
             let both = end.k[part.clone()].iter().zip(&end.y[part.clone()]);
             both.fold(sane, |sane, (k, y)| sane & k.is_finite() & y.is_finite())
         });
@@ -64,7 +64,7 @@ impl Run<'_> {
 
     /// Ratio of stored to approach energy, if a fixed step carried a free ball so far into the wall that it stores more than any
     /// approach could bring.
-    fn energy_of_overshoot(&self, j: usize, h: f64) -> Option<f64> {
+    fn overshoot_energy_ratio(&self, j: usize, h: f64) -> Option<f64> {
         let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
         if start.penetration > 0.0 || end.penetration <= 0.0 {
             return None;
@@ -75,9 +75,9 @@ impl Run<'_> {
         let pushed = self.mechanism.element_reports(self.state.now.t + h);
         let push: f64 = pushed.map(|element| element.force.norm()).sum();
         let least = least.fold(f64::INFINITY, f64::min);
-        let pull = self.machine.most_acceleration([(push, least)]);
+        let pull = self.machine.max_acceleration([(push, least)]);
         let speed = start.speed + pull * h + coefficients.speed_floor;
         let times = coefficients.elastic_energy(end.penetration) / (0.5 * mass * speed * speed);
-        (times > MOST_OVERSHOOT).then_some(times)
+        (times > MAX_OVERSHOOT).then_some(times)
     }
 }

@@ -1,5 +1,5 @@
-//! Ideal motion with which a probe is compared. If it has no closed form, the same machine with every ball joint ideal is simulated
-//! alongside.
+//! Ideal motion with which a probe is compared. If it has no closed form, the same machine with every ball joint ideal is
+//! simulated alongside.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ const TOLERANCE: f64 = 1e-10;
 /// First step, s.
 const FIRST_STEP: f64 = 1e-4;
 /// Number of latest step ends stored. Both motions step at most 10 ms, so that samples within a step lie among them.
-const MARKS: usize = 64;
+const STORED_TIPS: usize = 64;
 
 /// Why a probe has no ideal motion to be compared with.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -28,7 +28,7 @@ pub enum ProbeFault {
 
 /// Tip at the end of a step: position, velocity and acceleration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Mark {
+struct TipSample {
     time: f64,
     tip: [Vec3; 3],
 }
@@ -37,7 +37,7 @@ struct Mark {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct TipHistory {
     /// Ring buffer.
-    ring: Vec<Mark>,
+    ring: Vec<TipSample>,
     count: usize,
     /// Why it stopped.
     stopped: Option<Stopped>,
@@ -85,10 +85,10 @@ impl IdealModel {
     fn start(&self) -> IdealState {
         let mut state = IdealState {
             state: self.model.start(),
-            tips: TipHistory { ring: vec![Mark::default(); MARKS], count: 0, stopped: None },
+            tips: TipHistory { ring: vec![TipSample::default(); STORED_TIPS], count: 0, stopped: None },
         };
         let mut work = self.workspace(&state);
-        self.mark(&mut state, &mut work);
+        self.record_tip(&mut state, &mut work);
         state
     }
 
@@ -97,7 +97,7 @@ impl IdealModel {
     }
 
     /// Records the current tip.
-    fn mark(&self, state: &mut IdealState, work: &mut IdealWorkspace) {
+    fn record_tip(&self, state: &mut IdealState, work: &mut IdealWorkspace) {
         let IdealWorkspace { workspace, frame } = work;
         let time = state.state.time();
         self.model.sample(&mut state.state, workspace, time, frame);
@@ -106,15 +106,16 @@ impl IdealModel {
         let acceleration = body.acceleration + body.angular_acceleration.cross(&arm) + w.cross(&w.cross(&arm));
         let velocity = body.velocity + w.cross(&arm);
         let tips = &mut state.tips;
-        tips.ring[tips.count % MARKS] = Mark { time: frame.time, tip: [body.position + arm, velocity, acceleration] };
+        tips.ring[tips.count % STORED_TIPS] =
+            TipSample { time: frame.time, tip: [body.position + arm, velocity, acceleration] };
         tips.count += 1;
     }
 
-    /// The tip at `time`, m; `None` before the oldest mark, and after the motion stopped.
+    /// The tip at `time`, m; `None` before the oldest sample, and after the motion stopped.
     fn tip(&self, state: &mut IdealState, work: &mut IdealWorkspace, time: f64) -> Option<Vec3> {
         while state.state.time() < time && state.tips.stopped.is_none() {
             match self.model.step(&mut state.state, &mut work.workspace) {
-                Ok(()) => self.mark(state, work),
+                Ok(()) => self.record_tip(state, work),
                 Err(stopped) => state.tips.stopped = Some(stopped),
             }
         }
@@ -132,11 +133,11 @@ impl IdealModel {
     pub(super) fn set_gravity(&self, state: &mut IdealState, work: &mut IdealWorkspace, time: f64, gravity: Vec3) {
         self.tip(state, work, time);
         let mut run = Run::new(&self.model, &mut state.state, &mut work.workspace);
-        run.go_back_to(time);
+        run.rewind_to(time);
         run.set_gravity(gravity);
-        // Marks after `time` are no longer valid.
+        // Samples after `time` are no longer valid.
         state.tips.forget_after(time);
-        self.mark(state, work);
+        self.record_tip(state, work);
     }
 }
 
@@ -148,7 +149,7 @@ impl IdealState {
 
     /// Checks a state that was read against `own`, a state of `model`.
     pub(super) fn check(&self, model: &Model, own: &Self) -> Result<(), StateMismatch> {
-        if self.tips.ring.len() != MARKS {
+        if self.tips.ring.len() != STORED_TIPS {
             return Err(StateMismatch);
         }
         self.state.check(model, &own.state)
@@ -176,8 +177,8 @@ pub fn closed(machine: &Machine) -> Machine {
 
 impl TipHistory {
     fn tip(&self, time: f64) -> Option<Vec3> {
-        let oldest = self.count.saturating_sub(MARKS);
-        let at = |k: usize| &self.ring[k % MARKS];
+        let oldest = self.count.saturating_sub(STORED_TIPS);
+        let at = |k: usize| &self.ring[k % STORED_TIPS];
         let newest = at(self.count.checked_sub(1)?);
         if time >= newest.time {
             return (time == newest.time).then_some(newest.tip[0]);
@@ -187,14 +188,14 @@ impl TipHistory {
     }
 
     fn forget_after(&mut self, time: f64) {
-        while self.count > 1 && self.ring[(self.count - 1) % MARKS].time > time {
+        while self.count > 1 && self.ring[(self.count - 1) % STORED_TIPS].time > time {
             self.count -= 1;
         }
     }
 }
 
 /// Quintic interpolation of positions, velocities and accelerations at both ends.
-fn quintic(a: &Mark, b: &Mark, time: f64) -> Vec3 {
+fn quintic(a: &TipSample, b: &TipSample, time: f64) -> Vec3 {
     let h = b.time - a.time;
     let s = (time - a.time) / h;
     let ([x0, v0, a0], [x1, v1, a1]) = (a.tip, b.tip);
@@ -218,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn the_motion_alongside_is_the_closed_form_of_the_paper() {
+    fn the_simulated_ideal_motion_agrees_with_the_closed_form_of_the_paper() {
         let scene = scene("spcmm", &[]);
         let probe = scene.machine.output.probe.expect("has a probe");
         let model = Model::new(&closed(&scene.machine)).expect("starts");
@@ -235,13 +236,13 @@ mod tests {
             let body = &frame.bodies[scene.machine.output.body];
             let tip = body.position + body.rotation * probe;
             let closed = tip - frame.probe_error.expect("has a closed form");
-            let off = (ideal.tip(&mut alongside, &mut work, frame.time).expect("goes on") - closed).norm();
+            let off = (ideal.tip(&mut alongside, &mut work, frame.time).expect("continues") - closed).norm();
             assert!(off < 1e-10, "{off:e} at {time}");
         }
     }
 
     #[test]
-    fn a_change_of_gravity_holds_from_its_instant_on() {
+    fn a_change_of_gravity_takes_effect_at_its_instant() {
         let mut scene = scene("pendulum", &[]);
         scene.machine.output.probe = Some(Vec3::new(0.0, 0.0, -0.1));
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
@@ -252,13 +253,13 @@ mod tests {
         let weightless = Machine { gravity: Vec3::zeros(), ..scene.machine };
         assert_eq!(simulation.adopt(&weightless), Ok(Effect::Now));
         simulation.sample(change, &mut frame);
-        assert!(frame.probe_error.expect("goes on").norm() < 2e-3);
+        assert!(frame.probe_error.expect("continues").norm() < 2e-3);
         // Without gravity a rod in an ideal joint rotates uniformly: its tip stays on its circle, at its speed.
         let model = simulation.model().clone();
         let ideal = model.ideal().simulated().expect("simulated alongside");
         let mut alongside = simulation.state().ideal.clone().expect("alongside");
         let mut work = ideal.workspace(&alongside);
-        let mut tip = |time: f64| ideal.tip(&mut alongside, &mut work, time).expect("goes on");
+        let mut tip = |time: f64| ideal.tip(&mut alongside, &mut work, time).expect("continues");
         let times = [0.0, 0.01, 0.02].map(|ahead| change + ahead);
         let tips = times.map(&mut tip);
         let angle = |a: Vec3, b: Vec3| libm::atan2(a.cross(&b).norm(), a.dot(&b));

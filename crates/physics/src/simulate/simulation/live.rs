@@ -11,7 +11,7 @@ use crate::simulate::Effect;
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
 
 /// Largest distance of a hand, or of the point it holds, m: beyond it a pull makes no sense.
-const FARTHEST_HAND: f64 = 1e6;
+const MAX_HAND_DISTANCE: f64 = 1e6;
 
 /// Why a running simulation was not changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -28,7 +28,7 @@ pub enum ChangeError {
         bodies: usize,
     },
     /// A hand, or the point that it holds, out of reach.
-    #[error("a hand, or the point that it holds, is {far:e} m away; allowed at most {FARTHEST_HAND} m")]
+    #[error("a hand, or the point that it holds, is {far:e} m away; allowed at most {MAX_HAND_DISTANCE} m")]
     TooFar {
         /// m.
         far: f64,
@@ -41,7 +41,7 @@ pub(in crate::simulate) fn check_pull(machine: &Machine, pull: &Pull) -> Result<
     let far = pull.hand.amax().max(pull.point.amax());
     if body >= bodies {
         Err(ChangeError::NoBody { body, bodies })
-    } else if far > FARTHEST_HAND {
+    } else if far > MAX_HAND_DISTANCE {
         Err(ChangeError::TooFar { far })
     } else {
         Ok(())
@@ -54,7 +54,7 @@ impl Run<'_> {
         let pairs = self.machine.ball_joints.iter().zip(&next.ball_joints);
         let clearances = pairs.map(|(a, b)| (a.contact.clearance, b.contact.clearance));
         let changes_equations = clearances.into_iter().any(|(a, b)| (a == 0.0) != (b == 0.0));
-        if changes_equations || !self.machine.differs_in_conditions_alone(next) {
+        if changes_equations || !self.machine.differs_only_in_conditions(next) {
             return Ok(Effect::AtReset);
         }
         let solver = next.solver;
@@ -119,7 +119,7 @@ impl Run<'_> {
     }
 
     /// Rewinds to `time` within the latest step, on its interpolant; only for a simulation without contacts.
-    pub(in crate::simulate) fn go_back_to(&mut self, time: f64) {
+    pub(in crate::simulate) fn rewind_to(&mut self, time: f64) {
         let h = self.state.now.t - self.before.t;
         if !(time < self.state.now.t && time >= self.before.t) {
             return;

@@ -38,9 +38,9 @@ impl Model {
         Ok(workspace)
     }
 
-    /// A workspace that follows `state`, a state of this model.
+    /// A workspace attached to `state`, a state of this model.
     pub fn workspace(&self, state: &State) -> Workspace {
-        let mechanism = Mechanism::of(&self.machine, self.compiled.clone());
+        let mechanism = Mechanism::from_model(&self.machine, self.compiled.clone());
         self.workspace_in(mechanism, state).expect("checked when the state adopted its method")
     }
 

@@ -1,6 +1,6 @@
 //! Sampling of an instant within the latest step.
 
-use super::flights::put_flights;
+use super::flights::write_flights;
 use super::{IdealSource, Run};
 use crate::integrate::hermite;
 use crate::machine::Vec3;
@@ -11,7 +11,7 @@ impl Run<'_> {
     /// As [`Model::sample`](crate::simulate::Model::sample).
     pub(in crate::simulate) fn sample(&mut self, time: f64, out: &mut Frame) {
         let time = time.clamp(self.before.t, self.state.now.t);
-        self.look(time);
+        self.evaluate_at(time);
         let (contact_state, at) = (&*self.scratch_contacts, (time, &*self.scratch_y));
         report::fill(self.mechanism, self.machine, contact_state, at, out);
         for (sampled, report) in self.state.sampled.iter_mut().zip(&out.joints) {
@@ -21,7 +21,7 @@ impl Run<'_> {
             }
         }
         if let Some(loads) = &mut self.state.loads {
-            loads.take(self.mechanism, time);
+            loads.record(self.mechanism, time);
         }
         out.ledger = self.ledger_of(out);
         match self.model.ideal() {
@@ -37,7 +37,7 @@ impl Run<'_> {
 
     /// Evaluates everything at `time` within the latest step, so that the mechanism can be read; not counted as an
     /// evaluation.
-    pub(super) fn look(&mut self, time: f64) {
+    pub(super) fn evaluate_at(&mut self, time: f64) {
         let h = self.state.now.t - self.before.t;
         let inside = h > 0.0 && time < self.state.now.t;
         if inside {
@@ -46,7 +46,7 @@ impl Run<'_> {
         } else {
             self.scratch_y.copy_from_slice(&self.state.now.y);
         }
-        let flies = self.look_at_all();
+        let flies = self.include_all_bodies();
         let located = self.locates();
         let Self { mechanism, state, before, scratch_y, scratch_k, scratch_contacts, .. } = self;
         if inside {
@@ -61,7 +61,7 @@ impl Run<'_> {
         let mut evaluator = mechanism.evaluator(ActiveSet::by(located, scratch_contacts));
         evaluator.evaluate_fully(time, scratch_y, scratch_k);
         if flies {
-            self.leave_out_flights();
+            self.exclude_flights();
         }
     }
 
@@ -69,7 +69,7 @@ impl Run<'_> {
     pub(super) fn interpolate(&mut self, theta: f64, h: f64) {
         self.interpolate_stepped(theta, h);
         let (state, time) = (&self.state, self.before.t + theta * h);
-        put_flights(self.mechanism, &state.flights, time, self.scratch_y);
+        write_flights(self.mechanism, &state.flights, time, self.scratch_y);
     }
 
     /// The same without the bodies in flight.
@@ -80,7 +80,7 @@ impl Run<'_> {
         if mechanism.is_kinematic() {
             hermite(theta, h, y0, k0, y, k, scratch_y);
         } else {
-            for part in mechanism.moving() {
+            for part in mechanism.active_ranges() {
                 stepper.interpolate(part.clone(), theta, h, y0, k0, y, k, &state.polynomial, scratch_y);
             }
         }
@@ -94,7 +94,7 @@ mod tests {
     use crate::simulate::Simulation;
 
     #[test]
-    fn both_forms_report_the_same_coordinates_of_joints() {
+    fn both_formulations_report_the_same_joint_coordinates() {
         for name in ["slider-crank", "slider-crank-driven"] {
             let at = |form: &str| {
                 let method = ("solver.preset".to_owned(), "accurate".to_owned());
@@ -122,8 +122,8 @@ mod tests {
             };
             let body = &tree.bodies[0];
             // The crank turns about the world's x axis, along which the slider moves.
-            let turned = libm::atan2(body.rotation.m32, body.rotation.m22);
-            assert!(libm::sin(0.5 * (crank[0] - turned)).abs() < 1e-12);
+            let angle = libm::atan2(body.rotation.m32, body.rotation.m22);
+            assert!(libm::sin(0.5 * (crank[0] - angle)).abs() < 1e-12);
             assert!((crank[1] - body.angular_velocity.x).abs() < 1e-12);
             assert!((slider[0] - tree.pose.position.x).abs() < 1e-12);
             assert!((slider[1] - tree.pose.velocity.x).abs() < 1e-12);

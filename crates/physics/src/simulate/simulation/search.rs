@@ -22,7 +22,7 @@ impl Run<'_> {
                 continue;
             };
             let (size, time) = (reaction.norm(), self.state.now.t);
-            let vertex = self.state.record.reactions[j].rise(time, size);
+            let vertex = self.state.record.reactions[j].push_and_find_peak(time, size);
             self.take_reaction(j, if smooth { vertex } else { size }, time);
         }
     }
@@ -30,52 +30,52 @@ impl Run<'_> {
     /// Finds the largest normal force of every joint in contact over the step just accepted, and its step fraction, from the
     /// penetration cubic. A peak inside a located step is re-evaluated there: the cubic's rate, which sets the damping, differs
     /// from that of the motion.
-    pub(super) fn find_strongest(&mut self, h: f64) {
+    pub(super) fn find_peak_forces(&mut self, h: f64) {
         let located = self.locates();
         for j in 0..self.state.now.gaps.len() {
             let contact_state = self.before.contact_states[j].unfrozen();
             if !contact_state.active || !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let course = PenetrationCubic::new(self.before.gaps[j], self.state.now.gaps[j], h);
+            let cubic = PenetrationCubic::new(self.before.gaps[j], self.state.now.gaps[j], h);
             let c = *self.mechanism.contacts.coefficients(j);
-            let (force, theta) = course.strongest(&c, &contact_state);
-            self.attempt.strongest[j] = (force, theta);
+            let (force, theta) = cubic.strongest(&c, &contact_state);
+            self.attempt.peak_forces[j] = (force, theta);
             let least = self.state.record.statistics.peak_normal[j]
                 .min(self.state.record.peaks[j].normal)
                 .min(self.state.record.impacts.peak_under_way(j));
             if !located || theta <= 0.0 || theta >= 1.0 || force <= least {
                 continue;
             }
-            self.look(self.before.t + theta * h);
+            self.evaluate_at(self.before.t + theta * h);
             let inside = self.mechanism.contacts.gap(j).normal_force;
-            let ends = course.stronger_end(&c, &contact_state);
-            self.attempt.strongest[j] = if inside > ends.0 { (inside, theta) } else { ends };
+            let ends = cubic.stronger_end(&c, &contact_state);
+            self.attempt.peak_forces[j] = if inside > ends.0 { (inside, theta) } else { ends };
         }
     }
 
     /// Searches the step just accepted for peaks.
     pub(super) fn search_peaks(&mut self) {
-        let near = self.attempt.near_peak;
+        let near = self.attempt.may_contain_peak;
         self.search_contacts();
         self.search_reactions();
         let smooth = !(0..self.state.now.gaps.len()).any(|j| self.mechanism.contacts.has_clearance(j));
         let time = self.state.now.t;
         if self.state.loads.as_ref().is_some_and(|loads| near || smooth || loads.age(time) >= LOADS_EVERY) {
-            self.look_at_loads();
+            self.record_loads();
         }
     }
 
-    /// As [`Simulation::keep_load_peaks`](crate::simulate::Simulation::keep_load_peaks).
-    pub(in crate::simulate) fn keep_load_peaks(&mut self) {
+    /// As [`Simulation::track_load_peaks`](crate::simulate::Simulation::track_load_peaks).
+    pub(in crate::simulate) fn track_load_peaks(&mut self) {
         self.state.loads = Some(LoadPeaks::new(self.machine));
-        self.look_at_loads();
+        self.record_loads();
     }
 
     /// Records the loads at the latest state.
-    fn look_at_loads(&mut self) {
+    fn record_loads(&mut self) {
         let time = self.state.now.t;
-        self.look(time);
+        self.evaluate_at(time);
         if let Some(loads) = &mut self.state.loads {
             loads.evaluate(self.mechanism, time);
         }
@@ -84,14 +84,14 @@ impl Run<'_> {
     /// Samples a fixed step near a contact peak: if the step is long compared with an impact, an output row inside it sees other
     /// rates than the penetration cubic.
     fn search_contacts(&mut self) {
-        let near = std::mem::take(&mut self.attempt.near_peak);
+        let near = std::mem::take(&mut self.attempt.may_contain_peak);
         if !near || self.locates() {
             return;
         }
         let (t0, t) = (self.before.t, self.state.now.t);
         for part in PARTS {
             let time = t0 + part * (t - t0);
-            self.look(time);
+            self.evaluate_at(time);
             for j in 0..self.state.now.gaps.len() {
                 if let Some(reaction) = self.mechanism.reaction(j) {
                     self.take_reaction(j, reaction.norm(), time);
@@ -134,7 +134,7 @@ impl Run<'_> {
 
     /// Magnitude of the reaction of joint `j` at `time` within the latest step, N; recorded if it is a peak.
     fn reaction_at(&mut self, j: usize, time: f64) -> f64 {
-        self.look(time);
+        self.evaluate_at(time);
         let size = self.mechanism.reaction(j).map_or(0.0, |force| force.norm());
         self.take_reaction(j, size, time);
         size

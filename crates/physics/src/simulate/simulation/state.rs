@@ -2,7 +2,8 @@
 
 use super::automatic::{SchemeSelector, controller_of};
 use super::{
-    Control, DiscreteControl, FIRST_CONTACT_STEP, Follows, LONGEST_STEP, Model, Record, State, StateMismatch, StepEnd,
+    Control, DiscreteControl, FIRST_CONTACT_STEP, LONGEST_STEP, Model, Record, State, StateMismatch, StepEnd,
+    WorkspaceId,
 };
 use crate::contact::ContactState;
 use crate::integrate::Polynomial;
@@ -81,7 +82,7 @@ impl State {
             sampled: vec![(0.0, 0.0); joints],
             loads: None,
             ideal: None,
-            follows: Follows::default(),
+            workspace_id: WorkspaceId::default(),
             now: StepEnd::new(y, joints),
             conditions,
         }
@@ -185,7 +186,7 @@ impl State {
         const OF_JOINT: usize = 1024;
         const FIXED: usize = 4096;
         let (coordinates, joints) = (self.now.y.len(), self.now.gaps.len());
-        let impacts = std::mem::size_of_val(self.record.impacts.kept());
+        let impacts = std::mem::size_of_val(self.record.impacts.stored());
         let wear = self.record.wear.as_ref().map_or(0, Wear::bytes);
         let flights = self.flights.len() * size_of::<Option<Flight>>();
         let ideal = self.ideal.as_ref().map_or(0, |ideal| ideal.bytes());
@@ -203,7 +204,7 @@ impl State {
             |contacts: &Conditions| contacts.joints.iter().map(|contact| contact.clearance > 0.0).collect::<Vec<_>>();
         let fits = self.now.fits(dimension, joints)
             && loose(conditions) == loose(&own.conditions)
-            && model.machine().under(conditions).check().is_ok()
+            && model.machine().with_conditions(conditions).check().is_ok()
             && self.ramps.len() == joints
             && self.clearances.len() == joints
             && self.flights.len() == own.flights.len()

@@ -1,7 +1,7 @@
 //! Steps of a state: start, fixed and kinematic steps, and what every accepted step does.
 
 use super::discrete::discrete_size;
-use super::flights::{clear_flights, put_flights};
+use super::flights::{clear_flights, write_flights};
 use super::{
     Attempt, LONGEST_STEP, Model, NEARLY, OPEN_LOOP, Run, SHORTEST_KINEMATIC_STEP, State, StepEnd, Workspace,
     store_gaps,
@@ -18,17 +18,17 @@ impl Attempt {
         let edges = 2 * machine.elements.len();
         Self {
             end: StepEnd::new(vec![0.0; dimension], joints),
-            located: None,
+            located_joint: None,
             corner: None,
-            sides: Vec::with_capacity(edges),
+            element_sides: Vec::with_capacity(edges),
             edge: false,
-            pressed: std::array::from_fn(|_| Vec::with_capacity(edges)),
-            turned: false,
-            left: vec![false; joints],
-            whole: None,
-            beside: None,
-            near_peak: false,
-            strongest: vec![(0.0, 0.0); joints],
+            contact_indicators: std::array::from_fn(|_| Vec::with_capacity(edges)),
+            has_switched_branch: false,
+            has_left_branch: vec![false; joints],
+            full_step: None,
+            step_to_reproduce: None,
+            may_contain_peak: false,
+            peak_forces: vec![(0.0, 0.0); joints],
             stiffness: 0.0,
             counts: Counts::default(),
             factorisations: 0,
@@ -37,18 +37,18 @@ impl Attempt {
 
     /// Forgets how the latest step ended, which belongs to another state.
     pub(super) fn clear(&mut self) {
-        self.located = None;
+        self.located_joint = None;
         self.corner = None;
-        self.whole = None;
-        self.beside = None;
-        self.near_peak = false;
+        self.full_step = None;
+        self.step_to_reproduce = None;
+        self.may_contain_peak = false;
     }
 }
 
 impl<'a> Run<'a> {
-    /// Brings `workspace` to `state` first, if it follows another.
+    /// Attaches `workspace` to `state` first, if it is attached to another.
     pub(super) fn new(model: &'a Model, state: &'a mut State, workspace: &'a mut Workspace) -> Self {
-        workspace.follow(model, state);
+        workspace.attach_to(model, state);
         let Workspace { mechanism, stepper, before, attempt, scratch_y, scratch_k, scratch_contacts, ideal, .. } =
             workspace;
         let machine = model.machine();
@@ -73,7 +73,7 @@ impl Run<'_> {
     /// Completes the start: contacts, derivative, first peaks, ledger.
     pub(super) fn begin(&mut self) -> Result<(), StartError> {
         self.begin_contacts_at_start();
-        self.choose_first_member();
+        self.choose_first_scheme();
         self.refresh();
         self.state.record.determinant_positive = self.mechanism.is_determinant_positive();
         self.track_peaks(0.0);
@@ -118,10 +118,10 @@ impl Run<'_> {
         let located = self.locates();
         let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
-        let touching = ActiveSet::by(located, &now.contact_states);
-        let mut evaluator = mechanism.evaluator(touching);
+        let active_set = ActiveSet::by(located, &now.contact_states);
+        let mut evaluator = mechanism.evaluator(active_set);
         evaluator.derivative(now.t, &now.y, &mut now.k);
-        mechanism.complete_gaps(touching, &now.y);
+        mechanism.complete_gaps(active_set, &now.y);
         store_gaps(mechanism, &mut now.gaps);
         // Forces jump here: a parabola across the jump would have a spurious peak.
         state.record.reactions.fill(Recent::default());
@@ -137,14 +137,14 @@ impl Run<'_> {
         let limit = end.min(self.ramp_end());
         // Fixed steps ignore this limit: their size is the user's choice.
         let follows_drives = limit.min(self.mechanism.step_end(self.state.now.t));
-        self.attempt.sides.clear();
+        self.attempt.element_sides.clear();
         self.attempt.edge = false;
         if self.mechanism.is_kinematic() {
             self.kinematic_step(follows_drives)?;
         } else if self.state.conditions.solver.method.is_adaptive() {
             let step = self.adaptive_step(follows_drives);
             if step.is_err() {
-                self.forget_flown();
+                self.discard_step_with_flights();
             }
             step?;
         } else if self.state.conditions.solver.method == Method::DiscreteGradient {
@@ -183,16 +183,17 @@ impl Run<'_> {
         let Self { mechanism, stepper, state, attempt, .. } = self;
         let State { now, conditions, polynomial, .. } = &mut **state;
         let StepEnd { t, y, k, contact_states, .. } = &*now;
-        mechanism.hold_elements(&attempt.sides);
-        attempt.left.fill(false);
-        let mut evaluator = mechanism.evaluator_watching(ActiveSet::by(located, contact_states), &mut attempt.left);
+        mechanism.freeze_elements(&attempt.element_sides);
+        attempt.has_left_branch.fill(false);
+        let mut evaluator =
+            mechanism.evaluator_with_branches(ActiveSet::by(located, contact_states), &mut attempt.has_left_branch);
         let end = &mut attempt.end;
         let tolerance = conditions.solver.tolerance;
         let error = stepper.attempt(&mut evaluator, *t, h, y, k, &mut end.y, &mut end.k, tolerance, polynomial);
         attempt.counts += evaluator.counts;
         attempt.factorisations += stepper.factorisations();
         attempt.stiffness = stepper.stiffness(&evaluator, h, &end.y, &end.k);
-        mechanism.hold_elements(&[]);
+        mechanism.freeze_elements(&[]);
         error
     }
 
@@ -209,11 +210,11 @@ impl Run<'_> {
 
     /// Computes bodies in flight, and gaps, at the end `t_end` of the current step, after an evaluation there.
     pub(super) fn finish_gaps(&mut self, t_end: f64) {
-        let touching = ActiveSet::by(self.locates(), &self.state.now.contact_states);
+        let active_set = ActiveSet::by(self.locates(), &self.state.now.contact_states);
         let end = &mut self.attempt.end;
-        put_flights(self.mechanism, &self.state.flights, t_end, &mut end.y);
+        write_flights(self.mechanism, &self.state.flights, t_end, &mut end.y);
         clear_flights(self.mechanism, &self.state.flights, &mut end.k);
-        self.mechanism.complete_gaps(touching, &end.y);
+        self.mechanism.complete_gaps(active_set, &end.y);
         store_gaps(self.mechanism, &mut end.gaps);
     }
 
@@ -297,7 +298,7 @@ impl Run<'_> {
         if located {
             self.track_reactions();
         }
-        self.find_strongest(h);
+        self.find_peak_forces(h);
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
         let again = (mean_rates && self.mechanism.has_reactions()) || (!mean_rates && switched.forces);
@@ -305,7 +306,7 @@ impl Run<'_> {
             self.track_reactions();
         }
         self.record_step(h, switched.contacts || switched.forces);
-        self.pass_corner();
+        self.switch_at_corner();
         // The force now depends on the approach speed just found. Reactions of ideal joints need the derivative at the end even
         // if the method does not.
         if again {
@@ -330,8 +331,8 @@ impl Run<'_> {
         Stopped { time: self.state.now.t, fault, advice: if dependent { StopAdvice::Dependent } else { advice } }
     }
 
-    /// As [`Simulation::not_unique`](crate::simulate::Simulation::not_unique).
-    pub(super) fn not_unique(&mut self) -> Indeterminate {
+    /// As [`Simulation::indeterminate_forces`](crate::simulate::Simulation::indeterminate_forces).
+    pub(super) fn indeterminate_forces(&mut self) -> Indeterminate {
         self.sample(self.state.now.t, &mut Frame::default());
         let mechanism = &mut self.mechanism;
         Indeterminate {
@@ -341,8 +342,8 @@ impl Run<'_> {
     }
 }
 
-/// As [`Simulation::is_cut_by`](crate::simulate::Simulation::is_cut_by).
-pub(super) fn is_cut_by(state: &State, mechanism: &Mechanism, end: f64) -> bool {
+/// As [`Simulation::is_truncated_by`](crate::simulate::Simulation::is_truncated_by).
+pub(super) fn is_truncated_by(state: &State, mechanism: &Mechanism, end: f64) -> bool {
     let (t, control, solver) = (state.now.t, &state.control, &state.conditions.solver);
     let (t_end, h) = if mechanism.is_kinematic() {
         let h = mechanism.kinematic_step().min(LONGEST_STEP);

@@ -3,14 +3,14 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::automatic::prepare_implicit;
-use super::{Attempt, Follows, Model, State, StepEnd, Workspace};
+use super::{Attempt, Model, State, StepEnd, Workspace, WorkspaceId};
 use crate::contact::ContactState;
 use crate::integrate::Method;
 use crate::mechanism::Mechanism;
 use crate::simulate::StartError;
 use crate::simulate::stepper::AnyStepper;
 
-impl Follows {
+impl WorkspaceId {
     fn next() -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(1);
         Self(NEXT.fetch_add(1, Ordering::Relaxed))
@@ -21,14 +21,14 @@ impl Follows {
     }
 }
 
-impl Clone for Follows {
+impl Clone for WorkspaceId {
     fn clone(&self) -> Self {
         Self::default()
     }
 }
 
-/// Equal states may be followed by different workspaces.
-impl PartialEq for Follows {
+/// Equal states may be attached to different workspaces.
+impl PartialEq for WorkspaceId {
     fn eq(&self, _: &Self) -> bool {
         true
     }
@@ -49,7 +49,7 @@ impl Workspace {
             scratch_k: vec![0.0; n],
             scratch_contacts: vec![ContactState::default(); joints],
             ideal: None,
-            follows: Follows::default(),
+            workspace_id: WorkspaceId::default(),
             mechanism,
         };
         prepare_implicit(&mut workspace.mechanism, method)?;
@@ -61,15 +61,15 @@ impl Workspace {
         &self.mechanism
     }
 
-    /// Turns to `state`, if it follows another.
-    pub(super) fn follow(&mut self, model: &Model, state: &mut State) {
-        assert!(self.mechanism.is_of(model.compiled()), "a workspace of another model");
-        if self.follows.is_same(&state.follows) {
+    /// Prepares to step `state`, if the workspace is attached to another.
+    pub(super) fn attach_to(&mut self, model: &Model, state: &mut State) {
+        assert!(self.mechanism.belongs_to(model.compiled()), "a workspace of another model");
+        if self.workspace_id.is_same(&state.workspace_id) {
             return;
         }
-        let number = Follows::next();
-        state.follows = Follows(number.0);
-        self.follows = number;
+        let number = WorkspaceId::next();
+        state.workspace_id = WorkspaceId(number.0);
+        self.workspace_id = number;
         let method = state.conditions.solver.method;
         if method != self.stepper.method() {
             prepare_implicit(&mut self.mechanism, method).expect("checked when the state adopted the method");
@@ -83,7 +83,7 @@ impl Workspace {
         self.mechanism.forget_evaluation();
         sync_parameters(&mut self.mechanism, model, state);
         let flights = &state.flights;
-        self.mechanism.suspend(|flyer| flights[flyer].is_some());
+        self.mechanism.suspend(|body| flights[body].is_some());
     }
 }
 
@@ -109,7 +109,7 @@ mod tests {
     use crate::simulate::Simulation;
 
     #[test]
-    fn states_stepped_in_turn_in_one_workspace_have_the_bits_of_states_with_their_own() {
+    fn states_stepped_in_turn_in_one_workspace_have_the_bits_of_states_in_their_own() {
         for method in Method::ALL {
             let changes = [("solver.method", method.word()), ("solver.step", "20 us")];
             let changes = changes.map(|(key, value)| (key.to_owned(), value.to_owned()));
