@@ -16,7 +16,7 @@ use super::saved::Watcher;
 use super::speaker::Speaker;
 use crate::analysis::task::Job;
 use crate::files::{FileError, OutputFile, publish};
-use crate::scene::{largest_file, too_large};
+use crate::scene::{max_file_size, too_large};
 
 /// The desktop host.
 #[derive(Default)]
@@ -47,7 +47,7 @@ impl DesktopHost {
 fn read(path: &Path, bytes: impl FnOnce() -> Result<Vec<u8>, String>) -> OpenedFile {
     let name = path.display().to_string();
     let size = path.metadata().map_or(0, |file| file.len());
-    let content = match largest_file(&name) {
+    let content = match max_file_size(&name) {
         most if size > most => Err(too_large()),
         _ => bytes(),
     };

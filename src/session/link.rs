@@ -12,7 +12,7 @@ use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
 use super::embedded::Embedded;
 use super::goal::Goal;
 use super::log::Log;
-use crate::scene::{DEFAULT_SCENE, LARGEST_FILE, Scene, SceneError, Texts, built_in_text, visible, visible_line};
+use crate::scene::{DEFAULT_SCENE, MAX_FILE_SIZE, Scene, SceneError, Texts, built_in_text, visible, visible_line};
 use crate::simulate::{Quantity, SCALE_RANGE};
 use crate::units::{Dimension, parse_quantity};
 use crate::view::Picked;
@@ -22,7 +22,7 @@ use shown::{Instruments, PlotWindow};
 /// Longest link written and read, characters: mail, chats and every browser still accept it.
 pub const LONGEST_LINK: usize = 32_000;
 /// Size limit of an unpacked part of a link, bytes: that of a scene file.
-const LARGEST_UNPACKED: usize = LARGEST_FILE as usize;
+const LARGEST_UNPACKED: usize = MAX_FILE_SIZE as usize;
 
 /// Short names of parameters.
 pub const ALIASES: [(&str, &str); 4] = [

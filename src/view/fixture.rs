@@ -2,7 +2,7 @@
 
 use crate::contact;
 use crate::machine::{Attachment, BallJoint, Body, Geometry, Machine, Mat3, Output, Quat, Role, Shape, Vec3};
-use crate::scene::{MOST_PLOTS, Scene, SignedAxis, ViewSettings};
+use crate::scene::{MAX_PLOTS, Scene, SignedAxis, ViewSettings};
 use crate::simulate::{BodyMotion, ContactMode, Frame, JointReport, Peak};
 
 const BALL: f64 = 0.010;
@@ -36,7 +36,7 @@ fn scene(
 ) -> Scene {
     let mut scene = Scene::load("pendulum", &[]).expect("a built-in scene");
     scene.name = name.to_owned();
-    scene.view = ViewSettings { down, floor: None, isometric: None, time_scale: None, plots: [None; MOST_PLOTS] };
+    scene.view = ViewSettings { down, floor: None, isometric: None, time_scale: None, plots: [None; MAX_PLOTS] };
     scene.machine = Machine {
         gravity: down.unit() * 9.81,
         output: Output { body: 0, probe: None },

@@ -11,7 +11,7 @@ use wasm_bindgen::prelude::*;
 use super::work::Worker;
 use crate::analysis::task::Job;
 use crate::app::{Click, Dropped, Host, OpenedFile, Running, SaveFile, Voice};
-use crate::scene::{largest_file, too_large};
+use crate::scene::{max_file_size, too_large};
 
 #[wasm_bindgen]
 extern "C" {
@@ -77,7 +77,7 @@ impl Inbox {
             let mut read = Vec::with_capacity(files.len());
             for file in files {
                 let name = file.name();
-                let content = if file.size() > largest_file(&name) as f64 {
+                let content = if file.size() > max_file_size(&name) as f64 {
                     Err(too_large())
                 } else {
                     match file.array_buffer().await {

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use jointplay::machine::Drive;
-use jointplay::scene::{DRIVE_LAWS, LARGEST_FILE, Scene, SceneError};
+use jointplay::scene::{DRIVE_LAWS, MAX_FILE_SIZE, Scene, SceneError};
 
 /// A scene with one slide or hinge and its drive.
 fn text(kind: &str, drive: &str) -> String {
@@ -318,7 +318,7 @@ fn what_is_wrong_with_a_file_beside_the_scene_is_named_in_it() {
     fs::create_dir(folder.path().join("data")).unwrap();
     let error = in_folder(folder.path(), b"", "data").unwrap_err();
     holds("a folder", &error, &["this is a directory"]);
-    let large = vec![b'#'; LARGEST_FILE as usize + 1];
+    let large = vec![b'#'; MAX_FILE_SIZE as usize + 1];
     let error = in_folder(folder.path(), &large, "bump.csv").unwrap_err();
     holds("a large file", &error, &["too large; allowed at most 4 MiB"]);
     let mut many = String::from("t_s,x_m\n");

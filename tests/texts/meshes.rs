@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 
 use jointplay::machine::{Geometry, Role};
-use jointplay::scene::{LARGEST_MESH, Scene, file_bytes};
+use jointplay::scene::{MAX_MESH_SIZE, Scene, file_bytes};
 
 /// A body whose only shape is `shape`, with other keys.
 fn scene(shape: &str, keys: &str) -> String {
@@ -165,7 +165,7 @@ fn what_is_wrong_with_a_mesh_is_said_with_its_place() {
     let bad = BOX.replace("v 10 20 30", "v 10 2O 30");
     let open = BOX.replace("f 5 6 8 7\n", "");
     let cut = stl(7);
-    let large = vec![b'#'; LARGEST_MESH as usize + 1];
+    let large = vec![b'#'; MAX_MESH_SIZE as usize + 1];
     let folder = Folder::with(&[
         ("arm.obj", BOX.as_bytes()),
         ("bad.obj", bad.as_bytes()),

@@ -5,7 +5,7 @@ use jointplay_physics::simulate::{Peak, Simulation};
 /// Simulated time examined, s.
 pub const LENGTH: f64 = 0.05;
 /// Limit on evaluations times ball joints.
-const MOST_EVALUATIONS: u64 = 2_000_000;
+const MAX_EVALUATIONS: u64 = 2_000_000;
 
 /// Largest contact forces of the beginning of a run.
 pub struct Beginning {
@@ -19,7 +19,7 @@ impl Beginning {
     /// Examines `simulation`, which must be at its start, and advances it.
     pub fn of(simulation: &mut Simulation) -> Self {
         let joints = simulation.machine().ball_joints.len().max(1) as u64;
-        while simulation.time() < LENGTH && simulation.statistics().evaluations < MOST_EVALUATIONS / joints {
+        while simulation.time() < LENGTH && simulation.statistics().evaluations < MAX_EVALUATIONS / joints {
             // A run that stops here reports the reason itself.
             if simulation.step_until(LENGTH).is_err() {
                 break;

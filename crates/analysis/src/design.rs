@@ -13,9 +13,9 @@ use jointplay_scene::{Scene, SceneError, Value};
 /// affect which point continues from which.
 pub const FOLLOW_BLOCK: usize = 25;
 /// Largest number of points in a sweep.
-const MOST_POINTS: usize = 1 << 24;
+const MAX_POINTS: usize = 1 << 24;
 /// Largest number of points tried inside a map, or in a table.
-const MOST_TRIED: usize = 4096;
+const MAX_TRIED: usize = 4096;
 
 /// State from which a point starts: [`Self::meaning`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -130,8 +130,8 @@ impl Design {
         }
         let design = Self { axes, arrangement, starts: starts.to_vec() };
         let points = design.shape().into_iter().try_fold(1_usize, usize::checked_mul);
-        if points.is_none_or(|points| points > MOST_POINTS) {
-            return wrong(None, format!("the ranges have more than {MOST_POINTS} points together"));
+        if points.is_none_or(|points| points > MAX_POINTS) {
+            return wrong(None, format!("the ranges have more than {MAX_POINTS} points together"));
         }
         if let Some(start) = design.starts.iter().find(|start| **start != Start::Cold) {
             design.check_following(scene, *start)?;
@@ -269,15 +269,15 @@ impl Design {
     }
 
     /// Points to be tried before anything runs. Of crossed axes: every value of each with the others at their ends, and a
-    /// lattice inside, which covers every point of a small map; of more than two axes at most [`MOST_TRIED`] of these. Of zipped
+    /// lattice inside, which covers every point of a small map; of more than two axes at most [`MAX_TRIED`] of these. Of zipped
     /// ones: all, or as many spread over the rows.
     pub(super) fn tried(&self) -> Vec<usize> {
         let sets = self.sets();
         if self.arrangement == Arrangement::Zipped {
-            return (0..sets - 1).step_by(sets.div_ceil(MOST_TRIED)).chain([sets - 1]).collect();
+            return (0..sets - 1).step_by(sets.div_ceil(MAX_TRIED)).chain([sets - 1]).collect();
         }
-        let within = |most: usize| most.checked_pow(self.axes.len() as u32).is_some_and(|all| all <= MOST_TRIED);
-        let most_within = (1..=MOST_TRIED).take_while(|most| within(*most)).last().unwrap_or(1);
+        let within = |most: usize| most.checked_pow(self.axes.len() as u32).is_some_and(|all| all <= MAX_TRIED);
+        let most_within = (1..=MAX_TRIED).take_while(|most| within(*most)).last().unwrap_or(1);
         let tried = |point: &usize| {
             let indices = self.indices(*point);
             let along = || self.axes.iter().zip(&indices);
@@ -287,7 +287,7 @@ impl Design {
         };
         let all: Vec<usize> = (0..sets).filter(tried).collect();
         // The border of more than two ranges grows with a power of two.
-        let stride = if self.axes.len() > 2 { all.len().div_ceil(MOST_TRIED) } else { 1 };
+        let stride = if self.axes.len() > 2 { all.len().div_ceil(MAX_TRIED) } else { 1 };
         all.into_iter().step_by(stride).collect()
     }
 

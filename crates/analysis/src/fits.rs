@@ -6,7 +6,7 @@ use std::collections::BinaryHeap;
 use crate::yields::Estimate;
 
 /// Largest number of choices that a proof looks at; without an evaluation a choice costs nearly nothing.
-const MOST_CHOICES: usize = 1 << 20;
+const MAX_CHOICES: usize = 1 << 20;
 
 /// The yield that a choice of fits has to hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -182,7 +182,7 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
         let mut visited = 0;
         while let Some(node) = nodes.pop() {
             visited += 1;
-            if visited > MOST_CHOICES {
+            if visited > MAX_CHOICES {
                 return Ok(false);
             }
             while node.cost < self.best_cost() && !self.is_known_to_fail(&node.choice) {

@@ -20,7 +20,7 @@ const LONGEST: f64 = 10.0;
 const SLOW: f64 = 0.5;
 
 /// Reactions above this many times the weight of all bodies indicate a mechanism about to lose its stiffness.
-const MOST_WEIGHTS: f64 = 5.0;
+const MAX_WEIGHTS: f64 = 5.0;
 
 /// What is wrong with the motion without play.
 pub enum IdealFault {
@@ -39,7 +39,7 @@ impl std::fmt::Display for IdealFault {
             Self::Loaded(largest, when) => write!(
                 f,
                 "the mechanism comes near a singular pose: with ideal joints and a slow drive a reaction reaches {} at \
-                 t = {when:.3} s, more than {MOST_WEIGHTS} times the weight of all bodies",
+                 t = {when:.3} s, more than {MAX_WEIGHTS} times the weight of all bodies",
                 format_quantity_digits(*largest, "N", 4)
             ),
             Self::OffPath(time, distance) => write!(
@@ -67,7 +67,7 @@ pub fn ideal_fault(scene: &Scene) -> Option<IdealFault> {
     for joint in &mut rigid.machine.ball_joints {
         joint.contact.clearance = 0.0;
     }
-    let limit = MOST_WEIGHTS * 9.81 * rigid.machine.bodies.iter().map(|body| body.mass).sum::<f64>();
+    let limit = MAX_WEIGHTS * 9.81 * rigid.machine.bodies.iter().map(|body| body.mass).sum::<f64>();
     let mut simulation = Simulation::new(&rigid.machine).ok()?;
     // The loads of any other motion would need a simulation of arbitrary length.
     if !simulation.mechanism().is_kinematic() {

@@ -2,7 +2,7 @@
 //! of model output", Computer Physics Communications 181, 259-270.
 
 use crate::random::{Purpose, RandomStream};
-use crate::sampling::{MOST_DIMENSIONS, MOST_POINTS, Sampler, Sampling, SamplingError};
+use crate::sampling::{MAX_DIMENSIONS, MAX_POINTS, Sampler, Sampling, SamplingError};
 use crate::yields::{Estimate, interpolated_quantile};
 
 /// Least number of complete rows from which indices are estimated.
@@ -14,13 +14,13 @@ const LEAST_RESAMPLES: usize = 100;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IndicesError {
     /// No inputs or too many.
-    #[error("{inputs} inputs: 1 to {} are possible", MOST_DIMENSIONS / 2)]
+    #[error("{inputs} inputs: 1 to {} are possible", MAX_DIMENSIONS / 2)]
     Inputs {
         /// Number of inputs.
         inputs: usize,
     },
     /// Too many points.
-    #[error("{rows} rows of {inputs} inputs: at least one row and at most {MOST_POINTS} points in all are possible")]
+    #[error("{rows} rows of {inputs} inputs: at least one row and at most {MAX_POINTS} points in all are possible")]
     Size {
         /// Number of inputs.
         inputs: usize,
@@ -115,10 +115,10 @@ impl SaltelliDesign {
     /// # Errors
     /// No inputs, more than 64, no rows, or too many points.
     pub fn new(sampling: Sampling, inputs: usize, rows: usize, seed: u64) -> Result<Self, IndicesError> {
-        if !(1..=MOST_DIMENSIONS / 2).contains(&inputs) {
+        if !(1..=MAX_DIMENSIONS / 2).contains(&inputs) {
             return Err(IndicesError::Inputs { inputs });
         }
-        if rows == 0 || rows > MOST_POINTS / (inputs + 2) {
+        if rows == 0 || rows > MAX_POINTS / (inputs + 2) {
             return Err(IndicesError::Size { inputs, rows });
         }
         Ok(Self { inputs, sampler: Sampler::new(sampling, 2 * inputs, rows, seed)? })
@@ -368,6 +368,6 @@ mod tests {
         assert_eq!(of(Bootstrap::default()), of(Bootstrap::default()));
         assert!(design.indices(&[1.0], Bootstrap::default()).is_err());
         assert!(matches!(SaltelliDesign::new(Sampling::Sobol, 65, 16, 0), Err(IndicesError::Inputs { .. })));
-        assert!(matches!(SaltelliDesign::new(Sampling::Sobol, 64, MOST_POINTS, 0), Err(IndicesError::Size { .. })));
+        assert!(matches!(SaltelliDesign::new(Sampling::Sobol, 64, MAX_POINTS, 0), Err(IndicesError::Size { .. })));
     }
 }

@@ -10,10 +10,10 @@ use jointplay_scene::{Scene, SceneError};
 /// Allowed numbers of directions.
 pub const DIRECTIONS: std::ops::RangeInclusive<usize> = 2..=4096;
 /// Largest number of directions of all points together: their arrays take 512 MiB.
-const MOST_ERRORS: usize = 1 << 24;
+const MAX_ERRORS: usize = 1 << 24;
 /// The farthest error has been found when another direction enlarges it by less than this part, and maximum number of directions.
 const STANDSTILL: f64 = 1e-9;
-const MOST_TURNS: usize = 50;
+const MAX_TURNS: usize = 50;
 
 /// A grid of points at which the drives stand still.
 #[derive(Clone, Debug)]
@@ -58,9 +58,9 @@ impl WorkspaceMap {
     pub fn new(scene: Scene, over: &[String], directions: usize) -> Result<Self, RangeError> {
         let axes = over.iter().map(|text| Axis::parse_over(&scene, text)).collect::<Result<Vec<_>, _>>()?;
         let design = Design::crossed(&scene, axes, &[Start::Cold])?;
-        if design.points() > MOST_ERRORS / directions {
+        if design.points() > MAX_ERRORS / directions {
             let what = format!(
-                "{} points with {directions} directions each are more than a map holds ({MOST_ERRORS} errors): fewer values in \
+                "{} points with {directions} directions each are more than a map holds ({MAX_ERRORS} errors): fewer values in \
                  --over, or fewer --directions",
                 design.points()
             );
@@ -146,7 +146,7 @@ fn largest(sampled: &[Farthest], mut farthest: impl FnMut(&Vec3) -> Farthest) ->
     let size = |farthest: &Farthest| farthest.error.map_or(0.0, |error| error.norm());
     let first = sampled.iter().reduce(|most, next| if size(next) > size(most) { next } else { most })?;
     let mut most = first.clone();
-    for _ in 0..MOST_TURNS {
+    for _ in 0..MAX_TURNS {
         let direction = most.error?.try_normalize(0.0)?;
         let next = farthest(&direction);
         let grown = size(&next) > size(&most) * (1.0 + STANDSTILL);

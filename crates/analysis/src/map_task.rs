@@ -9,7 +9,7 @@ use super::source::{SceneSource, TaskFault};
 use jointplay_physics::machine::Vec3;
 
 /// Largest number of points that the window shows.
-pub const MOST_POINTS: usize = 5000;
+pub const MAX_POINTS: usize = 5000;
 
 /// A map to be computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,8 +63,8 @@ pub(super) async fn run(
     let directions = task.directions.clamp(*DIRECTIONS.start(), *DIRECTIONS.end());
     let map = WorkspaceMap::new(task.scene.scene()?, &task.over, directions)?;
     let points = map.design().points();
-    if points > MOST_POINTS {
-        return Err(TaskFault::TooManyPoints { points, most: MOST_POINTS });
+    if points > MAX_POINTS {
+        return Err(TaskFault::TooManyPoints { points, most: MAX_POINTS });
     }
     let axes = map.design().axes().iter();
     let axes = axes.map(|axis| (axis.key().to_owned(), axis.numbers().collect()));

@@ -2,18 +2,18 @@
 //! experiments", Technometrics 33, 161-174).
 
 use crate::random::{Purpose, RandomStream};
-use crate::sampling::MOST_POINTS;
+use crate::sampling::MAX_POINTS;
 use crate::yields::mean_and_deviation;
 
 /// Largest number of levels of an input.
-const MOST_LEVELS: usize = 1000;
+const MAX_LEVELS: usize = 1000;
 
 /// Why there is no such plan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MorrisError {
     /// Too few points or too many.
     #[error(
-        "{trajectories} trajectories of {inputs} inputs: at least one of each and at most {MOST_POINTS} points are possible"
+        "{trajectories} trajectories of {inputs} inputs: at least one of each and at most {MAX_POINTS} points are possible"
     )]
     Size {
         /// Number of inputs.
@@ -22,7 +22,7 @@ pub enum MorrisError {
         trajectories: usize,
     },
     /// A number of levels without the step that reaches all levels equally often.
-    #[error("{levels} levels: an even number from 2 to {MOST_LEVELS} is possible")]
+    #[error("{levels} levels: an even number from 2 to {MAX_LEVELS} is possible")]
     Levels {
         /// As asked for.
         levels: usize,
@@ -91,10 +91,10 @@ impl MorrisPlan {
     /// No inputs, no trajectories or too many points; an odd number of levels; a margin out of range.
     pub fn new(inputs: usize, trajectories: usize, levels: usize, margin: f64, seed: u64) -> Result<Self, MorrisError> {
         let points = inputs.checked_add(1).and_then(|n| n.checked_mul(trajectories));
-        if inputs == 0 || trajectories == 0 || points.is_none_or(|n| n > MOST_POINTS) {
+        if inputs == 0 || trajectories == 0 || points.is_none_or(|n| n > MAX_POINTS) {
             return Err(MorrisError::Size { inputs, trajectories });
         }
-        if levels < 2 || levels % 2 == 1 || levels > MOST_LEVELS {
+        if levels < 2 || levels % 2 == 1 || levels > MAX_LEVELS {
             return Err(MorrisError::Levels { levels });
         }
         if !(0.0..0.5).contains(&margin) {

@@ -8,11 +8,11 @@ use crate::random::{BITS, Purpose, RandomStream, unit};
 use direction_numbers::ROWS;
 
 /// Largest number of coordinates of a point.
-pub const MOST_DIMENSIONS: usize = ROWS.len() + 1;
+pub const MAX_DIMENSIONS: usize = ROWS.len() + 1;
 /// Largest number of points.
-pub const MOST_POINTS: usize = 1 << 24;
+pub const MAX_POINTS: usize = 1 << 24;
 /// Largest number of coordinates in a Latin hypercube, whose permutations are in memory: 256 MB.
-const MOST_STRATA: usize = 1 << 26;
+const MAX_STRATA: usize = 1 << 26;
 
 /// How points are distributed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +38,7 @@ words! { Sampling {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SamplingError {
     /// No coordinates or too many.
-    #[error("{dimensions} dimensions: 1 to {MOST_DIMENSIONS} are possible")]
+    #[error("{dimensions} dimensions: 1 to {MAX_DIMENSIONS} are possible")]
     Dimensions {
         /// As asked for.
         dimensions: usize,
@@ -79,12 +79,12 @@ impl Sampler {
     /// # Errors
     /// A number of dimensions or points out of range.
     pub fn new(sampling: Sampling, dimensions: usize, points: usize, seed: u64) -> Result<Self, SamplingError> {
-        if !(1..=MOST_DIMENSIONS).contains(&dimensions) {
+        if !(1..=MAX_DIMENSIONS).contains(&dimensions) {
             return Err(SamplingError::Dimensions { dimensions });
         }
         let most = match sampling {
-            Sampling::LatinHypercube => (MOST_STRATA / dimensions).min(MOST_POINTS),
-            Sampling::Sobol | Sampling::Random => MOST_POINTS,
+            Sampling::LatinHypercube => (MAX_STRATA / dimensions).min(MAX_POINTS),
+            Sampling::Sobol | Sampling::Random => MAX_POINTS,
         };
         if !(1..=most).contains(&points) {
             return Err(SamplingError::Points { points, most, sampling, dimensions });

@@ -12,7 +12,7 @@ use jointplay_physics::simulate::{LONGEST_RUN, Simulation};
 use jointplay_scene::{Scene, SceneError, Value};
 
 /// Largest total number of kept sections: an array of them takes 512 MiB.
-const MOST_SECTIONS: usize = 1 << 26;
+const MAX_SECTIONS: usize = 1 << 26;
 
 /// Why a sweep is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -113,8 +113,8 @@ impl Sweep {
                 return Err(SweepError::NothingKept { counted, all, discard });
             }
             let (points, kept) = (design.points(), protocol.kept());
-            if kept > MOST_SECTIONS / points {
-                return Err(SweepError::TooLarge { points, kept, most: MOST_SECTIONS });
+            if kept > MAX_SECTIONS / points {
+                return Err(SweepError::TooLarge { points, kept, most: MAX_SECTIONS });
             }
         }
         let layout = Layout::new(&scene, &protocol);

@@ -16,7 +16,7 @@ pub(super) const STEPS: u32 = 400;
 /// Coordinates of the output body: x, y, z in m, alpha, beta, gamma in rad.
 pub const COORDINATES: usize = 6;
 /// Largest total number of kept sections that a window holds and draws.
-const MOST_SECTIONS: usize = 50_000;
+const MAX_SECTIONS: usize = 50_000;
 
 /// A sweep to be computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -138,8 +138,8 @@ pub(super) async fn run(
     let plan = Plan { periods: task.periods, discard: task.discard, phase: task.phase, exponent: task.exponent };
     let design = Design::crossed(&scene, axes, &[task.start])?;
     let kept = task.periods.saturating_sub(task.discard);
-    if kept.saturating_mul(design.points()) > MOST_SECTIONS {
-        return Err(TaskFault::TooManySections { points: design.points(), kept, most: MOST_SECTIONS });
+    if kept.saturating_mul(design.points()) > MAX_SECTIONS {
+        return Err(TaskFault::TooManySections { points: design.points(), kept, most: MAX_SECTIONS });
     }
     let sweep = Sweep::new(scene, design, plan)?;
     say(SweepMessage::Ranges(ranges))?;

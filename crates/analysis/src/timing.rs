@@ -12,7 +12,7 @@ use jointplay_scene::Scene;
 const STEPS_IN_A_PIECE: u32 = 32;
 /// Fewest and most runs of one setting; and the multiple of the time to be measured after which two runs suffice.
 const FEWEST_RUNS: usize = 3;
-const MOST_RUNS: usize = 40;
+const MAX_RUNS: usize = 40;
 const LONG: f64 = 4.0;
 
 /// Limits on the work of an analysis.
@@ -174,7 +174,7 @@ pub(super) fn time_to(
 ) -> Result<f64, AnalysisError> {
     let mut pieces = Vec::new();
     let mut measured = 0.0;
-    for run in 0..MOST_RUNS {
+    for run in 0..MAX_RUNS {
         let mut simulation = start(context)?;
         let before = context.now();
         run_until_timed(&mut simulation, end, budget, context, &mut pieces, &mut |_| false)?;

@@ -72,7 +72,7 @@ impl Scene {
             let here = self.parameters();
             let table = here.iter().map(|parameter| parameter.key);
             // A longer search would cost more than the hint is worth.
-            let near = nearest_parameter(key, table.chain(numbers.take(MOST_CHANGES)), &[]);
+            let near = nearest_parameter(key, table.chain(numbers.take(MAX_CHANGES)), &[]);
             return format!("unknown key{near}");
         };
         let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
@@ -202,8 +202,8 @@ impl Scene {
             _ => self.write(parameter, &value),
         }
         self.changes.retain(|(changed, _)| changed != key);
-        if self.changes.len() >= MOST_CHANGES {
-            let message = format!("too many parameters are changed; allowed at most {MOST_CHANGES}");
+        if self.changes.len() >= MAX_CHANGES {
+            let message = format!("too many parameters are changed; allowed at most {MAX_CHANGES}");
             return Err(SceneError::about(key, Some(text), message));
         }
         self.changes.push((key.to_owned(), text.to_owned()));

@@ -15,15 +15,15 @@ use super::Texts;
 use super::mesh::{Fault, Format, Mesh};
 
 /// Size limit for scene and text files, bytes: a scene is a few kilobytes.
-pub const LARGEST_FILE: u64 = 4 << 20;
+pub const MAX_FILE_SIZE: u64 = 4 << 20;
 /// Size limit for a mesh file, and for all mesh files together, bytes.
-pub const LARGEST_MESH: u64 = 8 << 20;
+pub const MAX_MESH_SIZE: u64 = 8 << 20;
 
 /// Size limit for the user-supplied file `name`, bytes.
-pub fn largest_file(name: &str) -> u64 {
+pub fn max_file_size(name: &str) -> u64 {
     match Format::of(name) {
-        Some(_) => LARGEST_MESH,
-        None => LARGEST_FILE,
+        Some(_) => MAX_MESH_SIZE,
+        None => MAX_FILE_SIZE,
     }
 }
 
@@ -189,8 +189,8 @@ impl<'d> AssetResolver<'d> {
             return Err(AssetFault::NotBeside);
         }
         let (limit, files) = match what {
-            Use::Text => (LARGEST_FILE, "files"),
-            Use::Mesh => (LARGEST_MESH, "meshes"),
+            Use::Text => (MAX_FILE_SIZE, "files"),
+            Use::Mesh => (MAX_MESH_SIZE, "meshes"),
         };
         let held = &self.held[what as usize];
         let room = limit.saturating_sub(held.get());

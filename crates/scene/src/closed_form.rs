@@ -10,11 +10,11 @@ use jointplay_physics::suggest::nearest;
 use std::sync::LazyLock;
 
 /// Maximum number of functions.
-const MOST_FUNCTIONS: usize = 100;
+const MAX_FUNCTIONS: usize = 100;
 /// Maximum number of turns.
-const MOST_TURNS: usize = 6;
+const MAX_TURNS: usize = 6;
 /// Maximum number of repetitions per second, Hz.
-const FASTEST: f64 = 1e4;
+const MAX_FREQUENCY: f64 = 1e4;
 
 static FUNCTION: FileTable = FileTable::new(
     "function",
@@ -55,14 +55,14 @@ pub(super) static CLOSED_FORM: LazyLock<FileTable> = LazyLock::new(|| {
     let own = [
         key(
             "frequency",
-            ValueType::Number(Dimension::Frequency, (0.0, FASTEST)),
+            ValueType::Number(Dimension::Frequency, (0.0, MAX_FREQUENCY)),
             "\"0.5 Hz\"",
             "how often the motion repeats; 0 if nothing moves",
         )
         .fixed(),
         key(
             "functions",
-            ValueType::List(&FUNCTION, many(MOST_FUNCTIONS, "functions")),
+            ValueType::List(&FUNCTION, many(MAX_FUNCTIONS, "functions")),
             "[{ name = \"lift\", formula = \"20 mm * sin(2*pi*t/2 s)\" }]",
             "the functions, which drives follow by `law = \"function\"`",
         ),
@@ -76,7 +76,7 @@ pub(super) static CLOSED_FORM: LazyLock<FileTable> = LazyLock::new(|| {
     };
     let turns = key(
         "turns",
-        ValueType::List(&TURN, many(MOST_TURNS, "turns")),
+        ValueType::List(&TURN, many(MAX_TURNS, "turns")),
         "[{ axis = [0, 0, 1], angle = \"beta\" }]",
         "how the output body is turned there",
     )

@@ -5,16 +5,16 @@ use super::closed_form::read_follower;
 use super::document::{Node, Section};
 use super::formula::read_formula;
 use super::key::{FileKey, FileTable, MAX_SI, ValueType, Variants, key, many, number, positive};
-use super::points::{Graph, MOST_POINTS, SHORTEST_PART, read_file, read_points};
+use super::points::{Graph, MAX_POINTS, SHORTEST_PART, read_file, read_points};
 use super::*;
 use std::sync::LazyLock;
 
 /// Maximum frequency of a harmonic drive, Hz.
-pub(super) const FASTEST_DRIVE: f64 = 1e4;
+pub(super) const MAX_DRIVE_FREQUENCY: f64 = 1e4;
 /// Word of the law that follows a function of the machine's closed form.
 const FUNCTION: &str = "function";
 /// Maximum number of terms in a sum of harmonics.
-const MOST_TERMS: usize = 100;
+const MAX_TERMS: usize = 100;
 
 const fn place(name: &'static str, help: &'static str) -> FileKey {
     key(name, number(Dimension::Length), "\"10 mm\"", help).on_hinge(Dimension::Angle, "\"10 deg\"")
@@ -25,7 +25,7 @@ const MEAN: FileKey = place("mean", "mean").zero();
 /// Amplitude, frequency and phase of a harmonic.
 const TERM: [FileKey; 3] = [
     place("amplitude", "amplitude"),
-    key("frequency", positive(Dimension::Frequency, FASTEST_DRIVE), "\"1 Hz\"", "frequency"),
+    key("frequency", positive(Dimension::Frequency, MAX_DRIVE_FREQUENCY), "\"1 Hz\"", "frequency"),
     key("phase", number(Dimension::Angle), "\"90 deg\"", "phase at t = 0").zero(),
 ];
 
@@ -75,7 +75,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
             MEAN,
             key(
                 "terms",
-                ValueType::List(&TERMS, many(MOST_TERMS, "terms")),
+                ValueType::List(&TERMS, many(MAX_TERMS, "terms")),
                 "[{ amplitude = \"10 mm\", frequency = \"1 Hz\" }]",
                 "the harmonics",
             )
@@ -104,7 +104,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         keys: &[
             key(
                 "points",
-                ValueType::Pairs([Dimension::Time, Dimension::Length], many(MOST_POINTS, "points")),
+                ValueType::Pairs([Dimension::Time, Dimension::Length], many(MAX_POINTS, "points")),
                 "[[\"0 s\", \"0 mm\"], [\"1 s\", \"10 mm\"]]",
                 "time and position, in the order of time, at least two",
             )

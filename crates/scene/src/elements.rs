@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
 use super::document::{Node, Section};
-use super::drives::{DRIVE, FACTOR, FASTEST_DRIVE, read_drive};
+use super::drives::{DRIVE, FACTOR, MAX_DRIVE_FREQUENCY, read_drive};
 use super::instance::Instance;
 use super::key::{FileKey, FileTable, MAX_SI, ValueType, key, many, number};
 use super::placement::{ATTACHMENT, ROTATION, read_attachment, read_rotation};
-use super::points::{Axis, Graph, MOST_POINTS, read_file, read_points};
+use super::points::{Axis, Graph, MAX_POINTS, read_file, read_points};
 use super::read_joints::read_coordinate;
 use super::*;
 use jointplay_physics::machine::{
@@ -19,7 +19,7 @@ use jointplay_physics::machine::{
 use jointplay_physics::units::Dimension as D;
 use jointplay_physics::words::Words;
 
-const LARGEST_FORCE: f64 = 1e12;
+const MAX_FORCE: f64 = 1e12;
 
 /// All kinds of force elements: table, and reader of the section once the attachment is known.
 pub(super) static ELEMENTS: LazyLock<Vec<(&FileTable, ReadKind)>> = LazyLock::new(|| {
@@ -59,14 +59,14 @@ const fn point(name: &'static str) -> FileKey {
     key(name, ValueType::Table(&ATTACHMENT), "{ body = \"rod\", at = \"0 0 100 mm\" }", "point of attachment")
 }
 
-/// A number of either sign, such as a force, up to `LARGEST_FORCE`.
+/// A number of either sign, such as a force, up to `MAX_FORCE`.
 const fn signed(name: &'static str, dimension: D, like: &'static str, help: &'static str) -> FileKey {
-    key(name, ValueType::Number(dimension, (-LARGEST_FORCE, LARGEST_FORCE)), like, help)
+    key(name, ValueType::Number(dimension, (-MAX_FORCE, MAX_FORCE)), like, help)
 }
 
-/// A nonnegative number up to `LARGEST_FORCE`.
+/// A nonnegative number up to `MAX_FORCE`.
 const fn unsigned(name: &'static str, dimension: D, like: &'static str, help: &'static str) -> FileKey {
-    key(name, ValueType::Number(dimension, (0.0, LARGEST_FORCE)), like, help)
+    key(name, ValueType::Number(dimension, (0.0, MAX_FORCE)), like, help)
 }
 
 /// Stiffness and damping of an element on a joint.
@@ -85,13 +85,13 @@ const fn coordinate(name: &'static str, like: [&'static str; 2], help: &'static 
 
 /// Stiffnesses or dampings along or about three axes.
 const fn diagonal(name: &'static str, dimension: D, help: &'static str) -> FileKey {
-    key(name, ValueType::Vector(dimension, (0.0, LARGEST_FORCE)), "", help)
+    key(name, ValueType::Vector(dimension, (0.0, MAX_FORCE)), "", help)
         .zero()
         .frame("its axes: `axes` in the body of `from`")
 }
 
 const fn vector(name: &'static str, dimension: D, help: &'static str) -> FileKey {
-    key(name, ValueType::Vector(dimension, (-LARGEST_FORCE, LARGEST_FORCE)), "", help)
+    key(name, ValueType::Vector(dimension, (-MAX_FORCE, MAX_FORCE)), "", help)
         .zero()
         .frame("the world's, or the body's with `axes = \"body\"`")
 }
@@ -108,7 +108,7 @@ const CURVE_LIKE: &str = "[[\"-10 mm\", \"-50 N\"], [0, 0], [\"10 mm\", \"80 N\"
 
 /// Points of a force curve in place of `stiffness` and `preload`.
 const fn curve(help: &'static str) -> FileKey {
-    let pairs = ValueType::Pairs([D::Length, D::Force], many(MOST_POINTS, "points"));
+    let pairs = ValueType::Pairs([D::Length, D::Force], many(MAX_POINTS, "points"));
     key("characteristic", pairs, CURVE_LIKE, help).absent(WITHOUT_CURVE)
 }
 
@@ -163,7 +163,7 @@ static LOAD: LazyLock<FileTable> = LazyLock::new(|| {
             point("on"),
             key(
                 "frequency",
-                ValueType::Number(D::Frequency, (0.0, FASTEST_DRIVE)),
+                ValueType::Number(D::Frequency, (0.0, MAX_DRIVE_FREQUENCY)),
                 "\"2 Hz\"",
                 "0 for a constant load",
             )
@@ -371,7 +371,7 @@ impl Place<'_, '_> {
     /// Elastic law of a spring: a line, or a curve whose `axes` have these names and dimensions.
     fn elastic(&self, axes: [(&'static str, D); 2]) -> Result<Elastic, SceneError> {
         let line = Elastic::Line { stiffness: self.number("stiffness")?, preload: self.number("preload")? };
-        let most = [MAX_SI, LARGEST_FORCE];
+        let most = [MAX_SI, MAX_FORCE];
         let axis = |i: usize| Axis { name: axes[i].0, dimension: axes[i].1, most: most[i] };
         let rise = (1e-9, if self.on_hinge() { "1e-9 rad" } else { "1 nm" });
         let graph = Graph { axes: [axis(0), axis(1)], rise, repeats: false };

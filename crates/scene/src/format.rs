@@ -16,11 +16,11 @@ use jointplay_physics::units::Dimension as D;
 use jointplay_physics::words::Words;
 
 /// Maximum number of user-defined parameters.
-const MOST_OWN: usize = 1000;
+const MAX_OWN: usize = 1000;
 /// Range of the initial time scale.
 const SLOWEST_TO_REAL: (f64, f64) = (1e-4, 1.0);
 /// Maximum number of included files.
-const MOST_FILES: usize = 100;
+const MAX_FILES: usize = 100;
 /// Largest length of a shape, m.
 const LARGEST: f64 = 1000.0;
 
@@ -81,7 +81,7 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
         ),
         key(
             "include",
-            ValueType::Files(&INCLUDE, many(MOST_FILES, "files")),
+            ValueType::Files(&INCLUDE, many(MAX_FILES, "files")),
             "[\"leg.toml\"]",
             "files beside this one, whose lists are added to the scene",
         ),
@@ -89,7 +89,7 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
     .map(|key| key.absent("none"));
     let place = place("the scene");
     let joints =
-        [list_of(&JOINT_CONTACT, many(MOST_BALL_JOINTS, "ball joints"), "{ name = \"J2\", clearance = \"0.1 mm\" }")];
+        [list_of(&JOINT_CONTACT, many(MAX_BALL_JOINTS, "ball joints"), "{ name = \"J2\", clearance = \"0.1 mm\" }")];
     FileTable::new(
         "scene",
         "the file",
@@ -142,8 +142,8 @@ pub(super) static INCLUDED: LazyLock<FileTable> = LazyLock::new(|| {
 /// Lists allowed in a file.
 fn lists() -> Vec<FileKey> {
     let own = [
-        list_of(&PARAMETER, many(MOST_OWN, "parameters"), "{ name = \"stroke\", value = \"20 mm\" }"),
-        list_of(&PATTERN, many(MOST_BODIES, "patterns"), "{ name = \"leg\", count = 6, along = \"100 0 0 mm\" }"),
+        list_of(&PARAMETER, many(MAX_OWN, "parameters"), "{ name = \"stroke\", value = \"20 mm\" }"),
+        list_of(&PATTERN, many(MAX_BODIES, "patterns"), "{ name = \"leg\", count = 6, along = \"100 0 0 mm\" }"),
     ];
     own.into_iter().chain(parts()).collect()
 }
@@ -153,26 +153,26 @@ fn parts() -> Vec<FileKey> {
     let parts = [
         list_of(
             &BODY,
-            many(MOST_BODIES, "bodies"),
+            many(MAX_BODIES, "bodies"),
             "{ name = \"rod\", mass = \"0.384 kg\", inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\" }",
         ),
         list_of(
             &JOINT,
-            many(MOST_BODIES, "joints"),
+            many(MAX_BODIES, "joints"),
             "{ name = \"crank\", kind = \"revolute\", child = \"rod\", axis = [0, 1, 0] }",
         ),
         list_of(
             &BALL_JOINT,
-            many(MOST_BALL_JOINTS, "ball joints"),
+            many(MAX_BALL_JOINTS, "ball joints"),
             "{ name = \"S1\", socket = { body = \"world\" }, ball = { body = \"rod\" } }",
         ),
         list_of(
             &FIXED_SHAPE,
-            many(MOST_SHAPES, "shapes"),
+            many(MAX_SHAPES, "shapes"),
             "{ form = \"sphere\", role = \"frame\", centre = \"0 0 0 mm\", radius = \"4 mm\" }",
         ),
     ];
-    let element = |table| list_of(table, many(MOST_ELEMENTS, "force elements"), "");
+    let element = |table| list_of(table, many(MAX_ELEMENTS, "force elements"), "");
     let elements = ELEMENTS.iter().map(|(table, _)| element(*table));
     parts.into_iter().chain(elements).collect()
 }
@@ -218,7 +218,7 @@ static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
         .fixed(),
         key(
             "plots",
-            ValueType::Words(&PLOT_WORDS, many(MOST_PLOTS, "plots")),
+            ValueType::Words(&PLOT_WORDS, many(MAX_PLOTS, "plots")),
             "[\"normal-force\", \"acceleration\"]",
             "plots that a window begins with",
         )
@@ -281,7 +281,7 @@ static BODY: LazyLock<FileTable> = LazyLock::new(|| {
         .frame("the body's"),
         key(
             "shapes",
-            ValueType::List(&SHAPE, many(MOST_SHAPES, "shapes")),
+            ValueType::List(&SHAPE, many(MAX_SHAPES, "shapes")),
             "[{ form = \"sphere\", role = \"pin\", centre = \"0 0 0 mm\", radius = \"4 mm\" }]",
             "what it looks like",
         )
@@ -330,7 +330,7 @@ fn of_shape(name: &'static str, head: &'static str, help: &'static str) -> FileT
         key("size", vector(D::Length), "\"10 20 30 mm\"", "edge lengths along x, y and z").of(&["box"]),
         key(
             "corners",
-            ValueType::Vectors(D::Length, many(MOST_CORNERS, "corners")),
+            ValueType::Vectors(D::Length, many(MAX_CORNERS, "corners")),
             "[\"0 0 0 mm\", \"10 0 0 mm\", \"0 10 0 mm\"]",
             "corners of a polygon in one plane, in its order",
         )
@@ -624,7 +624,7 @@ static PARAMETER: FileTable = FileTable::new(
 static PATTERN: LazyLock<FileTable> = LazyLock::new(|| {
     let own = [
         key("name", ValueType::Name, "\"leg\"", "its name"),
-        key("count", ValueType::Whole(1, MOST_BODIES as u32), "6", "number of copies"),
+        key("count", ValueType::Whole(1, MAX_BODIES as u32), "6", "number of copies"),
         key(
             "about",
             ValueType::Table(&ABOUT),

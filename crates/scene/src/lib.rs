@@ -68,7 +68,7 @@ mod visible;
 mod write;
 
 pub use access::{contact_parts, contact_value};
-pub use assets::{LARGEST_FILE, LARGEST_MESH, file_bytes, largest_file};
+pub use assets::{MAX_FILE_SIZE, MAX_MESH_SIZE, file_bytes, max_file_size};
 pub use drives::{DRIVE_LAWS, DriveLaw};
 pub use elements::is_element;
 pub use error::SceneError;

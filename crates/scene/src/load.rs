@@ -1,6 +1,6 @@
 //! Loading of built-in scenes and scene files.
 
-use super::assets::{AssetResolver, LARGEST_FILE};
+use super::assets::{AssetResolver, MAX_FILE_SIZE};
 use super::error::line_and_column;
 use super::{Scene, SceneError, visible_line};
 use jointplay_physics::suggest::{brief, nearest};
@@ -37,21 +37,21 @@ embedded! {
 pub const DEFAULT_SCENE: &str = BUILT_IN[0];
 
 /// Maximum number of bodies in a scene.
-pub const MOST_BODIES: usize = 10_000;
+pub const MAX_BODIES: usize = 10_000;
 /// Maximum number of ball joints in a scene.
-pub const MOST_BALL_JOINTS: usize = 10_000;
+pub const MAX_BALL_JOINTS: usize = 10_000;
 /// Maximum number of shapes in a scene, on bodies and fixed.
-pub const MOST_SHAPES: usize = 50_000;
+pub const MAX_SHAPES: usize = 50_000;
 /// Maximum number of force elements of each kind.
-pub const MOST_ELEMENTS: usize = 10_000;
+pub const MAX_ELEMENTS: usize = 10_000;
 /// Maximum number of corners of a plate.
-pub const MOST_CORNERS: usize = 100;
+pub const MAX_CORNERS: usize = 100;
 /// Maximum number of changed parameters.
-pub const MOST_CHANGES: usize = 4096;
+pub const MAX_CHANGES: usize = 4096;
 
 /// Error message for a scene file above the size limit.
 pub fn too_large() -> String {
-    format!("too large for a scene file: more than {} MiB", LARGEST_FILE >> 20)
+    format!("too large for a scene file: more than {} MiB", MAX_FILE_SIZE >> 20)
 }
 
 /// A question with the built-in scene or benchmark nearest to `name`, and the list of both.
@@ -107,9 +107,9 @@ fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
     let mut bytes = Vec::new();
     // One byte more than allowed: a pipe or a device does not report its size.
     std::fs::File::open(path)
-        .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
+        .and_then(|file| file.take(MAX_FILE_SIZE + 1).read_to_end(&mut bytes))
         .map_err(|cause| error(format!("cannot read this file: {cause}")))?;
-    if bytes.len() as u64 > LARGEST_FILE {
+    if bytes.len() as u64 > MAX_FILE_SIZE {
         return Err(SceneError { unreadable: false, ..error(too_large()) });
     }
     String::from_utf8(bytes).map_err(|cause| {

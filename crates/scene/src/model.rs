@@ -99,11 +99,11 @@ pub struct ViewSettings {
     pub time_scale: Option<f64>,
     /// Initial plots, each one of [`PLOT_WORDS`](jointplay_physics::simulate::PLOT_WORDS); if the first is `None`, the window
     /// chooses.
-    pub plots: [Option<&'static str>; MOST_PLOTS],
+    pub plots: [Option<&'static str>; MAX_PLOTS],
 }
 
 /// Maximum number of initial plots.
-pub const MOST_PLOTS: usize = 4;
+pub const MAX_PLOTS: usize = 4;
 
 /// Keys set by a preset.
 pub const SOLVER_KEYS: [&str; 4] = ["solver.method", "solver.step", "solver.tolerance", "solver.steps_per_impact"];

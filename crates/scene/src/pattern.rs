@@ -35,7 +35,7 @@ pub(super) fn read_patterns<'d>(files: &[Section<'d>]) -> Result<Vec<Pattern<'d>
 }
 
 /// Maximum number of values in all copies of a pattern.
-const MOST_VALUES: usize = 1_000_000;
+const MAX_VALUES: usize = 1_000_000;
 
 /// Number of scalars in a TOML value.
 fn values(value: &DeValue<'_>) -> usize {
@@ -71,9 +71,9 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
         let message = format!("nothing to repeat; allowed here: {}", lists.join(", "));
         return Err(section.error("", message));
     }
-    if size.saturating_mul(count as usize) > MOST_VALUES {
+    if size.saturating_mul(count as usize) > MAX_VALUES {
         return Err(count_node
-            .error(format!("{count} copies of {size} values are too many; allowed at most {MOST_VALUES} in all")));
+            .error(format!("{count} copies of {size} values are too many; allowed at most {MAX_VALUES} in all")));
     }
     let (centre, axis, angle) = match section.get("about") {
         None => (Vec3::zeros(), Vec3::z(), 0.0),

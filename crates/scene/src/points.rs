@@ -10,7 +10,7 @@ use jointplay_physics::units::{Dimension, QuantityError, format_quantity, parse_
 /// Shortest interval of a table, ramp or pulse, s.
 pub(super) const SHORTEST_PART: f64 = 1e-6;
 /// Maximum number of points in a table.
-pub(super) const MOST_POINTS: usize = 10_000;
+pub(super) const MAX_POINTS: usize = 10_000;
 /// Allowed mismatch of the ends of a period, as a fraction of the range: measured data do not match exactly.
 const CLOSED: f64 = 1e-9;
 
@@ -18,7 +18,7 @@ type Points = Vec<[f64; 2]>;
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 enum PointsFault {
-    #[error("has {count} points; allowed {least} to {MOST_POINTS}")]
+    #[error("has {count} points; allowed {least} to {MAX_POINTS}")]
     Count { count: usize, least: usize },
     #[error("{name}s must rise, by at least {least} from one point to the next")]
     NotRising { name: &'static str, least: &'static str },
@@ -166,8 +166,8 @@ pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneE
             column.read(number).map_err(error)
         };
         points.push([value(x, of_x)?, value(y, of_y)?]);
-        if points.len() > MOST_POINTS {
-            let message = format!("too many points; allowed at most {MOST_POINTS}");
+        if points.len() > MAX_POINTS {
+            let message = format!("too many points; allowed at most {MAX_POINTS}");
             return Err(file.error(span, "", None, message));
         }
         let risen = graph.check_rise(&points);

@@ -197,7 +197,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         floor: None,
         isometric: None,
         time_scale: None,
-        plots: [None; MOST_PLOTS],
+        plots: [None; MAX_PLOTS],
     };
     if let Some(node) = top.get("view") {
         let section = node.section()?;
@@ -348,8 +348,8 @@ fn read_mechanism<'d>(
     }
     let of_bodies = scene.machine.bodies.iter().map(|body| body.shapes.len());
     let shapes = scene.machine.fixed_shapes.len() + of_bodies.sum::<usize>();
-    if shapes > MOST_SHAPES {
-        let message = format!("too many shapes: {shapes}; allowed at most {MOST_SHAPES}");
+    if shapes > MAX_SHAPES {
+        let message = format!("too many shapes: {shapes}; allowed at most {MAX_SHAPES}");
         return Err(top.document.error(0..0, "shapes", None, message));
     }
     if scene.machine.bodies.is_empty() {

@@ -36,7 +36,7 @@ pub(super) const MAX_MASS: f64 = 1e9;
 const MAX_INERTIA: f64 = 1e12;
 
 /// Largest dimension of a shape, m.
-const LARGEST_SHAPE: f64 = 1000.0;
+const MAX_SHAPE: f64 = 1000.0;
 
 /// Relative slack in the triangle inequality: moments of inertia are often given to three digits.
 const TRIANGLE_SLACK: f64 = 1e-9;
@@ -211,9 +211,9 @@ fn read_mesh(section: &Section<'_>) -> Result<Geometry, SceneError> {
     };
     let bounds = mesh.bounds();
     let largest = bounds.as_flattened().iter().fold(0.0, |most, x| x.abs().max(most));
-    if f64::from(largest) * unit > LARGEST_SHAPE {
+    if f64::from(largest) * unit > MAX_SHAPE {
         let size = format_quantity(f64::from(largest) * unit, "m");
-        let message = format!("with this unit, the mesh reaches {size} far; allowed up to {LARGEST_SHAPE} m");
+        let message = format!("with this unit, the mesh reaches {size} far; allowed up to {MAX_SHAPE} m");
         return Err(section.get("unit").unwrap_or(file).error(message));
     }
     Ok(Geometry::Mesh {

@@ -10,7 +10,7 @@ use super::{Scene, SceneError, Value};
 use jointplay_physics::units::exact_quantity;
 
 /// Maximum number of components in a vector.
-const MOST_PARTS: usize = 4;
+const MAX_PARTS: usize = 4;
 
 impl Scene {
     /// Text of a scene file that reads back to this scene, including its changes.
@@ -66,7 +66,7 @@ impl Scene {
                 }
                 Place::Value(span) if same.len() == 1 => (span, text(number)),
                 // Components are in the order of their keys: x, y, z.
-                Place::Part(span) if same.len() <= MOST_PARTS => {
+                Place::Part(span) if same.len() <= MAX_PARTS => {
                     let parts: Vec<String> = same.into_iter().map(text).collect();
                     (span, format!("[{}]", parts.join(", ")))
                 }

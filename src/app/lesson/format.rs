@@ -9,7 +9,7 @@ use toml::Spanned;
 
 use super::names::{Names, comparisons, parameter};
 use super::text;
-use crate::scene::{LARGEST_FILE, Quantity, Scene, SceneError};
+use crate::scene::{MAX_FILE_SIZE, Quantity, Scene, SceneError};
 use crate::session::link::{Link, SceneText};
 use crate::suggest::nearest;
 use crate::units::Dimension;
@@ -307,10 +307,10 @@ impl Lesson {
         let mut text = String::new();
         // One byte above the limit: a pipe does not report its size.
         std::fs::File::open(path)
-            .and_then(|file| file.take(LARGEST_FILE + 1).read_to_string(&mut text))
+            .and_then(|file| file.take(MAX_FILE_SIZE + 1).read_to_string(&mut text))
             .map_err(|why| wrong(format!("cannot read this lesson: {why}")))?;
-        if text.len() as u64 > LARGEST_FILE {
-            return Err(wrong(format!("larger than {} MiB: not a lesson", LARGEST_FILE >> 20)));
+        if text.len() as u64 > MAX_FILE_SIZE {
+            return Err(wrong(format!("larger than {} MiB: not a lesson", MAX_FILE_SIZE >> 20)));
         }
         Self::parse(path, &text, Some(path))
     }

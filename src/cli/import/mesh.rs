@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::{Component, Path};
 
 use crate::machine::{Mesh, Solid, Vec3};
-use crate::scene::LARGEST_MESH;
+use crate::scene::MAX_MESH_SIZE;
 use crate::scene::mesh::Format;
 use crate::words::words;
 
@@ -47,9 +47,9 @@ pub fn read(folder: &Path, file: &str) -> Result<Mesh, String> {
     let unreadable = |error: std::io::Error| format!("cannot read {file}: {error}");
     let mut bytes = Vec::new();
     let opened = std::fs::File::open(folder.join(file)).map_err(unreadable)?;
-    opened.take(LARGEST_MESH + 1).read_to_end(&mut bytes).map_err(unreadable)?;
-    if bytes.len() as u64 > LARGEST_MESH {
-        return Err(format!("{file} is too large; allowed at most {} MiB", LARGEST_MESH >> 20));
+    opened.take(MAX_MESH_SIZE + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > MAX_MESH_SIZE {
+        return Err(format!("{file} is too large; allowed at most {} MiB", MAX_MESH_SIZE >> 20));
     }
     let alone = |other: &str| Err(format!("{other} is another file").into());
     format.read(&bytes, &alone).map_err(|fault| format!("{file}: {}", fault.why))

@@ -78,7 +78,7 @@ fn the_sequence_has_property_a_in_all_dimensions() {
     // The first digits of the direction numbers then are a regular matrix over GF(2), and so is each of its leading blocks.
     let first_digits = |dimension: usize| -> u128 {
         let mut bits = Vec::new();
-        for k in 0..MOST_DIMENSIONS {
+        for k in 0..MAX_DIMENSIONS {
             let bit = match dimension.checked_sub(1).map(|row| &ROWS[row]) {
                 None => u128::from(k == 0),
                 Some(row) => match row.initial.get(k) {
@@ -94,15 +94,15 @@ fn the_sequence_has_property_a_in_all_dimensions() {
         }
         bits.iter().enumerate().map(|(k, bit)| bit << k).sum()
     };
-    let mut rows: Vec<u128> = (0..MOST_DIMENSIONS).map(first_digits).collect();
+    let mut rows: Vec<u128> = (0..MAX_DIMENSIONS).map(first_digits).collect();
     for (dimension, row) in rows.iter().enumerate() {
         let own = directions(dimension);
         assert!((0..BITS as usize).all(|k| u128::from(own[k] >> (BITS - 1)) == row >> k & 1), "{dimension}");
     }
     // Elimination without pivoting: every pivot is 1.
-    for pivot in 0..MOST_DIMENSIONS {
+    for pivot in 0..MAX_DIMENSIONS {
         assert_eq!(rows[pivot] >> pivot & 1, 1, "dimension {}", pivot + 1);
-        for below in pivot + 1..MOST_DIMENSIONS {
+        for below in pivot + 1..MAX_DIMENSIONS {
             if rows[below] >> pivot & 1 == 1 {
                 rows[below] ^= rows[pivot];
             }
@@ -222,6 +222,6 @@ fn impossible_samples_are_refused() {
     assert_eq!(refused(0, 8), "0 dimensions: 1 to 128 are possible");
     let text = refused(3, 0);
     assert_eq!(text, "0 points: 1 to 16777216 are possible for a sample `sobol` of 3 dimensions");
-    assert!(Sampler::new(Sampling::LatinHypercube, 128, MOST_POINTS, 0).is_err());
+    assert!(Sampler::new(Sampling::LatinHypercube, 128, MAX_POINTS, 0).is_err());
     assert!(Sampler::new(Sampling::Random, 2, 5, 0).unwrap().point(5).is_none());
 }

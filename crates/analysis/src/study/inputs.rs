@@ -11,7 +11,7 @@ use jointplay_scene::{Kind, Parameter, Scene, SceneError, Value, ValueError, Val
 /// Range of an input without one of its own, over its value in the scene.
 const DEFAULT_RANGE: [f64; 2] = [0.5, 1.5];
 /// Largest number of inputs.
-const MOST_INPUTS: usize = 64;
+const MAX_INPUTS: usize = 64;
 /// Process capability of hole and shaft of a fit.
 const CAPABILITY: f64 = 1.0;
 
@@ -77,7 +77,7 @@ pub fn inputs(scene: &Scene, requested: &[Uncertainty]) -> Result<Vec<Input>, St
 
 /// Requires no more inputs than a study varies.
 pub(super) fn check_count(found: usize) -> Result<(), StudyError> {
-    if found > MOST_INPUTS { Err(StudyError::TooMany { found, most: MOST_INPUTS }) } else { Ok(()) }
+    if found > MAX_INPUTS { Err(StudyError::TooMany { found, most: MAX_INPUTS }) } else { Ok(()) }
 }
 
 /// Row and value, SI, of the real parameter `key`.

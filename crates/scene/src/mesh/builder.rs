@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use super::{Mesh, MeshFault};
 
 /// Maximum number of triangles in a file.
-pub const MOST_TRIANGLES: usize = 200_000;
+pub const MAX_TRIANGLES: usize = 200_000;
 /// Maximum number of vertices in a file.
-const MOST_CORNERS: usize = 1_000_000;
+const MAX_CORNERS: usize = 1_000_000;
 /// Largest absolute coordinate, in file units.
 const LARGEST: f64 = 1e9;
 
@@ -25,8 +25,8 @@ impl Builder {
     /// Index of the vertex at `place`, which is added if new.
     pub fn vertex(&mut self, place: [f64; 3]) -> Result<u32, MeshFault> {
         self.asked[0] += 1;
-        if self.asked[0] > MOST_CORNERS {
-            let (what, most) = ("vertices", MOST_CORNERS);
+        if self.asked[0] > MAX_CORNERS {
+            let (what, most) = ("vertices", MAX_CORNERS);
             return Err(MeshFault::TooMany { what, most });
         }
         if !place.iter().all(|x| x.abs() <= LARGEST) {
@@ -45,8 +45,8 @@ impl Builder {
     /// Adds a triangle; one with a repeated vertex is dropped.
     pub fn triangle(&mut self, [a, b, c]: [u32; 3]) -> Result<(), MeshFault> {
         self.asked[1] += 1;
-        if self.asked[1] > MOST_TRIANGLES {
-            let (what, most) = ("triangles", MOST_TRIANGLES);
+        if self.asked[1] > MAX_TRIANGLES {
+            let (what, most) = ("triangles", MAX_TRIANGLES);
             return Err(MeshFault::TooMany { what, most });
         }
         if a != b && b != c && c != a {

@@ -12,7 +12,7 @@ mod stl;
 use std::path::Path;
 
 use builder::Builder;
-pub use builder::MOST_TRIANGLES;
+pub use builder::MAX_TRIANGLES;
 use fault::NoFile;
 pub use fault::{Fault, MeshFault};
 pub use jointplay_physics::machine::Mesh;
@@ -342,14 +342,14 @@ mod tests {
 
     #[test]
     fn more_triangles_than_allowed_are_refused() {
-        let mut bytes = vec![0; 84 + 50 * (MOST_TRIANGLES + 1)];
+        let mut bytes = vec![0; 84 + 50 * (MAX_TRIANGLES + 1)];
         for (i, triangle) in bytes[84..].chunks_exact_mut(50).enumerate() {
             for (k, place) in triangle[12..48].chunks_exact_mut(4).enumerate() {
                 let x = if k % 4 == 0 { i as f32 } else { 0.0 };
                 place.copy_from_slice(&x.to_le_bytes());
             }
         }
-        bytes[80..84].copy_from_slice(&(MOST_TRIANGLES as u32 + 1).to_le_bytes());
+        bytes[80..84].copy_from_slice(&(MAX_TRIANGLES as u32 + 1).to_le_bytes());
         let fault = read(Format::Stl, &bytes).unwrap_err();
         assert!(fault.why.to_string().contains("200000"), "{fault:?}");
     }
