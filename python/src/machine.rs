@@ -39,7 +39,7 @@ fn table(own: &Bound<'_, PyDict>, rows: Option<&FileTable>, place: &str, around:
         let row = rows.and_then(|rows| row(rows, &key, variant));
         // Drives and starts of a joint with two coordinates have a table or a number for each, by its name.
         let turns = turns.or_else(|| turns_word(&key));
-        all.insert(key, converted(&value, row.map(|row| (row, row.takes)), &place, Around { turns, ..around })?);
+        all.insert(key, converted(&value, row.map(|row| (row, row.value_type)), &place, Around { turns, ..around })?);
     }
     Ok(all)
 }

@@ -99,7 +99,7 @@ fn own(table: &FileTable) -> impl Iterator<Item = &FileKey> {
 
 /// Description of a key; only the first sentence for a parameter, whose own page says more.
 fn what(key: &FileKey) -> String {
-    match key.takes {
+    match key.value_type {
         ValueType::Parameter(_) => {
             let (first, _) = key.help.split_once(". ").unwrap_or((key.help, ""));
             first.trim_end_matches('.').to_owned()
@@ -136,7 +136,7 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
         _ => dimension(of).to_owned(),
     };
     let words = |words: &[&str]| format!("`{}`", words.join("`, `"));
-    match key.takes {
+    match key.value_type {
         ValueType::Number(of, range) => number(of) + &bounds(of, range),
         ValueType::Vector(Dimension::None, _) | ValueType::Direction => "direction".to_owned(),
         ValueType::Vector(of, range) => format!("vector, {}{}", number(of), bounds(of, range)),
@@ -151,7 +151,7 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
         ValueType::Joint => "name of a joint".to_owned(),
         ValueType::File => "name of a file".to_owned(),
         ValueType::Word(of) => words(of),
-        ValueType::Words(of, many) => format!("list of at most {} of {}", many.most, words(of)),
+        ValueType::Words(of, limit) => format!("list of at most {} of {}", limit.max, words(of)),
         ValueType::Parameter(name) => find(name).map_or_else(String::new, |parameter| match parameter.kind {
             Kind::Number { dimension: of, .. } => {
                 format!("{}, {}", dimension(of), parameter.range())
@@ -164,10 +164,10 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
             format!("`[[{}.{}]]`", table.name, key.name)
         }
         ValueType::List(of, _) if of.head.starts_with("[[") => called(of),
-        ValueType::List(_, many) => format!("list of {}", many.what),
+        ValueType::List(_, limit) => format!("list of {}", limit.entries),
         ValueType::Vectors(of, _) => format!("list of vectors, {}", number(of)),
-        ValueType::Pairs([first, second], many) => {
-            format!("list of pairs, {} and {}, at most {}", dimension(first), number(second), many.most)
+        ValueType::Pairs([first, second], limit) => {
+            format!("list of pairs, {} and {}, at most {}", dimension(first), number(second), limit.max)
         }
         ValueType::Files(of, _) => format!("list of names of files, or {}", called(of)),
         ValueType::Values => "table of quantities".to_owned(),
@@ -193,22 +193,22 @@ fn bounds(dimension: Dimension, (least, most): (f64, f64)) -> String {
 
 /// Default of an omitted key, in words.
 pub fn absent(key: &FileKey) -> String {
-    match (key.absent, key.takes) {
+    match (key.default, key.value_type) {
         (_, ValueType::Parameter(name)) => {
             let show = |parameter: &crate::scene::Parameter| parameter.show(&parameter.default);
             find(name).map_or_else(String::new, show)
         }
-        (DefaultRule::Fault, _) => "required".to_owned(),
-        (DefaultRule::Or(other), _) => format!("required, or `{other}`"),
-        (DefaultRule::Is(_), ValueType::Table(_)) => "none".to_owned(),
-        (DefaultRule::Is(value), _) if value.is_infinite() => "no limit".to_owned(),
-        (DefaultRule::Is(0.0), _) => "0".to_owned(),
-        (DefaultRule::Is(value), _) => {
+        (DefaultRule::Required, _) => "required".to_owned(),
+        (DefaultRule::RequiredUnless(other), _) => format!("required, or `{other}`"),
+        (DefaultRule::Number(_), ValueType::Table(_)) => "none".to_owned(),
+        (DefaultRule::Number(value), _) if value.is_infinite() => "no limit".to_owned(),
+        (DefaultRule::Number(0.0), _) => "0".to_owned(),
+        (DefaultRule::Number(value), _) => {
             let unit = key.dimension(false).map_or("", si_unit);
             format_quantity(value, unit)
         }
-        (DefaultRule::Means(words), ValueType::Word(_)) => format!("`{words}`"),
-        (DefaultRule::Means(words), _) => words.to_owned(),
+        (DefaultRule::Description(words), ValueType::Word(_)) => format!("`{words}`"),
+        (DefaultRule::Description(words), _) => words.to_owned(),
     }
 }
 

@@ -95,10 +95,10 @@ fn of_variant(table: &FileTable, word: &'static str) -> Json {
 
 /// Requires the mandatory ones among `keys`.
 fn needs(keys: &[&FileKey]) -> Json {
-    let needed = keys.iter().filter(|key| matches!(key.absent, DefaultRule::Fault));
+    let needed = keys.iter().filter(|key| matches!(key.default, DefaultRule::Required));
     let needed: Vec<&str> = needed.map(|key| key.name).collect();
-    let either = keys.iter().filter_map(|key| match key.absent {
-        DefaultRule::Or(other) => Some(json!({
+    let either = keys.iter().filter_map(|key| match key.default {
+        DefaultRule::RequiredUnless(other) => Some(json!({
             "anyOf": [{ "required": [key.name] }, { "required": [other] }]
         })),
         _ => None,
@@ -112,7 +112,7 @@ fn needs(keys: &[&FileKey]) -> Json {
 
 fn of_key(key: &FileKey, table: &FileTable) -> Json {
     let mut description = format!("{}\n\nValue: {}", capital(key.help), value(key, table));
-    let dimension = match key.takes {
+    let dimension = match key.value_type {
         ValueType::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
             Some(Kind::Number { dimension, .. }) => Some(dimension),
             _ => None,
@@ -126,8 +126,8 @@ fn of_key(key: &FileKey, table: &FileTable) -> Json {
     if !units.is_empty() {
         description += &format!("; units {}", units.join(", "));
     }
-    description += &match key.absent {
-        DefaultRule::Fault | DefaultRule::Or(_) => format!(".\n{}.", capital(&absent(key))),
+    description += &match key.default {
+        DefaultRule::Required | DefaultRule::RequiredUnless(_) => format!(".\n{}.", capital(&absent(key))),
         _ => format!(".\nDefault: {}.", absent(key)),
     };
     if !key.frame.is_empty() {
@@ -135,10 +135,10 @@ fn of_key(key: &FileKey, table: &FileTable) -> Json {
     }
     let mut schema = json!({ "description": description });
     merge(&mut schema, of_value(key));
-    if let Some(many) = key.many() {
-        schema["maxItems"] = many.most.into();
+    if let Some(limit) = key.list_limit() {
+        schema["maxItems"] = limit.max.into();
     }
-    if let Some(example) = example(key.like) {
+    if let Some(example) = example(key.example) {
         schema["examples"] = json!([example]);
     }
     schema
@@ -147,7 +147,7 @@ fn of_key(key: &FileKey, table: &FileTable) -> Json {
 fn of_value(key: &FileKey) -> Json {
     let text = || json!({ "type": "string" });
     let list = |items: Json| json!({ "type": "array", "items": items });
-    match key.takes {
+    match key.value_type {
         ValueType::Number(of, range) => number(of, range),
         ValueType::Vector(of, range) => numbers(3, number(of, range)),
         ValueType::Direction => numbers(3, number(Dimension::None, key.range())),

@@ -43,9 +43,9 @@ fn value(key: &'static FileKey, hinge: bool) -> BoxedStrategy<String> {
     let dimension = key.dimension(hinge).unwrap_or(Dimension::None);
     let like = match key.on_hinge {
         Some((_, like)) if hinge => like,
-        _ => key.like,
+        _ => key.example,
     };
-    match key.takes {
+    match key.value_type {
         ValueType::Number(_, range) => within(range).prop_map(move |x| quoted(x, dimension)).boxed(),
         ValueType::Vector(_, range) => proptest::collection::vec(within(range), 3)
             .prop_map(move |v| {
@@ -81,16 +81,16 @@ fn filled(
     let mut all: Vec<BoxedStrategy<Option<String>>> = Vec::new();
     let by = table.variants.map(|_| table.words());
     for key in table.of(word).filter(|key| !skip.contains(&key.name)) {
-        let values = match (key.takes, word) {
+        let values = match (key.value_type, word) {
             (ValueType::Word(words), Some(word)) if by == Some(words) => Just(format!("\"{word}\"")).boxed(),
             _ => value(key, hinge),
         };
         let written = values.prop_map(|value| format!("{} = {value}", key.name));
-        all.push(match key.absent {
-            DefaultRule::Fault => written.prop_map(Some).boxed(),
+        all.push(match key.default {
+            DefaultRule::Required => written.prop_map(Some).boxed(),
             // What goes instead of it is a file.
-            DefaultRule::Or(_) if matches!(key.takes, ValueType::File) => Just(None).boxed(),
-            DefaultRule::Or(_) => written.prop_map(Some).boxed(),
+            DefaultRule::RequiredUnless(_) if matches!(key.value_type, ValueType::File) => Just(None).boxed(),
+            DefaultRule::RequiredUnless(_) => written.prop_map(Some).boxed(),
             _ => proptest::option::weighted(0.7, written).boxed(),
         });
     }

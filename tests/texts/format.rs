@@ -144,7 +144,7 @@ impl Found {
             let row = rows.key(name, word).unwrap_or_else(|| panic!("{name}"));
             let path = [&path[..], &[Step::Key(name.to_owned())]].concat();
             self.keys.push((path.clone(), row, word));
-            match row.takes {
+            match row.value_type {
                 ValueType::Table(rows) => self.walk(inner, rows, path),
                 ValueType::List(rows, _) | ValueType::Files(rows, _) => {
                     let count = inner.as_array().map(|list| list.len());
@@ -244,7 +244,7 @@ fn rows_say_what_they_are() {
             let place = format!("{} of {}", row.name, table.name);
             assert!(!row.help.is_empty() && !row.help.contains('|'), "{place}");
             assert!(row.of.iter().all(|word| table.words().contains(word)), "{place}");
-            for like in [Some(row.like), row.on_hinge.map(|(_, like)| like)] {
+            for like in [Some(row.example), row.on_hinge.map(|(_, like)| like)] {
                 let text = format!("like = {}", like.unwrap_or("0"));
                 let parsed = like == Some("") || text.parse::<DocumentMut>().is_ok();
                 assert!(parsed, "{place}: {text}");

@@ -4,7 +4,7 @@ use super::assets::AssetResolver;
 use super::error::{nearest_parameter, no_ball_joint};
 use super::field::Access;
 use super::numbers::row_of_number;
-use super::read::{file_only, is_of_text};
+use super::read::{is_fixed_in_file, replaces_text};
 use super::table::{contact_part, contact_rows, find, joint_part};
 use super::*;
 use jointplay_physics::suggest::{did_you_mean, nearest, nearest_name};
@@ -40,7 +40,7 @@ impl Scene {
     /// Row of a number of the file, by key.
     fn number(&self, key: &str) -> Option<&'static Parameter> {
         let number = self.source.numbers.get(key)?;
-        if file_only(key) {
+        if is_fixed_in_file(key) {
             return None;
         }
         let own = self.source.own.iter().copied().find(|row| row.key == key);
@@ -66,7 +66,7 @@ impl Scene {
     fn explain_missing(&self, key: &str) -> String {
         let numbers = self.source.numbers.keys().map(String::as_str);
         let Some((name, part)) = joint_part(key) else {
-            if file_only(key) {
+            if is_fixed_in_file(key) {
                 return "only in the scene file: it cannot be changed from outside it".to_owned();
             }
             let here = self.parameters();
@@ -129,14 +129,15 @@ impl Scene {
         self.resolve(key).map(|resolved| resolved.parameter)
     }
 
-    /// Changes a parameter in place and records it in `changes`, or reads the scene again from its source with all changes so far.
+    /// Changes a parameter in place and records it in `changes`, or reads the scene again from its source with all changes so
+    /// far.
     ///
     /// # Errors
     /// Unknown key, wrong unit, out of range, or an inconsistent scene; `self` is then unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<&'static Parameter, SceneError> {
         let mut next = self.clone();
         let parameter = next.change(key, value)?;
-        if is_of_text(key) {
+        if replaces_text(key) {
             next = next.rebuilt()?;
         }
         next.apply_preset();
@@ -198,7 +199,7 @@ impl Scene {
                 }
             }
             // Applied when the text is read.
-            _ if is_of_text(key) => {}
+            _ if replaces_text(key) => {}
             _ => self.write(parameter, &value),
         }
         self.changes.retain(|(changed, _)| changed != key);

@@ -82,15 +82,15 @@ pub(super) enum AssetFault {
 }
 
 /// Why a mesh cannot be read.
-pub(super) enum NoMesh {
+pub(super) enum MeshError {
     /// The file is unavailable or its format unknown.
-    Nowhere(AssetFault),
+    Unavailable(AssetFault),
     /// The file is invalid; `text` is its content if it is text.
-    Within { text: Option<Arc<str>>, fault: Fault },
+    Invalid { text: Option<Arc<str>>, fault: Fault },
 }
 
 #[derive(Clone, Copy)]
-enum Use {
+enum FileKind {
     Text,
     Mesh,
 }
@@ -104,10 +104,10 @@ pub(super) struct AssetResolver<'d> {
     known: Option<&'d Texts>,
     /// Files opened together with the scene, by name without folder.
     given: Option<&'d BTreeMap<String, Vec<u8>>>,
-    asked: RefCell<Texts>,
-    /// Bytes read so far for each [`Use`].
-    held: [Cell<u64>; 2],
-    /// Meshes parsed from the files in `asked`.
+    requested: RefCell<Texts>,
+    /// Bytes read so far for each [`FileKind`].
+    bytes_read: [Cell<u64>; 2],
+    /// Meshes parsed from the files in `requested`.
     meshes: RefCell<BTreeMap<String, Arc<Mesh>>>,
 }
 
@@ -131,7 +131,7 @@ impl<'d> AssetResolver<'d> {
     /// # Errors
     /// The file is unavailable or not text.
     pub fn text(&self, name: &str) -> Result<Arc<str>, AssetFault> {
-        let text = self.content(name, Use::Text)?;
+        let text = self.content(name, FileKind::Text)?;
         if text.starts_with(ENCODED) {
             return Err(AssetFault::NotText);
         }
@@ -142,20 +142,20 @@ impl<'d> AssetResolver<'d> {
     ///
     /// # Errors
     /// The file is unavailable or invalid.
-    pub fn mesh(&self, name: &str) -> Result<Arc<Mesh>, NoMesh> {
+    pub fn mesh(&self, name: &str) -> Result<Arc<Mesh>, MeshError> {
         if let Some(mesh) = self.meshes.borrow().get(name) {
             return Ok(mesh.clone());
         }
-        let format = Format::of(name).ok_or(NoMesh::Nowhere(AssetFault::NotMesh))?;
-        let text = self.content(name, Use::Mesh).map_err(NoMesh::Nowhere)?;
+        let format = Format::of(name).ok_or(MeshError::Unavailable(AssetFault::NotMesh))?;
+        let text = self.content(name, FileKind::Mesh).map_err(MeshError::Unavailable)?;
         // References are relative to the folder of the mesh file.
         let other = |other: &str| {
             let other = Path::new(name).with_file_name(other);
-            let text = self.content(&other.to_string_lossy(), Use::Mesh)?;
+            let text = self.content(&other.to_string_lossy(), FileKind::Mesh)?;
             Ok(file_bytes(&text).into_owned())
         };
         let mesh = format.read(&file_bytes(&text), &other);
-        let mesh = mesh.map_err(|fault| NoMesh::Within {
+        let mesh = mesh.map_err(|fault| MeshError::Invalid {
             text: Some(text.clone()).filter(|text| !text.starts_with(ENCODED)),
             fault,
         })?;
@@ -166,58 +166,58 @@ impl<'d> AssetResolver<'d> {
     }
 
     /// Encoded content of the file `name`.
-    fn content(&self, name: &str, what: Use) -> Result<Arc<str>, AssetFault> {
-        let found = self.asked.borrow().get(name).cloned();
+    fn content(&self, name: &str, what: FileKind) -> Result<Arc<str>, AssetFault> {
+        let found = self.requested.borrow().get(name).cloned();
         let found = found.or_else(|| self.known?.get(name).cloned());
         let text = match found {
             Some(text) => text,
             None => self.read(name, what)?,
         };
-        let mut asked = self.asked.borrow_mut();
-        asked.insert(name.to_owned(), text.clone());
+        let mut requested = self.requested.borrow_mut();
+        requested.insert(name.to_owned(), text.clone());
         Ok(text)
     }
 
     /// Contents of all files requested.
     pub fn into_texts(self) -> Texts {
-        self.asked.into_inner()
+        self.requested.into_inner()
     }
 
-    fn read(&self, name: &str, what: Use) -> Result<Arc<str>, AssetFault> {
-        let plain = |part: Component<'_>| matches!(part, Component::Normal(_));
-        if name.is_empty() || !Path::new(name).components().all(plain) {
+    fn read(&self, name: &str, what: FileKind) -> Result<Arc<str>, AssetFault> {
+        let is_plain = |part: Component<'_>| matches!(part, Component::Normal(_));
+        if name.is_empty() || !Path::new(name).components().all(is_plain) {
             return Err(AssetFault::NotBeside);
         }
         let (limit, files) = match what {
-            Use::Text => (MAX_FILE_SIZE, "files"),
-            Use::Mesh => (MAX_MESH_SIZE, "meshes"),
+            FileKind::Text => (MAX_FILE_SIZE, "files"),
+            FileKind::Mesh => (MAX_MESH_SIZE, "meshes"),
         };
-        let held = &self.held[what as usize];
-        let room = limit.saturating_sub(held.get());
+        let bytes_read = &self.bytes_read[what as usize];
+        let remaining = limit.saturating_sub(bytes_read.get());
         // One byte more than allowed: a pipe or a device does not report its size.
-        let bytes = self.bytes(Path::new(name), room + 1)?;
-        if bytes.len() as u64 > room {
+        let bytes = self.bytes(Path::new(name), remaining + 1)?;
+        if bytes.len() as u64 > remaining {
             return Err(AssetFault::TooLarge { limit, files });
         }
-        held.set(held.get() + bytes.len() as u64);
+        bytes_read.set(bytes_read.get() + bytes.len() as u64);
         Ok(encode(bytes))
     }
 
-    /// The first `most` bytes of the file `name`.
-    fn bytes(&self, name: &Path, most: u64) -> Result<Vec<u8>, AssetFault> {
+    /// The first `limit` bytes of the file `name`.
+    fn bytes(&self, name: &Path, limit: u64) -> Result<Vec<u8>, AssetFault> {
         let path = self.folder.map(|folder| folder.join(name));
         // Files dropped on a web page come without a folder.
         let given = name.file_name().and_then(|own| self.given?.get(own.to_str()?));
         match (given, path) {
             (Some(bytes), path) if !path.as_ref().is_some_and(|path| path.exists()) => {
-                let most = bytes.len().min(usize::try_from(most).unwrap_or(usize::MAX));
-                Ok(bytes[..most].to_vec())
+                let limit = bytes.len().min(usize::try_from(limit).unwrap_or(usize::MAX));
+                Ok(bytes[..limit].to_vec())
             }
             (_, Some(path)) if path.is_dir() => Err(AssetFault::Directory),
             (_, Some(path)) => {
                 let mut bytes = Vec::new();
                 let file = std::fs::File::open(path)?;
-                file.take(most).read_to_end(&mut bytes)?;
+                file.take(limit).read_to_end(&mut bytes)?;
                 Ok(bytes)
             }
             (_, None) => Err(AssetFault::NoFolder),
@@ -230,7 +230,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_kept_gives_back_the_bytes() {
+    fn encoded_files_decode_to_the_same_bytes() {
         for bytes in [&b"v 1 2 3"[..], b"base64:AAAA", b"base64:", b"", b"\xff\x00solid"] {
             let text = encode(bytes.to_vec());
             assert_eq!(&*file_bytes(&text), bytes);

@@ -1,8 +1,8 @@
 //! Motions in closed form: functions of time by name, which drives follow, and the path of the output body.
 
 use super::document::{Node, Section};
-use super::formula::within;
-use super::key::{FileKey, FileTable, ValueType, key, many};
+use super::formula::error_within;
+use super::key::{FileKey, FileTable, ValueType, at_most, key};
 use super::*;
 use jointplay_physics::expression::Program;
 use jointplay_physics::machine::{ClosedForm, Function, Path};
@@ -35,7 +35,7 @@ static FUNCTION: FileTable = FileTable::new(
             "\"rod 1 is too short\"",
             "if its value must be above 0: what is wrong where it is not",
         )
-        .absent("any value is allowed")
+        .default_text("any value is allowed")
         .fixed(),
     ],
 );
@@ -62,7 +62,7 @@ pub(super) static CLOSED_FORM: LazyLock<FileTable> = LazyLock::new(|| {
         .fixed(),
         key(
             "functions",
-            ValueType::List(&FUNCTION, many(MAX_FUNCTIONS, "functions")),
+            ValueType::List(&FUNCTION, at_most(MAX_FUNCTIONS, "functions")),
             "[{ name = \"lift\", formula = \"20 mm * sin(2*pi*t/2 s)\" }]",
             "the functions, which drives follow by `law = \"function\"`",
         ),
@@ -71,16 +71,16 @@ pub(super) static CLOSED_FORM: LazyLock<FileTable> = LazyLock::new(|| {
         let help =
             format!("{axis} of the output body's frame where no joint has play, an expression of `t` and functions");
         key(name, ValueType::Text, "\"lift\"", help.leak())
-            .absent("not known; then a motion without play runs alongside")
+            .default_text("not known; then a motion without play runs alongside")
             .fixed()
     };
     let turns = key(
         "turns",
-        ValueType::List(&TURN, many(MAX_TURNS, "turns")),
+        ValueType::List(&TURN, at_most(MAX_TURNS, "turns")),
         "[{ axis = [0, 0, 1], angle = \"beta\" }]",
         "how the output body is turned there",
     )
-    .absent("not turned");
+    .default_text("not turned");
     let keys = own.into_iter().chain([place("x", "x"), place("y", "y"), place("z", "z"), turns]).collect::<Vec<_>>();
     FileTable::new(
         "closed_form",
@@ -101,13 +101,13 @@ pub(super) fn read_closed_form(section: &Section<'_>) -> Result<ClosedForm, Scen
         let name_node = entry.require("name")?;
         let name = name_node.identifier("a function")?;
         let reading = section.document.reading;
-        if reading.names(name) {
+        if reading.is_defined(name) {
             return Err(name_node.error("there is already a parameter or a function of this name; names must differ"));
         }
         let formula = entry.require("formula")?;
         let (program, value) = reading
             .function(formula.text()?)
-            .map_err(|error| within(&formula, formula.text().unwrap_or(""), error.at(), &error.to_string()))?;
+            .map_err(|error| error_within(&formula, formula.text().unwrap_or(""), error.at(), &error.to_string()))?;
         reading.add_function(name, value);
         let positive = entry.get("positive").map(|node| node.text()).transpose()?;
         let positive = positive.map(str::to_owned);
@@ -135,9 +135,12 @@ fn read_path(section: &Section<'_>) -> Result<Option<Path>, SceneError> {
 /// Reads an expression of time and functions with this dimension, or a pure number in SI units.
 fn read_value(node: &Node<'_>, dimension: Dimension) -> Result<Program, SceneError> {
     let text = node.text()?;
-    let (program, value) =
-        node.document.reading.function(text).map_err(|error| within(node, text, error.at(), &error.to_string()))?;
-    fits(value, dimension).map_err(|error| node.error(error.to_string()))?;
+    let (program, value) = node
+        .document
+        .reading
+        .function(text)
+        .map_err(|error| error_within(node, text, error.at(), &error.to_string()))?;
+    check_dimension(value, dimension).map_err(|error| node.error(error.to_string()))?;
     Ok(program)
 }
 
@@ -145,7 +148,7 @@ fn read_value(node: &Node<'_>, dimension: Dimension) -> Result<Program, SceneErr
 ///
 /// # Errors
 /// No such function, or one of another dimension.
-pub(super) fn read_follower(section: &Section<'_>, dimension: Dimension) -> Result<usize, SceneError> {
+pub(super) fn read_function_index(section: &Section<'_>, dimension: Dimension) -> Result<usize, SceneError> {
     let node = section.require("function")?;
     let name = node.text()?;
     let known = section.document.reading.functions();
@@ -157,11 +160,11 @@ pub(super) fn read_follower(section: &Section<'_>, dimension: Dimension) -> Resu
         };
         return Err(node.error(format!("no such function{}; {allowed}", nearest(name, names))));
     };
-    fits(known[found].1, dimension).map_err(|error| node.error(error.to_string()))?;
+    check_dimension(known[found].1, dimension).map_err(|error| node.error(error.to_string()))?;
     Ok(found)
 }
 
 /// Whether a value of functions is a pure number, or has this dimension.
-fn fits(value: Quantity, dimension: Dimension) -> Result<(), DimensionError> {
+fn check_dimension(value: Quantity, dimension: Dimension) -> Result<(), DimensionError> {
     if value.is_pure() { Ok(()) } else { value.has(dimension, false) }
 }

@@ -124,7 +124,7 @@ impl<'d> Section<'d> {
         let mut section = Self { document, path, table, span, rows, word: None };
         // Words come first: one may select the variant, and thus the allowed keys.
         for key in rows.keys {
-            if let (ValueType::Word(_), Some(node)) = (key.takes, section.get(key.name)) {
+            if let (ValueType::Word(_), Some(node)) = (key.value_type, section.get(key.name)) {
                 let word = node.choice()?;
                 if matches!(rows.variants, Some(Variants::Word(by, _)) if by == key.name) {
                     section.word = Some(word);
@@ -141,7 +141,7 @@ impl<'d> Section<'d> {
             .filter(|(key, _)| !known.contains(&key.get_ref().as_ref()))
             .min_by_key(|(key, _)| key.span().start);
         if let Some((key, _)) = unknown {
-            return Err(section.foreign(key, &known));
+            return Err(section.unknown_key(key, &known));
         }
         if let (Some(Variants::Word(by, _)), None) = (rows.variants, section.word) {
             section.require(by)?;
@@ -150,7 +150,7 @@ impl<'d> Section<'d> {
     }
 
     /// The error for a key that is not among the `known` ones.
-    fn foreign(&self, key: &Spanned<Cow<'_, str>>, known: &[&str]) -> SceneError {
+    fn unknown_key(&self, key: &Spanned<Cow<'_, str>>, known: &[&str]) -> SceneError {
         let name = key.get_ref();
         if let (Some(Variants::Word(_, one)), Some(word)) = (self.rows.variants, self.word)
             && let (false, Some(node)) = (one.is_empty(), self.find(name))
@@ -198,15 +198,15 @@ impl<'d> Section<'d> {
     pub fn require(&self, name: &str) -> Result<Node<'d>, SceneError> {
         self.get(name).ok_or_else(|| {
             let row = self.rows.key(name, self.word);
-            let like = row.map_or("", |row| row.like(self.document.on_hinge));
-            self.error(name, format!("missing; write for example `{name} = {like}`"))
+            let example = row.map_or("", |row| row.example(self.document.on_hinge));
+            self.error(name, format!("missing; write for example `{name} = {example}`"))
         })
     }
 
     /// Default of a key, if it is a number.
     fn default(&self, name: &str) -> Option<f64> {
-        match self.rows.key(name, self.word)?.absent {
-            DefaultRule::Is(number) => Some(number),
+        match self.rows.key(name, self.word)?.default {
+            DefaultRule::Number(number) => Some(number),
             _ => None,
         }
     }
@@ -228,7 +228,7 @@ impl<'d> Section<'d> {
     }
 
     /// Byte offset of this table in the text.
-    pub fn place(&self) -> usize {
+    pub fn offset(&self) -> usize {
         self.span.start
     }
 
@@ -264,13 +264,13 @@ impl<'d> Node<'d> {
     }
 
     /// The same value under another key.
-    pub fn retitled(&self, key: String) -> Self {
+    pub fn with_key(&self, key: String) -> Self {
         let written = self.written.is_some().then_some(self.value);
         Self::new(self.document, key, self.row, written).unwrap_or_else(|| self.clone())
     }
 
     /// Byte offset of this value in the text.
-    pub fn place(&self) -> usize {
+    pub fn offset(&self) -> usize {
         self.value.span().start
     }
 
@@ -285,8 +285,8 @@ impl<'d> Node<'d> {
     }
 
     /// The error for a second `what` with the `name` of `first`.
-    pub fn repeats(&self, first: &Self, what: &str, name: &str) -> SceneError {
-        let (line, _) = place_of(first.document.text, first.place());
+    pub fn duplicate_error(&self, first: &Self, what: &str, name: &str) -> SceneError {
+        let (line, _) = place_of(first.document.text, first.offset());
         let file = first.document.file.filter(|_| first.document.file != self.document.file);
         let of_file = file.map_or_else(String::new, |file| format!(" of {}", visible_line(file)));
         self.error(format!(
@@ -294,9 +294,9 @@ impl<'d> Node<'d> {
         ))
     }
 
-    fn wrong_type(&self, wanted: &str) -> SceneError {
+    fn wrong_type(&self, expected: &str) -> SceneError {
         self.error(format!(
-            "must be {wanted}, not {} {}",
+            "must be {expected}, not {} {}",
             article(self.value.get_ref()),
             self.value.get_ref().type_str()
         ))
@@ -324,13 +324,13 @@ impl<'d> Node<'d> {
 
     /// A finite quantity, SI: a number with its unit, or an expression. It is recorded as a number of the scene under this key.
     pub fn quantity(&self, dimension: Dimension) -> Result<f64, SceneError> {
-        self.recorded(dimension, UNCHECKED)
+        self.quantity_in(dimension, UNCHECKED)
     }
 
     /// The same, recorded with the range that its reader allows.
-    fn recorded(&self, dimension: Dimension, range: (f64, f64)) -> Result<f64, SceneError> {
+    fn quantity_in(&self, dimension: Dimension, range: (f64, f64)) -> Result<f64, SceneError> {
         let place = self.place_of(Place::Value);
-        self.evaluated(self.scalar()?, dimension, range, place)
+        self.evaluate_text(self.scalar()?, dimension, range, place)
     }
 
     /// Location of this value in the scene's text.
@@ -338,12 +338,12 @@ impl<'d> Node<'d> {
         match &self.written {
             _ if self.document.include.is_some() => Place::Included,
             Some(written) => here(written.clone()),
-            None => Place::DefaultRule,
+            None => Place::ChangedDefault,
         }
     }
 
-    /// Evaluates and records the quantity `text` at `place`, like [`Self::recorded`].
-    fn evaluated(
+    /// Evaluates and records the quantity `text` at `place`, like [`Self::quantity_in`].
+    fn evaluate_text(
         &self,
         text: &str,
         dimension: Dimension,
@@ -354,7 +354,7 @@ impl<'d> Node<'d> {
         let value =
             reading.evaluate(text, dimension, self.document.instance).map_err(|error| self.error(error.to_string()))?;
         self.limit(value, dimension)?;
-        let any = if is_of_motion(dimension) { ANY } else { UNCHECKED };
+        let any = if enters_squared(dimension) { ANY } else { UNCHECKED };
         let range = (least.max(any.0), most.min(any.1));
         reading.record(&self.key, FileNumber::new(value, dimension, range, place, text));
         Ok(value)
@@ -362,7 +362,7 @@ impl<'d> Node<'d> {
 
     /// Rejects values beyond any mechanism, before their squares overflow in the equations of motion.
     fn limit(&self, value: f64, dimension: Dimension) -> Result<(), SceneError> {
-        if is_of_motion(dimension) && value.abs() > MAX_SI {
+        if enters_squared(dimension) && value.abs() > MAX_SI {
             let limit = format_quantity(MAX_SI, si_unit(dimension));
             return Err(self.error(format!("out of range; allowed -{limit} to {limit}")));
         }
@@ -376,7 +376,7 @@ impl<'d> Node<'d> {
 
     /// A quantity in a closed range, SI.
     pub fn within(&self, dimension: Dimension, (least, most): (f64, f64)) -> Result<f64, SceneError> {
-        let value = self.recorded(dimension, (least, most))?;
+        let value = self.quantity_in(dimension, (least, most))?;
         if (least..=most).contains(&value) {
             return Ok(value);
         }
@@ -395,8 +395,8 @@ impl<'d> Node<'d> {
     }
 
     /// Example value from its row.
-    pub fn like(&self) -> &'static str {
-        self.row.like(self.document.on_hinge)
+    pub fn example(&self) -> &'static str {
+        self.row.example(self.document.on_hinge)
     }
 
     /// Dimension of its numbers, from its row.
@@ -406,8 +406,8 @@ impl<'d> Node<'d> {
     }
 
     /// A whole number in the range of its row: a number or an expression.
-    pub fn whole(&self) -> Result<u32, SceneError> {
-        let (least, most) = match self.row.takes {
+    pub fn whole_number(&self) -> Result<u32, SceneError> {
+        let (least, most) = match self.row.value_type {
             ValueType::Whole(least, most) => (least, most),
             _ => (0, u32::MAX),
         };
@@ -422,7 +422,7 @@ impl<'d> Node<'d> {
 
     /// One of the words of its row.
     pub fn choice(&self) -> Result<&'static str, SceneError> {
-        let words = match self.row.takes {
+        let words = match self.row.value_type {
             ValueType::Word(words) | ValueType::Words(words, _) => words,
             _ => &[],
         };
@@ -500,16 +500,16 @@ impl<'d> Node<'d> {
     /// The entries of a list, like [`Self::elements`], limited in number by its row.
     pub fn entries(&self) -> Result<Vec<Node<'d>>, SceneError> {
         let elements = self.elements()?;
-        let Some(ListLimit { most, what }) = self.row.many() else {
+        let Some(ListLimit { max, entries }) = self.row.list_limit() else {
             return Ok(elements);
         };
-        match elements.get(most) {
+        match elements.get(max) {
             None => Ok(elements),
             Some(first) => Err(self.document.error(
                 first.value.span(),
                 &first.key,
                 None,
-                format!("too many: {} {what}; allowed at most {most}", elements.len()),
+                format!("too many: {} {entries}; allowed at most {max}", elements.len()),
             )),
         }
     }
@@ -550,7 +550,7 @@ impl<'d> Node<'d> {
                 let part = part.expect("there is a value");
                 let place = self.place_of(Place::Part);
                 let text = if part.changed { part.scalar()?.to_owned() } else { format!("{number} {unit}") };
-                *value = part.evaluated(&text, dimension, self.row.range(), place)?;
+                *value = part.evaluate_text(&text, dimension, self.row.range(), place)?;
             }
             return Ok(values);
         }
@@ -560,7 +560,7 @@ impl<'d> Node<'d> {
         }
         for (index, (value, element)) in values.iter_mut().zip(&elements).enumerate() {
             let part = Node::new(self.document, key(index), self.row, Some(element.value));
-            *value = part.expect("there is a value").recorded(dimension, self.row.range())?;
+            *value = part.expect("there is a value").quantity_in(dimension, self.row.range())?;
         }
         Ok(values)
     }
@@ -610,7 +610,7 @@ impl<'d> Node<'d> {
 
     /// A parameter's value, read and checked against its row of the table.
     pub fn parameter(&self) -> Result<super::Value, SceneError> {
-        let parameter = match self.row.takes {
+        let parameter = match self.row.value_type {
             ValueType::Parameter(key) => find(key),
             _ => None,
         };
@@ -653,20 +653,20 @@ pub(super) fn lists<'d>(files: &[Section<'d>], name: &str, more: Vec<Node<'d>>) 
         }
     }
     nodes.extend(more);
-    let Some(ListLimit { most, what }) = nodes.first().and_then(|node| node.row.many()) else {
+    let Some(ListLimit { max, entries }) = nodes.first().and_then(|node| node.row.list_limit()) else {
         return Ok(nodes);
     };
-    match nodes.get(most) {
+    match nodes.get(max) {
         None => Ok(nodes),
         Some(first) => Err(first.error(format!(
-            "too many: {} {what} with those of patterns and included files; allowed at most {most}",
+            "too many: {} {entries} with those of patterns and included files; allowed at most {max}",
             nodes.len()
         ))),
     }
 }
 
 /// Whether values of this dimension enter the equations of motion squared, and so are limited by [`MAX_SI`].
-fn is_of_motion(dimension: Dimension) -> bool {
+fn enters_squared(dimension: Dimension) -> bool {
     !matches!(
         dimension,
         Dimension::Mass

@@ -1,10 +1,10 @@
 //! Drive laws: one row per law, and the reader of `drive` and of the factor of a load, which follows the same laws. The motion is
 //! computed in `mechanism/drives`.
 
-use super::closed_form::read_follower;
+use super::closed_form::read_function_index;
 use super::document::{Node, Section};
 use super::formula::read_formula;
-use super::key::{FileKey, FileTable, MAX_SI, ValueType, Variants, key, many, number, positive};
+use super::key::{FileKey, FileTable, MAX_SI, ValueType, Variants, at_most, key, number, positive};
 use super::points::{Graph, MAX_POINTS, SHORTEST_PART, read_file, read_points};
 use super::*;
 use std::sync::LazyLock;
@@ -16,22 +16,22 @@ const FUNCTION: &str = "function";
 /// Maximum number of terms in a sum of harmonics.
 const MAX_TERMS: usize = 100;
 
-const fn place(name: &'static str, help: &'static str) -> FileKey {
+const fn position_key(name: &'static str, help: &'static str) -> FileKey {
     key(name, number(Dimension::Length), "\"10 mm\"", help).on_hinge(Dimension::Angle, "\"10 deg\"")
 }
 
-const MEAN: FileKey = place("mean", "mean").zero();
+const MEAN: FileKey = position_key("mean", "mean").default_zero();
 
 /// Amplitude, frequency and phase of a harmonic.
 const TERM: [FileKey; 3] = [
-    place("amplitude", "amplitude"),
+    position_key("amplitude", "amplitude"),
     key("frequency", positive(Dimension::Frequency, MAX_DRIVE_FREQUENCY), "\"1 Hz\"", "frequency"),
-    key("phase", number(Dimension::Angle), "\"90 deg\"", "phase at t = 0").zero(),
+    key("phase", number(Dimension::Angle), "\"90 deg\"", "phase at t = 0").default_zero(),
 ];
 
 static TERMS: FileTable = FileTable::new("term", "a term", "a harmonic of a sum", &TERM);
 
-const START: FileKey = key("start", number(Dimension::Time), "\"1 s\"", "when it begins").zero();
+const START: FileKey = key("start", number(Dimension::Time), "\"1 s\"", "when it begins").default_zero();
 
 const DURATION: FileKey =
     key("duration", ValueType::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)), "\"0.5 s\"", "how long it lasts");
@@ -58,7 +58,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         word: "constant",
         help: "position + velocity t",
         keys: &[
-            place("position", "where it is at t = 0").zero(),
+            position_key("position", "where it is at t = 0").default_zero(),
             key("velocity", number(Dimension::Speed), "\"10 mm/s\"", "its rate")
                 .on_hinge(Dimension::AngularSpeed, "\"6 rad/s\""),
         ],
@@ -75,7 +75,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
             MEAN,
             key(
                 "terms",
-                ValueType::List(&TERMS, many(MAX_TERMS, "terms")),
+                ValueType::List(&TERMS, at_most(MAX_TERMS, "terms")),
                 "[{ amplitude = \"10 mm\", frequency = \"1 Hz\" }]",
                 "the harmonics",
             )
@@ -86,14 +86,19 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         word: "ramp",
         help: "from one position to another: with s from 0 to 1 over the duration, from + (to - from) (10 s³ - 15 s⁴ + 6 s⁵), \
                whose rate and acceleration are 0 at both ends",
-        keys: &[place("from", "where it is before").zero(), place("to", "where it is afterwards"), START, DURATION],
+        keys: &[
+            position_key("from", "where it is before").default_zero(),
+            position_key("to", "where it is afterwards"),
+            START,
+            DURATION,
+        ],
     },
     DriveLaw {
         word: "pulse",
         help: "one bump: with s from 0 to 1 over the duration, base + height sin³(π s)",
         keys: &[
-            place("base", "where it is before and afterwards").zero(),
-            place("height", "height of the bump above it"),
+            position_key("base", "where it is before and afterwards").default_zero(),
+            position_key("height", "height of the bump above it"),
             START,
             DURATION,
         ],
@@ -104,20 +109,21 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         keys: &[
             key(
                 "points",
-                ValueType::Pairs([Dimension::Time, Dimension::Length], many(MAX_POINTS, "points")),
+                ValueType::Pairs([Dimension::Time, Dimension::Length], at_most(MAX_POINTS, "points")),
                 "[[\"0 s\", \"0 mm\"], [\"1 s\", \"10 mm\"]]",
                 "time and position, in the order of time, at least two",
             )
             .on_hinge(Dimension::Angle, "[[\"0 s\", \"0 deg\"], [\"1 s\", \"10 deg\"]]")
-            .or("file"),
+            .unless("file"),
             key(
                 "file",
                 ValueType::File,
                 "\"bump.csv\"",
                 "the points: two columns under a header with units, `time_s,position_mm`",
             )
-            .or("points"),
-            key("repeat", ValueType::Flag, "true", "whether the points are one period of the motion").absent("false"),
+            .unless("points"),
+            key("repeat", ValueType::Flag, "true", "whether the points are one period of the motion")
+                .default_text("false"),
         ],
     },
     DriveLaw {
@@ -125,14 +131,14 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         help: "an expression of the time t in s, see below",
         keys: &[
             key("formula", ValueType::Text, "\"0.01 * sin(2*pi*t)\"", "an expression of `t`"),
-            key("unit", ValueType::Text, "\"mm\"", "unit of its value").absent("`m`, `rad` on a hinge"),
+            key("unit", ValueType::Text, "\"mm\"", "unit of its value").default_text("`m`, `rad` on a hinge"),
             key(
                 "resolve",
                 ValueType::Number(Dimension::Time, (SHORTEST_PART, 1.0)),
                 "\"1 ms\"",
                 "longest step of an adaptive method; a fifth of the shortest feature of the formula is suitable",
             )
-            .is(1e-3),
+            .default_value(1e-3),
         ],
     },
 ];
@@ -141,11 +147,11 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
 pub(super) static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
     let words: &[&str] = DRIVE_LAWS.each_ref().map(|kind| kind.word).to_vec().leak();
     let law = key("law", ValueType::Word(words), "\"constant\"", "which motion");
-    let of_kind = |(place, kind): (usize, &'static DriveLaw)| {
-        let keys = kind.keys.iter();
-        keys.map(move |key| key.of(&words[place..=place]))
+    let keys_of_law = |(index, law): (usize, &'static DriveLaw)| {
+        let keys = law.keys.iter();
+        keys.map(move |key| key.of(&words[index..=index]))
     };
-    let keys = DRIVE_LAWS.iter().enumerate().flat_map(of_kind);
+    let keys = DRIVE_LAWS.iter().enumerate().flat_map(keys_of_law);
     let keys: Vec<FileKey> = std::iter::once(law).chain(keys).collect();
     FileTable::new("drive", "a drive", "coordinate of a slide or a hinge as a function of time", keys.leak())
         .by(Variants::Word("law", ""))
@@ -159,34 +165,34 @@ static FACTOR_TERMS: LazyLock<FileTable> = LazyLock::new(|| {
 /// Table of the `factor` of a load: the laws of drives, for pure numbers.
 pub(super) static FACTOR: LazyLock<FileTable> = LazyLock::new(|| {
     let words: &[&str] = DRIVE.words().iter().copied().filter(|word| *word != FUNCTION).collect::<Vec<_>>().leak();
-    let kept = |key: &&FileKey| key.of != [FUNCTION] && key.name != "unit";
-    let row = |key: &FileKey| match key.takes {
-        ValueType::Word(_) => FileKey { takes: ValueType::Word(words), ..*key },
+    let applies = |key: &&FileKey| key.of != [FUNCTION] && key.name != "unit";
+    let row = |key: &FileKey| match key.value_type {
+        ValueType::Word(_) => FileKey { value_type: ValueType::Word(words), ..*key },
         _ => pure(key),
     };
-    let keys: Vec<FileKey> = DRIVE.keys.iter().filter(kept).map(row).collect();
+    let keys: Vec<FileKey> = DRIVE.keys.iter().filter(applies).map(row).collect();
     FileTable::new("factor", "a factor", "a number as a function of time", keys.leak()).by(Variants::Word("law", ""))
 });
 
 /// A row of a drive for pure numbers in place of lengths, and numbers per second in place of speeds.
 fn pure(key: &FileKey) -> FileKey {
     use Dimension::{Frequency, Length, None, Speed};
-    let (takes, like) = match key.takes {
+    let (value_type, example) = match key.value_type {
         ValueType::Number(Length, range) => (ValueType::Number(None, range), "0.5"),
         ValueType::Number(Speed, range) => (ValueType::Number(Frequency, range), "\"0.5 1/s\""),
-        ValueType::Pairs([time, _], many) => (ValueType::Pairs([time, None], many), "[[\"0 s\", 0], [\"1 s\", 0.5]]"),
-        ValueType::List(_, many) => {
-            (ValueType::List(&FACTOR_TERMS, many), "[{ amplitude = 0.5, frequency = \"1 Hz\" }]")
+        ValueType::Pairs([time, _], limit) => (ValueType::Pairs([time, None], limit), "[[\"0 s\", 0], [\"1 s\", 0.5]]"),
+        ValueType::List(_, limit) => {
+            (ValueType::List(&FACTOR_TERMS, limit), "[{ amplitude = 0.5, frequency = \"1 Hz\" }]")
         }
-        ValueType::File => (key.takes, "\"pull.csv\""),
-        takes => (takes, key.like),
+        ValueType::File => (key.value_type, "\"pull.csv\""),
+        value_type => (value_type, key.example),
     };
     let help = match key.name {
         "points" => "time and factor, in the order of time, at least two",
         "file" => "the points: two columns under a header that names the unit of the time, `time_s,factor`",
         _ => key.help,
     };
-    FileKey { takes, like, help, on_hinge: Option::None, ..*key }
+    FileKey { value_type, example, help, on_hinge: Option::None, ..*key }
 }
 
 /// Reads the drive of a coordinate, which is an angle if `turns`, or a factor, if the row of `node` has that table.
@@ -197,7 +203,7 @@ pub(super) fn read_drive(node: &Node<'_>, turns: bool) -> Result<Drive, SceneErr
     let law = section.require("law")?;
     let number = |name: &str| section.number(name);
     Ok(match law.choice()? {
-        FUNCTION => Drive::Function(read_follower(&section, coordinate(&section))?),
+        FUNCTION => Drive::Function(read_function_index(&section, coordinate(&section))?),
         "constant" => Drive::Constant { position: number("position")?, velocity: number("velocity")? },
         "harmonic" => Drive::Harmonic { mean: number("mean")?, terms: vec![read_term(&section)?] },
         "harmonics" => Drive::Harmonic { mean: number("mean")?, terms: read_terms(&section)? },
@@ -240,8 +246,8 @@ fn read_terms(section: &Section<'_>) -> Result<Vec<Harmonic>, SceneError> {
     let node = section.require("terms")?;
     let nodes = node.entries()?;
     if nodes.is_empty() {
-        let like = node.like();
-        return Err(node.error(format!("needs a term; write for example `terms = {like}`")));
+        let example = node.example();
+        return Err(node.error(format!("needs a term; write for example `terms = {example}`")));
     }
     nodes.into_iter().map(|node| read_term(&node.section()?)).collect()
 }

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 use super::document::{Node, Section};
 use super::drives::{DRIVE, FACTOR, MAX_DRIVE_FREQUENCY, read_drive};
 use super::instance::Instance;
-use super::key::{FileKey, FileTable, MAX_SI, ValueType, key, many, number};
+use super::key::{FileKey, FileTable, MAX_SI, ValueType, at_most, key, number};
 use super::placement::{ATTACHMENT, ROTATION, read_attachment, read_rotation};
 use super::points::{Axis, Graph, MAX_POINTS, read_file, read_points};
 use super::read_joints::read_coordinate;
@@ -39,7 +39,7 @@ pub fn is_element(table: &FileTable) -> bool {
     ELEMENTS.iter().any(|(of, _)| of.name == table.name)
 }
 
-pub(super) type ReadKind = fn(&Place<'_, '_>) -> Result<ElementKind, SceneError>;
+pub(super) type ReadKind = fn(&ElementReader<'_, '_>) -> Result<ElementKind, SceneError>;
 
 const NAME: FileKey = key("name", ValueType::Name, "\"s1\"", "its name, different from those of joints");
 
@@ -49,7 +49,7 @@ const COORDINATE: FileKey = key(
     "\"angle\"",
     "which coordinate of a joint that has two: `position` or `angle` of a cylindrical one, `angle` or `child_angle` of a universal one",
 )
-.absent("the only one");
+.default_text("the only one");
 
 const fn joint(help: &'static str) -> FileKey {
     key("joint", ValueType::Joint, "\"crank\"", help)
@@ -60,56 +60,60 @@ const fn point(name: &'static str) -> FileKey {
 }
 
 /// A number of either sign, such as a force, up to `MAX_FORCE`.
-const fn signed(name: &'static str, dimension: D, like: &'static str, help: &'static str) -> FileKey {
-    key(name, ValueType::Number(dimension, (-MAX_FORCE, MAX_FORCE)), like, help)
+const fn signed(name: &'static str, dimension: D, example: &'static str, help: &'static str) -> FileKey {
+    key(name, ValueType::Number(dimension, (-MAX_FORCE, MAX_FORCE)), example, help)
 }
 
 /// A nonnegative number up to `MAX_FORCE`.
-const fn unsigned(name: &'static str, dimension: D, like: &'static str, help: &'static str) -> FileKey {
-    key(name, ValueType::Number(dimension, (0.0, MAX_FORCE)), like, help)
+const fn unsigned(name: &'static str, dimension: D, example: &'static str, help: &'static str) -> FileKey {
+    key(name, ValueType::Number(dimension, (0.0, MAX_FORCE)), example, help)
 }
 
 /// Stiffness and damping of an element on a joint.
 const fn joint_stiffness(help: &'static str) -> FileKey {
-    unsigned("stiffness", D::Stiffness, "\"10 N/mm\"", help).zero().on_hinge(D::TurningStiffness, "\"5 N m/rad\"")
+    unsigned("stiffness", D::Stiffness, "\"10 N/mm\"", help)
+        .default_zero()
+        .on_hinge(D::TurningStiffness, "\"5 N m/rad\"")
 }
 
 const fn joint_damping(help: &'static str) -> FileKey {
-    unsigned("damping", D::Damping, "\"20 N s/m\"", help).zero().on_hinge(D::TurningDamping, "\"0.1 N m s/rad\"")
+    unsigned("damping", D::Damping, "\"20 N s/m\"", help)
+        .default_zero()
+        .on_hinge(D::TurningDamping, "\"0.1 N m s/rad\"")
 }
 
 /// A reference value of a joint coordinate.
-const fn coordinate(name: &'static str, like: [&'static str; 2], help: &'static str) -> FileKey {
-    key(name, number(D::Length), like[0], help).on_hinge(D::Angle, like[1])
+const fn coordinate(name: &'static str, examples: [&'static str; 2], help: &'static str) -> FileKey {
+    key(name, number(D::Length), examples[0], help).on_hinge(D::Angle, examples[1])
 }
 
 /// Stiffnesses or dampings along or about three axes.
 const fn diagonal(name: &'static str, dimension: D, help: &'static str) -> FileKey {
     key(name, ValueType::Vector(dimension, (0.0, MAX_FORCE)), "", help)
-        .zero()
+        .default_zero()
         .frame("its axes: `axes` in the body of `from`")
 }
 
 const fn vector(name: &'static str, dimension: D, help: &'static str) -> FileKey {
     key(name, ValueType::Vector(dimension, (-MAX_FORCE, MAX_FORCE)), "", help)
-        .zero()
+        .default_zero()
         .frame("the world's, or the body's with `axes = \"body\"`")
 }
 
 const fn rotation(name: &'static str, help: &'static str) -> FileKey {
-    key(name, ValueType::Table(&ROTATION), "{ axis = [0, 1, 0], angle = \"15 deg\" }", help).zero()
+    key(name, ValueType::Table(&ROTATION), "{ axis = [0, 1, 0], angle = \"15 deg\" }", help).default_zero()
 }
 
 fn law(name: &'static str, help: &'static str) -> FileKey {
-    key(name, ValueType::Table(&DRIVE), "{ law = \"constant\", velocity = \"10 mm/s\" }", help).absent("none")
+    key(name, ValueType::Table(&DRIVE), "{ law = \"constant\", velocity = \"10 mm/s\" }", help).default_text("none")
 }
 
 const CURVE_LIKE: &str = "[[\"-10 mm\", \"-50 N\"], [0, 0], [\"10 mm\", \"80 N\"]]";
 
 /// Points of a force curve in place of `stiffness` and `preload`.
 const fn curve(help: &'static str) -> FileKey {
-    let pairs = ValueType::Pairs([D::Length, D::Force], many(MAX_POINTS, "points"));
-    key("characteristic", pairs, CURVE_LIKE, help).absent(WITHOUT_CURVE)
+    let pairs = ValueType::Pairs([D::Length, D::Force], at_most(MAX_POINTS, "points"));
+    key("characteristic", pairs, CURVE_LIKE, help).default_text(WITHOUT_CURVE)
 }
 
 const CURVE_FILE: FileKey = key(
@@ -118,7 +122,7 @@ const CURVE_FILE: FileKey = key(
     "\"coil.csv\"",
     "instead of the points: a CSV file beside the scene, two columns under a header with units",
 )
-.absent(WITHOUT_CURVE);
+.default_text(WITHOUT_CURVE);
 const WITHOUT_CURVE: &str = "`stiffness` and `preload` hold";
 
 static SPRING: FileTable = FileTable::new(
@@ -135,9 +139,10 @@ static SPRING: FileTable = FileTable::new(
             "\"100 mm\"",
             "distance of the points at which the spring carries `preload`",
         ),
-        unsigned("stiffness", D::Stiffness, "\"10 N/mm\"", "change of its tension with the distance").zero(),
-        unsigned("damping", D::Damping, "\"20 N s/m\"", "change of its tension with the rate of the distance").zero(),
-        signed("preload", D::Force, "\"5 N\"", "tension at `length`; negative where it pushes").zero(),
+        unsigned("stiffness", D::Stiffness, "\"10 N/mm\"", "change of its tension with the distance").default_zero(),
+        unsigned("damping", D::Damping, "\"20 N s/m\"", "change of its tension with the rate of the distance")
+            .default_zero(),
+        signed("preload", D::Force, "\"5 N\"", "tension at `length`; negative where it pushes").default_zero(),
         curve(
             "tension over the change of the distance from `length`, 2 to 10000 of `[change, tension]`, in place of `stiffness` and \
              `preload`",
@@ -149,7 +154,7 @@ static SPRING: FileTable = FileTable::new(
             "",
             "direction in which it acts: a tyre or a rubber buffer only pushes, a rope only pulls",
         )
-        .absent(SpringSide::Both.word()),
+        .default_text(SpringSide::Both.word()),
     ],
 );
 
@@ -167,15 +172,16 @@ static LOAD: LazyLock<FileTable> = LazyLock::new(|| {
                 "\"2 Hz\"",
                 "0 for a constant load",
             )
-            .zero(),
-            key("phase", number(D::Angle), "\"90 deg\"", "phase at t = 0; not used where the load is constant").zero(),
+            .default_zero(),
+            key("phase", number(D::Angle), "\"90 deg\"", "phase at t = 0; not used where the load is constant")
+                .default_zero(),
             key(
                 "factor",
                 ValueType::Table(&FACTOR),
                 "{ law = \"ramp\", to = 1, duration = \"0.5 s\" }",
                 "factor of force and torque over time, by the laws of drives, in place of `frequency` and `phase`",
             )
-            .absent("1, or that of `frequency`"),
+            .default_text("1, or that of `frequency`"),
             vector("force", D::Force, "force at the point"),
             vector("torque", D::Torque, "torque"),
             key(
@@ -184,7 +190,7 @@ static LOAD: LazyLock<FileTable> = LazyLock::new(|| {
                 "",
                 "whether force and torque keep to the world's axes or turn with the body",
             )
-            .absent(LoadAxes::World.word()),
+            .default_text(LoadAxes::World.word()),
         ]
         .leak(),
     )
@@ -198,11 +204,11 @@ static JOINT_SPRING: FileTable = FileTable::new(
         NAME,
         joint("the joint on which it acts"),
         COORDINATE,
-        coordinate("position", ["\"10 mm\"", "\"30 deg\""], "joint coordinate at which it carries `preload`").zero(),
+        coordinate("position", ["\"10 mm\"", "\"30 deg\""], "joint coordinate at which it carries `preload`").default_zero(),
         joint_stiffness("change of its force or torque with the coordinate"),
         joint_damping("change of its force or torque with the rate of the coordinate"),
         signed("preload", D::Force, "\"5 N\"", "force or torque at `position`, towards lower coordinates")
-            .zero()
+            .default_zero()
             .on_hinge(D::Torque, "\"0.5 N m\""),
         curve(
             "force or torque, towards lower coordinates, over the coordinate from `position`, 2 to 10000 of `[coordinate, force]`, in \
@@ -222,13 +228,13 @@ static STOP: FileTable = FileTable::new(
         joint("the joint on which it acts"),
         COORDINATE,
         coordinate("lower", ["\"-20 mm\"", "\"-30 deg\""], "joint coordinate at which the lower stop begins")
-            .is(f64::NEG_INFINITY),
+            .default_value(f64::NEG_INFINITY),
         coordinate("upper", ["\"20 mm\"", "\"30 deg\""], "joint coordinate at which the upper stop begins")
-            .is(f64::INFINITY),
+            .default_value(f64::INFINITY),
         unsigned("force", D::Force, "\"500 N\"", "force of a stop pressed in slowly by `depth`, on a slide")
-            .or("torque"),
+            .unless("torque"),
         unsigned("torque", D::Torque, "\"20 N m\"", "torque of a stop pressed in slowly by `depth`, on a hinge")
-            .or("force"),
+            .unless("force"),
         key("depth", ValueType::Number(D::Length, (1e-9, 1e3)), "\"1 mm\"", "depth at which it exerts that")
             .on_hinge(D::Angle, "\"1 deg\""),
         key(
@@ -237,14 +243,14 @@ static STOP: FileTable = FileTable::new(
             "0.5",
             "speed after over speed before an impact at `speed`",
         )
-        .is(1.0),
+        .default_value(1.0),
         key(
             "speed",
             ValueType::Number(D::Speed, (0.0, 1e6)),
             "\"0.1 m/s\"",
             "approach speed at which it rebounds with `restitution`; needed where that is below 1",
         )
-        .zero()
+        .default_zero()
         .on_hinge(D::AngularSpeed, "\"1 rad/s\""),
     ],
 );
@@ -275,12 +281,12 @@ static MOTOR: LazyLock<FileTable> = LazyLock::new(|| {
             NAME,
             joint("the joint on which it acts, where that has no drive"),
             COORDINATE,
-            signed("force", D::Force, "\"50 N\"", "constant part, on a slide").zero(),
-            signed("torque", D::Torque, "\"2 N m\"", "constant part, on a hinge").zero(),
+            signed("force", D::Force, "\"50 N\"", "constant part, on a slide").default_zero(),
+            signed("torque", D::Torque, "\"2 N m\"", "constant part, on a hinge").default_zero(),
             joint_stiffness("gain on the distance from the target"),
             joint_damping("gain on the difference from the target's speed"),
             unsigned("limit", D::Force, "\"100 N\"", "largest force or torque, either way")
-                .is(f64::INFINITY)
+                .default_value(f64::INFINITY)
                 .on_hinge(D::Torque, "\"10 N m\""),
             law("target", "motion that it is to follow"),
         ]
@@ -303,8 +309,9 @@ static TYRE: LazyLock<FileTable> = LazyLock::new(|| {
                 "height of the point `on`, the wheel's centre, over the ground at which it begins to push",
             ),
             unsigned("stiffness", D::Stiffness, "\"200 kN/m\"", "change of its force with the height"),
-            unsigned("damping", D::Damping, "\"200 N s/m\"", "change of its force with the rate of the height").zero(),
-            key("up", ValueType::Direction, "[0, 0, 1]", "which way is up").absent("against the file's gravity"),
+            unsigned("damping", D::Damping, "\"200 N s/m\"", "change of its force with the rate of the height")
+                .default_zero(),
+            key("up", ValueType::Direction, "[0, 0, 1]", "which way is up").default_text("against the file's gravity"),
             law("ground", "height of the ground, along `up` from the world's origin; by default at rest at 0"),
         ]
         .leak(),
@@ -312,14 +319,14 @@ static TYRE: LazyLock<FileTable> = LazyLock::new(|| {
 });
 
 /// Attachment of an element, and the section with its other keys.
-pub(super) struct Place<'s, 'd> {
+pub(super) struct ElementReader<'s, 'd> {
     section: &'s Section<'d>,
     scene: &'s Scene,
     points: &'s [Attachment],
     coordinate: Option<JointCoordinate>,
 }
 
-impl Place<'_, '_> {
+impl ElementReader<'_, '_> {
     fn on_hinge(&self) -> bool {
         self.section.document.on_hinge
     }
@@ -357,9 +364,9 @@ impl Place<'_, '_> {
         node.map(|node| read_drive(&node, self.on_hinge())).transpose()
     }
 
-    /// Name of the body of attachment `place` (0 or 1); `None` for the world.
-    fn body(&self, place: usize) -> Option<&str> {
-        let body = self.points.get(place)?.body?;
+    /// Name of the body of attachment `index` (0 or 1); `None` for the world.
+    fn body(&self, index: usize) -> Option<&str> {
+        let body = self.points.get(index)?.body?;
         Some(&self.scene.machine.bodies[body].name)
     }
 
@@ -390,7 +397,7 @@ impl Place<'_, '_> {
     }
 
     /// Rejects an element without effect; `keys` lists the values of which one must not be 0.
-    fn must_act(&self, acts: bool, keys: &str) -> Result<(), SceneError> {
+    fn check_effect(&self, acts: bool, keys: &str) -> Result<(), SceneError> {
         if acts {
             return Ok(());
         }
@@ -418,167 +425,167 @@ impl Place<'_, '_> {
     }
 }
 
-fn read_spring(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
-    let [from, to] = place.two_points();
+fn read_spring(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
+    let [from, to] = reader.two_points();
     let spring = Spring {
         from,
         to,
-        length: place.number("length")?,
-        damping: place.number("damping")?,
-        elastic: place.elastic([("length", D::Length), ("tension", D::Force)])?,
-        side: place.word("side")?,
+        length: reader.number("length")?,
+        damping: reader.number("damping")?,
+        elastic: reader.elastic([("length", D::Length), ("tension", D::Force)])?,
+        side: reader.word("side")?,
     };
-    place.must_act(spring.damping != 0.0 || spring.elastic.has_effect(), "stiffness, damping, preload")?;
+    reader.check_effect(spring.damping != 0.0 || spring.elastic.has_effect(), "stiffness, damping, preload")?;
     Ok(ElementKind::Spring(spring))
 }
 
-fn read_load(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
-    let axes = place.word("axes")?;
+fn read_load(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
+    let axes = reader.word("axes")?;
     let frame = match axes {
         LoadAxes::World => None,
-        LoadAxes::Body => place.body(0),
+        LoadAxes::Body => reader.body(0),
     };
     let vector = |name: &str| {
-        let vector = place.section.vector(name)?;
-        Ok(place.instance().map_or(vector, |instance| instance.direction(frame, vector)))
+        let vector = reader.section.vector(name)?;
+        Ok(reader.instance().map_or(vector, |instance| instance.direction(frame, vector)))
     };
-    let factor = match place.law("factor")? {
+    let factor = match reader.law("factor")? {
         Some(law) => {
             for key in ["frequency", "phase"] {
-                place.section.refuse(key, "`factor` says how the load varies")?;
+                reader.section.refuse(key, "`factor` says how the load varies")?;
             }
             Some(law)
         }
         None => {
-            let [frequency, phase] = [place.number("frequency")?, place.number("phase")?];
+            let [frequency, phase] = [reader.number("frequency")?, reader.number("phase")?];
             let term = Harmonic { amplitude: 1.0, frequency, phase };
             (frequency > 0.0).then(|| Drive::Harmonic { mean: 0.0, terms: vec![term] })
         }
     };
-    let load = Load { on: place.points[0], force: vector("force")?, torque: vector("torque")?, axes, factor };
-    place.must_act(load.force != Vec3::zeros() || load.torque != Vec3::zeros(), "force, torque")?;
+    let load = Load { on: reader.points[0], force: vector("force")?, torque: vector("torque")?, axes, factor };
+    reader.check_effect(load.force != Vec3::zeros() || load.torque != Vec3::zeros(), "force, torque")?;
     Ok(ElementKind::Load(load))
 }
 
-fn read_joint_spring(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
-    let axes = match place.on_hinge() {
+fn read_joint_spring(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
+    let axes = match reader.on_hinge() {
         true => [("angle", D::Angle), ("torque", D::Torque)],
         false => [("position", D::Length), ("force", D::Force)],
     };
     let spring = JointSpring {
-        on: place.on(),
-        position: place.number("position")?,
-        damping: place.number("damping")?,
-        elastic: place.elastic(axes)?,
+        on: reader.on(),
+        position: reader.number("position")?,
+        damping: reader.number("damping")?,
+        elastic: reader.elastic(axes)?,
     };
-    place.must_act(spring.damping != 0.0 || spring.elastic.has_effect(), "stiffness, damping, preload")?;
+    reader.check_effect(spring.damping != 0.0 || spring.elastic.has_effect(), "stiffness, damping, preload")?;
     Ok(ElementKind::JointSpring(spring))
 }
 
-fn read_stop(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
+fn read_stop(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
     let stop = Stop {
-        on: place.on(),
-        lower: place.number("lower")?,
-        upper: place.number("upper")?,
-        force: place.force_or_torque()?,
-        depth: place.number("depth")?,
-        restitution: place.number("restitution")?,
-        speed: place.number("speed")?,
+        on: reader.on(),
+        lower: reader.number("lower")?,
+        upper: reader.number("upper")?,
+        force: reader.force_or_torque()?,
+        depth: reader.number("depth")?,
+        restitution: reader.number("restitution")?,
+        speed: reader.number("speed")?,
     };
-    let on_hinge = place.on_hinge();
+    let on_hinge = reader.on_hinge();
     let key = if on_hinge { "torque" } else { "force" };
-    place.must_act(stop.force != 0.0, key)?;
+    reader.check_effect(stop.force != 0.0, key)?;
     let Stop { lower, upper, .. } = stop;
     if lower == f64::NEG_INFINITY && upper == f64::INFINITY {
-        return place.fault("upper", "missing; a stop needs `lower`, `upper` or both");
+        return reader.fault("upper", "missing; a stop needs `lower`, `upper` or both");
     }
     if lower >= upper {
         let unit = if on_hinge { "deg" } else { "mm" };
-        return place.fault("upper", &format!("must be above lower, {}", format_quantity(lower, unit)));
+        return reader.fault("upper", &format!("must be above lower, {}", format_quantity(lower, unit)));
     }
     if on_hinge && upper - lower >= TAU && upper.is_finite() && lower.is_finite() {
         let why = "must be less than a turn above lower: a hinge is taken within half a turn of their middle";
-        return place.fault("upper", why);
+        return reader.fault("upper", why);
     }
     if stop.restitution < 1.0 && stop.speed == 0.0 {
         let why = "missing; a restitution below 1 holds at one approach speed, which must be above 0";
-        return place.fault("speed", why);
+        return reader.fault("speed", why);
     }
     Ok(ElementKind::Stop(stop))
 }
 
-fn read_bushing(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
-    let vector = |name: &str| place.section.vector(name);
+fn read_bushing(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
+    let vector = |name: &str| reader.section.vector(name);
     let [stiffness, damping] = [vector("stiffness")?, vector("damping")?];
     let [turning_stiffness, turning_damping] = [vector("turning_stiffness")?, vector("turning_damping")?];
     let rotation = |name: &str| -> Result<Quat, SceneError> {
-        let rotation = read_rotation(place.section.get(name))?;
-        Ok(place.instance().map_or(rotation, |instance| instance.rotation(place.body(0), rotation)))
+        let rotation = read_rotation(reader.section.get(name))?;
+        Ok(reader.instance().map_or(rotation, |instance| instance.rotation(reader.body(0), rotation)))
     };
-    let [from, to] = place.two_points();
+    let [from, to] = reader.two_points();
     let rest = rotation("rotation")?;
     let bushing = Bushing {
         from,
         to,
         axes: rotation("axes")?,
-        rotation: place.instance().map_or(rest, |instance| instance.rotation_of(place.body(1), rest)),
+        rotation: reader.instance().map_or(rest, |instance| instance.rotation_of(reader.body(1), rest)),
         stiffness,
         damping,
         turning_stiffness,
         turning_damping,
     };
     let acts = [stiffness, damping, turning_stiffness, turning_damping].iter().any(|vector| *vector != Vec3::zeros());
-    place.must_act(acts, "stiffness, damping, turning_stiffness, turning_damping")?;
+    reader.check_effect(acts, "stiffness, damping, turning_stiffness, turning_damping")?;
     Ok(ElementKind::Bushing(bushing))
 }
 
-fn read_motor(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
+fn read_motor(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
     let motor = Motor {
-        on: place.on(),
-        force: place.force_or_torque()?,
-        stiffness: place.number("stiffness")?,
-        damping: place.number("damping")?,
-        limit: place.number("limit")?,
-        target: place.law("target")?,
+        on: reader.on(),
+        force: reader.force_or_torque()?,
+        stiffness: reader.number("stiffness")?,
+        damping: reader.number("damping")?,
+        limit: reader.number("limit")?,
+        target: reader.law("target")?,
     };
     let follows = motor.stiffness > 0.0 || motor.damping > 0.0;
-    let key = if place.on_hinge() { "torque" } else { "force" };
-    place.must_act(motor.force != 0.0 || follows, &format!("{key}, stiffness, damping"))?;
+    let key = if reader.on_hinge() { "torque" } else { "force" };
+    reader.check_effect(motor.force != 0.0 || follows, &format!("{key}, stiffness, damping"))?;
     match (follows, &motor.target) {
-        (true, None) => return place.fault("target", "missing; stiffness and damping pull towards it"),
+        (true, None) => return reader.fault("target", "missing; stiffness and damping pull towards it"),
         (false, Some(_)) => {
-            return place.fault("target", "has no effect: stiffness and damping, which pull towards it, are 0");
+            return reader.fault("target", "has no effect: stiffness and damping, which pull towards it, are 0");
         }
-        _ => place.refuse_function(motor.target.as_ref(), "target", "motor")?,
+        _ => reader.refuse_function(motor.target.as_ref(), "target", "motor")?,
     }
     Ok(ElementKind::Motor(motor))
 }
 
-fn read_tyre(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
-    let up = match place.section.get("up") {
+fn read_tyre(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> {
+    let up = match reader.section.get("up") {
         Some(node) => node.direction()?,
-        None => up_of(place.scene).ok_or_else(|| {
+        None => up_of(reader.scene).ok_or_else(|| {
             let why =
                 "missing; without gravity only the file can say which way is up: write for example `up = [0, 0, 1]`";
-            place.section.error("up", why)
+            reader.section.error("up", why)
         })?,
     };
     // Against gravity, it does not turn with the scene.
-    let up = match (place.section.get("up"), place.instance()) {
+    let up = match (reader.section.get("up"), reader.instance()) {
         (Some(_), Some(instance)) => instance.direction(None, up),
         _ => up,
     };
     let tyre = Tyre {
-        on: place.points[0],
-        radius: place.number("radius")?,
-        stiffness: place.number("stiffness")?,
-        damping: place.number("damping")?,
+        on: reader.points[0],
+        radius: reader.number("radius")?,
+        stiffness: reader.number("stiffness")?,
+        damping: reader.number("damping")?,
         up,
-        height: place.instance().map_or(0.0, |instance| up.dot(&instance.point(None, Vec3::zeros()))),
-        ground: place.law("ground")?,
+        height: reader.instance().map_or(0.0, |instance| up.dot(&instance.point(None, Vec3::zeros()))),
+        ground: reader.law("ground")?,
     };
-    place.must_act(tyre.stiffness != 0.0, "stiffness")?;
-    place.refuse_function(tyre.ground.as_ref(), "ground", "ground")?;
+    reader.check_effect(tyre.stiffness != 0.0, "stiffness")?;
+    reader.refuse_function(tyre.ground.as_ref(), "ground", "ground")?;
     Ok(ElementKind::Tyre(tyre))
 }
 
@@ -628,7 +635,7 @@ pub(super) fn read_element<'d>(
         coordinate = Some(JointCoordinate { joint: index, freedom });
         section.document.on_hinge = freedom.turns();
     }
-    let place = Place { section: &section, scene, points: &points, coordinate };
-    let kind = read_kind(&place)?;
+    let reader = ElementReader { section: &section, scene, points: &points, coordinate };
+    let kind = read_kind(&reader)?;
     Ok((Element { name, kind }, section))
 }

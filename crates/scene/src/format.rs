@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use super::closed_form::CLOSED_FORM;
 use super::drives::DRIVE;
 use super::elements::ELEMENTS;
-use super::key::{FileKey, FileTable, ListLimit, ValueType, Variants, key, many, number, positive, vector};
+use super::key::{FileKey, FileTable, ListLimit, ValueType, Variants, at_most, key, number, positive, vector};
 use super::placement::{ATTACHMENT, ROTATION};
 use super::read_bodies::{Form, MAX_DENSITY, MAX_MASS};
 use super::table::{contact_rows, find};
@@ -16,27 +16,27 @@ use jointplay_physics::units::Dimension as D;
 use jointplay_physics::words::Words;
 
 /// Maximum number of user-defined parameters.
-const MAX_OWN: usize = 1000;
+const MAX_PARAMETERS: usize = 1000;
 /// Range of the initial time scale.
-const SLOWEST_TO_REAL: (f64, f64) = (1e-4, 1.0);
+const TIME_SCALE_RANGE: (f64, f64) = (1e-4, 1.0);
 /// Maximum number of included files.
 const MAX_FILES: usize = 100;
 /// Largest length of a shape, m.
-const LARGEST: f64 = 1000.0;
+const MAX_EXTENT: f64 = 1000.0;
 
 const WORLD: &str = "the world's";
 const PARENT: &str = "the parent's: the world's where there is no `parent`";
 const BODY_FRAME: &str = "the body's; of a fixed shape, the world's";
 
 /// Concatenated rows.
-fn joined(rows: &[&[FileKey]]) -> &'static [FileKey] {
+fn concatenated(rows: &[&[FileKey]]) -> &'static [FileKey] {
     rows.concat().leak()
 }
 
 /// The row of a parameter, as the key `name`.
 fn of_parameter(name: &'static str, parameter: &'static str) -> FileKey {
     let help = find(parameter).map_or("", |parameter| parameter.help);
-    key(name, ValueType::Parameter(parameter), "", help).absent("as parameters")
+    key(name, ValueType::Parameter(parameter), "", help).default_text("as parameters")
 }
 
 /// Rows of the parameters in `section`.
@@ -58,9 +58,9 @@ fn contact_keys() -> Vec<FileKey> {
 /// Top-level table of a scene file.
 pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
     let names = [
-        key("name", ValueType::Name, "\"press\"", "short name, for outputs").absent("the file's").fixed(),
-        key("title", ValueType::Text, "\"A press\"", "a line, for lists").absent("`name`").fixed(),
-        key("description", ValueType::Text, "\"It jumps.\"", "a paragraph").absent("none").fixed(),
+        key("name", ValueType::Name, "\"press\"", "short name, for outputs").default_text("the file's").fixed(),
+        key("title", ValueType::Text, "\"A press\"", "a line, for lists").default_text("`name`").fixed(),
+        key("description", ValueType::Text, "\"It jumps.\"", "a paragraph").default_text("none").fixed(),
         of_parameter("start", "start"),
         of_parameter("formulation", "formulation"),
     ];
@@ -71,7 +71,7 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
         key("view", ValueType::Table(&VIEW), "{ down = \"-z\" }", VIEW.help),
         key("output", ValueType::Table(&OUTPUT), "{ body = \"rod\" }", OUTPUT.help),
     ]
-    .map(|key| key.absent("the defaults"));
+    .map(|key| key.default_text("the defaults"));
     let others = [
         key(
             "closed_form",
@@ -81,20 +81,20 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
         ),
         key(
             "include",
-            ValueType::Files(&INCLUDE, many(MAX_FILES, "files")),
+            ValueType::Files(&INCLUDE, at_most(MAX_FILES, "files")),
             "[\"leg.toml\"]",
             "files beside this one, whose lists are added to the scene",
         ),
     ]
-    .map(|key| key.absent("none"));
+    .map(|key| key.default_text("none"));
     let place = place("the scene");
     let joints =
-        [list_of(&JOINT_CONTACT, many(MAX_BALL_JOINTS, "ball joints"), "{ name = \"J2\", clearance = \"0.1 mm\" }")];
+        [list_of(&JOINT_CONTACT, at_most(MAX_BALL_JOINTS, "ball joints"), "{ name = \"J2\", clearance = \"0.1 mm\" }")];
     FileTable::new(
         "scene",
         "the file",
         "a machine, and how it is simulated and shown",
-        joined(&[&names, &sections, &place, &others, &lists(), &joints]),
+        concatenated(&[&names, &sections, &place, &others, &lists(), &joints]),
     )
 });
 
@@ -108,7 +108,7 @@ fn place(what: &str) -> [FileKey; 2] {
             "\"0 0 100 mm\"",
             help(format!("by which {what} is shifted, after its turn; gravity is not changed")),
         )
-        .zero()
+        .default_zero()
         .frame(WORLD),
         key(
             "rotation",
@@ -116,7 +116,7 @@ fn place(what: &str) -> [FileKey; 2] {
             "{ axis = [0, 0, 1], angle = \"90 deg\" }",
             help(format!("by which {what} is turned about the world's origin; gravity is not changed")),
         )
-        .zero()
+        .default_zero()
         .frame(WORLD),
     ]
 }
@@ -125,11 +125,11 @@ static INCLUDE: LazyLock<FileTable> = LazyLock::new(|| {
     let own = [
         key("file", ValueType::File, "\"leg.toml\"", "the file, beside this one"),
         key("name", ValueType::Name, "\"left\"", "begins the names of its parts: `leg` becomes `left.leg`")
-            .absent("names stay as in the file"),
+            .default_text("names stay as in the file"),
         key("values", ValueType::Values, "{ length = \"0.3 m\" }", "values of its parameters, by their names in it")
-            .absent("as in the file"),
+            .default_text("as in the file"),
     ];
-    let keys = joined(&[&own, &place("the file")]);
+    let keys = concatenated(&[&own, &place("the file")]);
     FileTable::new("include", "[[include]]", "a file whose lists are added to the scene", keys)
 });
 
@@ -142,8 +142,8 @@ pub(super) static INCLUDED: LazyLock<FileTable> = LazyLock::new(|| {
 /// Lists allowed in a file.
 fn lists() -> Vec<FileKey> {
     let own = [
-        list_of(&PARAMETER, many(MAX_OWN, "parameters"), "{ name = \"stroke\", value = \"20 mm\" }"),
-        list_of(&PATTERN, many(MAX_BODIES, "patterns"), "{ name = \"leg\", count = 6, along = \"100 0 0 mm\" }"),
+        list_of(&PARAMETER, at_most(MAX_PARAMETERS, "parameters"), "{ name = \"stroke\", value = \"20 mm\" }"),
+        list_of(&PATTERN, at_most(MAX_BODIES, "patterns"), "{ name = \"leg\", count = 6, along = \"100 0 0 mm\" }"),
     ];
     own.into_iter().chain(parts()).collect()
 }
@@ -153,37 +153,37 @@ fn parts() -> Vec<FileKey> {
     let parts = [
         list_of(
             &BODY,
-            many(MAX_BODIES, "bodies"),
+            at_most(MAX_BODIES, "bodies"),
             "{ name = \"rod\", mass = \"0.384 kg\", inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\" }",
         ),
         list_of(
             &JOINT,
-            many(MAX_BODIES, "joints"),
+            at_most(MAX_BODIES, "joints"),
             "{ name = \"crank\", kind = \"revolute\", child = \"rod\", axis = [0, 1, 0] }",
         ),
         list_of(
             &BALL_JOINT,
-            many(MAX_BALL_JOINTS, "ball joints"),
+            at_most(MAX_BALL_JOINTS, "ball joints"),
             "{ name = \"S1\", socket = { body = \"world\" }, ball = { body = \"rod\" } }",
         ),
         list_of(
             &FIXED_SHAPE,
-            many(MAX_SHAPES, "shapes"),
+            at_most(MAX_SHAPES, "shapes"),
             "{ form = \"sphere\", role = \"frame\", centre = \"0 0 0 mm\", radius = \"4 mm\" }",
         ),
     ];
-    let element = |table| list_of(table, many(MAX_ELEMENTS, "force elements"), "");
+    let element = |table| list_of(table, at_most(MAX_ELEMENTS, "force elements"), "");
     let elements = ELEMENTS.iter().map(|(table, _)| element(*table));
     parts.into_iter().chain(elements).collect()
 }
 
 /// A list of tables under the table's name; `like` is an example of an entry, or empty.
-fn list_of(table: &'static FileTable, many: ListLimit, like: &'static str) -> FileKey {
-    let like = match like {
+fn list_of(table: &'static FileTable, limit: ListLimit, example: &'static str) -> FileKey {
+    let example = match example {
         "" => "",
-        like => format!("[{like}]").leak(),
+        example => format!("[{example}]").leak(),
     };
-    key(table.name, ValueType::List(table, many), like, table.help).absent("none")
+    key(table.name, ValueType::List(table, limit), example, table.help).default_text("none")
 }
 
 static GRAVITY: LazyLock<FileTable> = LazyLock::new(|| {
@@ -203,29 +203,30 @@ static SOLVER: LazyLock<FileTable> = LazyLock::new(|| {
 
 static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
     let own = [
-        key("floor", number(D::Length), "\"340 mm\"", "where the floor lies along `down`").absent("chosen by the view"),
+        key("floor", number(D::Length), "\"340 mm\"", "where the floor lies along `down`")
+            .default_text("chosen by the view"),
         key("yaw", number(D::Angle), "\"-35 deg\"", "azimuth of the isometric view, with `pitch`")
-            .absent("that of the default view"),
+            .default_text("that of the default view"),
         key("pitch", number(D::Angle), "\"12 deg\"", "elevation of the isometric view, with `yaw`")
-            .absent("that of the default view"),
+            .default_text("that of the default view"),
         key(
             "time_scale",
-            ValueType::Number(D::None, SLOWEST_TO_REAL),
+            ValueType::Number(D::None, TIME_SCALE_RANGE),
             "0.05",
             "simulated seconds per second that a window begins with",
         )
-        .absent("a period of the drives takes about 4 s; without drives 0.1")
+        .default_text("a period of the drives takes about 4 s; without drives 0.1")
         .fixed(),
         key(
             "plots",
-            ValueType::Words(&PLOT_WORDS, many(MAX_PLOTS, "plots")),
+            ValueType::Words(&PLOT_WORDS, at_most(MAX_PLOTS, "plots")),
             "[\"normal-force\", \"acceleration\"]",
             "plots that a window begins with",
         )
-        .absent("normal force and eccentricity")
+        .default_text("normal force and eccentricity")
         .fixed(),
     ];
-    let keys = joined(&[&parameters("view"), &own]);
+    let keys = concatenated(&[&parameters("view"), &own]);
     FileTable::new("view", "[view]", "how the machine is viewed", keys)
 });
 
@@ -234,9 +235,9 @@ static OUTPUT: FileTable = FileTable::new(
     "[output]",
     "output quantities",
     &[
-        key("body", ValueType::Body, "\"rod\"", "body whose pose is reported").absent("the last one").fixed(),
+        key("body", ValueType::Body, "\"rod\"", "body whose pose is reported").default_text("the last one").fixed(),
         key("probe", vector(D::Length), "\"60 0 0 mm\"", "a point of that body, reported as well")
-            .absent("none")
+            .default_text("none")
             .frame("the body's"),
     ],
 );
@@ -247,7 +248,7 @@ static JOINT_CONTACT: LazyLock<FileTable> = LazyLock::new(|| {
         "joint_contact",
         "[[joint_contact]]",
         "contact parameters of one ball joint, such as one copy of a pattern",
-        joined(&[&name, &contact_keys()]),
+        concatenated(&[&name, &contact_keys()]),
     )
     .also(&CONTACT)
 });
@@ -261,15 +262,15 @@ static BODY: LazyLock<FileTable> = LazyLock::new(|| {
             "\"0.384 kg\"",
             "its mass; 0 for a body that only connects two joints, whose inertia is then 0, too",
         )
-        .or("density"),
-        key("centre", vector(D::Length), "\"14 0 0 mm\"", "its centroid").zero().frame("the body's"),
+        .unless("density"),
+        key("centre", vector(D::Length), "\"14 0 0 mm\"", "its centroid").default_zero().frame("the body's"),
         key(
             "inertia",
             vector(D::Inertia),
             "\"1.58e-5 1.92e-3 1.93e-3 kg m^2\"",
             "Ixx, Iyy and Izz about the centroid, along these axes",
         )
-        .or("density")
+        .unless("density")
         .frame("the body's"),
         key(
             "products",
@@ -277,15 +278,15 @@ static BODY: LazyLock<FileTable> = LazyLock::new(|| {
             "\"0 1e-5 0 kg m^2\"",
             "integrals of xy, xz and yz over the mass, about the centroid",
         )
-        .zero()
+        .default_zero()
         .frame("the body's"),
         key(
             "shapes",
-            ValueType::List(&SHAPE, many(MAX_SHAPES, "shapes")),
+            ValueType::List(&SHAPE, at_most(MAX_SHAPES, "shapes")),
             "[{ form = \"sphere\", role = \"pin\", centre = \"0 0 0 mm\", radius = \"4 mm\" }]",
             "what it looks like",
         )
-        .absent("none"),
+        .default_text("none"),
         key(
             "density",
             positive(D::Density, MAX_DENSITY),
@@ -293,9 +294,9 @@ static BODY: LazyLock<FileTable> = LazyLock::new(|| {
             "density of its shapes, which then determine mass, centroid and inertia; overlapping volumes count twice; \
              `check` prints the result",
         )
-        .absent("`mass` and `inertia` are given"),
+        .default_text("`mass` and `inertia` are given"),
     ];
-    FileTable::new("body", "[[body]]", "a rigid body", joined(&[&keys]))
+    FileTable::new("body", "[[body]]", "a rigid body", concatenated(&[&keys]))
 });
 
 static SHAPE: LazyLock<FileTable> = LazyLock::new(|| {
@@ -309,20 +310,20 @@ static FIXED_SHAPE: LazyLock<FileTable> =
 fn of_shape(name: &'static str, head: &'static str, help: &'static str) -> FileTable {
     const LONG: &[&str] = &["capsule", "cylinder", "cone"];
     let point = |name, of, help| {
-        let takes = vector(D::Length);
-        let row = key(name, takes, "\"0 0 10 mm\"", help);
+        let value_type = vector(D::Length);
+        let row = key(name, value_type, "\"0 0 10 mm\"", help);
         row.of(of).frame(BODY_FRAME)
     };
     let length = |name, of, help| {
-        let takes = positive(D::Length, LARGEST);
-        key(name, takes, "\"4 mm\"", help).of(of)
+        let value_type = positive(D::Length, MAX_EXTENT);
+        key(name, value_type, "\"4 mm\"", help).of(of)
     };
     let own = [
         key("form", ValueType::Word(Form::WORDS), "\"capsule\"", "form"),
         key("role", ValueType::Word(Role::WORDS), "\"frame\"", "function of the part, which sets its colour")
-            .absent("the role of its body"),
+            .default_text("the role of its body"),
         key("colour", ValueType::Text, "\"#c2255c\"", "red, green and blue in place of the role's colour")
-            .absent("the role's"),
+            .default_text("the role's"),
         point("from", LONG, "one end of the axis; of a cone, its base"),
         point("to", LONG, "the other end; of a cone, its tip"),
         point("centre", &["box", "sphere"], "its middle"),
@@ -330,7 +331,7 @@ fn of_shape(name: &'static str, head: &'static str, help: &'static str) -> FileT
         key("size", vector(D::Length), "\"10 20 30 mm\"", "edge lengths along x, y and z").of(&["box"]),
         key(
             "corners",
-            ValueType::Vectors(D::Length, many(MAX_CORNERS, "corners")),
+            ValueType::Vectors(D::Length, at_most(MAX_CORNERS, "corners")),
             "[\"0 0 0 mm\", \"10 0 0 mm\", \"0 10 0 mm\"]",
             "corners of a polygon in one plane, in its order",
         )
@@ -340,13 +341,13 @@ fn of_shape(name: &'static str, head: &'static str, help: &'static str) -> FileT
         key("file", ValueType::File, "\"arm.stl\"", "its triangles: STL, OBJ or glTF, beside the scene").of(&["mesh"]),
         key(
             "unit",
-            positive(D::Length, LARGEST),
+            positive(D::Length, MAX_EXTENT),
             "\"1 mm\"",
             "length of the file's unit, or that unit alone, `\"mm\"`",
         )
         .of(&["mesh"])
-        .absent("1 m for glTF; required for STL and OBJ"),
-        point("position", &["mesh"], "where the file's frame lies").zero(),
+        .default_text("1 m for glTF; required for STL and OBJ"),
+        point("position", &["mesh"], "where the file's frame lies").default_zero(),
         key(
             "rotation",
             ValueType::Table(&ROTATION),
@@ -354,7 +355,7 @@ fn of_shape(name: &'static str, head: &'static str, help: &'static str) -> FileT
             "orientation of the file's frame",
         )
         .of(&["mesh"])
-        .zero()
+        .default_zero()
         .frame(BODY_FRAME),
     ];
     FileTable::new(name, head, help, own.to_vec().leak()).by(Variants::Word("form", "{}"))
@@ -373,7 +374,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "how it moves, in this order: not at all, along `axis`, about `axis`, in every way, along and about \
              `axis`, about two axes",
         ),
-        key("parent", ValueType::Body, "\"world\"", "the body that carries it").absent("the world"),
+        key("parent", ValueType::Body, "\"world\"", "the body that carries it").default_text("the world"),
         key("child", ValueType::Body, "\"rod\"", "the body that it carries; each body is carried by exactly one joint"),
         key(
             "axis",
@@ -393,10 +394,10 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .frame("the child's"),
         key("parent_point", vector(D::Length), "\"0 0 100 mm\"", "where it is on the parent")
             .of(PLACED)
-            .zero()
+            .default_zero()
             .frame(PARENT),
         key("child_point", vector(D::Length), "\"0 0 -100 mm\"", "where it is on the child")
-            .zero()
+            .default_zero()
             .frame("the child's"),
         key(
             "rotation",
@@ -405,7 +406,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "orientation of the child where the joint's coordinate is 0",
         )
         .of(PLACED)
-        .zero()
+        .default_zero()
         .frame(PARENT),
         key(
             "drive",
@@ -414,7 +415,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "prescribed motion",
         )
         .of(MOVES)
-        .absent("none: it moves freely"),
+        .default_text("none: it moves freely"),
         key(
             "drive",
             ValueType::Table(&CYLINDRICAL_DRIVE),
@@ -422,7 +423,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "prescribed motions",
         )
         .of(&["cylindrical"])
-        .absent("none: it moves freely"),
+        .default_text("none: it moves freely"),
         key(
             "drive",
             ValueType::Table(&UNIVERSAL_DRIVE),
@@ -430,7 +431,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "prescribed motions",
         )
         .of(&["universal"])
-        .absent("none: it moves freely"),
+        .default_text("none: it moves freely"),
         key(
             "start",
             ValueType::Table(&START),
@@ -438,7 +439,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "initial coordinate and rate; not with a drive",
         )
         .of(MOVES)
-        .absent("0, at rest")
+        .default_text("0, at rest")
         .on_hinge(D::Angle, "{ position = \"10 deg\" }"),
         key(
             "start",
@@ -454,7 +455,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "initial coordinates and rates, except driven ones",
         )
         .of(&["cylindrical"])
-        .absent("0, at rest"),
+        .default_text("0, at rest"),
         key(
             "start",
             ValueType::Table(&UNIVERSAL_START),
@@ -462,7 +463,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "initial coordinates and rates, except driven ones",
         )
         .of(&["universal"])
-        .absent("0, at rest"),
+        .default_text("0, at rest"),
         key(
             "drawn",
             ValueType::Flag,
@@ -470,7 +471,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "whether a pin, a rail or a cross is drawn for it, where the scene's shapes show none",
         )
         .of(TURNS)
-        .absent("true"),
+        .default_text("true"),
         key(
             "closes_loop",
             ValueType::Flag,
@@ -478,7 +479,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "whether its child is carried by another joint, so that this joint closes a loop; it then has neither \
              `drive` nor `start`",
         )
-        .absent("false"),
+        .default_text("false"),
     ];
     FileTable::new("joint", "[[joint]]", "a joint that carries a body", keys.to_vec().leak())
         .by(Variants::Word("kind", "{} joint"))
@@ -489,8 +490,12 @@ static START: FileTable = FileTable::new(
     "`start` of a slide or a hinge",
     "where it starts",
     &[
-        key("position", number(D::Length), "\"10 mm\"", "its coordinate").on_hinge(D::Angle, "\"10 deg\"").zero(),
-        key("velocity", number(D::Speed), "\"10 mm/s\"", "its rate").on_hinge(D::AngularSpeed, "\"6 rad/s\"").zero(),
+        key("position", number(D::Length), "\"10 mm\"", "its coordinate")
+            .on_hinge(D::Angle, "\"10 deg\"")
+            .default_zero(),
+        key("velocity", number(D::Speed), "\"10 mm/s\"", "its rate")
+            .on_hinge(D::AngularSpeed, "\"6 rad/s\"")
+            .default_zero(),
     ],
 );
 
@@ -499,16 +504,16 @@ static CYLINDRICAL_START: FileTable = FileTable::new(
     "start of a cylindrical joint",
     "where it starts, along its axis and about it",
     &[
-        key("position", number(D::Length), "\"10 mm\"", "along it").zero(),
-        key("angle", number(D::Angle), "\"30 deg\"", "about it").zero(),
-        key("velocity", number(D::Speed), "\"10 mm/s\"", "along it").zero(),
-        key("angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about it").zero(),
+        key("position", number(D::Length), "\"10 mm\"", "along it").default_zero(),
+        key("angle", number(D::Angle), "\"30 deg\"", "about it").default_zero(),
+        key("velocity", number(D::Speed), "\"10 mm/s\"", "along it").default_zero(),
+        key("angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about it").default_zero(),
     ],
 );
 
 /// Row of the drive of one of two coordinates.
-fn motion(freedom: Freedom, like: &'static str, help: &'static str) -> FileKey {
-    key(freedom.word(), ValueType::Table(&DRIVE), like, help).absent("none: it moves freely")
+fn motion(freedom: Freedom, example: &'static str, help: &'static str) -> FileKey {
+    key(freedom.word(), ValueType::Table(&DRIVE), example, help).default_text("none: it moves freely")
 }
 
 const TURNING: &str = "{ law = \"constant\", velocity = \"6 rad/s\" }";
@@ -545,10 +550,10 @@ static UNIVERSAL_START: FileTable = FileTable::new(
     "start of a universal joint",
     "where it starts, about its axes",
     &[
-        key("angle", number(D::Angle), "\"10 deg\"", "about `axis`").zero(),
-        key("child_angle", number(D::Angle), "\"30 deg\"", "about `child_axis`").zero(),
-        key("angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about `axis`").zero(),
-        key("child_angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about `child_axis`").zero(),
+        key("angle", number(D::Angle), "\"10 deg\"", "about `axis`").default_zero(),
+        key("child_angle", number(D::Angle), "\"30 deg\"", "about `child_axis`").default_zero(),
+        key("angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about `axis`").default_zero(),
+        key("child_angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about `child_axis`").default_zero(),
     ],
 );
 
@@ -564,19 +569,19 @@ static FREE_START: FileTable = FileTable::new(
             "{ axis = [0, 1, 0], angle = \"15 deg\" }",
             "orientation of the child",
         )
-        .zero()
+        .default_zero()
         .frame(WORLD),
-        key("velocity", vector(D::Speed), "\"1 0 0 m/s\"", "velocity of `child_point`").zero().frame(WORLD),
+        key("velocity", vector(D::Speed), "\"1 0 0 m/s\"", "velocity of `child_point`").default_zero().frame(WORLD),
         key("angular_velocity", vector(D::AngularSpeed), "\"0 0 6 rad/s\"", "angular velocity of the child")
-            .zero()
+            .default_zero()
             .frame(WORLD),
     ],
 );
 
 static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
     let end = |name, help| {
-        let like = "{ body = \"rod\", at = \"0 0 100 mm\" }";
-        key(name, ValueType::Table(&ATTACHMENT), like, help)
+        let example = "{ body = \"rod\", at = \"0 0 100 mm\" }";
+        key(name, ValueType::Table(&ATTACHMENT), example, help)
     };
     let own = [
         key("name", ValueType::Name, "\"S1\"", "its name, different from those of other joints"),
@@ -588,14 +593,14 @@ static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "[0, 0, 1]",
             "side on which the socket is drawn open; no effect on the motion",
         )
-        .absent("`view.down`")
+        .default_text("`view.down`")
         .frame("that of the socket's body"),
     ];
     FileTable::new(
         "ball_joint",
         "[[ball_joint]]",
         "a ball joint, which closes a loop: with play, or ideal where its `clearance` is 0",
-        joined(&[&own, &contact_keys()]),
+        concatenated(&[&own, &contact_keys()]),
     )
     .also(&CONTACT)
 });
@@ -607,17 +612,17 @@ static PARAMETER: FileTable = FileTable::new(
     &[
         key("name", ValueType::Name, "\"stroke\"", "its name in expressions: letters, digits and `_`"),
         key("value", ValueType::Quantity, "\"20 mm\"", "its value"),
-        key("label", ValueType::Text, "\"Stroke\"", "its name in the window").absent("`name`"),
+        key("label", ValueType::Text, "\"Stroke\"", "its name in the window").default_text("`name`"),
         key("unit", ValueType::Text, "\"mm\"", "unit in which it is shown")
-            .absent("that of `value`; required where that is an expression"),
-        key("range", ValueType::Range, "[\"10 mm\", \"40 mm\"]", "least and greatest value").absent("any value"),
-        key("slider", ValueType::Range, "[\"15 mm\", \"30 mm\"]", "ends of its slider").absent("`range`"),
-        key("whole", ValueType::Flag, "true", "whether it is a whole number").absent("false"),
-        key("key", ValueType::Text, "\"chain.links\"", "its key for `--set`").absent("`parameter.` and its name"),
-        key("help", ValueType::Text, "\"How far it goes.\"", "what it is").absent("none"),
+            .default_text("that of `value`; required where that is an expression"),
+        key("range", ValueType::Range, "[\"10 mm\", \"40 mm\"]", "least and greatest value").default_text("any value"),
+        key("slider", ValueType::Range, "[\"15 mm\", \"30 mm\"]", "ends of its slider").default_text("`range`"),
+        key("whole", ValueType::Flag, "true", "whether it is a whole number").default_text("false"),
+        key("key", ValueType::Text, "\"chain.links\"", "its key for `--set`").default_text("`parameter.` and its name"),
+        key("help", ValueType::Text, "\"How far it goes.\"", "what it is").default_text("none"),
         key("group", ValueType::Text, "\"Drive\"", "heading under which the window folds it away")
-            .absent("shown first"),
-        key("equation", ValueType::Text, "\"Paper eq. (59)\"", "the equation that it enters").absent("none"),
+            .default_text("shown first"),
+        key("equation", ValueType::Text, "\"Paper eq. (59)\"", "the equation that it enters").default_text("none"),
     ],
 );
 
@@ -631,12 +636,12 @@ static PATTERN: LazyLock<FileTable> = LazyLock::new(|| {
             "{ axis = [0, 0, 1] }",
             "the axis about which each copy is turned from the one before",
         )
-        .or("along"),
+        .unless("along"),
         key("along", vector(D::Length), "\"100 0 0 mm\"", "by which each copy is shifted from the one before")
-            .or("about")
+            .unless("about")
             .frame(WORLD),
     ];
-    let keys = joined(&[&own, &parts()]);
+    let keys = concatenated(&[&own, &parts()]);
     FileTable::new("pattern", "[[pattern]]", "a group that is repeated", keys)
 });
 
@@ -645,9 +650,9 @@ static ABOUT: FileTable = FileTable::new(
     "`about` of a pattern",
     "about which copies are turned",
     &[
-        key("point", vector(D::Length), "\"0 0 100 mm\"", "a point on it").zero().frame(WORLD),
+        key("point", vector(D::Length), "\"0 0 100 mm\"", "a point on it").default_zero().frame(WORLD),
         key("axis", ValueType::Direction, "[0, 0, 1]", "its direction").frame(WORLD),
-        key("angle", number(D::Angle), "\"60 deg\"", "from copy to copy").absent("a turn over `count`"),
+        key("angle", number(D::Angle), "\"60 deg\"", "from copy to copy").default_text("a turn over `count`"),
     ],
 );
 

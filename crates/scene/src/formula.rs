@@ -17,7 +17,7 @@ pub(super) fn read_formula(
     let (program, of_quantities) = document
         .reading
         .formula(text, dimension, document.instance)
-        .map_err(|error| within(node, text, error.at(), &error.to_string()))?;
+        .map_err(|error| error_within(node, text, error.at(), &error.to_string()))?;
     if let Some(function) = program.kink() {
         let at = text.find(function).unwrap_or(0);
         let why = match dimension {
@@ -27,7 +27,7 @@ pub(super) fn read_formula(
         let message = format!(
             "`{function}` has no second derivative where it turns: {why}; smoothstep(x) rises smoothly from 0 to 1"
         );
-        return Err(within(node, text, at, &message));
+        return Err(error_within(node, text, at, &message));
     }
     let scale = match unit {
         None => 1.0,
@@ -48,13 +48,14 @@ pub(super) fn read_formula(
             Dimension::None => ["value", "derivative", "second derivative"],
             _ => ["position", "speed", "acceleration"],
         };
-        let lacks = finite.iter().position(|fine| !fine).unwrap_or(0);
-        return Err(node.error(format!("has no finite {} at t = 0", what[lacks])));
+        let missing = finite.iter().position(|is_finite| !is_finite).unwrap_or(0);
+        return Err(node.error(format!("has no finite {} at t = 0", what[missing])));
     }
     Ok((program, scale))
 }
 
-pub(super) fn within(node: &Node<'_>, text: &str, at: usize, message: &str) -> SceneError {
+/// An error at the byte offset `at` of the string `text`, the value of `node`.
+pub(super) fn error_within(node: &Node<'_>, text: &str, at: usize, message: &str) -> SceneError {
     let span = node.value.span();
     let inner = span.start + 1;
     // A string with escapes or triple quotes is marked as a whole, because its offsets differ from the source.

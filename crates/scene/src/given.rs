@@ -28,7 +28,7 @@ pub(super) enum Place {
     /// In an included file.
     Included,
     /// Not in the text: a default that was changed.
-    DefaultRule,
+    ChangedDefault,
 }
 
 impl FileNumber {

@@ -47,7 +47,7 @@ pub(super) fn read_includes<'d>(top: &Section<'d>) -> Result<Vec<Include<'d>>, S
         }
         let first = includes.iter().filter(|_| !prefix.is_empty()).find(|other| other.prefix == prefix);
         if let (Some(node), Some(first)) = (&name, first.and_then(|first| first.entry.as_ref()?.get("name"))) {
-            return Err(node.repeats(&first, "file", node.text()?));
+            return Err(node.duplicate_error(&first, "file", node.text()?));
         }
         let text = file.document.beside.text(file.text()?).map_err(|fault| file.error(fault.to_string()))?;
         if *text == *node.document.text {
@@ -113,7 +113,7 @@ pub(super) fn check_values(file: &Section<'_>) -> Result<(), SceneError> {
     let names = nodes.iter().filter_map(|node| node.value.get_ref().get("name")?.get_ref().as_str());
     let names: Vec<&str> = names.collect();
     let unknown = include.values.iter().filter(|(name, _)| !names.contains(name));
-    let Some((name, node)) = unknown.min_by_key(|(_, node)| node.place()) else {
+    let Some((name, node)) = unknown.min_by_key(|(_, node)| node.offset()) else {
         return Ok(());
     };
     let near = nearest(name, names.iter().copied());

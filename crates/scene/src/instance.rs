@@ -161,7 +161,7 @@ impl Instance<'_> {
     }
 
     /// Whether what is attached to the world is only shifted, so that axis-aligned boxes can follow.
-    pub fn keeps_axes(&self) -> bool {
+    pub fn preserves_axes(&self) -> bool {
         self.placements(None).all(|placement| placement.turn.angle() == 0.0)
     }
 }

@@ -45,13 +45,13 @@ pub struct FileKey {
     /// Name in the file.
     pub name: &'static str,
     /// Type of its value.
-    pub takes: ValueType,
+    pub value_type: ValueType,
     /// Example in TOML; "" for a parameter of the parameter table.
-    pub like: &'static str,
+    pub example: &'static str,
     /// Dimension and example on a hinge, if different.
     pub on_hinge: Option<(Dimension, &'static str)>,
     /// Default.
-    pub absent: DefaultRule,
+    pub default: DefaultRule,
     /// Reference frame of the value; "" if none.
     pub frame: &'static str,
     /// One-line description.
@@ -115,27 +115,27 @@ pub enum ValueType {
 #[derive(Clone, Copy, Debug)]
 pub struct ListLimit {
     /// Maximum number of entries.
-    pub most: usize,
+    pub max: usize,
     /// Plural noun for the entries.
-    pub what: &'static str,
+    pub entries: &'static str,
 }
 
-/// At most `most` entries, called `what`.
-pub(super) const fn many(most: usize, what: &'static str) -> ListLimit {
-    ListLimit { most, what }
+/// A limit of `max` entries; `entries` is their plural noun.
+pub(super) const fn at_most(max: usize, entries: &'static str) -> ListLimit {
+    ListLimit { max, entries }
 }
 
 /// Default of an omitted key.
 #[derive(Clone, Copy, Debug)]
 pub enum DefaultRule {
     /// Required.
-    Fault,
+    Required,
     /// Required unless this other key is present.
-    Or(&'static str),
+    RequiredUnless(&'static str),
     /// This number, SI, for each component; for a rotation, the identity; infinite for no limit.
-    Is(f64),
+    Number(f64),
     /// A default described in words.
-    Means(&'static str),
+    Description(&'static str),
 }
 
 impl FileTable {
@@ -178,7 +178,7 @@ impl FileTable {
         match self.variants {
             None => &[],
             Some(Variants::Presence(words)) => words,
-            Some(Variants::Word(by, _)) => match self.key(by, None).map(|key| key.takes) {
+            Some(Variants::Word(by, _)) => match self.key(by, None).map(|key| key.value_type) {
                 Some(ValueType::Word(words)) => words,
                 _ => &[],
             },
@@ -187,31 +187,46 @@ impl FileTable {
 }
 
 /// A required key.
-pub(super) const fn key(name: &'static str, takes: ValueType, like: &'static str, help: &'static str) -> FileKey {
-    FileKey { name, takes, like, on_hinge: None, absent: DefaultRule::Fault, frame: "", help, of: &[], fixed: false }
+pub(super) const fn key(
+    name: &'static str,
+    value_type: ValueType,
+    example: &'static str,
+    help: &'static str,
+) -> FileKey {
+    FileKey {
+        name,
+        value_type,
+        example,
+        on_hinge: None,
+        default: DefaultRule::Required,
+        frame: "",
+        help,
+        of: &[],
+        fixed: false,
+    }
 }
 
 impl FileKey {
     /// Makes the key optional, with a default described by `words`.
-    pub(super) const fn absent(mut self, words: &'static str) -> Self {
-        self.absent = DefaultRule::Means(words);
+    pub(super) const fn default_text(mut self, words: &'static str) -> Self {
+        self.default = DefaultRule::Description(words);
         self
     }
 
     /// Sets the default, SI.
-    pub(super) const fn is(mut self, value: f64) -> Self {
-        self.absent = DefaultRule::Is(value);
+    pub(super) const fn default_value(mut self, value: f64) -> Self {
+        self.default = DefaultRule::Number(value);
         self
     }
 
     /// Sets the default to 0.
-    pub(super) const fn zero(self) -> Self {
-        self.is(0.0)
+    pub(super) const fn default_zero(self) -> Self {
+        self.default_value(0.0)
     }
 
     /// Makes the key optional if `other` is present.
-    pub(super) const fn or(mut self, other: &'static str) -> Self {
-        self.absent = DefaultRule::Or(other);
+    pub(super) const fn unless(mut self, other: &'static str) -> Self {
+        self.default = DefaultRule::RequiredUnless(other);
         self
     }
 
@@ -228,8 +243,8 @@ impl FileKey {
     }
 
     /// Sets dimension and example on a hinge.
-    pub(super) const fn on_hinge(mut self, dimension: Dimension, like: &'static str) -> Self {
-        self.on_hinge = Some((dimension, like));
+    pub(super) const fn on_hinge(mut self, dimension: Dimension, example: &'static str) -> Self {
+        self.on_hinge = Some((dimension, example));
         self
     }
 
@@ -246,21 +261,21 @@ impl FileKey {
 
     /// Table of its value, or of the entries of its list.
     pub fn table(&self) -> Option<&'static FileTable> {
-        match self.takes {
+        match self.value_type {
             ValueType::Table(table) | ValueType::List(table, _) | ValueType::Files(table, _) => Some(table),
             _ => None,
         }
     }
 
     /// Example, that for a hinge if `hinge`.
-    pub(super) fn like(&self, hinge: bool) -> &'static str {
+    pub(super) fn example(&self, hinge: bool) -> &'static str {
         let own = self.on_hinge.filter(|_| hinge);
-        own.map_or(self.like, |(_, like)| like)
+        own.map_or(self.example, |(_, example)| example)
     }
 
     /// Dimension of its numbers, if any; for pairs, of the second number. `hinge` selects the dimension on a hinge.
     pub fn dimension(&self, hinge: bool) -> Option<Dimension> {
-        let dimension = match self.takes {
+        let dimension = match self.value_type {
             ValueType::Number(dimension, _)
             | ValueType::Vector(dimension, _)
             | ValueType::Numbers(_, dimension)
@@ -274,20 +289,20 @@ impl FileKey {
 
     /// Closed range of its numbers, SI.
     pub fn range(&self) -> (f64, f64) {
-        match self.takes {
+        match self.value_type {
             ValueType::Number(_, range) | ValueType::Vector(_, range) => range,
             _ => UNCHECKED,
         }
     }
 
     /// Limit of its list, if any.
-    pub fn many(&self) -> Option<ListLimit> {
-        match self.takes {
-            ValueType::List(_, many)
-            | ValueType::Vectors(_, many)
-            | ValueType::Pairs(_, many)
-            | ValueType::Words(_, many)
-            | ValueType::Files(_, many) => Some(many),
+    pub fn list_limit(&self) -> Option<ListLimit> {
+        match self.value_type {
+            ValueType::List(_, limit)
+            | ValueType::Vectors(_, limit)
+            | ValueType::Pairs(_, limit)
+            | ValueType::Words(_, limit)
+            | ValueType::Files(_, limit) => Some(limit),
             _ => None,
         }
     }
@@ -298,9 +313,9 @@ pub(super) const fn number(dimension: Dimension) -> ValueType {
     ValueType::Number(dimension, ANY)
 }
 
-/// A quantity above 0 and at most `most`, SI.
-pub(super) const fn positive(dimension: Dimension, most: f64) -> ValueType {
-    ValueType::Number(dimension, (ABOVE_ZERO, most))
+/// A quantity above 0 and at most `max`, SI.
+pub(super) const fn positive(dimension: Dimension, max: f64) -> ValueType {
+    ValueType::Number(dimension, (ABOVE_ZERO, max))
 }
 
 /// A vector without a range.

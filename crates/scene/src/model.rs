@@ -40,8 +40,8 @@ pub struct Source {
     pub file: Option<String>,
     /// The TOML text.
     pub text: String,
-    /// Byte offsets in the text for errors found after reading: each parameter in the text, by key; `closed_form` for its section;
-    /// `joint.<name>` for each ball joint.
+    /// Byte offsets in the text for errors found after reading: each parameter in the text, by key; `closed_form` for its
+    /// section; `joint.<name>` for each ball joint.
     pub places: BTreeMap<String, usize>,
     /// Numbers parsed from the text, by key.
     pub numbers: Arc<BTreeMap<String, FileNumber>>,

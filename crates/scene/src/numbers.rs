@@ -9,7 +9,7 @@ use super::parameters::{Kind, Parameter, Scope};
 use super::value::Value;
 
 /// Larger than any number in a scene file.
-pub(super) const LARGEST: f64 = 1e13;
+pub(super) const MAX_NUMBER: f64 = 1e13;
 
 /// Group of the parameters of a file that names none; a window shows them first.
 pub const OWN_GROUP: &str = "Machine";
@@ -18,8 +18,8 @@ pub const OWN_GROUP: &str = "Machine";
 pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Parameter {
     let kind = Kind::Number {
         dimension: number.dimension,
-        min: number.range.0.max(-LARGEST),
-        max: number.range.1.min(LARGEST),
+        min: number.range.0.max(-MAX_NUMBER),
+        max: number.range.1.min(MAX_NUMBER),
         display: number.unit,
         slider: (-1.0, 1.0),
         logarithmic: false,
@@ -31,8 +31,8 @@ pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Paramete
     )
 }
 
-/// Row with this key, label, help, equation and group. Rows live as long as the program, like those of the table; equal ones are shared, so that a
-/// change of value adds none.
+/// Row with this key, label, help, equation and group. Rows live as long as the program, like those of the table; equal ones are
+/// shared, so that a change of value adds none.
 pub(super) fn row_of_file(
     [key, label, help, equation, group]: [&str; 5],
     kind: Kind,

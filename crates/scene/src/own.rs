@@ -4,7 +4,7 @@ use super::document::{Node, Section, lists};
 use super::error::place_of;
 use super::include::check_values;
 use super::instance::Instance;
-use super::numbers::{LARGEST, OWN_GROUP, row_of_file};
+use super::numbers::{MAX_NUMBER, OWN_GROUP, row_of_file};
 use super::*;
 use jointplay_physics::units::{all_units, same_unit, split_unit};
 
@@ -12,7 +12,7 @@ use jointplay_physics::units::{all_units, same_unit, split_unit};
 ///
 /// # Errors
 /// An invalid or repeated parameter.
-pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<&'static Parameter>, SceneError> {
+pub(super) fn read_user_parameters(files: &[Section<'_>]) -> Result<Vec<&'static Parameter>, SceneError> {
     let mut all: Vec<(&Parameter, bool)> = Vec::new();
     files.iter().try_for_each(check_values)?;
     let nodes = lists(files, "parameter", Vec::new())?;
@@ -23,7 +23,7 @@ pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<&'static Parameter>,
             let [name, first] =
                 [node, &nodes[first]].map(|node| node.section_as(node.title("parameter"))?.require("name"));
             let name = name?;
-            return Err(name.repeats(&first?, "parameter", &name.name()?));
+            return Err(name.duplicate_error(&first?, "parameter", &name.name()?));
         }
         all.push(own);
     }
@@ -78,7 +78,7 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     if let (true, Some(node), false) = (whole, section.get("whole"), dimension == Dimension::None) {
         return Err(node.error("a whole number has no unit"));
     }
-    let value_node = value_node.retitled(key.clone());
+    let value_node = value_node.with_key(key.clone());
     let value = value_node.quantity(dimension)?;
     let pair = |key: &str| section.get(key).map(|node| read_range(&node, dimension)).transpose();
     let words = |key: &str| section.get(key).map(|node| node.text()).transpose();
@@ -92,7 +92,7 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
         0.0 => (-1.0, 1.0),
         default => ((2.0 * default).min(0.0), (2.0 * default).max(0.0)),
     };
-    let (min, max) = range.unwrap_or((-LARGEST, LARGEST));
+    let (min, max) = range.unwrap_or((-MAX_NUMBER, MAX_NUMBER));
     let slider = pair("slider")?.or(range).unwrap_or(around);
     let kind = match whole {
         true => Kind::Count { min: min as u64, max: max as u64 },
@@ -104,13 +104,13 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     let checked = if whole { row.read(value_node.scalar()?).map(|_| ()) } else { row.check(&Value::Number(value)) };
     checked.map_err(|error| {
         let place = passed.map(|_| {
-            let (line, _) = place_of(document.text, section.place());
+            let (line, _) = place_of(document.text, section.offset());
             let file = document.file.map_or_else(String::new, |file| format!(" of {}", visible_line(file)));
             format!("; the parameter is defined in line {line}{file}")
         });
         value_node.error(format!("{error}{}", place.unwrap_or_default()))
     })?;
-    document.reading.own(&full, value, dimension);
+    document.reading.define_parameter(&full, value, dimension);
     // An expression without a range is an ordinary number, not an adjustable parameter.
     Ok((row, default.is_some() || range.is_some()))
 }

@@ -27,7 +27,7 @@ pub(super) fn read_patterns<'d>(files: &[Section<'d>]) -> Result<Vec<Pattern<'d>
         let pattern = read_pattern(&node)?;
         let name = pattern.section.require("name")?;
         if let Some(first) = names.insert(name.name()?, name.clone()) {
-            return Err(name.repeats(&first, "pattern", name.text()?));
+            return Err(name.duplicate_error(&first, "pattern", name.text()?));
         }
         patterns.push(pattern);
     }
@@ -59,11 +59,11 @@ fn names_previous(value: &DeValue<'_>) -> bool {
 fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
     let section = node.section_as(node.title("pattern"))?;
     let lists = section.rows.keys.iter();
-    let lists = lists.filter(|key| matches!(key.takes, ValueType::List(..)));
+    let lists = lists.filter(|key| matches!(key.value_type, ValueType::List(..)));
     let lists: Vec<&str> = lists.map(|key| key.name).collect();
     section.require("name")?.name()?;
     let count_node = section.require("count")?;
-    let count = count_node.whole()?;
+    let count = count_node.whole_number()?;
     let mut names = Names::default();
     add_names(section.table, &mut names.bodies, &mut names.joints);
     let size: usize = lists.iter().filter_map(|name| section.get(name)).map(|list| values(list.value.get_ref())).sum();

@@ -15,7 +15,7 @@ pub(super) static ATTACHMENT: FileTable = FileTable::new(
     "where something holds a body",
     &[
         key("body", ValueType::Body, "\"rod\"", "the body, or `world`"),
-        key("at", vector(D::Length), "\"0 0 100 mm\"", "the point").zero().frame("that of its `body`"),
+        key("at", vector(D::Length), "\"0 0 100 mm\"", "the point").default_zero().frame("that of its `body`"),
     ],
 );
 

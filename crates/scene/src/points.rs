@@ -117,7 +117,7 @@ pub(super) fn read_points(node: &Node<'_>, graph: &Graph) -> Result<Points, Scen
         let risen = graph.check_rise(&points);
         risen.map_err(|fault| x.error(fault.to_string()))?;
     }
-    let closed = close(&mut points, graph);
+    let closed = check_ends(&mut points, graph);
     closed.map_err(|fault| node.error(fault.to_string()))?;
     Ok(points)
 }
@@ -173,7 +173,7 @@ pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneE
         let risen = graph.check_rise(&points);
         risen.map_err(|fault| file.error(x.clone(), "", None, fault.to_string()))?;
     }
-    let closed = close(&mut points, graph);
+    let closed = check_ends(&mut points, graph);
     closed.map_err(|fault| node.error(fault.to_string()))?;
     Ok(points)
 }
@@ -230,7 +230,7 @@ impl<'t> Column<'t> {
 }
 
 /// Checks the number of points. The ends of a period must match, and are then made equal.
-fn close(points: &mut Points, graph: &Graph) -> Result<(), PointsFault> {
+fn check_ends(points: &mut Points, graph: &Graph) -> Result<(), PointsFault> {
     let least = if graph.repeats { 3 } else { 2 };
     if points.len() < least {
         let count = points.len();

@@ -28,14 +28,14 @@ pub enum DimensionError {
     #[error("is not a finite number")]
     NotFinite,
     /// A value of the wrong dimension.
-    #[error("gives {}", foreign(*.value, *.powers, *.wanted))]
-    Foreign {
+    #[error("gives {}", wrong_dimension(*.value, *.powers, *.required))]
+    WrongDimension {
         /// SI value.
         value: f64,
         /// Exponents of kg, m, s and rad.
         powers: [i8; 4],
         /// The dimension required.
-        wanted: Dimension,
+        required: Dimension,
     },
 }
 
@@ -89,12 +89,12 @@ impl Quantity {
 
     /// Whether it has this dimension, by the rules of [`Self::of`]; its value may be infinite or not a number.
     pub(super) fn has(self, dimension: Dimension, exact: bool) -> Result<(), DimensionError> {
-        let (found, wanted) = (self.powers?, powers(dimension));
-        let angle = !exact && wanted[..3] != [0; 3] || wanted[3] == found[3] || self.value == 0.0;
-        if found[..3] == wanted[..3] && angle {
+        let (own, required) = (self.powers?, powers(dimension));
+        let angle = !exact && required[..3] != [0; 3] || required[3] == own[3] || self.value == 0.0;
+        if own[..3] == required[..3] && angle {
             return Ok(());
         }
-        Err(DimensionError::Foreign { value: self.value, powers: found, wanted: dimension })
+        Err(DimensionError::WrongDimension { value: self.value, powers: own, required: dimension })
     }
 }
 
@@ -117,14 +117,14 @@ pub fn evaluate(text: &str, names: &[(&str, Quantity)]) -> Result<Quantity, Expr
 }
 
 /// Error text: a value with its unit, and the required units.
-fn foreign(value: f64, powers: [i8; 4], wanted: Dimension) -> String {
+fn wrong_dimension(value: f64, powers: [i8; 4], required: Dimension) -> String {
     let (value, unit) = (format_quantity(value, ""), unit_of(powers));
-    match unit_names(wanted).as_slice() {
+    match unit_names(required).as_slice() {
         [] => format!("{value} {unit}, but must be a pure number"),
         units => format!(
             "{value}{}{unit}, which is not in {}; units {}",
             if unit.is_empty() { "" } else { " " },
-            si_unit(wanted),
+            si_unit(required),
             units.join(", ")
         ),
     }

@@ -8,7 +8,7 @@ use super::error::{no_ball_joint, no_body};
 use super::format::FILE;
 use super::include::{self, read_includes};
 use super::instance::{Group, Instance};
-use super::own::read_own;
+use super::own::read_user_parameters;
 use super::pattern::{Pattern, read_patterns};
 use super::placement::read_placement;
 use super::read_bodies::{read_body, read_shape};
@@ -70,19 +70,19 @@ impl Scene {
         Self::read(text, file, beside, changes, |_, _| true)
     }
 
-    /// Like [`Self::parse_beside`], without the changes of keys that `keeps` rejects once the bodies and joints are read.
+    /// Like [`Self::parse_beside`], without the changes of keys that `retains` rejects once the bodies and joints are read.
     pub(super) fn read(
         text: &str,
         file: Option<&str>,
         beside: AssetResolver<'_>,
         changes: &[(String, String)],
-        keeps: fn(&Self, &str) -> bool,
+        retains: fn(&Self, &str) -> bool,
     ) -> Result<Self, SceneError> {
-        let of_text = changes.iter().filter(|(key, _)| is_of_text(key));
+        let of_text = changes.iter().filter(|(key, _)| replaces_text(key));
         let reading = Reading::new(of_text);
         let document =
             Document { file, text, reading: &reading, beside: &beside, include: None, instance: None, on_hinge: false };
-        let mut scene = Self::read_document(document, changes, keeps)?;
+        let mut scene = Self::read_document(document, changes, retains)?;
         scene.source.beside = beside.into_texts();
         Ok(scene)
     }
@@ -90,7 +90,7 @@ impl Scene {
     fn read_document(
         document: Document<'_>,
         changes: &[(String, String)],
-        keeps: fn(&Self, &str) -> bool,
+        retains: fn(&Self, &str) -> bool,
     ) -> Result<Self, SceneError> {
         let Document { file, text, .. } = document;
         if text.trim().is_empty() {
@@ -110,33 +110,35 @@ impl Scene {
         });
         let files = std::iter::once(Ok(top.clone())).chain(included);
         let files = files.collect::<Result<Vec<_>, _>>()?;
-        let own = read_own(&files)?;
-        let whole = read_whole(&top)?;
-        let placed = includes.iter().zip(&named).map(|(include, named)| include.placed(named.as_ref(), whole.as_ref()));
+        let own = read_user_parameters(&files)?;
+        let scene_instance = read_scene_instance(&top)?;
+        let placed =
+            includes.iter().zip(&named).map(|(include, named)| include.placed(named.as_ref(), scene_instance.as_ref()));
         let placed = placed.collect::<Result<Vec<_>, _>>()?;
-        let instances = std::iter::once(whole.as_ref()).chain(placed.iter().map(Option::as_ref));
+        let instances = std::iter::once(scene_instance.as_ref()).chain(placed.iter().map(Option::as_ref));
         let files = files.into_iter().zip(instances);
         let files = files.map(|(file, instance)| Section { document: Document { instance, ..file.document }, ..file });
         let files: Vec<Section<'_>> = files.collect();
         let patterns = read_patterns(&files)?;
         let mut scene = read_settings(&top)?;
-        if let (Some(whole), Some(form)) = (&whole, &mut scene.machine.closed_form)
+        if let (Some(scene_instance), Some(form)) = (&scene_instance, &mut scene.machine.closed_form)
             && let Some(path) = &mut form.path
         {
-            let origin = whole.point(None, Vec3::zeros());
-            path.place = Some((whole.rotation(None, Quat::identity()).to_rotation_matrix().into_inner(), origin));
+            let origin = scene_instance.point(None, Vec3::zeros());
+            path.place =
+                Some((scene_instance.rotation(None, Quat::identity()).to_rotation_matrix().into_inner(), origin));
         }
         let mut places = read_parameters(&top, &mut scene)?;
         scene.source.places = places
             .iter()
-            .map(|(key, node)| (key.clone(), node.place()))
-            .chain(top.get("closed_form").map(|node| ("closed_form".to_owned(), node.place())))
+            .map(|(key, node)| (key.clone(), node.offset()))
+            .chain(top.get("closed_form").map(|node| ("closed_form".to_owned(), node.offset())))
             .collect();
         read_mechanism(&files, &patterns, &mut scene, &mut places)?;
         scene.source.numbers = Arc::new(document.reading.numbers());
         scene.source.own = own;
         for (key, value) in changes {
-            if keeps(&scene, key) {
+            if retains(&scene, key) {
                 scene.change(key, value)?;
             }
         }
@@ -157,20 +159,20 @@ impl Scene {
 ///
 /// # Errors
 /// An invalid place.
-fn read_whole<'d>(top: &Section<'_>) -> Result<Option<Instance<'d>>, SceneError> {
+fn read_scene_instance<'d>(top: &Section<'_>) -> Result<Option<Instance<'d>>, SceneError> {
     let placement = read_placement(top)?;
     Ok(placement.map(|placement| Instance { group: Group::Scene, placement, outer: None }))
 }
 
 /// Whether a change of a key replaces a value of the text, which is read again: a number of the text, the parameter that places
 /// bodies, or the preset, which gives way to other settings. Other parameters of the table are changed in the machine.
-pub(super) fn is_of_text(key: &str) -> bool {
+pub(super) fn replaces_text(key: &str) -> bool {
     let in_table = |(_, part): (&str, &str)| find(&format!("contact.{part}")).is_some();
-    key == "solver.preset" || find(key).is_none() && !joint_part(key).is_some_and(in_table) && !file_only(key)
+    key == "solver.preset" || find(key).is_none() && !joint_part(key).is_some_and(in_table) && !is_fixed_in_file(key)
 }
 
 /// Whether a key exists in scene files but can never be changed from outside.
-pub(super) fn file_only(key: &str) -> bool {
+pub(super) fn is_fixed_in_file(key: &str) -> bool {
     let mut table: Option<&FileTable> = Some(&FILE);
     let mut fixed = false;
     for part in key.split('.') {
@@ -299,7 +301,7 @@ fn read_mechanism<'d>(
         let joint = read_joint(&node, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
         if joint.section.document.include.is_none() {
-            scene.source.places.insert(format!("joint.{}", joint.name), joint.section.place());
+            scene.source.places.insert(format!("joint.{}", joint.name), joint.section.offset());
         }
         joints.push(joint);
     }
@@ -319,7 +321,7 @@ fn read_mechanism<'d>(
         joint_names.add(&section, "joint", &joint.name)?;
         let title = format!("joint.{}", joint.name);
         if section.document.include.is_none() {
-            scene.source.places.insert(title, section.place());
+            scene.source.places.insert(title, section.offset());
         }
         scene.overrides.push(own.keys().copied().collect());
         places.extend(own.into_iter().map(|(part, node)| (format!("joint.{}.{part}", joint.name), node)));
@@ -415,7 +417,7 @@ impl<'d> Names<'d> {
         let node = section.require("name")?;
         match self.places.insert(name.to_owned(), node.clone()) {
             None => Ok(()),
-            Some(first) => Err(node.repeats(&first, what, name)),
+            Some(first) => Err(node.duplicate_error(&first, what, name)),
         }
     }
 }

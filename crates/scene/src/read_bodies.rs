@@ -1,6 +1,6 @@
 //! Bodies and shapes of a scene file.
 
-use super::assets::NoMesh;
+use super::assets::MeshError;
 use super::document::{Document, Node, Section};
 use super::instance::Instance;
 use super::mesh::{Fault, Format};
@@ -201,8 +201,8 @@ fn read_mesh(section: &Section<'_>) -> Result<Geometry, SceneError> {
     let document = &file.document;
     let mesh = document.beside.mesh(name);
     let mesh = mesh.map_err(|why| match why {
-        NoMesh::Nowhere(fault) => file.error(fault.to_string()),
-        NoMesh::Within { text, fault } => error_in(name, text.as_deref(), fault, document),
+        MeshError::Unavailable(fault) => file.error(fault.to_string()),
+        MeshError::Invalid { text, fault } => error_in(name, text.as_deref(), fault, document),
     })?;
     let own = Format::of(name).and_then(Format::unit);
     let unit = match own.filter(|_| section.get("unit").is_none()) {
@@ -283,7 +283,7 @@ fn place_shape(shape: &mut Shape, instance: &Instance<'_>) {
                 *corner = point(*corner);
             }
         }
-        Geometry::Box { centre, .. } if instance.keeps_axes() => *centre = point(*centre),
+        Geometry::Box { centre, .. } if instance.preserves_axes() => *centre = point(*centre),
         Geometry::Mesh { position, rotation, .. } => {
             *position = point(*position);
             *rotation = instance.rotation(None, *rotation);

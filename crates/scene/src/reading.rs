@@ -76,22 +76,22 @@ impl<'d> Reading<'d> {
             Ok(value) => return Ok(value),
             Err(error) => error,
         };
-        let plain = plain(text);
+        let ascii = to_ascii(text);
         let own = self.own.borrow();
         let (names, mut values) = named(&own, instance);
         let first_unit = values.len();
         values.extend(self.units());
         let program = Program::parse_with_units(
-            &plain,
+            &ascii,
             |name| names.iter().position(|own| *own == name),
             &names,
             |rest| unit_at_start(rest).map(|(length, place)| (length, first_unit + place)),
         );
-        let may_be_meant = operates(&plain) || split_unit(&plain) == plain;
+        let may_be_expression = has_operators(&ascii) || split_unit(&ascii) == ascii;
         match program {
             Ok(program) => {
                 let uses_own = (0..first_unit).any(|own| program.uses(own));
-                if !uses_own && !operates(&plain) {
+                if !uses_own && !has_operators(&ascii) {
                     // A number with its unit: the first error is more specific.
                     return Err(error.into());
                 }
@@ -99,7 +99,7 @@ impl<'d> Reading<'d> {
                 // A lone parameter must match exactly: only in products are radians optional.
                 Ok(value.of(dimension, uses_own && program.length() == 1)?)
             }
-            Err(wrong) if may_be_meant && !names.is_empty() => Err(wrong.into()),
+            Err(wrong) if may_be_expression && !names.is_empty() => Err(wrong.into()),
             Err(_) => Err(error.into()),
         }
     }
@@ -116,7 +116,7 @@ impl<'d> Reading<'d> {
         dimension: Dimension,
         instance: Option<&Instance<'_>>,
     ) -> Result<(Program, bool), ReadingError> {
-        let (program, value, has_units) = self.compiled(text, &[], instance)?;
+        let (program, value, has_units) = self.compile(text, &[], instance)?;
         if has_units {
             value.of(dimension, false)?;
         }
@@ -129,13 +129,13 @@ impl<'d> Reading<'d> {
     /// # Errors
     /// Invalid syntax, unit or dimension.
     pub fn function(&self, text: &str) -> Result<(Program, Quantity), ReadingError> {
-        let (program, value, _) = self.compiled(text, &self.functions.borrow(), None)?;
+        let (program, value, _) = self.compile(text, &self.functions.borrow(), None)?;
         value.dimension()?;
         Ok((program, value))
     }
 
     /// Compiles `text` as a function of t and `functions`; the program, its value at t = 0, and whether it has units.
-    fn compiled(
+    fn compile(
         &self,
         text: &str,
         functions: &[(String, Quantity)],
@@ -145,29 +145,29 @@ impl<'d> Reading<'d> {
         let of_time = [("t", Quantity::new(0.0, Dimension::Time))];
         let functions = functions.iter().map(|(name, value)| (name.as_str(), *value));
         let (mut names, mut values): (Vec<&str>, Vec<Quantity>) = of_time.into_iter().chain(functions).unzip();
-        let kept = names.len();
+        let free = names.len();
         let (own_names, own_values) = named(&own, instance);
         names.extend(own_names);
         values.extend(own_values);
         let first_unit = values.len();
         values.extend(self.units());
         let variable = |name: &str| names.iter().position(|of| *of == name);
-        let numbers: Vec<f64> = values[kept..].iter().map(Quantity::value).collect();
+        let numbers: Vec<f64> = values[free..].iter().map(Quantity::value).collect();
         let bare = Program::parse(text, variable, &names);
         let has_unit = |program: &Program| (1..first_unit).any(|own| program.uses(own) && !values[own].is_pure());
         if let Ok(program) = &bare
             && !has_unit(program)
         {
             let start: Vec<f64> = values.iter().map(Quantity::value).collect();
-            return Ok((program.with_bound_variables(kept, &numbers), Quantity::constant(program.eval(&start)), false));
+            return Ok((program.with_bound_variables(free, &numbers), Quantity::constant(program.eval(&start)), false));
         }
-        let spelt = plain(text);
+        let ascii = to_ascii(text);
         let unit = |rest: &str| {
             let (length, place) = unit_at_start(rest)?;
             Some((length, first_unit + place))
         };
-        match Program::parse_with_units(&spelt, variable, &names, unit) {
-            Ok(program) => Ok((program.with_bound_variables(kept, &numbers), program.eval(&values), true)),
+        match Program::parse_with_units(&ascii, variable, &names, unit) {
+            Ok(program) => Ok((program.with_bound_variables(free, &numbers), program.eval(&values), true)),
             // The error of the parse without units is more specific.
             Err(wrong) => Err(bare.err().unwrap_or(wrong).into()),
         }
@@ -182,13 +182,13 @@ impl<'d> Reading<'d> {
     }
 
     /// Defines the user parameter `name` for later expressions.
-    pub fn own(&self, name: &str, value: f64, dimension: Dimension) {
+    pub fn define_parameter(&self, name: &str, value: f64, dimension: Dimension) {
         let value = Quantity::new(value, dimension);
         self.own.borrow_mut().insert(name.to_owned(), value);
     }
 
     /// Whether `name` is that of a parameter of the scene or of a function.
-    pub fn names(&self, name: &str) -> bool {
+    pub fn is_defined(&self, name: &str) -> bool {
         self.own.borrow().contains_key(name) || self.functions.borrow().iter().any(|(own, _)| own == name)
     }
 
@@ -227,7 +227,7 @@ fn named<'a>(own: &'a BTreeMap<String, Quantity>, instance: Option<&Instance<'_>
 }
 
 /// Whether a text has operators beyond those of a number with its unit.
-fn operates(text: &str) -> bool {
+fn has_operators(text: &str) -> bool {
     let rest = split_unit(text);
     // In a unit, letters follow the slash: `m/s`.
     let number = |part: &str| part.trim_start().starts_with(|c: char| c.is_ascii_digit());
@@ -236,10 +236,10 @@ fn operates(text: &str) -> bool {
 }
 
 /// The text with unit symbols such as `µ`, `²` and `°` in ASCII.
-fn plain(text: &str) -> Cow<'_, str> {
+fn to_ascii(text: &str) -> Cow<'_, str> {
     if text.is_ascii() {
         return Cow::Borrowed(text);
     }
-    let spelt = text.replace(['µ', 'μ'], "u").replace('²', "^2").replace('³', "^3");
-    Cow::Owned(spelt.replace(['·', '⋅'], " ").replace('°', " deg"))
+    let ascii = text.replace(['µ', 'μ'], "u").replace('²', "^2").replace('³', "^3");
+    Cow::Owned(ascii.replace(['·', '⋅'], " ").replace('°', " deg"))
 }

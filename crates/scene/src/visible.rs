@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_steers_is_shown_and_the_rest_stays() {
+    fn control_characters_are_escaped_and_all_others_are_kept() {
         let plain = "µ ≤ 3 \"β\" \u{1f600}\n\tα";
         assert!(matches!(visible(plain), Cow::Borrowed(same) if same == plain));
         assert_eq!(visible_line("a\nb\tc"), "a\\u000ab\\u0009c");

@@ -18,12 +18,12 @@ impl Scene {
     /// # Errors
     /// A change that the format cannot express.
     pub fn to_toml(&self) -> Result<String, SceneError> {
-        let lost =
+        let write_error =
             |key: &str, message: String| SceneError { key: Some(key.to_owned()), message, ..SceneError::default() };
         let mut document: DocumentMut = self
             .numbers_in_place()?
             .parse()
-            .map_err(|error: toml_edit::TomlError| lost("", error.message().to_owned()))?;
+            .map_err(|error: toml_edit::TomlError| write_error("", error.message().to_owned()))?;
         for (key, _) in &self.changes {
             if !self.source.numbers.contains_key(key) {
                 self.write_change(&mut document, key)?;
@@ -35,7 +35,7 @@ impl Scene {
         let read = Self::parse_with(&text, source.file.as_deref(), &source.beside, &[])?;
         for (key, _) in &self.changes {
             if read.get(key)? != self.get(key)? {
-                return Err(lost(key, "cannot be written to a scene file".to_owned()));
+                return Err(write_error(key, "cannot be written to a scene file".to_owned()));
             }
         }
         Ok(text)
@@ -61,7 +61,7 @@ impl Scene {
                 Place::Included => {
                     return Err(refuse("it is in another file, which this one includes"));
                 }
-                Place::DefaultRule => {
+                Place::ChangedDefault => {
                     return Err(refuse("the text does not give it; write it there first"));
                 }
                 Place::Value(span) if same.len() == 1 => (span, text(number)),
@@ -86,24 +86,24 @@ impl Scene {
         let item = self.item(key)?;
         if let Some((name, part)) = joint_part(key) {
             let mut lists = ["joint_contact", "ball_joint"].into_iter();
-            if !lists.any(|list| put_joint(document.get_mut(list), name, part, &item)) {
+            if !lists.any(|list| set_joint_value(document.get_mut(list), name, part, &item)) {
                 add_joint_contact(document, name, part, item);
             }
             return Ok(());
         }
         match parameter.key.split_once('.') {
-            None => put(document.as_table_mut(), parameter.key, item),
+            None => set_value(document.as_table_mut(), parameter.key, item),
             Some((section, part)) => {
-                let fresh = !document.contains_key(section);
+                let is_new = !document.contains_key(section);
                 let table = document.entry(section).or_insert_with(|| Item::Table(Table::new()));
                 let table = table.as_table_like_mut().expect("the scene was read from this text");
                 // If a section gives one component of gravity, the others are 0.
-                if fresh && section == "gravity" {
+                if is_new && section == "gravity" {
                     for part in ["x", "y", "z"] {
-                        put(table, part, self.item(&format!("gravity.{part}"))?);
+                        set_value(table, part, self.item(&format!("gravity.{part}"))?);
                     }
                 } else {
-                    put(table, part, item);
+                    set_value(table, part, item);
                 }
             }
         }
@@ -125,7 +125,7 @@ fn toml_of(text: &str) -> Toml {
 }
 
 /// Writes `item` to the entry named `name` in a list of joints, if there is one.
-fn put_joint(joints: Option<&mut Item>, name: &str, part: &str, item: &Item) -> bool {
+fn set_joint_value(joints: Option<&mut Item>, name: &str, part: &str, item: &Item) -> bool {
     let mut entries: Vec<&mut dyn TableLike> = match joints {
         Some(Item::ArrayOfTables(tables)) => tables.iter_mut().map(|table| table as _).collect(),
         Some(Item::Value(Toml::Array(array))) => {
@@ -134,7 +134,7 @@ fn put_joint(joints: Option<&mut Item>, name: &str, part: &str, item: &Item) -> 
         _ => Vec::new(),
     };
     let named = entries.iter_mut().find(|entry| entry.get("name").and_then(Item::as_str) == Some(name));
-    named.map(|entry| put(*entry, part, item.clone())).is_some()
+    named.map(|entry| set_value(*entry, part, item.clone())).is_some()
 }
 
 /// Adds a `[[joint_contact]]` with `item` for the ball joint `name`.
@@ -151,7 +151,7 @@ fn add_joint_contact(document: &mut DocumentMut, name: &str, part: &str, item: I
 }
 
 /// Writes `item` to `table`; comments above and after the old value are preserved.
-fn put(table: &mut dyn TableLike, name: &str, mut item: Item) {
+fn set_value(table: &mut dyn TableLike, name: &str, mut item: Item) {
     let Some(old) = table.get_mut(name) else {
         table.insert(name, item);
         return;

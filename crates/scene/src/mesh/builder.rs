@@ -9,7 +9,7 @@ pub const MAX_TRIANGLES: usize = 200_000;
 /// Maximum number of vertices in a file.
 const MAX_CORNERS: usize = 1_000_000;
 /// Largest absolute coordinate, in file units.
-const LARGEST: f64 = 1e9;
+const MAX_COORDINATE: f64 = 1e9;
 
 /// Collects vertices and triangles, and merges vertices at the same position.
 #[derive(Default)]
@@ -18,19 +18,19 @@ pub(super) struct Builder {
     vertices: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     /// Numbers of vertices and triangles submitted: merged and degenerate ones also cost time.
-    asked: [usize; 2],
+    submitted: [usize; 2],
 }
 
 impl Builder {
     /// Index of the vertex at `place`, which is added if new.
     pub fn vertex(&mut self, place: [f64; 3]) -> Result<u32, MeshFault> {
-        self.asked[0] += 1;
-        if self.asked[0] > MAX_CORNERS {
+        self.submitted[0] += 1;
+        if self.submitted[0] > MAX_CORNERS {
             let (what, most) = ("vertices", MAX_CORNERS);
             return Err(MeshFault::TooMany { what, most });
         }
-        if !place.iter().all(|x| x.abs() <= LARGEST) {
-            return Err(MeshFault::OutOfRange { most: LARGEST });
+        if !place.iter().all(|x| x.abs() <= MAX_COORDINATE) {
+            return Err(MeshFault::OutOfRange { most: MAX_COORDINATE });
         }
         // Adding 0 turns -0 into 0, so that both share a vertex.
         let place = place.map(|x| x as f32 + 0.0);
@@ -44,8 +44,8 @@ impl Builder {
 
     /// Adds a triangle; one with a repeated vertex is dropped.
     pub fn triangle(&mut self, [a, b, c]: [u32; 3]) -> Result<(), MeshFault> {
-        self.asked[1] += 1;
-        if self.asked[1] > MAX_TRIANGLES {
+        self.submitted[1] += 1;
+        if self.submitted[1] > MAX_TRIANGLES {
             let (what, most) = ("triangles", MAX_TRIANGLES);
             return Err(MeshFault::TooMany { what, most });
         }

@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_its_place() {
+    fn errors_state_their_cause_and_offset() {
         let at = |text: &str, part: &str| text.find(part);
         let check = |format, text: &str, place: Option<usize>, why: &str| {
             let fault = read(format, text.as_bytes()).unwrap_err();

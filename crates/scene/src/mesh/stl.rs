@@ -8,15 +8,15 @@ const TRIANGLE: usize = 50;
 
 pub(super) fn read(bytes: &[u8]) -> Result<Builder, Fault> {
     // Many binary files begin with `solid`, too: their length tells them apart.
-    let told = bytes.get(80..HEAD).and_then(|count| count.try_into().ok());
-    let told = told.map(|count| u32::from_le_bytes(count) as usize);
+    let count = bytes.get(80..HEAD).and_then(|count| count.try_into().ok());
+    let count = count.map(|count| u32::from_le_bytes(count) as usize);
     let length = |count: usize| count.saturating_mul(TRIANGLE).saturating_add(HEAD);
     let begins = bytes.trim_ascii_start();
     let begins = begins.get(..5).unwrap_or_default();
     let solid = begins.eq_ignore_ascii_case(b"solid");
-    match told {
+    match count {
         Some(count) if bytes.len() == length(count) => binary(bytes),
-        _ if solid => in_words(text(bytes)?),
+        _ if solid => read_text(text(bytes)?),
         _ if bytes.is_empty() => Err(Fault::at(0, MeshFault::Empty)),
         Some(count) => {
             Err(Fault::at(80, MeshFault::Length { triangles: count, wanted: length(count), bytes: bytes.len() }))
@@ -44,7 +44,7 @@ fn binary(bytes: &[u8]) -> Result<Builder, Fault> {
     Ok(out)
 }
 
-fn in_words(text: &str) -> Result<Builder, Fault> {
+fn read_text(text: &str) -> Result<Builder, Fault> {
     let mut out = Builder::default();
     // Vertices of the open loop.
     let mut corners: Option<Vec<u32>> = None;
