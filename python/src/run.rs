@@ -111,7 +111,7 @@ pub fn run<'py>(
     if live.load_peaks().is_none() {
         live.track_load_peaks();
     }
-    chosen.iter().for_each(|channel| channel.reading().ask(&mut frame));
+    chosen.iter().for_each(|channel| channel.reading().request(&mut frame));
     let mut run =
         Recorder { live, duration, times, channels: chosen, frame, values, capacity, rows: 0, impacts: Vec::new() };
     let fault = loop {

@@ -161,7 +161,7 @@ impl PySimulation {
 
     /// Samples this instant with all channels.
     fn sample(&mut self) {
-        self.layout.channels.iter().for_each(|channel| channel.reading().ask(&mut self.frame));
+        self.layout.channels.iter().for_each(|channel| channel.reading().request(&mut self.frame));
         self.live.sample_now(&mut self.frame);
     }
 }

@@ -35,12 +35,12 @@ fn text(rows: &[GoalResult], machines: &[LooseSpeed], growth: f64) -> String {
             row.goal.label().to_owned(),
             format!("{} {}", row.setting.method, value(&row.setting)),
             times(Some(row.speed)),
-            format!("{:.0}", row.goal.asked()),
+            format!("{:.0}", row.goal.required_speed()),
             times(row.baseline),
             times(row.baseline.map(|other| row.speed / other)),
             percent(row.error),
             row.goal.error_of().to_owned(),
-            yes(row.met()),
+            yes(row.is_met()),
         ]
     });
     let mut out = String::new();

@@ -101,13 +101,13 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
             ))
         })?
     };
-    table.ask(&mut frame);
+    table.request(&mut frame);
     if let (Some(times), Some(file)) = (&times, &file) {
         check_size(times.last().saturating_add(1), table.names().len())?;
         table.spool_beside(file.target())?;
     }
     if !arguments.quiet {
-        if times.is_some_and(|times| !times.reach_the_end()) {
+        if times.is_some_and(|times| !times.include_the_end()) {
             warn("the duration is not a whole number of intervals: the last row lies before the end");
         }
         if wear_begins && arguments.from_state.is_some() {

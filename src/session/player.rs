@@ -219,7 +219,7 @@ impl Player {
             *record = record.rearranged(&from);
         }
         self.keyframes.rearrange(channels, &from);
-        self.record.channels.ask(&mut self.record.recorded);
+        self.record.channels.request(&mut self.record.recorded);
         // New channels start at the displayed instant.
         self.record_at(self.record.recorded_to);
     }

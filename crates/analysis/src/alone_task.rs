@@ -55,10 +55,10 @@ pub(super) enum AloneMessage {
 pub(super) async fn run(
     task: &AloneTask,
     share: Share,
-    tell: &mut dyn FnMut(AloneMessage) -> ControlFlow<()>,
+    report: &mut dyn FnMut(AloneMessage) -> ControlFlow<()>,
     rest: &mut impl AsyncFnMut(),
 ) -> Result<(), TaskFault> {
-    let mut say = |message| match tell(message) {
+    let mut send = |message| match report(message) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(TaskFault::Cancelled),
     };
@@ -75,7 +75,7 @@ pub(super) async fn run(
     let known: Vec<Option<Output>> = known.collect();
     let own: Vec<Output> = known.iter().flatten().cloned().collect();
     let runs = StudyRuns::new(&scene, &keys, &own, task.span, &alone.rows())?;
-    say(AloneMessage::Plan(AlonePlan {
+    send(AloneMessage::Plan(AlonePlan {
         nominal: alone.nominal().to_vec(),
         units: known.iter().map(|output| output.as_ref().map(|output| output.unit.to_owned())).collect(),
     }))?;
@@ -86,13 +86,13 @@ pub(super) async fn run(
             rest().await;
             block.advance(STEPS);
             let part = block.current().map_or(0.0, |run| run.machine().time() / duration);
-            say(AloneMessage::Progress((finished as f64 + part) / all as f64))?;
+            send(AloneMessage::Progress((finished as f64 + part) / all as f64))?;
         }
         let mut values = runs.outputs_of(&block.records()).into_iter();
         let mut next =
             |output: &Option<Output>| output.as_ref().and_then(|_| values.next()).filter(|value| value.is_finite());
-        say(AloneMessage::Run(AloneRun { index, outputs: known.iter().map(&mut next).collect() }))?;
-        say(AloneMessage::Progress((finished + 1) as f64 / all as f64))?;
+        send(AloneMessage::Run(AloneRun { index, outputs: known.iter().map(&mut next).collect() }))?;
+        send(AloneMessage::Progress((finished + 1) as f64 / all as f64))?;
     }
     Ok(())
 }
@@ -120,20 +120,20 @@ mod tests {
     }
 
     /// What is told of a share, which is sent as text, by its index.
-    fn told(task: &AloneTask, index: usize, of: usize) -> Vec<Message> {
+    fn reported(task: &AloneTask, index: usize, of: usize) -> Vec<Message> {
         let text = serde_json::to_string(&Job::Alone(task.clone(), Share { index, of })).expect("plain data");
-        let mut said = Vec::new();
+        let mut messages = Vec::new();
         perform(&serde_json::from_str(&text).expect("its own text"), &mut || 0.0, &mut |message| {
             let text = serde_json::to_string(&message).expect("plain data");
             assert_eq!(serde_json::from_str::<Message>(&text).expect("its own text"), message);
-            said.push(message);
+            messages.push(message);
             ControlFlow::Continue(())
         });
-        said
+        messages
     }
 
-    fn runs(said: &[Message]) -> Vec<AloneRun> {
-        let mut runs: Vec<AloneRun> = said
+    fn runs(messages: &[Message]) -> Vec<AloneRun> {
+        let mut runs: Vec<AloneRun> = messages
             .iter()
             .filter_map(|message| match message {
                 Message::Run(run) => Some(run.clone()),
@@ -145,9 +145,9 @@ mod tests {
     }
 
     #[test]
-    fn shares_have_the_bits_of_the_study_and_the_base_comes_first() {
+    fn shares_have_the_bits_of_the_study_and_the_nominal_run_comes_first() {
         let task = task("spcmm", "joint.*.clearance");
-        let whole = told(&task, 0, 1);
+        let whole = reported(&task, 0, 1);
         assert_eq!(whole.last(), Some(&Message::Done));
         let first = whole.iter().find(|message| matches!(message, Message::Run(_)));
         assert!(matches!(first, Some(Message::Run(AloneRun { index: 0, .. }))));
@@ -170,17 +170,17 @@ mod tests {
         // Each end changes something.
         assert!(expected[1..].iter().all(|run| run.outputs[..2] != expected[0].outputs[..2]));
         assert_eq!(runs(&whole), expected);
-        let shared: Vec<Message> = [2, 0, 1].into_iter().flat_map(|index| told(&task, index, 3)).collect();
+        let shared: Vec<Message> = [2, 0, 1].into_iter().flat_map(|index| reported(&task, index, 3)).collect();
         assert_eq!(runs(&shared), expected);
-        let done = |said: &[Message]| {
-            let last = said.iter().rev().find_map(|message| match message {
+        let done = |messages: &[Message]| {
+            let last = messages.iter().rev().find_map(|message| match message {
                 Message::Progress(done) => Some(*done),
                 _ => None,
             });
             last.expect("progress")
         };
         assert!((done(&whole) - 1.0).abs() < 1e-12);
-        let shares: f64 = (0..3).map(|index| done(&told(&task, index, 3))).sum();
+        let shares: f64 = (0..3).map(|index| done(&reported(&task, index, 3))).sum();
         assert!((shares - 1.0).abs() < 1e-12, "{shares}");
         let plan = whole.iter().find_map(|message| match message {
             Message::Plan(plan) => Some(plan),
@@ -194,18 +194,18 @@ mod tests {
 
     #[test]
     fn an_output_that_the_scene_lacks_is_left_out() {
-        let said = told(&task("pendulum", "joint.*.friction"), 0, 1);
-        let Some(Message::Plan(plan)) = said.first() else {
-            panic!("{said:?}");
+        let messages = reported(&task("pendulum", "joint.*.friction"), 0, 1);
+        let Some(Message::Plan(plan)) = messages.first() else {
+            panic!("{messages:?}");
         };
         assert_eq!(plan.units, [None, Some("N".to_owned()), Some(String::new())]);
-        for run in runs(&said) {
+        for run in runs(&messages) {
             assert!(run.outputs[0].is_none() && run.outputs[1].is_some_and(|force| force > 0.0), "{run:?}");
         }
     }
 
     #[test]
-    fn what_is_wrong_is_told() {
+    fn faults_are_reported() {
         let good = || task("spcmm", "joint.*.clearance");
         let of = |key: &str, ends| AloneTask { over: vec![(key.to_owned(), ends)], ..good() };
         let spans = |duration, from| AloneTask { span: RunSpan { duration, from }, ..good() };
@@ -217,31 +217,31 @@ mod tests {
             (spans(0.1, 0.1), "runs of 0.1 s, observed from 0.1 s on"),
             (spans(f64::NAN, 0.0), "must begin before the end"),
         ] {
-            let said = told_directly(&task);
-            let [Message::Failed(why)] = &said[..] else {
-                panic!("{words}: {said:?}");
+            let messages = reported_without_text(&task);
+            let [Message::Failed(why)] = &messages[..] else {
+                panic!("{words}: {messages:?}");
             };
             assert!(why.contains(words), "{why}");
         }
     }
 
-    /// As [`told`], of a task whose numbers text may not hold.
-    fn told_directly(task: &AloneTask) -> Vec<Message> {
-        let mut said = Vec::new();
+    /// As [`reported`], of a task whose numbers text may not hold.
+    fn reported_without_text(task: &AloneTask) -> Vec<Message> {
+        let mut messages = Vec::new();
         perform(&Job::Alone(task.clone(), Share::WHOLE), &mut || 0.0, &mut |message| {
-            said.push(message);
+            messages.push(message);
             ControlFlow::Continue(())
         });
-        said
+        messages
     }
 
     #[test]
-    fn it_ends_when_told() {
-        let mut said = 0;
+    fn a_cancelled_task_ends() {
+        let mut messages = 0;
         perform(&Job::Alone(task("spcmm", "joint.*.clearance"), Share::WHOLE), &mut || 0.0, &mut |_| {
-            said += 1;
-            if said < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            messages += 1;
+            if messages < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
-        assert_eq!(said, 3);
+        assert_eq!(messages, 3);
     }
 }

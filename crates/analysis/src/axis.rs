@@ -90,7 +90,7 @@ pub enum RangeError {
         fault: RangeFault,
     },
     /// A key that is given twice.
-    #[error(fmt = twice)]
+    #[error(fmt = duplicate_error)]
     Twice {
         /// Its argument.
         argument: Argument,
@@ -118,7 +118,7 @@ fn of_axis(argument: &Argument, text: &str, fault: &RangeFault, f: &mut Formatte
     write!(f, "{text}: {fault}")
 }
 
-fn twice(argument: &Argument, key: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
+fn duplicate_error(argument: &Argument, key: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
     argument.fmt(f)?;
     f.write_str(if f.alternate() { ": " } else { " " })?;
     write!(f, "{key} is given twice")
@@ -286,16 +286,17 @@ impl Axis {
             let (key, values) = text.split_once('=').ok_or(RangeFault::Form)?;
             let (key, values) = (key.trim(), values.trim());
             let (subject, values) = if let Some((from, rest)) = values.split_once("..") {
-                let range = parts(rest)?;
+                let range = parse_range(rest)?;
                 let subject = Subject::find(scene, argument, key)?;
-                let values = spaced(scene, &subject, key, from.trim(), range)?;
+                let values = spaced_values(scene, &subject, key, from.trim(), range)?;
                 (subject, values)
             } else {
                 let subject = Subject::find(scene, argument, key)?;
                 if !values.contains(',') {
                     return Err(RangeFault::Form);
                 }
-                let listed = values.split(',').map(|value| subject.read(value).map_err(|error| of_value(value, error)));
+                let listed =
+                    values.split(',').map(|value| subject.read(value).map_err(|error| value_fault(value, error)));
                 let listed = Values::Listed(listed.collect::<Result<_, _>>()?);
                 (subject, listed)
             };
@@ -316,7 +317,7 @@ impl Axis {
             if values.is_empty() {
                 return Err(RangeFault::Empty { what: "0 values".to_owned() });
             }
-            let check = |value| parameter.check(value).map_err(|error| of_value(&parameter.show(value), error));
+            let check = |value| parameter.check(value).map_err(|error| value_fault(&parameter.show(value), error));
             values.iter().try_for_each(check)
         };
         match read() {
@@ -339,7 +340,7 @@ impl Axis {
             let mut trial = scene.clone();
             trial
                 .set_value(&self.key, &self.value(i))
-                .map_err(|error| self.wrong(RangeFault::Scene(Box::new(error))))?;
+                .map_err(|error| self.error(RangeFault::Scene(Box::new(error))))?;
         }
         Ok(())
     }
@@ -355,11 +356,11 @@ impl Axis {
     }
 
     /// The error that it is given twice.
-    pub(super) fn twice(&self) -> RangeError {
+    pub(super) fn duplicate_error(&self) -> RangeError {
         RangeError::Twice { argument: self.argument, key: self.key.clone() }
     }
 
-    fn wrong(&self, fault: RangeFault) -> RangeError {
+    fn error(&self, fault: RangeFault) -> RangeError {
         RangeError::Axis { argument: self.argument, text: self.text.clone(), fault }
     }
 
@@ -420,7 +421,7 @@ impl Axis {
     }
 
     /// Whether its values take effect only at a reset of `scene`.
-    pub(super) fn waits(&self, scene: &Scene) -> bool {
+    pub(super) fn waits_for_restart(&self, scene: &Scene) -> bool {
         let at = |i| {
             let mut scene = scene.clone();
             let parameter = scene.set_value(&self.key, &self.value(i)).ok()?;
@@ -434,21 +435,21 @@ impl Axis {
 
     /// Error of an axis with words where numbers are needed.
     pub(super) fn not_numbers(&self, scene: &Scene) -> RangeError {
-        self.wrong(no_numbers(scene, &self.key))
+        self.error(not_a_number_fault(scene, &self.key))
     }
 }
 
-fn of_value(value: &str, error: ValueError) -> RangeFault {
+fn value_fault(value: &str, error: ValueError) -> RangeFault {
     RangeFault::Value { value: value.trim().to_owned(), error }
 }
 
-fn no_numbers(scene: &Scene, key: &str) -> RangeFault {
+fn not_a_number_fault(scene: &Scene, key: &str) -> RangeFault {
     let example = scene.parameter(key).map(|parameter| parameter.range().replace(", ", ",")).unwrap_or_default();
     RangeFault::Words { key: key.to_owned(), example }
 }
 
 /// Last value, number of values and spacing of a range that continues with `rest`: `B:N` or `B:N:log`.
-fn parts(rest: &str) -> Result<(&str, &str, Spacing), RangeFault> {
+fn parse_range(rest: &str) -> Result<(&str, &str, Spacing), RangeFault> {
     let parts: Vec<&str> = rest.split(':').map(str::trim).collect();
     match parts[..] {
         [last, count] => Ok((last, count, Spacing::Linear)),
@@ -458,7 +459,7 @@ fn parts(rest: &str) -> Result<(&str, &str, Spacing), RangeFault> {
 }
 
 /// Reads the range of `key` that begins with `first` and continues with `rest`, from [`parts`].
-fn spaced(
+fn spaced_values(
     scene: &Scene,
     subject: &Subject,
     key: &str,
@@ -470,14 +471,14 @@ fn spaced(
     if count == 0 {
         return empty("0 values".to_owned());
     }
-    let read = |end: &str| subject.read(end).map_err(|error| of_value(end, error));
+    let read = |end: &str| subject.read(end).map_err(|error| value_fault(end, error));
     if subject.has_words() {
-        return Err(no_numbers(scene, key));
+        return Err(not_a_number_fault(scene, key));
     }
     let (from, to, whole) = match (read(first)?, read(last)?) {
         (Value::Number(from), Value::Number(to)) => (from, to, false),
         (Value::Count(from), Value::Count(to)) => (from as f64, to as f64, true),
-        _ => return Err(no_numbers(scene, key)),
+        _ => return Err(not_a_number_fault(scene, key)),
     };
     if from > to {
         return Err(RangeFault::Reversed { from: first.to_owned(), to: last.to_owned() });
@@ -544,7 +545,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_that_are_none_say_why() {
+    fn invalid_ranges_state_their_fault() {
         for (text, fragment) in [
             ("contact.clearance", "expected KEY=A..B:N"),
             ("contact.clearance=0.1mm..1mm", "expected KEY=A..B:N"),

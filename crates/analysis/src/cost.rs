@@ -1,6 +1,6 @@
 //! Cost of each part of the model: one scene with parts added and removed.
 
-use super::timing::time_to;
+use super::timing::clock_time_to;
 use super::{AnalysisError, RunContext, Setting, WorkBudget};
 use jointplay_physics::integrate::System as _;
 use jointplay_physics::machine::Preset;
@@ -82,10 +82,10 @@ fn one(part: &CostCase, budget: &WorkBudget, context: &mut RunContext) -> Result
     // Counts the evaluations up to the end of the span, without a cap; the timed runs below cover the same span.
     while simulation.time() < part.span {
         simulation.step_until(part.span)?;
-        context.go_on(0.0)?;
+        context.report_progress(0.0)?;
     }
     let evaluations = simulation.statistics().evaluations;
-    let seconds = time_to(
+    let seconds = clock_time_to(
         part.span,
         &WorkBudget { evaluations: u64::MAX / 2, seconds: f64::INFINITY, ..*budget },
         context,
@@ -122,7 +122,7 @@ fn evaluation(setting: &Setting, scene: &Scene, loaded: f64, context: &mut RunCo
             std::hint::black_box(&mut dy);
         }
         shortest = shortest.min(context.now() - before);
-        context.go_on(1.0)?;
+        context.report_progress(1.0)?;
     }
     Ok(shortest / f64::from(BATCH))
 }

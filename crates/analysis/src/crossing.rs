@@ -9,7 +9,7 @@ use jointplay_physics::units::{Dimension, QuantityError, all_units, parse_quanti
 use jointplay_scene::Scene;
 
 /// Instants per step at which the channel is read: a value that it crosses twice between two of them counts as not crossed.
-const LOOKS: u32 = 4;
+const SAMPLES_PER_STEP: u32 = 4;
 /// Largest number of bisections: enough to reach neighbouring times.
 const BISECTIONS: u32 = 60;
 
@@ -55,7 +55,7 @@ pub enum CrossingError {
 
 /// Sense of a crossing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sense {
+enum Direction {
     Up,
     Down,
     Either,
@@ -68,7 +68,7 @@ pub struct Crossing {
     channel: String,
     value: f64,
     is_angle: bool,
-    sense: Sense,
+    direction: Direction,
 }
 
 impl Crossing {
@@ -79,10 +79,10 @@ impl Crossing {
     pub fn parse(scene: &Scene, text: &str) -> Result<Self, CrossingError> {
         let own = || text.to_owned();
         let (pattern, rest) = text.split_once('=').ok_or_else(|| CrossingError::Form { text: own() })?;
-        let (value, sense) = match rest.split_once(':').map(|(value, sense)| (value, sense.trim())) {
-            None => (rest, Sense::Either),
-            Some((value, "up")) => (value, Sense::Up),
-            Some((value, "down")) => (value, Sense::Down),
+        let (value, direction) = match rest.split_once(':').map(|(value, direction)| (value, direction.trim())) {
+            None => (rest, Direction::Either),
+            Some((value, "up")) => (value, Direction::Up),
+            Some((value, "down")) => (value, Direction::Down),
             Some(_) => return Err(CrossingError::Form { text: own() }),
         };
         let list = channels(&scene.machine, &mut Simulation::new(&scene.machine)?);
@@ -102,7 +102,7 @@ impl Crossing {
             CrossingError::Value { text: own(), value, error }
         })?;
         let is_angle = channel.unit == "rad";
-        Ok(Self { text: own(), channel: channel.name.clone(), value: number, is_angle, sense })
+        Ok(Self { text: own(), channel: channel.name.clone(), value: number, is_angle, direction })
     }
 
     /// As written.
@@ -119,10 +119,10 @@ impl Crossing {
     /// Whether the channel crosses its value between two deviations.
     fn is_between(&self, before: f64, after: f64) -> bool {
         // Between half a turn above and below, an angle jumps without a crossing.
-        let near = !self.is_angle || before.abs().max(after.abs()) < FRAC_PI_2;
-        let up = before < 0.0 && after >= 0.0 && self.sense != Sense::Down;
-        let down = before > 0.0 && after <= 0.0 && self.sense != Sense::Up;
-        near && (up || down)
+        let is_near = !self.is_angle || before.abs().max(after.abs()) < FRAC_PI_2;
+        let is_upward = before < 0.0 && after >= 0.0 && self.direction != Direction::Down;
+        let is_downward = before > 0.0 && after <= 0.0 && self.direction != Direction::Up;
+        is_near && (is_upward || is_downward)
     }
 }
 
@@ -158,7 +158,7 @@ impl CrossingRun {
         let list = channels(&machine, orbit.simulation_mut());
         let reading = list.iter().find(|channel| channel.name == crossing.channel).map(|channel| channel.reading());
         let mut frame = Frame::default();
-        reading.iter().for_each(|reading| reading.ask(&mut frame));
+        reading.iter().for_each(|reading| reading.request(&mut frame));
         let (kept, times) = (Vec::new(), Vec::new());
         let crossing = crossing.clone();
         let mut run = Self { orbit, crossing, reading, frame, latest: 0.0, count, discard, end, taken: 0, kept, times };
@@ -205,32 +205,36 @@ impl CrossingRun {
         let start = self.orbit.simulation().time();
         self.orbit.simulation_mut().step_until(self.end)?;
         let step = self.orbit.simulation().time() - start;
-        let (mut crossed, mut before) = (false, start);
-        for k in 1..=LOOKS {
-            let now = if k == LOOKS { start + step } else { start + step * f64::from(k) / f64::from(LOOKS) };
+        let (mut has_crossed, mut before) = (false, start);
+        for k in 1..=SAMPLES_PER_STEP {
+            let now = if k == SAMPLES_PER_STEP {
+                start + step
+            } else {
+                start + step * f64::from(k) / f64::from(SAMPLES_PER_STEP)
+            };
             let deviation = self.deviation_at(now);
             if self.taken < self.count && self.crossing.is_between(self.latest, deviation) {
-                crossed = true;
-                self.take(before, now);
+                has_crossed = true;
+                self.record_crossing(before, now);
             }
             (before, self.latest) = (now, deviation);
         }
-        Ok(crossed)
+        Ok(has_crossed)
     }
 
     /// Records the crossing between two times, s.
-    fn take(&mut self, mut before: f64, mut after: f64) {
-        let mut below = self.latest;
+    fn record_crossing(&mut self, mut before: f64, mut after: f64) {
+        let mut latest = self.latest;
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (before + after);
             if middle <= before || middle >= after {
                 break;
             }
             let deviation = self.deviation_at(middle);
-            if self.crossing.is_between(below, deviation) {
+            if self.crossing.is_between(latest, deviation) {
                 after = middle;
             } else {
-                (before, below) = (middle, deviation);
+                (before, latest) = (middle, deviation);
             }
         }
         self.taken += 1;
@@ -259,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn conditions_that_are_none_say_why() {
+    fn invalid_conditions_state_their_fault() {
         for (text, fragment) in [
             ("zero", "expected phase or CHANNEL=VALUE"),
             ("crank.angle=90deg:round", "expected phase or CHANNEL=VALUE"),

@@ -15,7 +15,7 @@ pub const FOLLOW_BLOCK: usize = 25;
 /// Largest number of points in a sweep.
 const MAX_POINTS: usize = 1 << 24;
 /// Largest number of points tried inside a map, or in a table.
-const MAX_TRIED: usize = 4096;
+const MAX_CHECKED: usize = 4096;
 
 /// State from which a point starts: [`Self::meaning`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -120,7 +120,7 @@ impl Design {
         }
         let mut keys = BTreeSet::new();
         if let Some(twice) = axes.iter().find(|axis| !keys.insert(axis.key())) {
-            return Err(twice.twice());
+            return Err(twice.duplicate_error());
         }
         let mut known = BTreeSet::new();
         match starts.iter().find(|start| !known.insert(start.word())) {
@@ -157,7 +157,7 @@ impl Design {
             Arrangement::Crossed => std::slice::from_ref(last),
             Arrangement::Zipped => &self.axes[..],
         };
-        if let Some(waiting) = along.iter().find(|axis| axis.waits(scene)) {
+        if let Some(waiting) = along.iter().find(|axis| axis.waits_for_restart(scene)) {
             let why = format!(
                 "{} takes effect at the next reset only, so no state can be followed through its values",
                 waiting.key()
@@ -269,25 +269,25 @@ impl Design {
     }
 
     /// Points to be tried before anything runs. Of crossed axes: every value of each with the others at their ends, and a
-    /// lattice inside, which covers every point of a small map; of more than two axes at most [`MAX_TRIED`] of these. Of zipped
+    /// lattice inside, which covers every point of a small map; of more than two axes at most [`MAX_CHECKED`] of these. Of zipped
     /// ones: all, or as many spread over the rows.
-    pub(super) fn tried(&self) -> Vec<usize> {
+    pub(super) fn checked_points(&self) -> Vec<usize> {
         let sets = self.sets();
         if self.arrangement == Arrangement::Zipped {
-            return (0..sets - 1).step_by(sets.div_ceil(MAX_TRIED)).chain([sets - 1]).collect();
+            return (0..sets - 1).step_by(sets.div_ceil(MAX_CHECKED)).chain([sets - 1]).collect();
         }
-        let within = |most: usize| most.checked_pow(self.axes.len() as u32).is_some_and(|all| all <= MAX_TRIED);
-        let most_within = (1..=MAX_TRIED).take_while(|most| within(*most)).last().unwrap_or(1);
-        let tried = |point: &usize| {
+        let within = |most: usize| most.checked_pow(self.axes.len() as u32).is_some_and(|all| all <= MAX_CHECKED);
+        let most_within = (1..=MAX_CHECKED).take_while(|most| within(*most)).last().unwrap_or(1);
+        let is_checked = |point: &usize| {
             let indices = self.indices(*point);
             let along = || self.axes.iter().zip(&indices);
             let is_end = |(axis, i): (&Axis, &usize)| *i == 0 || *i + 1 == axis.count();
             let ends = along().filter(|&of| is_end(of)).count();
             ends + 1 >= indices.len() || along().all(|(axis, i)| i % axis.count().div_ceil(most_within) == 0)
         };
-        let all: Vec<usize> = (0..sets).filter(tried).collect();
+        let all: Vec<usize> = (0..sets).filter(is_checked).collect();
         // The border of more than two ranges grows with a power of two.
-        let stride = if self.axes.len() > 2 { all.len().div_ceil(MAX_TRIED) } else { 1 };
+        let stride = if self.axes.len() > 2 { all.len().div_ceil(MAX_CHECKED) } else { 1 };
         all.into_iter().step_by(stride).collect()
     }
 
@@ -429,16 +429,16 @@ mod tests {
     }
 
     #[test]
-    fn maps_are_tried_within() {
-        let tried = |rows: usize, columns: usize| {
+    fn points_within_a_small_map_are_checked() {
+        let checked_points = |rows: usize, columns: usize| {
             let axes =
                 [format!("contact.clearance=0.2mm..0.5mm:{rows}"), format!("contact.friction=0.1..0.2:{columns}")];
             let axes = axes.map(|text| axis(&text)).to_vec();
-            Design::crossed(&spcmm(), axes, &[Start::Cold]).expect("a map").tried()
+            Design::crossed(&spcmm(), axes, &[Start::Cold]).expect("a map").checked_points()
         };
-        assert_eq!(tried(3, 5), (0..15).collect::<Vec<_>>());
+        assert_eq!(checked_points(3, 5), (0..15).collect::<Vec<_>>());
         // The border, and every second value of the first range and every third of the second.
-        let large = tried(128, 130);
+        let large = checked_points(128, 130);
         for (i, j, is) in [(0, 1, true), (127, 7, true), (5, 129, true), (2, 3, true), (2, 4, false), (3, 3, false)] {
             assert_eq!(large.contains(&(i * 130 + j)), is, "{i} {j}");
         }

@@ -8,7 +8,7 @@ use crate::normal::{cumulative, quantile};
 use crate::yields::interpolated_quantile;
 
 /// Smallest probability between the limits of a truncated normal distribution.
-const LEAST_MASS: f64 = 1e-200;
+const MIN_MASS: f64 = 1e-200;
 const FORMS: &str = "a value, `uniform(LOW, HIGH)`, `normal(MEAN, SD)`, `normal(MEAN, SD, LOW..HIGH)`, \
                      `triangular(LOW, MODE, HIGH)`, `measured(VALUE, VALUE, …)` or a fit such as `H7/g6`";
 
@@ -116,7 +116,7 @@ impl Distribution {
         let (from, to) = ((low - mean) / deviation, (high - mean) / deviation);
         let mass = if from > 0.0 { cumulative(-from) - cumulative(-to) } else { cumulative(to) - cumulative(from) };
         check(
-            mass > LEAST_MASS,
+            mass > MIN_MASS,
             "the limits of a truncated normal distribution are too many standard deviations from its mean",
         )?;
         Ok(Self(Law::Truncated { mean, deviation, low, high }))

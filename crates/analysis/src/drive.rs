@@ -170,7 +170,7 @@ impl Orbit for Simulation {
     }
 
     /// True only while the same balls touch: otherwise one run is in an impact that the other has not reached or has left.
-    fn comparable(&self, twin: &Self) -> bool {
+    fn is_comparable(&self, twin: &Self) -> bool {
         (0..self.machine().ball_joints.len()).all(|j| self.contact_state(j).active == twin.contact_state(j).active)
     }
 
@@ -225,8 +225,8 @@ impl Orbit for ObservedRun {
         self.simulation.adopt_step_control(&other.simulation);
     }
 
-    fn comparable(&self, twin: &Self) -> bool {
-        self.simulation.comparable(&twin.simulation)
+    fn is_comparable(&self, twin: &Self) -> bool {
+        self.simulation.is_comparable(&twin.simulation)
     }
 
     fn observables(&self) -> usize {

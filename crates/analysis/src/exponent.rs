@@ -34,7 +34,7 @@ pub struct Exponent {
 ///
 /// Growth of a small separation is meaningful only while both runs have the same contacts: while one ball touches and its twin's
 /// does not yet, their velocities differ as before and after an impact, whatever the separation. So growth is measured, and the
-/// twin rescaled, only where [`Orbit::comparable`] holds. A section that ends between two such events is counted with the next. A
+/// twin rescaled, only where [`Orbit::is_comparable`] holds. A section that ends between two such events is counted with the next. A
 /// twin lost meanwhile is restarted, and growth since the latest counted section is discarded.
 #[derive(Clone, Debug)]
 pub struct Benettin {
@@ -74,7 +74,7 @@ impl Benettin {
     pub fn start<O: Orbit>(&mut self, orbit: &O, twin: &mut O) {
         self.difference.clear();
         self.difference.extend(offset(orbit.scales(), self.separation));
-        self.place(orbit, twin);
+        self.place_twin(orbit, twin);
     }
 
     /// Starts accumulating growth.
@@ -91,10 +91,10 @@ impl Benettin {
         twin.reproduce_step(orbit)?;
         self.open += usize::from(at_section);
         let off = distance(orbit, twin) / self.separation;
-        if !orbit.comparable(twin) {
+        if !orbit.is_comparable(twin) {
             if at_section && !(off < LOST_AT) {
                 *twin = orbit.twin();
-                self.place(orbit, twin);
+                self.place_twin(orbit, twin);
                 self.aligning = ALIGNMENT;
             }
             return Ok(());
@@ -125,11 +125,11 @@ impl Benettin {
             // The onset history of a settled contact has no effect and does not decay, so it must not be amplified.
             twin.blend_approach_speeds(orbit, (1.0 - 1.0 / off).max(0.0));
         }
-        self.place(orbit, twin);
+        self.place_twin(orbit, twin);
     }
 
     /// Moves the twin to the orbit's state displaced by `difference`.
-    fn place<O: Orbit>(&mut self, orbit: &O, twin: &mut O) {
+    fn place_twin<O: Orbit>(&mut self, orbit: &O, twin: &mut O) {
         let states = orbit.state().iter().zip(twin.state());
         let away: Vec<f64> = self.difference.iter().zip(states).map(|(d, (a, b))| d + (a - b)).collect();
         twin.displace(&away);

@@ -22,7 +22,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_nothing_beats_is_on_the_front() {
+    fn the_front_holds_the_points_that_no_other_dominates() {
         let pairs = [
             (1.0, 0.5),
             (2.0, 0.1),

@@ -6,9 +6,9 @@ use crate::sampling::{MAX_DIMENSIONS, MAX_POINTS, Sampler, Sampling, SamplingErr
 use crate::yields::{Estimate, interpolated_quantile};
 
 /// Least number of complete rows from which indices are estimated.
-pub const LEAST_ROWS: usize = 8;
+pub const MIN_ROWS: usize = 8;
 /// Least number of resamples of an interval.
-const LEAST_RESAMPLES: usize = 100;
+const MIN_RESAMPLES: usize = 100;
 
 /// Why there is no such design, or no indices.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -39,7 +39,7 @@ pub enum IndicesError {
         points: usize,
     },
     /// Too few rows with all their results.
-    #[error("{complete} of {rows} rows have all their results: at least {LEAST_ROWS} are needed")]
+    #[error("{complete} of {rows} rows have all their results: at least {MIN_ROWS} are needed")]
     TooFewRows {
         /// Complete rows.
         complete: usize,
@@ -54,7 +54,7 @@ pub enum IndicesError {
     },
     /// Settings of the intervals out of range.
     #[error(
-        "{resamples} resamples, confidence {confidence}: at least {LEAST_RESAMPLES} and a confidence between 0 and 1 are needed"
+        "{resamples} resamples, confidence {confidence}: at least {MIN_RESAMPLES} and a confidence between 0 and 1 are needed"
     )]
     Interval {
         /// Number of resamples.
@@ -157,13 +157,13 @@ impl SaltelliDesign {
             return Err(IndicesError::Results { results: results.len(), points: self.points() });
         }
         let Bootstrap { resamples, confidence, seed } = bootstrap;
-        if resamples < LEAST_RESAMPLES || !(confidence > 0.0 && confidence < 1.0) {
+        if resamples < MIN_RESAMPLES || !(confidence > 0.0 && confidence < 1.0) {
             return Err(IndicesError::Interval { resamples, confidence });
         }
         let all = results.chunks_exact(self.inputs + 2);
         let rows: Vec<&[f64]> = all.filter(|row| row.iter().all(|value| value.is_finite())).collect();
         let incomplete_rows = self.sampler.points() - rows.len();
-        if rows.len() < LEAST_ROWS {
+        if rows.len() < MIN_ROWS {
             return Err(IndicesError::TooFewRows { complete: rows.len(), rows: self.sampler.points() });
         }
         let value = rows[0][0];

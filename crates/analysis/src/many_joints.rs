@@ -1,6 +1,6 @@
 //! The fastest settings with which machines with loose joints reproduce the peaks of their first impacts.
 
-use super::timing::time_to;
+use super::timing::clock_time_to;
 use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
 use jointplay_physics::integrate::Method;
 use jointplay_scene::Scene;
@@ -97,7 +97,7 @@ pub fn loose_speed(machine: LooseMachine, context: &mut RunContext) -> Result<Lo
         if let Some(known) = timed.iter().find(|known| known.setting == setting) {
             return Ok::<_, AnalysisError>(*known);
         }
-        let seconds = time_to(machine.span, &BUDGET, context, |_| setting.start(&scene))?;
+        let seconds = clock_time_to(machine.span, &BUDGET, context, |_| setting.start(&scene))?;
         timed.push(Timed { setting, error, speed: machine.span / seconds });
         Ok(timed[timed.len() - 1])
     };
@@ -106,7 +106,7 @@ pub fn loose_speed(machine: LooseMachine, context: &mut RunContext) -> Result<Lo
         let mut errors = Vec::with_capacity(values.len());
         for value in values {
             let setting = Setting::new(method, *value);
-            errors.push((setting, reference.impacts_of(&setting, &BUDGET, &mut context)?.1.peak));
+            errors.push((setting, reference.impact_errors(&setting, &BUDGET, &mut context)?.1.peak));
         }
         for (limit, fastest) in LIMITS.into_iter().zip(&mut fastest) {
             let within = errors.iter().find(|(_, error)| error.is_some_and(|error| error <= limit));
@@ -116,7 +116,7 @@ pub fn loose_speed(machine: LooseMachine, context: &mut RunContext) -> Result<Lo
         }
     }
     let baseline = Setting::baseline();
-    let error = reference.impacts_of(&baseline, &BUDGET, &mut context)?.1.peak;
+    let error = reference.impact_errors(&baseline, &BUDGET, &mut context)?.1.peak;
     let baseline = time(baseline, error, &mut context)?;
     for fastest in &mut fastest {
         fastest.sort_by(|a, b| b.speed.total_cmp(&a.speed));
@@ -137,7 +137,7 @@ pub fn growth(context: &mut RunContext) -> Result<f64, AnalysisError> {
         let mut scene = Scene::load("chain", &[])?;
         scene.set("chain.links", &links.to_string())?;
         let mut context = context.part(n, 2);
-        *cost = time_to(span, &BUDGET, &mut context, |_| setting.start(&scene))? / f64::from(links);
+        *cost = clock_time_to(span, &BUDGET, &mut context, |_| setting.start(&scene))? / f64::from(links);
     }
     Ok(cost[1] / cost[0])
 }

@@ -57,7 +57,7 @@ impl TipErrors {
 /// Computes `task`, point after point, and awaits `rest` after each.
 pub(super) async fn run(
     task: &MapTask,
-    tell: &mut dyn FnMut(MapMessage) -> ControlFlow<()>,
+    report: &mut dyn FnMut(MapMessage) -> ControlFlow<()>,
     rest: &mut impl AsyncFnMut(),
 ) -> Result<(), TaskFault> {
     let directions = task.directions.clamp(*DIRECTIONS.start(), *DIRECTIONS.end());
@@ -68,15 +68,15 @@ pub(super) async fn run(
     }
     let axes = map.design().axes().iter();
     let axes = axes.map(|axis| (axis.key().to_owned(), axis.numbers().collect()));
-    let mut told = tell(MapMessage::Axes(axes.collect()));
+    let mut flow = report(MapMessage::Axes(axes.collect()));
     for point in 0..points {
-        if told.is_break() {
+        if flow.is_break() {
             return Err(TaskFault::Cancelled);
         }
-        told = tell(MapMessage::Point(map.point(point).ok().as_ref().map(TipErrors::of)));
+        flow = report(MapMessage::Point(map.point(point).ok().as_ref().map(TipErrors::of)));
         rest().await;
     }
-    if told.is_break() { Err(TaskFault::Cancelled) } else { Ok(()) }
+    if flow.is_break() { Err(TaskFault::Cancelled) } else { Ok(()) }
 }
 
 #[cfg(test)]
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_tells_its_axes_then_its_points_and_ends_when_told() {
+    fn a_map_reports_its_axes_then_its_points_and_ends_when_cancelled() {
         let over = ["crank.angle=0deg,90deg,180deg", "contact.clearance=0.1mm,0.2mm"];
         let all = said(&over, usize::MAX);
         assert_eq!((all.len(), all.last()), (8, Some(&Message::Done)));

@@ -46,7 +46,7 @@ pub trait Orbit: Sized {
 
     /// Whether the two states differ in continuous variables alone: while only one of them is in contact, a small difference is
     /// about to jump.
-    fn comparable(&self, _twin: &Self) -> bool {
+    fn is_comparable(&self, _twin: &Self) -> bool {
         true
     }
 

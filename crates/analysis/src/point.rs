@@ -118,7 +118,7 @@ impl Protocol {
 
     /// The run of a simulation that starts cold at t = 0 or, if it `follows` another point, continues that.
     /// A duration is a transient that ends at a first, discarded section, and one interval to a second.
-    fn watch(&self, machine: ObservedRun, interval: f64, separation: Option<f64>, follows: bool) -> Watch {
+    fn start_run(&self, machine: ObservedRun, interval: f64, separation: Option<f64>, follows: bool) -> SpanRun {
         let now = machine.time();
         let follows = follows.then_some(now);
         let schedule = match &self.span {
@@ -135,10 +135,10 @@ impl Protocol {
             }
             Span::Crossings { crossing, count, discard, duration } => {
                 let run = CrossingRun::new(machine, crossing, (*count, *discard), now + duration);
-                return Watch::Crossings(Box::new(run));
+                return SpanRun::Crossings(Box::new(run));
             }
         };
-        Watch::Sections(Box::new(SectionRun::new(machine, schedule, separation)))
+        SpanRun::Sections(Box::new(SectionRun::new(machine, schedule, separation)))
     }
 }
 
@@ -198,12 +198,12 @@ pub struct PointResult {
 }
 
 /// A run through the sections of a point.
-enum Watch {
+enum SpanRun {
     Sections(Box<SectionRun<ObservedRun>>),
     Crossings(Box<CrossingRun>),
 }
 
-impl Watch {
+impl SpanRun {
     fn orbit(&self) -> &ObservedRun {
         match self {
             Self::Sections(run) => run.orbit(),
@@ -242,7 +242,7 @@ impl Watch {
 
 /// A point being computed.
 pub struct PointRun {
-    watch: Watch,
+    span_run: SpanRun,
     interval: f64,
     /// Whether the transient is over.
     is_keeping: bool,
@@ -294,7 +294,7 @@ impl PointRun {
             resolution: resolution(simulation.machine(), tolerance),
             means: Means::new(joints, sample_interval),
             statistics: Accumulator::new(&protocol.keep, simulation, sample_interval),
-            watch: protocol.watch(machine, interval, separation, follows),
+            span_run: protocol.start_run(machine, interval, separation, follows),
             interval,
             is_keeping: false,
             started,
@@ -303,7 +303,7 @@ impl PointRun {
             peaks,
             transient_peaks: vec![0.0; joints],
         };
-        if run.watch.discard() == 0 {
+        if run.span_run.discard() == 0 {
             run.begin_keeping();
         }
         run
@@ -311,9 +311,9 @@ impl PointRun {
 
     /// Time of the first section at a phase of the drive, including discarded ones, s; NaN for crossings.
     pub fn first(&self) -> f64 {
-        match &self.watch {
-            Watch::Sections(run) => run.schedule().first,
-            Watch::Crossings(_) => f64::NAN,
+        match &self.span_run {
+            SpanRun::Sections(run) => run.schedule().first,
+            SpanRun::Crossings(_) => f64::NAN,
         }
     }
 
@@ -324,25 +324,25 @@ impl PointRun {
 
     /// Whether all periods have been run.
     pub fn is_done(&self) -> bool {
-        match &self.watch {
-            Watch::Sections(run) => run.is_done(),
-            Watch::Crossings(run) => run.is_done(),
+        match &self.span_run {
+            SpanRun::Sections(run) => run.is_done(),
+            SpanRun::Crossings(run) => run.is_done(),
         }
     }
 
     /// Number of sections taken, including discarded ones.
     pub fn taken(&self) -> usize {
-        self.watch.taken()
+        self.span_run.taken()
     }
 
     /// Kept sections so far, in the order of [`OBSERVABLES`].
     pub fn sections(&self) -> &[f64] {
-        self.watch.sections()
+        self.span_run.sections()
     }
 
     /// The running scene.
     pub fn machine(&self) -> &ObservedRun {
-        self.watch.orbit()
+        self.span_run.orbit()
     }
 
     /// One step of the scene.
@@ -350,18 +350,18 @@ impl PointRun {
     /// # Errors
     /// The divergence guard: the point has diverged.
     pub fn step(&mut self) -> Result<(), ObservedError> {
-        let at_section = match &mut self.watch {
-            Watch::Sections(run) => run.step()?,
-            Watch::Crossings(run) => run.step()?,
+        let at_section = match &mut self.span_run {
+            SpanRun::Sections(run) => run.step()?,
+            SpanRun::Crossings(run) => run.step()?,
         };
-        if self.watch.taken() < self.watch.discard() {
+        if self.span_run.taken() < self.span_run.discard() {
             return Ok(());
         }
         if !self.is_keeping {
             self.begin_keeping();
         } else {
-            self.means.look(self.watch.orbit_mut(), at_section);
-            self.statistics.look(self.watch.orbit_mut().simulation_mut());
+            self.means.sample(self.span_run.orbit_mut(), at_section);
+            self.statistics.sample(self.span_run.orbit_mut().simulation_mut());
         }
         Ok(())
     }
@@ -369,7 +369,7 @@ impl PointRun {
     /// Ends the transient and starts recording.
     fn begin_keeping(&mut self) {
         self.is_keeping = true;
-        let machine = self.watch.orbit_mut();
+        let machine = self.span_run.orbit_mut();
         let simulation = machine.simulation_mut();
         simulation.take_peaks(&mut self.peaks);
         for (largest, peak) in self.transient_peaks.iter_mut().zip(&self.peaks) {
@@ -382,7 +382,7 @@ impl PointRun {
 
     /// The result, and the scene in the state of its latest section, from which the next point can continue.
     pub fn finish(mut self) -> (PointResult, ObservedRun) {
-        let simulation = self.watch.orbit_mut().simulation_mut();
+        let simulation = self.span_run.orbit_mut().simulation_mut();
         simulation.take_peaks(&mut self.peaks);
         let doubts = simulation.doubts().iter().fold(0, |bits, doubt| bits | 1 << doubt.kind());
         let residual = simulation.ledger().map_or(f64::NAN, |ledger| ledger.share());
@@ -407,11 +407,11 @@ impl PointRun {
             .collect();
         let known = self.means.probe_now.filter(|_| !self.means.probe_lost);
         let probe = known.map(|_| (self.means.probe_largest, (self.means.probe_square / span).sqrt()));
-        let sections = self.watch.sections().to_vec();
-        let crossings = self.watch.taken();
-        let (exponent, times) = match &self.watch {
-            Watch::Sections(run) => (run.exponent().and_then(|benettin| benettin.result()), Vec::new()),
-            Watch::Crossings(run) => (None, run.times().iter().map(|time| time - self.started).collect()),
+        let sections = self.span_run.sections().to_vec();
+        let crossings = self.span_run.taken();
+        let (exponent, times) = match &self.span_run {
+            SpanRun::Sections(run) => (run.exponent().and_then(|benettin| benettin.result()), Vec::new()),
+            SpanRun::Crossings(run) => (None, run.times().iter().map(|time| time - self.started).collect()),
         };
         let (regime, evidence) = classify(&sections, &self.resolution, self.interval, exponent);
         let statistics = statistics_of_channels;
@@ -428,9 +428,9 @@ impl PointRun {
             times,
             statistics,
         };
-        let machine = match self.watch {
-            Watch::Sections(run) => run.into_orbit(),
-            Watch::Crossings(run) => run.into_orbit(),
+        let machine = match self.span_run {
+            SpanRun::Sections(run) => run.into_orbit(),
+            SpanRun::Crossings(run) => run.into_orbit(),
         };
         (result, machine)
     }
@@ -520,7 +520,7 @@ impl Means {
     }
 
     /// Takes a sample if the latest one is old enough, or at a section.
-    fn look(&mut self, machine: &mut ObservedRun, at_section: bool) {
+    fn sample(&mut self, machine: &mut ObservedRun, at_section: bool) {
         let ago = machine.time() - self.latest;
         if ago >= self.least || (at_section && ago > 0.0) {
             self.latest = machine.time();

@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_has_its_line() {
+    fn errors_name_their_line() {
         for (text, fragment) in [
             ("", "points.csv: expected a header"),
             ("contact.friction\n", "points.csv: expected a header"),

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 
-use super::timing::time_to;
+use super::timing::clock_time_to;
 use super::work_precision::{Baseline, measure as measure_point};
 use super::{AnalysisError, Point, ReferenceSolution, RunContext, Setting, WorkBudget, WorkPrecision};
 use jointplay_physics::machine::{Preset, Solver};
@@ -56,7 +56,7 @@ pub struct Record {
 }
 
 /// Span over which the preset `real-time` is measured, s.
-const PACED: f64 = 1.0;
+const PACE_SPAN: f64 = 1.0;
 
 /// A scene that requests the preset `real-time` but ran slower than real time when measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -79,9 +79,9 @@ pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
     let record = record();
     let own = Preset::RealTime.solver(scene.machine.joints_with_clearance());
     let settings = |solver: &Solver| (solver.preset, solver.method, solver.tolerance, solver.steps_per_impact);
-    let asks = settings(&scene.machine.solver) == settings(&own) && scene.source.file.is_none();
+    let is_requested = settings(&scene.machine.solver) == settings(&own) && scene.source.file.is_none();
     let pace = record.pace.get(&scene.name).copied();
-    pace.filter(|pace| asks && *pace < 1.0).map(|pace| TooSlow {
+    pace.filter(|pace| is_requested && *pace < 1.0).map(|pace| TooSlow {
         scene: scene.name.clone(),
         pace,
         machine: &record.machine,
@@ -95,14 +95,14 @@ pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
 pub fn pace(scene: &Scene, budget: &WorkBudget, context: &mut RunContext) -> Result<f64, AnalysisError> {
     let setting = Setting::of_preset(Preset::RealTime, &scene.machine);
     let budget = WorkBudget { measured: budget.measured, ..WorkBudget::REFERENCE };
-    let seconds = time_to(PACED, &budget, context, |_| setting.start(scene))?;
-    Ok(PACED / seconds)
+    let seconds = clock_time_to(PACE_SPAN, &budget, context, |_| setting.start(scene))?;
+    Ok(PACE_SPAN / seconds)
 }
 
 /// The stored record.
 pub fn record() -> &'static Record {
-    static READ: OnceLock<Record> = OnceLock::new();
-    READ.get_or_init(|| serde_json::from_str(RECORD).expect("a test reads the same file"))
+    static PARSED: OnceLock<Record> = OnceLock::new();
+    PARSED.get_or_init(|| serde_json::from_str(RECORD).expect("a test reads the same file"))
 }
 
 /// Measured performance of `preset` on the built-in scene `scene` with its default parameters.
@@ -124,7 +124,7 @@ pub fn limit(preset: Preset) -> f64 {
 /// the largest product of speed ratios over the impacts and the settled motion of every scene.
 pub fn choose(found: &[&WorkPrecision], limit: f64) -> Option<Setting> {
     let candidates = found.first()?.points.iter().map(|point| point.setting);
-    let worth = |setting: &Setting| {
+    let score = |setting: &Setting| {
         let mut product = 1.0;
         for scene in found {
             let point = scene.points.iter().find(|p| p.setting == *setting)?;
@@ -139,7 +139,7 @@ pub fn choose(found: &[&WorkPrecision], limit: f64) -> Option<Setting> {
         Some(product)
     };
     candidates
-        .filter_map(|setting| Some((setting, worth(&setting)?)))
+        .filter_map(|setting| Some((setting, score(&setting)?)))
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(setting, _)| setting)
 }
@@ -158,7 +158,7 @@ pub fn measure(scene: &Scene, presets: &[Preset], context: &mut RunContext) -> R
         let setting = Setting::of_preset(*preset, &scene.machine);
         let mut point = measure_point(&reference, setting, &budget, &mut context.part(n + 2, parts))?;
         point.preset = Some(*preset);
-        baseline.divide(&mut point);
+        baseline.set_ratios(&mut point);
         points.push(point);
     }
     Ok(points)
@@ -170,8 +170,8 @@ mod tests {
     use jointplay_scene::BUILT_IN;
 
     #[test]
-    fn a_built_in_scene_says_beforehand_that_real_time_is_too_fast_for_it() {
-        const ASKED: (&str, &str) = ("solver.preset", "real-time");
+    fn a_built_in_scene_slower_than_real_time_is_reported_before_it_runs() {
+        const REAL_TIME: (&str, &str) = ("solver.preset", "real-time");
         let slow = |name: &str, changes: &[(&str, &str)]| {
             let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
             let changes: Vec<_> = changes.iter().map(owned).collect();
@@ -181,14 +181,14 @@ mod tests {
             let pace = *record().pace.get(name).unwrap_or_else(|| {
                 panic!("{name}: run `jointplay tradeoff --all --write .`");
             });
-            let said = slow(name, &[ASKED]);
-            assert_eq!(said.as_ref().map(|slow| slow.pace), (pace < 1.0).then_some(pace));
-            if let Some(said) = said {
-                assert!(said.to_string().contains(name), "{said}");
+            let warning = slow(name, &[REAL_TIME]);
+            assert_eq!(warning.as_ref().map(|slow| slow.pace), (pace < 1.0).then_some(pace));
+            if let Some(warning) = warning {
+                assert!(warning.to_string().contains(name), "{warning}");
             }
             // The preset is not requested, or its values are overridden.
             assert_eq!(slow(name, &[]), None);
-            assert_eq!(slow(name, &[ASKED, ("solver.tolerance", "1e-4")]), None);
+            assert_eq!(slow(name, &[REAL_TIME, ("solver.tolerance", "1e-4")]), None);
         }
     }
 }

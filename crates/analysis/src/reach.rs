@@ -1,7 +1,7 @@
 //! Speed goals of the program: three spans of the default scene, each with its required speed.
 
-use super::reference_solution::{MeanForces, done};
-use super::timing::{advance_capped, time_to};
+use super::reference_solution::{MeanForces, require_reached};
+use super::timing::{advance_capped, clock_time_to};
 use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
 use jointplay_physics::simulate::Simulation;
 use jointplay_scene::Scene;
@@ -9,9 +9,9 @@ use jointplay_scene::Scene;
 /// Tolerance of the automatic selection that must reach them.
 const TOLERANCE: f64 = 1e-5;
 /// Tolerance of the reference run for the settled forces.
-const CONVERGED: f64 = 1e-10;
+const REFERENCE_TOLERANCE: f64 = 1e-10;
 /// Allowed relative error of goals that have one.
-const ALLOWED: f64 = 0.01;
+const ALLOWED_ERROR: f64 = 0.01;
 /// Number of instants over which settled forces are averaged.
 const SAMPLES: u32 = 3000;
 
@@ -49,7 +49,7 @@ impl Goal {
     }
 
     /// Required simulated seconds per clock second.
-    pub fn asked(self) -> f64 {
+    pub fn required_speed(self) -> f64 {
         match self {
             Self::FirstSecond => 40.0,
             Self::Settled => 300.0,
@@ -84,8 +84,8 @@ pub struct GoalResult {
 
 impl GoalResult {
     /// Whether the goal is met.
-    pub fn met(&self) -> bool {
-        self.speed >= self.goal.asked() && self.error.is_none_or(|error| error <= ALLOWED)
+    pub fn is_met(&self) -> bool {
+        self.speed >= self.goal.required_speed() && self.error.is_none_or(|error| error <= ALLOWED_ERROR)
     }
 }
 
@@ -101,12 +101,12 @@ pub fn reach(scene: &Scene, context: &mut RunContext) -> Result<Vec<GoalResult>,
             if *goal == Goal::Ideal {
                 scene.set("contact.clearance", "0")?;
             }
-            one(&scene, *goal, &mut context.part(n, Goal::ALL.len()))
+            measure_goal(&scene, *goal, &mut context.part(n, Goal::ALL.len()))
         })
         .collect()
 }
 
-fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<GoalResult, AnalysisError> {
+fn measure_goal(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<GoalResult, AnalysisError> {
     let setting = Setting::automatic(TOLERANCE);
     let baseline = Setting::baseline();
     let integrates = !setting.start(scene)?.mechanism().is_kinematic();
@@ -114,7 +114,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<GoalResult
     let (from, to) = goal.span();
     let speed = |setting: &Setting, context: &mut RunContext| {
         let start = run_to(setting, scene, from, context, |_| {})?;
-        let seconds = time_to(to, &budget, context, |_| Ok(start.clone()))?;
+        let seconds = clock_time_to(to, &budget, context, |_| Ok(start.clone()))?;
         Ok::<_, AnalysisError>((to - from) / seconds)
     };
     // Timed before and after the baseline, so that load setting in meanwhile slows both.
@@ -125,11 +125,11 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<GoalResult
     let error = match goal {
         Goal::FirstSecond => {
             let reference = ReferenceSolution::new(scene, &mut last)?;
-            let (_, errors, _) = reference.impacts_of(&setting, &budget, &mut last)?;
+            let (_, errors, _) = reference.impact_errors(&setting, &budget, &mut last)?;
             errors.peak
         }
         Goal::Settled => {
-            let converged = Setting::reference(CONVERGED);
+            let converged = Setting::reference(REFERENCE_TOLERANCE);
             let expected = mean_forces(&converged, scene, (from, to), &mut last)?;
             let means = mean_forces(&setting, scene, (from, to), &mut last)?;
             let pairs = means.iter().zip(&expected);
@@ -140,21 +140,21 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<GoalResult
     Ok(GoalResult { goal, setting, speed: first.max(second), baseline, error })
 }
 
-/// Runs from the start to `end`; `seen` is called after every step.
+/// Runs from the start to `end`; `after_step` is called after every step.
 fn run_to(
     setting: &Setting,
     scene: &Scene,
     end: f64,
     context: &mut RunContext,
-    mut seen: impl FnMut(&mut Simulation),
+    mut after_step: impl FnMut(&mut Simulation),
 ) -> Result<Simulation, AnalysisError> {
     let mut simulation = setting.start(scene)?;
     let look = |simulation: &mut Simulation| {
-        seen(simulation);
+        after_step(simulation);
         false
     };
     let ended = advance_capped(&mut simulation, end, &WorkBudget::REFERENCE, context, look)?;
-    done(ended)?;
+    require_reached(ended)?;
     Ok(simulation)
 }
 
@@ -165,6 +165,6 @@ fn mean_forces(
     context: &mut RunContext,
 ) -> Result<Vec<f64>, AnalysisError> {
     let mut forces = MeanForces::new(scene, span, SAMPLES);
-    run_to(setting, scene, span.1, context, |simulation| forces.see(simulation))?;
+    run_to(setting, scene, span.1, context, |simulation| forces.sample_step(simulation))?;
     Ok(forces.means)
 }

@@ -14,22 +14,22 @@ use jointplay_scene::Scene;
 
 /// Number of impacts compared; and the scene in which it is smaller, as the next impact overlaps that of a neighbour by 25 us: its peak
 /// depends on which of the two comes first, so that no method comes close to it before it resolves the instants to a microsecond.
-const IMPACTS: usize = 6;
-const OF_OVERLAPPING: (&str, usize) = ("chain", 5);
+const IMPACT_COUNT: usize = 6;
+const OVERLAPPING_SCENE: (&str, usize) = ("chain", 5);
 /// The impact at which the position is compared.
-const POSITION_AT: usize = 3;
+const POSITION_IMPACT: usize = 3;
 /// Simulated time within which the impacts must occur, s; and the span compared in a scene without any, s.
-const IMPACTS_WITHIN: f64 = 0.5;
-const WITHOUT_IMPACTS: f64 = 0.1;
+const IMPACT_TIME_LIMIT: f64 = 0.5;
+const SPAN_WITHOUT_IMPACTS: f64 = 0.1;
 /// A longer contact counts as ended after this time, s: an impact takes 0.1 ms.
 const LONG_CONTACT: f64 = 5e-3;
 /// Extra time run after the last impact, s.
-const AFTERWARDS: f64 = 0.1e-3;
+const EXTRA_TIME: f64 = 0.1e-3;
 /// Contacts that have all been closed for this long have settled, s; and the time limit for settling, s.
-const QUIET: f64 = 0.15;
-const SETTLED_WITHIN: f64 = 1.2;
+const QUIET_TIME: f64 = 0.15;
+const SETTLING_TIME_LIMIT: f64 = 1.2;
 /// Tolerance of the run that settles a scene: all methods start from its final state.
-const SETTLING: f64 = 1e-6;
+const SETTLING_TOLERANCE: f64 = 1e-6;
 /// Untimed beginning of a settled run, in which a method finds its step size, and the timed span, s.
 const WARM_UP: f64 = 0.05;
 const SETTLED_SPAN: f64 = 0.2;
@@ -38,7 +38,7 @@ const SAMPLES: u32 = 200;
 /// A mean force below this fraction of the largest one has no meaningful relative error.
 const SMALL_FORCE: f64 = 1e-3;
 /// Tolerance of the reference.
-const REFERENCE: f64 = 1e-12;
+const REFERENCE_TOLERANCE: f64 = 1e-12;
 
 /// The comparison slot of one impact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -122,7 +122,7 @@ struct Contact {
 
 impl Contact {
     /// End of the contact, or the time after which it counts as ended; `None` while neither is known at `now`.
-    fn over(&self, now: f64) -> Option<f64> {
+    fn end_at(&self, now: f64) -> Option<f64> {
         let long = self.begin + LONG_CONTACT;
         self.end.filter(|end| *end <= long).or((now >= long).then_some(long))
     }
@@ -130,8 +130,8 @@ impl Contact {
 
 /// Number of impacts of `scene` that are compared.
 fn impacts_compared(scene: &Scene) -> usize {
-    let (name, fewer) = OF_OVERLAPPING;
-    if scene.name == name { fewer } else { IMPACTS }
+    let (name, fewer) = OVERLAPPING_SCENE;
+    if scene.name == name { fewer } else { IMPACT_COUNT }
 }
 
 impl ReferenceSolution {
@@ -141,9 +141,9 @@ impl ReferenceSolution {
     /// A scene that does not start, or whose reference does not reach the end of the first impacts; cancellation by
     /// [`RunContext`].
     pub fn new(scene: &Scene, context: &mut RunContext) -> Result<Self, AnalysisError> {
-        let mut reference = Self::of_impacts(scene, REFERENCE, &mut context.part(0, 2))?;
+        let mut reference = Self::of_impacts(scene, REFERENCE_TOLERANCE, &mut context.part(0, 2))?;
         let setting = reference.setting;
-        let tighter = Setting { tolerance: 0.5 * REFERENCE, ..setting };
+        let tighter = Setting { tolerance: 0.5 * REFERENCE_TOLERANCE, ..setting };
         let (peaks, position) = reference.reference_impacts(&tighter, &mut context.part(2, 4))?;
         reference.floor.peak = reference.peak_error(&peaks);
         reference.floor.position_m = Some((position - reference.position).norm());
@@ -162,15 +162,15 @@ impl ReferenceSolution {
             scene: scene.clone(),
             slots: Vec::new(),
             impacts,
-            span: WITHOUT_IMPACTS,
-            instant: WITHOUT_IMPACTS,
+            span: SPAN_WITHOUT_IMPACTS,
+            instant: SPAN_WITHOUT_IMPACTS,
             instant_impact: 0,
             position: Vec3::zeros(),
             settled: None,
             setting,
             floor: Errors::default(),
         };
-        reference.lay_slots(&contacts, scene.machine.ball_joints.len());
+        reference.set_slots(&contacts, scene.machine.ball_joints.len());
         let (peaks, position) = reference.reference_impacts(&setting, &mut context.part(1, 2))?;
         for (slot, peak) in reference.slots.iter_mut().zip(&peaks) {
             slot.peak_n = *peak;
@@ -180,16 +180,16 @@ impl ReferenceSolution {
     }
 
     /// Sets the slots of the first impacts: half-way to the same joint's contacts before and after.
-    fn lay_slots(&mut self, contacts: &[Contact], joints: usize) {
+    fn set_slots(&mut self, contacts: &[Contact], joints: usize) {
         let first = &contacts[..self.impacts];
         if first.is_empty() {
-            let whole = |joint| Slot { joint, begin_s: 0.0, from_s: 0.0, to_s: WITHOUT_IMPACTS, peak_n: 0.0 };
+            let whole = |joint| Slot { joint, begin_s: 0.0, from_s: 0.0, to_s: SPAN_WITHOUT_IMPACTS, peak_n: 0.0 };
             self.slots = (0..joints).map(whole).collect();
             return;
         }
-        let over = |contact: &Contact| contact.over(f64::INFINITY).unwrap_or(contact.begin);
-        self.span = first.iter().map(over).fold(0.0, f64::max) + AFTERWARDS;
-        let at = self.impacts.min(POSITION_AT);
+        let end_of = |contact: &Contact| contact.end_at(f64::INFINITY).unwrap_or(contact.begin);
+        self.span = first.iter().map(end_of).fold(0.0, f64::max) + EXTRA_TIME;
+        let at = self.impacts.min(POSITION_IMPACT);
         self.instant = first[at - 1].begin;
         self.instant_impact = at;
         for (index, contact) in first.iter().enumerate() {
@@ -199,8 +199,8 @@ impl ReferenceSolution {
             self.slots.push(Slot {
                 joint: contact.joint,
                 begin_s: contact.begin,
-                from_s: before.map_or(0.0, |other| 0.5 * (over(other) + contact.begin)),
-                to_s: after.map_or(self.span, |other| self.span.min(0.5 * (over(contact) + other.begin))),
+                from_s: before.map_or(0.0, |other| 0.5 * (end_of(other) + contact.begin)),
+                to_s: after.map_or(self.span, |other| self.span.min(0.5 * (end_of(contact) + other.begin))),
                 peak_n: 0.0,
             });
         }
@@ -212,13 +212,13 @@ impl ReferenceSolution {
         context: &mut RunContext,
     ) -> Result<(Vec<f64>, Vec3), AnalysisError> {
         let mut simulation = setting.start(&self.scene)?;
-        let (end, peaks, position) = self.look(&mut simulation, &WorkBudget::REFERENCE, context)?;
-        done(end)?;
+        let (end, peaks, position) = self.observe_impacts(&mut simulation, &WorkBudget::REFERENCE, context)?;
+        require_reached(end)?;
         Ok((peaks, position.unwrap_or_default()))
     }
 
     /// Runs over the first impacts; returns how that ended, the largest force in every slot, and the position at the instant.
-    fn look(
+    fn observe_impacts(
         &self,
         simulation: &mut Simulation,
         budget: &WorkBudget,
@@ -255,14 +255,14 @@ impl ReferenceSolution {
     }
 
     /// Errors of a run over the first impacts, its work, and how it ended.
-    pub(super) fn impacts_of(
+    pub(super) fn impact_errors(
         &self,
         setting: &Setting,
         budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<(End, Errors, PhaseCost), AnalysisError> {
         let mut simulation = setting.start(&self.scene)?;
-        let (end, peaks, position) = self.look(&mut simulation, budget, context)?;
+        let (end, peaks, position) = self.observe_impacts(&mut simulation, budget, context)?;
         let mut errors = Errors::default();
         if end == End::Reached {
             errors.peak = self.peak_error(&peaks);
@@ -287,7 +287,7 @@ impl ReferenceSolution {
         let budget = WorkBudget::REFERENCE;
         let mut means = [Vec::new(), Vec::new()];
         for (n, (setting, means)) in [setting, tighter].into_iter().zip(&mut means).enumerate() {
-            let (end, found, _) = self.averages(setting, &budget, &mut context.part(n + 1, 3))?;
+            let (end, found, _) = self.mean_forces(setting, &budget, &mut context.part(n + 1, 3))?;
             if end != End::Reached {
                 // Settled motion that the reference cannot follow is no basis for comparison.
                 self.settled = None;
@@ -316,7 +316,7 @@ impl ReferenceSolution {
         Ok((end, simulation))
     }
 
-    fn averages(
+    fn mean_forces(
         &self,
         setting: &Setting,
         budget: &WorkBudget,
@@ -330,7 +330,7 @@ impl ReferenceSolution {
             return Ok((end, forces.means, work(&simulation, &before)));
         }
         let end = advance_capped(&mut simulation, span.to, budget, context, |simulation| {
-            forces.see(simulation);
+            forces.sample_step(simulation);
             false
         })?;
         Ok((end, forces.means, work(&simulation, &before)))
@@ -338,16 +338,16 @@ impl ReferenceSolution {
 
     fn mean_error(&self, means: &[f64]) -> Option<f64> {
         let expected = &self.settled.as_ref()?.means;
-        let least = SMALL_FORCE * expected.iter().copied().fold(0.0, f64::max);
+        let smallest = SMALL_FORCE * expected.iter().copied().fold(0.0, f64::max);
         let pairs = expected.iter().zip(means);
         pairs
-            .filter(|(expected, _)| **expected > least)
+            .filter(|(expected, _)| **expected > smallest)
             .map(|(expected, mean)| (mean / expected - 1.0).abs())
             .reduce(f64::max)
     }
 
     /// Error of the settled forces, the run's work, and how it ended; `None` if the scene does not settle.
-    pub(super) fn settled_of(
+    pub(super) fn settled_error(
         &self,
         setting: &Setting,
         budget: &WorkBudget,
@@ -356,7 +356,7 @@ impl ReferenceSolution {
         if self.settled.is_none() {
             return Ok(None);
         }
-        let (end, means, work) = self.averages(setting, budget, context)?;
+        let (end, means, work) = self.mean_forces(setting, budget, context)?;
         let error = (end == End::Reached).then(|| self.mean_error(&means));
         Ok(Some((end, error.flatten(), work)))
     }
@@ -398,7 +398,7 @@ impl MeanForces {
     }
 
     /// Samples the instants that lie in the latest step.
-    pub(super) fn see(&mut self, simulation: &mut Simulation) {
+    pub(super) fn sample_step(&mut self, simulation: &mut Simulation) {
         let (from, to) = self.span;
         while self.next < self.samples {
             let theta = (f64::from(self.next) + 0.5) / f64::from(self.samples);
@@ -417,7 +417,7 @@ impl MeanForces {
 }
 
 /// Requires that the reference reached its end; the error states why it did not.
-pub(super) fn done(end: End) -> Result<(), AnalysisError> {
+pub(super) fn require_reached(end: End) -> Result<(), AnalysisError> {
     match end {
         End::Reached => Ok(()),
         End::Capped => Err(AnalysisError::TooLong { evaluations: WorkBudget::REFERENCE.evaluations }),
@@ -443,7 +443,7 @@ fn first_contacts(
     let mut peaks: Vec<Peak> = Vec::new();
     simulation.take_peaks(&mut peaks);
     let (budget, most) = (WorkBudget::REFERENCE, impacts_compared(scene));
-    let end = advance_capped(&mut simulation, IMPACTS_WITHIN, &budget, context, |simulation| {
+    let end = advance_capped(&mut simulation, IMPACT_TIME_LIMIT, &budget, context, |simulation| {
         let now = simulation.time();
         simulation.take_peaks(&mut peaks);
         for (joint, peak) in peaks.iter().enumerate() {
@@ -458,24 +458,24 @@ fn first_contacts(
                 contacts.push(Contact { joint, begin: now, end: (!active).then_some(now) });
             }
         }
-        let over = |contact: &Contact| contact.over(now).is_some_and(|t| now > t + AFTERWARDS);
-        contacts.len() >= most && contacts[..most].iter().all(over)
+        let is_over = |contact: &Contact| contact.end_at(now).is_some_and(|t| now > t + EXTRA_TIME);
+        contacts.len() >= most && contacts[..most].iter().all(is_over)
     })?;
     match end {
         // A large scene may be capped before its sixth impact: the impacts until then are compared.
         End::Capped if !contacts.is_empty() => {}
-        end => done(end)?,
+        end => require_reached(end)?,
     }
     let last = simulation.time();
     // Only contacts that have ended by then can be compared to their end.
-    let over = |contact: &&Contact| contact.over(last).is_some_and(|end| end + AFTERWARDS <= last);
-    let compared = contacts.iter().take(most).take_while(over).count();
+    let is_over = |contact: &&Contact| contact.end_at(last).is_some_and(|end| end + EXTRA_TIME <= last);
+    let compared = contacts.iter().take(most).take_while(is_over).count();
     Ok((contacts, compared))
 }
 
 /// The state in which every joint with clearance has been in contact for a while without a new impact.
 fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<Simulation>, AnalysisError> {
-    let setting = Setting::automatic(SETTLING);
+    let setting = Setting::automatic(SETTLING_TOLERANCE);
     let mut simulation = setting.start(scene)?;
     let mut peaks: Vec<Peak> = Vec::new();
     let mut since = 0.0;
@@ -484,13 +484,13 @@ fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<Simul
         .collect();
     let mut settled = false;
     let budget = WorkBudget { seconds: f64::INFINITY, ..WorkBudget::FULL };
-    advance_capped(&mut simulation, SETTLED_WITHIN, &budget, context, |simulation| {
+    advance_capped(&mut simulation, SETTLING_TIME_LIMIT, &budget, context, |simulation| {
         simulation.take_peaks(&mut peaks);
         let open = |&j: &usize| !simulation.contact_state(j).active || peaks[j].impacts > 0;
         if clearance.iter().any(open) {
             since = simulation.time();
         }
-        settled = simulation.time() - since >= QUIET;
+        settled = simulation.time() - since >= QUIET_TIME;
         settled
     })?;
     Ok(settled.then_some(simulation))
@@ -506,8 +506,8 @@ mod tests {
         let changes: Vec<_> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         let scene = Scene::load(name, &changes).expect("built in");
         let mut clock = || 0.0;
-        let mut go_on = |_: f64| ControlFlow::Continue(());
-        ReferenceSolution::new(&scene, &mut RunContext::new(&mut clock, &mut go_on)).expect("measures")
+        let mut keep_going = |_: f64| ControlFlow::Continue(());
+        ReferenceSolution::new(&scene, &mut RunContext::new(&mut clock, &mut keep_going)).expect("measures")
     }
 
     #[test]

@@ -98,30 +98,30 @@ pub struct Evidence {
 }
 
 /// Fewest sections that allow a verdict.
-pub const FEWEST: usize = 8;
+pub const MIN_SECTIONS: usize = 8;
 /// At least this many sections are examined, if there are that many.
-const LOOKED_AT: usize = 32;
+const MIN_EXAMINED: usize = 32;
 /// Largest spread, in resolutions, of the sections of an attracting cycle despite the errors of its steps.
-const NEARBY: f64 = 100.0;
+const MAX_CYCLE_SPREAD: f64 = 100.0;
 /// How often such a cycle must occur, and how far its points may drift as a fraction of their extent: errors come and go.
-const SEEN: usize = 8;
-const DRIFT: f64 = 0.3;
+const CYCLE_RETURNS: usize = 8;
+const MAX_DRIFT: f64 = 0.3;
 /// Number of times that a period must occur.
-const RETURNS: usize = 3;
+const MIN_RETURNS: usize = 3;
 /// Sections whose spread falls below this fraction of their earlier spread are converging to a cycle.
-const CLOSING: f64 = 0.7;
+const CONVERGENCE_RATIO: f64 = 0.7;
 /// Without an exponent, the 0-1 test indicates chaos above the first of these and regular motion below the second.
-const CHAOS: f64 = 0.8;
-const REGULAR: f64 = 0.2;
+const CHAOTIC_ABOVE: f64 = 0.8;
+const REGULAR_BELOW: f64 = 0.2;
 
 /// Classifies `sections` (concatenated, each as long as `resolution`), taken every `interval` seconds; `resolution` is
 /// the smallest difference that distinguishes two values.
 pub fn classify(sections: &[f64], resolution: &[f64], interval: f64, exponent: Option<Exponent>) -> (Regime, Evidence) {
     let width = resolution.len();
     let all: Vec<&[f64]> = sections.chunks_exact(width).collect();
-    let from = all.len() - (all.len() / 2).max(LOOKED_AT).min(all.len());
+    let from = all.len() - (all.len() / 2).max(MIN_EXAMINED).min(all.len());
     let used = &all[from..];
-    let period = (1..=used.len() / RETURNS).find(|&n| spread(used, n, resolution) <= 1.0);
+    let period = (1..=used.len() / MIN_RETURNS).find(|&n| spread(used, n, resolution) <= 1.0);
     let many = all.len().max(2) as f64;
     let evidence = Evidence {
         sections: used.len(),
@@ -131,16 +131,16 @@ pub fn classify(sections: &[f64], resolution: &[f64], interval: f64, exponent: O
         exponent_bound: libm::log(many) / (many * interval),
         exponent,
     };
-    let regime = match judge(period, &evidence) {
+    let regime = match decide(period, &evidence) {
         // Close to a bifurcation a cycle attracts so weakly that its exponent is indistinguishable from 0.
-        Regime::QuasiPeriodic if still_closing(used, resolution) => Regime::NotSettled,
+        Regime::QuasiPeriodic if is_converging(used, resolution) => Regime::NotSettled,
         // Step errors keep the sections of an attracting cycle from returning within the resolution, but not from staying near.
-        Regime::NotSettled if !still_closing(used, resolution) => {
-            let stays = |n: &usize| {
+        Regime::NotSettled if !is_converging(used, resolution) => {
+            let is_cycle = |n: &usize| {
                 let spread = spread(used, *n, resolution);
-                spread <= NEARBY && drift(used, *n, resolution) <= DRIFT * spread
+                spread <= MAX_CYCLE_SPREAD && drift(used, *n, resolution) <= MAX_DRIFT * spread
             };
-            let near = (1..=used.len() / SEEN).find(stays);
+            let near = (1..=used.len() / CYCLE_RETURNS).find(is_cycle);
             near.map_or(Regime::NotSettled, Regime::Periodic)
         }
         regime => regime,
@@ -149,41 +149,41 @@ pub fn classify(sections: &[f64], resolution: &[f64], interval: f64, exponent: O
 }
 
 /// Whether the sections of the best-fitting period continue to approach each other.
-fn still_closing(sections: &[&[f64]], resolution: &[f64]) -> bool {
+fn is_converging(sections: &[&[f64]], resolution: &[f64]) -> bool {
     let (first, second) = sections.split_at(sections.len() / 2);
     let by_spread = |&a: &usize, &b: &usize| {
         let spread = |n| spread(sections, n, resolution);
         spread(a).total_cmp(&spread(b))
     };
-    let best = (1..=second.len() / RETURNS).min_by(by_spread);
-    best.is_some_and(|n| spread(second, n, resolution) < CLOSING * spread(first, n, resolution))
+    let best = (1..=second.len() / MIN_RETURNS).min_by(by_spread);
+    best.is_some_and(|n| spread(second, n, resolution) < CONVERGENCE_RATIO * spread(first, n, resolution))
 }
 
-fn judge(period: Option<usize>, evidence: &Evidence) -> Regime {
-    if evidence.sections < FEWEST {
+fn decide(period: Option<usize>, evidence: &Evidence) -> Regime {
+    if evidence.sections < MIN_SECTIONS {
         return Regime::Unclear;
     }
-    let regular = evidence.zero_one < 0.5;
+    let is_regular = evidence.zero_one < 0.5;
     let diverges = |e: &Exponent| e.value - 2.0 * e.standard_error > evidence.exponent_bound;
     if let Some(n) = period {
         // The sections indicate a repetition that the twin excludes: one of them is wrong.
-        let contradicted = evidence.exponent.as_ref().is_some_and(diverges);
-        return if contradicted { Regime::Unclear } else { Regime::Periodic(n) };
+        let is_contradicted = evidence.exponent.as_ref().is_some_and(diverges);
+        return if is_contradicted { Regime::Unclear } else { Regime::Periodic(n) };
     }
     let Some(exponent) = &evidence.exponent else {
         return match evidence.zero_one {
-            k if k > CHAOS => Regime::Chaotic,
-            k if k < REGULAR => Regime::QuasiPeriodic,
+            k if k > CHAOTIC_ABOVE => Regime::Chaotic,
+            k if k < REGULAR_BELOW => Regime::QuasiPeriodic,
             _ => Regime::Unclear,
         };
     };
     let (bound, doubt) = (evidence.exponent_bound, 2.0 * exponent.standard_error);
     if diverges(exponent) {
         // Neighbours diverge, yet the sections wander like those of a regular motion: one of them is wrong.
-        if evidence.zero_one < REGULAR { Regime::Unclear } else { Regime::Chaotic }
+        if evidence.zero_one < REGULAR_BELOW { Regime::Unclear } else { Regime::Chaotic }
     } else if exponent.value + doubt < -bound {
         Regime::NotSettled
-    } else if exponent.value.abs() <= bound + doubt && regular {
+    } else if exponent.value.abs() <= bound + doubt && is_regular {
         Regime::QuasiPeriodic
     } else {
         Regime::Unclear
@@ -253,8 +253,8 @@ fn most_varying(sections: &[&[f64]], resolution: &[f64]) -> usize {
 fn zero_one(sections: &[&[f64]], observable: usize) -> f64 {
     const FREQUENCIES: usize = 61;
     let n = sections.len();
-    let cut = n / 10;
-    if cut < 4 {
+    let max_shift = n / 10;
+    if max_shift < 4 {
         return f64::NAN;
     }
     let mean = sections.iter().map(|s| s[observable]).sum::<f64>() / n as f64;
@@ -275,13 +275,13 @@ fn zero_one(sections: &[&[f64]], observable: usize) -> f64 {
                 })
                 .collect();
             let displacement = |lag: usize| {
-                let squares = (0..n - cut).map(|j| {
+                let squares = (0..n - max_shift).map(|j| {
                     let (dp, dq) = (walk[j + lag].0 - walk[j].0, walk[j + lag].1 - walk[j].1);
                     dp * dp + dq * dq
                 });
-                squares.sum::<f64>() / (n - cut) as f64
+                squares.sum::<f64>() / (n - max_shift) as f64
             };
-            correlation_with_time(&(1..=cut).map(displacement).collect::<Vec<_>>())
+            correlation_with_time(&(1..=max_shift).map(displacement).collect::<Vec<_>>())
         })
         .collect();
     correlations.sort_by(f64::total_cmp);
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn too_few_sections_say_nothing() {
+    fn too_few_sections_give_an_unclear_regime() {
         assert_eq!(classify(&[0.5; 7], &[1e-9], 1.0, None).0, Regime::Unclear);
         assert_eq!(classify(&[], &[1e-9], 1.0, None).0, Regime::Unclear);
     }
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn witnesses_that_contradict_each_other_are_unclear() {
+    fn contradicting_evidence_gives_an_unclear_regime() {
         let turn = 0.618_033_988_749_894_9;
         let torus: Vec<f64> = (0..400).map(|k| libm::cos(std::f64::consts::TAU * turn * f64::from(k))).collect();
         assert_eq!(classify(&torus, &[1e-9], 1.0, exponent(0.0)).0, Regime::QuasiPeriodic);

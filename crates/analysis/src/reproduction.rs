@@ -196,16 +196,16 @@ impl Agenda {
         PAPER.period * periods as f64
     }
 
-    /// Runs job `job`; `go_on` receives the completed part of [`Self::length`] and returns false to cancel.
+    /// Runs job `job`; `keep_going` receives the completed part of [`Self::length`] and returns false to cancel.
     ///
     /// # Errors
-    /// A run stopped by the divergence guard; cancellation by `go_on`. Points of a sweep that diverge are no error.
-    pub fn run(&self, job: usize, mut go_on: impl FnMut(f64) -> bool) -> Result<Outcome, RunError> {
+    /// A run stopped by the divergence guard; cancellation by `keep_going`. Points of a sweep that diverge are no error.
+    pub fn run(&self, job: usize, mut keep_going: impl FnMut(f64) -> bool) -> Result<Outcome, RunError> {
         let failed = |name: &str, error| RunError { name: name.to_owned(), error: Box::new(error) };
         match self.jobs[job] {
             ReportJob::Run(n) => {
                 let run = &self.runs[n];
-                let recorded = record(run, self.extent.settle, go_on).map_err(|error| failed(&run.name, error))?;
+                let recorded = record(run, self.extent.settle, keep_going).map_err(|error| failed(&run.name, error))?;
                 Ok(Outcome::Run(Box::new(recorded)))
             }
             ReportJob::Block(s, b) => {
@@ -216,7 +216,7 @@ impl Agenda {
                 while !block.is_done() {
                     block.advance(2048);
                     let now = block.current().map_or(0.0, |run| run.taken() as f64 / all);
-                    if !go_on(share * (block.finished().len() as f64 + now)) {
+                    if !keep_going(share * (block.finished().len() as f64 + now)) {
                         return Err(failed(&self.sweeps[s].file_name(), ResponseError::Cancelled));
                     }
                 }
@@ -256,23 +256,31 @@ impl Agenda {
 }
 
 /// Records a run of section 4.2, with its settled motion if requested.
-fn record(run: &PlannedRun, settle: usize, mut go_on: impl FnMut(f64) -> bool) -> Result<RecordedRun, ResponseError> {
+fn record(
+    run: &PlannedRun,
+    settle: usize,
+    mut keep_going: impl FnMut(f64) -> bool,
+) -> Result<RecordedRun, ResponseError> {
     let mut rows = Vec::new();
     let observe = |look: &Observation| rows.push(COLUMNS.map(|column| (column.of)(look)));
-    let response = respond(&run.scene, PAPER.period, PAPER.sampling, observe, &mut go_on)?;
-    let settled = run.settles.then(|| settled(&run.scene, settle, |time| go_on(PAPER.period + time)));
+    let response = respond(&run.scene, PAPER.period, PAPER.sampling, observe, &mut keep_going)?;
+    let settled = run.settles.then(|| settled(&run.scene, settle, |time| keep_going(PAPER.period + time)));
     Ok(RecordedRun { name: run.name.clone(), case: run.case, response, rows, settled: settled.transpose()? })
 }
 
 /// Settled motion over the period after `settle` periods and the next one, at equal phases.
-fn settled(scene: &Scene, settle: usize, mut go_on: impl FnMut(f64) -> bool) -> Result<SettledCurve, ResponseError> {
+fn settled(
+    scene: &Scene,
+    settle: usize,
+    mut keep_going: impl FnMut(f64) -> bool,
+) -> Result<SettledCurve, ResponseError> {
     let mut simulation = Simulation::new(&scene.machine)?;
     let mut frame = Frame::default();
     let mut found = SettledCurve::default();
     for n in 0..=2 * CURVE_POINTS {
         let time = PAPER.period * (settle as f64 + n as f64 / CURVE_POINTS as f64);
         while simulation.time() < time {
-            if !go_on(simulation.time()) {
+            if !keep_going(simulation.time()) {
                 return Err(ResponseError::Cancelled);
             }
             simulation.step()?;

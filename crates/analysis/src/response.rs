@@ -158,17 +158,17 @@ impl Observation<'_> {
 }
 
 /// Runs `scene` for `duration` (s) and compares it with its ideal motion; `every` (s) is the sampling interval of
-/// [`Response::sampled`]. `observe` receives every examined instant in order of time; `go_on` receives the simulated time
+/// [`Response::sampled`]. `observe` receives every examined instant in order of time; `keep_going` receives the simulated time
 /// after every step and returns false to cancel.
 ///
 /// # Errors
-/// A scene that does not start, the divergence guard, cancellation by `go_on`.
+/// A scene that does not start, the divergence guard, cancellation by `keep_going`.
 pub fn respond(
     scene: &Scene,
     duration: f64,
     every: f64,
     mut observe: impl FnMut(&Observation),
-    mut go_on: impl FnMut(f64) -> bool,
+    mut keep_going: impl FnMut(f64) -> bool,
 ) -> Result<Response, ResponseError> {
     let mut simulation = Simulation::new(&scene.machine)?;
     let mut ideal = Ideal { simulation: ideal_of(scene), frame: Frame::default() };
@@ -211,7 +211,7 @@ pub fn respond(
         if end >= duration {
             break;
         }
-        if !go_on(end) {
+        if !keep_going(end) {
             return Err(ResponseError::Cancelled);
         }
         simulation.step_until(duration)?;
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_ends_when_asked() {
+    fn a_cancelled_run_ends() {
         let scene = scene("pendulum", &[]);
         let ended = respond(&scene, 1.0, 1e-3, |_| (), |t| t < 0.01);
         assert!(matches!(ended, Err(ResponseError::Cancelled)));

@@ -52,7 +52,7 @@ impl RowTimes {
     }
 
     /// Whether the last row lies at the end of the run.
-    pub fn reach_the_end(&self) -> bool {
+    pub fn include_the_end(&self) -> bool {
         self.duration - self.at(self.last) <= 1e-9 * self.duration
     }
 }
@@ -83,9 +83,9 @@ mod tests {
         let times = rows(0.7, 0.1);
         assert_eq!([0.0, 0.05, 0.1, 0.3, 0.7].map(|from| times.first(from, 0.0)), [0, 1, 1, 3, 7]);
         assert_eq!([0.3, 0.35, 0.71].map(|time| times.first(0.3, time)), [3, 4, 8]);
-        assert!(rows(0.7, 0.1).reach_the_end());
-        assert!(rows(0.0, 0.1).reach_the_end());
-        assert!(!rows(1.0, 0.3).reach_the_end());
+        assert!(rows(0.7, 0.1).include_the_end());
+        assert!(rows(0.0, 0.1).include_the_end());
+        assert!(!rows(1.0, 0.3).include_the_end());
         assert_eq!(RowTimes::new(1.0, 0.0), None);
         assert_eq!(RowTimes::new(1.0, f64::NAN), None);
     }

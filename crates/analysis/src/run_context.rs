@@ -26,12 +26,12 @@ impl<'a> RunContext<'a> {
         (self.clock)()
     }
 
-    /// Reports how much of the current part is done.
+    /// Reports `fraction` of the current part as done; the caller receives that of the whole.
     ///
     /// # Errors
     /// [`AnalysisError::Cancelled`] if the caller cancelled.
-    pub(super) fn go_on(&mut self, done: f64) -> Result<(), AnalysisError> {
-        let fraction = self.from + (self.to - self.from) * done.clamp(0.0, 1.0);
+    pub(super) fn report_progress(&mut self, fraction: f64) -> Result<(), AnalysisError> {
+        let fraction = self.from + (self.to - self.from) * fraction.clamp(0.0, 1.0);
         match (self.progress)(fraction) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(AnalysisError::Cancelled),

@@ -218,7 +218,7 @@ impl Tally {
 /// Statistics being accumulated: one tally for each requested [`ChannelStatistic`].
 #[derive(Debug)]
 pub(super) struct Accumulator {
-    wanted: Vec<ChannelStatistic>,
+    requested: Vec<ChannelStatistic>,
     tallies: Vec<Tally>,
     frame: Frame,
     /// Largest time between two samples, s.
@@ -228,18 +228,18 @@ pub(super) struct Accumulator {
 }
 
 impl Accumulator {
-    /// An accumulator of `wanted`, with samples at every end of a step and at most `interval`, s, apart. Channels that the
+    /// An accumulator of `requested`, with samples at every end of a step and at most `interval`, s, apart. Channels that the
     /// simulation does not have stay unknown.
-    pub(super) fn new(wanted: &[ChannelStatistic], simulation: &mut Simulation, interval: f64) -> Self {
+    pub(super) fn new(requested: &[ChannelStatistic], simulation: &mut Simulation, interval: f64) -> Self {
         let machine = simulation.machine().clone();
-        let list = if wanted.is_empty() { Vec::new() } else { channels(&machine, simulation) };
+        let list = if requested.is_empty() { Vec::new() } else { channels(&machine, simulation) };
         let tally = |of: &ChannelStatistic| {
             Tally::new(list.iter().find(|channel| channel.name == of.channel).map(ChannelInfo::reading))
         };
-        let tallies: Vec<Tally> = wanted.iter().map(tally).collect();
+        let tallies: Vec<Tally> = requested.iter().map(tally).collect();
         let mut frame = Frame::default();
-        tallies.iter().filter_map(|tally| tally.reading).for_each(|reading| reading.ask(&mut frame));
-        Self { wanted: wanted.to_vec(), tallies, frame, interval, latest: simulation.time(), span: 0.0 }
+        tallies.iter().filter_map(|tally| tally.reading).for_each(|reading| reading.request(&mut frame));
+        Self { requested: requested.to_vec(), tallies, frame, interval, latest: simulation.time(), span: 0.0 }
     }
 
     /// Starts over at the latest state.
@@ -256,7 +256,7 @@ impl Accumulator {
     }
 
     /// Adds the latest step.
-    pub(super) fn look(&mut self, simulation: &mut Simulation) {
+    pub(super) fn sample(&mut self, simulation: &mut Simulation) {
         if self.tallies.is_empty() {
             return;
         }
@@ -282,7 +282,7 @@ impl Accumulator {
             Some(joint) => peaks(joint),
             None => tally.value(of.statistic, self.span),
         };
-        self.wanted.iter().zip(&self.tallies).map(value).collect()
+        self.requested.iter().zip(&self.tallies).map(value).collect()
     }
 }
 

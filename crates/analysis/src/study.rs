@@ -30,7 +30,7 @@ use crate::design::{Design, Start};
 use crate::distribution::DistributionError;
 use crate::drive::common_period;
 use crate::fits::FitSearchError;
-use crate::indices::{IndicesError, LEAST_ROWS};
+use crate::indices::{IndicesError, MIN_ROWS};
 use crate::morris::MorrisError;
 use crate::point::{Protocol, Span};
 use crate::sampling::SamplingError;
@@ -149,7 +149,7 @@ pub enum StudyError {
         error: Box<Self>,
     },
     /// Fewer rows than indices need.
-    #[error("allowed at least {LEAST_ROWS}, or 0 for no indices")]
+    #[error("allowed at least {MIN_ROWS}, or 0 for no indices")]
     TooFewRows,
     /// No design for indices.
     #[error(transparent)]

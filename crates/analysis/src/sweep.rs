@@ -97,7 +97,7 @@ impl Sweep {
     /// No kept periods, no drive phase where sections need one, or a value at which the scene cannot start.
     pub fn new(scene: Scene, design: Design, protocol: impl Into<Protocol>) -> Result<Self, SweepError> {
         let sweep = Self::untried(scene, design, protocol)?;
-        sweep.design.tried().into_iter().try_for_each(|point| sweep.check(point))?;
+        sweep.design.checked_points().into_iter().try_for_each(|point| sweep.check(point))?;
         Ok(sweep)
     }
 
@@ -266,7 +266,7 @@ mod tests {
     use crate::statistic::ChannelStatistic;
     use jointplay_physics::simulate::Frame;
 
-    fn swept(name: &str, vary: &str, span: Span, keep: &str) -> (Sweep, Vec<PointResult>) {
+    fn sweep_of(name: &str, vary: &str, span: Span, keep: &str) -> (Sweep, Vec<PointResult>) {
         let scene = Scene::load(name, &[]).expect("built in");
         let keep = ChannelStatistic::parse_list(&scene, keep).expect("channels");
         let design = Design::crossed(&scene, vec![Axis::parse(&scene, vary).expect("a range")], &[Start::Cold]);
@@ -288,7 +288,7 @@ mod tests {
     fn a_duration_needs_no_drive_and_its_statistics_are_those_of_a_run() {
         let span = Span::Duration { duration: 0.06, from: 0.02 };
         let keep = "rod.pose.x:min,rod.pose.x:max,rod.velocity.x:mean,rod.pose.x:end,*.normal:max,*.normal:mean";
-        let (sweep, results) = swept("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, keep);
+        let (sweep, results) = sweep_of("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, keep);
         let names: Vec<&str> = sweep.layout().columns().iter().map(|column| &column.name[..]).collect();
         assert_eq!(names[..4], ["status", "stopped_at_s", "doubts", "energy_residual"]);
         for (point, result) in results.iter().enumerate() {
@@ -343,7 +343,8 @@ mod tests {
         for (discard, keeps) in [(1, true), (40, false)] {
             let (count, crossing) = (50, crossing.clone());
             let span = Span::Crossings { crossing, count, discard, duration: 1.0 };
-            let (sweep, results) = swept("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, "*.normal:max,time:end");
+            let (sweep, results) =
+                sweep_of("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, "*.normal:max,time:end");
             for result in results {
                 assert!(result.crossings >= 1 && result.crossings < 40, "{}", result.crossings);
                 let (peak, end) = (result.statistics[0], result.statistics[1]);
@@ -361,7 +362,7 @@ mod tests {
     fn a_given_period_replaces_that_of_the_drives() {
         let plan = Plan { periods: 3, discard: 1, phase: 0.0, exponent: false };
         let span = Span::Sections { plan, interval: Some(0.01) };
-        let (sweep, results) = swept("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, "time:end");
+        let (sweep, results) = sweep_of("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, "time:end");
         assert_eq!(sweep.layout().kept(), 2);
         assert!(
             results.iter().all(|result| (result.statistics[0] - 0.03).abs() < 1e-12 && result.sections.len() == 24)

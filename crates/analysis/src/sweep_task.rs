@@ -112,10 +112,10 @@ pub(super) enum SweepMessage {
 pub(super) async fn run(
     task: &SweepTask,
     share: Share,
-    tell: &mut dyn FnMut(SweepMessage) -> ControlFlow<()>,
+    report: &mut dyn FnMut(SweepMessage) -> ControlFlow<()>,
     rest: &mut impl AsyncFnMut(),
 ) -> Result<(), TaskFault> {
-    let mut say = |message| match tell(message) {
+    let mut send = |message| match report(message) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(TaskFault::Cancelled),
     };
@@ -142,9 +142,9 @@ pub(super) async fn run(
         return Err(TaskFault::TooManySections { points: design.points(), kept, most: MAX_SECTIONS });
     }
     let sweep = Sweep::new(scene, design, plan)?;
-    say(SweepMessage::Ranges(ranges))?;
+    send(SweepMessage::Ranges(ranges))?;
     let blocks = sweep.design().blocks();
-    let mut through = 0;
+    let mut completed = 0;
     let own = coarse_first(blocks).into_iter();
     for b in own.skip(share.index).step_by(share.of.max(1)) {
         let mut block = Block::new(&sweep, b);
@@ -152,11 +152,11 @@ pub(super) async fn run(
             rest().await;
             block.advance();
             if let Some(point) = block.latest() {
-                through += 1;
-                say(SweepMessage::Point(Box::new(point)))?;
+                completed += 1;
+                send(SweepMessage::Point(Box::new(point)))?;
             }
             let part = block.run.current().map_or(0.0, |run| run.taken() as f64 / task.periods as f64);
-            say(SweepMessage::Progress((through as f64 + part) / sweep.design().points() as f64))?;
+            send(SweepMessage::Progress((completed as f64 + part) / sweep.design().points() as f64))?;
         }
     }
     Ok(())
@@ -185,7 +185,7 @@ fn coarse_first(n: usize) -> Vec<usize> {
 struct Block<'a> {
     sweep: &'a Sweep,
     run: BlockRun<'a>,
-    told: usize,
+    reported: usize,
     /// Time of the first section of the current point, s, and whether it starts cold.
     first: Option<(f64, bool)>,
     /// The previous point: its number and the time of its last section, s.
@@ -194,7 +194,7 @@ struct Block<'a> {
 
 impl<'a> Block<'a> {
     fn new(sweep: &'a Sweep, b: usize) -> Self {
-        Self { run: sweep.begin(b), sweep, told: 0, first: None, before: None }
+        Self { run: sweep.begin(b), sweep, reported: 0, first: None, before: None }
     }
 
     fn advance(&mut self) {
@@ -209,9 +209,9 @@ impl<'a> Block<'a> {
 
     /// The point just finished, if any.
     fn latest(&mut self) -> Option<SweptPoint> {
-        let (index, result) = self.run.finished().get(self.told)?;
-        self.told += 1;
-        let (first, cold) = self.first.take().unwrap_or((0.0, true));
+        let (index, result) = self.run.finished().get(self.reported)?;
+        self.reported += 1;
+        let (first, is_cold) = self.first.take().unwrap_or((0.0, true));
         let before = self.before.take();
         let settings = self.sweep.design().settings(*index);
         let scene = self.sweep.design().scene(self.sweep.scene(), *index).ok();
@@ -225,7 +225,7 @@ impl<'a> Block<'a> {
             index: *index,
             values: Vec::new(),
             settings: settings.iter().map(|(key, value)| ((*key).to_owned(), write(key, value))).collect(),
-            after: before.filter(|_| !cold).map(|(index, _)| index),
+            after: before.filter(|_| !is_cold).map(|(index, _)| index),
             first,
             interval,
             diverged: None,
@@ -244,7 +244,7 @@ impl<'a> Block<'a> {
             None => point.diverged = Some(0.0),
             Some(PointResult { stopped: Some(time), .. }) => point.diverged = Some(*time),
             Some(result) => {
-                tell_result(&mut point, result);
+                set_result(&mut point, result);
                 let periods = self.sweep.protocol().plan().map_or(1, |plan| plan.periods);
                 self.before = Some((*index, first + (periods - 1) as f64 * interval));
             }
@@ -253,7 +253,7 @@ impl<'a> Block<'a> {
     }
 }
 
-fn tell_result(point: &mut SweptPoint, result: &PointResult) {
+fn set_result(point: &mut SweptPoint, result: &PointResult) {
     let finite = |value: f64| value.is_finite().then_some(value);
     point.regime = result.regime.to_string();
     point.regime_code = result.regime.code();
@@ -290,25 +290,26 @@ mod tests {
         }
     }
 
-    fn told(task: SweepTask, most: usize) -> Vec<Message> {
-        told_of(task, Share::WHOLE, most)
+    fn reported(task: SweepTask, most: usize) -> Vec<Message> {
+        reported_of_share(task, Share::WHOLE, most)
     }
 
-    fn told_of(task: SweepTask, share: Share, most: usize) -> Vec<Message> {
-        let mut said = Vec::new();
+    fn reported_of_share(task: SweepTask, share: Share, most: usize) -> Vec<Message> {
+        let mut messages = Vec::new();
         // Jobs and messages are sent as text.
         let text = serde_json::to_string(&Job::Sweep(task, share)).expect("plain data");
         let job = serde_json::from_str(&text).expect("its own text");
         perform(&job, &mut || 0.0, &mut |message| {
             let text = serde_json::to_string(&message).expect("plain data");
-            said.push(serde_json::from_str(&text).expect("its own text"));
-            if said.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            messages.push(serde_json::from_str(&text).expect("its own text"));
+            if messages.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
-        said
+        messages
     }
 
-    fn points(said: &[Message]) -> Vec<&SweptPoint> {
-        said.iter()
+    fn points(messages: &[Message]) -> Vec<&SweptPoint> {
+        messages
+            .iter()
             .filter_map(|message| match message {
                 Message::Point(point) => Some(&**point),
                 _ => None,
@@ -317,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn the_outline_comes_first_and_every_number_once() {
+    fn coarse_order_starts_at_the_ends_and_holds_every_number_once() {
         assert_eq!(coarse_first(9), [0, 8, 4, 2, 6, 1, 3, 5, 7]);
         for n in 0..40 {
             let mut order = coarse_first(n);
@@ -327,11 +328,11 @@ mod tests {
     }
 
     #[test]
-    fn points_are_what_the_sweep_records_and_say_how_to_get_there() {
+    fn points_match_the_records_of_the_sweep_and_hold_their_settings() {
         let task = task(&["contact.clearance=0.2mm..0.4mm:3"]);
-        let said = told(task.clone(), usize::MAX);
-        assert_eq!(said.last(), Some(&Message::Done));
-        let points = points(&said);
+        let messages = reported(task.clone(), usize::MAX);
+        assert_eq!(messages.last(), Some(&Message::Done));
+        let points = points(&messages);
         let order: Vec<usize> = points.iter().map(|point| point.index).collect();
         assert_eq!(order, [0, 2, 1]);
         for point in points {
@@ -356,26 +357,26 @@ mod tests {
     }
 
     #[test]
-    fn several_share_the_points_and_each_is_the_same_to_the_bit() {
+    fn shares_together_hold_every_point_with_the_same_bits() {
         // One share for each of four workers, two of which have nothing to do; then two blocks of points that follow each other.
-        let cold = task(&["contact.clearance=0.2mm..0.4mm:2"]);
+        let is_cold = task(&["contact.clearance=0.2mm..0.4mm:2"]);
         let mut followed = task(&["contact.friction=0.1..0.3:26"]);
         (followed.start, followed.periods, followed.discard) = (Start::FollowUp, 2, 1);
         followed.scene.changes.push(("solver.preset".to_owned(), "preview".to_owned()));
-        for task in [cold, followed] {
-            let mut whole: Vec<_> = told(task.clone(), usize::MAX);
+        for task in [is_cold, followed] {
+            let mut whole: Vec<_> = reported(task.clone(), usize::MAX);
             let mut shared = Vec::new();
             let mut done = 0.0;
             for index in 0..4 {
-                let said = told_of(task.clone(), Share { index, of: 4 }, usize::MAX);
-                assert!(matches!(said[0], Message::Ranges(_)));
-                assert_eq!(said.last(), Some(&Message::Done));
-                done += said.iter().rev().find_map(progress).unwrap_or(0.0);
-                shared.extend(said);
+                let messages = reported_of_share(task.clone(), Share { index, of: 4 }, usize::MAX);
+                assert!(matches!(messages[0], Message::Ranges(_)));
+                assert_eq!(messages.last(), Some(&Message::Done));
+                done += messages.iter().rev().find_map(progress).unwrap_or(0.0);
+                shared.extend(messages);
             }
             assert!((done - 1.0).abs() < 1e-12, "{done}");
-            let sorted = |said: &mut Vec<Message>| {
-                let mut points: Vec<SweptPoint> = points(said).into_iter().cloned().collect();
+            let sorted = |messages: &mut Vec<Message>| {
+                let mut points: Vec<SweptPoint> = points(messages).into_iter().cloned().collect();
                 points.sort_by_key(|point| point.index);
                 points
             };
@@ -394,8 +395,8 @@ mod tests {
     fn a_followed_point_names_the_one_before() {
         let mut task = task(&["contact.friction=0.1..0.3:3"]);
         task.start = Start::FollowDown;
-        let said = told(task, usize::MAX);
-        let points = points(&said);
+        let messages = reported(task, usize::MAX);
+        let points = points(&messages);
         let after: Vec<_> = points.iter().map(|p| (p.index, p.after)).collect();
         assert_eq!(after, [(2, None), (1, Some(2)), (0, Some(1))]);
         let first: Vec<f64> = points.iter().map(|p| p.first).collect();
@@ -415,13 +416,13 @@ mod tests {
             let scene = Scene::parse(&text, None, &[]).expect("a scene");
             let mut task = task(&["parameter.gap=0.2mm..0.3mm:2"]);
             (task.scene, task.start) = (SceneSource::of(&scene), Start::FollowUp);
-            let said = told(task, usize::MAX);
+            let messages = reported(task, usize::MAX);
             if followed {
-                let after: Vec<_> = points(&said).iter().map(|point| point.after).collect();
+                let after: Vec<_> = points(&messages).iter().map(|point| point.after).collect();
                 assert_eq!(after, [None, Some(0)]);
             } else {
-                let [Message::Failed(why)] = &said[..] else {
-                    panic!("{said:?}");
+                let [Message::Failed(why)] = &messages[..] else {
+                    panic!("{messages:?}");
                 };
                 assert!(why.contains("at the next reset"), "{why}");
             }
@@ -429,18 +430,18 @@ mod tests {
     }
 
     #[test]
-    fn it_ends_when_told_and_bad_ranges_are_explained() {
+    fn a_cancelled_sweep_ends_and_faulty_ranges_are_reported() {
         let good = task(&["contact.friction=0.1..0.3:3"]);
-        assert_eq!(told(good, 3).len(), 3);
+        assert_eq!(reported(good, 3).len(), 3);
         for (vary, words) in [
             ("contact.friction=0.3..0.1:3", "reversed"),
             ("contact.friction=0.3", "expected KEY=A..B:N"),
             ("contact.friction=0.1..0.3:900000", "more than the window draws"),
             ("contact.clearance=0.1mm..20mm:3", "below the ball radius"),
         ] {
-            let said = told(task(&[vary]), usize::MAX);
-            let [Message::Failed(why)] = &said[..] else {
-                panic!("{vary}: {said:?}");
+            let messages = reported(task(&[vary]), usize::MAX);
+            let [Message::Failed(why)] = &messages[..] else {
+                panic!("{vary}: {messages:?}");
             };
             assert!(why.contains(words), "{why}");
         }

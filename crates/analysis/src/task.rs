@@ -75,11 +75,11 @@ impl From<AloneMessage> for Message {
     }
 }
 
-/// Runs `job`. `clock` returns seconds from any origin; `tell` receives each message and may cancel. The last message is
+/// Runs `job`. `clock` returns seconds from any origin; `report` receives each message and may cancel. The last message is
 /// [`Message::Done`] or [`Message::Failed`], unless cancelled.
-pub fn perform(job: &Job, clock: &mut dyn FnMut() -> f64, tell: &mut dyn FnMut(Message) -> ControlFlow<()>) {
+pub fn perform(job: &Job, clock: &mut dyn FnMut() -> f64, report: &mut dyn FnMut(Message) -> ControlFlow<()>) {
     let mut rest = async || {};
-    let performed = pin!(perform_with_rests(job, clock, tell, &mut rest));
+    let performed = pin!(perform_with_rests(job, clock, report, &mut rest));
     let end = performed.poll(&mut Context::from_waker(Waker::noop()));
     assert!(end.is_ready(), "nothing in it waits");
 }
@@ -88,14 +88,14 @@ pub fn perform(job: &Job, clock: &mut dyn FnMut() -> f64, tell: &mut dyn FnMut(M
 pub async fn perform_with_rests(
     job: &Job,
     clock: &mut dyn FnMut() -> f64,
-    tell: &mut dyn FnMut(Message) -> ControlFlow<()>,
+    report: &mut dyn FnMut(Message) -> ControlFlow<()>,
     rest: &mut impl AsyncFnMut(),
 ) {
     let outcome = match job {
-        Job::Presets { scene, presets } => measure_presets(scene, presets, clock, tell),
-        Job::Map(task) => map_task::run(task, &mut |message| tell(Message::Map(message)), rest).await,
-        Job::Sweep(task, share) => sweep_task::run(task, *share, &mut |message| tell(message.into()), rest).await,
-        Job::Alone(task, share) => alone_task::run(task, *share, &mut |message| tell(message.into()), rest).await,
+        Job::Presets { scene, presets } => measure_presets(scene, presets, clock, report),
+        Job::Map(task) => map_task::run(task, &mut |message| report(Message::Map(message)), rest).await,
+        Job::Sweep(task, share) => sweep_task::run(task, *share, &mut |message| report(message.into()), rest).await,
+        Job::Alone(task, share) => alone_task::run(task, *share, &mut |message| report(message.into()), rest).await,
     };
     let last = match outcome {
         Ok(()) => Message::Done,
@@ -103,14 +103,14 @@ pub async fn perform_with_rests(
         Err(fault) => Message::Failed(fault.to_string()),
     };
     // Nothing is left to cancel.
-    let _ = tell(last);
+    let _ = report(last);
 }
 
 fn measure_presets(
     scene: &SceneSource,
     words: &[String],
     clock: &mut dyn FnMut() -> f64,
-    tell: &mut dyn FnMut(Message) -> ControlFlow<()>,
+    report: &mut dyn FnMut(Message) -> ControlFlow<()>,
 ) -> Result<(), TaskFault> {
     let scene = scene.scene()?;
     let presets: Vec<Preset> = words
@@ -120,11 +120,11 @@ fn measure_presets(
             found.ok_or_else(|| TaskFault::NoPreset(word.clone()))
         })
         .collect::<Result<_, _>>()?;
-    let mut progress = |done| tell(Message::Progress(done));
+    let mut progress = |done| report(Message::Progress(done));
     let points = presets::measure(&scene, &presets, &mut RunContext::new(clock, &mut progress))?;
     let measured = points.iter().map(Measured::of);
     let message = Message::Presets(words.iter().cloned().zip(measured).collect());
-    match tell(message) {
+    match report(message) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(TaskFault::Cancelled),
     }
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sweep_that_rests_tells_the_same() {
+    fn a_sweep_with_rests_reports_the_same() {
         let scene = Scene::load("slider-crank-driven", &[]).expect("built in");
         let task = SweepTask {
             scene: SceneSource::of(&scene),
@@ -190,7 +190,7 @@ mod tests {
         };
         let job = Job::Sweep(task, Share::WHOLE);
         let (mut said, mut rests, mut waits) = (Vec::new(), 0, 0);
-        let mut tell = |message| {
+        let mut report = |message| {
             said.push(message);
             ControlFlow::Continue(())
         };
@@ -205,7 +205,7 @@ mod tests {
         };
         let mut clock = || 0.0;
         {
-            let mut sweep = pin!(perform_with_rests(&job, &mut clock, &mut tell, &mut rest));
+            let mut sweep = pin!(perform_with_rests(&job, &mut clock, &mut report, &mut rest));
             let mut context = Context::from_waker(Waker::noop());
             while sweep.as_mut().poll(&mut context).is_pending() {
                 waits += 1;
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn it_ends_when_told_and_says_what_is_wrong() {
+    fn a_cancelled_job_ends_and_faults_are_reported() {
         assert_eq!(messages(&job(&[], &["preview"]), 3).len(), 3);
         let said = messages(&job(&[], &["quick"]), usize::MAX);
         assert!(matches!(&said[..], [Message::Failed(why)] if why.contains("quick")));

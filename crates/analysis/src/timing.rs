@@ -9,11 +9,11 @@ use jointplay_physics::simulate::{Simulation, StartError, Stopped};
 use jointplay_scene::Scene;
 
 /// Steps between two checks of the clock, the cap and cancellation.
-const STEPS_IN_A_PIECE: u32 = 32;
+const STEPS_PER_PIECE: u32 = 32;
 /// Fewest and most runs of one setting; and the multiple of the time to be measured after which two runs suffice.
-const FEWEST_RUNS: usize = 3;
+const MIN_RUNS: usize = 3;
 const MAX_RUNS: usize = 40;
-const LONG: f64 = 4.0;
+const LONG_MEASUREMENT: f64 = 4.0;
 
 /// Limits on the work of an analysis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,12 +52,12 @@ impl WorkBudget {
         steps_per_impact: &[2.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 64.0],
     };
     /// Runs with more loose joints than this are long.
-    const MANY: usize = 8;
+    const MANY_JOINTS: usize = 8;
 
     /// Budget for `scene`: runs of many loose joints are capped earlier, at the same settings.
     #[must_use]
     pub fn of(self, scene: &Scene) -> Self {
-        if scene.machine.joints_with_clearance() <= Self::MANY {
+        if scene.machine.joints_with_clearance() <= Self::MANY_JOINTS {
             return self;
         }
         Self {
@@ -103,15 +103,15 @@ fn as_words<S: Serializer>(fault: &impl Display, serializer: S) -> Result<S::Ok,
     serializer.collect_str(fault)
 }
 
-/// Steps `simulation` to exactly `end`; `seen` is called after every step and returns true to stop.
+/// Steps `simulation` to exactly `end`; `after_step` is called after every step and returns true to stop.
 pub(super) fn advance_capped(
     simulation: &mut Simulation,
     end: f64,
     budget: &WorkBudget,
     context: &mut RunContext,
-    mut seen: impl FnMut(&mut Simulation) -> bool,
+    mut after_step: impl FnMut(&mut Simulation) -> bool,
 ) -> Result<End, AnalysisError> {
-    run_until_timed(simulation, end, budget, context, &mut Vec::new(), &mut seen)
+    run_until_timed(simulation, end, budget, context, &mut Vec::new(), &mut after_step)
 }
 
 /// The same with timing; `pieces` holds the shortest time so far of each piece, s.
@@ -121,13 +121,13 @@ fn run_until_timed(
     budget: &WorkBudget,
     context: &mut RunContext,
     pieces: &mut Vec<f64>,
-    seen: &mut impl FnMut(&mut Simulation) -> bool,
+    after_step: &mut impl FnMut(&mut Simulation) -> bool,
 ) -> Result<End, AnalysisError> {
-    let most = simulation.statistics().evaluations + budget.evaluations;
+    let max_evaluations = simulation.statistics().evaluations + budget.evaluations;
     let deadline = context.now() + budget.seconds;
     for piece in 0.. {
         let before = context.now();
-        let outcome = some_steps(simulation, end, seen);
+        let outcome = take_steps(simulation, end, after_step);
         let now = context.now();
         match pieces.get_mut(piece) {
             Some(shortest) => *shortest = shortest.min(now - before),
@@ -138,26 +138,26 @@ fn run_until_timed(
             Ok(false) => {}
             Err(stopped) => return Ok(End::Stopped(stopped)),
         }
-        context.go_on(0.0)?;
-        if simulation.statistics().evaluations > most || now > deadline {
+        context.report_progress(0.0)?;
+        if simulation.statistics().evaluations > max_evaluations || now > deadline {
             return Ok(End::Capped);
         }
     }
     unreachable!("pieces are counted for ever")
 }
 
-/// Steps one piece; returns whether `end` is reached or `seen` has returned true.
-fn some_steps(
+/// Steps one piece; returns whether `end` is reached or `after_step` has returned true.
+fn take_steps(
     simulation: &mut Simulation,
     end: f64,
-    seen: &mut impl FnMut(&mut Simulation) -> bool,
+    after_step: &mut impl FnMut(&mut Simulation) -> bool,
 ) -> Result<bool, Stopped> {
-    for _ in 0..STEPS_IN_A_PIECE {
+    for _ in 0..STEPS_PER_PIECE {
         if simulation.time() >= end {
             return Ok(true);
         }
         simulation.step_until(end)?;
-        if seen(simulation) {
+        if after_step(simulation) {
             return Ok(true);
         }
     }
@@ -166,7 +166,7 @@ fn some_steps(
 
 /// Clock seconds to step to `end`: the sum of the shortest times of all pieces, so that other load on the machine counts as
 /// little as possible. Every run starts from the result of `start`, whose time does not count.
-pub(super) fn time_to(
+pub(super) fn clock_time_to(
     end: f64,
     budget: &WorkBudget,
     context: &mut RunContext,
@@ -179,8 +179,8 @@ pub(super) fn time_to(
         let before = context.now();
         run_until_timed(&mut simulation, end, budget, context, &mut pieces, &mut |_| false)?;
         measured += context.now() - before;
-        let long = measured >= LONG * budget.measured && run > 0;
-        if long || (measured >= budget.measured && run + 1 >= FEWEST_RUNS) {
+        let long = measured >= LONG_MEASUREMENT * budget.measured && run > 0;
+        if long || (measured >= budget.measured && run + 1 >= MIN_RUNS) {
             break;
         }
     }
@@ -195,22 +195,22 @@ mod tests {
     use jointplay_scene::Scene;
 
     #[test]
-    fn work_is_capped_and_can_be_broken_off() {
+    fn work_is_capped_and_can_be_cancelled() {
         let scene = Scene::load("spcmm", &[]).expect("built in");
         let small = WorkBudget { evaluations: 500, ..WorkBudget::QUICK };
         let mut clock = || 0.0;
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
-        let mut go_on = |_: f64| ControlFlow::Continue(());
-        let mut context = RunContext::new(&mut clock, &mut go_on);
+        let mut keep_going = |_: f64| ControlFlow::Continue(());
+        let mut context = RunContext::new(&mut clock, &mut keep_going);
         let end = advance_capped(&mut simulation, 1.0, &small, &mut context, |_| false);
         assert_eq!(end, Ok(End::Capped));
         let evaluations = simulation.statistics().evaluations;
         assert!((501..1500).contains(&evaluations), "{evaluations}");
 
-        let mut looks = 0;
+        let mut calls = 0;
         let mut stop = |_: f64| {
-            looks += 1;
-            if looks > 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            calls += 1;
+            if calls > 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let mut context = RunContext::new(&mut clock, &mut stop);
         let end = advance_capped(&mut simulation, 1.0, &WorkBudget::FULL, &mut context, |_| false);
@@ -221,23 +221,23 @@ mod tests {
     fn a_run_takes_the_time_of_its_shortest_pieces() {
         let scene = Scene::load("pendulum", &[]).expect("built in");
         // A clock that advances by 1 s per reading, but by 100 s if the reading falls on a busy moment.
-        let (mut time, mut look) = (0.0, 0);
+        let (mut time, mut reading) = (0.0, 0);
         let mut clock = || {
-            look += 1;
-            time += if look % 17 == 0 { 100.0 } else { 1.0 };
+            reading += 1;
+            time += if reading % 17 == 0 { 100.0 } else { 1.0 };
             time
         };
-        let mut go_on = |_: f64| ControlFlow::Continue(());
-        let mut context = RunContext::new(&mut clock, &mut go_on);
+        let mut keep_going = |_: f64| ControlFlow::Continue(());
+        let mut context = RunContext::new(&mut clock, &mut keep_going);
         let budget = WorkBudget { measured: 1e6, seconds: 1e9, ..WorkBudget::QUICK };
         let mut steps = 0;
-        let seconds = time_to(5e-3, &budget, &mut context, |_| {
+        let seconds = clock_time_to(5e-3, &budget, &mut context, |_| {
             let mut simulation = Simulation::new(&scene.machine)?;
             while simulation.step_until(5e-3).is_ok() && simulation.time() < 5e-3 {}
             steps = simulation.statistics().steps;
             Ok(Simulation::new(&scene.machine)?)
         })
         .expect("runs");
-        assert_eq!(seconds, (steps as f64 / f64::from(STEPS_IN_A_PIECE)).ceil());
+        assert_eq!(seconds, (steps as f64 / f64::from(STEPS_PER_PIECE)).ceil());
     }
 }

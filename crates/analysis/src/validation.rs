@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_run_does_not_show_does_not_hold() {
+    fn a_check_without_a_measured_value_does_not_hold() {
         let pendulum = CASES.iter().find(|case| case.scene == "simple-pendulum").expect("a case");
         for measure in [
             Measure::Impact { number: 1, property: ImpactProperty::Peak },

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::reference_solution::PhaseCost;
-use super::timing::time_to;
+use super::timing::clock_time_to;
 use super::{AnalysisError, End, Errors, ReferenceSolution, RunContext, Setting, WorkBudget, front};
 use jointplay_physics::integrate::{Method, StepControl};
 use jointplay_physics::machine::{Machine, Preset};
@@ -129,9 +129,9 @@ pub fn work_precision(
         points.push(point);
     }
     // Timed again after the points, so that other load on the machine slows the baseline and the points alike.
-    baseline.again(&reference, budget, &mut context.part(parts - 1, parts))?;
+    baseline.measure_again(&reference, budget, &mut context.part(parts - 1, parts))?;
     for point in &mut points {
-        baseline.divide(point);
+        baseline.set_ratios(point);
     }
     mark_fronts(&mut points, &reference.floor);
     Ok(WorkPrecision { reference, points })
@@ -170,7 +170,7 @@ pub(super) fn measure(
     budget: &WorkBudget,
     context: &mut RunContext,
 ) -> Result<Point, AnalysisError> {
-    let (end, mut errors, work) = match reference.impacts_of(&setting, budget, context) {
+    let (end, mut errors, work) = match reference.impact_errors(&setting, budget, context) {
         Ok(found) => found,
         Err(AnalysisError::Start(refused)) => {
             let (end, none) = (End::Refused(refused), PhaseCost::default());
@@ -185,17 +185,17 @@ pub(super) fn measure(
         Err(error) => return Err(error),
     };
     let wall = match end {
-        End::Reached => Some(time_to(reference.span, budget, context, |_| setting.start(reference.scene()))?),
+        End::Reached => Some(clock_time_to(reference.span, budget, context, |_| setting.start(reference.scene()))?),
         _ => None,
     };
     let impacts = phase(end, reference.span, wall, &work);
     let mut settled = None;
-    if let Some((end, error, work)) = reference.settled_of(&setting, budget, context)?
+    if let Some((end, error, work)) = reference.settled_error(&setting, budget, context)?
         && let Some(span) = &reference.settled
     {
         errors.settled = error;
         let wall = match end {
-            End::Reached => Some(time_to(span.to, budget, context, |context| {
+            End::Reached => Some(clock_time_to(span.to, budget, context, |context| {
                 Ok(reference.resume(span, &setting, budget, context)?.1)
             })?),
             _ => None,
@@ -232,11 +232,11 @@ impl Baseline {
         context: &mut RunContext,
     ) -> Result<Self, AnalysisError> {
         let mut baseline = Self { setting: Setting::baseline(), impacts: None, settled: None };
-        baseline.again(reference, budget, context)?;
+        baseline.measure_again(reference, budget, context)?;
         Ok(baseline)
     }
 
-    pub(super) fn again(
+    pub(super) fn measure_again(
         &mut self,
         reference: &ReferenceSolution,
         budget: &WorkBudget,
@@ -252,7 +252,7 @@ impl Baseline {
         Ok(())
     }
 
-    pub(super) fn divide(&self, point: &mut Point) {
+    pub(super) fn set_ratios(&self, point: &mut Point) {
         let ratio = |own: Option<f64>, of: Option<f64>| Some(of? / own.filter(|w| *w > 0.0)?);
         point.impacts.ratio = ratio(point.impacts.wall_s, self.impacts);
         if let Some(settled) = &mut point.settled {

@@ -199,7 +199,7 @@ impl Pass {
             gauge.dimension = dimension_of(listed[0].unit);
             // Normal force magnitudes are available in continuous time.
             gauge.joint = channel.strip_suffix(".normal").and_then(|name| self.joint(name).ok());
-            readings.iter().for_each(|reading| reading.ask(&mut self.frame));
+            readings.iter().for_each(|reading| reading.request(&mut self.frame));
             gauge.readings = readings.to_vec();
         }
         gauge.so_far = match gauge.kind {

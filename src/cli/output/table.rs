@@ -79,8 +79,8 @@ impl Table {
     }
 
     /// Makes `frame` request the quantities that the columns need.
-    pub fn ask(&self, frame: &mut Frame) {
-        self.readings.iter().for_each(|reading| reading.ask(frame));
+    pub fn request(&self, frame: &mut Frame) {
+        self.readings.iter().for_each(|reading| reading.request(frame));
     }
 
     /// Column names, in order.

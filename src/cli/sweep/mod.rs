@@ -34,7 +34,7 @@ use crate::analysis::design::{Arrangement, FOLLOW_BLOCK};
 use crate::analysis::ideal_fault::{IdealFault, ideal_fault};
 use crate::analysis::layout::Status;
 use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Span};
-use crate::analysis::regime::{FEWEST, Regime};
+use crate::analysis::regime::{MIN_SECTIONS, Regime};
 use crate::analysis::sweep::Sweep;
 use crate::machine::WarningKind;
 use crate::scene::{Scene, insert_texts};
@@ -214,9 +214,9 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
     }
     let protocol = sweep.protocol();
     let kept = protocol.kept();
-    if protocol.sections().is_some() && kept < FEWEST {
+    if protocol.sections().is_some() && kept < MIN_SECTIONS {
         all.push(format!(
-            "{} of each point: with fewer than {FEWEST} no regime can be classified and all are reported as unclear; \
+            "{} of each point: with fewer than {MIN_SECTIONS} no regime can be classified and all are reported as unclear; \
              raise --{} or lower --discard.",
             count(kept as u64, "section"),
             if protocol.plan().is_some() { "periods" } else { "crossings" }

@@ -8,7 +8,7 @@ use crate::paper::{Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Seri
 use crate::regime::Regime;
 
 /// A change below this fraction of the amplitude is negligible; the criteria call it 5 %.
-const LITTLE: f64 = 0.05;
+const NEGLIGIBLE_SHARE: f64 = 0.05;
 
 /// A statement of the paper and this program's verdict.
 #[derive(Clone, Debug)]
@@ -30,52 +30,59 @@ impl Findings {
     /// Every statement of the paper, in its order.
     pub fn statements(&self) -> Vec<Statement> {
         let of = |claim: &'static Claim| {
-            let (confirmed, criterion, evidence) = self.judge(&claim.test);
+            let (confirmed, criterion, evidence) = self.evaluate(&claim.test);
             Statement { claim, confirmed, criterion, evidence }
         };
         PAPER.statements.iter().map(of).collect()
     }
 
     /// Evaluates a test: whether its criterion is met, the criterion, and the numbers compared with it.
-    fn judge(&self, test: &Test) -> (bool, &'static str, Vec<Reading>) {
+    fn evaluate(&self, test: &Test) -> (bool, &'static str, Vec<Reading>) {
         match *test {
             Test::StaysNearIdeal { coordinate, run } => {
                 let most = self.run(run).response.full.deviation[coordinate.index()];
                 let share = most / coordinate.amplitude(0);
-                let evidence =
-                    vec![micro("at most", most, coordinate), ("of the amplitude".to_owned(), share * 100.0, "%")];
-                (share < LITTLE, "leaves the ideal motion by less than 5 % of its amplitude", evidence)
+                let evidence = vec![
+                    distance_reading("at most", most, coordinate),
+                    ("of the amplitude".to_owned(), share * 100.0, "%"),
+                ];
+                (share < NEGLIGIBLE_SHARE, "leaves the ideal motion by less than 5 % of its amplitude", evidence)
             }
             Test::Grows { of, with } => {
                 let values = self.values(of, with);
                 let criterion = "larger at each value than at the one before, in continuous time";
-                (ascending(&values), criterion, each(with, &values, of.unit()))
+                (is_ascending(&values), criterion, readings_per_run(with, &values, of.unit()))
             }
             Test::AllGrow(series) => {
                 let tests = PAPER.statements.iter().map(|claim| &claim.test);
                 let own = |test: &&Test| matches!(test, Test::Grows { with, .. } if *with == series);
-                let grown: Vec<bool> = tests.filter(own).map(|test| self.judge(test).0).collect();
+                let grown: Vec<bool> = tests.filter(own).map(|test| self.evaluate(test).0).collect();
                 let held = grown.iter().filter(|held| **held).count();
-                let evidence = vec![count("that grow", held), count("measured", grown.len())];
+                let evidence = vec![count_reading("that grow", held), count_reading("measured", grown.len())];
                 (held == grown.len(), "every measured quantity of section 4.2 grows at both steps", evidence)
             }
             Test::Exceeds { of, that, over } => {
                 let [large, small] = [of, that].map(|quantity| self.values(quantity, over));
                 let larger = large.iter().zip(&small).all(|(large, small)| large > small);
-                let evidence = [each(over, &large, of.unit()), each(over, &small, that.unit())].concat();
+                let evidence =
+                    [readings_per_run(over, &large, of.unit()), readings_per_run(over, &small, that.unit())].concat();
                 (larger, "its peak is the larger number, in SI units, at all three values", evidence)
             }
             Test::NoRule { of, with } => {
                 let v = self.values(of, with);
                 let extreme = (v[1] - v[0]) * (v[2] - v[1]) < 0.0;
-                (extreme, "the middle value has the largest or the smallest peak", each(with, &v, of.unit()))
+                (
+                    extreme,
+                    "the middle value has the largest or the smallest peak",
+                    readings_per_run(with, &v, of.unit()),
+                )
             }
             Test::DiffersMore { of, than, with } => {
                 let shares = [of, than].map(|quantity| {
                     let values = self.values(quantity, with);
                     extent(values) / (values.iter().sum::<f64>() / 3.0)
                 });
-                let evidence = percent([of, than].map(FigureValue::word), &shares);
+                let evidence = percent_readings([of, than].map(FigureValue::word), &shares);
                 (shares[0] > shares[1], "over the three values it differs by a larger share of its mean", evidence)
             }
             Test::ChangesMoreWith { of, with, than } => {
@@ -87,7 +94,7 @@ impl Findings {
             Test::Steady { after, over } => {
                 let last = self.values(FigureValue::LastSeparation, over);
                 let steady = last.iter().all(|t| *t <= after);
-                (steady, "no ball leaves its socket after that instant", each(over, &last, "s"))
+                (steady, "no ball leaves its socket after that instant", readings_per_run(over, &last, "s"))
             }
             Test::Hardest { joint, run } => {
                 let response = &self.run(run).response;
@@ -101,57 +108,61 @@ impl Findings {
                 let curves = self.curves_of(curves).into_iter().chain(ideal);
                 let curves: Vec<Vec<&RecordedRow>> = curves.map(RecordedRun::samples).collect();
                 let columns: Vec<usize> = columns.iter().map(|name| column_of(name)).collect();
-                let shares: Vec<f64> = columns.iter().map(|&c| apart(&curves, c, from)).collect();
-                let mut evidence = percent(columns.iter().map(|&c| COLUMNS[c].label), &shares);
+                let shares: Vec<f64> = columns.iter().map(|&c| largest_distance(&curves, c, from)).collect();
+                let mut evidence = percent_readings(columns.iter().map(|&c| COLUMNS[c].label), &shares);
                 evidence.push(("from".to_owned(), from, "s"));
-                (little(&shares), "no two curves are further apart than 5 % of the ideal motion's amplitude", evidence)
+                (
+                    are_negligible(&shares),
+                    "no two curves are further apart than 5 % of the ideal motion's amplitude",
+                    evidence,
+                )
             }
             Test::FormulationsAgree(ref coordinates) => {
                 let apart: Vec<f64> = coordinates.iter().map(|&c| self.formulations_apart(c)).collect();
                 let most = &self.runs[0].response.full.deviation;
                 let shares = coordinates.iter().zip(&apart).map(|(c, apart)| apart / most[c.index()]);
                 let shares: Vec<f64> = shares.collect();
-                let mut evidence = percent(coordinates.iter().map(|c| c.word()), &shares);
-                evidence.extend(coordinates.iter().zip(apart).map(|(&c, apart)| micro(c.word(), apart, c)));
+                let mut evidence = percent_readings(coordinates.iter().map(|c| c.word()), &shares);
+                evidence.extend(coordinates.iter().zip(apart).map(|(&c, apart)| distance_reading(c.word(), apart, c)));
                 let criterion = "tree and lagrange agree within 5 % of the largest deviation from the ideal motion";
-                (little(&shares), criterion, evidence)
+                (are_negligible(&shares), criterion, evidence)
             }
             Test::PortraitsCoincide { of, over } => {
                 let (c, loops) = (of as usize, self.loops(over));
-                let values = furthest(&loops.map(|l| &l.coordinates[c])) / of.amplitude(0);
-                let share = [values.max(furthest(&loops.map(|l| &l.rates[c])) / of.amplitude(1))];
+                let values = largest_difference(&loops.map(|l| &l.coordinates[c])) / of.amplitude(0);
+                let share = [values.max(largest_difference(&loops.map(|l| &l.rates[c])) / of.amplitude(1))];
                 let criterion = "no two settled curves are further apart than 5 % of the amplitude at equal phases";
-                (little(&share), criterion, percent(["at most"], &share))
+                (are_negligible(&share), criterion, percent_readings(["at most"], &share))
             }
             Test::PortraitsWide { of, over, growing } => {
                 let widths = self.loops(over).map(|l| l.width[of as usize]);
                 let wide = widths.iter().all(|w| *w > self.resolution[of as usize]);
-                let evidence = self.resolved(of, over, &widths);
+                let evidence = self.distance_readings(of, over, &widths);
                 if growing == Some(true) {
                     let criterion = "successive settled periods differ by more than the resolution, and increasingly";
-                    return (wide && ascending(&widths), criterion, evidence);
+                    return (wide && is_ascending(&widths), criterion, evidence);
                 }
                 (wide, "successive settled periods differ by more than the resolution", evidence)
             }
             Test::SectionsAscend { of, over } => {
                 let latest: Vec<f64> = self.sections(over).iter().map(|r| r.latest(of)).collect();
                 let further = |pair: &[f64]| pair[1] - pair[0] > self.resolution[of as usize];
-                let evidence = self.resolved(of, over, &latest);
+                let evidence = self.distance_readings(of, over, &latest);
                 (latest.windows(2).all(further), "from value to value it grows by more than the resolution", evidence)
             }
             Test::SectionsSpread { of, over } => {
                 let spreads = spreads(self.sections(over), of);
                 let wide = spreads.iter().all(|spread| *spread > self.resolution[of as usize]);
-                let evidence = self.resolved(of, over, &spreads);
-                (wide && ascending(&spreads), "their spread is above the resolution and grows", evidence)
+                let evidence = self.distance_readings(of, over, &spreads);
+                (wide && is_ascending(&spreads), "their spread is above the resolution and grows", evidence)
             }
             Test::SectionsCrowd(over) => {
                 let runs = self.sections(over).iter();
                 let crowds: Vec<f64> =
-                    runs.map(|run| 100.0 * crowd(run, self.resolution).unwrap_or(f64::NAN)).collect();
+                    runs.map(|run| 100.0 * share_near_mean(run, self.resolution).unwrap_or(f64::NAN)).collect();
                 let criterion = "they can be told apart, and more than half lie within half of the largest distance \
                                  from their mean, in units of the resolution";
-                (crowds.iter().all(|share| *share > 50.0), criterion, each(over, &crowds, "%"))
+                (crowds.iter().all(|share| *share > 50.0), criterion, readings_per_run(over, &crowds, "%"))
             }
             Test::SectionsStay { of, over } => {
                 let points = match of {
@@ -159,55 +170,63 @@ impl Findings {
                     Sections::Sweep => self.swept(over),
                 };
                 let shares = Coordinate::ALL.map(|c| extent(points.iter().map(|p| p.latest(c))) / c.amplitude(0));
-                let evidence = percent(Coordinate::ALL.map(Coordinate::word), &shares);
-                (little(&shares), "they lie within 5 % of the amplitude of each other", evidence)
+                let evidence = percent_readings(Coordinate::ALL.map(Coordinate::word), &shares);
+                (are_negligible(&shares), "they lie within 5 % of the amplitude of each other", evidence)
             }
             Test::SectionsRepeat { of, over } => {
                 let (resolution, spreads) = (self.resolution[of as usize], spreads(self.swept(over), of));
                 let narrow = spreads.iter().all(|spread| *spread <= resolution);
                 let widest = spreads.iter().copied().fold(0.0, f64::max);
-                let evidence = vec![micro("largest spread", widest, of), micro("resolution", resolution, of)];
+                let evidence = vec![
+                    distance_reading("largest spread", widest, of),
+                    distance_reading("resolution", resolution, of),
+                ];
                 (narrow, "at every point the latest half of the sections agree within the resolution", evidence)
             }
             Test::QuasiPeriodic(over) => {
                 let runs = self.sections(over);
                 let regular = runs.iter().all(|r| r.regime == Some(Regime::QuasiPeriodic));
-                (regular, "exponent not told from 0, regular 0-1 test, no period, in all three runs", regimes(runs))
+                (
+                    regular,
+                    "exponent not told from 0, regular 0-1 test, no period, in all three runs",
+                    regime_readings(runs),
+                )
             }
             Test::AllPeriodic(over) => {
                 let points = self.swept(over);
-                (points.iter().all(|p| p.period() == 1), "every point is periodic 1", regimes(points))
+                (points.iter().all(|p| p.period() == 1), "every point is periodic 1", regime_readings(points))
             }
             Test::PeriodicToChaotic(over) => {
                 let points = self.swept(over);
                 let regular = points.first().is_some_and(|p| p.period() > 0);
                 let criterion = "the smallest value is periodic; at the largest the exponent is above its uncertainty";
-                (regular && points.last().is_some_and(is_chaotic), criterion, regimes(points))
+                (regular && points.last().is_some_and(is_chaotic), criterion, regime_readings(points))
             }
             Test::ChaosGrows(over) => {
                 let points = self.swept(over);
                 let (lower, upper) = points.split_at(points.len() / 2);
-                let [below, above] = [lower, upper].map(chaotic);
-                let mut evidence = vec![count("chaotic in the lower half", below), count("in the upper half", above)];
+                let [below, above] = [lower, upper].map(count_chaotic);
+                let mut evidence =
+                    vec![count_reading("chaotic in the lower half", below), count_reading("in the upper half", above)];
                 for (half, of) in [(lower, "spread in the lower half"), (upper, "in the upper half")] {
                     let widest = spreads(half, Coordinate::Beta).into_iter().fold(0.0, f64::max);
-                    evidence.push(micro(of, widest, Coordinate::Beta));
+                    evidence.push(distance_reading(of, widest, Coordinate::Beta));
                 }
                 (above > below, "more chaotic points in the upper half of the values than in the lower half", evidence)
             }
             Test::ChaosAllOrNone(over) => {
                 let points = self.swept(over);
-                let chaotic = chaotic(points);
-                (chaotic == 0 || chaotic == points.len(), "all points are chaotic or none is", regimes(points))
+                let chaotic = count_chaotic(points);
+                (chaotic == 0 || chaotic == points.len(), "all points are chaotic or none is", regime_readings(points))
             }
         }
     }
 
     /// Distances in a coordinate, run by run, and the smallest one that counts.
-    fn resolved(&self, of: Coordinate, over: Series, sizes: &[f64]) -> Vec<Reading> {
+    fn distance_readings(&self, of: Coordinate, over: Series, sizes: &[f64]) -> Vec<Reading> {
         let runs = over.cases().map(|case| over.run_name(case)).into_iter().zip(sizes);
-        let runs = runs.map(|(name, size)| micro(&name, *size, of));
-        runs.chain([micro("resolution", self.resolution[of as usize], of)]).collect()
+        let runs = runs.map(|(name, size)| distance_reading(&name, *size, of));
+        runs.chain([distance_reading("resolution", self.resolution[of as usize], of)]).collect()
     }
 
     /// A quantity in continuous time, per run.
@@ -234,24 +253,24 @@ impl Findings {
 }
 
 /// Largest distance between any two of `curves` at any instant from `from` (s) on, over the amplitude.
-fn apart(curves: &[Vec<&RecordedRow>], column: usize, from: f64) -> f64 {
+fn largest_distance(curves: &[Vec<&RecordedRow>], column: usize, from: f64) -> f64 {
     let coordinate = Coordinate::ALL[(column - 1) / 3];
     let late = curves.iter().map(|c| {
         let late = c.iter().filter(|row| row[0] >= from);
         late.map(|row| row[column]).collect()
     });
     let late: Vec<Vec<f64>> = late.collect();
-    furthest(&late) / coordinate.amplitude((column - 1) % 3)
+    largest_difference(&late) / coordinate.amplitude((column - 1) % 3)
 }
 
 /// Largest distance between any two of `curves` at equal indices.
-fn furthest<C: AsRef<[f64]>>(curves: &[C]) -> f64 {
+fn largest_difference<C: AsRef<[f64]>>(curves: &[C]) -> f64 {
     let places = curves.iter().map(|c| c.as_ref().len()).min().unwrap_or(0);
     (0..places).map(|k| extent(curves.iter().map(|c| c.as_ref()[k]))).fold(0.0, f64::max)
 }
 
 /// Fraction of the sections within half of the largest distance from their mean; `None` if they cannot be told apart.
-fn crowd(run: &SettledPoint, resolution: [f64; 2]) -> Option<f64> {
+fn share_near_mean(run: &SettledPoint, resolution: [f64; 2]) -> Option<f64> {
     let middle = [0, 1].map(|c| {
         let all = &run.sections[c];
         all.iter().sum::<f64>() / all.len() as f64
@@ -268,29 +287,29 @@ fn crowd(run: &SettledPoint, resolution: [f64; 2]) -> Option<f64> {
 }
 
 /// One value per run of a series.
-fn each(series: Series, values: &[f64], unit: &'static str) -> Vec<Reading> {
+fn readings_per_run(series: Series, values: &[f64], unit: &'static str) -> Vec<Reading> {
     let runs = series.cases().into_iter().zip(values);
     runs.map(|(case, value)| (series.run_name(case), *value, unit)).collect()
 }
 
 /// Converts shares, fractions of 1, to percent.
-fn percent<'a>(of: impl IntoIterator<Item = &'a str>, shares: &[f64]) -> Vec<Reading> {
+fn percent_readings<'a>(of: impl IntoIterator<Item = &'a str>, shares: &[f64]) -> Vec<Reading> {
     let shares = of.into_iter().zip(shares);
     shares.map(|(of, share)| (of.to_owned(), share * 100.0, "%")).collect()
 }
 
 /// Converts a distance in a coordinate, m or rad, to µm or µrad.
-fn micro(of: &str, size: f64, coordinate: Coordinate) -> Reading {
+fn distance_reading(of: &str, size: f64, coordinate: Coordinate) -> Reading {
     (of.to_owned(), size * 1e6, ["µm", "µrad"][coordinate as usize])
 }
 
-fn count(of: &str, number: usize) -> Reading {
+fn count_reading(of: &str, number: usize) -> Reading {
     (of.to_owned(), number as f64, "")
 }
 
 /// Whether all `shares` are negligible.
-fn little(shares: &[f64]) -> bool {
-    shares.iter().all(|share| *share < LITTLE)
+fn are_negligible(shares: &[f64]) -> bool {
+    shares.iter().all(|share| *share < NEGLIGIBLE_SHARE)
 }
 
 fn spreads(points: &[SettledPoint], coordinate: Coordinate) -> Vec<f64> {
@@ -301,17 +320,17 @@ fn is_chaotic(point: &SettledPoint) -> bool {
     point.regime == Some(Regime::Chaotic)
 }
 
-fn chaotic(points: &[SettledPoint]) -> usize {
+fn count_chaotic(points: &[SettledPoint]) -> usize {
     points.iter().filter(|p| is_chaotic(p)).count()
 }
 
-fn ascending(values: &[f64]) -> bool {
+fn is_ascending(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] < pair[1])
 }
 
 /// Number of points per regime, and the range of exponents.
-fn regimes(points: &[SettledPoint]) -> Vec<Reading> {
-    let mut counts: Vec<Reading> = regime_counts(points).into_iter().map(|(word, n)| count(&word, n)).collect();
+fn regime_readings(points: &[SettledPoint]) -> Vec<Reading> {
+    let mut counts: Vec<Reading> = regime_counts(points).into_iter().map(|(word, n)| count_reading(&word, n)).collect();
     let (least, most) = exponents(points);
     if least <= most {
         counts.extend([("smallest exponent".to_owned(), least, "1/s"), ("largest exponent".to_owned(), most, "1/s")]);
@@ -557,11 +576,12 @@ mod tests {
     #[test]
     fn sections_crowd_around_a_centre_only_where_they_can_be_told_apart() {
         let near = [0.0, 1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 9.0, -9.0];
-        let with = |size: f64| crowd(&point(0.2, Regime::Chaotic, 0.2, &near.map(|v| v * size)), [1e-7, 1e-6]);
+        let with =
+            |size: f64| share_near_mean(&point(0.2, Regime::Chaotic, 0.2, &near.map(|v| v * size)), [1e-7, 1e-6]);
         assert_eq!(with(1e-5), Some(7.0 / 9.0));
         assert_eq!(with(1e-9), None);
         let ring = point(0.2, Regime::Chaotic, 0.2, &[1e-4, -1e-4, 1e-4, -1e-4]);
-        assert_eq!(crowd(&ring, [1e-7, 1e-6]), Some(0.0));
+        assert_eq!(share_near_mean(&ring, [1e-7, 1e-6]), Some(0.0));
     }
 
     #[test]

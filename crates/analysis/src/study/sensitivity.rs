@@ -3,7 +3,7 @@
 use super::target::{self, TargetAnswer};
 use super::{AloneOutputs, ENDS, StudyError, StudyRunner};
 use crate::argument::Argument;
-use crate::indices::{Bootstrap, IndicesError, LEAST_ROWS, SaltelliDesign, SensitivityIndices};
+use crate::indices::{Bootstrap, IndicesError, MIN_ROWS, SaltelliDesign, SensitivityIndices};
 use crate::morris::{ElementaryEffects, MorrisPlan};
 use crate::sampling::Sampling;
 
@@ -34,7 +34,7 @@ impl SensitivityOptions {
     /// # Errors
     /// Too few rows.
     pub fn check(&self) -> Result<(), StudyError> {
-        if (1..LEAST_ROWS).contains(&self.rows) {
+        if (1..MIN_ROWS).contains(&self.rows) {
             return Err(StudyError::argument(Argument::Rows, self.rows, StudyError::TooFewRows));
         }
         Ok(())

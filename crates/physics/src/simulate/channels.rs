@@ -33,7 +33,7 @@ impl Reading {
     }
 
     /// Requests the value from `frame`, if frames contain it only on request.
-    pub fn ask(&self, frame: &mut Frame) {
+    pub fn request(&self, frame: &mut Frame) {
         if matches!(self.source, Source::Reaction(_)) {
             frame.reactions.get_or_insert_default();
         }
@@ -133,9 +133,9 @@ impl Channels {
     }
 
     /// Makes `frame` request the picked channels and nothing else.
-    pub fn ask(&self, frame: &mut Frame) {
+    pub fn request(&self, frame: &mut Frame) {
         frame.reactions = None;
-        self.picked.iter().for_each(|channel| channel.reading.ask(frame));
+        self.picked.iter().for_each(|channel| channel.reading.request(frame));
     }
 
     /// Appends the values of the picked channels to `out`, in the manner of [`Self::read`].
