@@ -390,8 +390,7 @@ mod tests {
         for (i, slip) in [2e-7, 3e-5, -4e-5].iter().enumerate() {
             y[v + i] += slip;
         }
-        let contact_state =
-            ContactState { active: true, approach_speed: approach_speed, floored: true, ..ContactState::default() };
+        let contact_state = ContactState { active: true, approach_speed, floored: true, ..ContactState::default() };
         (mechanism, y, [contact_state; 3])
     }
 

@@ -5,8 +5,7 @@
 //! - the arrival of such a ball at its wall, or that part of its Hertz time if it arrives sooner;
 //! - a period of the ringing of a ball on its wall ([`RINGING`]), as longer steps alternate instead of following it;
 //! - the step at which forces other than contact forces move the mechanism by [`SMOOTH`] of its scales more or less than the
-//! midpoint
-//!   rule says, from their change since the step before;
+//!   midpoint rule says, from their change since the step before;
 //! - [`LONGEST`].
 //!
 //! Beyond [`COARSE`] steps per impact the last three shrink, too, so that the motion converges.
