@@ -23,7 +23,7 @@ impl App {
     pub(super) fn compare(&mut self, is_over: bool) {
         let comparison = &mut self.plots.comparison;
         let wanted = comparison.is_on() && self.course.is_none();
-        if let Some((run, key)) = self.player.take_before(wanted, is_over).filter(|_| wanted) {
+        if let Some((run, key)) = self.player.take_copy_before_change(wanted, is_over).filter(|_| wanted) {
             comparison.add(run, key);
         }
     }
@@ -66,7 +66,7 @@ impl App {
         let (before, now) = halves(area);
         if plain {
             kept.run_mut().follow(player.pacer.shown(), || true);
-            kept.run_mut().hand_out_peaks();
+            kept.run_mut().publish_peaks();
         }
         let (_, picture) = match beside.take().filter(|(of, _)| *of == number) {
             Some(shown) => beside.insert(shown),

@@ -170,8 +170,8 @@ impl Comparison {
         let budget = (SHARE * dt).max(LEAST_BUDGET) * if waited { WAITED_FOR } else { 1.0 };
         let lags = self.follow(player, budget.min(MOST_BUDGET));
         for kept in &mut self.kept {
-            kept.run.hand_out_peaks();
-            kept.run.place_ghost();
+            kept.run.publish_peaks();
+            kept.run.update_ghosts();
         }
         lags
     }
@@ -198,10 +198,10 @@ impl Comparison {
 
     /// Follows a reset: a run whose parameters have changed since its start is restarted, because its record is no longer valid.
     pub fn reset(&mut self) {
-        self.kept.retain_mut(|kept| kept.run.is_as_started() || kept.run.reset().is_ok());
+        self.kept.retain_mut(|kept| kept.run.is_unchanged_since_start() || kept.run.reset().is_ok());
         for kept in &mut self.kept {
             kept.run.follow(0.0, || true);
-            kept.run.hand_out_peaks();
+            kept.run.publish_peaks();
         }
     }
 

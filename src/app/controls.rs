@@ -211,7 +211,7 @@ impl Controls {
             let words = format!("The scene file sets {}, which overrides the preset", names.join(", "));
             ui.label(RichText::new(words).small().weak());
         }
-        if player.is_waiting(key) {
+        if player.is_pending(key) {
             theme::warning(ui, "Applies at the next reset");
         }
         if let Some(warning) = player.warning(key) {
@@ -373,7 +373,7 @@ impl Controls {
             if ui.input(|i| i.key_pressed(egui::Key::Escape)) {
                 self.drafts.remove(row.key);
             } else if text != shown {
-                self.set(player, row.key, &value::completed(&text, &row.parameter.kind));
+                self.set(player, row.key, &value::with_display_unit(&text, &row.parameter.kind));
                 if let Some(draft) = self.drafts.get_mut(row.key) {
                     draft.text = text;
                 }

@@ -31,13 +31,13 @@ impl App {
             .frame(bar)
             .show(ui, |ui| {
                 spoken::landmark(ui, "Transport");
-                if panels.has(Part::Timeline) {
+                if panels.contains(Part::Timeline) {
                     ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 }
                 ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner
             })
             .inner;
-        if panels.has(Part::Controls) {
+        if panels.contains(Part::Controls) {
             let panel = if wide {
                 Panel::left("controls").exact_size(CONTROLS.min(0.45 * ui.available_width()))
             } else {
@@ -50,7 +50,7 @@ impl App {
                 });
             });
         }
-        if panels.has(Part::Bench) {
+        if panels.contains(Part::Bench) {
             let panel = Panel::right("bench").exact_size(0.45 * ui.available_width());
             let wish = panel.frame(bar).resizable(false).show(ui, |ui| {
                 ScrollArea::vertical()
@@ -67,7 +67,7 @@ impl App {
                 self.bench_asks(wish);
             }
         }
-        if panels.has(Part::Plots) {
+        if panels.contains(Part::Plots) {
             let panel = Panel::bottom("plots").exact_size(PLOTS * ui.available_height());
             let asked = panel.frame(bar).resizable(false).show(ui, |ui| {
                 ui.take_available_space();

@@ -12,7 +12,7 @@ use super::lesson::Course;
 use super::player::Player;
 use super::reload::{Given, SceneFile};
 use super::{App, Notice, value};
-use crate::session::link::shown::{self, Instruments};
+use crate::session::link::settings::{self as link_settings, Instruments};
 use crate::session::link::{Link, SceneText, is_link};
 use crate::session::replay::Verdict;
 use crate::simulate::Channel;
@@ -58,7 +58,7 @@ impl App {
             time_scale: Some(player.pacer.scale()),
             camera: self.viewport.pose(),
             magnification: Some(self.viewport.options.magnification),
-            follow: followed.and_then(|part| shown::name_followed(player.running(), part)),
+            follow: followed.and_then(|part| link_settings::name_followed(player.running(), part)),
             plots,
             channels: (!self.plots.picked.is_empty()).then(|| self.plots.picked.clone()),
             window,
@@ -80,7 +80,7 @@ impl App {
     /// The state including contents too large for an address: a large scene, many changes, files referenced by a scene.
     /// [`super::AppOptions::from_link`] restores it.
     pub fn session(&self) -> String {
-        self.link().keep()
+        self.link().to_storage_text()
     }
 
     /// Whether closing this window would lose changes to the user's own scene: not for built-in scenes, nor for changes saved in

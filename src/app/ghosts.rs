@@ -31,7 +31,7 @@ pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawLi
             let length = value::quantity(error.norm(), "um", 4);
             notes.push(format!("tip error {length}"));
         }
-    } else if ideal.fault().is_some() {
+    } else if ideal.error_message().is_some() {
         notes.push("no ideal ghost: see View options".to_owned());
     } else {
         notes.push("computing the ideal ghost".to_owned());
@@ -43,7 +43,7 @@ impl App {
     /// Shows or hides the ideal ghost; reports why if there is none.
     pub fn show_ideal(&mut self, on: bool) {
         self.player.set_ideal(on);
-        if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.fault()) {
+        if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.error_message()) {
             self.problem = Some(format!("No ideal ghost: {fault}"));
         }
     }
@@ -57,7 +57,7 @@ impl App {
         if ui.checkbox(&mut on, "Ideal ghost").on_hover_text(help).changed() {
             self.show_ideal(on);
         }
-        if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.fault()) {
+        if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.error_message()) {
             theme::warning(ui, format!("No ideal ghost: {fault}"));
         }
     }
@@ -77,7 +77,7 @@ mod tests {
         let mut player = Player::new(&scene).expect("starts");
         player.set_ideal(true);
         player.run_to(0.06);
-        player.place_ghost();
+        player.update_ghosts();
         let time = player.frame().time;
         let tip = |machine: &Machine| {
             let mut frame = Frame::default();

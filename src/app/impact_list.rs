@@ -137,7 +137,7 @@ impl ImpactList {
                     let all = format!("Impact {}", words.join(", "));
                     response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &all));
                     if response.on_hover_text("Go to its peak").clicked() {
-                        asked = Some(own.top.time);
+                        asked = Some(own.force_peak.time);
                     }
                     row(ui, |ui, index| {
                         let mut text = RichText::new(&words[index]).small();
@@ -217,10 +217,10 @@ impl App {
         // The impact of the followed ball joint, while that is in contact.
         let touches =
             |joint: &usize| player.frame().joints.get(*joint).is_some_and(|own| own.state != ContactMode::Free);
-        let (number, own) = record.under_way(self.viewport.focus().filter(touches), shown)?;
+        let (number, own) = record.in_progress(self.viewport.focus().filter(touches), shown)?;
         let report = player.frame().joints.get(own.joint)?;
         let begins = format!("Impact {number}, {}: {}", joint(player, own.joint), value::time(own.start));
-        let peak = value::quantity(own.top.force.norm(), "N", 3);
+        let peak = value::quantity(own.force_peak.force.norm(), "N", 3);
         Some(match own.finished() {
             Some(impact) => format!(
                 "{begins}, peak {peak}, {}, approach {}, rebound {} mm/s",

@@ -484,7 +484,7 @@ impl App {
         let area = self.picture_before(ui, area, plain);
         self.picture_rect = area;
         let presenting = self.is_presenting() || self.embedded().is_some();
-        self.player.place_ghost();
+        self.player.update_ghosts();
         let caption = self.caption_plate(ui, area, self.is_presenting());
         let mut above: Vec<_> = caption.iter().map(|(_, plate)| *plate).collect();
         let inner = area.shrink(10.0);

@@ -78,8 +78,10 @@ use crate::simulate::{LONGEST_FRAME, SPELL, Simulation, StartError};
 use crate::view::{Preset, Quality, ViewOptions};
 
 pub use crate::session::embedded::Embedded;
-pub use crate::session::link::shown::PlotWindow;
-pub use crate::session::link::{CameraPose, LONGEST_LINK, Link, LinkError, NO_PAGE, SceneText, is_page};
+pub use crate::session::link::settings::PlotWindow;
+pub use crate::session::link::{
+    CameraPose, LONGEST_LINK, Link, LinkError, NOT_A_PAGE_ADDRESS, SceneText, is_page_address,
+};
 pub use crate::session::replay::{Replay, Verdict};
 use accuracy::Accuracy;
 use announce::Announcer;
@@ -211,14 +213,14 @@ impl AppOptions {
                 ..Self::of_lesson(lesson.clone(), *step)
             });
         }
-        if link.is_of_nothing(text) {
+        if link.requests_nothing(text) {
             let theme = link.theme.map_or(ThemePreference::System, theme::preference);
             return Ok(Self { theme, embedded: link.embedded, ..Self::first() });
         }
         let scene = link.load().map_err(|error| format!("link: {error}"))?;
         Simulation::new(&scene.machine).map_err(|error| format!("link: {}", scene.locate(&error)))?;
-        link.followed(&scene).map_err(|error| error.to_string())?;
-        link.under_microscope(&scene).map_err(|error| error.to_string())?;
+        link.followed_part(&scene).map_err(|error| error.to_string())?;
+        link.microscope_joint(&scene).map_err(|error| error.to_string())?;
         let mut options = Self::new(scene);
         options.lesson = lesson;
         options.embedded.clone_from(&link.embedded);
@@ -241,7 +243,7 @@ impl AppOptions {
     pub fn from_link_or_default(text: &str) -> Self {
         Self::from_link(text).unwrap_or_else(|problem| {
             let scene = Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right");
-            let embedded = link::embedded_in(text);
+            let embedded = link::requested_panels(text);
             Self { problem: Some(problem), playing: false, embedded, ..Self::new(scene) }
         })
     }
@@ -447,7 +449,7 @@ impl App {
         }
         // The existence of the parts was checked when the link was read.
         let scene = self.player.running();
-        self.viewport.follow(link.followed(scene).ok().flatten());
+        self.viewport.follow(link.followed_part(scene).ok().flatten());
         if let Some(chosen) = &link.plots {
             self.plots.chosen.clone_from(chosen);
         }
@@ -458,7 +460,7 @@ impl App {
             self.plots.window = window;
         }
         if let Some(shown) = &link.instruments {
-            let joint = link.under_microscope(scene).ok().flatten();
+            let joint = link.microscope_joint(scene).ok().flatten();
             self.microscope.set_open(joint.is_some());
             if let Some(joint) = joint {
                 self.microscope.focus(joint);

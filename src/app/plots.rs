@@ -15,7 +15,7 @@ use super::zoom::{self, Zoom};
 use super::{curve, layout, opening};
 use super::{spoken, theme, value};
 use crate::scene::Scene;
-use crate::session::link::shown::PlotWindow;
+use crate::session::link::settings::PlotWindow;
 use crate::simulate::{Bin, ChannelInfo, MAX_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
 
 #[cfg(not(target_arch = "wasm32"))]

@@ -163,9 +163,9 @@ impl App {
         if let Some(pose) = link.camera {
             self.viewport.set_pose(pose);
         }
-        let followed = link.followed(&scene).ok().flatten();
+        let followed = link.followed_part(&scene).ok().flatten();
         self.viewport.follow(followed);
-        match link.under_microscope(&scene) {
+        match link.microscope_joint(&scene) {
             Ok(Some(joint)) => self.microscope.focus(joint),
             _ => self.microscope.set_open(false),
         }

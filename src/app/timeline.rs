@@ -341,7 +341,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
     let left = player.abandoned_future().into_iter().flat_map(|left| left.flags.iter().cloned());
     for flag in player.flags().chain(left) {
         if (scale.x(flag.time) - pos.x).abs() <= NEAR {
-            ui.label(format!("{}: {}", value::time(flag.time), flag.words));
+            ui.label(format!("{}: {}", value::time(flag.time), flag.text));
         }
     }
     let known = player.contact_history().known_from();

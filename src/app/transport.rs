@@ -122,7 +122,7 @@ pub fn first_of_tab(ui: &Ui) {
 /// Reset, play and step. Returns as [`ui`].
 fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
     let (small, large) = (theme::side(ui, 30.0), theme::side(ui, PLAY));
-    let help = if player.has_waiting() {
+    let help = if player.has_pending_changes() {
         "Back to t = 0; applies the changes that wait for it (key R)"
     } else {
         "Back to t = 0 (key R)"

@@ -10,7 +10,7 @@ use super::player::Edit;
 use super::{App, layout, theme, value};
 use crate::scene::Scene;
 use crate::session::link::CameraPose;
-use crate::session::link::shown::PlotWindow;
+use crate::session::link::settings::PlotWindow;
 use crate::simulate::Quantity;
 use crate::view::{Picked, Quality, ViewOptions};
 
@@ -208,7 +208,7 @@ impl App {
                 edits.sort_by_key(|edit| edit.key != PRESET);
                 for edit in edits {
                     let wanted = if redo { &edit.after } else { &edit.before };
-                    if let Err(error) = self.player.put_back(&edit.key, wanted.as_deref()) {
+                    if let Err(error) = self.player.restore_parameter(&edit.key, wanted.as_deref()) {
                         self.problem = Some(error.to_string());
                     }
                 }

@@ -1,7 +1,7 @@
 //! The page that the window's links open.
 
 use super::Failure;
-use crate::app::{NO_PAGE, is_page};
+use crate::app::{NOT_A_PAGE_ADDRESS, is_page_address};
 
 /// Environment variable with the address that links are appended to, read at start-up or else at build time.
 const PAGE: &str = "JOINTPLAY_PAGE";
@@ -24,10 +24,10 @@ fn choose(option: Option<&str>, variable: Option<String>, built: Option<&str>) -
         (None, None, None) => return Ok(String::new()),
     };
     let page = page.trim();
-    if page.is_empty() || is_page(page) {
+    if page.is_empty() || is_page_address(page) {
         return Ok(page.to_owned());
     }
-    Err(Failure::usage(format!("{name} {page}: {NO_PAGE}")))
+    Err(Failure::usage(format!("{name} {page}: {NOT_A_PAGE_ADDRESS}")))
 }
 
 #[cfg(test)]

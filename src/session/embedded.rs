@@ -28,8 +28,8 @@ impl Embedded {
     pub fn read(text: &str) -> Result<Self, String> {
         let words = text.split([',', ' ']).filter(|word| !word.is_empty());
         let parts = words.map(|word| {
-            let known = PARTS.iter().find(|(own, _)| *own == word);
-            known.map(|(_, part)| *part).ok_or_else(|| {
+            let part = PARTS.iter().find(|(name, _)| *name == word);
+            part.map(|(_, part)| *part).ok_or_else(|| {
                 let all = PARTS.map(|(word, _)| word).join(", ");
                 format!("no panel `{word}`; allowed, separated by commas: {all}")
             })
@@ -37,19 +37,19 @@ impl Embedded {
         Ok(Self(parts.collect::<Result<_, _>>()?))
     }
 
-    /// With the first sliders.
+    /// The panel of the first sliders alone.
     pub fn with_controls() -> Self {
         Self(vec![Part::Controls])
     }
 
     /// The reverse of [`Self::read`].
     pub fn write(&self) -> String {
-        let words = PARTS.iter().filter(|(_, part)| self.has(*part));
+        let words = PARTS.iter().filter(|(_, part)| self.contains(*part));
         words.map(|(word, _)| *word).collect::<Vec<_>>().join(",")
     }
 
-    /// Whether it includes `part`.
-    pub fn has(&self, part: Part) -> bool {
+    /// Whether `part` is shown.
+    pub fn contains(&self, part: Part) -> bool {
         self.0.contains(&part)
     }
 }

@@ -1,4 +1,4 @@
-//! An instant of a run to go to, and what may prevent the run from getting there.
+//! An instant of a run to go to, and why the run may not reach it.
 
 use crate::scene::SetError;
 use crate::simulate::{Simulation, Stopped};
@@ -6,7 +6,7 @@ use crate::simulate::{Simulation, Stopped};
 /// An instant of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
-    /// Accepted steps before it; `None`: as many as its time needs.
+    /// Accepted steps before it; `None` if only its time determines them.
     pub steps: Option<u64>,
     /// Time within the last of these steps, s; infinite for the end of the step.
     pub time: f64,
@@ -28,7 +28,7 @@ impl Goal {
         self.steps.map_or(run.time() >= self.time, |steps| run.statistics().steps >= steps)
     }
 
-    /// Whether a run leads to it from the state at `time`, s, after `steps` steps.
+    /// Whether the goal is at or after the state at `time`, s, that `steps` steps led to.
     pub fn is_ahead_of(&self, steps: u64, time: f64) -> bool {
         self.steps.map_or(time <= self.time, |goal| steps <= goal)
     }
@@ -43,7 +43,7 @@ pub enum Obstacle {
     /// A logged event is not accepted.
     #[error(transparent)]
     Refused(#[from] SetError),
-    /// A step is accepted that the log says was refused.
+    /// A step was accepted, although the log records that it was refused.
     #[error("the run does not stop where the link's run did")]
     MissedStop,
 }

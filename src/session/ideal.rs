@@ -8,51 +8,52 @@ use crate::simulate::{Frame, Simulation, StartError, closed};
 use crate::view::output_point;
 
 /// The ideal motion follows the recording if it is less than this behind, s, in at most this many steps.
-const NEAR: f64 = 0.02;
-const STEPS: u32 = 512;
+const FOLLOW_LAG: f64 = 0.02;
+const FOLLOW_STEPS: u32 = 512;
 /// Stepping budget per frame on the way to the displayed instant, s.
-const BUDGET: f64 = 4e-3;
+const FRAME_BUDGET: f64 = 4e-3;
 
-/// Gravity of a run over time, which the ideal motion must follow.
+/// Gravity of a run over time. The ideal motion applies the same changes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gravity {
     /// Start time, s, and value, m/s^2, in order.
-    since: Vec<(f64, Vec3)>,
+    changes: Vec<(f64, Vec3)>,
 }
 
 impl Gravity {
     /// Constant from the start.
     pub fn new(gravity: Vec3) -> Self {
-        Self { since: vec![(f64::NEG_INFINITY, gravity)] }
+        Self { changes: vec![(f64::NEG_INFINITY, gravity)] }
     }
 
-    /// Notes a step of the run from `start`, s, under `gravity`. Later entries belong to an abandoned future and are dropped.
+    /// Records that `gravity` acted in a step of the run from `start`, s. Later entries belong to an abandoned future and are
+    /// dropped.
     /// Returns whether any were dropped or gravity changed.
     pub fn observe(&mut self, start: f64, gravity: Vec3) -> bool {
-        let kept = self.since.partition_point(|(time, _)| *time <= start);
-        let forgets = kept < self.since.len();
-        self.since.truncate(kept.max(1));
-        let last = self.since.len() - 1;
-        if self.since[last].1 == gravity {
-            return forgets;
+        let retained = self.changes.partition_point(|(time, _)| *time <= start);
+        let has_dropped = retained < self.changes.len();
+        self.changes.truncate(retained.max(1));
+        let last = self.changes.len() - 1;
+        if self.changes[last].1 == gravity {
+            return has_dropped;
         }
-        if self.since[last].0 == start {
-            self.since[last].1 = gravity;
+        if self.changes[last].0 == start {
+            self.changes[last].1 = gravity;
         } else {
-            self.since.push((start, gravity));
+            self.changes.push((start, gravity));
         }
         true
     }
 
     fn at(&self, time: f64) -> Vec3 {
-        let known = self.since.partition_point(|(since, _)| *since <= time);
-        self.since[known.max(1) - 1].1
+        let known = self.changes.partition_point(|(since, _)| *since <= time);
+        self.changes[known.max(1) - 1].1
     }
 
     /// Time of the next change after `time`, s.
     fn next(&self, time: f64) -> f64 {
-        let known = self.since.partition_point(|(since, _)| *since <= time);
-        self.since.get(known).map_or(f64::INFINITY, |next| next.0)
+        let known = self.changes.partition_point(|(since, _)| *since <= time);
+        self.changes.get(known).map_or(f64::INFINITY, |next| next.0)
     }
 }
 
@@ -64,17 +65,17 @@ pub struct Ideal {
 }
 
 impl Ideal {
-    /// The ideal motion of `machine`, at its start. [`Self::fault`] reports loops that do not close and a machine too large
+    /// The ideal motion of `machine`, at its start. [`Self::error_message`] reports loops that do not close and a machine too large
     /// with closed joints.
     pub fn new(machine: &Machine) -> Self {
         Self { output: machine.output.clone(), motion: Simulation::new(&closed(machine)).map(Companion::new) }
     }
 
-    /// Advances to `time`, s, up to which the run is recorded, if that is near.
+    /// Advances to `time`, s, up to which the run is recorded, if the motion lags by less than [`FOLLOW_LAG`].
     pub(crate) fn follow(&mut self, time: f64, gravity: &Gravity) {
-        if self.motion.as_ref().is_ok_and(|motion| time - motion.simulation.time() < NEAR) {
-            let mut left = STEPS;
-            self.place(time, gravity, || {
+        if self.motion.as_ref().is_ok_and(|motion| time - motion.simulation.time() < FOLLOW_LAG) {
+            let mut left = FOLLOW_STEPS;
+            self.move_to(time, gravity, || {
                 left = left.saturating_sub(1);
                 left > 0
             });
@@ -85,19 +86,19 @@ impl Ideal {
     pub(crate) fn catch_up(&mut self, time: f64, gravity: &Gravity, clock: Clock) {
         if self.frame(time).is_none() {
             let start = clock();
-            self.place(time, gravity, || clock() - start < BUDGET);
+            self.move_to(time, gravity, || clock() - start < FRAME_BUDGET);
         }
     }
 
     /// Samples the state at `time`, s, if `may_step` allows the steps needed.
-    fn place(&mut self, time: f64, gravity: &Gravity, mut may_step: impl FnMut() -> bool) {
+    fn move_to(&mut self, time: f64, gravity: &Gravity, mut may_step: impl FnMut() -> bool) {
         let Ok(motion) = &mut self.motion else {
             return;
         };
         if time < motion.simulation.step_start() {
             motion.go_back(time);
         }
-        let there = motion.advance(time, |motion| {
+        let is_reached = motion.advance(time, |motion| {
             may_step().then(|| {
                 motion.save_state();
                 let now = motion.simulation.time();
@@ -107,8 +108,8 @@ impl Ideal {
                 gravity.next(now)
             })
         });
-        if there {
-            motion.show(time);
+        if is_reached {
+            motion.sample(time);
         }
     }
 
@@ -125,7 +126,7 @@ impl Ideal {
         Some(&motion.frame).filter(|frame| frame.time == time)
     }
 
-    /// Whether it still has to reach `time`, s.
+    /// Whether the motion has not reached `time`, s, yet.
     pub fn is_behind(&self, time: f64) -> bool {
         self.motion.as_ref().is_ok_and(|motion| motion.frame.time != time && motion.stopped.is_none())
     }
@@ -137,7 +138,7 @@ impl Ideal {
     }
 
     /// Why there is no ideal motion, or why it ended.
-    pub fn fault(&self) -> Option<String> {
+    pub fn error_message(&self) -> Option<String> {
         match &self.motion {
             Err(error) => Some(format!("with ideal joints, {error}")),
             Ok(motion) => motion.stopped.as_ref().map(|stopped| {
@@ -162,18 +163,18 @@ mod tests {
         Scene::load(name, &changes).expect("built in")
     }
 
-    fn reach(player: &mut Player) {
+    fn catch_up_fully(player: &mut Player) {
         for _ in 0..10_000 {
-            player.place_ghost();
+            player.update_ghosts();
             if !player.is_ideal_behind() {
                 return;
             }
         }
-        panic!("never comes there");
+        panic!("is never reached");
     }
 
     /// Output point of `machine` at `time`, from an independent run.
-    fn alone(machine: &Machine, output: &Output, time: f64) -> Vec3 {
+    fn output_of_separate_run(machine: &Machine, output: &Output, time: f64) -> Vec3 {
         let mut frame = Frame::default();
         let mut run = Simulation::new(machine).expect("starts");
         run.advance_to(time).expect("runs");
@@ -182,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_is_that_of_two_runs_apart_and_costs_the_run_no_bit() {
+    fn the_output_error_equals_that_of_two_separate_runs_and_the_run_is_unchanged() {
         for name in BUILT_IN {
             let scene = scene(name, &[]);
             let [mut with, mut without] = [(); 2].map(|()| Player::new(&scene).expect("starts"));
@@ -197,29 +198,29 @@ mod tests {
                 }
                 with.run_to(time);
                 without.run_to(time);
-                reach(&mut with);
+                catch_up_fully(&mut with);
                 assert_eq!(with.simulation().state_hash(), without.simulation().state_hash(), "{name}");
                 let error = with.ideal().expect("on").output_error(with.frame());
                 let error = error.unwrap_or_else(|| panic!("{name}: none at {time}"));
                 let time = with.frame().time;
-                let two = alone(&scene.machine, &scene.machine.output, time)
-                    - alone(&closed(&scene.machine), &scene.machine.output, time);
-                let off = (error - two).norm();
-                assert!(off < 1e-12 + 1e-9 * two.norm(), "{name}: {off:e}");
-                assert!(two.norm() > 1e-6, "{name}: {two:?}");
+                let expected = output_of_separate_run(&scene.machine, &scene.machine.output, time)
+                    - output_of_separate_run(&closed(&scene.machine), &scene.machine.output, time);
+                let deviation = (error - expected).norm();
+                assert!(deviation < 1e-12 + 1e-9 * expected.norm(), "{name}: {deviation:e}");
+                assert!(expected.norm() > 1e-6, "{name}: {expected:?}");
             }
         }
     }
 
     #[test]
-    fn the_probe_s_own_reference_says_the_same_and_the_record_has_it() {
+    fn the_output_error_agrees_with_the_closed_form_and_is_recorded() {
         let mut player = Player::new(&scene("spcmm", &[])).expect("starts");
         player.set_ideal(true);
         player.run_to(0.02);
-        reach(&mut player);
+        catch_up_fully(&mut player);
         let error = player.ideal().expect("on").output_error(player.frame());
         let probe = player.frame().probe_error.expect("has a closed form");
-        assert!((error.expect("came there") - probe).norm() < 1e-9);
+        assert!((error.expect("reached") - probe).norm() < 1e-9);
         let channel = player.channels().tip_error();
         assert_eq!(player.channels().list()[channel].quantity, Quantity::TipError);
         let mut bins = Vec::new();
@@ -236,21 +237,21 @@ mod tests {
     }
 
     #[test]
-    fn it_goes_back_with_the_run_and_feels_its_gravity() {
+    fn the_ideal_motion_goes_back_with_the_run_and_follows_its_gravity() {
         let changes = [("joint.B.clearance", "0"), ("joint.C.clearance", "0.1 mm")];
         let scene = scene("slider-crank", &changes);
         let mut player = Player::new(&scene).expect("starts");
         player.set_ideal(true);
         player.run_to(0.05);
-        reach(&mut player);
+        catch_up_fully(&mut player);
         let change = player.simulation().time();
         player.set("gravity.z", "0").expect("in range");
         player.run_to(0.12);
-        reach(&mut player);
+        catch_up_fully(&mut player);
         let time = player.frame().time;
         let there = |player: &Player| {
             let ideal = player.ideal().expect("on").frame(player.frame().time);
-            output_point(&scene.machine.output, ideal.expect("came there")).expect("has a body")
+            output_point(&scene.machine.output, ideal.expect("reached")).expect("has a body")
         };
         let mut other = Simulation::new(&closed(&scene.machine)).expect("starts");
         let mut frame = Frame::default();
@@ -263,21 +264,21 @@ mod tests {
         other.advance_to(time).expect("runs");
         other.sample(time, &mut frame);
         let expected = output_point(&scene.machine.output, &frame).expect("has a body");
-        let off = (there(&player) - expected).norm();
-        assert!(off < 1e-9, "{off:e}");
+        let deviation = (there(&player) - expected).norm();
+        assert!(deviation < 1e-9, "{deviation:e}");
         // Switched on late, it still applies the change.
         player.set_ideal(false);
         player.set_ideal(true);
-        reach(&mut player);
+        catch_up_fully(&mut player);
         assert_eq!(there(&player), expected);
         // Single steps back.
         for _ in 0..20 {
             player.single_step();
         }
-        reach(&mut player);
+        catch_up_fully(&mut player);
         for _ in 0..20 {
             player.step_back();
-            reach(&mut player);
+            catch_up_fully(&mut player);
         }
         let time = player.frame().time;
         other.advance_to(time).expect("runs");
@@ -293,14 +294,14 @@ mod tests {
     }
 
     #[test]
-    fn states_kept_to_go_back_to_are_bounded_and_lead_everywhere() {
+    fn the_number_of_saved_states_is_bounded_and_every_instant_stays_reachable() {
         let scene = scene("pendulum", &[]);
         let mut ideal = Ideal::new(&scene.machine);
         let gravity = Gravity::new(scene.machine.gravity);
         let at = |ideal: &mut Ideal, time: f64| {
-            ideal.place(time, &gravity, || true);
+            ideal.move_to(time, &gravity, || true);
             assert!(ideal.motion.as_ref().expect("starts").states.len() <= MOST_STATES);
-            output_point(&scene.machine.output, ideal.frame(time).expect("came there")).expect("a body")
+            output_point(&scene.machine.output, ideal.frame(time).expect("reached")).expect("a body")
         };
         let times: Vec<f64> = (0..60).map(|k| 0.05 * f64::from(k)).collect();
         let forth: Vec<Vec3> = times.iter().map(|time| at(&mut ideal, *time)).collect();
@@ -310,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_that_does_not_close_says_so() {
+    fn a_scene_whose_loops_do_not_close_reports_it() {
         // A rod between two sockets that are farther apart than its balls, by less than the play.
         let text = crate::scene::built_in_text("pendulum").expect("built in");
         let second = "
@@ -325,15 +326,15 @@ mod tests {
         let mut player = Player::new(&scene).expect("has play enough");
         player.set_ideal(true);
         player.run_to(0.01);
-        player.place_ghost();
+        player.update_ghosts();
         let ideal = player.ideal().expect("on");
-        let fault = ideal.fault().expect("cannot close");
+        let fault = ideal.error_message().expect("cannot close");
         assert!(fault.contains("ball joint S"), "{fault}");
         assert!(!player.is_ideal_behind() && ideal.output_error(player.frame()).is_none());
     }
 
     #[test]
-    fn gravity_is_that_of_the_way_that_the_run_took() {
+    fn gravity_follows_the_branch_that_the_run_took() {
         let g = |z: f64| Vec3::new(0.0, 0.0, z);
         let mut gravity = Gravity::new(g(-9.81));
         assert!(!gravity.observe(0.0, g(-9.81)));

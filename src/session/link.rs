@@ -17,9 +17,9 @@ use crate::simulate::{Quantity, SCALE_RANGE};
 use crate::units::{Dimension, parse_quantity};
 use crate::view::Picked;
 use crate::words::{Words as _, words};
-use shown::{Instruments, PlotWindow};
+use settings::{Instruments, PlotWindow};
 
-/// Longest link written and read, characters: mail, chats and every browser still accept it.
+/// Length limit of links, characters: e-mail, chats and every browser accept this length.
 pub const LONGEST_LINK: usize = 32_000;
 /// Size limit of an unpacked part of a link, bytes: that of a scene file.
 const LARGEST_UNPACKED: usize = MAX_FILE_SIZE as usize;
@@ -32,8 +32,8 @@ pub const ALIASES: [(&str, &str); 4] = [
     ("method", "solver.method"),
 ];
 
-/// Words of a link that are not parameters.
-const WORDS: [&str; 22] = [
+/// Keywords of a link: every key that is not a parameter.
+const KEYWORDS: [&str; 22] = [
     "scene",
     "file",
     "text",
@@ -58,12 +58,12 @@ const WORDS: [&str; 22] = [
     "theme",
 ];
 
-/// Latest instant that a link may name, s: running there takes days.
-const LATEST: f64 = 1e6;
+/// Latest instant that a link may name, s; a run to it takes days.
+const LATEST_TIME: f64 = 1e6;
 /// Renderers that a page accepts; the desktop window chooses its own.
 const RENDERERS: [&str; 2] = ["webgpu", "webgl"];
 
-/// Colours of the window.
+/// Colour theme of the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ThemeChoice {
     /// Dark on light.
@@ -83,7 +83,7 @@ words!(ThemeChoice {
 
 /// A link that cannot be read: the cause and the allowed values.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}{}", place(.key, .value), visible(.message))]
+#[error("{}{}", location(.key, .value), visible(.message))]
 pub struct LinkError {
     /// Word or key at fault; empty if it is the whole link.
     pub key: String,
@@ -93,7 +93,7 @@ pub struct LinkError {
     pub message: String,
 }
 
-fn place(key: &str, value: &str) -> String {
+fn location(key: &str, value: &str) -> String {
     match (key, value) {
         ("", _) => "link: ".to_owned(),
         (key, "") => format!("link: {}: ", visible_line(key)),
@@ -118,11 +118,11 @@ pub enum SceneText {
 /// Pose of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraPose {
-    /// Turn about the vertical, rad.
+    /// Rotation about the vertical, rad.
     pub yaw: f32,
     /// Elevation, rad.
     pub pitch: f32,
-    /// Eye to target, m.
+    /// Distance from eye to target, m.
     pub distance: f32,
     /// Point it looks at, m.
     pub target: [f32; 3],
@@ -160,7 +160,7 @@ pub struct Link {
     pub window: Option<PlotWindow>,
     /// Instruments that are on.
     pub instruments: Option<Instruments>,
-    /// Name of the built-in lesson that it belongs to.
+    /// Name of the built-in lesson that the link belongs to.
     pub lesson: Option<String>,
     /// Step of the lesson, counted from 1.
     pub step: Option<usize>,
@@ -172,15 +172,15 @@ pub struct Link {
     pub theme: Option<ThemeChoice>,
     /// Version of the program that made the link.
     pub version: Option<String>,
-    /// Texts of the files that the scene references. No link carries them; [`Self::keep`] stores them with it.
+    /// Texts of the files that the scene references. A link does not carry them; [`Self::to_storage_text`] does.
     pub beside: Texts,
 }
 
-/// Message for a text that [`is_page`] rejects.
-pub const NO_PAGE: &str = "not an address of a page; expected one that begins with https:// or http:// and has no `#`, e.g. https://example.org/lab/";
+/// Error message for a text that [`is_page_address`] rejects.
+pub const NOT_A_PAGE_ADDRESS: &str = "not an address of a page; expected one that begins with https:// or http:// and has no `#`, e.g. https://example.org/lab/";
 
 /// Whether `text` can be the address of a page, to which links are appended.
-pub fn is_page(text: &str) -> bool {
+pub fn is_page_address(text: &str) -> bool {
     let rest = text.strip_prefix("https://").or_else(|| text.strip_prefix("http://"));
     rest.is_some_and(|rest| !rest.is_empty() && !rest.contains(|c: char| c == '#' || c.is_whitespace()))
 }
@@ -193,13 +193,13 @@ pub fn is_link(text: &str) -> bool {
         || (text.contains('=') && !text.ends_with(".toml") && !is_file(text))
 }
 
-/// A browser has no files by name.
+/// Whether `text` is the path of a file; a browser has none.
 fn is_file(text: &str) -> bool {
     cfg!(not(target_arch = "wasm32")) && std::path::Path::new(text).is_file()
 }
 
 /// The panels that a link requests, even if it cannot be opened.
-pub fn embedded_in(text: &str) -> Option<Embedded> {
+pub fn requested_panels(text: &str) -> Option<Embedded> {
     let parts = text.split(['?', '#']);
     let mut words = parts.flat_map(|part| form_urlencoded::parse(part.as_bytes()));
     let (_, panels) = words.find(|(word, _)| word == "embed")?;
@@ -208,20 +208,20 @@ pub fn embedded_in(text: &str) -> Option<Embedded> {
 
 impl Link {
     /// Reads a whole URL, a query (`?…`), a fragment (`#…`) or the bare pairs. A fragment that names a scene stands alone;
-    /// otherwise the query's pairs come first and the fragment's override them. Also reads the output of [`Self::keep`].
+    /// otherwise the query's pairs come first and the fragment's override them. Also reads the output of [`Self::to_storage_text`].
     ///
     /// # Errors
     /// An unknown word, an invalid value, a packed part that does not unpack. Whether the scene has the parameters and allows
     /// the values is checked only in [`Self::load`].
     pub fn parse(text: &str) -> Result<Self, LinkError> {
         let text = text.trim();
-        if let Some(kept) = text.strip_prefix(kept::PREFIX) {
-            return kept::read(kept);
+        if let Some(kept) = text.strip_prefix(storage::PREFIX) {
+            return storage::read(kept);
         }
         let length = text.chars().count();
         if length > LONGEST_LINK {
             let message = format!("has {length} characters; allowed at most {LONGEST_LINK}");
-            return Err(fault("", "", message));
+            return Err(link_error("", "", message));
         }
         Self::read(text)
     }
@@ -231,7 +231,7 @@ impl Link {
         let (before, fragment) = text.split_once('#').unwrap_or((text, ""));
         let query = match before.split_once('?') {
             Some((_, query)) => query,
-            // No URL: the pairs themselves, unless there is a fragment behind a plain address.
+            // Not a URL: bare pairs, unless a fragment follows a plain address.
             None if fragment.is_empty() && before.contains('=') => before,
             None => "",
         };
@@ -252,7 +252,7 @@ impl Link {
         let mut base: Vec<(String, String)> = Vec::new();
         for (key, value) in pairs {
             let value = value.trim();
-            let wrong = |message: &str| fault(key, value, message);
+            let wrong = |message: &str| link_error(key, value, message);
             match key.as_str() {
                 "scene" => name = Some(value.to_owned()),
                 "file" => {
@@ -264,7 +264,7 @@ impl Link {
                 "log" => log = Some(unpack(key, value)?),
                 "t" => {
                     let time = parse_quantity(value, Dimension::Time).map_err(|error| wrong(&error.to_string()))?;
-                    if !(0.0..=LATEST).contains(&time) {
+                    if !(0.0..=LATEST_TIME).contains(&time) {
                         return Err(wrong("allowed 0 to 1000000 s"));
                     }
                     link.time = Some(time);
@@ -281,15 +281,15 @@ impl Link {
                 "camera" => link.camera = Some(read_camera(value).map_err(|m| wrong(&m))?),
                 "magnification" => {
                     let factor = value.parse::<f32>().ok();
-                    let fine = factor.filter(|factor| (1.0..=100.0).contains(factor));
-                    link.magnification = Some(fine.ok_or_else(|| wrong("allowed 1 to 100"))?);
+                    let valid = factor.filter(|factor| (1.0..=100.0).contains(factor));
+                    link.magnification = Some(valid.ok_or_else(|| wrong("allowed 1 to 100"))?);
                 }
                 "follow" => link.follow = Some(value.to_owned()),
-                "plots" => link.plots = Some(shown::read_plots(value).map_err(|m| wrong(&m))?),
+                "plots" => link.plots = Some(settings::read_plots(value).map_err(|m| wrong(&m))?),
                 "channels" => {
-                    link.channels = Some(shown::read_channels(value).map_err(|m| wrong(&m))?);
+                    link.channels = Some(settings::read_channels(value).map_err(|m| wrong(&m))?);
                 }
-                "window" => link.window = Some(shown::read_window(value).map_err(|m| wrong(&m))?),
+                "window" => link.window = Some(settings::read_window(value).map_err(|m| wrong(&m))?),
                 "show" => {
                     link.instruments = Some(Instruments::read(value).map_err(|m| wrong(&m))?);
                 }
@@ -308,7 +308,7 @@ impl Link {
                 }
                 // Set by the page, `web/main.js`.
                 "kept" => {
-                    return Err(fault(
+                    return Err(link_error(
                         "kept",
                         "",
                         "its scene is larger than an address can hold, and is stored only in the browser tab that showed it; open the scene file here",
@@ -329,7 +329,7 @@ impl Link {
                     let alias = ALIASES.iter().find(|(short, _)| *short == other);
                     let full = alias.map_or(other, |(_, full)| full);
                     if !full.contains('.') && full != "formulation" {
-                        return Err(fault(other, "", unknown(other)));
+                        return Err(link_error(other, "", unknown_keyword(other)));
                     }
                     base.retain(|(before, _)| before != full);
                     base.push((full.to_owned(), value.to_owned()));
@@ -337,19 +337,19 @@ impl Link {
             }
         }
         link.log = match log {
-            Some(text) => Log::read(base, &text).map_err(|message| fault("log", "", message))?,
+            Some(text) => Log::read(base, &text).map_err(|message| link_error("log", "", message))?,
             None => Log::new(&base),
         };
         let last = link.log.entries.last().map_or(0, |entry| entry.steps);
         if last > 0 && link.steps.is_none_or(|steps| steps < last) {
-            return Err(fault("log", "", "continues past the link's last step"));
+            return Err(link_error("log", "", "continues past the link's last step"));
         }
         link.scene = match (file, name) {
             (Some(text), name) => SceneText::File { name: name.unwrap_or_else(|| "link.toml".to_owned()), text },
             (None, Some(name)) => {
                 if name.contains('/') || name.ends_with(".toml") {
                     let message = "a link names a built-in scene; a file travels in `text`";
-                    return Err(fault("scene", &name, message));
+                    return Err(link_error("scene", &name, message));
                 }
                 SceneText::BuiltIn(name)
             }
@@ -386,10 +386,10 @@ impl Link {
         add("camera", self.camera.map(write_camera));
         add("magnification", self.magnification.map(|factor| factor.to_string()));
         add("follow", self.follow.clone());
-        add("plots", self.plots.as_deref().map(shown::write_plots));
+        add("plots", self.plots.as_deref().map(settings::write_plots));
         let channels = self.channels.as_deref();
-        add("channels", channels.map(shown::write_channels));
-        add("window", self.window.map(shown::write_window));
+        add("channels", channels.map(settings::write_channels));
+        add("window", self.window.map(settings::write_window));
         add("show", self.instruments.as_ref().map(Instruments::write));
         add("lesson", self.lesson.clone());
         add("step", self.step.map(|step| step.to_string()));
@@ -399,7 +399,7 @@ impl Link {
         add("version", self.version.clone());
         add("hash", self.hash.map(|hash| format!("{hash:016x}")));
         if !self.log.entries.is_empty() {
-            packed.push(("log", pack(&self.log.text())));
+            packed.push(("log", pack(&self.log.to_text())));
         }
         for (key, value) in packed {
             out.append_pair(key, &value);
@@ -411,8 +411,8 @@ impl Link {
     ///
     /// # Errors
     /// A message if the scene file is too large for a link or references other files.
-    pub fn format_short(&self, wanted: &Scene) -> Result<(String, Option<String>), String> {
-        if let Some(name) = wanted.source.beside.keys().next() {
+    pub fn format_short(&self, pending: &Scene) -> Result<(String, Option<String>), String> {
+        if let Some(name) = pending.source.beside.keys().next() {
             return Err(format!(
                 "The scene reads the file {}, which a link cannot contain. Copy its contents into the scene file, or \
                  share both files instead",
@@ -423,9 +423,15 @@ impl Link {
         if whole.len() <= LONGEST_LINK {
             return Ok((whole, None));
         }
-        let start =
-            Self { log: Log::new(&wanted.changes), steps: None, time: None, hash: None, playing: None, ..self.clone() }
-                .format();
+        let start = Self {
+            log: Log::new(&pending.changes),
+            steps: None,
+            time: None,
+            hash: None,
+            playing: None,
+            ..self.clone()
+        }
+        .format();
         if start.len() <= LONGEST_LINK {
             let note = format!(
                 "This run has more changes than fit in a link of {LONGEST_LINK} characters ({}): the link starts the \
@@ -452,14 +458,14 @@ impl Link {
         }
     }
 
-    /// The part of `scene` that the view is to follow, if any.
+    /// The part of `scene` that the view follows, if any.
     ///
     /// # Errors
     /// There is no such part.
-    pub fn followed(&self, scene: &Scene) -> Result<Option<Picked>, LinkError> {
+    pub fn followed_part(&self, scene: &Scene) -> Result<Option<Picked>, LinkError> {
         self.follow
             .as_ref()
-            .map(|name| shown::find_followed(scene, name).map_err(|why| fault("follow", name, why)))
+            .map(|name| settings::find_followed(scene, name).map_err(|why| link_error("follow", name, why)))
             .transpose()
     }
 
@@ -467,7 +473,7 @@ impl Link {
     ///
     /// # Errors
     /// There is no such joint.
-    pub fn under_microscope(&self, scene: &Scene) -> Result<Option<usize>, LinkError> {
+    pub fn microscope_joint(&self, scene: &Scene) -> Result<Option<usize>, LinkError> {
         let Some(name) = self.instruments.as_ref().and_then(|i| i.microscope.as_ref()) else {
             return Ok(None);
         };
@@ -477,13 +483,13 @@ impl Link {
             None => {
                 let known: Vec<_> = scene.machine.ball_joints.iter().map(|j| j.name.as_str()).collect();
                 let message = format!("no such ball joint; allowed: {}", known.join(", "));
-                Err(fault("show", &format!("microscope.{name}"), message))
+                Err(link_error("show", &format!("microscope.{name}"), message))
             }
         }
     }
 
-    /// Whether the link, read from `text`, requests nothing: no scene, change, instant, lesson or view.
-    pub fn is_of_nothing(&self, text: &str) -> bool {
+    /// Whether the link, read from `text`, names no scene, change, instant, lesson or view.
+    pub fn requests_nothing(&self, text: &str) -> bool {
         // Naming the default scene is a request.
         let bare = Self { theme: self.theme, embedded: self.embedded.clone(), ..Self::default() };
         !text.contains("scene=") && *self == bare
@@ -519,7 +525,7 @@ impl SceneText {
     }
 }
 
-fn fault(key: &str, value: &str, message: impl Into<String>) -> LinkError {
+fn link_error(key: &str, value: &str, message: impl Into<String>) -> LinkError {
     let short = |text: &str| -> String {
         let mut short: String = text.chars().take(60).collect();
         if short.len() < text.len() {
@@ -530,9 +536,9 @@ fn fault(key: &str, value: &str, message: impl Into<String>) -> LinkError {
     LinkError { key: short(key), value: short(value), message: message.into() }
 }
 
-fn unknown(key: &str) -> String {
+fn unknown_keyword(key: &str) -> String {
     let short = ALIASES.iter().map(|(short, _)| *short);
-    let known: Vec<&str> = WORDS.into_iter().chain(short).collect();
+    let known: Vec<&str> = KEYWORDS.into_iter().chain(short).collect();
     format!(
         "unknown word{}; allowed: {}, and every parameter by its key, for example contact.clearance",
         crate::scene::suggest_parameter(key, &known),
@@ -559,7 +565,7 @@ fn read_camera(text: &str) -> Result<CameraPose, String> {
         .map(|part| part.parse().ok().filter(|number: &f32| number.is_finite()))
         .collect();
     let numbers = numbers.unwrap_or_default();
-    let steepest = std::f32::consts::FRAC_PI_2;
+    let max_pitch = std::f32::consts::FRAC_PI_2;
     let (numbers, fitted) = match numbers[..] {
         [.., aspect] if numbers.len() == 7 => (&numbers[..6], Some(aspect)),
         _ => (&numbers[..], None),
@@ -567,7 +573,7 @@ fn read_camera(text: &str) -> Result<CameraPose, String> {
     match *numbers {
         [yaw, pitch, distance, x, y, z]
             if yaw.abs() <= 1e3
-                && pitch.abs() <= steepest
+                && pitch.abs() <= max_pitch
                 && (1e-4..=1e4).contains(&distance)
                 && [x, y, z].iter().all(|part| part.abs() <= 1e4)
                 && fitted.is_none_or(|aspect| (1e-2..=1e2).contains(&aspect)) =>
@@ -602,13 +608,13 @@ fn unpack(key: &str, packed: &str) -> Result<String, LinkError> {
 
 /// The reverse of [`pack`] for a text of at most `most` bytes.
 fn unpack_within(key: &str, packed: &str, most: usize) -> Result<String, LinkError> {
-    let damaged = || fault(key, "", "does not unpack: the link is cut short or damaged");
+    let damaged = || link_error(key, "", "does not unpack: the link is cut short or damaged");
     let bytes = BASE64.decode(packed).map_err(|_| damaged())?;
     let text = miniz_oxide::inflate::decompress_to_vec_with_limit(&bytes, most).map_err(|_| damaged())?;
     String::from_utf8(text).map_err(|_| damaged())
 }
 
-mod kept;
-pub mod shown;
+pub mod settings;
+mod storage;
 #[cfg(test)]
 mod tests;

@@ -19,8 +19,8 @@ pub struct Load {
     /// Legs to come: what is set at the beginning of each, and its end, s.
     legs: VecDeque<(Vec<Event>, f64)>,
     /// End of the current leg, s, and of the last.
-    next: f64,
-    total: f64,
+    leg_end: f64,
+    end_time: f64,
 }
 
 /// How a load ended.
@@ -36,24 +36,24 @@ impl Load {
         section: usize,
         periods: usize,
     ) -> Option<Self> {
-        let mut way = vec![points(index)?];
-        while let Some(before) = way[way.len() - 1].after {
-            way.push(points(before)?);
+        let mut chain = vec![points(index)?];
+        while let Some(before) = chain[chain.len() - 1].after {
+            chain.push(points(before)?);
         }
         // The first point is where the run starts.
-        let first = way[way.len() - 1].settings.clone();
+        let first = chain[chain.len() - 1].settings.clone();
         let leg = |(at, point): (usize, &&SweptPoint)| {
             let sections = if at == 0 { section + 1 } else { periods };
             let schedule = Schedule { first: point.first, interval: point.interval, sections, discard: 0 };
-            let set = point.settings.iter().filter(|_| at + 1 < way.len());
+            let set = point.settings.iter().filter(|_| at + 1 < chain.len());
             let set = set.map(|(key, value)| Event::set(key, value));
             (set.chain([schedule.into()]).collect(), schedule.time(sections.saturating_sub(1)))
         };
-        let legs: VecDeque<_> = way.iter().enumerate().map(leg).rev().collect();
+        let legs: VecDeque<_> = chain.iter().enumerate().map(leg).rev().collect();
         let varied = first.iter().map(|(key, _)| key.clone()).collect();
         let mut scene = scene.clone();
         scene.changes.extend(first);
-        Some(Self { scene, varied, total: legs.back()?.1, legs, next: 0.0 })
+        Some(Self { scene, varied, end_time: legs.back()?.1, legs, leg_end: 0.0 })
     }
 
     /// Keys that the sweep varied.
@@ -63,13 +63,13 @@ impl Load {
 
     /// Fraction of the way completed, 0 to 1.
     pub fn fraction(&self, player: &Player) -> f32 {
-        (player.simulation().time() / self.total).clamp(0.0, 1.0) as f32
+        (player.simulation().time() / self.end_time).clamp(0.0, 1.0) as f32
     }
 
     /// Continues while `may_step`; returns how it ended, once there.
     pub fn advance(&mut self, player: &mut Player, mut may_step: impl FnMut() -> bool) -> Option<Arrival> {
         loop {
-            match player.continue_to(Goal::at(self.next), &mut may_step) {
+            match player.continue_to(Goal::at(self.leg_end), &mut may_step) {
                 Ok(true) => {}
                 Ok(false) => return None,
                 Err(obstacle) => return Some(Err(obstacle.to_string())),
@@ -79,7 +79,7 @@ impl Load {
             };
             let steps = player.steps();
             player.queue(events.into_iter().map(|event| Entry { steps, event }));
-            self.next = end;
+            self.leg_end = end;
         }
     }
 }
@@ -116,14 +116,14 @@ mod tests {
             ControlFlow::Continue(())
         });
         let find = |index: usize| points.get(index)?.as_ref();
-        for (index, kept) in [(2, 0), (1, 1), (0, 0)] {
-            let way = Load::new(&task.scene, find, index, task.discard + kept, 3);
-            let mut way = way.expect("all came");
-            let scene = way.scene.scene().expect("its settings");
+        for (index, section) in [(2, 0), (1, 1), (0, 0)] {
+            let load = Load::new(&task.scene, find, index, task.discard + section, 3);
+            let mut load = load.expect("all came");
+            let scene = load.scene.scene().expect("its settings");
             let mut player = Player::new(&scene).expect("starts");
             let arrival = loop {
                 let mut left = 100;
-                let arrival = way.advance(&mut player, || {
+                let arrival = load.advance(&mut player, || {
                     left -= 1;
                     left > 0
                 });
@@ -131,10 +131,10 @@ mod tests {
                     break arrival;
                 }
             };
-            assert_eq!((arrival, way.fraction(&player)), (Ok(()), 1.0));
+            assert_eq!((arrival, load.fraction(&player)), (Ok(()), 1.0));
             let point = find(index).expect("came");
             let state = observed(&player.frame().pose);
-            assert_eq!(state[..6], point.sections[kept], "point {index}");
+            assert_eq!(state[..6], point.sections[section], "point {index}");
             let wanted = player.pending().machine.contact.clearance;
             assert_eq!(wanted, point.values[0]);
         }

@@ -8,10 +8,10 @@ use crate::machine::Vec3;
 use crate::scene::{LiveScene, SOLVER_KEYS, Scene, SetError, Value};
 use crate::simulate::{Effect, Pull};
 
-/// Largest stiffness in N/m, and damping in N s/m, of a pull in a log.
-const STIFFEST: f64 = 1e9;
+/// Largest stiffness, N/m, and damping, N s/m, of a logged pull.
+const MAX_STIFFNESS: f64 = 1e9;
 
-/// What happened between two steps.
+/// An event between two steps.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A parameter was given a value, as a user writes it.
@@ -35,8 +35,8 @@ pub enum Event {
         /// Number of instants.
         sections: u64,
     },
-    /// The user pulled, or let go.
-    Pull(Option<Pulled>),
+    /// The user pulled a body, or released it.
+    Pull(Option<LoggedPull>),
     /// The divergence guard refused a step.
     Stop,
 }
@@ -62,8 +62,8 @@ impl Event {
                 let effect = run.set(key, value)?;
                 if key == "solver.preset" {
                     // A preset chosen live must take effect: it replaces solver keys set by name before.
-                    for by_name in SOLVER_KEYS {
-                        run.set_value(by_name, &Value::Unset)?;
+                    for solver_key in SOLVER_KEYS {
+                        run.set_value(solver_key, &Value::Unset)?;
                     }
                 }
                 Ok(effect)
@@ -88,7 +88,7 @@ impl Event {
     }
 
     /// Description of the event.
-    pub fn words(&self) -> String {
+    pub fn description(&self) -> String {
         match self {
             Self::Set { key, value } => format!("{key} = {value}"),
             Self::Original { key } => format!("{key} as in the scene file"),
@@ -109,12 +109,12 @@ impl From<Schedule> for Event {
 
 /// A pull: the body, and the numbers of a [`Pull`]: point, hand, stiffness, damping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pulled {
+pub struct LoggedPull {
     body: usize,
     numbers: [Number; 8],
 }
 
-impl From<Pull> for Pulled {
+impl From<Pull> for LoggedPull {
     fn from(pull: Pull) -> Self {
         let (p, h) = (pull.point, pull.hand);
         let numbers = [p.x, p.y, p.z, h.x, h.y, h.z, pull.stiffness, pull.damping];
@@ -122,8 +122,8 @@ impl From<Pull> for Pulled {
     }
 }
 
-impl From<Pulled> for Pull {
-    fn from(pulled: Pulled) -> Self {
+impl From<LoggedPull> for Pull {
+    fn from(pulled: LoggedPull) -> Self {
         let [px, py, pz, hx, hy, hz, stiffness, damping] = pulled.numbers.map(|n| n.0);
         Self { body: pulled.body, point: Vec3::new(px, py, pz), hand: Vec3::new(hx, hy, hz), stiffness, damping }
     }
@@ -146,7 +146,7 @@ impl Eq for Number {}
 pub struct Entry {
     /// Accepted steps before it.
     pub steps: u64,
-    /// What happened.
+    /// The event.
     pub event: Event,
 }
 
@@ -176,7 +176,7 @@ impl Log {
     }
 
     /// The entries as text: a line each, with the steps since the line before.
-    pub fn text(&self) -> String {
+    pub fn to_text(&self) -> String {
         let mut text = String::new();
         let mut before = 0;
         for entry in &self.entries {
@@ -199,7 +199,7 @@ impl Log {
         text
     }
 
-    /// Reads what [`Self::text`] wrote.
+    /// The reverse of [`Self::to_text`].
     ///
     /// # Errors
     /// A line that is not an entry.
@@ -207,30 +207,30 @@ impl Log {
         let mut log = Self { base, entries: Vec::new() };
         let mut before = 0_u64;
         for line in text.lines() {
-            let wrong = || {
+            let error = || {
                 let start: String = line.chars().take(60).collect();
                 format!("`{start}` is not a line of a log")
             };
-            let (steps, what) = line.split_once(' ').ok_or_else(wrong)?;
-            let more: u64 = steps.parse().map_err(|_| wrong())?;
-            before = before.checked_add(more).ok_or_else(wrong)?;
-            if what.is_empty() {
-                return Err(wrong());
+            let (steps, body) = line.split_once(' ').ok_or_else(error)?;
+            let more: u64 = steps.parse().map_err(|_| error())?;
+            before = before.checked_add(more).ok_or_else(error)?;
+            if body.is_empty() {
+                return Err(error());
             }
-            if let Some(text) = what.strip_prefix('|') {
-                log.push(before, read_sections(text).ok_or_else(wrong)?);
+            if let Some(text) = body.strip_prefix('|') {
+                log.push(before, read_sections(text).ok_or_else(error)?);
                 continue;
             }
-            if let Some(text) = what.strip_prefix('@') {
-                log.push(before, read_pull(text).ok_or_else(wrong)?);
+            if let Some(text) = body.strip_prefix('@') {
+                log.push(before, read_pull(text).ok_or_else(error)?);
                 continue;
             }
             log.push(
                 before,
-                match what.split_once('=') {
+                match body.split_once('=') {
                     Some((key, value)) => Event::Set { key: key.to_owned(), value: value.to_owned() },
-                    None if what == "!" => Event::Stop,
-                    None => Event::Original { key: what.to_owned() },
+                    None if body == "!" => Event::Stop,
+                    None => Event::Original { key: body.to_owned() },
                 },
             );
         }
@@ -288,8 +288,8 @@ impl Script {
     }
 
     /// Adds an event that happened after `steps` steps at `time`, s, and drops the entries ahead.
-    pub fn note(&mut self, steps: u64, event: Event, time: f64) {
-        self.cut();
+    pub fn record(&mut self, steps: u64, event: Event, time: f64) {
+        self.drop_ahead();
         self.log.push(steps, event);
         self.pass(time);
     }
@@ -302,7 +302,7 @@ impl Script {
     }
 
     /// Drops the entries ahead.
-    pub fn cut(&mut self) {
+    pub fn drop_ahead(&mut self) {
         self.log.entries.truncate(self.passed);
         self.times.truncate(self.passed);
     }
@@ -315,10 +315,10 @@ impl Script {
     /// Time, s, and description of every event ever passed; a pull has only its start and end.
     pub fn flags(&self) -> impl Iterator<Item = (f64, String)> {
         let entries = &self.log.entries;
-        let pulls = |at: usize| matches!(entries[at].event, Event::Pull(Some(_)));
-        let continues = move |at: usize| at > 0 && pulls(at) && pulls(at - 1);
-        let times = self.times.iter().enumerate().filter(move |(at, _)| !continues(*at));
-        times.map(|(at, time)| (*time, entries[at].event.words()))
+        let is_pull = |at: usize| matches!(entries[at].event, Event::Pull(Some(_)));
+        let continues_pull = move |at: usize| at > 0 && is_pull(at) && is_pull(at - 1);
+        let times = self.times.iter().enumerate().filter(move |(at, _)| !continues_pull(*at));
+        times.map(|(at, time)| (*time, entries[at].event.description()))
     }
 }
 
@@ -346,9 +346,9 @@ fn read_pull(text: &str) -> Option<Event> {
         .map(|value| value.filter(|value| value.is_finite()).map(Number))
         .collect();
     let numbers: [Number; 8] = numbers?.try_into().ok()?;
-    let soft = numbers[6..].iter().all(|n| (0.0..=STIFFEST).contains(&n.0));
+    let is_in_range = numbers[6..].iter().all(|n| (0.0..=MAX_STIFFNESS).contains(&n.0));
     let body = body.parse().ok()?;
-    soft.then_some(Event::Pull(Some(Pulled { body, numbers })))
+    is_in_range.then_some(Event::Pull(Some(LoggedPull { body, numbers })))
 }
 
 #[cfg(test)]
@@ -356,7 +356,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_log_survives_as_text() {
+    fn a_log_written_as_text_reads_back_unchanged() {
         let mut log = Log::new(&[("contact.friction".to_owned(), "0.2".to_owned())]);
         log.set(0, "contact.clearance", " 0.5\n mm");
         log.set(120, "joint.S1.clearance", "0.4 mm");
@@ -374,7 +374,7 @@ mod tests {
         log.push(131, Event::Pull(Some(pull.into())));
         log.push(140, Event::Pull(None));
         log.push(7_000_000_000, Event::Stop);
-        let text = log.text();
+        let text = log.to_text();
         assert_eq!(text.lines().next(), Some("0 contact.clearance=0.5 mm"));
         assert_eq!(Log::read(log.base.clone(), &text), Ok(log));
         for bad in [
@@ -396,7 +396,7 @@ mod tests {
         }
     }
     #[test]
-    fn a_script_knows_what_was_passed_and_drops_what_lies_ahead_of_another_event() {
+    fn a_new_event_drops_the_entries_ahead_and_passed_entries_stay() {
         let mut script = Script::new(Log::default());
         let sections = Event::from(Schedule { first: 1.0, interval: 0.5, sections: 2, discard: 0 });
         script.queue([Entry { steps: 4, event: sections }, Entry { steps: 9, event: Event::Stop }]);
@@ -408,7 +408,7 @@ mod tests {
         script.go_back(0);
         assert!(script.step_end(0.0).is_infinite() && script.past().entries.is_empty());
         script.pass(0.25);
-        script.note(5, Event::Pull(None), 0.3);
+        script.record(5, Event::Pull(None), 0.3);
         assert!(!script.has_more());
         assert_eq!(script.past().entries.iter().map(|entry| entry.steps).collect::<Vec<_>>(), [4, 5]);
     }

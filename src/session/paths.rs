@@ -5,9 +5,9 @@ use crate::scene::Scene;
 use crate::simulate::{Frame, RECORDED_JOINTS};
 
 /// Points stored per ball joint.
-const KEPT: usize = 4096;
+const MAX_POINTS: usize = 4096;
 /// A ball that has moved by less than this fraction of its clearance counts as unmoved.
-const GRAIN: f32 = 1e-3;
+const RESOLUTION: f32 = 1e-3;
 
 /// Position of a ball's centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub struct Point {
     /// Time, s.
     pub time: f64,
     /// Position from the socket's centre, in the axes of the socket's body, m: the path turns with its socket.
-    pub place: [f32; 3],
+    pub position: [f32; 3],
 }
 
 /// The latest path of each of the first [`RECORDED_JOINTS`] ball joints.
@@ -52,22 +52,22 @@ impl Paths {
                 points.pop();
             }
             let here = axes_of(frame, path.carrier).tr_mul(&joint.eccentricity);
-            let place = [here.x as f32, here.y as f32, here.z as f32];
-            let grain = GRAIN * joint.clearance as f32;
-            let moved = |last: &Point| {
-                let squares = last.place.iter().zip(&place).map(|(a, b)| (a - b) * (a - b));
-                squares.sum::<f32>() > grain * grain
+            let position = [here.x as f32, here.y as f32, here.z as f32];
+            let resolution = RESOLUTION * joint.clearance as f32;
+            let has_moved = |last: &Point| {
+                let squares = last.position.iter().zip(&position).map(|(a, b)| (a - b) * (a - b));
+                squares.sum::<f32>() > resolution * resolution
             };
             // In an ideal joint the ball cannot move.
-            if joint.clearance <= 0.0 || !points.last().is_none_or(moved) {
+            if joint.clearance <= 0.0 || !points.last().is_none_or(has_moved) {
                 continue;
             }
-            if points.len() == KEPT {
+            if points.len() == MAX_POINTS {
                 // Half at once: shifting all points for each new one would be too costly.
-                points.drain(..KEPT / 2);
+                points.drain(..MAX_POINTS / 2);
             }
             let time = frame.time;
-            points.push(Point { time, place });
+            points.push(Point { time, position });
         }
     }
 
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_is_where_the_run_had_the_ball_seen_from_its_socket() {
+    fn a_path_holds_the_positions_of_the_ball_in_the_axes_of_its_socket() {
         // The crank turns the socket of B; slider-crank has a clearance at C alone, so that B is ideal and stays where it is.
         let changes = [("joint.B.clearance".to_owned(), "0.3 mm".to_owned())];
         let scene = Scene::load("slider-crank", &changes).expect("built in");
@@ -110,7 +110,7 @@ mod tests {
             assert!(points.is_sorted_by(|a, b| a.time < b.time));
         }
         let points = player.paths().between(0, ALL.0, ALL.1);
-        let (mut at, mut turned) = (0, 0.0_f64);
+        let (mut at, mut rotation_change) = (0, 0.0_f64);
         while at < points.len() {
             let point = points[at];
             while other.time() < point.time {
@@ -119,17 +119,17 @@ mod tests {
             other.sample(point.time, &mut frame);
             let joint = &frame.joints[0];
             let carrier = axes_of(&frame, scene.machine.ball_joints[0].socket.body);
-            let seen = carrier * crate::machine::Vec3::from(point.place.map(f64::from));
-            let off = (seen - joint.eccentricity).norm();
-            assert!(off < 1e-9, "{off:e} m at {} s", point.time);
-            turned = turned.max((carrier - Mat3::identity()).norm());
+            let seen = carrier * crate::machine::Vec3::from(point.position.map(f64::from));
+            let deviation = (seen - joint.eccentricity).norm();
+            assert!(deviation < 1e-9, "{deviation:e} m at {} s", point.time);
+            rotation_change = rotation_change.max((carrier - Mat3::identity()).norm());
             at += 7;
         }
-        assert!(turned > 0.1, "the socket turns: {turned}");
+        assert!(rotation_change > 0.1, "the socket turns: {rotation_change}");
     }
 
     #[test]
-    fn what_lies_ahead_of_a_step_back_is_forgotten_and_memory_is_bounded() {
+    fn points_after_a_step_back_are_dropped_and_memory_is_bounded() {
         let mut player = player("spcmm");
         player.run_to(8.6e-3);
         // The rest of the displayed step is recorded by the next.
@@ -159,7 +159,7 @@ mod tests {
             frame.time = f64::from(step) * 1e-5;
             frame.joints[0].eccentricity.x = 1e-4 * f64::from(step % 3);
             paths.record(&frame);
-            assert!(paths.between(0, ALL.0, ALL.1).len() <= KEPT);
+            assert!(paths.between(0, ALL.0, ALL.1).len() <= MAX_POINTS);
         }
         assert_eq!(paths.between(0, 0.19999, ALL.1).len(), 1);
         // A ball at rest is one point.

@@ -46,7 +46,7 @@ pub struct Player {
     unchanged: Option<Box<LiveScene>>,
     /// The scene as loaded from its file.
     original: Scene,
-    /// Warnings about settings that are valid but may surprise the user.
+    /// Key and sentence of each warning about settings that are valid but may surprise the user.
     warnings: Vec<(Option<&'static str>, String)>,
     playing: bool,
     /// Time runs backwards while it plays.
@@ -59,8 +59,8 @@ pub struct Player {
     reached: f64,
     most_steps: u64,
     /// The future abandoned when the run branched from its past.
-    left: Option<Box<AbandonedFuture>>,
-    sought: Option<ImpactSearch>,
+    abandoned: Option<Box<AbandonedFuture>>,
+    impact_search: Option<ImpactSearch>,
     /// Events since the start, and those ahead of the displayed instant.
     script: Script,
     /// Parameter changes since the last `take_edits`.
@@ -87,25 +87,25 @@ pub struct Edit {
 }
 
 /// Latest value text of `key` in `changes`.
-fn changed(changes: &[(String, String)], key: &str) -> Option<String> {
+fn changed_value(changes: &[(String, String)], key: &str) -> Option<String> {
     changes.iter().rev().find(|(other, _)| other == key).map(|(_, text)| text.clone())
 }
 
 /// Viewing time covered by the automatic plot window, s.
-const VIEWING: f64 = 5.0;
+const VIEWING_TIME: f64 = 5.0;
 
-/// Averaging time of the capacity, s of stepping, and the least that yields a value.
-const MEASURED: f64 = 0.3;
-const LEAST_MEASURED: f64 = 1e-3;
+/// Averaging time of the capacity, s of stepping, and the shortest measured time that yields a value.
+const AVERAGING_TIME: f64 = 0.3;
+const MIN_AVERAGING_TIME: f64 = 1e-3;
 
-/// Most instants recorded within one step.
-const MOST_RECORDED: f64 = 64.0;
+/// Largest number of instants recorded within one step.
+const MAX_RECORDED_PER_STEP: f64 = 64.0;
 
 /// The key, as [`Warning::key`], and the sentence of every warning about `scene` before it runs.
 fn warnings_of(scene: &Scene) -> Vec<(Option<&'static str>, String)> {
-    let known = |warning: Warning| (warning.key(), warning.to_string());
+    let entry = |warning: Warning| (warning.key(), warning.to_string());
     let slow = too_slow(scene).map(|slow| (Some("solver.preset"), slow.to_string()));
-    scene.machine.warnings().into_iter().map(known).chain(slow).collect()
+    scene.machine.warnings().into_iter().map(entry).chain(slow).collect()
 }
 
 impl Player {
@@ -114,16 +114,16 @@ impl Player {
     /// # Errors
     /// As [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
-        // The text parsed before; if it fails now, a control's default is its present value.
+        // The text has been parsed before. Should it fail now, the default of a control is its present value.
         let original = Scene::parse_with(&scene.source.text, scene.source.file.as_deref(), &scene.source.beside, &[])
             .unwrap_or_else(|_| scene.clone());
-        let mut player = Self::of(LiveScene::new(scene)?, original);
+        let mut player = Self::with_simulation(LiveScene::new(scene)?, original);
         player.start();
         Ok(player)
     }
 
-    /// A paused run that nothing is recorded of yet.
-    fn of(simulation: LiveScene, original: Scene) -> Self {
+    /// A paused run without any record yet.
+    fn with_simulation(simulation: LiveScene, original: Scene) -> Self {
         let scene = simulation.running();
         Self {
             pacer: Pacer::default(),
@@ -139,8 +139,8 @@ impl Player {
             keyframes: Keyframes::default(),
             reached: 0.0,
             most_steps: 0,
-            left: None,
-            sought: None,
+            abandoned: None,
+            impact_search: None,
             stepped: 0.0,
             stepping: 0.0,
             script: Script::new(Log::new(&scene.changes)),
@@ -213,8 +213,8 @@ impl Player {
         };
         let picked = self.record.channels.picked().iter().map(place);
         let from: Vec<Option<usize>> = (0..first).map(Some).chain(picked).collect();
-        let left = self.left.as_mut().map(|left| &mut left.history);
-        let near = self.record.near.as_deref_mut();
+        let left = self.abandoned.as_mut().map(|left| &mut left.history);
+        let near = self.record.detailed.as_deref_mut();
         for record in std::iter::once(&mut self.record.history).chain(near).chain(left) {
             *record = record.rearranged(&from);
         }
@@ -260,9 +260,9 @@ impl Player {
     }
 
     /// Moves the ghosts to the displayed instant.
-    pub(crate) fn place_ghost(&mut self) {
+    pub(crate) fn update_ghosts(&mut self) {
         if let Some(twin) = &mut self.twin {
-            twin.place(self.pacer.shown());
+            twin.move_to(self.pacer.shown());
         }
         if let Some(ideal) = &mut self.ideal {
             ideal.catch_up(self.pacer.shown(), &self.gravity, self.clock);
@@ -292,7 +292,7 @@ impl Player {
 
     /// Restarts the twin from the present state if `is_wrong` for its start, s.
     fn restart_twin(&mut self, is_wrong: impl Fn(f64) -> bool) {
-        if let Some(twin) = self.twin.as_mut().filter(|twin| is_wrong(twin.begins())) {
+        if let Some(twin) = self.twin.as_mut().filter(|twin| is_wrong(twin.start_time())) {
             twin.restart(&self.simulation);
         }
     }
@@ -304,12 +304,12 @@ impl Player {
 
     /// Drops the queued events that were not reached.
     pub(crate) fn drop_queued(&mut self) {
-        self.script.cut();
+        self.script.drop_ahead();
     }
 
     /// Logs an event at the present step.
-    fn note(&mut self, event: Event) {
-        self.script.note(self.steps(), event, self.simulation.time());
+    fn log_event(&mut self, event: Event) {
+        self.script.record(self.steps(), event, self.simulation.time());
     }
 
     /// Accepted steps since the start.
@@ -319,7 +319,7 @@ impl Player {
 
     /// Default time window of the plots, s: a few seconds of viewing.
     pub fn automatic_window(&self) -> f64 {
-        VIEWING * self.pacer.scale()
+        VIEWING_TIME * self.pacer.scale()
     }
 
     /// Whether the run is playing, in either direction.
@@ -332,7 +332,7 @@ impl Player {
         self.set_paused();
         self.playing = playing && self.stopped.is_none();
         if self.playing {
-            self.go_on();
+            self.resume();
             // Restart the average of the speed reached.
             self.pacer.jump(self.pacer.shown());
         }
@@ -363,8 +363,8 @@ impl Player {
 
     /// Advances by one frame, `dt` seconds after the last, and updates the display.
     pub fn advance(&mut self, dt: f64) {
-        if let Some(sought) = self.sought {
-            self.seek(sought);
+        if let Some(impact_search) = self.impact_search {
+            self.seek(impact_search);
         } else if self.is_playing_backwards() {
             let shown = self.pacer.shown();
             let ahead = self.pacer.begin(dt);
@@ -372,31 +372,31 @@ impl Player {
             self.playing = self.pacer.shown() > 0.0;
         } else if self.playing {
             let target = self.pacer.begin(dt);
-            let spent = self.pursue(target, Pacer::may_step);
+            let spent = self.step_within_budget(target, Pacer::may_step);
             self.pacer.end(dt, target, self.simulation.time(), spent);
-            self.present();
+            self.update_display();
         }
-        self.hand_out_peaks();
+        self.publish_peaks();
     }
 
     /// Steps for a while between two frames, `since` seconds after the first began. Returns whether the run is still behind;
     /// `None` if nothing remains to do before the next frame.
     pub fn step_between(&mut self, since: f64) -> Option<bool> {
-        if !self.playing || self.backwards || self.sought.is_some() {
+        if !self.playing || self.backwards || self.impact_search.is_some() {
             return None;
         }
         let target = self.pacer.begin_between(since)?;
-        let spent = self.pursue(target, Pacer::may_step_between);
+        let spent = self.step_within_budget(target, Pacer::may_step_between);
         let before = self.pacer.shown();
         let (another, behind) = self.pacer.end_between(target, self.simulation.time(), spent);
         if self.pacer.shown() > before {
-            self.present();
+            self.update_display();
         }
         another.then_some(behind)
     }
 
     /// Steps to `target`, s, while the pacer allows it. Returns the time spent, s.
-    fn pursue(&mut self, target: f64, may_step: fn(&Pacer, f64) -> bool) -> f64 {
+    fn step_within_budget(&mut self, target: f64, may_step: fn(&Pacer, f64) -> bool) -> f64 {
         if self.simulation.time() >= target {
             return 0.0;
         }
@@ -405,15 +405,15 @@ impl Player {
         // A stop is displayed by the window.
         let _ = self.step_towards(target, |player| player.simulation.time() >= target, in_time);
         let spent = (self.clock)() - start;
-        let keep = libm::exp(-spent / MEASURED);
-        self.stepped = self.stepped * keep + (self.simulation.time() - before);
-        self.stepping = self.stepping * keep + spent;
+        let decay = libm::exp(-spent / AVERAGING_TIME);
+        self.stepped = self.stepped * decay + (self.simulation.time() - before);
+        self.stepping = self.stepping * decay + spent;
         spent
     }
 
     /// Recent simulated seconds per second of stepping, recording included; `None` until enough steps were measured.
     pub fn capacity(&self) -> Option<f64> {
-        (self.stepping > LEAST_MEASURED).then(|| self.stepped / self.stepping)
+        (self.stepping > MIN_AVERAGING_TIME).then(|| self.stepped / self.stepping)
     }
 
     /// What holds the run below the requested time scale; `None` while it keeps up.
@@ -430,7 +430,7 @@ impl Player {
     pub fn single_step(&mut self) {
         self.set_paused();
         if self.stopped.is_none() {
-            self.go_on();
+            self.resume();
             let _ = self.continue_to(Goal::after(self.steps() + 1), || true);
         }
     }
@@ -440,10 +440,10 @@ impl Player {
         self.run_towards(time, || true);
     }
 
-    /// The same while `may_step`. Returns true once `time` is reached or the run cannot continue.
+    /// As [`Self::run_to`], while `may_step`. Returns true once `time` is reached or the run cannot continue.
     pub fn run_towards(&mut self, time: f64, may_step: impl FnMut() -> bool) -> bool {
         self.set_paused();
-        self.go_on();
+        self.resume();
         self.continue_to(Goal::at(time), may_step) != Ok(false)
     }
 
@@ -463,7 +463,7 @@ impl Player {
             before_change: std::mem::take(&mut self.before_change),
             stepped: self.stepped,
             stepping: self.stepping,
-            ..Self::of(simulation, self.original.clone())
+            ..Self::with_simulation(simulation, self.original.clone())
         };
         run.record.watch.set_phase(self.record.watch.phase(), 0.0);
         run.set_ideal(self.ideal.is_some());
@@ -487,10 +487,10 @@ impl Player {
     }
 
     /// Records the edits relative to the changes `before`.
-    fn note_edits(&mut self, before: &[(String, String)]) {
+    fn record_edits(&mut self, before: &[(String, String)]) {
         let after = &self.simulation.pending().changes;
         for (key, _) in before.iter().chain(after) {
-            let (old, new) = (changed(before, key), changed(after, key));
+            let (old, new) = (changed_value(before, key), changed_value(after, key));
             if old == new {
                 continue;
             }
@@ -510,8 +510,8 @@ impl Player {
     ///
     /// # Errors
     /// As [`Self::set`].
-    pub(crate) fn put_back(&mut self, key: &str, text: Option<&str>) -> Result<(), SetError> {
-        if changed(&self.pending().changes, key).as_deref() == text {
+    pub(crate) fn restore_parameter(&mut self, key: &str, text: Option<&str>) -> Result<(), SetError> {
+        if changed_value(&self.pending().changes, key).as_deref() == text {
             return Ok(());
         }
         match text {
@@ -538,8 +538,8 @@ impl Player {
     /// Keys that the scene's file sets by name and that therefore override any preset.
     pub fn keys_overriding_preset(&self) -> Vec<&'static str> {
         let places = &self.original.source.places;
-        let given = |key: &&str| places.contains_key(*key);
-        SOLVER_KEYS.into_iter().filter(given).collect()
+        let is_in_file = |key: &&str| places.contains_key(*key);
+        SOLVER_KEYS.into_iter().filter(is_in_file).collect()
     }
 
     /// Resets a parameter to its value in the scene file.
@@ -565,32 +565,32 @@ impl Player {
         self.apply(&event)?;
         // Only the last of several moves between two steps counts.
         let steps = self.steps();
-        let moved = |entry: &Entry| entry.steps == steps && matches!(entry.event, Event::Pull(Some(_)));
-        if pull.is_some() && self.script.log.entries.last().is_some_and(moved) {
+        let is_same_pull = |entry: &Entry| entry.steps == steps && matches!(entry.event, Event::Pull(Some(_)));
+        if pull.is_some() && self.script.log.entries.last().is_some_and(is_same_pull) {
             self.script.go_back(self.script.passed - 1);
         }
-        self.note(event);
+        self.log_event(event);
         Ok(())
     }
 
     fn after_change(&mut self) {
         self.warnings = warnings_of(self.pending());
-        self.record.watch.begin(self.simulation.running(), self.simulation.time());
+        self.record.watch.restart(self.simulation.running(), self.simulation.time());
         self.record.settling = Settling::new(self.simulation.running());
         // While the run is retraced, the twin may begin later than now.
         let now = self.simulation.time();
-        self.restart_twin(|begins| begins <= now);
-        self.present();
+        self.restart_twin(|start| start <= now);
+        self.update_display();
     }
 
     /// Whether `key` was changed and waits for a reset.
-    pub fn is_waiting(&self, key: &str) -> bool {
+    pub fn is_pending(&self, key: &str) -> bool {
         self.pending().get(key).ok() != self.running().get(key).ok()
     }
 
     /// Whether any change waits for a reset.
-    pub fn has_waiting(&self) -> bool {
-        self.pending().changes.iter().any(|(key, _)| self.is_waiting(key))
+    pub fn has_pending_changes(&self) -> bool {
+        self.pending().changes.iter().any(|(key, _)| self.is_pending(key))
     }
 
     /// Warnings, as sentences, about settings that are valid but may surprise the user.
@@ -613,13 +613,13 @@ impl Player {
     /// Records the rest of the previous step and takes one step; false if the divergence guard stopped it.
     pub(crate) fn step(&mut self) -> bool {
         self.record_until(self.simulation.time());
-        self.keep();
+        self.store_keyframe();
         let end = self.script.step_end(self.simulation.time());
         match self.simulation.step_until(end) {
             Ok(()) => {
                 self.unchanged = None;
-                self.simulation.take_peaks(&mut self.record.coming);
-                self.record.impact_record.record(&mut self.simulation, &self.record.coming);
+                self.simulation.take_peaks(&mut self.record.upcoming_peaks);
+                self.record.impact_record.record(&mut self.simulation, &self.record.upcoming_peaks);
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
@@ -637,7 +637,7 @@ impl Player {
                 match self.script.due(self.steps()) {
                     // Repeated: the stop is already in the log.
                     Some(Event::Stop) => self.script.pass(self.simulation.time()),
-                    _ => self.note(Event::Stop),
+                    _ => self.log_event(Event::Stop),
                 }
                 false
             }
@@ -656,12 +656,12 @@ impl Player {
     fn record_until(&mut self, until: f64) {
         let start = self.record.recorded_to;
         let next_peak = |player: &Self| {
-            let forces = player.record.coming.iter().filter(|peak| peak.normal > 0.0);
+            let forces = player.record.upcoming_peaks.iter().filter(|peak| peak.normal > 0.0);
             forces.map(|peak| peak.time).min_by(f64::total_cmp)
         };
         if until > start {
             // A long step is also recorded at instants within it, so that plots stay smooth.
-            let parts = ((until - start) / self.automatic_window() * 400.0).ceil().clamp(1.0, MOST_RECORDED);
+            let parts = ((until - start) / self.automatic_window() * 400.0).ceil().clamp(1.0, MAX_RECORDED_PER_STEP);
             for part in 1..=parts as u32 {
                 let end =
                     if f64::from(part) == parts { until } else { start + (until - start) * f64::from(part) / parts };
@@ -669,12 +669,12 @@ impl Player {
                 let close = end - 1e-3 * (end - start) / parts;
                 while let Some(peak) = next_peak(self).filter(|peak| *peak < close) {
                     self.record_at(peak);
-                    self.pass_peaks(peak);
+                    self.commit_peaks(peak);
                 }
                 self.record_at(end);
             }
         }
-        self.pass_peaks(until);
+        self.commit_peaks(until);
         self.record.watch.step(self.unchanged.as_deref_mut().unwrap_or(&mut self.simulation), until);
     }
 
@@ -686,7 +686,7 @@ impl Player {
         let joints = frame.joints.iter().take(self.clearances().len());
         self.record.values.extend(joints.map(|joint| joint.clearance));
         self.record.channels.read_picked(&frame, &mut self.record.values);
-        for (joint, peak) in self.record.coming.iter().enumerate() {
+        for (joint, peak) in self.record.upcoming_peaks.iter().enumerate() {
             // The peak comes from the cubic of the step, not from the interpolated state.
             if peak.normal > 0.0
                 && peak.time == time
@@ -701,7 +701,7 @@ impl Player {
             let error = ideal.output_error(&frame).map_or(f64::NAN, |e| e.norm());
             self.record.values[self.record.channels.tip_error()] = error;
         }
-        for record in std::iter::once(&mut self.record.history).chain(self.record.near.as_deref_mut()) {
+        for record in std::iter::once(&mut self.record.history).chain(self.record.detailed.as_deref_mut()) {
             record.push(time, &self.record.values);
         }
         self.record.contact_history.record(&frame);
@@ -712,27 +712,27 @@ impl Player {
     }
 
     /// Adds the peaks up to `time`, s, to the record and to the frame's peaks.
-    fn pass_peaks(&mut self, time: f64) {
-        self.record.passed.resize(self.record.coming.len(), Peak::default());
+    fn commit_peaks(&mut self, time: f64) {
+        self.record.passed_peaks.resize(self.record.upcoming_peaks.len(), Peak::default());
         let all = time >= self.simulation.time();
         if all {
             self.simulation.commit_wear();
         }
-        for joint in 0..self.record.coming.len() {
-            let peak = self.record.coming[joint];
+        for joint in 0..self.record.upcoming_peaks.len() {
+            let peak = self.record.upcoming_peaks[joint];
             // A contact that carries no force yet began at the end of the step.
             if !all && (peak.normal <= 0.0 || peak.time > time) {
                 continue;
             }
-            self.record.coming[joint] = Peak::default();
+            self.record.upcoming_peaks[joint] = Peak::default();
             if peak.normal > 0.0
                 && let Some(channel) = self.record.channels.normal_force(joint)
             {
-                for record in std::iter::once(&mut self.record.history).chain(self.record.near.as_deref_mut()) {
+                for record in std::iter::once(&mut self.record.history).chain(self.record.detailed.as_deref_mut()) {
                     record.widen(peak.time, channel, peak.normal);
                 }
             }
-            let passed = &mut self.record.passed[joint];
+            let passed = &mut self.record.passed_peaks[joint];
             let (impacts, speed) = (passed.impacts, passed.approach_speed);
             if peak.normal > passed.normal {
                 *passed = peak;
@@ -743,18 +743,18 @@ impl Player {
     }
 
     /// Hands out the peaks since the previous call.
-    pub(crate) fn hand_out_peaks(&mut self) {
-        std::mem::swap(&mut self.record.peaks, &mut self.record.passed);
-        self.record.passed.clear();
-        self.record.passed.resize(self.record.peaks.len(), Peak::default());
+    pub(crate) fn publish_peaks(&mut self) {
+        std::mem::swap(&mut self.record.peaks, &mut self.record.passed_peaks);
+        self.record.passed_peaks.clear();
+        self.record.passed_peaks.resize(self.record.peaks.len(), Peak::default());
     }
 
     /// Records up to the displayed instant and samples the frame there.
-    fn present(&mut self) {
+    fn update_display(&mut self) {
         let shown = self.pacer.shown();
         self.record_until(shown);
         self.reached = self.reached.max(shown);
-        self.record.watch.show(shown);
+        self.record.watch.set_shown(shown);
         let mut frame = std::mem::take(&mut self.frame);
         self.run_at(shown).sample(shown, &mut frame);
         // The hand is shown at its current position, although it acts only from the next step on.
@@ -782,12 +782,12 @@ impl Player {
         self.simulation.track_wear();
         self.record.contact_history.begin(0.0);
         // Forces at the start belong to the first frame: there has been no impact yet.
-        self.simulation.take_peaks(&mut self.record.coming);
-        self.record.impact_record.begin(&self.record.coming);
-        self.record.forget_peaks();
+        self.simulation.take_peaks(&mut self.record.upcoming_peaks);
+        self.record.impact_record.begin(&self.record.upcoming_peaks);
+        self.record.drop_peaks();
         self.record_at(self.simulation.time());
-        self.keep();
+        self.store_keyframe();
         self.pacer.jump(self.simulation.time());
-        self.present();
+        self.update_display();
     }
 }

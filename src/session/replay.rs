@@ -22,7 +22,7 @@ pub enum Verdict {
     },
     /// The instant is reached; the link has no hash to compare with.
     Reached,
-    /// The instant could not be reached, and why.
+    /// The instant could not be reached, for this reason.
     Failed(String),
 }
 
@@ -63,7 +63,7 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// A replay to the instant of `link` by `player`, which is at its start; `None` if the link names none.
+    /// A replay to the instant of `link` by `player`, which is at its start; `None` if the link names no instant.
     pub fn new(link: Link, player: &mut Player) -> Option<Self> {
         link.has_instant().then(|| {
             player.queue(link.log.entries.iter().cloned());
@@ -127,31 +127,31 @@ mod tests {
         Link::parse(&link.format()).expect("a link")
     }
 
-    /// Replays `link` in chunks of `piece` steps.
-    fn follow(link: Link, piece: u32) -> (Player, Verdict, u32) {
+    /// Replays `link` in chunks of `chunk_steps` steps.
+    fn follow(link: Link, chunk_steps: u32) -> (Player, Verdict, u32) {
         let mut player = Player::new(&link.load().expect("loads")).expect("starts");
         let replay = Replay::new(link, &mut player).expect("an instant");
-        for pieces in 1.. {
-            let mut left = piece;
+        for chunks in 1.. {
+            let mut left = chunk_steps;
             let verdict = replay.advance(&mut player, || {
                 left = left.saturating_sub(1);
                 left > 0
             });
             if let Some(verdict) = verdict {
-                return (player, verdict, pieces);
+                return (player, verdict, chunks);
             }
             assert!((0.0..1.0).contains(&replay.fraction(&player)));
         }
         unreachable!()
     }
 
-    fn agrees(player: &Player) {
+    fn assert_reproduced(player: &Player) {
         let link = link_to(player);
-        let (copy, verdict, pieces) = follow(link, 50);
+        let (copy, verdict, chunks) = follow(link, 50);
         assert_eq!(verdict, Verdict::Agrees(player.simulation().state_hash()));
         assert_eq!(copy.log(), player.log(), "the copy's own link is the same");
         assert_eq!(copy.pacer.shown().to_bits(), player.pacer.shown().to_bits());
-        assert!(pieces > 1, "in more than one frame");
+        assert!(chunks > 1, "in more than one frame");
     }
 
     #[test]
@@ -188,19 +188,19 @@ mod tests {
             original.set_original("contact.clearance").expect("the file's");
             play(&mut original, 5);
             assert!(original.log().entries.len() >= 8);
-            agrees(&original);
+            assert_reproduced(&original);
             // The change comes at the end of a step whose beginning is displayed.
             original.pacer.set_scale(1e-4);
             original.set_playing(true);
             original.advance(1.0 / 60.0);
             assert!(original.pacer.shown() < original.simulation().time());
             original.set("contact.friction", "0.1").expect("in range");
-            agrees(&original);
+            assert_reproduced(&original);
         }
     }
 
     #[test]
-    fn changes_before_a_reset_are_what_the_run_starts_with() {
+    fn changes_before_a_reset_apply_from_the_start_of_the_next_run() {
         let mut original = player("spcmm");
         original.run_to(5e-3);
         original.set("contact.clearance", "0.5 mm").expect("in range");
@@ -212,13 +212,13 @@ mod tests {
         original.run_to(40e-3);
         // A change that waits for the next reset is in the link, too.
         original.set("spcmm.frequency", "0.45 Hz").expect("in range");
-        agrees(&original);
+        assert_reproduced(&original);
         let (copy, ..) = follow(link_to(&original), 50);
-        assert!(copy.is_waiting("spcmm.frequency"));
+        assert!(copy.is_pending("spcmm.frequency"));
     }
 
     #[test]
-    fn a_run_that_the_guard_stopped_stops_again() {
+    fn a_run_stopped_by_the_guard_stops_again_when_replayed() {
         let mut original = player("spcmm");
         original.set("solver.method", "rk4").expect("a method");
         original.set("solver.step", "1 ms").expect("in range");
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn another_state_or_a_wrong_event_is_told() {
+    fn a_different_state_or_an_invalid_event_is_reported() {
         let mut original = player("pendulum");
         original.run_to(20e-3);
         let mut link = link_to(&original);
@@ -263,10 +263,10 @@ mod tests {
             let mut link = link_to(&original);
             link.log = Log::read(Vec::new(), pull).expect("a log");
             let Verdict::Failed(reason) = follow(link, 50).1 else {
-                panic!("nobody can pull there: {pull}");
+                panic!("the pull is out of range: {pull}");
             };
-            let said = ["body 7 is pulled, of 1", "1000000 m"];
-            assert!(said.iter().any(|words| reason.contains(words)), "{reason}");
+            let reasons = ["body 7 is pulled, of 1", "1000000 m"];
+            assert!(reasons.iter().any(|text| reason.contains(text)), "{reason}");
         }
 
         let mut link = link_to(&original);

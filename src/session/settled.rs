@@ -1,11 +1,11 @@
 //! Whether the motion of a run relative to its drives has ended.
 //!
 //! - A scene with moving drives has settled when every ball with play has, over the last eighth of the drives' period, stayed
-//!   in contact, moved in its socket by no more than [`STILL`] of the clearance (at that rate, hardly once across its play in a
-//!   period), and borne the same load within [`LOAD`]. If motion resumes after such a stretch, the next one must last a whole
-//!   period: where the ball crosses its play once per turn, it is quiet in between.
-//! - A scene without a moving drive is at rest when no point of a body has moved by more than [`STILL`] of the least clearance
-//!   for [`REST`]. A pendulum stands still at the end of each swing, but not for so long.
+//!   in contact, moved in its socket by no more than [`MAX_DISPLACEMENT`] of the clearance (at that rate, hardly once across its
+//!   play in a period), and borne the same load within [`MAX_LOAD_CHANGE`]. If motion resumes after such a stretch, the next one
+//!   must last a whole period: a ball that crosses its play once per turn is quiet in between.
+//! - A scene without a moving drive is at rest when no point of a body has moved by more than [`MAX_DISPLACEMENT`] of the
+//!   least clearance for [`REST_TIME`]. A pendulum also stops at the end of each swing, but not for so long.
 //! - A scene without play never settles: nothing in it rattles.
 //!
 //! All of this is judged from the frames of the run.
@@ -16,15 +16,15 @@ use crate::scene::Scene;
 use crate::simulate::{ContactMode, Frame, JointReport};
 
 /// Fraction of the period over which a driven scene is watched.
-const PART: f64 = 1.0 / 8.0;
+const WATCHED_FRACTION: f64 = 1.0 / 8.0;
 /// How long a scene without drives is watched, s.
-const REST: f64 = 0.5;
+const REST_TIME: f64 = 0.5;
 /// Largest displacement of a ball, or of a point of a body, over that time, in clearances.
-const STILL: f64 = 0.15;
+const MAX_DISPLACEMENT: f64 = 0.15;
 /// Largest relative change of a contact force over that time.
-const LOAD: f64 = 0.25;
+const MAX_LOAD_CHANGE: f64 = 0.25;
 /// Instants stored per stretch.
-const KEPT: f64 = 16.0;
+const INSTANTS: f64 = 16.0;
 
 /// One instant to compare with.
 #[derive(Clone, Debug, Default)]
@@ -45,15 +45,15 @@ pub struct Settling {
     /// Earlier instants that equal the latest within the tolerances, oldest first.
     past: Vec<Instant>,
     /// The latest instant.
-    here: Instant,
+    latest: Instant,
     /// Start of the quiet time, s.
-    quiet: Option<f64>,
+    quiet_since: Option<f64>,
     /// Whether motion resumed after a quiet time.
     has_resumed: bool,
 }
 
 impl Settling {
-    /// Watches a run of `scene` from now on.
+    /// Observes a run of `scene` from now on.
     pub fn new(scene: &Scene) -> Self {
         let period = match drive_period(scene) {
             Ok(period) => Some(period),
@@ -68,19 +68,19 @@ impl Settling {
             period,
             joints: scene.machine.ball_joints.iter().map(play).collect(),
             past: Vec::new(),
-            here: Instant::default(),
-            quiet: None,
+            latest: Instant::default(),
+            quiet_since: None,
             has_resumed: false,
         }
     }
 
-    /// Whether it has settled.
+    /// Whether the motion has settled.
     pub fn has_settled(&self) -> bool {
         let needed = match self.period {
             Some(period) if self.has_resumed => period,
             _ => 0.0,
         };
-        self.quiet.is_some_and(|since| self.here.time - since >= needed)
+        self.quiet_since.is_some_and(|since| self.latest.time - since >= needed)
     }
 
     /// Records the next instant of the run.
@@ -90,39 +90,41 @@ impl Settling {
         if !least.is_finite() || frame.joints.len() != self.joints.len() {
             return;
         }
-        let free = |(play, now): (&Option<_>, &JointReport)| play.is_some() && now.state == ContactMode::Free;
-        let driven = self.period.is_some();
-        if driven && self.joints.iter().zip(&frame.joints).any(free) {
+        let is_free = |(play, now): (&Option<_>, &JointReport)| play.is_some() && now.state == ContactMode::Free;
+        let is_driven = self.period.is_some();
+        if is_driven && self.joints.iter().zip(&frame.joints).any(is_free) {
             self.past.clear();
         }
-        self.take(frame);
-        let stretch = self.period.map_or(REST, |period| period * PART);
-        let Self { joints, here, .. } = self;
+        self.sample(frame);
+        let stretch = self.period.map_or(REST_TIME, |period| period * WATCHED_FRACTION);
+        let Self { joints, latest, .. } = self;
         self.past.retain(|then| {
-            let mut points = then.points.iter().zip(&here.points).enumerate();
-            let still = points.all(|(i, (a, b))| {
-                let clearance = if driven { joints[i].map(|(_, clearance)| clearance) } else { Some(least) };
-                clearance.is_none_or(|clearance| (a - b).norm() <= STILL * clearance)
+            let mut points = then.points.iter().zip(&latest.points).enumerate();
+            let is_still = points.all(|(i, (a, b))| {
+                let clearance = if is_driven { joints[i].map(|(_, clearance)| clearance) } else { Some(least) };
+                clearance.is_none_or(|clearance| (a - b).norm() <= MAX_DISPLACEMENT * clearance)
             });
-            let mut loads = then.loads.iter().zip(&here.loads);
+            let mut loads = then.loads.iter().zip(&latest.loads);
             // Those older than two stretches are no longer needed.
-            still && here.time - then.time < 2.0 * stretch && loads.all(|(a, b)| (a - b).abs() <= LOAD * a)
+            is_still
+                && latest.time - then.time < 2.0 * stretch
+                && loads.all(|(a, b)| (a - b).abs() <= MAX_LOAD_CHANGE * a)
         });
-        let since = |then: Option<&Instant>| then.map(|then| here.time - then.time);
-        let quiet = since(self.past.first()).is_some_and(|age| age >= stretch);
-        match (quiet, self.quiet) {
-            (true, None) => self.quiet = Some(here.time),
-            (false, Some(_)) => (self.quiet, self.has_resumed) = (None, true),
+        let age_of = |then: Option<&Instant>| then.map(|then| latest.time - then.time);
+        let is_quiet = age_of(self.past.first()).is_some_and(|age| age >= stretch);
+        match (is_quiet, self.quiet_since) {
+            (true, None) => self.quiet_since = Some(latest.time),
+            (false, Some(_)) => (self.quiet_since, self.has_resumed) = (None, true),
             _ => {}
         }
-        if since(self.past.last()).is_none_or(|age| age >= stretch / KEPT) {
-            self.past.push(here.clone());
+        if age_of(self.past.last()).is_none_or(|age| age >= stretch / INSTANTS) {
+            self.past.push(latest.clone());
         }
     }
 
     /// Samples positions: in a driven scene the balls in the axes of their sockets, otherwise points of the bodies.
-    fn take(&mut self, frame: &Frame) {
-        let Instant { time, points, loads } = &mut self.here;
+    fn sample(&mut self, frame: &Frame) {
+        let Instant { time, points, loads } = &mut self.latest;
         *time = frame.time;
         points.clear();
         loads.clear();
@@ -149,7 +151,7 @@ mod tests {
     use crate::simulate::Simulation;
 
     /// Runs `scene` to `to`, s. Returns the times at which it settled or resumed.
-    fn turns(scene: &Scene, to: f64) -> Vec<f64> {
+    fn changes_of_state(scene: &Scene, to: f64) -> Vec<f64> {
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut settling = Settling::new(scene);
         let (mut frame, mut turns) = (Frame::default(), Vec::new());
@@ -171,13 +173,13 @@ mod tests {
     }
 
     #[test]
-    fn the_papers_mechanism_settles_once_it_has_rattled_and_stays_so() {
-        let turns = turns(&scene("spcmm", &[]), 2.2);
+    fn the_papers_mechanism_settles_after_rattling_and_stays_settled() {
+        let turns = changes_of_state(&scene("spcmm", &[]), 2.2);
         assert!(turns.len() == 1 && (0.1..0.45).contains(&turns[0]), "{turns:?}");
     }
 
     #[test]
-    fn what_swings_or_is_driven_about_its_play_never_settles() {
+    fn a_swinging_pendulum_and_a_mechanism_driven_across_its_play_never_settle() {
         for (name, changes, to) in [
             ("pendulum", &[][..], 3.0),
             ("chain", &[("chain.links", "3")], 1.5),
@@ -186,7 +188,7 @@ mod tests {
             ("slider-crank-driven", &[("contact.friction", "0")], 3.0),
             ("slider-crank-driven", &[("contact.friction", "0.5")], 3.0),
         ] {
-            let turns = turns(&scene(name, changes), to);
+            let turns = changes_of_state(&scene(name, changes), to);
             assert!(turns.is_empty(), "{name} {changes:?}: {turns:?}");
         }
     }
@@ -194,10 +196,10 @@ mod tests {
     #[test]
     fn a_rod_that_hangs_straight_down_comes_to_rest() {
         let text = scene("pendulum", &[]).source.text.clone();
-        let hangs = text.replace("-30 deg", "0 deg");
-        assert_ne!(hangs, text);
-        let hangs = Scene::parse(&hangs, None, &[]).expect("a scene");
-        let turns = turns(&hangs, 1.5);
-        assert!(turns.len() == 1 && turns[0] > REST, "{turns:?}");
+        let hanging = text.replace("-30 deg", "0 deg");
+        assert_ne!(hanging, text);
+        let hanging = Scene::parse(&hanging, None, &[]).expect("a scene");
+        let turns = changes_of_state(&hanging, 1.5);
+        assert!(turns.len() == 1 && turns[0] > REST_TIME, "{turns:?}");
     }
 }

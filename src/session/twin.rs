@@ -10,16 +10,16 @@ use crate::simulate::{Frame, Simulation, Stopped};
 
 /// The displacement, in units of the scales of the state.
 pub const DISPLACEMENT: f64 = 1e-9;
-/// Most distances; at this number every second one is dropped.
-const KEPT: usize = 4096;
+/// Largest number of stored distances; at this number every second one is dropped.
+const MAX_DISTANCES: usize = 4096;
 /// Interval between renormalisations of an undriven machine, s.
-const UNDRIVEN: f64 = 0.1;
-/// Fewest intervals that yield an exponent: two in each block of its error.
-const FEWEST: usize = 20;
+const UNDRIVEN_INTERVAL: f64 = 0.1;
+/// Smallest number of intervals that yield an exponent: two in each block of its error.
+const MIN_INTERVALS: usize = 20;
 /// Rounding tolerance of the end of an interval, in intervals.
-const NEARLY: f64 = 1e-9;
+const TIME_TOLERANCE: f64 = 1e-9;
 /// Initial capacity, intervals.
-const ROOM: usize = 1024;
+const INITIAL_CAPACITY: usize = 1024;
 
 /// The renormalised twin and the growth of its separation.
 #[derive(Clone)]
@@ -29,30 +29,30 @@ struct Growth {
     /// Length of an interval, s, end of the current one, s, and number of completed ones.
     interval: f64,
     next: f64,
-    ended: usize,
+    completed: usize,
     /// Whether a step of the twin failed.
-    lost: bool,
+    has_failed: bool,
 }
 
 impl Growth {
     /// Measures the growth from the present state of `run` on.
     fn new(run: &Simulation) -> Self {
         let machine = &run.changed_machine();
-        let interval = common_period(machine).ok().flatten().unwrap_or(UNDRIVEN);
-        let mut benettin = Benettin::new(separation_of(machine), interval, ROOM);
+        let interval = common_period(machine).ok().flatten().unwrap_or(UNDRIVEN_INTERVAL);
+        let mut benettin = Benettin::new(separation_of(machine), interval, INITIAL_CAPACITY);
         let mut twin = run.twin();
         benettin.start(run, &mut twin);
-        Self { twin, benettin, interval, next: run.time() + interval, ended: 0, lost: false }
+        Self { twin, benettin, interval, next: run.time() + interval, completed: 0, has_failed: false }
     }
 
     /// Call after each step of `run`.
     fn follow(&mut self, run: &Simulation) {
-        let at_end = run.time() >= self.next - NEARLY * self.interval;
-        self.lost |= self.benettin.follow(run, &mut self.twin, at_end).is_err();
+        let at_end = run.time() >= self.next - TIME_TOLERANCE * self.interval;
+        self.has_failed |= self.benettin.follow(run, &mut self.twin, at_end).is_err();
         if at_end {
-            self.ended += 1;
+            self.completed += 1;
             self.next += self.interval;
-            if self.ended == ALIGNMENT {
+            if self.completed == ALIGNMENT {
                 self.benettin.begin_counting();
             }
         }
@@ -81,13 +81,13 @@ impl Twin {
     /// A displaced copy of `run` in its present state.
     pub fn new(run: &Simulation) -> Self {
         let mut simulation = run.twin();
-        let away: Vec<f64> = offset(run.scales(), DISPLACEMENT).collect();
-        simulation.displace(&away);
+        let offsets: Vec<f64> = offset(run.scales(), DISPLACEMENT).collect();
+        simulation.displace(&offsets);
         let steps = run.statistics().steps;
         let mut twin = Self {
             motion: Companion::new(simulation),
             steps_before: steps,
-            distances: Vec::with_capacity(KEPT),
+            distances: Vec::with_capacity(MAX_DISTANCES),
             stride: 1,
             goal: run.time(),
             goal_steps: steps,
@@ -101,58 +101,58 @@ impl Twin {
     /// Restarts from the present state of `run`. Keeps the known distances if the start is the same.
     pub fn restart(&mut self, run: &Simulation) {
         let before = std::mem::replace(self, Self::new(run));
-        if before.begins() == self.begins() {
+        if before.start_time() == self.start_time() {
             (self.distances, self.stride) = (before.distances, before.stride);
         }
     }
 
-    /// Start, s.
-    pub fn begins(&self) -> f64 {
-        self.motion.begins()
+    /// Start time, s.
+    pub fn start_time(&self) -> f64 {
+        self.motion.start_time()
     }
 
     /// Goes back with `run`, which was just restored to the instant of `state`. Without a state of this twin it waits for its
     /// start, or restarts if that has passed.
     pub fn go_back(&mut self, state: Option<&CompanionState>, run: &Simulation) {
-        if !self.motion.restore(state) && self.begins() < run.time() {
+        if !self.motion.restore(state) && self.start_time() < run.time() {
             return self.restart(run);
         }
-        self.aim_at(run, self.begins().max(run.time()));
+        self.set_goal(run, self.start_time().max(run.time()));
         self.growth = None;
     }
 
     /// Drops the distances after `time`, s, for a new branch.
-    pub fn cut(&mut self, time: f64) {
-        let time = time.max(self.begins());
+    pub fn truncate(&mut self, time: f64) {
+        let time = time.max(self.start_time());
         self.distances.retain(|[at, _]| *at <= time);
     }
 
-    /// Whether [`Self::place`] can sample `time`, s, without going back.
+    /// Whether [`Self::move_to`] can sample `time`, s, without going back.
     pub fn reaches(&self, time: f64) -> bool {
-        time <= self.begins() || self.motion.simulation.step_start() < time
+        time <= self.start_time() || self.motion.simulation.step_start() < time
     }
 
     /// Call after each step of `run`: the twin advances to the start of that step.
     pub fn follow(&mut self, run: &Simulation) {
-        if run.time() <= self.begins() {
+        if run.time() <= self.start_time() {
             return;
         }
-        self.come_to(self.goal);
-        self.aim_at(run, run.time());
+        self.advance_to_within_step(self.goal);
+        self.set_goal(run, run.time());
         match &mut self.growth {
             Some(growth) => growth.follow(run),
             None => self.growth = Some(Growth::new(run)),
         }
     }
 
-    /// The twin is to come to `time`, s, which `run` has reached.
-    fn aim_at(&mut self, run: &Simulation, time: f64) {
+    /// Sets the instant that the twin advances to: `time`, s, which `run` has reached.
+    fn set_goal(&mut self, run: &Simulation, time: f64) {
         (self.goal, self.goal_steps) = (time, run.statistics().steps);
         self.goal_state.copy_from_slice(run.state_vector());
     }
 
     /// Steps until `time`, s, lies within the latest step; the steps end where those of the run do.
-    fn come_to(&mut self, time: f64) {
+    fn advance_to_within_step(&mut self, time: f64) {
         let (before, goal) = (self.motion.simulation.time(), self.goal);
         self.motion.advance(time.min(goal), |_| Some(goal));
         let steps = self.goal_steps.saturating_sub(self.steps_before);
@@ -168,7 +168,7 @@ impl Twin {
         }
         let twin = &self.motion.simulation;
         let distance = scaled_distance(&self.goal_state, twin.state_vector(), twin.scales());
-        if self.distances.len() == KEPT {
+        if self.distances.len() == MAX_DISTANCES {
             drop_every_second(&mut self.distances);
             self.stride *= 2;
         }
@@ -179,9 +179,9 @@ impl Twin {
     }
 
     /// Samples the state at `time`, s, into [`Self::frame`], clamped to the twin's start and end.
-    pub fn place(&mut self, time: f64) {
-        self.come_to(time);
-        self.motion.show(time);
+    pub fn move_to(&mut self, time: f64) {
+        self.advance_to_within_step(time);
+        self.motion.sample(time);
     }
 
     /// The displayed state.
@@ -195,7 +195,7 @@ impl Twin {
     }
 
     /// Why it ended before the run.
-    pub fn ended(&self) -> Option<&Stopped> {
+    pub fn stopped(&self) -> Option<&Stopped> {
         self.motion.stopped.as_ref()
     }
 
@@ -204,15 +204,15 @@ impl Twin {
     /// # Errors
     /// Too few intervals so far: how many more are needed, and their length, s.
     pub fn exponent(&self) -> Result<Exponent, (usize, f64)> {
-        let growth = self.growth.as_ref().filter(|growth| !growth.lost);
+        let growth = self.growth.as_ref().filter(|growth| !growth.has_failed);
         let Some(growth) = growth else {
-            return Err((ALIGNMENT + FEWEST, UNDRIVEN));
+            return Err((ALIGNMENT + MIN_INTERVALS, UNDRIVEN_INTERVAL));
         };
-        let known = growth.benettin.result().filter(|exponent| exponent.running.len() >= FEWEST);
-        known.ok_or_else(|| {
+        let exponent = growth.benettin.result().filter(|exponent| exponent.running.len() >= MIN_INTERVALS);
+        exponent.ok_or_else(|| {
             let counted = growth.benettin.result().map_or(0, |exponent| exponent.running.len());
-            let waits = ALIGNMENT.saturating_sub(growth.ended) + FEWEST - counted;
-            (waits, growth.interval)
+            let missing = ALIGNMENT.saturating_sub(growth.completed) + MIN_INTERVALS - counted;
+            (missing, growth.interval)
         })
     }
 }
@@ -224,33 +224,33 @@ mod tests {
     use crate::scene::Scene;
 
     #[test]
-    fn a_twin_starts_a_billionth_away_and_thins_its_record() {
+    fn a_twin_starts_displaced_by_a_billionth_and_its_record_is_thinned() {
         let changes = [("contact.friction".to_owned(), "0".to_owned())];
         let scene = Scene::load("spcmm", &changes).expect("built in");
         let mut run = Simulation::new(&scene.machine).expect("starts");
         let mut twin = Twin::new(&run);
         let start = twin.distances()[0];
         assert!((start[1] / DISPLACEMENT - 1.0).abs() < 1e-6, "{start:?}");
-        for _ in 0..3 * KEPT {
+        for _ in 0..3 * MAX_DISTANCES {
             run.step().expect("runs");
             let start = run.step_start();
             twin.follow(&run);
-            // Whatever instant of the step is displayed, the twin is there.
+            // The twin can be sampled at any instant of the step.
             for part in [0.3, 0.9, 1.0] {
                 let time = start + part * (run.time() - start);
-                twin.place(time);
+                twin.move_to(time);
                 assert_eq!(twin.frame().time, time);
             }
         }
-        assert!(twin.distances().len() <= KEPT && twin.stride > 1);
+        assert!(twin.distances().len() <= MAX_DISTANCES && twin.stride > 1);
         assert!(twin.distances().is_sorted_by(|a, b| a[0] < b[0]));
     }
 
     #[test]
-    fn its_exponent_is_that_of_a_sweep() {
+    fn the_exponent_equals_that_of_a_sweep() {
         let scene = Scene::load("slider-crank-driven", &[]).expect("built in");
         let period = crate::analysis::drive::drive_period(&scene).expect("driven");
-        let (discard, kept) = (ALIGNMENT, FEWEST);
+        let (discard, kept) = (ALIGNMENT, MIN_INTERVALS);
         let plan = Plan { periods: discard + kept, discard, phase: 0.0, exponent: true };
         let mut point = PointRun::cold(&scene, &plan.into(), period).expect("starts");
         while !point.is_done() {

@@ -1,4 +1,4 @@
-//! Values as text on the screen: words as in files and on the command line, typeset units.
+//! Values as text for the screen: the names of files and the command line, with typeset units.
 
 use crate::integrate::StepControl;
 use crate::scene::{Kind, Scene, Value};
@@ -140,7 +140,7 @@ pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String
 }
 
 /// Text typed by the user, with the display unit added to a bare number.
-pub fn completed(typed: &str, kind: &Kind) -> String {
+pub fn with_display_unit(typed: &str, kind: &Kind) -> String {
     let typed = typed.trim();
     match kind {
         Kind::Number { display, .. } if !display.is_empty() && typed.parse::<f64>().is_ok() => {
@@ -230,14 +230,14 @@ mod tests {
     };
 
     #[test]
-    fn a_bare_number_takes_the_unit_on_show() {
-        assert_eq!(completed(" 0.5 ", &LENGTH), "0.5 mm");
-        assert_eq!(completed("500 um", &LENGTH), "500 um");
-        assert_eq!(completed("half", &LENGTH), "half");
+    fn a_bare_number_gets_the_displayed_unit() {
+        assert_eq!(with_display_unit(" 0.5 ", &LENGTH), "0.5 mm");
+        assert_eq!(with_display_unit("500 um", &LENGTH), "500 um");
+        assert_eq!(with_display_unit("half", &LENGTH), "half");
     }
 
     #[test]
-    fn units_are_printed_one_way_and_read_back() {
+    fn displayed_units_are_typeset_and_read_back() {
         for (plain, printed) in [
             ("3 um", "3 µm"),
             ("3um and 5 us.", "3µm and 5 µs."),
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn values_read_as_people_write_them() {
+    fn a_value_is_displayed_in_its_display_unit() {
         assert_eq!(shown(&Value::Number(3e-4), &LENGTH), "0.3 mm");
     }
 

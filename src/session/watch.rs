@@ -6,14 +6,14 @@ use crate::analysis::drive::{OBSERVABLES, drive_period, observed};
 use crate::scene::Scene;
 use crate::simulate::{Frame, Simulation};
 
-/// Most instants stored per drive period.
-const PER_PERIOD: f64 = 1000.0;
+/// Largest number of instants stored per drive period.
+const SAMPLES_PER_PERIOD: f64 = 1000.0;
 /// Length of the stored orbit, periods.
 pub const PERIODS: usize = 6;
-/// Most sections stored; the oldest are dropped.
-const SECTIONS: usize = 20_000;
-/// Used in place of the period if there is none, s.
-const NO_PERIOD: f64 = 1.0;
+/// Largest number of stored sections; beyond that the oldest are dropped.
+const MAX_SECTIONS: usize = 20_000;
+/// Substitute for the period of a scene without one, s.
+const FALLBACK_PERIOD: f64 = 1.0;
 
 /// Pose of the output body and its rates, in the order of [`OBSERVABLES`].
 pub type Observed = [f64; OBSERVABLES.len()];
@@ -69,21 +69,21 @@ impl RunWatch {
 
     /// The orbit of the last periods, oldest first: time in s, state.
     pub fn orbit(&self) -> impl DoubleEndedIterator<Item = &(f64, Observed)> {
-        self.orbit.range(..known(&self.orbit, self.shown))
+        self.orbit.range(..count_until(&self.orbit, self.shown))
     }
 
     /// The sections, oldest first: time in s, state.
     pub fn sections(&self) -> impl ExactSizeIterator<Item = &(f64, Observed)> {
-        self.sections.range(..known(&self.sections, self.shown))
+        self.sections.range(..count_until(&self.sections, self.shown))
     }
 
     /// Sets the displayed instant, s.
-    pub fn show(&mut self, shown: f64) {
+    pub fn set_shown(&mut self, shown: f64) {
         self.shown = shown;
     }
 
     /// Restarts after a change at `now`, s: earlier data belong to another motion.
-    pub fn begin(&mut self, scene: &Scene, now: f64) {
+    pub fn restart(&mut self, scene: &Scene, now: f64) {
         self.period = drive_period(scene).map_err(|why| why.to_string());
         self.orbit.clear();
         self.sections.clear();
@@ -91,9 +91,9 @@ impl RunWatch {
     }
 
     /// Drops data after `now`, s, for a new branch.
-    pub fn cut(&mut self, now: f64) {
+    pub fn truncate(&mut self, now: f64) {
         for list in [&mut self.orbit, &mut self.sections] {
-            list.truncate(known(list, now));
+            list.truncate(count_until(list, now));
         }
         self.seek(now);
     }
@@ -122,10 +122,10 @@ impl RunWatch {
 
     /// Records an instant, unless it is too close to the one before.
     pub fn record(&mut self, frame: &Frame) {
-        let period = self.period.as_ref().copied().unwrap_or(NO_PERIOD);
+        let period = self.period.as_ref().copied().unwrap_or(FALLBACK_PERIOD);
         let before = self.orbit.back().map(|(time, _)| *time);
         // This also skips instants recorded before the run went back.
-        if before.is_some_and(|before| frame.time - before < period / PER_PERIOD) {
+        if before.is_some_and(|before| frame.time - before < period / SAMPLES_PER_PERIOD) {
             return;
         }
         let oldest = frame.time - PERIODS as f64 * period;
@@ -143,7 +143,7 @@ impl RunWatch {
                 continue;
             }
             simulation.sample(time, &mut self.frame);
-            if self.sections.len() == SECTIONS {
+            if self.sections.len() == MAX_SECTIONS {
                 self.sections.pop_front();
             }
             self.sections.push_back((time, observed(&self.frame.pose)));
@@ -152,7 +152,7 @@ impl RunWatch {
 }
 
 /// Number of entries of `list` up to `now`, s.
-fn known(list: &VecDeque<(f64, Observed)>, now: f64) -> usize {
+fn count_until(list: &VecDeque<(f64, Observed)>, now: f64) -> usize {
     list.partition_point(|(time, _)| *time <= now)
 }
 
@@ -167,12 +167,12 @@ mod tests {
             watch.step(simulation, simulation.time());
             simulation.sample(simulation.time(), &mut frame);
             watch.record(&frame);
-            watch.show(frame.time);
+            watch.set_shown(frame.time);
         }
     }
 
     #[test]
-    fn sections_lie_at_the_drive_phase_and_the_orbit_is_as_long_as_it_says() {
+    fn sections_lie_at_the_drive_phase_and_the_orbit_covers_the_stated_periods() {
         let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
         let scene = Scene::load("spcmm", &changes).expect("built in");
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
@@ -182,18 +182,18 @@ mod tests {
         run(&mut watch, &mut simulation, 0.21);
         assert_eq!(watch.sections().len(), 1);
         simulation = Simulation::new(&scene.machine).expect("starts");
-        watch.begin(&scene, 0.0);
+        watch.restart(&scene, 0.0);
         watch.set_phase(0.25, 0.0);
         run(&mut watch, &mut simulation, 0.7);
         let times = |watch: &RunWatch| watch.sections().map(|(time, _)| *time).collect::<Vec<_>>();
         let near = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45, 0.65]));
-        watch.show(0.5);
+        watch.set_shown(0.5);
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45]));
         // Retraced sections are unchanged; a new branch cuts them.
-        watch.show(0.7);
+        watch.set_shown(0.7);
         assert_eq!(watch.sections().len(), 4);
-        watch.cut(0.5);
+        watch.truncate(0.5);
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45]));
         run(&mut watch, &mut simulation, 0.9);
         watch.set_phase(0.75, simulation.time());
@@ -202,7 +202,7 @@ mod tests {
         let first = watch.orbit().next().expect("recorded").0;
         assert!((0.7..0.9).contains(&first), "{first}");
         assert!(watch.orbit().count() <= PERIODS * 1000 + 1);
-        watch.begin(&scene, simulation.time());
+        watch.restart(&scene, simulation.time());
         assert_eq!((watch.sections().len(), watch.orbit().count()), (0, 0));
     }
 

@@ -133,13 +133,13 @@ impl Shown {
 /// Whether the ball presses on its wall with the force that the badge names, the largest of the impact.
 fn stands_at_peak(shown: &Shown, number: u64, joint: usize) -> bool {
     let record = shown.app().player().impact_record();
-    let at = record.under_way(Some(joint), shown.time());
+    let at = record.in_progress(Some(joint), shown.time());
     let force = shown.joint(joint).normal_force.norm();
     let badge = shown.app().impact_badge().unwrap_or_default();
     at.is_some_and(|(own, impact)| {
         own == number
-            && impact.top.time == shown.time()
-            && (force / impact.top.force.norm() - 1.0).abs() < 2e-3
+            && impact.force_peak.time == shown.time()
+            && (force / impact.force_peak.force.norm() - 1.0).abs() < 2e-3
             && badge.starts_with(&format!("Impact {number}, S{}: ", joint + 1))
     })
 }

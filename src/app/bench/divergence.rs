@@ -56,7 +56,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
          because the first impacts say nothing about it",
     );
     reserved(ui, "twin says", 2, |ui| {
-        if let Some(why) = twin.ended() {
+        if let Some(why) = twin.stopped() {
             theme::warning(ui, format!("The twin run {why}"));
         }
     });

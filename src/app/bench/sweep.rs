@@ -336,7 +336,7 @@ impl SweepPanel {
             && let Ok(parameter) = player.pending().parameter(settings.key)
         {
             self.reveal = true;
-            let end = |text: &str| value::completed(text, &parameter.kind);
+            let end = |text: &str| value::with_display_unit(text, &parameter.kind);
             let Settings { key, from, to, values, .. } = settings;
             self.asked = Some(SweepTask {
                 scene: SceneSource::of(player.pending()),

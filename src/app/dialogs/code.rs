@@ -8,7 +8,7 @@ use qrcodegen::{QrCode, QrCodeEcc, QrSegment, Version};
 
 use super::Dialog;
 use crate::app::App;
-use crate::session::link::{NO_PAGE, is_page};
+use crate::session::link::{NOT_A_PAGE_ADDRESS, is_page_address};
 
 /// Quiet zone around a code, modules.
 const QUIET: i32 = 4;
@@ -99,14 +99,14 @@ impl SharedLink {
 
     /// Whether the address is valid or empty.
     pub fn can_be_copied(&self) -> bool {
-        !self.typed || self.page().is_empty() || is_page(self.page())
+        !self.typed || self.page().is_empty() || is_page_address(self.page())
     }
 
     fn encode(&mut self) {
         let page = self.page();
         self.code = match page {
             "" => Err("No QR code without an address: a phone could not open it".to_owned()),
-            _ if !self.can_be_copied() => Err(format!("{page}: {NO_PAGE}")),
+            _ if !self.can_be_copied() => Err(format!("{page}: {NOT_A_PAGE_ADDRESS}")),
             _ if !is_found_by_others(page) => Err(format!("No QR code: other devices cannot reach {page}")),
             _ => encode(&self.link()),
         };

@@ -438,7 +438,7 @@ impl Lesson {
                 run.changes.push((time, key.clone(), value.clone()));
             }
         }
-        let followed = link.followed(&scene).and(link.under_microscope(&scene));
+        let followed = link.followed_part(&scene).and(link.microscope_joint(&scene));
         followed.map_err(|error| wrong(error.to_string()))?;
         let view = row.view.as_ref().map(|view| {
             look(view.get_ref(), &scene).map_err(|message| source.error(view.span(), &key("view"), message))

@@ -178,7 +178,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     let here = place(to_f32(&report.eccentricity));
     let mut before: Option<Pos2> = None;
     for point in path {
-        let at = place(carrier * Vec3::from_array(point.place));
+        let at = place(carrier * Vec3::from_array(point.position));
         if let Some(from) = before {
             if from.distance(at) < APART {
                 continue;

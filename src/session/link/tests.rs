@@ -126,7 +126,7 @@ fn every_link_reads_back_to_the_same_bits() {
 }
 
 #[test]
-fn no_text_whatever_makes_it_panic() {
+fn no_text_causes_a_panic() {
     let mut chance = Chance(2);
     let mut read = 0;
     for _ in 0..1000 {
@@ -151,7 +151,7 @@ fn no_text_whatever_makes_it_panic() {
 }
 
 #[test]
-fn a_link_by_hand_takes_short_names_and_full_keys() {
+fn a_handwritten_link_accepts_short_names_and_full_keys() {
     let link = Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50").expect("a link");
     let scene = link.load().expect("the scene has these");
     assert_eq!(scene.name, "pendulum");
@@ -178,7 +178,7 @@ fn a_link_by_hand_takes_short_names_and_full_keys() {
 }
 
 #[test]
-fn what_is_wrong_in_a_link_is_said() {
+fn errors_in_a_link_are_named() {
     for (text, words) in [
         ("clearance=0.5mm", "link: clearance: unknown word (did you mean `contact.clearance`?); allowed:"),
         ("clearence=0.5mm", "(did you mean `contact.clearance`?)"),
@@ -224,7 +224,7 @@ fn what_is_wrong_in_a_link_is_said() {
 }
 
 #[test]
-fn a_small_bomb_does_not_unpack() {
+fn a_decompression_bomb_is_refused() {
     let zeros = "0".repeat(LARGEST_UNPACKED + 1);
     let packed = pack(&zeros);
     assert!(packed.len() < 10_000);
@@ -237,7 +237,7 @@ fn a_small_bomb_does_not_unpack() {
 }
 
 #[test]
-fn a_link_that_would_be_too_long_leaves_the_run_out_or_says_so() {
+fn a_link_that_is_too_long_omits_the_run_or_is_refused() {
     let mut chance = Chance(3);
     let scene = Scene::load("pendulum", &[("contact.friction".into(), "0.3".into())]).expect("built in");
     let mut link = Link { scene: SceneText::of(&scene), steps: Some(1 << 40), hash: Some(7), ..Link::default() };
@@ -259,17 +259,17 @@ fn a_link_that_would_be_too_long_leaves_the_run_out_or_says_so() {
 }
 
 #[test]
-fn what_no_address_holds_is_kept_and_read_back() {
+fn a_link_too_long_for_an_address_is_stored_and_read_back() {
     let mut chance = Chance(5);
     let (mut plain, mut packed) = (0, 0);
     for _ in 0..100 {
         let mut link = chance.link();
         let fragment = link.format();
-        assert_eq!(link.keep(), fragment);
+        assert_eq!(link.to_storage_text(), fragment);
         plain += 1;
         link.beside.insert("a lift.csv".to_owned(), "time_s,y_mm\n0,0\n".into());
         assert_eq!(link.format(), fragment, "no link carries a file");
-        let kept = link.keep();
+        let kept = link.to_storage_text();
         assert!(kept.starts_with("kept:"));
         assert_eq!(Link::parse(&kept).expect("reads"), link);
         packed += 1;
@@ -279,7 +279,7 @@ fn what_no_address_holds_is_kept_and_read_back() {
     let (name, text) = ("mine.toml".to_owned(), noise);
     let large = Link { scene: SceneText::File { name, text }, ..Link::default() };
     assert!(Link::parse(&format!("#{}", large.format())).is_err());
-    let kept = large.keep();
+    let kept = large.to_storage_text();
     assert_eq!(Link::parse(&kept).expect("reads"), large);
     let error = Link::parse(&kept[..kept.len() / 2]).expect_err("cut");
     assert!(error.to_string().contains("cut short or damaged"), "{error}");
@@ -288,7 +288,7 @@ fn what_no_address_holds_is_kept_and_read_back() {
 }
 
 #[test]
-fn a_built_in_scene_is_named_and_any_other_travels() {
+fn a_built_in_scene_is_named_and_any_other_is_contained_in_the_link() {
     let scene = Scene::load("chain", &[]).expect("built in");
     assert_eq!(SceneText::of(&scene), SceneText::BuiltIn("chain".to_owned()));
     let text = format!("{}\n# mine\n", scene.source.text);
@@ -298,7 +298,7 @@ fn a_built_in_scene_is_named_and_any_other_travels() {
 }
 
 #[test]
-fn links_are_told_from_files_and_scenes() {
+fn links_are_distinguished_from_files_and_scenes() {
     for link in [
         "https://example.org/lab/#scene=pendulum",
         "example.org/lab/?scene=pendulum",

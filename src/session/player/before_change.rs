@@ -17,7 +17,7 @@ impl Player {
     fn copy(&self) -> Self {
         let mut copy = self.clone();
         copy.set_paused();
-        (copy.twin, copy.left) = (None, None);
+        (copy.twin, copy.abandoned) = (None, None);
         (copy.edits, copy.before_change) = Default::default();
         copy
     }
@@ -25,7 +25,7 @@ impl Player {
     /// Takes the copy made before the latest parameter change, with the key; `None` if none was made since the last call. `enabled`:
     /// whether the run is copied before the next change. `is_over`: the gesture has ended, so that the next change counts as a
     /// new one, even of the same parameter.
-    pub(crate) fn take_before(&mut self, enabled: bool, is_over: bool) -> Option<(Box<Self>, String)> {
+    pub(crate) fn take_copy_before_change(&mut self, enabled: bool, is_over: bool) -> Option<(Box<Self>, String)> {
         self.before_change.enabled = enabled;
         self.before_change.gesture.take_if(|_| is_over);
         self.before_change.copy.take()
@@ -35,13 +35,13 @@ impl Player {
     /// requested, unless the change belongs to the same gesture as the last or the value is the same.
     pub(super) fn change(&mut self, key: &str, event: Event) -> Result<Effect, SetError> {
         let BeforeChange { enabled, gesture, .. } = &self.before_change;
-        let copies = *enabled && gesture.as_deref() != Some(key);
-        let copy = copies.then(|| Box::new(self.copy()));
+        let copies_run = *enabled && gesture.as_deref() != Some(key);
+        let copy = copies_run.then(|| Box::new(self.copy()));
         self.branch();
         let before = self.pending().changes.clone();
         let effect = self.apply(&event)?;
-        self.note(event);
-        self.note_edits(&before);
+        self.log_event(event);
+        self.record_edits(&before);
         if let Some(copy) = copy.filter(|_| before != self.pending().changes) {
             self.before_change.copy = Some((copy, key.to_owned()));
             self.before_change.gesture = Some(key.to_owned());
@@ -50,8 +50,8 @@ impl Player {
     }
 
     /// Whether the whole record used the current parameters and no pull acted.
-    pub(crate) fn is_as_started(&self) -> bool {
-        self.script.log.entries.iter().all(|entry| entry.event == Event::Stop) && !self.has_waiting()
+    pub(crate) fn is_unchanged_since_start(&self) -> bool {
+        self.script.log.entries.iter().all(|entry| entry.event == Event::Stop) && !self.has_pending_changes()
     }
 
     /// Displays `time`, s, stepping while `may_step`. Returns true once it is reached or the run cannot continue.

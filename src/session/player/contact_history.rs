@@ -3,7 +3,7 @@
 use crate::simulate::{ContactMode, Frame};
 
 /// Most state changes stored for all joints together; beyond that the older half is dropped.
-const KEPT: usize = 200_000;
+const MAX_CHANGES: usize = 200_000;
 
 /// The contact states of a run over time. Retraced time is recorded once.
 #[derive(Clone, Debug, Default)]
@@ -36,17 +36,17 @@ impl ContactHistory {
                 self.changes += 1;
             }
         }
-        if self.changes > KEPT {
-            self.forget_half();
+        if self.changes > MAX_CHANGES {
+            self.drop_older_half();
         }
     }
 
-    fn forget_half(&mut self) {
+    fn drop_older_half(&mut self) {
         let middle = 0.5 * (self.from + self.to);
         self.from = middle;
         for states in &mut self.joints {
-            let gone = states.partition_point(|(time, _)| *time <= middle);
-            states.drain(..gone.saturating_sub(1));
+            let dropped = states.partition_point(|(time, _)| *time <= middle);
+            states.drain(..dropped.saturating_sub(1));
             if let Some(first) = states.first_mut() {
                 first.0 = first.0.max(middle);
             }
@@ -55,7 +55,7 @@ impl ContactHistory {
     }
 
     /// Drops the states after `time`, s.
-    pub(super) fn cut(&mut self, time: f64) {
+    pub(super) fn truncate(&mut self, time: f64) {
         for states in &mut self.joints {
             states.truncate(states.partition_point(|(from, _)| *from <= time));
         }
@@ -90,11 +90,11 @@ impl ContactHistory {
         let states = self.joints.get(joint).map_or(&[][..], Vec::as_slice);
         let first = states.partition_point(|(time, _)| *time < from);
         let pairs = states[first.saturating_sub(1)..].windows(2);
-        let touches = |pair: &&[(f64, ContactMode)]| {
+        let is_touch = |pair: &&[(f64, ContactMode)]| {
             pair[0].1 == ContactMode::Free && matches!(pair[1].1, ContactMode::Slip | ContactMode::Creep)
         };
         pairs
-            .filter(touches)
+            .filter(is_touch)
             .map(|pair| pair[1].0)
             .filter(move |time| *time >= from)
             .take_while(move |time| *time <= to)
@@ -134,14 +134,14 @@ mod tests {
     }
 
     #[test]
-    fn touches_are_found_and_a_second_time_changes_nothing() {
+    fn touches_are_found_and_retracing_adds_none() {
         let mut history = history();
         for _ in 0..2 {
             let touches: Vec<f64> = history.touches(0, 0.0, 9.0).collect();
             assert_eq!(touches, [2.0, 5.0]);
             history.record(&frame(1.0, ContactMode::Creep));
         }
-        history.cut(2.5);
+        history.truncate(2.5);
         assert_eq!(history.touches(0, 2.1, 9.0).next(), None);
         history.record(&frame(3.0, ContactMode::Free));
         history.record(&frame(4.0, ContactMode::Creep));
@@ -149,17 +149,17 @@ mod tests {
     }
 
     #[test]
-    fn a_long_run_forgets_its_oldest_states_and_says_from_when_it_knows() {
+    fn a_long_run_drops_its_oldest_states_and_reports_the_start_of_the_known_time() {
         let mut history = ContactHistory::default();
         history.begin(0.0);
-        for index in 0..=KEPT + 10 {
+        for index in 0..=MAX_CHANGES + 10 {
             let state = if index % 2 == 0 { ContactMode::Free } else { ContactMode::Slip };
             history.record(&frame(index as f64, state));
         }
         let from = history.known_from();
-        assert!(from > 0.4 * KEPT as f64);
+        assert!(from > 0.4 * MAX_CHANGES as f64);
         let (start, ..) = history.states(0, 0.0, 1e9).next().expect("kept");
         assert_eq!(start, from);
-        assert!(history.changes <= KEPT / 2 + 12);
+        assert!(history.changes <= MAX_CHANGES / 2 + 12);
     }
 }

@@ -1,4 +1,4 @@
-//! Impacts of a run: start and peak while each lasts, and once it is over the data that `run --impacts` writes.
+//! Impacts of a run: start and peak while an impact lasts, then the data that `run --impacts` writes.
 
 use std::collections::VecDeque;
 
@@ -6,22 +6,22 @@ use crate::machine::Vec3;
 use crate::simulate::{Impact, Peak, Simulation};
 
 /// Most impacts stored; beyond that the oldest are dropped.
-const KEPT: usize = 20_000;
+const MAX_IMPACTS: usize = 20_000;
 
 /// Time after its start for which the end of an impact is awaited, s. A longer contact, such as a ball coming to rest on its
 /// wall, has the peak of this time.
 pub const LONGEST_IMPACT: f64 = 10e-3;
 
-/// Number of latest impacts searched for the last to end.
-const RECENT: usize = 64;
+/// Number of latest impacts that are searched for the one that ended last.
+const SEARCHED: usize = 64;
 
 /// Relative rounding difference between the times of a record and of an impact.
 const ROUNDING: f64 = 1e-12;
 
 /// The largest normal force of an impact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Top {
-    /// When, s.
+pub struct ForcePeak {
+    /// Time, s.
     pub time: f64,
     /// Force on the ball, N, world axes.
     pub force: Vec3,
@@ -37,7 +37,7 @@ pub struct RecordedImpact {
     /// Time at which the ball left its wall, s; infinite in contact, and until the next impact if a change removed the wall.
     pub end: f64,
     /// Its largest force.
-    pub top: Top,
+    pub force_peak: ForcePeak,
     /// Numbers of the steps in which it began and in which its end became known.
     steps: [u64; 2],
     impact: Option<Impact>,
@@ -50,7 +50,7 @@ impl RecordedImpact {
     }
 
     /// Whether it had begun by `time`, s.
-    fn begun(&self, time: f64) -> bool {
+    fn has_begun(&self, time: f64) -> bool {
         self.start <= time + ROUNDING * time.abs()
     }
 }
@@ -61,7 +61,7 @@ pub struct ImpactRecord {
     all: VecDeque<RecordedImpact>,
     dropped: u64,
     /// Largest force so far of the impact in progress, by joint.
-    under_way: Vec<Option<Top>>,
+    in_progress: Vec<Option<ForcePeak>>,
     /// Number of accepted steps recorded, and start and end of the latest, s.
     steps: u64,
     latest_step: [f64; 2],
@@ -72,8 +72,8 @@ pub struct ImpactRecord {
 impl ImpactRecord {
     /// Begins a new run; `peaks` contain the impacts that begin with it.
     pub(super) fn begin(&mut self, peaks: &[Peak]) {
-        *self = Self { under_way: vec![None; peaks.len()], ..Self::default() };
-        for (joint, peak) in peaks.iter().enumerate().filter(|(_, peak)| begins(peak)) {
+        *self = Self { in_progress: vec![None; peaks.len()], ..Self::default() };
+        for (joint, peak) in peaks.iter().enumerate().filter(|(_, peak)| begins_impact(peak)) {
             self.add(joint, peak);
         }
     }
@@ -95,22 +95,22 @@ impl ImpactRecord {
     }
 
     fn record_joint(&mut self, joint: usize, peak: &Peak, ended: Option<&Impact>) {
-        let begins = begins(peak);
+        let begins = begins_impact(peak);
         // An impact that ends began in an earlier step or in this one.
         let (before, now) = match ended {
             Some(impact) if begins && impact.start >= self.latest_step[0] => (None, ended),
             _ => (ended, None),
         };
         if let Some(impact) = before {
-            self.raise(joint, peak);
-            self.end(joint, impact.end, Some(impact));
+            self.raise_peak(joint, peak);
+            self.end_contact(joint, impact.end, Some(impact));
         }
         if begins {
             self.add(joint, peak);
         }
-        self.raise(joint, peak);
+        self.raise_peak(joint, peak);
         if let Some(impact) = now {
-            self.end(joint, impact.end, Some(impact));
+            self.end_contact(joint, impact.end, Some(impact));
         }
     }
 
@@ -118,36 +118,36 @@ impl ImpactRecord {
         // Without a force yet, it begins at the end of the step.
         let start = self.latest_step[usize::from(peak.normal <= 0.0)];
         // A change has removed the wall of the previous impact.
-        self.end(joint, start, None);
-        if self.all.len() == KEPT {
+        self.end_contact(joint, start, None);
+        if self.all.len() == MAX_IMPACTS {
             self.all.pop_front();
             self.dropped += 1;
         }
-        let top = Top { time: start, force: Vec3::zeros() };
-        self.under_way[joint] = Some(top);
+        let force_peak = ForcePeak { time: start, force: Vec3::zeros() };
+        self.in_progress[joint] = Some(force_peak);
         let steps = [self.steps, u64::MAX];
-        self.all.push_back(RecordedImpact { joint, start, end: f64::INFINITY, top, steps, impact: None });
+        self.all.push_back(RecordedImpact { joint, start, end: f64::INFINITY, force_peak, steps, impact: None });
     }
 
     /// Updates the peak of the impact in progress at `joint` with the latest step.
-    fn raise(&mut self, joint: usize, peak: &Peak) {
-        let Some(top) = &mut self.under_way[joint] else {
+    fn raise_peak(&mut self, joint: usize, peak: &Peak) {
+        let Some(force_peak) = &mut self.in_progress[joint] else {
             return;
         };
-        if peak.normal <= top.force.norm() || peak.time < top.time {
+        if peak.normal <= force_peak.force.norm() || peak.time < force_peak.time {
             return;
         }
-        *top = Top { time: peak.time, force: peak.normal_force };
-        let top = *top;
+        *force_peak = ForcePeak { time: peak.time, force: peak.normal_force };
+        let force_peak = *force_peak;
         let own = self.all.iter_mut().rev().find(|impact| impact.joint == joint);
-        if let Some(own) = own.filter(|own| top.time <= own.start + LONGEST_IMPACT) {
-            own.top = top;
+        if let Some(own) = own.filter(|own| force_peak.time <= own.start + LONGEST_IMPACT) {
+            own.force_peak = force_peak;
         }
     }
 
     /// Ends the contact of `joint` at `time`, s; `impact` is `None` if a change ended it.
-    fn end(&mut self, joint: usize, time: f64, impact: Option<&Impact>) {
-        let Some(top) = self.under_way[joint].take() else {
+    fn end_contact(&mut self, joint: usize, time: f64, impact: Option<&Impact>) {
+        let Some(force_peak) = self.in_progress[joint].take() else {
             return;
         };
         let Some(at) = self.all.iter().rposition(|own| own.joint == joint && own.end.is_infinite()) else {
@@ -158,7 +158,7 @@ impl ImpactRecord {
         };
         (own.end, own.steps[1], own.impact) = (time, self.steps, impact.copied());
         if let Some(impact) = impact {
-            (own.start, own.top) = (impact.start, top);
+            (own.start, own.force_peak) = (impact.start, force_peak);
         }
         // Another may have begun earlier in the same step.
         let at = self.all.partition_point(|other| other.start <= own.start);
@@ -166,16 +166,16 @@ impl ImpactRecord {
     }
 
     /// Drops everything after `time`, s, and step number `steps`.
-    pub(super) fn cut(&mut self, time: f64, steps: u64) {
+    pub(super) fn truncate(&mut self, time: f64, steps: u64) {
         self.all.retain(|impact| impact.steps[0] <= steps);
-        self.under_way.fill(None);
+        self.in_progress.fill(None);
         for impact in &mut self.all {
             if impact.steps[1] > steps {
                 (impact.end, impact.steps[1], impact.impact) = (f64::INFINITY, u64::MAX, None);
-                if impact.top.time > time {
-                    impact.top = Top { time: impact.start, force: Vec3::zeros() };
+                if impact.force_peak.time > time {
+                    impact.force_peak = ForcePeak { time: impact.start, force: Vec3::zeros() };
                 }
-                self.under_way[impact.joint] = Some(impact.top);
+                self.in_progress[impact.joint] = Some(impact.force_peak);
             }
         }
         self.steps = self.steps.min(steps);
@@ -196,32 +196,32 @@ impl ImpactRecord {
 
     /// The impacts of ball joint `joint`, or of any, that had begun by `time`, s, and whose end is known; the latest first.
     pub fn latest(&self, joint: Option<usize>, time: f64) -> impl Iterator<Item = &Impact> {
-        let begun = self.all.iter().rev().filter(move |impact| impact.begun(time) && is_of(joint, impact));
+        let begun = self.all.iter().rev().filter(move |impact| impact.has_begun(time) && is_of(joint, impact));
         begun.filter_map(RecordedImpact::finished)
     }
 
     /// The impact that ended last, but not after `end`, s, among the latest that had begun by `time`, s.
     pub fn last_ended(&self, time: f64, end: f64) -> Option<&Impact> {
         let ended = self.latest(None, time).filter(|impact| impact.end <= end);
-        ended.take(RECENT).max_by(|a, b| a.end.total_cmp(&b.end))
+        ended.take(SEARCHED).max_by(|a, b| a.end.total_cmp(&b.end))
     }
 
     /// The impact in progress at `time`, s, of ball joint `joint`, or of any, once its peak is known; resting balls are
     /// excluded. Among several, the one that peaks at that instant, otherwise the one that began last.
-    pub fn under_way(&self, joint: Option<usize>, time: f64) -> Option<(u64, &RecordedImpact)> {
+    pub fn in_progress(&self, joint: Option<usize>, time: f64) -> Option<(u64, &RecordedImpact)> {
         let touching = || {
             let own = self.numbered().rev().filter(move |(_, impact)| is_of(joint, impact));
             let touches = move |impact: &RecordedImpact| match impact.end {
                 end if end.is_infinite() => time <= impact.start + LONGEST_IMPACT,
                 end => time <= end,
             };
-            own.filter(move |(_, impact)| impact.begun(time) && touches(impact) && !self.is_open(impact))
+            own.filter(move |(_, impact)| impact.has_begun(time) && touches(impact) && !self.may_still_peak(impact))
         };
-        touching().find(|(_, impact)| impact.top.time == time).or_else(|| touching().next())
+        touching().find(|(_, impact)| impact.force_peak.time == time).or_else(|| touching().next())
     }
 
     /// Whether `impact` may still reach its peak.
-    fn is_open(&self, impact: &RecordedImpact) -> bool {
+    fn may_still_peak(&self, impact: &RecordedImpact) -> bool {
         impact.end.is_infinite() && self.latest_step[1] <= impact.start + LONGEST_IMPACT
     }
 
@@ -229,24 +229,30 @@ impl ImpactRecord {
     /// come; with `at_once` the first known so far.
     pub fn next_peak(&self, joint: Option<usize>, time: f64, at_once: bool) -> Option<f64> {
         let own = || self.all.iter().filter(|impact| is_of(joint, impact));
-        let peaks = own().map(|impact| impact.top.time).filter(|peak| *peak > time);
+        let peaks = own().map(|impact| impact.force_peak.time).filter(|peak| *peak > time);
         let next = peaks.min_by(f64::total_cmp)?;
-        let open = own().any(|impact| self.is_open(impact) && impact.start <= next);
+        let open = own().any(|impact| self.may_still_peak(impact) && impact.start <= next);
         (at_once || !open).then_some(next)
     }
 
     /// The last peak before `time`, s, of an impact of ball joint `joint`, or of any.
     pub fn previous_peak(&self, joint: Option<usize>, time: f64) -> Option<f64> {
         // A force that is largest in the latest step may still rise.
-        let rises = |impact: &RecordedImpact| self.is_open(impact) && impact.top.time >= self.latest_step[0];
-        let own = self.all.iter().filter(|impact| is_of(joint, impact) && !rises(impact));
-        own.map(|impact| impact.top.time).filter(|peak| *peak < time).max_by(f64::total_cmp)
+        let may_rise =
+            |impact: &RecordedImpact| self.may_still_peak(impact) && impact.force_peak.time >= self.latest_step[0];
+        let own = self.all.iter().filter(|impact| is_of(joint, impact) && !may_rise(impact));
+        own.map(|impact| impact.force_peak.time).filter(|peak| *peak < time).max_by(f64::total_cmp)
     }
 
     /// The peaks after `from` and up to `to`, s, with the ball joint of each.
-    pub fn peaks(&self, from: f64, to: f64) -> impl Iterator<Item = (usize, Top)> {
-        let within = move |top: &Top| top.time > from && top.time <= to && top.force != Vec3::zeros();
-        self.all.iter().map(|impact| (impact.joint, impact.top)).filter(move |(_, top)| within(top))
+    pub fn peaks(&self, from: f64, to: f64) -> impl Iterator<Item = (usize, ForcePeak)> {
+        let within = move |force_peak: &ForcePeak| {
+            force_peak.time > from && force_peak.time <= to && force_peak.force != Vec3::zeros()
+        };
+        self.all
+            .iter()
+            .map(|impact| (impact.joint, impact.force_peak))
+            .filter(move |(_, force_peak)| within(force_peak))
     }
 
     /// Number of impacts dropped.
@@ -256,7 +262,7 @@ impl ImpactRecord {
 }
 
 /// Whether an impact begins in the step of `peak`. A ball that reaches its wall at zero speed is no impact.
-fn begins(peak: &Peak) -> bool {
+fn begins_impact(peak: &Peak) -> bool {
     peak.impacts > 0 && peak.approach_speed > 0.0
 }
 
@@ -305,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn impacts_have_their_numbers_and_peaks_and_are_found_both_ways() {
+    fn impacts_are_numbered_and_their_peaks_are_found_forwards_and_backwards() {
         let mut record = record();
         let numbers = |record: &ImpactRecord, time| record.until(time).map(|(number, ..)| number).collect::<Vec<_>>();
         assert_eq!(numbers(&record, 4e-3), [0; 0]);
@@ -320,14 +326,15 @@ mod tests {
         assert_eq!(record.next_peak(None, 10e-3, true), None);
         assert_eq!([record.previous_peak(None, 1.0), record.previous_peak(None, 10e-3)], [Some(10e-3), Some(4e-3)]);
         assert_eq!(record.previous_peak(Some(1), 10e-3), None);
-        let at = |joint, time| record.under_way(joint, time).map(|(number, _)| number);
+        let at = |joint, time| record.in_progress(joint, time).map(|(number, _)| number);
         assert_eq!([at(None, 2e-3), at(None, 6e-3), at(Some(0), 9e-3), at(None, 9e-3)], [Some(1), None, None, Some(2)]);
-        let peaks: Vec<(usize, f64)> = record.peaks(0.0, 9.9e-3).map(|(joint, top)| (joint, top.force.x)).collect();
+        let peaks: Vec<(usize, f64)> =
+            record.peaks(0.0, 9.9e-3).map(|(joint, force_peak)| (joint, force_peak.force.x)).collect();
         assert_eq!(peaks, [(0, 9.0)]);
         assert_eq!(record.latest(None, 8e-3).next().map(|impact| impact.joint), Some(1));
         assert_eq!(record.latest(Some(0), 8e-3).count(), 1);
         // Retraced steps would add nothing; those of a new branch do.
-        record.cut(8e-3, 8);
+        record.truncate(8e-3, 8);
         assert_eq!(numbers(&record, 1.0), [1]);
         assert_eq!(record.next_peak(None, 4e-3, false), None, "it is under way again");
         contact(&mut record, 0, 9, &[0.0, 1.0, 0.5], true);
@@ -341,24 +348,24 @@ mod tests {
     }
 
     #[test]
-    fn of_several_the_one_with_its_peak_then_is_meant_and_else_the_one_that_began_last() {
+    fn among_simultaneous_impacts_the_one_at_its_peak_is_chosen_otherwise_the_latest() {
         let mut record = ImpactRecord::default();
         record.begin(&[Peak::default(); 2]);
         // Both in the steps 1 to 5.
         for k in 1..=5_u64 {
             (record.steps, record.latest_step) = (k, [(k - 1) as f64 * STEP, k as f64 * STEP]);
-            for (joint, top) in [(0, 2), (1, 4)] {
+            for (joint, force_peak) in [(0, 2), (1, 4)] {
                 let impact = Impact { joint, start: STEP, end: 5e-3, ..Impact::default() };
-                let force = if k == 1 { 0.0 } else { 9.0 - k.abs_diff(top) as f64 };
+                let force = if k == 1 { 0.0 } else { 9.0 - k.abs_diff(force_peak) as f64 };
                 record.record_joint(joint, &peak(k, force, (k == 1).then_some(0.1)), Some(&impact).filter(|_| k == 5));
             }
         }
-        let at = |time| record.under_way(None, time).map(|(_, impact)| impact.joint);
+        let at = |time| record.in_progress(None, time).map(|(_, impact)| impact.joint);
         assert_eq!([at(2e-3), at(3e-3), at(4e-3)], [Some(0), Some(1), Some(1)]);
     }
 
     #[test]
-    fn a_ball_that_comes_to_rest_has_the_peak_of_its_first_moments_and_one_that_leaves_late_that_of_all() {
+    fn a_resting_contact_has_the_peak_of_its_first_10_ms_and_a_finished_one_that_of_its_whole_duration() {
         let mut record = ImpactRecord::default();
         record.begin(&[Peak::default()]);
         let mut forces = vec![0.0, 5.0, 8.0];
@@ -367,15 +374,15 @@ mod tests {
         // The impact may still end in time.
         assert_eq!((record.next_peak(None, 0.0, false), record.next_peak(None, 0.0, true)), (None, Some(3e-3)));
         assert_eq!((record.previous_peak(None, 1.0), record.previous_peak(None, 3e-3)), (Some(3e-3), None));
-        assert!(record.under_way(None, 2e-3).is_none());
+        assert!(record.in_progress(None, 2e-3).is_none());
         for k in 9..40 {
             (record.steps, record.latest_step) = (k, [(k - 1) as f64 * STEP, k as f64 * STEP]);
             record.record_joint(0, &peak(k, if k == 30 { 9.0 } else { 4.0 }, None), None);
         }
         assert_eq!(record.next_peak(None, 0.0, false), Some(3e-3));
-        assert!(record.under_way(None, 35e-3).is_none(), "it rests");
-        let (_, lasting) = record.under_way(None, 9e-3).expect("it touches");
-        assert!(lasting.finished().is_none() && lasting.top.force.x == 8.0);
+        assert!(record.in_progress(None, 35e-3).is_none(), "it rests");
+        let (_, lasting) = record.in_progress(None, 9e-3).expect("it touches");
+        assert!(lasting.finished().is_none() && lasting.force_peak.force.x == 8.0);
         (record.steps, record.latest_step) = (40, [39e-3, 40e-3]);
         let impact = Impact { start: 1e-3, end: 40e-3, peak: 9.0, ..Impact::default() };
         record.record_joint(0, &peak(40, 1.0, None), Some(&impact));
@@ -383,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn a_force_that_still_rises_is_no_peak_yet_and_one_without_an_end_ends_with_the_next() {
+    fn a_rising_force_is_no_peak_yet_and_an_impact_without_an_end_ends_with_the_next() {
         let mut record = ImpactRecord::default();
         // An impact begins with the run.
         record.begin(&[peak(0, 0.0, Some(0.1))]);
@@ -396,21 +403,21 @@ mod tests {
         contact(&mut record, 0, 6, &[0.0, 2.0, 1.0], true);
         assert_eq!(record.next_peak(None, 0.0, false), Some(3e-3));
         assert_eq!(record.until(1.0).count(), 1);
-        assert!(record.under_way(None, 7e-3).is_some_and(|(number, _)| number == 2));
+        assert!(record.in_progress(None, 7e-3).is_some_and(|(number, _)| number == 2));
         // A contact at zero speed is no impact.
         record.record_joint(0, &peak(20, 1.0, Some(0.0)), None);
         assert_eq!(record.next_peak(None, 8e-3, true), None);
     }
 
     #[test]
-    fn so_many_are_kept_and_the_oldest_go() {
+    fn the_number_of_stored_impacts_is_bounded_and_the_oldest_are_dropped() {
         let mut record = ImpactRecord::default();
         record.begin(&[Peak::default()]);
-        for k in 0..KEPT as u64 + 7 {
+        for k in 0..MAX_IMPACTS as u64 + 7 {
             contact(&mut record, 0, 3 * k + 1, &[0.0, 2.0, 1.0], true);
         }
-        assert_eq!((record.all.len(), record.dropped()), (KEPT, 7));
+        assert_eq!((record.all.len(), record.dropped()), (MAX_IMPACTS, 7));
         assert_eq!(record.until(f64::INFINITY).map(|(number, ..)| number).next(), Some(8));
-        assert!(KEPT * size_of::<RecordedImpact>() < 5_000_000);
+        assert!(MAX_IMPACTS * size_of::<RecordedImpact>() < 5_000_000);
     }
 }

@@ -1,4 +1,4 @@
-//! What is recorded of a run.
+//! The record of a run.
 
 use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
@@ -11,22 +11,22 @@ use crate::simulate::{Bin, Channels, Frame, History, Mark, Peak, RECORDED_JOINTS
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
 pub(super) const FINEST_BIN: f64 = 2e-6;
 
-/// The record of a run, as far as it was ever displayed, and the peaks on their way to it.
+/// The record of a run, as far as it was ever displayed, and the peaks that are still to be added.
 #[derive(Clone)]
 pub(super) struct Record {
     /// Largest forces since the previous frame.
     pub peaks: Vec<Peak>,
     /// Peaks of the latest step after the displayed instant.
-    pub coming: Vec<Peak>,
+    pub upcoming_peaks: Vec<Peak>,
     /// Peaks to be handed out with the next frame.
-    pub passed: Vec<Peak>,
+    pub passed_peaks: Vec<Peak>,
     pub channels: Channels,
     /// Name patterns of the picked channels.
     pub picks: Vec<String>,
     /// The channels, then the clearance of each recorded ball joint, then the picked channels.
     pub history: History,
     /// Full-resolution record of the time window last retraced.
-    pub near: Option<Box<History>>,
+    pub detailed: Option<Box<History>>,
     pub contact_history: ContactHistory,
     pub impact_record: ImpactRecord,
     /// The instant recorded last, and its time, s; the time also follows the run when it goes back.
@@ -39,16 +39,16 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Nothing yet of a run of `scene`.
+    /// An empty record of a run of `scene`.
     pub fn new(scene: &Scene) -> Self {
         let channels = Channels::of(&scene.machine);
         let joints = scene.machine.ball_joints.len().min(RECORDED_JOINTS);
         Self {
             peaks: Vec::new(),
-            coming: Vec::new(),
-            passed: Vec::new(),
+            upcoming_peaks: Vec::new(),
+            passed_peaks: Vec::new(),
             history: History::new(channels.len() + joints, FINEST_BIN),
-            near: None,
+            detailed: None,
             contact_history: ContactHistory::default(),
             impact_record: ImpactRecord::default(),
             channels,
@@ -63,7 +63,7 @@ impl Record {
     }
     /// As [`History::bins`], from the window last retraced where possible.
     pub fn bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
-        let near = self.near.as_ref().and_then(|near| near.span());
+        let near = self.detailed.as_ref().and_then(|near| near.span());
         let Some((start, end)) = near.filter(|(start, end)| *start < to && *end > from) else {
             return self.history.bins(channel, from, to, most_bins, out);
         };
@@ -74,7 +74,7 @@ impl Record {
             let whole = out[first..].iter().filter(|bin| bin.to <= start).count();
             out.truncate(first + whole);
         }
-        if let Some(near) = &self.near {
+        if let Some(near) = &self.detailed {
             near.bins(channel, from.max(start), to.min(end), most_bins, out);
         }
         if to > end {
@@ -85,34 +85,34 @@ impl Record {
     }
 
     /// Begins another full-resolution record.
-    pub fn begin_near(&mut self) {
-        match &mut self.near {
+    pub fn begin_detailed(&mut self) {
+        match &mut self.detailed {
             Some(near) => near.clear(),
             none => *none = Some(Box::new(History::new(self.history.channels(), FINEST_BIN))),
         }
     }
 
-    /// Drops all peaks on their way.
-    pub fn forget_peaks(&mut self) {
-        let joints = self.coming.len();
-        for peaks in [&mut self.peaks, &mut self.coming, &mut self.passed] {
+    /// Drops all peaks that are still to be added or handed out.
+    pub fn drop_peaks(&mut self) {
+        let joints = self.upcoming_peaks.len();
+        for peaks in [&mut self.peaks, &mut self.upcoming_peaks, &mut self.passed_peaks] {
             peaks.clear();
             peaks.resize(joints, Peak::default());
         }
     }
 
     /// Drops everything after `time`, s, and `steps` steps, for a new branch; `mark` is the position of the history there.
-    pub fn cut(&mut self, time: f64, steps: u64, mark: Option<&Mark>) {
+    pub fn truncate(&mut self, time: f64, steps: u64, mark: Option<&Mark>) {
         if let Some(mark) = mark {
             self.history.rewind(mark);
         }
-        self.near = None;
-        self.contact_history.cut(time);
-        self.impact_record.cut(time, steps);
-        self.watch.cut(time);
+        self.detailed = None;
+        self.contact_history.truncate(time);
+        self.impact_record.truncate(time, steps);
+        self.watch.truncate(time);
     }
 
-    /// The run of `scene` continues from `time`, s; what is known stays.
+    /// Continues from `time`, s, in a run of `scene`. Known data stay.
     pub fn go_back(&mut self, time: f64, scene: &Scene) {
         if time > self.recorded_to {
             // The time skipped was not recorded.
@@ -121,7 +121,7 @@ impl Record {
         self.recorded_to = time;
         self.watch.go_to(time);
         self.settling = Settling::new(scene);
-        self.forget_peaks();
+        self.drop_peaks();
     }
 }
 

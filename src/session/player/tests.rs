@@ -55,7 +55,7 @@ fn one_clock(player: &Player) {
 }
 
 #[test]
-fn nothing_tells_of_what_is_still_to_come() {
+fn record_and_peaks_contain_nothing_after_the_displayed_instant() {
     let mut player = player("spcmm");
     one_clock(&player);
     player.pacer.set_scale(0.01);
@@ -96,7 +96,7 @@ fn nothing_tells_of_what_is_still_to_come() {
 }
 
 #[test]
-fn a_warning_stands_beside_the_parameter_that_it_is_about() {
+fn a_warning_is_found_by_the_key_of_its_parameter() {
     let check = |changes: &[(&str, &str)], key: &str, of_joint: Option<&str>| {
         let mut player = player("spcmm");
         assert!(player.warnings().next().is_none());
@@ -124,7 +124,7 @@ thread_local! {
 }
 
 #[test]
-fn what_is_stepped_between_frames_is_shown_as_it_comes_and_changes_no_bit() {
+fn steps_between_frames_are_displayed_at_once_and_change_no_bit() {
     let mut player = player("spcmm");
     // Each clock reading adds half a millisecond, so that a slice between frames has several steps.
     player.clock = || LOOKS.replace(LOOKS.get() + 5e-4);
@@ -170,7 +170,7 @@ fn what_is_stepped_between_frames_is_shown_as_it_comes_and_changes_no_bit() {
 }
 
 #[test]
-fn after_steps_back_the_record_is_as_before_and_another_future_follows_it() {
+fn after_steps_back_the_record_is_unchanged_and_a_new_future_continues_it() {
     let mut player = player("spcmm");
     player.run_to(8.6e-3);
     player.single_step();
@@ -221,7 +221,7 @@ fn a_new_branch_keeps_the_record_of_the_step_before_an_earlier_change() {
 }
 
 #[test]
-fn a_change_in_the_middle_of_a_step_leaves_the_rest_of_it_as_it_was() {
+fn a_change_within_a_step_leaves_the_rest_of_that_step_unchanged() {
     let (mut player, mut other) = (player("spcmm"), player("spcmm"));
     for player in [&mut player, &mut other] {
         player.pacer.set_scale(0.005);
@@ -260,7 +260,7 @@ fn a_change_in_the_middle_of_a_step_leaves_the_rest_of_it_as_it_was() {
 }
 
 #[test]
-fn a_window_that_was_hidden_for_minutes_goes_on_and_does_not_catch_up() {
+fn a_window_hidden_for_minutes_resumes_without_catching_up() {
     let mut player = player("spcmm");
     player.pacer.set_scale(0.02);
     player.set_playing(true);
@@ -287,10 +287,10 @@ fn another_number_of_links_is_recorded_after_the_reset() {
     let mut player = player("chain");
     let before = player.channels().len();
     assert_eq!(player.set("chain.links", "3").expect("in range"), Effect::AtReset);
-    assert!(player.is_waiting("chain.links") && player.has_waiting());
+    assert!(player.is_pending("chain.links") && player.has_pending_changes());
     assert_eq!(player.channels().len(), before);
     player.reset().expect("starts");
-    assert!(!player.has_waiting());
+    assert!(!player.has_pending_changes());
     assert!(player.channels().len() < before);
     player.run_to(0.01);
     assert!(!recorded(&player, Quantity::NormalForce, 0.01).is_empty());
@@ -346,7 +346,7 @@ fn a_picked_channel_is_recorded_from_then_on_and_changes_no_bit() {
 }
 
 #[test]
-fn picked_channels_go_back_and_branch_with_the_rest() {
+fn picked_channels_go_back_and_branch_with_the_record() {
     let mut player = player("slider-crank-driven");
     player.run_to(4e-3);
     player.pick(&names(&["crank.angle"]));
@@ -373,7 +373,7 @@ fn picked_channels_go_back_and_branch_with_the_rest() {
 }
 
 #[test]
-fn only_so_many_picked_channels_are_recorded() {
+fn the_number_of_recorded_picked_channels_is_limited() {
     let mut player = player("chain");
     let before = player.history().channels();
     player.pick(&names(&["*"]));
@@ -387,7 +387,7 @@ fn only_so_many_picked_channels_are_recorded() {
 }
 
 #[test]
-fn single_steps_are_taken_back_bit_by_bit() {
+fn stepping_back_restores_every_single_step_bit_by_bit() {
     let mut player = player("spcmm");
     player.step_back();
     player.run_to(8e-3);
@@ -452,7 +452,7 @@ const CHANGES: [(f64, &str, &str); 4] = [
 ];
 
 #[test]
-fn any_instant_of_the_past_has_the_bits_of_the_first_time() {
+fn any_past_instant_is_displayed_with_the_same_bits_again() {
     for (scene, to) in [("spcmm", 0.3), ("slider-crank", 0.25), ("chain", 0.22)] {
         let mut player = player(scene);
         let hashes = run_with(&mut player, &CHANGES, to);
@@ -505,7 +505,7 @@ fn full_a_thousand_jumps_over_a_thousand_impacts_have_the_bits_of_the_run() {
 }
 
 #[test]
-fn the_twin_goes_back_and_on_with_the_run() {
+fn the_twin_goes_back_and_forward_with_the_run() {
     let mut player = player("spcmm");
     player.run_to(10e-3);
     player.set_twin(true);
@@ -519,7 +519,7 @@ fn the_twin_goes_back_and_on_with_the_run() {
         seen.push((player.pacer.shown(), twin.frame().clone()));
     }
     let distances = player.twin().expect("on").distances().to_vec();
-    let began = player.twin().expect("on").begins();
+    let began = player.twin().expect("on").start_time();
     let mut random = Uniform(5);
     for _ in 0..100 {
         let (time, frame) = &seen[(random.next() * seen.len() as f64) as usize];
@@ -536,7 +536,7 @@ fn the_twin_goes_back_and_on_with_the_run() {
     player.go_to(seen[10].0);
     player.set("contact.friction", "0.3").expect("in range");
     let twin = player.twin().expect("stays on");
-    assert_eq!(twin.begins(), player.simulation().time());
+    assert_eq!(twin.start_time(), player.simulation().time());
     assert_eq!(twin.distances().len(), 1);
 }
 
@@ -581,7 +581,7 @@ fn an_hour_takes_no_more_memory_than_ten_minutes() {
 }
 
 #[test]
-fn what_is_far_back_is_seen_in_detail_again() {
+fn the_distant_past_is_displayed_in_full_detail_again() {
     let mut player = player("spcmm");
     player.run_to(9e-3);
     let fine = recorded(&player, Quantity::NormalForce, 9e-3);
@@ -603,7 +603,7 @@ fn what_is_far_back_is_seen_in_detail_again() {
 }
 
 #[test]
-fn time_runs_backwards_through_the_same_states_to_the_start() {
+fn playing_backwards_passes_the_same_states_to_the_start() {
     let mut player = player("spcmm");
     player.run_to(20e-3);
     player.pacer.set_scale(0.02);
@@ -631,7 +631,7 @@ fn time_runs_backwards_through_the_same_states_to_the_start() {
 }
 
 #[test]
-fn going_on_from_the_past_leaves_what_was_done_later() {
+fn resuming_from_the_past_abandons_later_changes() {
     let mut player = player("spcmm");
     let _ = run_with(&mut player, &CHANGES[..2], 0.15);
     assert_eq!(player.flags().count(), 2);
@@ -673,7 +673,7 @@ fn peaks_of_run(player: &Player, to: f64) -> Vec<(usize, f64, f64)> {
 }
 
 #[test]
-fn next_and_previous_impact_arrive_at_its_peak() {
+fn next_and_previous_impact_go_to_its_peak() {
     let mut player = player("spcmm");
     let tops = peaks_of_run(&player, 80e-3);
     let known = 60e-3;
@@ -690,11 +690,11 @@ fn next_and_previous_impact_arrive_at_its_peak() {
         assert!(!player.is_seeking());
         assert_eq!(player.pacer.shown(), *time);
         one_clock(&player);
-        let (_, impact) = player.impact_record().under_way(None, *time).expect("an impact");
+        let (_, impact) = player.impact_record().in_progress(None, *time).expect("an impact");
         assert_eq!((impact.joint, impact.start), (*joint, *start));
         // The displayed force is the peak.
         let force = player.frame().joints[*joint].normal_force.norm();
-        assert!((force / impact.top.force.norm() - 1.0).abs() < 1e-3, "{force} at {time}");
+        assert!((force / impact.force_peak.force.norm() - 1.0).abs() < 1e-3, "{force} at {time}");
     }
     // A future impact is reached by stepping, without displaying the instants between.
     player.go_to(reached);
@@ -720,7 +720,7 @@ fn next_and_previous_impact_arrive_at_its_peak() {
 }
 
 #[test]
-fn an_impact_under_way_is_run_to_its_peak() {
+fn an_impact_in_progress_is_continued_to_its_peak() {
     let mut player = player("spcmm");
     let tops = peaks_of_run(&player, 20e-3);
     let first = tops[0];
@@ -750,13 +750,13 @@ fn an_impact_under_way_is_run_to_its_peak() {
     while player.is_seeking() {
         player.advance(1.0 / 60.0);
     }
-    let number = player.impact_record().under_way(Some(first.0), player.pacer.shown()).map(|(number, _)| number);
+    let number = player.impact_record().in_progress(Some(first.0), player.pacer.shown()).map(|(number, _)| number);
     let before = tops.iter().filter(|top| top.2 < player.pacer.shown()).count() as u64;
     assert!(number.is_some_and(|number| number > 1), "{number:?}, {before}");
 }
 
 #[test]
-fn a_run_without_further_impacts_is_not_sought_for_ever() {
+fn the_search_for_an_impact_ends_in_a_run_without_further_impacts() {
     let mut player = player("spcmm");
     player.run_to(0.4);
     let latest = player.impact_record().previous_peak(None, 0.4).expect("hit");
@@ -771,15 +771,15 @@ fn a_run_without_further_impacts_is_not_sought_for_ever() {
     assert!(shown >= 5.4 - 1e-9 || player.impact_record().next_peak(None, latest, true).is_some(), "{shown}");
     one_clock(&player);
     // The balls rest on their walls: their last impacts have no end.
-    assert!(player.impact_record().under_way(None, shown).is_none());
+    assert!(player.impact_record().in_progress(None, shown).is_none());
     player.go_to_impact(None, false);
     assert_eq!(player.pacer.shown(), latest);
-    let (_, resting) = player.impact_record().under_way(None, latest).expect("in contact");
-    assert!(resting.finished().is_none() && resting.top.time == latest);
+    let (_, resting) = player.impact_record().in_progress(None, latest).expect("in contact");
+    assert!(resting.finished().is_none() && resting.force_peak.time == latest);
 }
 
 #[test]
-fn the_wear_map_is_that_of_the_steps_that_are_over() {
+fn the_wear_map_includes_only_completed_steps() {
     let mut player = player("spcmm");
     let kept = |player: &Player| player.wear().expect("kept").clone();
     let contacts = |player: &Player| -> u64 {
@@ -822,7 +822,7 @@ fn the_wear_map_is_that_of_the_steps_that_are_over() {
 }
 
 #[test]
-fn a_preset_chosen_here_replaces_what_was_set_by_name() {
+fn a_preset_chosen_live_replaces_solver_keys_set_by_name() {
     let mut player = player("spcmm");
     player.set("solver.tolerance", "1e-9").expect("in range");
     player.set("solver.preset", "accurate").expect("a preset");
@@ -847,7 +847,7 @@ fn a_refused_value_changes_nothing() {
 }
 
 #[test]
-fn how_long_frames_take_changes_how_many_steps_they_take_and_no_bit() {
+fn the_duration_of_frames_changes_the_steps_per_frame_and_no_bit() {
     fn slow() -> f64 {
         thread_local! {
             static LOOKS: std::cell::Cell<f64> = const { std::cell::Cell::new(0.0) };

@@ -1,6 +1,5 @@
-//! Going to an instant. A known one is displayed from the latest step, or by restoring the nearest earlier keyframe and repeating
-//! the same steps and logged events, with the same bits ([`Player::display`]); a later one by further steps
-//! ([`Player::continue_to`]).
+//! Going to an instant. [`Player::display`] shows a known instant: from the latest step, or by restoring the nearest earlier
+//! keyframe and repeating the same steps and logged events, with the same bits. [`Player::continue_to`] steps to a later one.
 
 use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
@@ -15,7 +14,7 @@ use crate::simulate::{Bin, History};
 const LEAD: u64 = 512;
 
 /// Search horizon for the next impact, s.
-const FARTHEST: f64 = 5.0;
+const SEARCH_HORIZON: f64 = 5.0;
 
 /// A search for the next impact.
 #[derive(Clone, Copy)]
@@ -34,7 +33,7 @@ pub struct Flag {
     /// Time, s.
     pub time: f64,
     /// Description.
-    pub words: String,
+    pub text: String,
 }
 
 /// A future abandoned when the run branched before it.
@@ -65,7 +64,7 @@ impl Player {
 
     /// The abandoned future, while it extends beyond the run.
     pub fn abandoned_future(&self) -> Option<&AbandonedFuture> {
-        self.left.as_deref().filter(|left| left.to > self.reached)
+        self.abandoned.as_deref().filter(|left| left.to > self.reached)
     }
 
     /// Time up to which the run, or its abandoned future, is known, s.
@@ -85,7 +84,7 @@ impl Player {
 
     /// Events of the run, its future included; a pull has only its start and end.
     pub fn flags(&self) -> impl Iterator<Item = Flag> {
-        self.script.flags().map(|(time, words)| Flag { time, words })
+        self.script.flags().map(|(time, text)| Flag { time, text })
     }
 
     /// Appends the bins of `channel` from `from` to `to`, s, to `out`, as [`History::bins`] does. Uses the window last
@@ -112,40 +111,42 @@ impl Player {
     pub fn go_to_impact(&mut self, joint: Option<usize>, forward: bool) {
         let shown = self.pacer.shown();
         if !forward {
-            let found = self.record.impact_record.previous_peak(joint, shown);
-            return self.go_to(found.unwrap_or(0.0));
+            let peak = self.record.impact_record.previous_peak(joint, shown);
+            return self.go_to(peak.unwrap_or(0.0));
         }
-        let found = self.record.impact_record.next_peak(joint, shown, false);
-        match found.filter(|time| *time <= self.reached) {
+        let peak = self.record.impact_record.next_peak(joint, shown, false);
+        match peak.filter(|time| *time <= self.reached) {
             Some(time) => self.go_to(time),
             None => {
                 self.go_to(self.reached);
-                let until = self.reached + FARTHEST;
-                self.sought = Some(ImpactSearch { joint, from: shown, until });
+                let until = self.reached + SEARCH_HORIZON;
+                self.impact_search = Some(ImpactSearch { joint, from: shown, until });
             }
         }
     }
 
     /// Whether the run is seeking the next impact.
     pub fn is_seeking(&self) -> bool {
-        self.sought.is_some()
+        self.impact_search.is_some()
     }
 
-    /// Continues towards the sought impact within the budget of a frame.
-    pub(super) fn seek(&mut self, sought: ImpactSearch) {
-        self.go_on();
+    /// Continues towards the next impact within the budget of a frame.
+    pub(super) fn seek(&mut self, impact_search: ImpactSearch) {
+        self.resume();
         let (start, before) = ((self.clock)(), self.steps());
-        let is_over = |player: &Self| player.simulation.time() > sought.until || player.stopped.is_some();
-        // Its results are displayed with it, so it has to be over.
-        let found = |player: &Self| player.record.impact_record.next_peak(sought.joint, sought.from, is_over(player));
+        let is_over = |player: &Self| player.simulation.time() > impact_search.until || player.stopped.is_some();
+        // The window shows the results of the impact with it, so the search continues until the impact is over.
+        let next_peak = |player: &Self| {
+            player.record.impact_record.next_peak(impact_search.joint, impact_search.from, is_over(player))
+        };
         let in_time = |player: &Self| player.pacer.may_step((player.clock)() - start);
-        let _ = self.step_towards(f64::INFINITY, |player| is_over(player) || found(player).is_some(), in_time);
+        let _ = self.step_towards(f64::INFINITY, |player| is_over(player) || next_peak(player).is_some(), in_time);
         if self.steps() > before {
             self.record_until(self.simulation.time());
         }
         self.reached = self.reached.max(self.record.recorded_to);
-        if let Some(time) = found(self).or_else(|| is_over(self).then_some(f64::INFINITY)) {
-            self.sought = None;
+        if let Some(time) = next_peak(self).or_else(|| is_over(self).then_some(f64::INFINITY)) {
+            self.impact_search = None;
             self.travel(time.min(self.reached));
         }
     }
@@ -160,7 +161,7 @@ impl Player {
 
     pub(super) fn set_paused(&mut self) {
         (self.playing, self.backwards) = (false, false);
-        self.sought = None;
+        self.impact_search = None;
     }
 
     /// Displays `time`, s: any instant displayed before.
@@ -170,8 +171,8 @@ impl Player {
         }
     }
 
-    /// Displays `goal`, an instant of the past or of the known future. This is where it is decided how: from the latest step if
-    /// the goal lies in it; otherwise by repeating known steps, from here or from a keyframe.
+    /// Displays `goal`, an instant of the past or of the known future. If the goal lies in the latest step, that step is
+    /// sampled; otherwise known steps are repeated from here or from a keyframe.
     fn display(&mut self, goal: Goal) {
         let (here, now) = (self.steps(), self.simulation.time());
         // If a change was made within the latest step, that step is displayed as it was before.
@@ -186,7 +187,7 @@ impl Player {
                 let seen = if goal.time.is_finite() { goal.time } else { start };
                 self.restore_before(start, steps, seen);
             }
-            // What happened before happens again; a stop is displayed by the window.
+            // The same steps end in the same way. The window displays a stop.
             let _ = self.step_towards(goal.time, |player| goal.is_reached(&player.simulation), |_| true);
         }
         let _ = self.arrive(goal.time);
@@ -200,24 +201,24 @@ impl Player {
     pub(crate) fn continue_to(&mut self, goal: Goal, mut may_step: impl FnMut() -> bool) -> Result<bool, Obstacle> {
         let stepped = self.step_towards(goal.time, |player| goal.is_reached(&player.simulation), |_| may_step());
         if stepped.is_err() {
-            self.script.cut();
+            self.script.drop_ahead();
         }
         let arrived = self.arrive(goal.time.max(self.record.recorded_to));
         if arrived.is_err() {
-            self.script.cut();
+            self.script.drop_ahead();
         }
         arrived.and(stepped)
     }
 
-    /// Takes steps, and applies the events logged between them, until `is_there` or while `may_step`; displays nothing beyond
-    /// `time`, s. Returns whether it is there. Every step of a run is taken here.
+    /// Takes steps, and applies the events logged between them, until `is_reached` or while `may_step`; displays nothing beyond
+    /// `time`, s. Returns whether the goal is reached. Every step of a run is taken here.
     pub(super) fn step_towards(
         &mut self,
         time: f64,
-        is_there: impl Fn(&Self) -> bool,
+        is_reached: impl Fn(&Self) -> bool,
         mut may_step: impl FnMut(&Self) -> bool,
     ) -> Result<bool, Obstacle> {
-        while !is_there(self) {
+        while !is_reached(self) {
             self.apply_due(time)?;
             if let Some(stopped) = self.stopped.clone() {
                 return Err(stopped.into());
@@ -234,26 +235,26 @@ impl Player {
     fn arrive(&mut self, time: f64) -> Result<(), Obstacle> {
         self.pacer.jump(time.min(self.simulation.time()));
         let applied = if time >= self.simulation.time().min(self.reached) { self.apply_due(time) } else { Ok(()) };
-        self.present();
+        self.update_display();
         applied
     }
 
     /// Restores the keyframe at `start`, s, after `steps` steps, or an earlier one if the history of the instant `seen`, s, must
     /// be recorded in detail.
     fn restore_before(&mut self, start: f64, steps: u64, seen: f64) {
-        let span = self.record.near.as_ref().and_then(|near| near.span());
+        let span = self.record.detailed.as_ref().and_then(|near| near.span());
         if span.is_some_and(|(from, to)| from <= start && start <= to) {
             return self.restore(start, false);
         }
         let lead = seen - self.automatic_window();
-        let early = |k: &Keyframe| k.state.time() <= lead || k.state.steps() + LEAD <= steps;
-        let first = self.keyframes.latest_kept(early);
+        let is_early_enough = |k: &Keyframe| k.state.time() <= lead || k.state.steps() + LEAD <= steps;
+        let first = self.keyframes.latest_regular(is_early_enough);
         let start = first.map_or(0.0, |k| k.state.time());
         self.restore(start, true);
     }
 
-    /// Restores the latest keyframe up to `time`, s; `anew` starts another detailed record there.
-    fn restore(&mut self, time: f64, anew: bool) {
+    /// Restores the latest keyframe up to `time`, s; `starts_detail` starts another detailed record there.
+    fn restore(&mut self, time: f64, starts_detail: bool) {
         let Some(keyframe) = self.keyframes.latest(|k| k.state.time() <= time) else {
             return;
         };
@@ -267,9 +268,9 @@ impl Player {
         self.unchanged = None;
         self.record.go_back(now, self.simulation.running());
         self.warnings = warnings_of(self.pending());
-        if anew {
-            self.keyframes.forget_fine();
-            self.record.begin_near();
+        if starts_detail {
+            self.keyframes.drop_fine();
+            self.record.begin_detailed();
             self.record_at(now);
         }
     }
@@ -295,7 +296,7 @@ impl Player {
     }
 
     /// Continues from the displayed instant by repeating the known steps; a future with later events is abandoned.
-    pub(super) fn go_on(&mut self) {
+    pub(super) fn resume(&mut self) {
         if self.script.has_more() {
             self.branch();
         }
@@ -309,7 +310,7 @@ impl Player {
         let (steps, shown, passed) = (self.steps(), self.pacer.shown(), self.script.passed);
         if shown < self.reached {
             let after = |flag: &Flag| flag.time > shown;
-            self.left = Some(Box::new(AbandonedFuture {
+            self.abandoned = Some(Box::new(AbandonedFuture {
                 history: self.record.history.clone(),
                 contact_history: self.record.contact_history.clone(),
                 flags: self.flags().filter(after).collect(),
@@ -317,36 +318,36 @@ impl Player {
                 to: self.reached,
             }));
         }
-        self.script.cut();
+        self.script.drop_ahead();
         let before = |k: &Keyframe| k.state.steps() <= steps && k.events <= passed;
-        let Some(keyframe) = self.keyframes.latest_kept(before) else {
+        let Some(keyframe) = self.keyframes.latest_regular(before) else {
             return;
         };
         let (start, start_steps) = (keyframe.state.time(), keyframe.state.steps());
-        self.record.cut(start, start_steps, keyframe.record.as_ref());
-        self.keyframes.cut(start_steps);
+        self.record.truncate(start, start_steps, keyframe.record.as_ref());
+        self.keyframes.truncate(start_steps);
         if let Some(twin) = &mut self.twin {
-            twin.cut(start);
+            twin.truncate(start);
         }
         (self.reached, self.most_steps) = (start, start_steps);
         self.restore(start, false);
         let _ = self.step_towards(shown, |player| player.steps() >= steps, |_| true);
         let now = self.simulation.time();
-        self.restart_twin(|begins| begins > now);
+        self.restart_twin(|start| start > now);
         let _ = self.arrive(shown);
     }
 
     /// Stores a keyframe of the latest state if one is due, while the run advances or retraces.
-    pub(super) fn keep(&mut self) {
+    pub(super) fn store_keyframe(&mut self) {
         let steps = self.steps();
         let new = steps >= self.most_steps;
         self.most_steps = self.most_steps.max(steps);
         if new && self.keyframes.is_due(steps) {
             let record = Some(self.record.history.mark());
-            self.keyframes.keep(self.keyframe(record));
+            self.keyframes.store(self.keyframe(record));
         } else if !new && self.keyframes.is_fine(steps) {
             let keyframe = self.keyframe(None);
-            self.keyframes.keep_fine(keyframe);
+            self.keyframes.store_fine(keyframe);
         }
     }
 

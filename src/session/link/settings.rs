@@ -1,15 +1,15 @@
-//! The settings of plots, view and instruments that a link carries, as words.
+//! Text form of the settings of plots, view and instruments that a link carries.
 
 use crate::scene::Scene;
 use crate::simulate::{MAX_PICKED, Quantity};
 use crate::units::{Dimension, parse_quantity};
 use crate::view::{Picked, WearMap};
 
-/// Longest window of the plots that a link asks for, s.
+/// Longest window of the plots that a link may request, s.
 const LONGEST_WINDOW: f64 = 1e4;
 /// Shortest window, s.
 const SHORTEST_WINDOW: f64 = 1e-6;
-/// Longest name of a channel, or pattern: bytes.
+/// Length limit of a channel's name or of a pattern, bytes.
 const LONGEST_NAME: usize = 120;
 
 const IDEAL: &str = "ideal";
@@ -44,14 +44,14 @@ impl Instruments {
     /// # Errors
     /// An unknown word; lists the allowed ones.
     pub fn read(text: &str) -> Result<Self, String> {
-        let mut on = Self::default();
+        let mut instruments = Self::default();
         for part in text.split([',', ' ']).filter(|part| !part.is_empty()) {
             if let Some(joint) = part.strip_prefix(MICROSCOPE) {
-                on.microscope = Some(joint.to_owned());
+                instruments.microscope = Some(joint.to_owned());
             } else if let Some((_, map)) = WEAR.iter().find(|(word, _)| *word == part) {
-                on.wear = *map;
+                instruments.wear = *map;
             } else if part == IDEAL {
-                on.ideal = true;
+                instruments.ideal = true;
             } else if part != "none" {
                 return Err(format!(
                     "no instrument `{part}`; allowed, separated by commas: {MICROSCOPE}JOINT, {IDEAL}, {}, none",
@@ -59,7 +59,7 @@ impl Instruments {
                 ));
             }
         }
-        Ok(on)
+        Ok(instruments)
     }
 
     /// The reverse of [`Self::read`].
@@ -104,11 +104,11 @@ pub fn write_plots(chosen: &[Quantity]) -> String {
 
 /// Reads names of channels, or patterns of them, separated by commas or spaces; `none` stands for none.
 pub fn read_channels(text: &str) -> Result<Vec<String>, String> {
-    let fine = |c: char| c.is_ascii_alphanumeric() || "_-.*?".contains(c);
+    let is_allowed = |c: char| c.is_ascii_alphanumeric() || "_-.*?".contains(c);
     let parts = text.split([',', ' ']).filter(|part| !part.is_empty());
     let mut names: Vec<String> = Vec::new();
     for part in parts.filter(|part| *part != "none") {
-        if part.len() > LONGEST_NAME || !part.chars().all(fine) {
+        if part.len() > LONGEST_NAME || !part.chars().all(is_allowed) {
             return Err(
                 "no names of channels; allowed, separated by commas, are those that `jointplay check --channels` lists, with * for any \
                  characters and ? for one"
