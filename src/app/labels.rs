@@ -89,7 +89,7 @@ impl<'a> Wanted<'a> {
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
         let (size, direction) = match label.kind {
             LabelKind::Joint(_) => (13.0, -FRAC_PI_4),
-            LabelKind::Peak(_) | LabelKind::Outside => (12.0, 0.0),
+            LabelKind::Peak(_) | LabelKind::External => (12.0, 0.0),
             LabelKind::Error => (12.0, FRAC_PI_2),
             LabelKind::Axis | LabelKind::Gravity => return None,
         };
@@ -140,7 +140,7 @@ pub(super) fn paint(
     let cover = Cover::of(list, CELL * scale);
     let cost = |plate: Rect, (gap, turn): Place| {
         let [min, max] = [plate.min, plate.max].map(|corner| (corner - rect.min) * scale);
-        let [bodies, balls] = cover.under(glam::Vec2::new(min.x, min.y), glam::Vec2::new(max.x, max.y));
+        let [bodies, balls] = cover.covered_fractions(glam::Vec2::new(min.x, min.y), glam::Vec2::new(max.x, max.y));
         BODY * bodies + BALL * balls + FURTHER * gap as f32 + TURNED * turn as f32
     };
     let is_peak = |label: &&Label| matches!(label.kind, LabelKind::Peak(_));

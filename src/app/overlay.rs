@@ -277,7 +277,7 @@ fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme) ->
     painter.add(Shape::closed_line(outline.to_vec(), Stroke::new(1.0, ink)));
     let mut all = bar;
     for tick in scale.ticks() {
-        let y = at(scale.place(tick));
+        let y = at(scale.position(tick));
         let left = bar.min.x - 4.0;
         painter.line_segment([pos2(left, y), pos2(bar.min.x, y)], Stroke::new(1.0, ink));
         let words = format_quantity_digits(f64::from(tick), "", 1);

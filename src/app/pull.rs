@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use super::player::Player;
 use crate::machine::Vec3 as Exact;
 use crate::simulate::Pull;
-use crate::view::{Camera, Hit, Picked};
+use crate::view::{Camera, Hit, ScenePart};
 
 /// A grip of the pointer on a body.
 #[derive(Clone, Copy, Debug)]
@@ -20,9 +20,9 @@ impl Grip {
     pub fn new(player: &Player, hit: Hit) -> Option<Self> {
         let scene = player.running();
         let body = match hit.what {
-            Picked::Body(body) => body,
-            Picked::Joint(joint) => scene.machine.ball_joints.get(joint)?.ball.body?,
-            Picked::Fixed(_) => return None,
+            ScenePart::Body(body) => body,
+            ScenePart::Joint(joint) => scene.machine.ball_joints.get(joint)?.ball.body?,
+            ScenePart::Fixed(_) => return None,
         };
         let motion = player.frame().bodies.get(body)?;
         let point = Exact::from(hit.point.to_array().map(f64::from));
@@ -64,8 +64,8 @@ mod tests {
         let place = player.frame().bodies[0].position;
         let point = to_f32(&place);
         let hit = |what| Hit { what, point };
-        assert!(Grip::new(&player, hit(Picked::Fixed(0))).is_none());
-        let mut grip = Grip::new(&player, hit(Picked::Body(0))).expect("moves");
+        assert!(Grip::new(&player, hit(ScenePart::Fixed(0))).is_none());
+        let mut grip = Grip::new(&player, hit(ScenePart::Body(0))).expect("moves");
         // Length of the spring, m.
         let stretch = |grip: &Grip, player: &Player| {
             let motion = &player.frame().bodies[grip.pull.body];

@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::session::link::CameraPose;
 use crate::session::link::settings::PlotWindow;
 use crate::simulate::Quantity;
-use crate::view::{Picked, Quality, ViewOptions};
+use crate::view::{Quality, ScenePart, ViewOptions};
 
 /// Length of the history; the oldest changes are dropped.
 const KEPT: usize = 200;
@@ -28,7 +28,7 @@ const PRESET: &str = "solver.preset";
 struct View {
     options: ViewOptions,
     camera: CameraPose,
-    followed: Option<Picked>,
+    followed: Option<ScenePart>,
     chosen: Vec<Quantity>,
     picked: Vec<String>,
     window: PlotWindow,

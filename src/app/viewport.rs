@@ -20,8 +20,8 @@ use crate::render;
 use crate::session::link::CameraPose;
 use crate::simulate::{ContactMode, Pull};
 use crate::view::{
-    Camera, Cloud, DrawList, PeakMarks, Picked, Preset, Quality, SEEN, Scaling, SceneView, Shot, Theme, ViewOptions,
-    WearMap, to_f32,
+    Camera, Cloud, DrawList, MARK_DURATION, PeakMarks, Preset, Quality, Scaling, ScenePart, SceneView, Shot, Theme,
+    ViewOptions, WearMap, to_f32,
 };
 
 /// Length of the probe's trail, points.
@@ -79,7 +79,7 @@ pub struct Viewport {
     #[cfg(not(target_arch = "wasm32"))]
     second: (Arc<DrawList>, u64),
     trail: Vec<Vec3>,
-    followed: Option<Picked>,
+    followed: Option<ScenePart>,
     time: f64,
     /// Whether the user has changed the view from the scene's initial one.
     moved: bool,
@@ -225,7 +225,7 @@ impl Viewport {
 
     /// Shows the blows before the displayed instant as in playback.
     fn recall(&mut self, player: &Player) {
-        let (shown, fade) = (player.pacer.shown(), SEEN * player.pacer.scale());
+        let (shown, fade) = (player.pacer.shown(), MARK_DURATION * player.pacer.scale());
         let peaks = player.impact_record().peaks(shown - fade, shown);
         let blows = peaks.map(|(joint, top)| (joint, crate::view::to_f32(&top.force), top.time));
         self.marks.recall(player.frame(), blows, fade);
@@ -247,7 +247,7 @@ impl Viewport {
     /// moving.
     pub fn advance(&mut self, player: &Player, dt: f32) -> bool {
         let shown = player.pacer.shown();
-        let fade = SEEN * player.pacer.scale();
+        let fade = MARK_DURATION * player.pacer.scale();
         self.marks.update(player.frame(), player.peaks(), fade);
         if shown != self.time || player.is_playing() {
             if shown < self.time {
@@ -309,7 +309,7 @@ impl Viewport {
 
     /// Centres the view on ball joint `joint` and follows it.
     pub fn centre(&mut self, player: &Player, joint: usize) {
-        if let Some(centre) = self.view.anchor(player.frame(), Picked::Joint(joint)) {
+        if let Some(centre) = self.view.anchor(player.frame(), ScenePart::Joint(joint)) {
             let mut goal = self.goal.unwrap_or(self.camera);
             goal.target = centre;
             self.glide(player, goal, joint);
@@ -320,7 +320,7 @@ impl Viewport {
     fn glide(&mut self, player: &Player, goal: Camera, joint: usize) {
         self.goal = Some(goal);
         (self.fit_pending, self.fits, self.moved) = (false, false, true);
-        let picked = Picked::Joint(joint);
+        let picked = ScenePart::Joint(joint);
         self.follow(Some(picked));
         let anchor = self.view.anchor(player.frame(), picked);
         self.camera.follow(anchor);
@@ -351,7 +351,7 @@ impl Viewport {
     }
 
     /// Fixes a body or joint at its screen position; `None` releases it.
-    pub fn follow(&mut self, picked: Option<Picked>) {
+    pub fn follow(&mut self, picked: Option<ScenePart>) {
         self.followed = picked;
         self.camera.follow(None);
         if let Some(goal) = &mut self.goal {
@@ -368,13 +368,13 @@ impl Viewport {
     /// The ball joint in focus, i.e. the followed one.
     pub fn focus(&self) -> Option<usize> {
         match self.followed {
-            Some(Picked::Joint(joint)) => Some(joint),
+            Some(ScenePart::Joint(joint)) => Some(joint),
             _ => None,
         }
     }
 
     /// The followed part, as set by [`Self::follow`].
-    pub fn followed(&self) -> Option<Picked> {
+    pub fn followed(&self) -> Option<ScenePart> {
         self.followed
     }
 
@@ -476,7 +476,7 @@ impl Viewport {
         } else {
             self.compose(player, &camera, &screen, self.options.quality)
         };
-        if let Some(Picked::Joint(joint)) = tapped {
+        if let Some(ScenePart::Joint(joint)) = tapped {
             self.clicked = Some(joint);
         } else if response.double_clicked() {
             self.follow(tapped);
@@ -878,17 +878,17 @@ impl Screen {
     }
 }
 
-fn name_of(player: &Player, picked: Picked) -> Option<&str> {
+fn name_of(player: &Player, picked: ScenePart) -> Option<&str> {
     let scene = player.running();
     match picked {
-        Picked::Body(index) => scene.machine.bodies.get(index).map(|body| body.name.as_str()),
-        Picked::Joint(index) => scene.machine.ball_joints.get(index).map(|joint| joint.name.as_str()),
-        Picked::Fixed(_) => None,
+        ScenePart::Body(index) => scene.machine.bodies.get(index).map(|body| body.name.as_str()),
+        ScenePart::Joint(index) => scene.machine.ball_joints.get(index).map(|joint| joint.name.as_str()),
+        ScenePart::Fixed(_) => None,
     }
 }
 
 /// Describes the part under the cursor.
-fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
+fn describe(ui: &mut Ui, player: &Player, picked: ScenePart) {
     // Makes the tooltip as wide as its longest line.
     ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
     let row = |ui: &mut Ui, name: &str, si: f64, unit: &str| {
@@ -901,7 +901,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
     };
     ui.strong(name);
     match picked {
-        Picked::Body(index) => {
+        ScenePart::Body(index) => {
             if let (Some(body), Some(motion)) = (player.running().machine.bodies.get(index), frame.bodies.get(index)) {
                 row(ui, "Mass", body.mass, "kg");
                 row(ui, "Speed", motion.velocity.norm(), "m/s");
@@ -909,7 +909,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
                 row(ui, "Acceleration", motion.acceleration.norm(), "m/s^2");
             }
         }
-        Picked::Joint(index) => {
+        ScenePart::Joint(index) => {
             if let Some(joint) = frame.joints.get(index) {
                 ui.label(value::contact(joint.state));
                 row(ui, "Normal force", joint.normal_force.norm(), "N");
@@ -921,7 +921,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
                 }
             }
         }
-        Picked::Fixed(_) => {}
+        ScenePart::Fixed(_) => {}
     }
     ui.label(RichText::new("Double-click to follow").small().weak());
 }
@@ -1044,7 +1044,7 @@ mod tests {
                 let cover = Cover::of(&seen.list, 2.0);
                 let under = |plate: Rect| {
                     let [min, max] = [plate.min, plate.max].map(|corner| Vec2::new(corner.x, corner.y));
-                    cover.under(min, max)
+                    cover.covered_fractions(min, max)
                 };
                 for plate in [time, legend] {
                     let hidden: f32 = under(plate).iter().sum();

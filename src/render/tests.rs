@@ -729,7 +729,7 @@ fn struck_cells_have_the_colour_of_their_value_and_others_none() {
                 clear += 1;
                 continue;
             }
-            let place = scale.place(per_area as f32);
+            let place = scale.position(per_area as f32);
             let [r, g, b, _] = WearScale::colour(place).to_rgba8();
             let off = difference(after, [r, g, b]);
             assert!(off <= 2, "cell {i}: {after:?} for {:?}", [r, g, b]);

@@ -15,7 +15,7 @@ use super::log::Log;
 use crate::scene::{DEFAULT_SCENE, MAX_FILE_SIZE, Scene, SceneError, Texts, built_in_text, visible, visible_line};
 use crate::simulate::{Quantity, SCALE_RANGE};
 use crate::units::{Dimension, parse_quantity};
-use crate::view::Picked;
+use crate::view::ScenePart;
 use crate::words::{Words as _, words};
 use settings::{Instruments, PlotWindow};
 
@@ -462,7 +462,7 @@ impl Link {
     ///
     /// # Errors
     /// There is no such part.
-    pub fn followed_part(&self, scene: &Scene) -> Result<Option<Picked>, LinkError> {
+    pub fn followed_part(&self, scene: &Scene) -> Result<Option<ScenePart>, LinkError> {
         self.follow
             .as_ref()
             .map(|name| settings::find_followed(scene, name).map_err(|why| link_error("follow", name, why)))

@@ -16,15 +16,15 @@ pub const ARROW_LENGTH: f32 = 0.22;
 /// Longest arrow, in reference lengths.
 const LONGEST_ARROW: f32 = 2.5;
 /// Radius of the thickest shaft, as a fraction of the picture height.
-const THICKEST: f32 = 0.0055;
+const MAX_SHAFT_RADIUS: f32 = 0.0055;
 /// Shortest arrow with the full thickness, in shaft radii; a shorter one is proportionally thinner.
-const STOUTEST: f32 = 10.0;
+const FULL_THICKNESS_LENGTH: f32 = 10.0;
 /// Length and radius of a head, in radii of the shaft.
 const HEAD: [f32; 2] = [5.5, 2.3];
 /// Gaps in the shaft of an arrow too long to be drawn in full: its three parts, from tail to neck.
 const BREAK: [[f32; 2]; 3] = [[0.0, 0.44], [0.48, 0.52], [0.56, 1.0]];
 /// Outline width of a mark, points.
-const OUTLINE: f32 = 1.8;
+const OUTLINE_WIDTH: f32 = 1.8;
 
 /// A shaft with its head.
 #[derive(Clone, Copy)]
@@ -33,14 +33,14 @@ pub(super) struct Arrow {
     pub along: Vec3,
     /// Radius of the shaft, m.
     pub radius: f32,
-    /// Whether it is too long to be drawn in full.
-    pub broken: bool,
+    /// Whether it is too long to be drawn in full, so that its shaft has gaps.
+    pub is_broken: bool,
 }
 
 impl Arrow {
     /// An arrow with a shaft radius of at most `radius`.
     pub fn new(tail: Vec3, along: Vec3, radius: f32) -> Self {
-        Self { tail, along, radius: radius.min(along.length() / STOUTEST), broken: false }
+        Self { tail, along, radius: radius.min(along.length() / FULL_THICKNESS_LENGTH), is_broken: false }
     }
 
     fn neck(&self) -> Vec3 {
@@ -54,7 +54,7 @@ impl Arrow {
         }
         let material = Material { colour, roughness: 0.55, metal: 0.0 };
         let (neck, radius) = (self.neck(), self.radius);
-        let pieces = if self.broken { &BREAK[..] } else { &[[0.0, 1.0]][..] };
+        let pieces = if self.is_broken { &BREAK[..] } else { &[[0.0, 1.0]][..] };
         for [from, to] in pieces {
             let piece = bar(self.tail + neck * *from, neck * (to - from), radius, material);
             layer.push(Mesh::Cylinder, piece);
@@ -134,61 +134,61 @@ fn arrow_length(force: f32, reference: f32, scaling: Scaling) -> (f32, bool) {
 /// Arrows of the current forces, marks of past peaks, and their legend.
 pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Palette, out: &mut DrawList) {
     let options = &shot.options.arrows;
-    let at_joints = (options.normal || options.friction) && !joints.is_empty();
+    let draws_joint_forces = (options.normal || options.friction) && !joints.is_empty();
     let elements = shot.scene.machine.elements.iter().zip(&shot.frame.elements);
     let loads = elements.filter(|(of, _)| options.normal && matches!(of.kind, ElementKind::Load(_)));
     let loads = loads.map(|(_, report)| report);
-    let mut outside = loads.chain(&shot.frame.pull).peekable();
-    if !at_joints && outside.peek().is_none() {
+    let mut external = loads.chain(&shot.frame.pull).peekable();
+    if !draws_joint_forces && external.peek().is_none() {
         return;
     }
     let ruler = Ruler::new(shot.camera, shot.size);
     let height = shot.size[1] as f32;
-    let thickest = THICKEST * options.thickness;
+    let max_radius = MAX_SHAFT_RADIUS * options.thickness;
     let reference = shot.marks.reference(options);
     let mut clipped = false;
     // `None` for a zero force.
     let mut arrow = |force: Vec3, tail: Vec3| {
         let along = force.try_normalize()?;
-        let (length, broken) = arrow_length(force.length(), reference, options.scaling);
+        let (length, is_broken) = arrow_length(force.length(), reference, options.scaling);
         let (length, pixel) = ruler.measure(tail, along, length * ARROW_LENGTH * height)?;
-        clipped |= broken;
-        Some(Arrow { broken, ..Arrow::new(tail, along * length, thickest * height * pixel) })
+        clipped |= is_broken;
+        Some(Arrow { is_broken, ..Arrow::new(tail, along * length, max_radius * height * pixel) })
     };
     let reports = joints.iter().zip(&shot.frame.joints);
-    for (joint, report) in reports.filter(|_| at_joints) {
+    for (joint, report) in reports.filter(|_| draws_joint_forces) {
         let normal = to_f32(&report.normal_force);
         // The wall pushes the ball away from the contact point, which therefore lies opposite to the normal force.
         let contact = joint.ball_centre - normal.normalize_or_zero() * joint.ball_radius;
         let friction = to_f32(&report.friction_force);
-        for (shown, force, colour) in
+        for (is_drawn, force, colour) in
             [(options.normal, normal, palette.normal), (options.friction, friction, palette.friction)]
         {
-            if let Some(arrow) = shown.then(|| arrow(force, contact)).flatten() {
+            if let Some(arrow) = is_drawn.then(|| arrow(force, contact)).flatten() {
                 arrow.push(&mut out.arrows, colour);
             }
         }
     }
-    for report in outside {
+    for report in external {
         let point = to_f32(&report.points[1]);
         if let Some(arrow) = arrow(to_f32(&report.force), point) {
-            arrow.push(&mut out.arrows, palette.outside);
-            let words = format_quantity_digits(report.force.norm(), "N", 3);
+            arrow.push(&mut out.arrows, palette.external);
+            let text = format_quantity_digits(report.force.norm(), "N", 3);
             let tip = arrow.tail + arrow.along;
-            push_label(out, &words.into(), LabelKind::Outside, tip, palette.outside);
+            push_label(out, &text.into(), LabelKind::External, tip, palette.external);
         }
     }
     if let Some(pull) = &shot.frame.pull {
         let [from, to] = pull.points.map(|point| to_f32(&point));
-        let width = OUTLINE * shot.options.arrows.thickness * shot.pixels_per_point;
-        let faint = palette.outside.with_opacity(0.6);
+        let width = OUTLINE_WIDTH * shot.options.arrows.thickness * shot.pixels_per_point;
+        let faint = palette.external.with_opacity(0.6);
         out.lines.push(Line::new(from, to, width, [faint; 2]));
     }
-    if !at_joints {
+    if !draws_joint_forces {
         return;
     }
-    let marked = options.normal && options.peaks;
-    for mark in shot.marks.marks(shot.frame).filter(|_| marked) {
+    let draws_peaks = options.normal && options.peaks;
+    for mark in shot.marks.marks(shot.frame).filter(|_| draws_peaks) {
         let Some(joint) = joints.get(mark.joint) else {
             continue;
         };
@@ -196,10 +196,10 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         let contact = joint.socket_centre - mark.force.normalize_or_zero() * joint.inner;
         if let Some(arrow) = arrow(mark.force, contact) {
             let colour = palette.normal.with_opacity(mark.strength.sqrt());
-            let width = OUTLINE * shot.options.arrows.thickness * shot.pixels_per_point;
+            let width = OUTLINE_WIDTH * shot.options.arrows.thickness * shot.pixels_per_point;
             arrow.outline(ruler.eye, colour, width, &mut out.marks);
             let kind = LabelKind::Peak(mark.joint);
-            push_label(out, &words(&mark).into(), kind, arrow.tail + arrow.along, colour);
+            push_label(out, &peak_label(&mark).into(), kind, arrow.tail + arrow.along, colour);
         }
     }
     let marks: &[f32] = match options.scaling {
@@ -217,7 +217,7 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         clipped,
         ticks: marks.iter().map(tick).collect(),
         normal: options.normal.then_some(palette.normal),
-        peaks: marked,
+        peaks: draws_peaks,
         friction: options.friction.then_some(palette.friction),
     });
 }
@@ -228,11 +228,11 @@ pub(super) fn push_error(
     tail: Vec3,
     along: Vec3,
     colour: Colour,
-    words: &std::sync::Arc<str>,
+    text: &std::sync::Arc<str>,
     out: &mut DrawList,
 ) {
     push_error_arrow(shot, tail, along, colour, out);
-    push_label(out, words, LabelKind::Error, tail + along, colour);
+    push_label(out, text, LabelKind::Error, tail + along, colour);
 }
 
 /// The same without a label.
@@ -241,14 +241,14 @@ pub(super) fn push_error_arrow(shot: &Shot<'_>, tail: Vec3, along: Vec3, colour:
     let height = shot.size[1] as f32;
     let unit = along.normalize_or(shot.camera.axes().0);
     if let Some((_, pixel)) = ruler.measure(tail, unit, 1.0) {
-        let thickest = THICKEST * shot.options.arrows.thickness;
-        let arrow = Arrow::new(tail, along, thickest * height * pixel);
+        let max_radius = MAX_SHAFT_RADIUS * shot.options.arrows.thickness;
+        let arrow = Arrow::new(tail, along, max_radius * height * pixel);
         arrow.push(&mut out.arrows, colour);
     }
 }
 
 /// Force of the peak, and how long ago in simulated time.
-fn words(mark: &Mark) -> String {
+fn peak_label(mark: &Mark) -> String {
     let (ago, unit) = match mark.age {
         age if age < 0.9995e-3 => (age * 1e6, "µs"),
         age if age < 0.9995 => (age * 1e3, "ms"),
@@ -296,17 +296,17 @@ mod tests {
                             end.expect("seen").distance(pixel)
                         };
                         for along in [in_picture, square] {
-                            let seen = length(along);
-                            assert!((seen - PIXELS).abs() < 0.01 * PIXELS, "{along}: {seen}");
+                            let measured = length(along);
+                            assert!((measured - PIXELS).abs() < 0.01 * PIXELS, "{along}: {measured}");
                             checked += 1;
                         }
                         // Pointing towards the eye or away from it, it is shorter.
                         for tilt in [0.7, -0.7] {
-                            let seen = length((in_picture + back * tilt).normalize());
-                            assert!(seen <= PIXELS * 1.001, "{seen}");
+                            let measured = length((in_picture + back * tilt).normalize());
+                            assert!(measured <= PIXELS * 1.001, "{measured}");
                         }
-                        let seen = length(-ray);
-                        assert!(seen < 1.0, "along the ray: {seen}");
+                        let measured = length(-ray);
+                        assert!(measured < 1.0, "along the ray: {measured}");
                     }
                 }
             }
@@ -316,7 +316,7 @@ mod tests {
 
     #[test]
     fn an_arrow_that_would_be_too_long_is_broken() {
-        let arrow = Arrow { broken: true, ..Arrow::new(Vec3::ZERO, Vec3::X, 0.01) };
+        let arrow = Arrow { is_broken: true, ..Arrow::new(Vec3::ZERO, Vec3::X, 0.01) };
         let mut layer = Layer::default();
         layer.clear(Mesh::SHARED);
         arrow.push(&mut layer, Colour::hex(0));
@@ -328,9 +328,9 @@ mod tests {
     #[test]
     fn a_peak_is_told_with_three_digits_and_its_age_in_a_fitting_unit() {
         let mark = |age: f64| Mark { joint: 0, force: Vec3::new(0.0, 870.6, 0.0), age, strength: 1.0 };
-        assert_eq!(words(&mark(2.14e-3)), "peak 871 N, 2.1 ms ago");
-        assert_eq!(words(&mark(38.4e-6)), "peak 871 N, 38 µs ago");
-        assert_eq!(words(&mark(0.312)), "peak 871 N, 310 ms ago");
-        assert_eq!(words(&mark(1.26)), "peak 871 N, 1.3 s ago");
+        assert_eq!(peak_label(&mark(2.14e-3)), "peak 871 N, 2.1 ms ago");
+        assert_eq!(peak_label(&mark(38.4e-6)), "peak 871 N, 38 µs ago");
+        assert_eq!(peak_label(&mark(0.312)), "peak 871 N, 310 ms ago");
+        assert_eq!(peak_label(&mark(1.26)), "peak 871 N, 1.3 s ago");
     }
 }

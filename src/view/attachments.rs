@@ -20,16 +20,16 @@ const BUFFER: [f32; 2] = [0.016, 0.055];
 /// Start and end, from the joint, and radius of the bar at the limit of a hinge.
 const PEG: [f32; 3] = [0.05, 0.16, 0.013];
 /// Start and end of a motor's case along the axis of a hinge, on both sides of it, or behind a slide; and its radius.
-const ABOUT: [f32; 2] = [-0.09, 0.09];
-const BEHIND: [f32; 2] = [-0.36, -0.24];
-const CASE: f32 = 0.035;
+const HINGE_CASE: [f32; 2] = [-0.09, 0.09];
+const SLIDE_CASE: [f32; 2] = [-0.36, -0.24];
+const CASE_RADIUS: f32 = 0.035;
 /// Radius of the arc about a motor's axis, and the length of a straight arrow beside it.
-const ARC: f32 = 0.075;
-const ARROW: f32 = 0.12;
-/// Segments of an arc, its extent in turns, and the length of the strokes at its tip in radii of the arc.
+const ARC_RADIUS: f32 = 0.075;
+const ARROW_LENGTH: f32 = 0.12;
+/// Segments of an arc, its extent in turns, and the length of the barbs at its tip in radii of the arc.
 const SEGMENTS: u16 = 36;
-const TURNS: f32 = 0.75;
-const TIP: f32 = 0.45;
+const ARC_TURNS: f32 = 0.75;
+const BARB_LENGTH: f32 = 0.45;
 
 /// Drawing style.
 pub(super) struct Style {
@@ -46,7 +46,7 @@ pub(super) struct Style {
 }
 
 fn bar(from: Vec3, to: Vec3, radius: f32) -> Solid<'static> {
-    Solid::Bar { from, to, radius, kind: BarKind::Cylinder, capped: [false; 2] }
+    Solid::Bar { from, to, radius, kind: BarKind::Cylinder, has_cap: [false; 2] }
 }
 
 fn rotation(quat: &machine::Quat) -> Mat3 {
@@ -56,9 +56,9 @@ fn rotation(quat: &machine::Quat) -> Mat3 {
 /// A sleeve at the point of one body and a pin at that of the other, along the bushing axis of lowest rotational stiffness.
 pub(super) fn push_bushing(bushing: &Bushing, report: &ElementReport, frame: &Frame, style: &Style, layer: &mut Layer) {
     let axes = Pose::in_frame(frame, bushing.from.body).rotation * rotation(&bushing.axes);
-    let turning = &bushing.turning_stiffness;
-    // Ties go to the last axis: the axis of a turned part is z.
-    let softest = (0..3).rev().min_by(|&a, &b| turning[a].total_cmp(&turning[b])).unwrap_or(2);
+    let stiffness = &bushing.turning_stiffness;
+    // Of equally soft axes the last is taken: the axis of a rotationally symmetric part is z.
+    let softest = (0..3).rev().min_by(|&a, &b| stiffness[a].total_cmp(&stiffness[b])).unwrap_or(2);
     let along = axes.col(softest) * style.radius;
     let [outer, inner] = report.points.map(|point| to_f32(&point));
     push_solid(
@@ -123,9 +123,9 @@ pub(super) fn push_stop(
             let [from, to, radius] = PEG.map(|part| part * style.radius);
             bar(axis.origin + out * from, axis.origin + out * to, radius)
         } else {
-            let [thick, radius] = BUFFER.map(|part| part * style.radius);
+            let [thickness, radius] = BUFFER.map(|part| part * style.radius);
             let from = axis.origin + axis.along * limit;
-            bar(from, from + axis.along * (side * thick), radius)
+            bar(from, from + axis.along * (side * thickness), radius)
         };
         push_solid(layer, &solid, style.material);
     }
@@ -143,28 +143,32 @@ pub(super) fn push_motor(
     let Some(axis) = Axis::of(motor.on, report, scene, frame) else {
         return;
     };
-    let thick = CASE * style.radius;
-    let [from, to] = if axis.freedom.turns() { ABOUT } else { BEHIND }.map(|part| part * style.radius);
+    let thickness = CASE_RADIUS * style.radius;
+    let [from, to] = if axis.freedom.turns() { HINGE_CASE } else { SLIDE_CASE }.map(|part| part * style.radius);
     let at = |along: f32| axis.origin + axis.along * along;
-    push_solid(layer, &bar(at(from), at(to), thick), style.outer);
+    push_solid(layer, &bar(at(from), at(to), thickness), style.outer);
     let side = axis.along.any_orthonormal_vector();
     let other = axis.along.cross(side);
     let mut line = |from, to| lines.push(Line::new(from, to, style.width, [style.colour; 2]));
     if axis.freedom.turns() {
-        let (centre, radius) = (at(to), ARC * style.radius);
+        let (centre, radius) = (at(to), ARC_RADIUS * style.radius);
         let on = |part: f32, out: f32| {
-            let (sin, cos) = (TAU * TURNS * part).sin_cos();
+            let (sin, cos) = (TAU * ARC_TURNS * part).sin_cos();
             centre + (side * cos + other * sin) * (radius * out)
         };
-        let place = |k: u16| on(f32::from(k) / f32::from(SEGMENTS), 1.0);
-        (0..SEGMENTS).for_each(|k| line(place(k), place(k + 1)));
-        let back = 1.0 - TIP / (TAU * TURNS);
-        [1.0 - 0.6 * TIP, 1.0 + 0.6 * TIP].into_iter().for_each(|out| line(on(back, out), on(1.0, 1.0)));
+        let arc_point = |k: u16| on(f32::from(k) / f32::from(SEGMENTS), 1.0);
+        (0..SEGMENTS).for_each(|k| line(arc_point(k), arc_point(k + 1)));
+        let back = 1.0 - BARB_LENGTH / (TAU * ARC_TURNS);
+        [1.0 - 0.6 * BARB_LENGTH, 1.0 + 0.6 * BARB_LENGTH]
+            .into_iter()
+            .for_each(|out| line(on(back, out), on(1.0, 1.0)));
     } else {
-        let beside = side * (1.5 * thick);
-        let (tail, tip) = (at(from) + beside, at(from + ARROW * style.radius) + beside);
-        let back = tip - axis.along * (TIP * ARC * style.radius);
+        let beside = side * (1.5 * thickness);
+        let (tail, tip) = (at(from) + beside, at(from + ARROW_LENGTH * style.radius) + beside);
+        let back = tip - axis.along * (BARB_LENGTH * ARC_RADIUS * style.radius);
         line(tail, tip);
-        [-1.0, 1.0].into_iter().for_each(|sign| line(back + side * (sign * 0.6 * TIP * ARC * style.radius), tip));
+        [-1.0, 1.0]
+            .into_iter()
+            .for_each(|sign| line(back + side * (sign * 0.6 * BARB_LENGTH * ARC_RADIUS * style.radius), tip));
     }
 }

@@ -7,13 +7,13 @@ use parry3d::query::Ray;
 
 use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
 use super::attachments::{Style, push_bushing, push_motor, push_stop};
-use super::cast::{cast, room};
+use super::cast::{cast, max_outer_radii};
 use super::coil::push_coil;
-use super::cover::{Cover, Covered};
+use super::cover::{Cover, CoverKind};
 use super::drawn::{self, DrawnJoint, DrawnShape};
 use super::ground::push_ground;
 use super::instances::{self, bar, placed, push_label};
-use super::near::Near;
+use super::relative::RelativeShot;
 use super::solids::push_solid;
 use super::symbols::{Symbol, symbols};
 use super::theme::Material;
@@ -38,11 +38,11 @@ pub struct SceneView {
     /// Coordinate of the floor along `down`, m.
     floor: f32,
     /// Largest outer radius of each drawn socket, m, limited by the part that carries it.
-    pub(super) room: Vec<f32>,
+    pub(super) max_outer_radii: Vec<f32>,
     /// Points of the moving parts at the start, m, for the occlusion test of fixed parts.
-    watched: Vec<Vec3>,
+    occlusion_points: Vec<Vec3>,
     /// Ball joints at the start.
-    at_start: Vec<DrawnJoint>,
+    initial_joints: Vec<DrawnJoint>,
 }
 
 /// Smallest picture edge that leaves room for the triad, points.
@@ -53,9 +53,9 @@ const SMALLEST_WITH_GRAVITY: f32 = 300.0;
 const HALO: f32 = 1.7;
 const WIDEST_HALO: f32 = 22.0;
 /// Opacity of a ball in front of a wear map.
-const CLEAR_BALL: f32 = 0.25;
+const WEAR_BALL_OPACITY: f32 = 0.25;
 /// Most points of moving parts tested for occlusion: every frame casts a ray to each.
-const MOST_WATCHED: usize = 600;
+const MAX_OCCLUSION_POINTS: usize = 600;
 /// Width of an arrow's outline, points.
 const OUTLINE: f32 = 1.1;
 /// Radius of a drawn spring, in radii of the scene.
@@ -69,8 +69,8 @@ impl SceneView {
         let (parts, plates) = drawn::parts(scene);
         let joints = drawn::joints(scene, frame, 1.0);
         let down = to_f32(&scene.view.down.unit());
-        let without = bounds(&extents(&parts, &[], frame, &joints));
-        let symbols = symbols(scene, &parts, frame, &joints, without.radius);
+        let bounds_without_symbols = bounds(&extents(&parts, &[], frame, &joints));
+        let symbols = symbols(scene, &parts, frame, &joints, bounds_without_symbols.radius);
         let extents = extents(&parts, &symbols, frame, &joints);
         let bounds = bounds(&extents);
         let lowest = extents.iter().map(|(p, r)| p.dot(down) + r).fold(f32::NEG_INFINITY, f32::max);
@@ -80,25 +80,25 @@ impl SceneView {
             None if lowest.is_finite() => lowest + 0.15 * bounds.radius,
             None => bounds.radius,
         };
-        let room = room(scene, &parts, frame, &joints);
+        let max_outer_radii = max_outer_radii(scene, &parts, frame, &joints);
         let moving = parts.iter().filter(|part| part.body.is_some());
-        let mut watched = Vec::new();
+        let mut occlusion_points = Vec::new();
         for part in moving {
             let mut ends = Vec::new();
             part.place(frame, &joints).extent(|point, _| ends.push(point));
             let middle = ends.iter().sum::<Vec3>() / ends.len().max(1) as f32;
-            watched.push(middle);
+            occlusion_points.push(middle);
             // A bar is long: include its ends.
-            watched.extend(ends.into_iter().take(2).filter(|_| part.is_bar()));
+            occlusion_points.extend(ends.into_iter().take(2).filter(|_| part.is_bar()));
         }
-        watched.retain(|point| point.is_finite());
-        let apart = watched.len().div_ceil(MOST_WATCHED).max(1);
-        let watched = watched.into_iter().step_by(apart).collect();
+        occlusion_points.retain(|point| point.is_finite());
+        let stride = occlusion_points.len().div_ceil(MAX_OCCLUSION_POINTS).max(1);
+        let occlusion_points = occlusion_points.into_iter().step_by(stride).collect();
         Self {
-            room,
-            watched,
+            max_outer_radii,
+            occlusion_points,
             symbols,
-            at_start: joints,
+            initial_joints: joints,
             parts,
             plates: plates.into(),
             joint_names: scene.machine.ball_joints.iter().map(|joint| joint.name.as_str().into()).collect(),
@@ -129,8 +129,8 @@ impl SceneView {
         self.fit_around(camera, scene, frame, options, size, &[]);
     }
 
-    /// The same with the machine clear of `plates` (least and greatest corner, pixels), which overlay the picture. Selects the
-    /// largest such view, or the one with the least area under plates.
+    /// As [`Self::fit`], with the machine clear of `plates` (least and greatest corner, pixels), which overlay the picture.
+    /// Selects the largest such view, or the one with the least area under plates.
     pub fn fit_around(
         &self,
         camera: &mut Camera,
@@ -146,7 +146,7 @@ impl SceneView {
         const CELLS: f32 = 80.0;
         const GAP: f32 = 1.5;
         // Most solids compared with the plates; beyond that some are skipped.
-        const MOST: usize = 300;
+        const MAX_SOLIDS: usize = 300;
         let solids = self.solids(scene, frame, options);
         let mut balls: Vec<(Vec3, f32)> = solids.iter().flatten().copied().collect();
         // Half a reference length of arrows around each joint: they point anywhere, and most are shorter. Included even if
@@ -155,41 +155,42 @@ impl SceneView {
         balls.extend(frame.joints.iter().map(|joint| (to_f32(&joint.socket_centre), arrow)));
         balls.retain(|(centre, radius)| centre.is_finite() && radius.is_finite());
         let whole = Vec2::new(size[0] as f32, size[1] as f32);
-        let mut most = [0.0_f32; 4];
+        let mut reserved = [0.0_f32; 4];
         for [low, high] in plates {
             let middle = (*low + *high) / 2.0;
             let (x, y) = if middle.x < whole.x / 2.0 { (0, high.x) } else { (1, whole.x - low.x) };
-            most[x] = most[x].max(y);
+            reserved[x] = reserved[x].max(y);
             let (x, y) = if middle.y < whole.y / 2.0 { (2, high.y) } else { (3, whole.y - low.y) };
-            most[x] = most[x].max(y);
+            reserved[x] = reserved[x].max(y);
         }
         let shares = |room: f32| SHARES.into_iter().map(move |share| share * room).take(if room > 0.0 { 4 } else { 1 });
-        let mut tried: Vec<([f32; 4], Camera)> = Vec::new();
-        for left in shares(most[0]) {
-            for right in shares(most[1]) {
-                for top in shares(most[2]) {
-                    for bottom in shares(most[3]) {
+        let mut candidates: Vec<([f32; 4], Camera)> = Vec::new();
+        for left in shares(reserved[0]) {
+            for right in shares(reserved[1]) {
+                for top in shares(reserved[2]) {
+                    for bottom in shares(reserved[3]) {
                         let (mut moved, free) = (*camera, [left, right, top, bottom]);
                         moved.fit_balls(&balls, size, free);
-                        tried.push((free, moved));
+                        candidates.push((free, moved));
                     }
                 }
             }
         }
         let room = |free: &[f32; 4]| free.iter().sum::<f32>();
-        tried.sort_by(|(a, near), (b, far)| near.distance.total_cmp(&far.distance).then(room(a).total_cmp(&room(b))));
+        candidates
+            .sort_by(|(a, near), (b, far)| near.distance.total_cmp(&far.distance).then(room(a).total_cmp(&room(b))));
         let cell = whole.min_element() / CELLS;
-        let step = solids.len().div_ceil(MOST).max(1);
+        let step = solids.len().div_ceil(MAX_SOLIDS).max(1);
         let mut least = f32::INFINITY;
         let mut best = *camera;
-        for (_, moved) in tried {
+        for (_, moved) in candidates {
             let mut cover = Cover::new(size, cell);
             let eye = moved.view(size);
             for solid in solids.iter().step_by(step).filter(|_| !plates.is_empty()) {
-                cover.add(&eye, size, solid.iter().copied(), Covered::Body);
+                cover.add(&eye, size, solid.iter().copied(), CoverKind::Body);
             }
             let gap = Vec2::splat(GAP * cell);
-            let covered = |[low, high]: &[Vec2; 2]| cover.under(*low - gap, *high + gap)[0];
+            let covered = |[low, high]: &[Vec2; 2]| cover.covered_fractions(*low - gap, *high + gap)[0];
             let covered: f32 = plates.iter().map(covered).sum();
             if covered < least {
                 (least, best) = (covered, moved);
@@ -201,31 +202,31 @@ impl SceneView {
         *camera = best;
     }
 
-    /// Magnification actually drawn for the requested one in `options`.
+    /// Magnification as drawn; at most the one requested in `options`.
     pub(super) fn magnification(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> f32 {
-        drawn::magnification(scene, frame, &self.room, options.magnification)
+        drawn::magnification(scene, frame, &self.max_outer_radii, options.magnification)
     }
 
     /// Opacity of part `index` from `eye`: a fixed part that hides much of the moving parts becomes translucent. It is
     /// based on the first frame, so that it changes only with the viewpoint.
     pub(super) fn opacity(&self, index: usize, eye: Vec3) -> f32 {
-        const HIDES: [f32; 2] = [0.05, 0.16];
-        const LEAST: f32 = 0.22;
-        if self.parts[index].body.is_some() || self.watched.is_empty() {
+        const HIDDEN_RANGE: [f32; 2] = [0.05, 0.16];
+        const MIN_OPACITY: f32 = 0.22;
+        if self.parts[index].body.is_some() || self.occlusion_points.is_empty() {
             return 1.0;
         }
-        let solid = self.parts[index].place(&Frame::default(), &self.at_start);
+        let solid = self.parts[index].place(&Frame::default(), &self.initial_joints);
         let hidden = |point: &&Vec3| {
             let to_point = **point - eye;
             let ray = Ray::new(eye, to_point.normalize_or_zero());
             cast(&solid, &ray).is_some_and(|distance| distance < to_point.length())
         };
-        let share = self.watched.iter().filter(hidden).count() as f32 / self.watched.len() as f32;
-        let t = ((share - HIDES[0]) / (HIDES[1] - HIDES[0])).clamp(0.0, 1.0);
-        1.0 - (1.0 - LEAST) * t * t * (3.0 - 2.0 * t)
+        let share = self.occlusion_points.iter().filter(hidden).count() as f32 / self.occlusion_points.len() as f32;
+        let t = ((share - HIDDEN_RANGE[0]) / (HIDDEN_RANGE[1] - HIDDEN_RANGE[0])).clamp(0.0, 1.0);
+        1.0 - (1.0 - MIN_OPACITY) * t * t * (3.0 - 2.0 * t)
     }
 
-    /// For each drawn thing, spheres (centre, radius) whose convex hull contains it.
+    /// For each drawn solid, spheres (centre, radius) whose convex hull contains it.
     fn solids(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> Vec<Vec<(Vec3, f32)>> {
         let joints = drawn::joints(scene, frame, self.magnification(scene, frame, options));
         let palette = Palette::of(options.theme);
@@ -255,11 +256,11 @@ impl SceneView {
 
     /// Rebuilds `out`, reusing its buffers.
     pub fn build(&self, shot: &Shot<'_>, out: &mut DrawList) {
-        let near = Near::of(shot);
-        let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
+        let relative = RelativeShot::of(shot);
+        let shot = &relative.as_ref().map_or(*shot, |relative| relative.shot(shot));
         let Shot { scene, frame, options, camera, .. } = *shot;
         let palette = Palette::of(options.theme);
-        self.start(shot, &palette, out);
+        self.begin(shot, &palette, out);
 
         let m = self.magnification(scene, frame, options);
         out.magnification = m;
@@ -288,13 +289,13 @@ impl SceneView {
                 out.solid.push(Mesh::Sphere, ball);
             } else {
                 let [r, g, b, _] = ball.colour;
-                let colour = [r, g, b, CLEAR_BALL];
+                let colour = [r, g, b, WEAR_BALL_OPACITY];
                 out.clear_balls.push(Instance { colour, ..ball });
             }
             let flash = shot.marks.flash(i);
             if options.flash && flash > 0.02 {
                 let light = Material { colour: palette.flash.with_opacity(flash), ..palette.ball };
-                // A wider ring would hide the surroundings of the joint in a close-up.
+                // In a close-up, a wider ring would hide the surroundings of the joint.
                 let pixel = (joint.socket_centre - eye).dot(-camera.axes().2) * camera.metres_per_pixel(shot.size)
                     / camera.distance;
                 let ring = ((HALO - 1.0) * joint.outer).min(WIDEST_HALO * shot.pixels_per_point * pixel.max(0.0));
@@ -368,7 +369,7 @@ impl SceneView {
         }
     }
 
-    fn start(&self, shot: &Shot<'_>, palette: &Palette, out: &mut DrawList) {
+    fn begin(&self, shot: &Shot<'_>, palette: &Palette, out: &mut DrawList) {
         let meshes = Mesh::SHARED + self.plates.len();
         for layer in [
             &mut out.solid,
@@ -474,7 +475,7 @@ fn extents(parts: &[DrawnShape], symbols: &[Symbol], frame: &Frame, joints: &[Dr
     solids(parts, symbols, frame, joints).into_iter().flatten().collect()
 }
 
-/// The same, separately for each thing.
+/// As [`extents`], separately for each solid.
 fn solids(parts: &[DrawnShape], symbols: &[Symbol], frame: &Frame, joints: &[DrawnJoint]) -> Vec<Vec<(Vec3, f32)>> {
     let pins = symbols.iter().map(|symbol| symbol.ends(frame).map(|end| (end, symbol.radius)).to_vec());
     let shapes = parts.iter().map(|part| {
@@ -504,24 +505,24 @@ fn bounds(extents: &[(Vec3, f32)]) -> Bounds {
     Bounds { centre, radius: radius.max(1e-4) }
 }
 
-/// A magnification in words, without the multiplication sign.
-pub(super) fn times(x: f32) -> String {
+/// A magnification as text, without the multiplication sign.
+pub(super) fn format_factor(x: f32) -> String {
     if (x - x.round()).abs() < 0.05 { format!("{x:.0}") } else { format!("{x:.1}") }
 }
 
-fn magnification_text(drawn: f32, asked: f32) -> String {
-    if drawn < asked * 0.999 {
-        format!("clearance drawn ×{} (×{} does not fit)", times(drawn), times(asked))
+fn magnification_text(drawn: f32, requested: f32) -> String {
+    if drawn < requested * 0.999 {
+        format!("clearance drawn ×{} (×{} does not fit)", format_factor(drawn), format_factor(requested))
     } else {
-        format!("clearance drawn ×{}", times(drawn))
+        format!("clearance drawn ×{}", format_factor(drawn))
     }
 }
 
 /// Unit vector from a joint's ball to the contact point, and 1 while in contact.
 fn touch(report: &JointReport) -> [f32; 4] {
-    let touches = matches!(report.state, ContactMode::Creep | ContactMode::Slip);
+    let is_in_contact = matches!(report.state, ContactMode::Creep | ContactMode::Slip);
     let outwards = to_f32(&report.eccentricity).normalize_or_zero();
-    outwards.extend(f32::from(u8::from(touches))).to_array()
+    outwards.extend(f32::from(u8::from(is_in_contact))).to_array()
 }
 
 /// The halves of all sockets, sorted from far to near as seen from `eye`.

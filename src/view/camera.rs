@@ -42,7 +42,7 @@ pub struct Camera {
     pub yaw: f32,
     /// Elevation, rad; positive looks down.
     pub pitch: f32,
-    /// Eye to target, m.
+    /// Distance from eye to target, m.
     pub distance: f32,
     /// Vertical field of view, rad.
     pub field_of_view: f32,
@@ -53,7 +53,7 @@ pub struct Camera {
 }
 
 /// Steepest elevation; a right angle looks straight down.
-const STEEPEST: f32 = std::f32::consts::FRAC_PI_2;
+const MAX_PITCH: f32 = std::f32::consts::FRAC_PI_2;
 
 impl Camera {
     /// Isometric view of `bounds` with `down` pointing down on the screen.
@@ -80,7 +80,7 @@ impl Camera {
 
     /// Sets an isometric view with other than the default yaw and pitch, rad.
     pub fn with_isometric(mut self, yaw: f32, pitch: f32) -> Self {
-        self.isometric = (yaw, pitch.clamp(-STEEPEST, STEEPEST));
+        self.isometric = (yaw, pitch.clamp(-MAX_PITCH, MAX_PITCH));
         self.preset(Preset::Isometric);
         self
     }
@@ -89,8 +89,8 @@ impl Camera {
     pub fn preset(&mut self, preset: Preset) {
         (self.yaw, self.pitch) = match preset {
             Preset::Front => (0.0, 0.0),
-            Preset::Side => (STEEPEST, 0.0),
-            Preset::Top => (0.0, STEEPEST),
+            Preset::Side => (MAX_PITCH, 0.0),
+            Preset::Top => (0.0, MAX_PITCH),
             Preset::Isometric => self.isometric,
         };
     }
@@ -112,8 +112,8 @@ impl Camera {
         // Slope of one pixel. The reserved space is limited so that most of the picture remains.
         let pixel = 2.0 * (self.field_of_view / 2.0).tan() / height;
         let free_of = |edge: f32, low: f32, high: f32| {
-            let keep = (0.6 * edge / (low + high).max(1e-3)).min(1.0);
-            let (middle, half) = (keep * (low - high) / 2.0, (edge - keep * (low + high)) / 2.0 / MARGIN);
+            let kept_share = (0.6 * edge / (low + high).max(1e-3)).min(1.0);
+            let (middle, half) = (kept_share * (low - high) / 2.0, (edge - kept_share * (low + high)) / 2.0 / MARGIN);
             (pixel * (half - middle), pixel * (half + middle))
         };
         // Along one screen axis, up to slopes `low` and `high`: a sphere at (x, depth z towards the eye) is inside both
@@ -150,7 +150,7 @@ impl Camera {
         if level.length() > 1e-3 {
             self.yaw = level.x.atan2(level.y) + 0.25;
         }
-        self.pitch = (out.dot(self.up).clamp(-1.0, 1.0).asin() + 0.25).clamp(-STEEPEST, STEEPEST);
+        self.pitch = (out.dot(self.up).clamp(-1.0, 1.0).asin() + 0.25).clamp(-MAX_PITCH, MAX_PITCH);
         self.fit(Bounds { centre, radius }, 1.0);
     }
 
@@ -158,7 +158,7 @@ impl Camera {
     pub fn orbit(&mut self, drag: Vec2) {
         const RADIANS_PER_PIXEL: f32 = 0.006;
         self.yaw = (self.yaw - drag.x * RADIANS_PER_PIXEL).rem_euclid(std::f32::consts::TAU);
-        self.pitch = (self.pitch + drag.y * RADIANS_PER_PIXEL).clamp(-STEEPEST, STEEPEST);
+        self.pitch = (self.pitch + drag.y * RADIANS_PER_PIXEL).clamp(-MAX_PITCH, MAX_PITCH);
     }
 
     /// Pans by a drag of `drag` pixels: points at the target's distance stay under the cursor.
@@ -196,7 +196,7 @@ impl Camera {
         }
     }
 
-    /// Moves with a followed point: call each frame with its position, or `None` to stay.
+    /// Moves with a followed point. Call in each frame with its position, or `None` to stay.
     pub fn follow(&mut self, point: Option<Vec3>) {
         if let (Some(now), Some(before)) = (point, self.followed) {
             self.target += now - before;
@@ -322,8 +322,8 @@ mod tests {
         for point in [Vec3::new(0.1, 0.0, 0.2), Vec3::new(0.3, -0.2, -0.1), camera.target] {
             let pixel = camera.project(point, SIZE).expect("before the eye");
             let (origin, direction) = camera.ray(pixel, SIZE);
-            let miss = (point - origin).cross(direction).length();
-            assert!(miss < 1e-5, "passes {miss} m beside {point}");
+            let distance = (point - origin).cross(direction).length();
+            assert!(distance < 1e-5, "passes {distance} m from {point}");
         }
     }
 
@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn coming_nearer_to_a_point_keeps_it_in_its_place_and_in_front() {
+    fn zooming_about_a_point_keeps_it_in_place_and_in_front() {
         let mut camera = camera(SignedAxis::PlusX);
         let point = Vec3::new(0.3, 0.05, -0.2);
         let before = camera.project(point, SIZE).expect("before the eye");
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn following_keeps_the_followed_point_in_its_place_on_the_screen() {
+    fn following_keeps_the_followed_point_in_place_on_the_screen() {
         let mut camera = camera(SignedAxis::MinusZ);
         let start = Vec3::new(0.25, 0.0, 0.1);
         camera.follow(Some(start));

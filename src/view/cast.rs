@@ -20,7 +20,7 @@ pub(super) fn distance(solid: &Solid<'_>, point: Vec3) -> Option<f32> {
 }
 
 /// Queries the solid's placed shape; `None` if it has none.
-fn with_shape<T>(solid: &Solid<'_>, ask: impl FnOnce(&dyn Shape, &ParryPose) -> T) -> Option<T> {
+fn with_shape<T>(solid: &Solid<'_>, query: impl FnOnce(&dyn Shape, &ParryPose) -> T) -> Option<T> {
     // A broken frame must not reach parry's iterations.
     let mut finite = true;
     solid.extent(|centre, radius| finite &= centre.is_finite() && radius.is_finite());
@@ -37,19 +37,19 @@ fn with_shape<T>(solid: &Solid<'_>, ask: impl FnOnce(&dyn Shape, &ParryPose) -> 
             let turn = Quat::from_rotation_arc(Vec3::Y, (to - from).normalize_or(Vec3::Y));
             let pose = ParryPose::from_parts((from + to) / 2.0, turn);
             match kind {
-                BarKind::Capsule => ask(&Capsule::new_y(half, radius), &pose),
-                BarKind::Cylinder => ask(&Cylinder::new(half, radius), &pose),
-                BarKind::Cone => ask(&Cone::new(half, radius), &pose),
+                BarKind::Capsule => query(&Capsule::new_y(half, radius), &pose),
+                BarKind::Cylinder => query(&Cylinder::new(half, radius), &pose),
+                BarKind::Cone => query(&Cone::new(half, radius), &pose),
             }
         }
         Solid::Box { centre, size, rotation } => {
             let pose = ParryPose::from_parts(centre, Quat::from_mat3(&rotation));
-            ask(&Cuboid::new(size / 2.0), &pose)
+            query(&Cuboid::new(size / 2.0), &pose)
         }
-        Solid::Ball { centre, radius } => ask(&Ball::new(radius), &ParryPose::from_translation(centre)),
-        Solid::Own { shape, pose: Pose { position, rotation }, .. } => {
+        Solid::Ball { centre, radius } => query(&Ball::new(radius), &ParryPose::from_translation(centre)),
+        Solid::Mesh { shape, pose: Pose { position, rotation }, .. } => {
             let pose = ParryPose::from_parts(position, Quat::from_mat3(&rotation));
-            ask(&**shape?, &pose)
+            query(&**shape?, &pose)
         }
     })
 }
@@ -60,8 +60,8 @@ pub(super) fn cast_ball(centre: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
 
 /// Outer radius, m, to which the socket of each ball joint may grow before it intersects the part that carries it, with
 /// `joints` drawn without magnification. Parts that it already touches, or that end at its outer face, do not limit it.
-pub(super) fn room(scene: &Scene, parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<f32> {
-    let room_of = |(i, joint): (usize, &DrawnJoint)| {
+pub(super) fn max_outer_radii(scene: &Scene, parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<f32> {
+    let max_outer_radius = |(i, joint): (usize, &DrawnJoint)| {
         let body = scene.machine.ball_joints[i].socket.body;
         parts
             .iter()
@@ -70,5 +70,5 @@ pub(super) fn room(scene: &Scene, parts: &[DrawnShape], frame: &Frame, joints: &
             .filter(|&distance| distance > joint.outer)
             .fold(f32::INFINITY, f32::min)
     };
-    joints.iter().enumerate().map(room_of).collect()
+    joints.iter().enumerate().map(max_outer_radius).collect()
 }

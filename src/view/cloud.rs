@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::arrows::push_error_arrow;
 use super::instances::push_label;
-use super::near::Near;
+use super::relative::RelativeShot;
 use super::theme::Ghost;
 use super::{DrawList, LabelKind, Palette, SceneView, Shot, build};
 use crate::units::format_quantity_digits;
@@ -15,8 +15,8 @@ pub struct Cloud {
     /// Tip without play, and the error there, world axes, m.
     pub arrows: Vec<[Vec3; 2]>,
     /// Length of an arrow, over that of the error.
-    pub times: f32,
-    /// What the errors are.
+    pub factor: f32,
+    /// Name of the errors.
     pub name: &'static str,
     /// Remark on them, for the label.
     pub note: &'static str,
@@ -33,17 +33,18 @@ impl Cloud {
 impl SceneView {
     /// Adds `cloud` to the list built from `shot`, with a label at the longest arrow.
     pub fn add_cloud(&self, shot: &Shot<'_>, cloud: &Cloud, out: &mut DrawList) {
-        let near = Near::of(shot);
-        let origin = near.as_ref().map_or(Vec3::ZERO, |_| shot.camera.target);
-        let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
+        let relative = RelativeShot::of(shot);
+        let origin = relative.as_ref().map_or(Vec3::ZERO, |_| shot.camera.target);
+        let shot = &relative.as_ref().map_or(*shot, |relative| relative.shot(shot));
         let colour = Palette::of(shot.options.theme).ghost(Ghost::Twin).edge;
         for [tip, error] in &cloud.arrows {
-            push_error_arrow(shot, *tip - origin, *error * cloud.times, colour, out);
+            push_error_arrow(shot, *tip - origin, *error * cloud.factor, colour, out);
         }
         if let Some([tip, error]) = cloud.longest() {
             let length = format_quantity_digits(f64::from(error.length()) * 1e6, "", 4);
-            let words = format!("{} {length} µm{}, drawn ×{}", cloud.name, cloud.note, build::times(cloud.times));
-            push_label(out, &words.into(), LabelKind::Error, *tip - origin + *error * cloud.times, colour);
+            let text =
+                format!("{} {length} µm{}, drawn ×{}", cloud.name, cloud.note, build::format_factor(cloud.factor));
+            push_label(out, &text.into(), LabelKind::Error, *tip - origin + *error * cloud.factor, colour);
         }
     }
 }
@@ -78,7 +79,7 @@ mod tests {
                 [Vec3::new(0.01, 0.02, 0.0), Vec3::new(2e-4, 0.0, -1e-4)],
                 [Vec3::new(-0.03, 0.0, 0.04), Vec3::Y * 1e-4],
             ],
-            times: 200.0,
+            factor: 200.0,
             name: "largest error",
             note: ", contact ignored",
         };

@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_coil_goes_from_end_to_end_and_keeps_to_its_radius() {
+    fn a_coil_runs_from_end_to_end_within_its_radius() {
         let (from, to) = (Vec3::new(1.0, 2.0, 3.0), Vec3::new(1.0, 2.5, 3.0));
         let mut lines = Vec::new();
         push_coil(from, to, 0.02, 2.0, Colour([1.0; 4]), &mut lines);
@@ -44,9 +44,9 @@ mod tests {
         let mut widest: f32 = 0.0;
         for line in &lines {
             let p = Vec3::from(line.from);
-            let off = (p - from).reject_from(Vec3::Y).length();
-            widest = widest.max(off);
-            assert!(off < 0.0201 && p.y >= 1.999 && p.y <= 2.501, "{p}");
+            let distance = (p - from).reject_from(Vec3::Y).length();
+            widest = widest.max(distance);
+            assert!(distance < 0.0201 && p.y >= 1.999 && p.y <= 2.501, "{p}");
         }
         assert!(widest > 0.0199);
         push_coil(from, from, 0.02, 2.0, Colour([1.0; 4]), &mut lines);

@@ -7,16 +7,16 @@ use super::{DrawList, Eye, Instance, Mesh, MeshData};
 /// Corners of the polygons that approximate circles.
 const CORNERS: u16 = 12;
 /// Most vertices of a mesh covered by its convex hull; larger meshes use their bounding box.
-const VERTICES: usize = 64;
+const MAX_HULL_VERTICES: usize = 64;
 /// Most instances considered in a picture; beyond that some are skipped.
-const MOST: usize = 800;
+const MAX_INSTANCES: usize = 800;
 
 /// What covers a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Covered {
+pub enum CoverKind {
     /// Nothing but background and floor.
     #[default]
-    Nothing,
+    Empty,
     /// A body.
     Body,
     /// A ball or its socket.
@@ -29,7 +29,7 @@ pub struct Cover {
     /// Edge of a cell, pixels.
     cell: f32,
     columns: usize,
-    cells: Vec<Covered>,
+    cells: Vec<CoverKind>,
     hull: Vec<Vec2>,
 }
 
@@ -38,40 +38,40 @@ impl Cover {
     pub(super) fn new(size: [u32; 2], cell: f32) -> Self {
         let cell = cell.max(1.0);
         let [columns, rows] = size.map(|edge| (edge as f32 / cell).ceil() as usize);
-        Self { cell, columns, cells: vec![Covered::Nothing; columns * rows], hull: Vec::new() }
+        Self { cell, columns, cells: vec![CoverKind::Empty; columns * rows], hull: Vec::new() }
     }
 
     /// Cover of the machine in `list`, with cells of `cell` pixels. Arrows, ghosts, lines and shadows do not count.
     pub fn of(list: &DrawList, cell: f32) -> Self {
         let mut cover = Self::new(list.size, cell);
-        let step = (list.solid.len() + list.faded.len() + list.sockets.len()).div_ceil(MOST).max(1);
+        let step = (list.solid.len() + list.faded.len() + list.sockets.len()).div_ceil(MAX_INSTANCES).max(1);
         let sphere = Mesh::Sphere.index();
         for layer in [&list.faded, &list.solid] {
             for (mesh, instances) in layer.by_mesh.iter().enumerate() {
                 // Only balls of joints have a facing sphere.
-                let what = |one: &Instance| {
-                    if mesh == sphere && one.other != [0.0; 4] { Covered::Ball } else { Covered::Body }
+                let kind = |one: &Instance| {
+                    if mesh == sphere && one.other != [0.0; 4] { CoverKind::Ball } else { CoverKind::Body }
                 };
                 for one in instances.iter().step_by(step) {
-                    cover.mark(one, mesh, list, what(one));
+                    cover.mark(one, mesh, list, kind(one));
                 }
             }
         }
         for one in list.sockets.iter().chain(&list.clear_balls).step_by(step) {
-            cover.mark(one, sphere, list, Covered::Ball);
+            cover.mark(one, sphere, list, CoverKind::Ball);
         }
         cover
     }
 
-    fn mark(&mut self, instance: &Instance, mesh: usize, list: &DrawList, what: Covered) {
+    fn mark(&mut self, instance: &Instance, mesh: usize, list: &DrawList, kind: CoverKind) {
         let [x, y, z] = instance.world_from_mesh.map(Vec4::from);
-        let place = |p: Vec3| {
+        let position = |p: Vec3| {
             let p = p.extend(1.0);
             Vec3::new(x.dot(p), y.dot(p), z.dot(p))
         };
         if Mesh::is_round(mesh) {
             let radius = Vec3::new(x.x, y.x, z.x).length();
-            return self.add(&list.eye, list.size, [(place(Vec3::ZERO), radius)], what);
+            return self.add(&list.eye, list.size, [(position(Vec3::ZERO), radius)], kind);
         }
         let circle = (0..CORNERS).map(|k| {
             let (sin, cos) = (std::f32::consts::TAU * f32::from(k) / f32::from(CORNERS)).sin_cos();
@@ -88,7 +88,7 @@ impl Cover {
         } else if let Some(own) = mesh.checked_sub(Mesh::SHARED).and_then(|plate| list.plates.get(plate)) {
             points.extend(outline(own, corner));
         }
-        self.add(&list.eye, list.size, points.into_iter().map(|point| (place(point), 0.0)), what);
+        self.add(&list.eye, list.size, points.into_iter().map(|point| (position(point), 0.0)), kind);
     }
 
     /// Adds the convex hull of spheres (centre, radius), m, as `eye` sees it in a picture of `size`. Parts behind the eye are
@@ -98,7 +98,7 @@ impl Cover {
         eye: &Eye,
         size: [u32; 2],
         spheres: impl IntoIterator<Item = (Vec3, f32)>,
-        what: Covered,
+        kind: CoverKind,
     ) {
         let [right, up] = across(&eye.clip_from_world);
         let mut points = std::mem::take(&mut self.hull);
@@ -114,12 +114,12 @@ impl Cover {
             points.extend(around.filter_map(|point| eye.project(point, size)).filter(|point| point.is_finite()));
         }
         hull(&mut points);
-        self.fill(&points, what);
+        self.fill(&points, kind);
         self.hull = points;
     }
 
     /// Fills the cells that a convex polygon touches.
-    fn fill(&mut self, polygon: &[Vec2], what: Covered) {
+    fn fill(&mut self, polygon: &[Vec2], kind: CoverKind) {
         let ys = || polygon.iter().map(|p| p.y / self.cell);
         let (top, bottom) = (ys().fold(f32::INFINITY, f32::min), ys().fold(f32::NEG_INFINITY, f32::max));
         let rows = self.cells.len() / self.columns.max(1);
@@ -148,13 +148,13 @@ impl Cover {
                 continue;
             };
             for cell in &mut self.cells[row * self.columns..][columns] {
-                *cell = (*cell).max(what);
+                *cell = (*cell).max(kind);
             }
         }
     }
 
     /// Fractions of the rectangle from `min` to `max`, pixels, covered by bodies and by balls.
-    pub fn under(&self, min: Vec2, max: Vec2) -> [f32; 2] {
+    pub fn covered_fractions(&self, min: Vec2, max: Vec2) -> [f32; 2] {
         let rows = self.cells.len() / self.columns.max(1);
         let (Some(rows), Some(columns)) = (
             span(min.y / self.cell, max.y / self.cell, rows),
@@ -166,8 +166,8 @@ impl Cover {
         let (mut bodies, mut balls) = (0_u32, 0_u32);
         for row in rows {
             for cell in &self.cells[row * self.columns..][columns.clone()] {
-                bodies += u32::from(*cell == Covered::Body);
-                balls += u32::from(*cell == Covered::Ball);
+                bodies += u32::from(*cell == CoverKind::Body);
+                balls += u32::from(*cell == CoverKind::Ball);
             }
         }
         [bodies, balls].map(|count| count as f32 / all)
@@ -190,7 +190,7 @@ fn across(clip_from_world: &Mat4) -> [Vec3; 2] {
 
 /// Points whose convex hull contains a mesh of the scene.
 fn outline(mesh: &MeshData, corner: impl Fn(u8) -> Vec3) -> Vec<Vec3> {
-    if mesh.vertices.len() <= VERTICES {
+    if mesh.vertices.len() <= MAX_HULL_VERTICES {
         return mesh.vertices.iter().map(|(p, _)| Vec3::new(p[0], p[1], p[2])).collect();
     }
     let [middle, half] = mesh.bounds();
@@ -229,9 +229,9 @@ mod tests {
         let mut cover = Cover::new([100, 80], 10.0);
         let mut points = corners.to_vec();
         hull(&mut points);
-        cover.fill(&points, Covered::Body);
+        cover.fill(&points, CoverKind::Body);
         let places = (0..8).flat_map(|y| (0..10).map(move |x| (x, y)));
-        places.filter(|(x, y)| cover.cells[y * 10 + x] == Covered::Body).collect()
+        places.filter(|(x, y)| cover.cells[y * 10 + x] == CoverKind::Body).collect()
     }
 
     #[test]
@@ -255,11 +255,11 @@ mod tests {
     fn shares_are_those_of_the_cells_that_a_rectangle_touches() {
         let mut cover = Cover::new([100, 80], 10.0);
         let corners = [(1.0, 1.0), (18.0, 1.0), (18.0, 38.0), (1.0, 38.0)].map(|(x, y)| Vec2::new(x, y));
-        cover.fill(&corners, Covered::Body);
-        cover.fill(&corners[..2], Covered::Ball);
-        assert_eq!(cover.under(Vec2::new(0.0, 0.0), Vec2::new(39.0, 19.0)), [2.0 / 8.0, 2.0 / 8.0]);
-        assert_eq!(cover.under(Vec2::new(60.0, 0.0), Vec2::new(99.0, 79.0)), [0.0; 2]);
-        assert_eq!(cover.under(Vec2::splat(-50.0), Vec2::splat(-20.0)), [0.0; 2]);
-        assert_eq!(cover.under(Vec2::splat(f32::NAN), Vec2::splat(f32::NAN)), [0.0; 2]);
+        cover.fill(&corners, CoverKind::Body);
+        cover.fill(&corners[..2], CoverKind::Ball);
+        assert_eq!(cover.covered_fractions(Vec2::new(0.0, 0.0), Vec2::new(39.0, 19.0)), [2.0 / 8.0, 2.0 / 8.0]);
+        assert_eq!(cover.covered_fractions(Vec2::new(60.0, 0.0), Vec2::new(99.0, 79.0)), [0.0; 2]);
+        assert_eq!(cover.covered_fractions(Vec2::splat(-50.0), Vec2::splat(-20.0)), [0.0; 2]);
+        assert_eq!(cover.covered_fractions(Vec2::splat(f32::NAN), Vec2::splat(f32::NAN)), [0.0; 2]);
     }
 }

@@ -192,7 +192,7 @@ pub struct Floor {
     pub lines: Colour,
 }
 
-/// What a label names.
+/// The object that a label names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LabelKind {
     /// An axis of the triad.
@@ -204,7 +204,7 @@ pub enum LabelKind {
     /// The mark of a ball joint's peak, by index.
     Peak(usize),
     /// The arrow of an external force.
-    Outside,
+    External,
     /// The error of the output point.
     Error,
 }
@@ -214,7 +214,7 @@ pub enum LabelKind {
 pub struct Label {
     /// The text.
     pub text: Arc<str>,
-    /// What it names.
+    /// The object that it names.
     pub kind: LabelKind,
     /// Anchor point, m, in the coordinates of [`DrawList::eye`].
     pub anchor: Vec3,
@@ -288,9 +288,9 @@ pub struct DrawList {
     pub floor: Option<Floor>,
     /// The scene's own meshes; shared, so that a renderer can tell by pointer whether it has loaded them.
     pub plates: Arc<[MeshData]>,
-    /// Solid things that cast shadows.
+    /// Solids that cast shadows.
     pub solid: Layer,
-    /// Fixed things in front of moving ones, drawn translucent.
+    /// Fixed solids in front of moving ones, drawn translucent.
     pub faded: Layer,
     /// Force arrows: solid, and visible through whatever is in front of them.
     pub arrows: Layer,
@@ -302,11 +302,11 @@ pub struct DrawList {
     pub halos: Vec<Instance>,
     /// Sockets, farthest first: for each the remaining half and, fainter, the half cut away.
     pub sockets: Vec<Instance>,
-    /// Cells of wear maps, in their own colours regardless of light; fainter behind other things and behind the wall.
+    /// Cells of wear maps, in their own colours regardless of light; fainter behind solids and behind the wall.
     pub wear: Layer,
     /// Translucent balls in front of wear maps.
     pub clear_balls: Vec<Instance>,
-    /// Solid things in front of everything: the triad.
+    /// Solids in front of everything: the triad.
     pub overlay: Layer,
     /// Lines.
     pub lines: Vec<Line>,

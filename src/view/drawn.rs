@@ -21,7 +21,7 @@ use crate::simulate::{BodyMotion, Frame};
 /// Largest drawn inner radius of a socket, in ball radii: it limits the magnification.
 const LARGEST_SOCKET: f32 = 4.2;
 /// Thickness of a drawn socket, in ball radii.
-const WALL: f32 = 0.26;
+const WALL_THICKNESS: f32 = 0.26;
 /// Gap drawn in an ideal joint, in ball radii: ball and socket must not coincide.
 const IDEAL_GAP: f32 = 0.02;
 
@@ -41,12 +41,12 @@ enum Form {
     Bar { ends: [End; 2], radius: f32, kind: BarKind },
     Box { centre: Vec3, size: Vec3 },
     Ball { centre: Vec3, radius: f32 },
-    Own { triangles: OwnMesh, place: Pose },
+    Mesh { triangles: SceneMesh, pose_in_body: Pose },
 }
 
 /// A mesh specific to the scene.
 #[derive(Clone)]
-struct OwnMesh {
+struct SceneMesh {
     mesh: Mesh,
     /// Shape for ray casts.
     shape: Option<SharedShape>,
@@ -64,11 +64,11 @@ pub(super) enum BarKind {
 /// End of a bar, and the ball joint it reaches into.
 struct End {
     point: Vec3,
-    at: Option<Reach>,
+    joint: Option<JointEnd>,
 }
 
 #[derive(Clone, Copy)]
-enum Reach {
+enum JointEnd {
     /// The joint's ball is on this end.
     Ball(usize),
     /// The joint's socket is in front of this end.
@@ -98,13 +98,13 @@ impl DrawnJoint {
 
 /// A placed part, world axes.
 pub(super) enum Solid<'a> {
-    /// `capped[i]`: whether end i of a capsule shows its hemisphere.
+    /// `has_cap[i]`: whether end i of a capsule shows its hemisphere.
     Bar {
         from: Vec3,
         to: Vec3,
         radius: f32,
         kind: BarKind,
-        capped: [bool; 2],
+        has_cap: [bool; 2],
     },
     Box {
         centre: Vec3,
@@ -115,7 +115,7 @@ pub(super) enum Solid<'a> {
         centre: Vec3,
         radius: f32,
     },
-    Own {
+    Mesh {
         mesh: Mesh,
         shape: Option<&'a SharedShape>,
         points: &'a [Vec3],
@@ -143,7 +143,7 @@ impl Pose {
     }
 
     /// World pose of `inner`, which is given in this frame.
-    fn of(&self, inner: &Self) -> Self {
+    fn compose(&self, inner: &Self) -> Self {
         Self { position: self.apply(inner.position), rotation: self.rotation * inner.rotation }
     }
 
@@ -160,7 +160,7 @@ impl Pose {
 /// Shapes of `scene`, and the meshes that are not shared: the zones of wear maps, then its plates and the
 /// meshes of its files.
 pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
-    let mut meshes = Meshes { data: zones::meshes(), of_files: Vec::new() };
+    let mut meshes = Meshes { data: zones::meshes(), from_files: Vec::new() };
     let mut parts = Vec::new();
     let roles = scene.machine.body_roles();
     let fixed = scene.machine.fixed_shapes.iter().enumerate().map(|(i, shape)| (None, i, shape));
@@ -199,7 +199,7 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
     let bar = |from, to, radius: f64, kind| {
         let ends = [from, to].map(|point| {
             let point = to_f32(point);
-            End { point, at: reach(scene, body, point) }
+            End { point, joint: joint_at_end(scene, body, point) }
         });
         Some(Form::Bar { ends, radius: radius as f32, kind })
     };
@@ -227,13 +227,13 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
             } else {
                 SharedShape::convex_hull(&points)
             };
-            let triangles = OwnMesh { shape, points: points.into(), mesh: meshes.add(mesh)? };
-            let place = Pose::WORLD;
-            Some(Form::Own { triangles, place })
+            let triangles = SceneMesh { shape, points: points.into(), mesh: meshes.add(mesh)? };
+            let pose_in_body = Pose::WORLD;
+            Some(Form::Mesh { triangles, pose_in_body })
         }
-        Geometry::Mesh { mesh, unit, position, rotation } => Some(Form::Own {
-            triangles: meshes.of_file(mesh, *unit)?,
-            place: Pose::new(position, &rotation.to_rotation_matrix().into_inner()),
+        Geometry::Mesh { mesh, unit, position, rotation } => Some(Form::Mesh {
+            triangles: meshes.from_file(mesh, *unit)?,
+            pose_in_body: Pose::new(position, &rotation.to_rotation_matrix().into_inner()),
         }),
     }
 }
@@ -245,7 +245,7 @@ const HAS_MESHES: bool = cfg!(not(target_arch = "wasm32"));
 struct Meshes {
     data: Vec<MeshData>,
     /// Meshes of files, with the length of the file's unit, m.
-    of_files: Vec<(Arc<mesh::Mesh>, f64, OwnMesh)>,
+    from_files: Vec<(Arc<mesh::Mesh>, f64, SceneMesh)>,
 }
 
 impl Meshes {
@@ -256,9 +256,10 @@ impl Meshes {
     }
 
     /// The mesh of a file: one for all shapes that name it.
-    fn of_file(&mut self, file: &Arc<mesh::Mesh>, unit: f64) -> Option<OwnMesh> {
-        let same = |(other, length, _): &&(Arc<mesh::Mesh>, f64, OwnMesh)| Arc::ptr_eq(other, file) && *length == unit;
-        if let Some((_, _, known)) = self.of_files.iter().find(same) {
+    fn from_file(&mut self, file: &Arc<mesh::Mesh>, unit: f64) -> Option<SceneMesh> {
+        let same =
+            |(other, length, _): &&(Arc<mesh::Mesh>, f64, SceneMesh)| Arc::ptr_eq(other, file) && *length == unit;
+        if let Some((_, _, known)) = self.from_files.iter().find(same) {
             return Some(known.clone());
         }
         let scaled = |p: &[f32; 3]| Vec3::from(p.map(|x| (f64::from(x) * unit) as f32));
@@ -266,21 +267,24 @@ impl Meshes {
         let bounds = file.bounds().map(|end| scaled(&end));
         let corner = |i: usize| Vec3::from([0, 1, 2].map(|axis| bounds[i >> axis & 1][axis]));
         let shape = if HAS_MESHES { SharedShape::trimesh(vertices, file.triangles().to_vec()).ok() } else { None };
-        let own = OwnMesh { shape, points: (0..8).map(corner).collect(), mesh: self.add(surface(file, unit))? };
-        self.of_files.push((file.clone(), unit, own.clone()));
-        Some(own)
+        let scene_mesh =
+            SceneMesh { shape, points: (0..8).map(corner).collect(), mesh: self.add(surface(file, unit))? };
+        self.from_files.push((file.clone(), unit, scene_mesh.clone()));
+        Some(scene_mesh)
     }
 }
 
 /// The ball joint that a bar's end reaches into, if any.
-fn reach(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<Reach> {
+fn joint_at_end(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<JointEnd> {
     for (i, joint) in scene.machine.ball_joints.iter().enumerate() {
         let radius = joint.contact.ball_radius as f32;
         if joint.ball.body == body && to_f32(&joint.ball.point).distance(end) < 1.3 * radius {
-            return Some(Reach::Ball(i));
+            return Some(JointEnd::Ball(i));
         }
-        if joint.socket.body == body && to_f32(&joint.socket.point).distance(end) < (LARGEST_SOCKET + WALL) * radius {
-            return Some(Reach::Socket(i));
+        if joint.socket.body == body
+            && to_f32(&joint.socket.point).distance(end) < (LARGEST_SOCKET + WALL_THICKNESS) * radius
+        {
+            return Some(JointEnd::Socket(i));
         }
     }
     None
@@ -318,16 +322,17 @@ fn plate(corners: &[Vec3], triangles: &[[usize; 3]], thickness: f32) -> Option<M
     Some(mesh)
 }
 
-/// Magnification drawn when `asked` is requested: no socket may outgrow [`LARGEST_SOCKET`] ball radii, nor its [`room`].
-pub(super) fn magnification(scene: &Scene, frame: &Frame, room: &[f32], asked: f32) -> f32 {
-    let asked = if asked.is_finite() { asked.clamp(1.0, 100.0) } else { 1.0 };
-    let drawable = scene.machine.ball_joints.iter().zip(&frame.joints).enumerate().map(|(i, (joint, now))| {
+/// Magnification as drawn, at most `requested`: no socket exceeds [`LARGEST_SOCKET`] ball radii, or its limit in
+/// `max_outer_radii`, m.
+pub(super) fn magnification(scene: &Scene, frame: &Frame, max_outer_radii: &[f32], requested: f32) -> f32 {
+    let requested = if requested.is_finite() { requested.clamp(1.0, 100.0) } else { 1.0 };
+    let limits = scene.machine.ball_joints.iter().zip(&frame.joints).enumerate().map(|(i, (joint, now))| {
         let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
         let radius = joint.contact.ball_radius as f32;
-        let room = room.get(i).copied().unwrap_or(f32::INFINITY) - WALL * radius;
+        let room = max_outer_radii.get(i).copied().unwrap_or(f32::INFINITY) - WALL_THICKNESS * radius;
         if gap > 0.0 { (room.min(LARGEST_SOCKET * radius) - radius) / gap } else { f32::INFINITY }
     });
-    drawable.fold(asked, f32::min).max(1.0)
+    limits.fold(requested, f32::min).max(1.0)
 }
 
 /// Every ball joint as drawn at magnification `m`.
@@ -344,7 +349,7 @@ pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
             shift: (m - 1.0) * eccentricity,
             ball_radius,
             inner: ball_radius + gap,
-            outer: ball_radius + gap + WALL * ball_radius,
+            outer: ball_radius + gap + WALL_THICKNESS * ball_radius,
             opening: opening.normalize_or(Vec3::Z),
         }
     });
@@ -366,7 +371,9 @@ impl DrawnShape {
     /// Whether it ends at the outer face of the socket of ball joint `joint`.
     pub fn reaches_socket(&self, joint: usize) -> bool {
         match &self.form {
-            Form::Bar { ends, .. } => ends.iter().any(|end| matches!(end.at, Some(Reach::Socket(j)) if j == joint)),
+            Form::Bar { ends, .. } => {
+                ends.iter().any(|end| matches!(end.joint, Some(JointEnd::Socket(j)) if j == joint))
+            }
             _ => false,
         }
     }
@@ -377,37 +384,37 @@ impl DrawnShape {
         match &self.form {
             Form::Bar { ends, radius, kind } => {
                 let mut points = [pose.apply(ends[0].point), pose.apply(ends[1].point)];
-                let mut capped = [true; 2];
+                let mut has_cap = [true; 2];
                 for i in 0..2 {
-                    match ends[i].at {
-                        Some(Reach::Ball(j)) => points[i] += joints.get(j).map_or(Vec3::ZERO, |joint| joint.shift),
-                        Some(Reach::Socket(j)) => {
-                            let cut = joints.get(j).and_then(|joint| leave_socket(points[1 - i], points[i], joint));
+                    match ends[i].joint {
+                        Some(JointEnd::Ball(j)) => points[i] += joints.get(j).map_or(Vec3::ZERO, |joint| joint.shift),
+                        Some(JointEnd::Socket(j)) => {
+                            let cut = joints.get(j).and_then(|joint| end_at_socket(points[1 - i], points[i], joint));
                             if let Some(point) = cut {
-                                (points[i], capped[i]) = (point, false);
+                                (points[i], has_cap[i]) = (point, false);
                             }
                         }
                         None => {}
                     }
                 }
-                Solid::Bar { from: points[0], to: points[1], radius: *radius, kind: *kind, capped }
+                Solid::Bar { from: points[0], to: points[1], radius: *radius, kind: *kind, has_cap }
             }
             Form::Box { centre, size } => {
                 Solid::Box { centre: pose.apply(*centre), size: *size, rotation: pose.rotation }
             }
             Form::Ball { centre, radius } => Solid::Ball { centre: pose.apply(*centre), radius: *radius },
-            Form::Own { triangles, place } => Solid::Own {
+            Form::Mesh { triangles, pose_in_body } => Solid::Mesh {
                 mesh: triangles.mesh,
                 shape: triangles.shape.as_ref(),
                 points: &triangles.points,
-                pose: pose.of(place),
+                pose: pose.compose(pose_in_body),
             },
         }
     }
 }
 
 /// New end of a bar from `start` to `end` that reaches into a drawn socket: on the outer face.
-fn leave_socket(start: Vec3, end: Vec3, joint: &DrawnJoint) -> Option<Vec3> {
+fn end_at_socket(start: Vec3, end: Vec3, joint: &DrawnJoint) -> Option<Vec3> {
     let radius = 0.99 * joint.outer;
     let to_end = end - joint.socket_centre;
     if to_end.length() >= radius {
@@ -436,7 +443,7 @@ impl Solid<'_> {
                 }
             }
             Solid::Ball { centre, radius } => visit(*centre, *radius),
-            Solid::Own { points, pose, .. } => points.iter().for_each(|&p| visit(pose.apply(p), 0.0)),
+            Solid::Mesh { points, pose, .. } => points.iter().for_each(|&p| visit(pose.apply(p), 0.0)),
         }
     }
 }

@@ -27,14 +27,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_lies_where_the_ground_is() {
+    fn the_ring_lies_on_the_ground() {
         let (centre, up) = (Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.6, 0.0, 0.8));
         let mut lines = Vec::new();
         push_ground(centre, up, 0.2, 2.0, Colour([1.0; 4]), &mut lines);
         assert_eq!(lines.len(), usize::from(SEGMENTS) + 2);
         for end in lines.iter().flat_map(|line| [line.from, line.to]) {
-            let off = Vec3::from(end) - centre;
-            assert!(off.dot(up).abs() < 1e-6 && (off.length() - 0.2).abs() < 1e-6);
+            let offset = Vec3::from(end) - centre;
+            assert!(offset.dot(up).abs() < 1e-6 && (offset.length() - 0.2).abs() < 1e-6);
         }
     }
 }

@@ -1,11 +1,11 @@
-//! Turns a scene at one instant into a plain list of things to draw; camera and picking. No GPU here.
+//! Turns a scene at one instant into a plain list of solids, lines and labels; camera and picking. No GPU here.
 //!
 //! Lengths are metres in world axes, f32. The view recomputes no physics: forces, gaps and contact points are
 //! those that the step reported. Usage, once per frame:
 //!
 //! ```ignore
 //! let view = SceneView::new(&scene, &first_frame);            // once per scene
-//! marks.update(&frame, &peaks, SEEN * time_scale);            // holds peaks, fades them
+//! marks.update(&frame, &peaks, MARK_DURATION * time_scale);   // holds peaks, fades them
 //! view.build(&Shot { frame: &frame, marks: &marks, options: &options, camera: &camera, trail: &[], size }, &mut list);
 //! ```
 
@@ -24,10 +24,10 @@ pub(crate) mod fixture;
 mod ghost;
 mod ground;
 mod instances;
-mod near;
 mod options;
 mod peaks;
 mod pick;
+mod relative;
 mod shot;
 mod solids;
 mod sticks;
@@ -50,8 +50,8 @@ pub use draw_list::{
 };
 pub use ghost::output_point;
 pub use options::{ArrowOptions, Quality, Scaling, ViewOptions, WearMap};
-pub use peaks::{Mark, PeakMarks, SEEN};
-pub use pick::{Hit, Picked};
+pub use peaks::{MARK_DURATION, Mark, PeakMarks};
+pub use pick::{Hit, ScenePart};
 pub use shot::Shot;
 pub use theme::{Colour, Ghost, GhostLook, Palette, Theme};
 

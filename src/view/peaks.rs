@@ -1,7 +1,7 @@
-//! Displays the hardest blow to each ball joint for some time: an impact lasts a hundredth of a frame, too short to be seen.
+//! Marks the hardest impact of each ball joint for some time: an impact lasts a hundredth of a frame, too short to be seen.
 //!
-//! A past blow has a mark of its own, never an arrow: arrows are the current forces. It fades with simulated time alone; the
-//! rate follows from the time scale, so that it stays visible equally long at any scale.
+//! A mark is never an arrow: arrows are the current forces. It fades with simulated time alone; the rate follows from the time
+//! scale, so that a mark stays visible equally long at any scale.
 
 use glam::Vec3;
 
@@ -17,18 +17,18 @@ pub struct Mark {
     pub force: Vec3,
     /// Simulated time since, s.
     pub age: f64,
-    /// 1 at the peak, falling to 0 when it is forgotten.
+    /// 1 at the peak, falling to 0 when the mark disappears.
     pub strength: f32,
 }
 
-/// The hardest blow to each joint that has not faded. Deterministic: depends only on its inputs.
+/// The hardest impact of each joint that has not faded. Deterministic: depends only on its inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PeakMarks {
     joints: Vec<Joint>,
     /// Displayed instant, s.
     now: f64,
     /// Time up to which peaks were processed, s.
-    seen: f64,
+    processed_to: f64,
     /// Fade time of a mark, s of simulated time.
     fade: f64,
     /// Largest recent force, N: the input of the automatic scale.
@@ -37,15 +37,15 @@ pub struct PeakMarks {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Joint {
-    blow: Option<Blow>,
-    /// Blow of the latest step after the displayed instant.
-    coming: Option<Blow>,
+    impact: Option<Impact>,
+    /// Impact of the latest step after the displayed instant.
+    upcoming: Option<Impact>,
     /// Largest force of a recently begun contact, N, while it still rises.
     rising: Option<f32>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Blow {
+struct Impact {
     force: Vec3,
     time: f64,
     /// Brightness of its flash.
@@ -53,17 +53,23 @@ struct Blow {
 }
 
 /// Viewing time for which a mark stays visible, s; a flash lasts half as long.
-pub const SEEN: f64 = 0.8;
+pub const MARK_DURATION: f64 = 0.8;
 /// Half-life of the automatic scale, in multiples of the fade time: slow, so that lengths can be compared.
 const SCALE_HALF_LIFE: f64 = 0.75;
-/// A current force above this fraction of the peak counts as the peak: nothing to mark.
-const PRESENT: f32 = 0.95;
-/// Least brightness: a touch a hundred times softer than the hardest recent one still shows, but does not dazzle.
-const FAINTEST: f32 = 0.15;
+/// A current force above this fraction of the peak counts as the peak, which is then not marked.
+const CURRENT_FRACTION: f32 = 0.95;
+/// Smallest brightness of a flash: a contact a hundred times softer than the hardest recent one is still visible.
+const MIN_FLASH: f32 = 0.15;
 
 impl Default for PeakMarks {
     fn default() -> Self {
-        Self { joints: Vec::new(), now: f64::NEG_INFINITY, seen: f64::NEG_INFINITY, fade: f64::INFINITY, largest: 0.0 }
+        Self {
+            joints: Vec::new(),
+            now: f64::NEG_INFINITY,
+            processed_to: f64::NEG_INFINITY,
+            fade: f64::INFINITY,
+            largest: 0.0,
+        }
     }
 }
 
@@ -75,26 +81,26 @@ impl PeakMarks {
 
     /// Drops everything up to `time`, s, as after a reset.
     pub fn clear(&mut self, time: f64) {
-        *self = Self { now: time, seen: time, ..Self::default() };
+        *self = Self { now: time, processed_to: time, ..Self::default() };
     }
 
-    /// Restores blows (joint, force, time) before the displayed instant `frame` as if they had been seen: after
+    /// Restores impacts (joint, force, time) before the displayed instant `frame` as if they had been displayed: after
     /// [`Self::clear`], when a past instant is displayed again.
-    pub fn recall(&mut self, frame: &Frame, blows: impl Iterator<Item = (usize, Vec3, f64)>, fade: f64) {
+    pub fn recall(&mut self, frame: &Frame, impacts: impl Iterator<Item = (usize, Vec3, f64)>, fade: f64) {
         self.fade = fade.max(f64::MIN_POSITIVE);
         self.joints.resize(frame.joints.len(), Joint::default());
-        for (joint, force, time) in blows.filter(|(_, force, _)| force.is_finite()) {
+        for (joint, force, time) in impacts.filter(|(_, force, _)| force.is_finite()) {
             let size = force.length();
             self.largest = self.largest.max(size);
-            let flash = (size / self.largest.max(f32::MIN_POSITIVE)).sqrt().clamp(FAINTEST, 1.0);
+            let flash = (size / self.largest.max(f32::MIN_POSITIVE)).sqrt().clamp(MIN_FLASH, 1.0);
             if let Some(joint) = self.joints.get_mut(joint) {
-                joint.take(Blow { force, time, flash }, self.fade);
+                joint.add_impact(Impact { force, time, flash }, self.fade);
             }
         }
     }
 
-    /// Processes the displayed instant and the `peaks` since the previous one (one per ball joint, or empty). A blow expires
-    /// `fade` seconds of simulated time after its peak. If time has gone back, all blows are dropped.
+    /// Processes the displayed instant and the `peaks` since the previous one (one per ball joint, or empty). An impact expires
+    /// `fade` seconds of simulated time after its peak. If time has gone back, all impacts are dropped.
     pub fn update(&mut self, frame: &Frame, peaks: &[Peak], fade: f64) {
         if frame.time < self.now {
             // The scale is kept: it is the same run.
@@ -112,72 +118,77 @@ impl PeakMarks {
             .map(|force| force as f32)
             .filter(|force| force.is_finite())
             .fold(self.largest, f32::max);
-        let Self { now, seen, .. } = *self;
+        let Self { now, processed_to, .. } = *self;
         for ((joint, peak), report) in self.joints.iter_mut().zip(peaks).zip(&frame.joints) {
             // A peak after the previous instant may be due now.
-            if let Some(blow) = joint.coming.take_if(|blow| blow.time <= now) {
-                joint.take(blow, self.fade);
+            if let Some(impact) = joint.upcoming.take_if(|impact| impact.time <= now) {
+                joint.add_impact(impact, self.fade);
             }
             let force = to_f32(&peak.normal_force);
             let size = force.length();
-            let rises = joint.rising.is_some_and(|before| size > before);
-            if !(peak.time > seen && size.is_finite() && (peak.impacts > 0 || rises)) {
+            let is_rising = joint.rising.is_some_and(|before| size > before);
+            if !(peak.time > processed_to && size.is_finite() && (peak.impacts > 0 || is_rising)) {
                 if peak.impacts > 0 && size == 0.0 {
                     // The contact begins at the end of the latest step.
                     joint.rising = Some(0.0);
-                } else if peak.time > seen {
+                } else if peak.time > processed_to {
                     joint.rising = None;
                 }
                 continue;
             }
             joint.rising = Some(size);
-            let blow = |force: Vec3, time: f64| Blow {
+            let impact = |force: Vec3, time: f64| Impact {
                 force,
                 time,
-                flash: (force.length() / hardest.max(f32::MIN_POSITIVE)).sqrt().clamp(FAINTEST, 1.0),
+                flash: (force.length() / hardest.max(f32::MIN_POSITIVE)).sqrt().clamp(MIN_FLASH, 1.0),
             };
             if peak.time <= now {
-                joint.take(blow(force, peak.time), self.fade);
+                joint.add_impact(impact(force, peak.time), self.fade);
                 continue;
             }
-            joint.coming = Some(blow(force, peak.time));
+            joint.upcoming = Some(impact(force, peak.time));
             let present = to_f32(&report.normal_force);
             if present.is_finite() && present != Vec3::ZERO {
                 // The contact has begun: show it with its current force.
-                joint.take(blow(present, now), self.fade);
+                joint.add_impact(impact(present, now), self.fade);
             }
         }
-        self.seen = peaks.iter().map(|peak| peak.time).fold(seen, f64::max);
+        self.processed_to = peaks.iter().map(|peak| peak.time).fold(processed_to, f64::max);
         for joint in &mut self.joints {
-            joint.blow = joint.blow.filter(|blow| now - blow.time < self.fade);
+            joint.impact = joint.impact.filter(|impact| now - impact.time < self.fade);
         }
         let half_lives = passed / (SCALE_HALF_LIFE * self.fade);
         let present =
             frame.joints.iter().map(|joint| joint.normal_force.norm() as f32).filter(|force| force.is_finite());
-        let marked = self.joints.iter().filter_map(|joint| joint.blow);
+        let marked = self.joints.iter().filter_map(|joint| joint.impact);
         self.largest = present
-            .chain(marked.map(|blow| blow.force.length()))
+            .chain(marked.map(|impact| impact.force.length()))
             .fold(self.largest * (-half_lives as f32).exp2(), f32::max);
     }
 
     /// The marks to draw beside the forces of `frame`: none for a joint whose current force is as large.
     pub fn marks<'a>(&'a self, frame: &'a Frame) -> impl Iterator<Item = Mark> + 'a {
-        let mark = |(joint, (held, report)): (usize, (&Joint, _))| {
-            let blow = held.blow?;
+        let mark = |(joint, (state, report)): (usize, (&Joint, _))| {
+            let impact = state.impact?;
             let report: &crate::simulate::JointReport = report;
-            let age = self.now - blow.time;
-            let over = (report.normal_force.norm() as f32) < PRESENT * blow.force.length();
-            over.then_some(Mark { joint, force: blow.force, age, strength: (1.0 - age / self.fade) as f32 })
+            let age = self.now - impact.time;
+            let exceeds_current = (report.normal_force.norm() as f32) < CURRENT_FRACTION * impact.force.length();
+            exceeds_current.then_some(Mark {
+                joint,
+                force: impact.force,
+                age,
+                strength: (1.0 - age / self.fade) as f32,
+            })
         };
         self.joints.iter().zip(&frame.joints).enumerate().filter_map(mark)
     }
 
     /// Brightness of the flash of ball joint `joint`, 0..=1.
     pub fn flash(&self, joint: usize) -> f32 {
-        let blow = self.joints.get(joint).and_then(|joint| joint.blow);
-        blow.map_or(0.0, |blow| {
-            let left = 1.0 - 2.0 * (self.now - blow.time) / self.fade;
-            blow.flash * left.max(0.0) as f32
+        let impact = self.joints.get(joint).and_then(|joint| joint.impact);
+        impact.map_or(0.0, |impact| {
+            let left = 1.0 - 2.0 * (self.now - impact.time) / self.fade;
+            impact.flash * left.max(0.0) as f32
         })
     }
 
@@ -192,14 +203,14 @@ impl PeakMarks {
 }
 
 impl Joint {
-    /// Shows `blow` unless the displayed one, faded, is still stronger.
-    fn take(&mut self, blow: Blow, fade: f64) {
-        let faded = self.blow.map_or(0.0, |before| {
-            let left = 1.0 - (blow.time - before.time) / fade;
+    /// Shows `impact` unless the displayed one, faded, is still stronger.
+    fn add_impact(&mut self, impact: Impact, fade: f64) {
+        let faded = self.impact.map_or(0.0, |before| {
+            let left = 1.0 - (impact.time - before.time) / fade;
             before.force.length() * left.max(0.0) as f32
         });
-        if blow.force.length() >= faded {
-            self.blow = Some(blow);
+        if impact.force.length() >= faded {
+            self.impact = Some(impact);
         }
     }
 }
@@ -256,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn time_that_runs_back_and_a_reset_leave_nothing() {
+    fn going_back_and_a_reset_drop_all_marks() {
         let mut marks = PeakMarks::new();
         let hit = peak(0.6e-3, 800.0, 1);
         let (before, after) = (frame(0.5e-3, 0.0), frame(1e-3, 0.0));
@@ -266,13 +277,13 @@ mod tests {
         marks.update(&after, &hit, 1.0);
         assert!(mark(&marks, &after).is_some());
         marks.clear(1e-3);
-        // Blows before that time are not new.
+        // Impacts before that time are not new.
         marks.update(&after, &hit, 1.0);
         assert_eq!((mark(&marks, &after), marks.flash(0)), (None, 0.0));
     }
 
     #[test]
-    fn a_contact_that_lasts_is_neither_marked_nor_lit() {
+    fn a_lasting_contact_is_neither_marked_nor_flashed() {
         let mut marks = PeakMarks::new();
         for k in 1..100 {
             let time = f64::from(k) * 1e-3;
@@ -284,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blow_that_is_watched_as_it_rises_and_falls_is_marked_once_it_falls() {
+    fn an_impact_resolved_by_frames_is_marked_once_its_force_falls() {
         // The contact begins at the end of a step, in a frame of its own: still without force.
         let mut marks = PeakMarks::new();
         marks.update(&frame(1e-6, 0.0), &peak(0.0, 0.0, 1), 80e-6);
@@ -304,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_peak_later_than_the_instant_on_show_waits_for_it() {
+    fn a_peak_after_the_displayed_instant_is_marked_when_it_is_reached() {
         let mut marks = PeakMarks::new();
         let shown = frame(1.0e-3, 0.0);
         marks.update(&shown, &peak(1.2e-3, 500.0, 1), 0.1);
@@ -317,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blow_whose_peak_is_yet_to_come_lights_up_and_is_not_marked() {
+    fn an_impact_before_its_peak_flashes_and_is_not_marked() {
         let mut marks = PeakMarks::new();
         let shown = frame(1.0e-3, 300.0);
         marks.update(&shown, &peak(1.001e-3, 310.0, 1), 0.1);
@@ -326,17 +337,17 @@ mod tests {
     }
 
     #[test]
-    fn the_stronger_of_two_blows_is_marked_until_it_has_faded_below_the_other() {
+    fn the_stronger_of_two_impacts_is_marked_until_it_has_faded_below_the_other() {
         let mut marks = PeakMarks::new();
-        let mut blow = |time: f64, force: f64| {
+        let mut impact = |time: f64, force: f64| {
             let shown = frame(time + 1e-4, 0.0);
             marks.update(&shown, &peak(time, force, 1), 0.1);
             mark(&marks, &shown).expect("a mark").force.x
         };
-        assert_eq!(blow(0.01, 800.0), 800.0);
-        assert_eq!(blow(0.02, 300.0), 800.0);
-        assert_eq!(blow(0.08, 300.0), 300.0);
-        assert_eq!(blow(0.09, 400.0), 400.0);
+        assert_eq!(impact(0.01, 800.0), 800.0);
+        assert_eq!(impact(0.02, 300.0), 800.0);
+        assert_eq!(impact(0.08, 300.0), 300.0);
+        assert_eq!(impact(0.09, 400.0), 400.0);
     }
 
     #[test]

@@ -8,9 +8,9 @@ use super::drawn;
 use super::{SceneView, Shot};
 use crate::simulate::Frame;
 
-/// A thing that can be hovered or followed.
+/// A part of the scene that can be hovered or followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Picked {
+pub enum ScenePart {
     /// A body, by index.
     Body(usize),
     /// A ball joint, by index.
@@ -22,21 +22,21 @@ pub enum Picked {
 /// Where the cursor's ray first meets the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// What was hit.
-    pub what: Picked,
-    /// Where, m, world axes.
+    /// The part that was hit.
+    pub what: ScenePart,
+    /// Point of intersection, m, world axes.
     pub point: Vec3,
 }
 
 impl SceneView {
-    /// Nearest drawn thing under `pixel` of the picture described by `shot`, or `None`.
+    /// Nearest drawn part under `pixel` of the picture described by `shot`, or `None`.
     pub fn pick(&self, shot: &Shot<'_>, pixel: Vec2) -> Option<Hit> {
         let (origin, direction) = shot.camera.ray(pixel, shot.size);
         let ray = Ray::new(origin, direction);
         let m = self.magnification(shot.scene, shot.frame, shot.options);
         let joints = drawn::joints(shot.scene, shot.frame, m);
         let parts = self.parts.iter().enumerate().filter_map(|(i, part)| {
-            let what = part.body.map_or(Picked::Fixed(part.index), Picked::Body);
+            let what = part.body.map_or(ScenePart::Fixed(part.index), ScenePart::Body);
             let distance = cast(&part.place(shot.frame, &joints), &ray)?;
             // Translucent parts do not block picking.
             (self.opacity(i, origin) > 0.6).then_some((distance, what))
@@ -47,18 +47,18 @@ impl SceneView {
             // A ray through the cut-away half of the socket continues inside.
             let socket = socket.filter(|&t| (ray.point_at(t) - joint.socket_centre).dot(joint.opening) <= 0.0);
             let distance = [ball, socket].into_iter().flatten().min_by(f32::total_cmp)?;
-            Some((distance, Picked::Joint(i)))
+            Some((distance, ScenePart::Joint(i)))
         });
         let (distance, what) = parts.chain(balls).min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(Hit { what, point: ray.point_at(distance) })
     }
 
     /// Point to follow: a body's origin or a joint's socket centre, m; `None` for fixed shapes.
-    pub fn anchor(&self, frame: &Frame, picked: Picked) -> Option<Vec3> {
+    pub fn anchor(&self, frame: &Frame, picked: ScenePart) -> Option<Vec3> {
         match picked {
-            Picked::Body(i) => frame.bodies.get(i).map(|body| super::to_f32(&body.position)),
-            Picked::Joint(i) => frame.joints.get(i).map(|joint| super::to_f32(&joint.socket_centre)),
-            Picked::Fixed(_) => None,
+            ScenePart::Body(i) => frame.bodies.get(i).map(|body| super::to_f32(&body.position)),
+            ScenePart::Joint(i) => frame.joints.get(i).map(|joint| super::to_f32(&joint.socket_centre)),
+            ScenePart::Fixed(_) => None,
         }
     }
 }

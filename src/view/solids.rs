@@ -10,14 +10,14 @@ use super::{Layer, Mesh};
 /// Adds `solid`, made of `material`, to `layer`.
 pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
     match *solid {
-        Solid::Bar { from, to, radius, kind, capped } => {
+        Solid::Bar { from, to, radius, kind, has_cap } => {
             if from == to {
                 return;
             }
             let mesh = if kind == BarKind::Cone { Mesh::Cone } else { Mesh::Cylinder };
             layer.push(mesh, bar(from, to - from, radius, material));
             if kind == BarKind::Capsule {
-                for (end, _) in [from, to].into_iter().zip(capped).filter(|(_, capped)| *capped) {
+                for (end, _) in [from, to].into_iter().zip(has_cap).filter(|(_, has_cap)| *has_cap) {
                     layer.push(Mesh::Sphere, instances::ball(end, radius, material));
                 }
             }
@@ -26,6 +26,6 @@ pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Materia
             layer.push(Mesh::Cube, placed(rotation * Mat3::from_diagonal(size), centre, material));
         }
         Solid::Ball { centre, radius } => layer.push(Mesh::Sphere, instances::ball(centre, radius, material)),
-        Solid::Own { mesh, pose, .. } => layer.push(mesh, placed(pose.rotation, pose.position, material)),
+        Solid::Mesh { mesh, pose, .. } => layer.push(mesh, placed(pose.rotation, pose.position, material)),
     }
 }

@@ -11,9 +11,9 @@ const BALL: f64 = 0.08;
 
 /// Default shapes of the bodies without shapes, by body.
 pub(super) fn sticks(scene: &Scene) -> BTreeMap<usize, Vec<Shape>> {
-    let bare = scene.machine.bodies.iter().enumerate();
-    let bare = bare.filter(|(_, body)| body.shapes.is_empty());
-    let mut points: BTreeMap<usize, Vec<Vec3>> = bare.map(|(i, _)| (i, Vec::new())).collect();
+    let bodies_without_shapes = scene.machine.bodies.iter().enumerate();
+    let bodies_without_shapes = bodies_without_shapes.filter(|(_, body)| body.shapes.is_empty());
+    let mut points: BTreeMap<usize, Vec<Vec3>> = bodies_without_shapes.map(|(i, _)| (i, Vec::new())).collect();
     let bound = scene.machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
     let tree = bound.flat_map(|joint| joint.points());
     let balls = scene.machine.ball_joints.iter();

@@ -11,21 +11,21 @@ use crate::scene::Scene;
 use crate::simulate::Frame;
 
 /// Radius of a pin as a fraction of the hub's width; its maximum, and its value without a hub, in radii of the scene.
-const IN_HUB: f32 = 0.2;
-const THICKEST: f32 = 0.04;
-const ALONE: f32 = 0.02;
+const PIN_PER_HUB: f32 = 0.2;
+const MAX_PIN_RADIUS: f32 = 0.04;
+const PIN_WITHOUT_HUB: f32 = 0.02;
 /// Overhang of a rail beyond the child's shapes, in radii of the scene.
-const REACH: f32 = 0.25;
+const RAIL_OVERHANG: f32 = 0.25;
 /// Radii of a rail and its sleeve, in radii of the scene.
 const RAIL: [f32; 2] = [0.012, 0.022];
 /// Half length and radius of a bearing; radius, half length and distance from the bearing of the pin across its shaft, which
 /// shows that it turns. All in radii of the shaft.
 const BEARING: [f32; 2] = [1.5, 1.35];
-const ACROSS: [f32; 3] = [0.3, 1.6, 0.6];
+const CROSS_PIN: [f32; 3] = [0.3, 1.6, 0.6];
 /// Most shapes of a body examined for each of its joints: set-up time stays proportional to the scene.
 const MOST_SHAPES: usize = 500;
 /// Largest sine of the angle between an axis and a bar that lies along it.
-const ALONG: f32 = 0.02;
+const MAX_SINE: f32 = 0.02;
 
 /// A round bar, in the frame of its body.
 pub(super) struct Symbol {
@@ -47,7 +47,7 @@ impl Symbol {
 
 /// A joint at one instant, world axes.
 #[derive(Clone, Copy)]
-struct Place<'a> {
+struct JointPlacement<'a> {
     joint: &'a Joint,
     /// The child's joint point, m.
     point: Vec3,
@@ -68,9 +68,9 @@ pub(super) fn symbols(
     let mut shapes: Vec<Vec<(Role, Solid<'_>)>> = Vec::new();
     shapes.resize_with(scene.machine.bodies.len() + 1, Vec::new);
     // Shapes of the world come last.
-    let of = |body: Option<usize>| body.unwrap_or(scene.machine.bodies.len());
+    let index_of = |body: Option<usize>| body.unwrap_or(scene.machine.bodies.len());
     for part in parts {
-        let shapes = &mut shapes[of(part.body)];
+        let shapes = &mut shapes[index_of(part.body)];
         if shapes.len() < MOST_SHAPES {
             shapes.push((part.role, part.place(frame, joints)));
         }
@@ -83,13 +83,13 @@ pub(super) fn symbols(
             Some(parent) => &shapes[parent],
             None => &[],
         };
-        let place = Place {
+        let placement = JointPlacement {
             joint,
             point: child.apply(to_f32(&joint.child_point)),
             axis: (parent.rotation * to_f32(&joint.axis)).normalize_or(Vec3::X),
-            shapes: [&shapes[of(None)], own, &shapes[joint.child]],
+            shapes: [&shapes[index_of(None)], own, &shapes[joint.child]],
         };
-        if !place.point.is_finite() || !place.axis.is_finite() {
+        if !placement.point.is_finite() || !placement.axis.is_finite() {
             continue;
         }
         let mut bar = |body, ends: [Vec3; 2], radius, role| {
@@ -99,55 +99,55 @@ pub(super) fn symbols(
             symbols.push(Symbol { body, from, to, radius, role });
         };
         match joint.kind {
-            JointKind::Revolute if !place.has_pin() => {
-                let hub = place.hub(radius);
-                let thick = match hub {
-                    Some([low, high]) => (IN_HUB * (high - low)).min(THICKEST * radius),
-                    None => ALONE * radius,
+            JointKind::Revolute if !placement.has_pin() => {
+                let hub = placement.hub(radius);
+                let pin_radius = match hub {
+                    Some([low, high]) => (PIN_PER_HUB * (high - low)).min(MAX_PIN_RADIUS * radius),
+                    None => PIN_WITHOUT_HUB * radius,
                 };
                 let [low, high] = hub.unwrap_or_default();
-                let ends = [low - 1.5 * thick, high + 1.5 * thick];
-                bar(joint.parent, place.on_axis(ends), thick, Role::Pin);
+                let ends = [low - 1.5 * pin_radius, high + 1.5 * pin_radius];
+                bar(joint.parent, placement.on_axis(ends), pin_radius, Role::Pin);
             }
-            JointKind::Prismatic if !place.has_rail() => {
-                place.slide(radius, &mut bar);
+            JointKind::Prismatic if !placement.has_rail() => {
+                placement.slide(radius, &mut bar);
             }
-            JointKind::Cylindrical if !place.parent_has_rail() => {
+            JointKind::Cylindrical if !placement.parent_has_rail() => {
                 // A shaft of the child needs a bearing.
-                let (thick, beside) = match place.bar_on_axis(place.shapes[2]) {
+                let (pin_radius, beside) = match placement.bar_on_axis(placement.shapes[2]) {
                     Some(shaft) => {
                         let [half, sleeve] = BEARING.map(|part| part * shaft);
-                        let ends = place.on_axis([-half, half]);
+                        let ends = placement.on_axis([-half, half]);
                         bar(joint.parent, ends, sleeve, Role::Rail);
-                        let [low, high] = place.span();
-                        (shaft, (half + ACROSS[2] * shaft).copysign(low + high))
+                        let [low, high] = placement.span();
+                        (shaft, (half + CROSS_PIN[2] * shaft).copysign(low + high))
                     }
                     None => {
-                        place.slide(radius, &mut bar);
+                        placement.slide(radius, &mut bar);
                         (RAIL[1] * radius, 0.0)
                     }
                 };
-                let across = place.axis.any_orthonormal_vector() * ACROSS[1] * thick;
-                let [at, _] = place.on_axis([beside, beside]);
+                let across = placement.axis.any_orthonormal_vector() * CROSS_PIN[1] * pin_radius;
+                let [at, _] = placement.on_axis([beside, beside]);
                 let ends = [at - across, at + across];
-                bar(Some(joint.child), ends, ACROSS[0] * thick, Role::Pin);
+                bar(Some(joint.child), ends, CROSS_PIN[0] * pin_radius, Role::Pin);
             }
             JointKind::Universal => {
                 let second = child.rotation * to_f32(&joint.child_axis);
-                let pins = [place.axis, second].map(|axis| Place { axis, ..place });
-                let reach = |pin: &Place<'_>| {
+                let pins = [placement.axis, second].map(|axis| JointPlacement { axis, ..placement });
+                let reach = |pin: &JointPlacement<'_>| {
                     let [low, high] = pin.hub(radius).unwrap_or_default();
                     high.max(-low)
                 };
                 let half = reach(&pins[0]).max(reach(&pins[1]));
-                let (thick, out) = match half > 0.0 {
-                    true => ((2.0 * IN_HUB * half).min(THICKEST * radius), 1.5),
-                    false => (ALONE * radius, 4.0),
+                let (pin_radius, out) = match half > 0.0 {
+                    true => ((2.0 * PIN_PER_HUB * half).min(MAX_PIN_RADIUS * radius), 1.5),
+                    false => (PIN_WITHOUT_HUB * radius, 4.0),
                 };
-                let end = half + out * thick;
+                let end = half + out * pin_radius;
                 for (pin, body) in pins.iter().zip([joint.parent, Some(joint.child)]) {
                     if !pin.has_pin() {
-                        bar(body, pin.on_axis([-end, end]), thick, Role::Pin);
+                        bar(body, pin.on_axis([-end, end]), pin_radius, Role::Pin);
                     }
                 }
             }
@@ -158,7 +158,7 @@ pub(super) fn symbols(
     symbols
 }
 
-impl Place<'_> {
+impl JointPlacement<'_> {
     /// Points of the axis at these distances from the joint.
     fn on_axis(&self, along: [f32; 2]) -> [Vec3; 2] {
         along.map(|along| self.point + self.axis * along)
@@ -168,7 +168,7 @@ impl Place<'_> {
     fn slide(&self, radius: f32, bar: &mut impl FnMut(Option<usize>, [Vec3; 2], f32, Role)) {
         let [rail, sleeve] = RAIL.map(|part| part * radius);
         let [low, high] = self.span();
-        let ends = [low - REACH * radius, high + REACH * radius];
+        let ends = [low - RAIL_OVERHANG * radius, high + RAIL_OVERHANG * radius];
         bar(self.joint.parent, self.on_axis(ends), rail, Role::Rail);
         let ends = self.on_axis([-2.0 * sleeve, 2.0 * sleeve]);
         bar(Some(self.joint.child), ends, sleeve, Role::Slider);
@@ -179,10 +179,11 @@ impl Place<'_> {
         let along = |(_, solid): &(Role, Solid<'_>)| match *solid {
             Solid::Bar { from, to, radius, .. } => {
                 let bar = (to - from).normalize_or_zero();
-                let off = (from - self.point).reject_from_normalized(self.axis);
+                let offset = (from - self.point).reject_from_normalized(self.axis);
                 let is_long = from.distance(to) > radius;
-                let lies = is_long && bar.cross(self.axis).length() < ALONG && off.length() < 0.5 * radius;
-                lies.then_some(radius)
+                let lies_on_axis =
+                    is_long && bar.cross(self.axis).length() < MAX_SINE && offset.length() < 0.5 * radius;
+                lies_on_axis.then_some(radius)
             }
             _ => None,
         };
@@ -223,8 +224,8 @@ impl Place<'_> {
                 let reach = |out: Vec3| {
                     let ray = Ray::new(point + out * most, -out);
                     // A shape that begins farther out is no hub.
-                    let met = cast(solid, &ray).filter(|distance| *distance > 0.0)?;
-                    Some(most - met)
+                    let hit_distance = cast(solid, &ray).filter(|distance| *distance > 0.0)?;
+                    Some(most - hit_distance)
                 };
                 if let (Some(high), Some(low)) = (reach(self.axis), reach(-self.axis)) {
                     let [lowest, highest] = ends.unwrap_or([-low, high]);

@@ -65,7 +65,7 @@ fn the_ball_stays_in_its_drawn_socket_at_every_magnification() {
 }
 
 #[test]
-fn a_magnification_that_cannot_be_drawn_is_held_back_and_says_so() {
+fn a_magnification_that_does_not_fit_is_reduced_and_the_label_states_it() {
     let (scene, mut frame) = fixture::pendulum();
     frame.joints[0].clearance = 2e-3;
     frame.joints[0].eccentricity *= 2e-3 / 0.3e-3;
@@ -78,7 +78,7 @@ fn a_magnification_that_cannot_be_drawn_is_held_back_and_says_so() {
 }
 
 #[test]
-fn the_rod_goes_along_with_its_magnified_ball() {
+fn the_rod_moves_with_its_magnified_ball() {
     let (scene, frame) = fixture::pendulum();
     let options = ViewOptions { magnification: 80.0, ..Default::default() };
     let list = list(&scene, &frame, &options);
@@ -88,7 +88,7 @@ fn the_rod_goes_along_with_its_magnified_ball() {
 }
 
 #[test]
-fn the_carrier_of_a_socket_ends_at_the_socket() {
+fn the_bar_that_carries_a_socket_ends_at_the_socket() {
     let (scene, frame) = fixture::pendulum();
     let carrier = |magnification| {
         let list = list(&scene, &frame, &ViewOptions { magnification, ..Default::default() });
@@ -106,7 +106,7 @@ fn the_carrier_of_a_socket_ends_at_the_socket() {
 }
 
 #[test]
-fn a_magnified_socket_cuts_into_nothing_that_carries_it() {
+fn a_magnified_socket_does_not_intersect_its_carrier() {
     let options = ViewOptions { magnification: 100.0, ..Default::default() };
     let mut checked = 0;
     for name in crate::scene::BUILT_IN {
@@ -153,7 +153,7 @@ fn a_magnified_socket_cuts_into_nothing_that_carries_it() {
 }
 
 #[test]
-fn a_ghost_is_drawn_where_it_differs_and_only_there() {
+fn only_the_differing_parts_of_a_ghost_are_drawn() {
     let (scene, frame) = fixture::three_legs();
     let view = SceneView::new(&scene, &frame);
     let (marks, options, camera) = (PeakMarks::new(), ViewOptions::default(), view.camera());
@@ -210,7 +210,7 @@ fn a_logarithmic_scale_shortens_three_decades_to_one_length() {
 }
 
 #[test]
-fn what_is_under_the_cursor_is_what_is_drawn_there() {
+fn the_picked_part_is_the_one_drawn_under_the_cursor() {
     let (scene, frame) = fixture::three_legs();
     let view = SceneView::new(&scene, &frame);
     let (marks, options) = (PeakMarks::new(), ViewOptions { magnification: 30.0, ..Default::default() });
@@ -222,11 +222,11 @@ fn what_is_under_the_cursor_is_what_is_drawn_there() {
         view.pick(&shot, pixel).map(|hit| hit.what)
     };
     let middle_of_rod = Pose::in_frame(&frame, Some(3)).apply(Vec3::new(0.0, 0.0, 0.1));
-    assert_eq!(under(to_f32(&frame.joints[0].socket_centre)), Some(Picked::Joint(0)));
-    assert_eq!(under(middle_of_rod), Some(Picked::Body(3)));
-    assert_eq!(under(to_f32(&frame.bodies[6].position)), Some(Picked::Body(6)));
-    assert_eq!(under(to_f32(&frame.bodies[0].position)), Some(Picked::Body(0)));
-    assert_eq!(under(Vec3::new(0.032, 0.0, 0.29)), Some(Picked::Fixed(0)));
+    assert_eq!(under(to_f32(&frame.joints[0].socket_centre)), Some(ScenePart::Joint(0)));
+    assert_eq!(under(middle_of_rod), Some(ScenePart::Body(3)));
+    assert_eq!(under(to_f32(&frame.bodies[6].position)), Some(ScenePart::Body(6)));
+    assert_eq!(under(to_f32(&frame.bodies[0].position)), Some(ScenePart::Body(0)));
+    assert_eq!(under(Vec3::new(0.032, 0.0, 0.29)), Some(ScenePart::Fixed(0)));
     assert_eq!(view.pick(&shot, Vec2::new(2.0, 2.0)), None, "the background");
     let pixel = camera.project(to_f32(&frame.joints[1].socket_centre), SIZE).expect("before the eye");
     let hit = view.pick(&shot, pixel).expect("a socket");
@@ -234,7 +234,7 @@ fn what_is_under_the_cursor_is_what_is_drawn_there() {
 }
 
 #[test]
-fn labels_name_the_axes_gravity_and_the_joints_where_they_are() {
+fn axes_gravity_and_joints_are_labelled_at_their_positions() {
     let (scene, frame) = fixture::three_legs();
     let list = list(&scene, &frame, &ViewOptions::default());
     let texts: Vec<&str> = list.labels.iter().map(|label| &*label.text).collect();
@@ -279,7 +279,7 @@ fn building_twice_gives_the_same_list_in_the_same_buffers() {
 }
 
 #[test]
-fn a_flash_is_a_narrow_ring_in_a_close_up_and_a_wide_one_from_afar() {
+fn a_flash_is_a_narrow_ring_in_a_close_up_and_a_wide_one_at_a_distance() {
     let (scene, frame) = fixture::three_legs();
     let view = SceneView::new(&scene, &frame);
     let options = ViewOptions::default();
@@ -307,7 +307,7 @@ fn a_flash_is_a_narrow_ring_in_a_close_up_and_a_wide_one_from_afar() {
 }
 
 #[test]
-fn a_fit_takes_account_of_what_sticks_out_and_keeps_clear_of_plates() {
+fn fitting_includes_protruding_parts_and_keeps_clear_of_plates() {
     // The discs of the stop are far beyond the rail.
     let stop = "[[stop]]\nname = \"ends\"\njoint = \"slide\"\nlower = \"-900 mm\"\nupper = \"800 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n";
     let motor = "[[motor]]\nname = \"m\"\njoint = \"slide\"\nforce = \"1 N\"\n";
@@ -335,14 +335,14 @@ fn a_fit_takes_account_of_what_sticks_out_and_keeps_clear_of_plates() {
             assert!(seen > 4);
             let cover = crate::view::Cover::of(&list, 4.0);
             for [low, high] in plates {
-                assert_eq!(cover.under(*low, *high), [0.0; 2], "{low} {high}");
+                assert_eq!(cover.covered_fractions(*low, *high), [0.0; 2], "{low} {high}");
             }
         }
     }
 }
 
 #[test]
-fn a_frame_with_broken_numbers_draws_without_a_panic() {
+fn a_frame_with_non_finite_numbers_is_drawn_without_a_panic() {
     let (scene, mut frame) = fixture::three_legs();
     frame.bodies[3].position.x = f64::NAN;
     frame.joints[0].eccentricity.y = f64::NAN;
@@ -361,7 +361,7 @@ fn a_frame_with_broken_numbers_draws_without_a_panic() {
 }
 
 #[test]
-fn a_spring_is_in_the_picture_from_end_to_end() {
+fn a_spring_is_within_the_picture_from_end_to_end() {
     let text = "[[body]]\nname = \"mass\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
                 shapes = [{ form = \"box\", centre = [0, 0, 0], size = \"20 20 20 mm\", role = \"slider\" }]\n\
                 [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = { position = \"0 0 -200 mm\" }\n\
@@ -523,7 +523,7 @@ fn a_cylindrical_joint_is_a_rail_and_a_sleeve_with_a_pin_across_or_the_bearing_o
 }
 
 #[test]
-fn joints_that_close_loops_are_drawn_like_those_that_do_not() {
+fn joints_that_close_loops_are_drawn_like_tree_joints() {
     let closing = |kind: &str| {
         let text = format!(
             "{ARM}drawn = false\n[[joint]]\nname = \"closes\"\nkind = \"{kind}\"\nchild = \"arm\"\n\
@@ -548,7 +548,7 @@ fn joints_that_close_loops_are_drawn_like_those_that_do_not() {
 }
 
 #[test]
-fn a_body_without_shapes_is_seen() {
+fn a_body_without_shapes_is_drawn() {
     let shapes = ARM.lines().find(|line| line.starts_with("shapes")).unwrap();
     let (scene, frame) = started(&ARM.replace(shapes, ""), &[]);
     let view = SceneView::new(&scene, &frame);
@@ -578,7 +578,7 @@ fn shapes_of_one_file_share_a_mesh_and_are_picked() {
     let shot = shot(&scene, &frame, &marks, &options, &camera);
     let pixel = drawn.eye.project(Vec3::new(0.065, 0.0, 0.0), SIZE).unwrap();
     let hit = view.pick(&shot, pixel).unwrap();
-    assert_eq!(hit.what, Picked::Body(0));
+    assert_eq!(hit.what, ScenePart::Body(0));
     assert!((0.055..0.1).contains(&hit.point.x), "{:?}", hit.point);
     // Past its edge there is nothing.
     let pixel = drawn.eye.project(Vec3::new(0.045, 0.02, 0.0), SIZE).unwrap();
@@ -594,7 +594,7 @@ const ATTACHED: &str = "[[body]]\nname = \"mass\"\nmass = \"1 kg\"\ninertia = \"
     [[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 1, 0]\nparent_point = \"0 0 150 mm\"\n";
 
 #[test]
-fn bushings_stops_and_motors_are_in_the_picture_where_they_act() {
+fn bushings_stops_and_motors_are_drawn_where_they_act() {
     let stop = "[[stop]]\nname = \"ends\"\njoint = \"slide\"\nlower = \"-60 mm\"\nupper = \"80 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n";
     let turn =
         "[[stop]]\nname = \"ends\"\njoint = \"hinge\"\nupper = \"90 deg\"\ntorque = \"1 N m\"\ndepth = \"1 deg\"\n";

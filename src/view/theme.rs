@@ -5,10 +5,10 @@ use crate::machine::Role;
 /// Light or dark.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Theme {
-    /// Dark things on a light background.
+    /// Dark objects on a light background.
     #[default]
     Light,
-    /// Light things on a dark background.
+    /// Light objects on a dark background.
     Dark,
 }
 
@@ -129,7 +129,7 @@ pub struct Palette {
     /// Friction arrows.
     pub friction: Colour,
     /// Arrows of external forces.
-    pub outside: Colour,
+    pub external: Colour,
     /// Halo of a joint that was hit.
     pub flash: Colour,
     /// Gravity arrow.
@@ -166,7 +166,7 @@ impl Palette {
                 text: Colour::hex(0x1E2A36),
                 normal: Colour::hex(0xB83818),
                 friction: Colour::hex(0x1769C9),
-                outside: Colour::hex(0x00796B),
+                external: Colour::hex(0x00796B),
                 flash: Colour::hex(0xFFC61A),
                 gravity: Colour::hex(0x6B3FA0),
                 axes: [Colour::hex(0xC92A2A), Colour::hex(0x2B8A3E), Colour::hex(0x1864AB)],
@@ -187,7 +187,7 @@ impl Palette {
                 text: Colour::hex(0xE6EBF0),
                 normal: Colour::hex(0xFF6B6B),
                 friction: Colour::hex(0x4DABF7),
-                outside: Colour::hex(0x2FD6BE),
+                external: Colour::hex(0x2FD6BE),
                 flash: Colour::hex(0xFFE27A),
                 gravity: Colour::hex(0xB197FC),
                 axes: [Colour::hex(0xFF6B6B), Colour::hex(0x69DB7C), Colour::hex(0x4DABF7)],
@@ -229,7 +229,7 @@ mod tests {
 
     /// Linear colours as a dichromat sees them: G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, A Physiologically-based
     /// Model for Simulation of Color Vision Deficiency, IEEE TVCG 15 (2009), severity 1.0.
-    const SIGHTS: [(&str, [[f32; 3]; 3]); 3] = [
+    const VISIONS: [(&str, [[f32; 3]; 3]); 3] = [
         ("full", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
         (
             "protanopia",
@@ -242,7 +242,7 @@ mod tests {
     ];
 
     /// Least CIE 1976 difference: a difference of 2.3 can just be seen side by side.
-    const TOLD_APART: f32 = 25.0;
+    const MIN_DIFFERENCE: f32 = 25.0;
 
     fn product(rows: [[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
         rows.map(|row| (0..3).map(|i| row[i] * v[i]).sum())
@@ -262,18 +262,18 @@ mod tests {
     }
 
     #[test]
-    fn forces_are_told_apart_and_from_an_amber_rod_by_every_eye() {
+    fn force_colours_are_distinguishable_from_each_other_and_from_an_amber_rod_with_any_colour_vision() {
         for theme in [Theme::Light, Theme::Dark] {
             let palette = Palette::of(theme);
             let rod = palette.material(Role::DrivenRod).colour;
-            let marks = [palette.normal, palette.friction, palette.outside, rod];
-            for (eye, sight) in SIGHTS {
-                let seen = marks.map(|colour| lab(product(sight, colour.linear())));
+            let marks = [palette.normal, palette.friction, palette.external, rod];
+            for (eye, vision) in VISIONS {
+                let seen = marks.map(|colour| lab(product(vision, colour.linear())));
                 for (i, a) in seen.iter().enumerate() {
                     for (j, b) in seen.iter().enumerate().skip(i + 1) {
                         let squares = (0..3).map(|k| (a[k] - b[k]).powi(2));
-                        let apart = squares.sum::<f32>().sqrt();
-                        assert!(apart > TOLD_APART, "{theme:?} {eye} {i} {j}: {apart}");
+                        let difference = squares.sum::<f32>().sqrt();
+                        assert!(difference > MIN_DIFFERENCE, "{theme:?} {eye} {i} {j}: {difference}");
                     }
                 }
             }

@@ -4,7 +4,7 @@ use glam::{Mat3, Vec3};
 
 use super::drawn::{self, Pose};
 use super::instances::placed;
-use super::near::Near;
+use super::relative::RelativeShot;
 use super::theme::Material;
 use super::{Colour, DrawList, Mesh, SceneView, Shot, WearMap, WearScale};
 use crate::simulate::{Cell, Wear};
@@ -12,7 +12,7 @@ use crate::simulate::{Cell, Wear};
 /// Decades of the scale below the largest value.
 const DECADES: f32 = 3.0;
 /// Radius of the drawn cells, in inner radii of the socket: just in front of its wall.
-const BEFORE_WALL: f32 = 0.99;
+const CELL_RADIUS: f32 = 0.99;
 
 impl WearMap {
     /// Value of a cell per square millimetre of its `area` (m^2), without sign.
@@ -35,7 +35,7 @@ impl WearScale {
     }
 
     /// Position of `value` on the logarithmic scale: 0 for the smallest, 1 for the largest.
-    pub fn place(&self, value: f32) -> f32 {
+    pub fn position(&self, value: f32) -> f32 {
         (1.0 + (value / self.largest).log10() / DECADES).clamp(0.0, 1.0)
     }
 
@@ -49,10 +49,10 @@ impl WearScale {
 
     /// Colour at a position on the scale: viridis (S. van der Walt and N. Smith, 2015), whose lightness rises evenly, also
     /// for the colour-blind and in grey.
-    pub fn colour(place: f32) -> Colour {
+    pub fn colour(position: f32) -> Colour {
         const VIRIDIS: [u32; 9] =
             [0x440154, 0x472D7B, 0x3B528B, 0x2C728E, 0x21918C, 0x28AE80, 0x5EC962, 0xADDC30, 0xFDE725];
-        let at = place.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f32;
+        let at = position.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f32;
         let lower = (at as usize).min(VIRIDIS.len() - 2);
         let [from, to] = [lower, lower + 1].map(|i| Colour::hex(VIRIDIS[i]).0);
         let part = at - lower as f32;
@@ -68,8 +68,8 @@ impl SceneView {
         if map == WearMap::Off {
             return;
         }
-        let near = Near::of(shot);
-        let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
+        let relative = RelativeShot::of(shot);
+        let shot = &relative.as_ref().map_or(*shot, |relative| relative.shot(shot));
         let joints = 0..shot.scene.machine.ball_joints.len().min(shot.frame.joints.len());
         let value = |joint: usize, cell: &Cell| map.value(cell, wear.area(joint));
         let values = joints.clone().flat_map(|j| wear.cells(j).iter().map(move |cell| value(j, cell)));
@@ -85,14 +85,14 @@ impl SceneView {
             // Rows of a rotation are columns of its inverse.
             let axis = |i: usize| super::to_f32(&grid.row(i).transpose());
             let socket = body * Mat3::from_cols(axis(0), axis(1), axis(2));
-            let size = Mat3::from_diagonal(Vec3::splat(BEFORE_WALL * drawn[j].inner));
+            let size = Mat3::from_diagonal(Vec3::splat(CELL_RADIUS * drawn[j].inner));
             for (i, cell) in wear.cells(j).iter().enumerate() {
                 let value = value(j, cell);
                 if value <= 0.0 {
                     continue;
                 }
                 let turn = Mat3::from_rotation_z(wear.grid().edges(i).azimuth[0] as f32);
-                let surface = Material { colour: WearScale::colour(scale.place(value)), roughness: 1.0, metal: 0.0 };
+                let surface = Material { colour: WearScale::colour(scale.position(value)), roughness: 1.0, metal: 0.0 };
                 let mesh = Mesh::Plate(wear.grid().zone_of(i) as u16);
                 let cell = placed(socket * turn * size, drawn[j].socket_centre, surface);
                 out.wear.push(mesh, cell);
@@ -108,10 +108,10 @@ mod tests {
     #[test]
     fn the_scale_is_logarithmic_and_ends_at_the_largest_value() {
         let scale = WearScale { map: WearMap::Impulse, largest: 1.2 };
-        assert_eq!(scale.place(1.2), 1.0);
-        assert!((scale.place(0.12) - 2.0 / 3.0).abs() < 1e-6);
-        assert!(scale.place(scale.least()) < 1e-6);
-        assert_eq!(scale.place(1e-9), 0.0);
+        assert_eq!(scale.position(1.2), 1.0);
+        assert!((scale.position(0.12) - 2.0 / 3.0).abs() < 1e-6);
+        assert!(scale.position(scale.least()) < 1e-6);
+        assert_eq!(scale.position(1e-9), 0.0);
         let ticks: Vec<f32> = scale.ticks().collect();
         assert_eq!(ticks.len(), 3);
         for (tick, expected) in ticks.into_iter().zip([0.01, 0.1, 1.0]) {
@@ -122,10 +122,8 @@ mod tests {
     #[test]
     fn a_larger_value_is_lighter() {
         // Relative luminance (IEC 61966-2-1) of a colour.
-        let luminance = |place: f32| {
-            let [r, g, b, _] = WearScale::colour(place)
-                .0
-                .map(|c| if c > 0.04045 { ((c + 0.055) / 1.055).powf(2.4) } else { c / 12.92 });
+        let luminance = |position: f32| {
+            let [r, g, b] = WearScale::colour(position).linear();
             0.2126 * r + 0.7152 * g + 0.0722 * b
         };
         for i in 0..40 {

@@ -4,7 +4,7 @@ use super::MeshData;
 use crate::simulate::{Edges, Grid};
 
 /// Largest flat facet of a cell, rad.
-const FLAT: f64 = 0.07;
+const MAX_FACET: f64 = 0.07;
 
 /// A mesh for each zone of the grid: its cell that begins at azimuth 0, on the unit sphere, seen from inside.
 pub(super) fn meshes() -> Vec<MeshData> {
@@ -15,7 +15,7 @@ pub(super) fn meshes() -> Vec<MeshData> {
 
 fn patch(edges: &Edges) -> MeshData {
     let Edges { polar, azimuth } = *edges;
-    let parts = |[from, to]: [f64; 2]| ((to - from) / FLAT).ceil() as u32;
+    let parts = |[from, to]: [f64; 2]| ((to - from) / MAX_FACET).ceil() as u32;
     let (rows, columns) = (parts(polar), parts(azimuth));
     let mut mesh = MeshData::default();
     for i in 0..=rows {

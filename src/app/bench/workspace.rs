@@ -180,7 +180,7 @@ impl MapPanel {
             let errors = errors.as_ref()?;
             Some([vector(errors.tip), vector(self.which.of(errors)?)])
         });
-        Some(Cloud { arrows: arrows.collect(), times: self.scale, name: self.which.name(), note: self.which.note() })
+        Some(Cloud { arrows: arrows.collect(), factor: self.scale, name: self.which.name(), note: self.which.note() })
     }
 
     /// Axes, progress, and what is shown.
@@ -358,7 +358,7 @@ mod tests {
         for which in Which::ALL {
             panel.which = which;
             let cloud = shown(&mut panel);
-            assert_eq!((cloud.arrows.len(), cloud.times), (6, FIRST_SCALE));
+            assert_eq!((cloud.arrows.len(), cloud.factor), (6, FIRST_SCALE));
             for (point, [tip, error]) in cloud.arrows.iter().enumerate() {
                 let own = map.point(point).expect("a pose");
                 let expected = match which {

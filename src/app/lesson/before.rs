@@ -9,7 +9,7 @@ use crate::app::plots::PlotChoice;
 use crate::app::reload::SceneFile;
 use crate::app::undo::Undo;
 use crate::app::{App, CameraPose};
-use crate::view::{Picked, ViewOptions};
+use crate::view::{ScenePart, ViewOptions};
 
 /// All settings that a lesson changes.
 pub struct WindowBefore {
@@ -21,7 +21,7 @@ pub struct WindowBefore {
     options: ViewOptions,
     pose: Option<CameraPose>,
     shape: f32,
-    followed: Option<Picked>,
+    followed: Option<ScenePart>,
     /// Whether the microscope was open, and its ball joint.
     microscope: (bool, usize),
     ideal: bool,

@@ -12,7 +12,7 @@ use crate::scene::LiveScene;
 use crate::scene::Scene;
 use crate::session::log::Log;
 use crate::simulate::{Frame, Peak};
-use crate::view::{Camera, DrawList, PeakMarks, SEEN, SceneView, Shot, ViewOptions, WearMap, to_f32};
+use crate::view::{Camera, DrawList, MARK_DURATION, PeakMarks, SceneView, Shot, ViewOptions, WearMap, to_f32};
 
 /// A simulation with its renderer.
 pub trait Studio {
@@ -123,7 +123,7 @@ impl Studio for SceneStudio {
         self.simulation.take_peaks(&mut self.peaks);
         match time_scale {
             Some(time_scale) => {
-                let fade = SEEN * time_scale;
+                let fade = MARK_DURATION * time_scale;
                 self.marks.update(&self.frame, &self.peaks, fade);
                 if let Some((body, tip)) = self.probe {
                     let motion = &self.frame.bodies[body];

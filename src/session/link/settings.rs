@@ -3,7 +3,7 @@
 use crate::scene::Scene;
 use crate::simulate::{MAX_PICKED, Quantity};
 use crate::units::{Dimension, parse_quantity};
-use crate::view::{Picked, WearMap};
+use crate::view::{ScenePart, WearMap};
 
 /// Longest window of the plots that a link may request, s.
 const LONGEST_WINDOW: f64 = 1e4;
@@ -161,12 +161,12 @@ pub fn write_window(window: PlotWindow) -> String {
 ///
 /// # Errors
 /// There is no such part; lists the allowed ones.
-pub fn find_followed(scene: &Scene, text: &str) -> Result<Picked, String> {
+pub fn find_followed(scene: &Scene, text: &str) -> Result<ScenePart, String> {
     let joints = || scene.machine.ball_joints.iter().map(|joint| joint.name.as_str());
     let bodies = || scene.machine.bodies.iter().map(|body| body.name.as_str());
     let found = match text.split_once('.') {
-        Some(("joint", name)) => joints().position(|joint| joint == name).map(Picked::Joint),
-        Some(("body", name)) => bodies().position(|body| body == name).map(Picked::Body),
+        Some(("joint", name)) => joints().position(|joint| joint == name).map(ScenePart::Joint),
+        Some(("body", name)) => bodies().position(|body| body == name).map(ScenePart::Body),
         _ => None,
     };
     found.ok_or_else(|| {
@@ -177,13 +177,13 @@ pub fn find_followed(scene: &Scene, text: &str) -> Result<Picked, String> {
 }
 
 /// The reverse of [`find_followed`].
-pub fn name_followed(scene: &Scene, picked: Picked) -> Option<String> {
+pub fn name_followed(scene: &Scene, picked: ScenePart) -> Option<String> {
     match picked {
-        Picked::Joint(index) => {
+        ScenePart::Joint(index) => {
             let joint = scene.machine.ball_joints.get(index)?;
             Some(format!("joint.{}", joint.name))
         }
-        Picked::Body(index) => Some(format!("body.{}", scene.machine.bodies.get(index)?.name)),
-        Picked::Fixed(_) => None,
+        ScenePart::Body(index) => Some(format!("body.{}", scene.machine.bodies.get(index)?.name)),
+        ScenePart::Fixed(_) => None,
     }
 }

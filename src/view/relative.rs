@@ -1,4 +1,4 @@
-//! Far from the world's origin f32 is too coarse for a machine: positions are then measured from the camera's target.
+//! Positions relative to the camera's target. Far from the world's origin f32 is too coarse for absolute positions.
 
 use glam::Vec3;
 
@@ -6,20 +6,20 @@ use super::{Camera, Shot, to_f32};
 use crate::simulate::Frame;
 
 /// Distance of the target from the origin, in distances from the eye, beyond which positions are measured from it.
-const FAR: f32 = 20.0;
+const MAX_DISTANCE_RATIO: f32 = 20.0;
 
-/// A shot's frame, camera and trail measured from the camera's target.
-pub(super) struct Near {
+/// Frame, camera and trail of a shot, relative to the camera's target.
+pub(super) struct RelativeShot {
     frame: Frame,
     camera: Camera,
     trail: Vec<Vec3>,
 }
 
-impl Near {
-    /// `None` if the world's origin is near enough.
+impl RelativeShot {
+    /// Converts `shot`; `None` if the target is near enough to the world's origin.
     pub fn of(shot: &Shot<'_>) -> Option<Self> {
         let target = shot.camera.target;
-        if !(target.length() > FAR * shot.camera.distance) {
+        if !(target.length() > MAX_DISTANCE_RATIO * shot.camera.distance) {
             return None;
         }
         let mut camera = *shot.camera;
@@ -46,18 +46,18 @@ impl Near {
 fn frame_from(frame: &Frame, origin: Vec3) -> Frame {
     let [x, y, z] = origin.to_array().map(f64::from);
     let origin = crate::machine::Vec3::new(x, y, z);
-    let mut near = frame.clone();
-    near.origin += origin;
-    for body in &mut near.bodies {
+    let mut relative = frame.clone();
+    relative.origin += origin;
+    for body in &mut relative.bodies {
         body.position -= origin;
     }
-    for joint in &mut near.joints {
+    for joint in &mut relative.joints {
         joint.socket_centre -= origin;
         joint.ball_centre -= origin;
         joint.contact_point -= origin;
     }
-    for report in near.elements.iter_mut().chain(&mut near.pull) {
+    for report in relative.elements.iter_mut().chain(&mut relative.pull) {
         report.points.iter_mut().for_each(|point| *point -= origin);
     }
-    near
+    relative
 }
