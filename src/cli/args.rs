@@ -85,7 +85,7 @@ pub struct SceneArguments {
     #[arg(required_unless_present = "link")]
     pub scene: Option<OsString>,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_change)]
     pub changes: Vec<(String, String)>,
     /// Use the scene of a share link, with its initial parameters. `run` also replays the live changes up to the link's instant
     /// and compares the state hash.
@@ -125,7 +125,7 @@ pub struct ViewArguments {
     /// [default: the scene opened last; the first time spcmm at 6 Hz, where its joints rattle in every period].
     pub scene: Option<OsString>,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_change)]
     pub changes: Vec<(String, String)>,
     /// Open a share link, e.g. `?scene=pendulum&c=0.5mm&t=20ms`, and reproduce its state; the address before its `?` or
     /// `#` is optional.
@@ -206,10 +206,10 @@ pub struct SweepArguments {
     #[arg(long, value_name = "FILE")]
     pub points: Option<PathBuf>,
     /// Drive periods per point, including those discarded.
-    #[arg(long, value_name = "P", value_parser = periods, required_unless_present = "duration", requires = "discard")]
+    #[arg(long, value_name = "P", value_parser = parse_count, required_unless_present = "duration", requires = "discard")]
     pub periods: Option<usize>,
     /// Initial periods or crossings to discard as the transient.
-    #[arg(long, value_name = "D", value_parser = periods)]
+    #[arg(long, value_name = "D", value_parser = parse_count)]
     pub discard: Option<usize>,
     /// Time between two sections, where the drives have no common period or none at all [default: the common period].
     #[arg(long, value_name = "TIME", requires = "periods")]
@@ -229,13 +229,13 @@ pub struct SweepArguments {
     #[arg(long, value_name = "phase|CHANNEL=VALUE[:up|:down]", default_value = "phase")]
     pub section: String,
     /// Crossings of --section per point, including those discarded; --duration ends the search for them.
-    #[arg(long, value_name = "N", value_parser = periods, requires_all = ["section", "discard", "duration"])]
+    #[arg(long, value_name = "N", value_parser = parse_count, requires_all = ["section", "discard", "duration"])]
     pub crossings: Option<usize>,
     /// Drive phase of the sections: a fraction of the period, or an angle such as `90deg`.
     #[arg(long, value_name = "PHASE", default_value = "0", allow_hyphen_values = true)]
     pub phase: String,
     /// Where each point starts from; several, separated by commas, run every point from each.
-    #[arg(long, value_parser = starts(), value_name = "START", value_delimiter = ',', default_value = "cold")]
+    #[arg(long, value_parser = start_parser(), value_name = "START", value_delimiter = ',', default_value = "cold")]
     pub start: Vec<Start>,
     /// Leave out the twin runs that measure the largest Lyapunov exponent.
     #[arg(long)]
@@ -367,7 +367,7 @@ pub struct RenderArguments {
     #[arg(long, value_name = "S", requires = "duration", default_value_t = 1.0)]
     pub slow: f64,
     /// Width and height of a frame in pixels.
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
     pub size: (u32, u32),
     /// Folder to write; it appears when all frames are done.
     #[arg(long, value_name = "FOLDER")]
@@ -433,7 +433,7 @@ pub struct TradeoffArguments {
     /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`).
     pub scene: Option<OsString>,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change, conflicts_with = "all")]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_change, conflicts_with = "all")]
     pub changes: Vec<(String, String)>,
     /// Use a coarse grid of steps and tolerances, which takes seconds.
     #[arg(long)]
@@ -490,7 +490,7 @@ pub struct ValidateArguments {
 #[derive(Debug, Args)]
 pub struct BenchArguments {
     /// Change a parameter of the default scene, e.g. `contact.friction=0.2`; may be repeated, the last wins.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_change)]
     pub changes: Vec<(String, String)>,
     /// No progress.
     #[arg(long)]
@@ -571,7 +571,7 @@ pub enum Hideable {
     Peaks,
 }
 
-fn change(text: &str) -> Result<(String, String), String> {
+fn parse_change(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((key, value)) if !key.trim().is_empty() && !value.trim().is_empty() => {
             Ok((key.trim().to_owned(), value.trim().to_owned()))
@@ -581,26 +581,26 @@ fn change(text: &str) -> Result<(String, String), String> {
 }
 
 /// Parser for `--start`.
-fn starts() -> impl TypedValueParser<Value = Start> {
+fn start_parser() -> impl TypedValueParser<Value = Start> {
     let words = Start::ALL.map(|start| PossibleValue::new(start.word()).help(start.meaning()));
-    let of_word = |word: String| Start::ALL.into_iter().find(|start| start.word() == word);
-    PossibleValuesParser::new(words).map(move |word| of_word(word).expect("one of these"))
+    let start_of_word = |word: String| Start::ALL.into_iter().find(|start| start.word() == word);
+    PossibleValuesParser::new(words).map(move |word| start_of_word(word).expect("one of these"))
 }
 
 /// Parses a whole number, also one like `1e3`. The upper limit is checked later, when the drive period is known.
-fn periods(text: &str) -> Result<usize, String> {
+fn parse_count(text: &str) -> Result<usize, String> {
     let number = text.parse::<f64>().ok().filter(|n| *n >= 0.0 && n.fract() == 0.0);
     let whole = text.parse().ok().or(number.map(|n| n as usize));
     whole.ok_or_else(|| "expected a whole number, e.g. 100".to_owned())
 }
 
 /// Largest edge of a frame that every adapter can draw, pixels.
-const LARGEST_EDGE: u32 = 8192;
+const MAX_EDGE: u32 = 8192;
 
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let wrong = || format!("expected WIDTHxHEIGHT in pixels, each from 16 to {LARGEST_EDGE}, e.g. 1280x720");
-    let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
-    let edge = |text: &str| text.parse().ok().filter(|e| (16..=LARGEST_EDGE).contains(e)).ok_or_else(wrong);
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let error = || format!("expected WIDTHxHEIGHT in pixels, each from 16 to {MAX_EDGE}, e.g. 1280x720");
+    let (width, height) = text.split_once(['x', 'X']).ok_or_else(error)?;
+    let edge = |text: &str| text.parse().ok().filter(|e| (16..=MAX_EDGE).contains(e)).ok_or_else(error);
     Ok((edge(width)?, edge(height)?))
 }
 
@@ -623,19 +623,19 @@ mod tests {
     #[test]
     fn periods_are_whole_numbers() {
         for (text, number) in [("0", 0), ("100", 100), ("1e3", 1000)] {
-            assert_eq!(super::periods(text), Ok(number));
+            assert_eq!(super::parse_count(text), Ok(number));
         }
-        assert_eq!(super::periods("9e18"), Ok(9_000_000_000_000_000_000));
+        assert_eq!(super::parse_count("9e18"), Ok(9_000_000_000_000_000_000));
         for bad in ["-1", "1.5", "nan", "inf", "", "x"] {
-            assert!(super::periods(bad).is_err(), "{bad}");
+            assert!(super::parse_count(bad).is_err(), "{bad}");
         }
     }
 
     #[test]
     fn sizes_outside_the_range_are_refused() {
-        assert_eq!(super::size("1280x720"), Ok((1280, 720)));
+        assert_eq!(super::parse_size("1280x720"), Ok((1280, 720)));
         for bad in ["1280", "0x10", "-5x100", "99999x100", "x", "1e3x500"] {
-            assert!(super::size(bad).is_err(), "{bad}");
+            assert!(super::parse_size(bad).is_err(), "{bad}");
         }
     }
 }

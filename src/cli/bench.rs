@@ -30,7 +30,7 @@ pub fn bench(arguments: &BenchArguments) -> Result<(), Failure> {
 }
 
 fn text(rows: &[GoalResult], machines: &[LooseSpeed], growth: f64) -> String {
-    let reach = rows.iter().map(|row| {
+    let goal_rows = rows.iter().map(|row| {
         vec![
             row.goal.label().to_owned(),
             format!("{} {}", row.setting.method, value(&row.setting)),
@@ -50,8 +50,8 @@ fn text(rows: &[GoalResult], machines: &[LooseSpeed], growth: f64) -> String {
         "Speeds            simulated seconds in a second of stepping, one core\n\
          All joints ideal  no differential equation is solved, so the stepper plays no part\n\n",
     );
-    let heads = "span | method | speed | asked | rk4 at 10 us | ratio | error | of | reached";
-    out.push_str(&Table::new(heads, reach).text());
+    let headings = "span | method | speed | asked | rk4 at 10 us | ratio | error | of | reached";
+    out.push_str(&Table::new(headings, goal_rows).text());
     out.push_str(
         "\nLoose joints: the fastest setting of each method whose peaks of the first impacts err by no more than the limit\n\n",
     );
@@ -69,8 +69,8 @@ fn text(rows: &[GoalResult], machines: &[LooseSpeed], growth: f64) -> String {
         }
         speeds.push(line(row, "-", &row.baseline));
     }
-    let heads = "machine | span | limit | setting | error | speed | over rk4";
-    out.push_str(&Table::new(heads, speeds).text());
+    let headings = "machine | span | limit | setting | error | speed | over rk4";
+    out.push_str(&Table::new(headings, speeds).text());
     let ([short, long], span, most) = GROWTH;
     let _ = writeln!(
         out,

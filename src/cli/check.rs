@@ -25,7 +25,7 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     let scene = load(&arguments.scene)?;
     // Only starting the scene reveals joints that do not close and rods that do not reach.
     let mut simulation = start(&scene)?;
-    let begun = StartReport::of(&mut simulation);
+    let start_report = StartReport::of(&mut simulation);
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     if arguments.channels {
@@ -33,7 +33,7 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     }
     let contents = simulation.mechanism().summary();
     let beginning = (contents.contacts > 0).then(|| Beginning::of(&mut simulation));
-    print(&report(&scene, &contents, &begun, &frame, beginning.as_ref())?)
+    print(&report(&scene, &contents, &start_report, &frame, beginning.as_ref())?)
 }
 
 /// The channels of a scene, one per line: name, unit, column, description.
@@ -60,7 +60,7 @@ fn is_ideal(joint: &BallJoint) -> bool {
 fn report(
     scene: &Scene,
     contents: &Summary,
-    begun: &StartReport,
+    start_report: &StartReport,
     start: &Frame,
     beginning: Option<&Beginning>,
 ) -> Result<String, Failure> {
@@ -82,27 +82,27 @@ fn report(
         ),
     );
     for body in scene.machine.bodies.iter().filter(|body| body.density.is_some()) {
-        line(&format!("  {}", body.name), &of_its_shapes(body));
+        line(&format!("  {}", body.name), &mass_from_shapes(body));
     }
     line("Joints", &joints(&scene.machine.joints));
     if !scene.machine.closing_joints.is_empty() {
         line("Close loops", &joints(&scene.machine.closing_joints));
     }
     for (joint, [force, torque]) in scene.machine.closing_joints.iter().zip(&start.closing) {
-        let unique = !begun.reactions.contains(&joint.name);
-        let words = format!(
+        let is_unique = !start_report.reactions.contains(&joint.name);
+        let reaction = format!(
             "reaction at the start {} N and {} N m{}",
             significant(force.norm(), 6),
             significant(torque.norm(), 6),
-            if unique { "" } else { " (not unique)" }
+            if is_unique { "" } else { " (not unique)" }
         );
-        line(&format!("  {}", joint.name), &words);
+        line(&format!("  {}", joint.name), &reaction);
     }
     line("Ball joints", &format!("{} with clearance, {} ideal", contents.contacts, contents.ideal_joints));
     for (joint, report) in scene.machine.ball_joints.iter().zip(&start.joints) {
         line(
             &format!("  {}", joint.name),
-            &ball_joint(joint, report.normal_force.norm(), !begun.reactions.contains(&joint.name)),
+            &ball_joint(joint, report.normal_force.norm(), !start_report.reactions.contains(&joint.name)),
         );
     }
     if !scene.machine.elements.is_empty() {
@@ -111,21 +111,21 @@ fn report(
     for (element, report) in scene.machine.elements.iter().zip(&start.elements) {
         line(&format!("  {}", element.name), &force_element(element, report));
     }
-    begun.lines.iter().for_each(|(label, words)| line(label, words));
+    start_report.lines.iter().for_each(|(label, value)| line(label, value));
     if let Some(beginning) = beginning {
         let until = format_quantity_digits(beginning.until, "ms", 4);
         line("Beginning", &format!("largest contact forces of the first {until}"));
         let loose = scene.machine.ball_joints.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
-        for (joint, peak) in loose.take(MOST_JOINTS) {
+        for (joint, peak) in loose.take(MAX_LISTED) {
             line(&format!("  {}", joint.name), &first_contact(peak));
         }
-        if contents.contacts > MOST_JOINTS {
-            line("  …", &format!("and {} more ball joints", contents.contacts - MOST_JOINTS));
+        if contents.contacts > MAX_LISTED {
+            line("  …", &format!("and {} more ball joints", contents.contacts - MAX_LISTED));
         }
     }
     line("Degrees of freedom", &freedoms(contents));
     line("Constraint rows", &rows(contents));
-    begun.indeterminate_forces().iter().for_each(|words| line("Not unique", words));
+    start_report.indeterminate_forces().iter().for_each(|value| line("Not unique", value));
     line(
         "Equations",
         &format!(
@@ -134,11 +134,11 @@ fn report(
         ),
     );
     line("Method", &method(scene, contents));
-    let (computed, left_out) = work(scene, contents);
+    let (computed, skipped) = work(scene, contents);
     computed.iter().for_each(|item| line("Computed", item));
-    left_out.iter().for_each(|item| line("Not computed", item));
-    let singular = ideal_fault(scene).map(|near| near.to_string());
-    begun.warnings_of(scene).iter().chain(&singular).for_each(|warning| line("Warning", warning));
+    skipped.iter().for_each(|item| line("Not computed", item));
+    let near_singularity = ideal_fault(scene).map(|near| near.to_string());
+    start_report.warnings_of(scene).iter().chain(&near_singularity).for_each(|warning| line("Warning", warning));
     Ok(out)
 }
 
@@ -147,7 +147,7 @@ fn names<'a>(names: impl Iterator<Item = &'a String>) -> String {
 }
 
 /// Mass properties of a body, computed from its shapes.
-fn of_its_shapes(body: &Body) -> String {
+fn mass_from_shapes(body: &Body) -> String {
     let each = |values: [f64; 3], unit: &str| {
         let numbers = values.map(|value| significant(to_display(value, unit) + 0.0, 4));
         format!("{} {unit}", numbers.join(" "))
@@ -174,28 +174,28 @@ fn joints(all: &[Joint]) -> String {
     let mut parts = Vec::new();
     for kind in kinds {
         for driven in [true, false] {
-            let alike = || {
-                let alike = |j: &&Joint| j.kind == kind && j.drives().next().is_some() == driven;
-                all.iter().filter(alike)
+            let of_kind = || {
+                let is_of_kind = |j: &&Joint| j.kind == kind && j.drives().next().is_some() == driven;
+                all.iter().filter(is_of_kind)
             };
-            let count = alike().count();
+            let count = of_kind().count();
             if count > 0 {
                 let word = kind.word();
                 let word = if driven { format!("driven {word}") } else { word.to_owned() };
-                parts.push(format!("{count} {word} ({})", names(alike().map(|joint| &joint.name))));
+                parts.push(format!("{count} {word} ({})", names(of_kind().map(|joint| &joint.name))));
             }
         }
     }
     parts.join(", ")
 }
 
-fn ball_joint(joint: &BallJoint, force: f64, unique: bool) -> String {
+fn ball_joint(joint: &BallJoint, force: f64, is_unique: bool) -> String {
     let contact = &joint.contact;
     if is_ideal(joint) {
         return format!(
             "ideal; reaction at the start {} N{}",
             significant(force, 6),
-            if unique { "" } else { " (not unique)" }
+            if is_unique { "" } else { " (not unique)" }
         );
     }
     let friction = match contact.friction_law {
@@ -220,7 +220,7 @@ fn force_element(element: &Element, report: &ElementReport) -> String {
 }
 
 /// Largest number of ball joints listed with their first contact forces.
-const MOST_JOINTS: usize = 12;
+const MAX_LISTED: usize = 12;
 
 /// Largest contact force, its time and the fastest approach in the first part of a run.
 fn first_contact(peak: &Peak) -> String {
@@ -262,14 +262,14 @@ fn rows(contents: &Summary) -> String {
 fn method(scene: &Scene, contents: &Summary) -> String {
     let method = scene.machine.solver.method;
     let step = significant(scene.machine.solver.step * 1e6, 6);
-    let explicit = method == Method::Automatic
+    let is_explicit = method == Method::Automatic
         && contents.solves_differential_equation
         && contents.velocity_coordinates > contents.largest_implicit;
     match method.control() {
         StepControl::Fixed => format!("{method}, step {step} us"),
         StepControl::PerImpact => format!("{method}, {} steps per impact", scene.machine.solver.steps_per_impact),
         StepControl::Error => {
-            let alone = if explicit {
+            let note = if is_explicit {
                 format!(
                     "; explicit steps only: the implicit methods allow at most {} velocity coordinates",
                     contents.largest_implicit
@@ -278,7 +278,7 @@ fn method(scene: &Scene, contents: &Summary) -> String {
                 String::new()
             };
             format!(
-                "{method}, relative tolerance {}, first step {step} us{alone}",
+                "{method}, relative tolerance {}, first step {step} us{note}",
                 significant(scene.machine.solver.tolerance, 3)
             )
         }
@@ -288,11 +288,11 @@ fn method(scene: &Scene, contents: &Summary) -> String {
 /// Lists of what the run computes and of what it skips.
 fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     let with = |ideal| names(scene.machine.ball_joints.iter().filter(move |j| is_ideal(j) == ideal).map(|j| &j.name));
-    let (mut computed, mut left_out) = (Vec::new(), Vec::new());
-    let mut sort = |needed: bool, yes: String, no: &str| {
-        if needed { computed.push(yes) } else { left_out.push(no.to_owned()) }
+    let (mut computed, mut skipped) = (Vec::new(), Vec::new());
+    let mut list = |needed: bool, yes: String, no: &str| {
+        if needed { computed.push(yes) } else { skipped.push(no.to_owned()) }
     };
-    sort(
+    list(
         contents.solves_differential_equation,
         match contents.degrees_of_freedom as u64 {
             // Purely kinematic, but the number of constraint rows differs from that of the coordinates.
@@ -301,29 +301,33 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
         },
         "differential equations: nothing is free, the drives prescribe the motion",
     );
-    sort(
+    list(
         contents.contacts > 0,
         format!("contact forces at {}", with(false)),
         "contact forces: no ball joint has clearance",
     );
-    let rubs = |joint: &&BallJoint| {
+    let has_friction = |joint: &&BallJoint| {
         !is_ideal(joint) && joint.contact.friction > 0.0 && joint.contact.friction_law != FrictionLaw::None
     };
-    let rubbing = || scene.machine.ball_joints.iter().filter(rubs).map(|joint| &joint.name);
-    sort(rubbing().next().is_some(), format!("friction at {}", names(rubbing())), "friction: no contact has any");
-    sort(
+    let with_friction = || scene.machine.ball_joints.iter().filter(has_friction).map(|joint| &joint.name);
+    list(
+        with_friction().next().is_some(),
+        format!("friction at {}", names(with_friction())),
+        "friction: no contact has any",
+    );
+    list(
         contents.ideal_joints > 0,
         format!("reactions of the ideal joints at {}", with(true)),
         "reactions of ideal joints: no ball joint is ideal",
     );
     if contents.closing_joints > 0 {
         let closing = names(scene.machine.closing_joints.iter().map(|joint| &joint.name));
-        sort(true, format!("reactions of the joints that close loops at {closing}"), "");
+        list(true, format!("reactions of the joints that close loops at {closing}"), "");
     }
-    sort(
+    list(
         contents.drives > 0,
         format!("actuator forces at {}", names(scene.machine.driven().map(|(joint, _)| &joint.name))),
         "actuator forces: nothing is driven",
     );
-    (computed, left_out)
+    (computed, skipped)
 }

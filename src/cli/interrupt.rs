@@ -9,8 +9,8 @@ use super::Failure;
 /// `timeout` signals its child and then the child's group: signals this close together are one request.
 const ONE_REQUEST: Duration = Duration::from_secs(1);
 
-static ASKED: AtomicBool = AtomicBool::new(false);
-static LISTEN: Once = Once::new();
+static REQUESTED: AtomicBool = AtomicBool::new(false);
+static INSTALL: Once = Once::new();
 
 /// From now on these signals are recorded instead of ending the process.
 pub fn listen() {
@@ -18,10 +18,10 @@ pub fn listen() {
     if cfg!(test) {
         return;
     }
-    LISTEN.call_once(|| {
+    INSTALL.call_once(|| {
         let mut signals = Signals::default();
         let outcome = catch(move || {
-            ASKED.store(true, Ordering::Relaxed);
+            REQUESTED.store(true, Ordering::Relaxed);
             if signals.must_exit(Instant::now()) {
                 std::process::exit(i32::from(Failure::INTERRUPTED));
             }
@@ -32,9 +32,9 @@ pub fn listen() {
     });
 }
 
-/// Whether the run has been asked to end.
-pub fn asked() -> bool {
-    ASKED.load(Ordering::Relaxed)
+/// Whether the user requested the end of the run.
+pub fn is_requested() -> bool {
+    REQUESTED.load(Ordering::Relaxed)
 }
 
 /// The signals received so far.
@@ -54,13 +54,15 @@ impl Signals {
 }
 
 #[cfg(unix)]
-fn catch(mut told: impl FnMut() + Send + 'static) -> std::io::Result<()> {
+fn catch(mut on_signal: impl FnMut() + Send + 'static) -> std::io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
     if !outlives_its_terminal() {
         signals.add_signal(SIGHUP)?;
     }
-    std::thread::Builder::new().name("signals".to_owned()).spawn(move || signals.forever().for_each(|_| told()))?;
+    std::thread::Builder::new()
+        .name("signals".to_owned())
+        .spawn(move || signals.forever().for_each(|_| on_signal()))?;
     Ok(())
 }
 
@@ -70,9 +72,9 @@ fn outlives_its_terminal() -> bool {
     use std::io::IsTerminal;
     match std::fs::read_to_string("/proc/self/status") {
         Ok(status) => {
-            let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-            let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-            ignored.is_some_and(|mask| mask & 1 != 0)
+            let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+            let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+            mask.is_some_and(|mask| mask & 1 != 0)
         }
         // Other than on Linux: `nohup` leaves no output on a terminal.
         Err(_) => !std::io::stderr().is_terminal(),
@@ -80,8 +82,8 @@ fn outlives_its_terminal() -> bool {
 }
 
 #[cfg(windows)]
-fn catch(told: impl FnMut() + Send + 'static) -> Result<(), ctrlc::Error> {
-    ctrlc::set_handler(told)
+fn catch(on_signal: impl FnMut() + Send + 'static) -> Result<(), ctrlc::Error> {
+    ctrlc::set_handler(on_signal)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use crate::session::log::Script;
 use crate::session::replay::Verdict;
 
 /// The remaining replay of a link's run.
-pub struct Way {
+pub struct LinkReplay {
     link: Link,
     script: Script,
     /// The scene as parsed from its file.
@@ -24,7 +24,7 @@ pub fn parse(text: &str) -> Result<Link, Failure> {
     Link::parse(text).map_err(|error| Failure::usage(error.to_string()))
 }
 
-impl Way {
+impl LinkReplay {
     /// The replay up to the instant of `link`.
     ///
     /// # Errors
@@ -41,7 +41,7 @@ impl Way {
     }
 
     /// Whether `simulation` is at the link's instant.
-    pub fn is_there(&self, simulation: &LiveScene) -> bool {
+    pub fn is_reached(&self, simulation: &LiveScene) -> bool {
         self.link.goal().is_reached(simulation) && !self.script.has_more()
     }
 
@@ -54,17 +54,17 @@ impl Way {
     /// the step is not truncated, as in the window, and none is taken once the link's instant is reached.
     ///
     /// # Errors
-    /// Text: a rejected change, or a rejected step that was not rejected in the link's run.
+    /// A message about a rejected change, or about a step that was rejected only here or only in the link's run.
     pub fn step(&mut self, simulation: &mut LiveScene, end: Option<f64>) -> Result<(), String> {
-        self.do_due(simulation)?;
-        if end.is_none() && self.is_there(simulation) {
+        self.apply_due(simulation)?;
+        if end.is_none() && self.is_reached(simulation) {
             return Ok(());
         }
-        let stops = self.script.due(simulation.statistics().steps) == Some(&Event::Stop);
+        let must_stop = self.script.due(simulation.statistics().steps) == Some(&Event::Stop);
         let latest = self.script.step_end(simulation.time()).min(end.unwrap_or(f64::INFINITY));
         match simulation.step_until(latest) {
-            Ok(()) if stops && end.is_none() => Err(Obstacle::MissedStop.to_string()),
-            Err(stopped) if !stops => Err(stopped.to_string()),
+            Ok(()) if must_stop && end.is_none() => Err(Obstacle::MissedStop.to_string()),
+            Err(stopped) if !must_stop => Err(stopped.to_string()),
             Err(_) => {
                 self.script.pass(simulation.time());
                 Ok(())
@@ -73,21 +73,21 @@ impl Way {
         }
     }
 
-    fn do_due(&mut self, simulation: &mut LiveScene) -> Result<(), String> {
+    fn apply_due(&mut self, simulation: &mut LiveScene) -> Result<(), String> {
         let steps = simulation.statistics().steps;
         while let Some(event) = self.script.due(steps).filter(|event| **event != Event::Stop) {
-            let done = event.apply(simulation, &self.original);
-            done.map_err(|error| format!("the change that the link made after {steps} steps: {error}"))?;
+            let applied = event.apply(simulation, &self.original);
+            applied.map_err(|error| format!("the change that the link made after {steps} steps: {error}"))?;
             self.script.pass(simulation.time());
         }
         Ok(())
     }
 
-    /// Compares the state with the link's, in words; an error if it differs.
+    /// Compares the state with the link's. Returns the verdict as text, as an error if the states differ.
     pub fn verdict(&self, simulation: &LiveScene) -> Result<String, String> {
         let verdict = Verdict::of(&self.link, simulation.state_hash());
-        let words = verdict.to_string();
-        if matches!(verdict, Verdict::Differs { .. }) { Err(words) } else { Ok(words) }
+        let message = verdict.to_string();
+        if matches!(verdict, Verdict::Differs { .. }) { Err(message) } else { Ok(message) }
     }
 }
 
@@ -100,7 +100,7 @@ mod tests {
         let mut link = Link::parse("?scene=pendulum&steps=9").expect("a link");
         link.log.push(3, Event::Stop);
         let mut simulation = crate::cli::start(&link.load().expect("built in")).expect("starts");
-        let mut way = Way::new(link).expect("its scene");
+        let mut way = LinkReplay::new(link).expect("its scene");
         let outcomes: Vec<_> = (0..9).map(|_| way.step(&mut simulation, None)).collect();
         assert_eq!(outcomes.iter().position(Result::is_err), Some(3), "{outcomes:?}");
     }

@@ -23,7 +23,7 @@ pub fn measure<T>(
     let mut clock = clock();
     let mut progress = |done: f64| {
         bar.set_position((done * PARTS) as u64);
-        if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if interrupt::is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let result = analysis(&mut RunContext::new(&mut clock, &mut progress));
     bar.finish_and_clear();

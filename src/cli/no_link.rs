@@ -3,9 +3,9 @@
 use crate::scene::LiveScene;
 
 /// A replay that never exists.
-pub enum Way {}
+pub enum LinkReplay {}
 
-impl Way {
+impl LinkReplay {
     /// Never called.
     pub fn time(&self) -> Option<f64> {
         match *self {}
@@ -17,7 +17,7 @@ impl Way {
     }
 
     /// Never called.
-    pub fn is_there(&self, _simulation: &LiveScene) -> bool {
+    pub fn is_reached(&self, _simulation: &LiveScene) -> bool {
         match *self {}
     }
 

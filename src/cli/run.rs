@@ -9,7 +9,7 @@ use serde_json::{Value as Json, json};
 
 use super::args::{RunArguments, SummaryForm};
 use super::impacts::ImpactsFile;
-use super::link::Way;
+use super::link::LinkReplay;
 use super::output::{RowError, RowsFile, Table, check_distinct, check_size, significant};
 use super::state::{self, StateFile};
 use super::summary::{self, Status, Stepping};
@@ -21,9 +21,9 @@ use crate::scene::{LiveScene, SavedState, Scene, insert_texts};
 use crate::simulate::Frame;
 
 /// Steps between two checks of the clock, the progress bar and Ctrl-C.
-const STEPS_BETWEEN_LOOKS: u32 = 256;
+const STEPS_BETWEEN_CHECKS: u32 = 256;
 
-/// How stepping ended, with a message for the user if it ended early.
+/// How the stepping ended, with a message for the user if it ended early.
 struct End {
     status: Status,
     failure: Option<Failure>,
@@ -34,9 +34,9 @@ struct End {
 /// # Errors
 /// Bad input, before the run starts; later the divergence guard, Ctrl-C or the file system.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
-    let mut way = way(arguments)?;
-    let asked = arguments.duration.as_deref().map(|text| quantity::duration("--duration", text)).transpose()?;
-    let Some(duration) = asked.or(way.as_ref().and_then(Way::time)) else {
+    let mut replay = link_replay(arguments)?;
+    let requested = arguments.duration.as_deref().map(|text| quantity::duration("--duration", text)).transpose()?;
+    let Some(duration) = requested.or(replay.as_ref().and_then(LinkReplay::time)) else {
         return Err(Failure::usage("--link: the link names no instant; give the length of the run with --duration"));
     };
     let times = match &arguments.every {
@@ -73,12 +73,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     };
     let scene = load(&arguments.scene)?;
     let mut simulation = start(&scene)?;
-    let begun = StartReport::of(&mut simulation);
+    let start_report = StartReport::of(&mut simulation);
     let mut frame = Frame::default();
     // Columns are determined at t = 0, also for a resumed run.
     simulation.sample(0.0, &mut frame);
     let from = match &arguments.from_state {
-        Some(path) => go_on(&mut simulation, path, &scene, duration)?,
+        Some(path) => resume_from(&mut simulation, path, &scene, duration)?,
         None => 0.0,
     };
     if let Some(impacts) = &mut impacts {
@@ -87,8 +87,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     if simulation.load_peaks().is_none() {
         simulation.track_load_peaks();
     }
-    let wear_begins = wear.is_some() && simulation.wear().is_none();
-    if wear_begins {
+    let starts_wear = wear.is_some() && simulation.wear().is_none();
+    if starts_wear {
         simulation.track_wear();
     }
     let mut table = if arguments.channels.is_empty() {
@@ -110,10 +110,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         if times.is_some_and(|times| !times.include_the_end()) {
             warn("the duration is not a whole number of intervals: the last row lies before the end");
         }
-        if wear_begins && arguments.from_state.is_some() {
+        if starts_wear && arguments.from_state.is_some() {
             warn("the wear map begins at the saved state, which has none");
         }
-        begun.warnings_of(&scene).iter().for_each(|warning| warn(warning));
+        start_report.warnings_of(&scene).iter().for_each(|warning| warn(warning));
     }
 
     interrupt::listen();
@@ -124,7 +124,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         (from, duration),
         times,
         &mut table,
-        &mut StepObservers { impacts: impacts.as_mut(), state: state.as_mut(), way: way.as_mut(), end: asked },
+        &mut StepObservers {
+            impacts: impacts.as_mut(),
+            state: state.as_mut(),
+            replay: replay.as_mut(),
+            end: requested,
+        },
         &mut frame,
         &mut stopwatch,
         &progress,
@@ -140,10 +145,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let wall = stopwatch.as_secs_f64();
     let stepping = Stepping { from, wall };
 
-    let found = impacts.as_ref().map(ImpactsFile::impacts);
-    let mut facts = summary::json(&simulation, end.status, stepping, found);
-    let mut text = summary::text(&simulation, end.status, stepping, found);
-    summary::start(&mut facts, &mut text, &begun);
+    let finished_impacts = impacts.as_ref().map(ImpactsFile::impacts);
+    let mut facts = summary::json(&simulation, end.status, stepping, finished_impacts);
+    let mut text = summary::text(&simulation, end.status, stepping, finished_impacts);
+    summary::start(&mut facts, &mut text, &start_report);
     let fault = simulation.probe_fault();
     if let Some(fault) = &fault {
         summary::line(&mut text, "No tip error", &format!("the ideal mechanism {fault}"));
@@ -151,17 +156,17 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     facts.insert("probe_fault".into(), json!(fault.map(|fault| fault.to_string())));
     facts.insert("rows".into(), json!(table.len()));
     if let Some(path) = &arguments.from_state {
-        let words = format!("{} s, from {}", significant(from, 9), path.display());
-        summary::line(&mut text, "Resumed at", &words);
+        let message = format!("{} s, from {}", significant(from, 9), path.display());
+        summary::line(&mut text, "Resumed at", &message);
         facts.insert("from_time_s".into(), json!(from));
     }
     let mut verdict = None;
-    if let Some(way) = way.as_ref().filter(|way| asked.is_none() && way.is_there(&simulation)) {
-        let compared = way.verdict(&simulation);
-        facts.insert("agrees_with_link".into(), json!(way.hash().map(|_| compared.is_ok())));
+    if let Some(replay) = replay.as_ref().filter(|replay| requested.is_none() && replay.is_reached(&simulation)) {
+        let compared = replay.verdict(&simulation);
+        facts.insert("agrees_with_link".into(), json!(replay.hash().map(|_| compared.is_ok())));
         match compared {
-            Ok(words) => summary::line(&mut text, "Link", &words),
-            Err(words) => verdict = Some(Failure::new(Failure::MISSED, format!("--link: {words}"))),
+            Ok(message) => summary::line(&mut text, "Link", &message),
+            Err(message) => verdict = Some(Failure::new(Failure::MISSED, format!("--link: {message}"))),
         }
     }
     let mut meta = facts.clone();
@@ -220,15 +225,15 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     failure.map_or(Ok(()), Err)
 }
 
-/// Replay of the run behind `--link`, if given.
+/// The replay of the run that `--link` names, if given.
 #[cfg(feature = "gui")]
-fn way(arguments: &RunArguments) -> Result<Option<Way>, Failure> {
+fn link_replay(arguments: &RunArguments) -> Result<Option<LinkReplay>, Failure> {
     let text = arguments.scene.link.as_deref();
-    text.map(|text| Way::new(super::link::parse(text)?)).transpose()
+    text.map(|text| LinkReplay::new(super::link::parse(text)?)).transpose()
 }
 
 #[cfg(not(feature = "gui"))]
-fn way(_arguments: &RunArguments) -> Result<Option<Way>, Failure> {
+fn link_replay(_arguments: &RunArguments) -> Result<Option<LinkReplay>, Failure> {
     Ok(None)
 }
 
@@ -236,7 +241,7 @@ fn way(_arguments: &RunArguments) -> Result<Option<Way>, Failure> {
 ///
 /// # Errors
 /// As [`state::read`]; a `duration`, s, before the saved time; a state that does not fit the simulation.
-fn go_on(simulation: &mut LiveScene, path: &Path, scene: &Scene, duration: f64) -> Result<f64, Failure> {
+fn resume_from(simulation: &mut LiveScene, path: &Path, scene: &Scene, duration: f64) -> Result<f64, Failure> {
     let SavedState { state, time, .. } = state::read(path, scene)?;
     if duration < time {
         return Err(Failure::usage(format!(
@@ -244,7 +249,9 @@ fn go_on(simulation: &mut LiveScene, path: &Path, scene: &Scene, duration: f64) 
             path.display()
         )));
     }
-    simulation.resume(&state).map_err(|misfit| Failure::usage(format!("--from-state {}: {misfit}", path.display())))?;
+    simulation
+        .resume(&state)
+        .map_err(|mismatch| Failure::usage(format!("--from-state {}: {mismatch}", path.display())))?;
     Ok(time)
 }
 
@@ -253,15 +260,15 @@ struct StepObservers<'a> {
     impacts: Option<&'a mut ImpactsFile>,
     state: Option<&'a mut StateFile>,
     /// Replay of a link. It ends at `end`, s, or by default at the link's instant.
-    way: Option<&'a mut Way>,
+    replay: Option<&'a mut LinkReplay>,
     end: Option<f64>,
 }
 
 impl StepObservers<'_> {
     /// Whether the run is over.
     fn is_over(&self, simulation: &LiveScene, duration: f64) -> bool {
-        let at_link = self.way.as_ref().filter(|_| self.end.is_none());
-        at_link.map_or(simulation.time() >= duration, |way| way.is_there(simulation))
+        let at_link = self.replay.as_ref().filter(|_| self.end.is_none());
+        at_link.map_or(simulation.time() >= duration, |replay| replay.is_reached(simulation))
     }
 }
 
@@ -274,7 +281,7 @@ fn simulate(
     (from, duration): (f64, f64),
     times: Option<RowTimes>,
     table: &mut Table,
-    keepers: &mut StepObservers<'_>,
+    observers: &mut StepObservers<'_>,
     frame: &mut Frame,
     stopwatch: &mut Duration,
     progress: &ProgressBar,
@@ -301,11 +308,11 @@ fn simulate(
                 next += 1;
             }
         }
-        if keepers.is_over(simulation, duration) {
+        if observers.is_over(simulation, duration) {
             return Ok(End { status: Status::Done, failure: None });
         }
         progress.set_position(position(simulation.time()));
-        if interrupt::asked() {
+        if interrupt::is_requested() {
             return Ok(End {
                 status: Status::Interrupted,
                 failure: Some(Failure::new(
@@ -314,37 +321,37 @@ fn simulate(
                 )),
             });
         }
-        let last = if keepers.way.is_some() { f64::INFINITY } else { duration };
+        let last = if observers.replay.is_some() { f64::INFINITY } else { duration };
         let row = times.filter(|times| next <= times.last()).map_or(last, |times| times.at(next));
         let started = Instant::now();
-        let outcome = step_some(simulation, row, duration, keepers);
+        let outcome = step_until_check(simulation, row, duration, observers);
         *stopwatch += started.elapsed();
-        if let Err(words) = outcome {
-            return Ok(End { status: Status::Diverged, failure: Some(Failure::new(Failure::DIVERGED, words)) });
+        if let Err(message) = outcome {
+            return Ok(End { status: Status::Diverged, failure: Some(Failure::new(Failure::DIVERGED, message)) });
         }
     }
 }
 
-/// Steps until time `row` is reached, the run ends, or a check is due; a row never shortens a step. The error says why stepping
-/// stopped.
-fn step_some(
+/// Steps until time `row`, s, is reached, the run ends, or a check is due; a row never shortens a step. The error is the reason
+/// why the stepping stopped.
+fn step_until_check(
     simulation: &mut LiveScene,
     row: f64,
     duration: f64,
-    keepers: &mut StepObservers<'_>,
+    observers: &mut StepObservers<'_>,
 ) -> Result<(), String> {
-    for _ in 0..STEPS_BETWEEN_LOOKS {
-        if simulation.time() >= row || keepers.is_over(simulation, duration) {
+    for _ in 0..STEPS_BETWEEN_CHECKS {
+        if simulation.time() >= row || observers.is_over(simulation, duration) {
             break;
         }
-        if let Some(state) = &mut keepers.state {
+        if let Some(state) = &mut observers.state {
             state.watch(simulation, duration);
         }
-        match &mut keepers.way {
+        match &mut observers.replay {
             None => simulation.step_until(duration).map_err(|stopped| stopped.to_string())?,
-            Some(way) => way.step(simulation, keepers.end)?,
+            Some(replay) => replay.step(simulation, observers.end)?,
         }
-        if let Some(impacts) = &mut keepers.impacts {
+        if let Some(impacts) = &mut observers.impacts {
             impacts.collect(simulation);
         }
     }

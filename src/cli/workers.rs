@@ -18,7 +18,7 @@ pub fn run_jobs<T: Send>(
 ) -> Result<(), Failure> {
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
-    let go_on = || !(stop.load(Ordering::Relaxed) || interrupt::asked());
+    let go_on = || !(stop.load(Ordering::Relaxed) || interrupt::is_requested());
     let worker = |send: mpsc::SyncSender<(usize, Result<T, Failure>)>| {
         while let Some(&job) = todo.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| go_on()) {
             let Some(result) = work(job, &go_on) else {

@@ -19,7 +19,7 @@ pub struct MapArguments {
     #[arg(long, value_name = "KEY=VALUES", required = true)]
     pub over: Vec<String>,
     /// Directions in which the farthest error is found at each point.
-    #[arg(long, value_name = "N", default_value = "64", value_parser = directions)]
+    #[arg(long, value_name = "N", default_value = "64", value_parser = parse_directions)]
     pub directions: usize,
     /// Threads to use [default: one for each core]; the result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -39,7 +39,7 @@ pub struct MapArguments {
 }
 
 /// Parses a number of directions.
-fn directions(text: &str) -> Result<usize, String> {
+fn parse_directions(text: &str) -> Result<usize, String> {
     let number = text.parse().ok().filter(|number| DIRECTIONS.contains(number));
     number.ok_or_else(|| format!("expected a whole number from {} to {}", DIRECTIONS.start(), DIRECTIONS.end()))
 }

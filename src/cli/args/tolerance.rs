@@ -33,7 +33,7 @@ pub struct ToleranceArguments {
     #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
     pub runs: u32,
     /// How the values of the lot are drawn.
-    #[arg(long, value_name = "METHOD", default_value = "sobol", value_parser = sampling())]
+    #[arg(long, value_name = "METHOD", default_value = "sobol", value_parser = sampling_parser())]
     pub sampling: Sampling,
     /// Find the cheapest fits that hold --yield: a CSV file with the heading `parameter,fit,cost`, in each row a key or
     /// pattern, one of its candidates as in --over, and the cost of it; the candidates of a parameter from the loosest to the
@@ -41,7 +41,7 @@ pub struct ToleranceArguments {
     #[arg(long, value_name = "FILE")]
     pub cost: Option<PathBuf>,
     /// Yield that the fits must hold, e.g. `99%` or `0.99`.
-    #[arg(long = "yield", value_name = "FRACTION", default_value = "99%", value_parser = fraction)]
+    #[arg(long = "yield", value_name = "FRACTION", default_value = "99%", value_parser = parse_fraction)]
     pub required_yield: f64,
     /// Most choices of fits that are tried, each with --runs runs.
     #[arg(long, value_name = "N", default_value = "64", value_parser = clap::value_parser!(u32).range(1..=10000))]
@@ -52,13 +52,14 @@ pub struct ToleranceArguments {
 }
 
 /// Parser for `--sampling`.
-fn sampling() -> impl TypedValueParser<Value = Sampling> {
-    let of_word = |word: String| Sampling::ALL.into_iter().find(|sampling| sampling.word() == word);
-    PossibleValuesParser::new(Sampling::ALL.map(Sampling::word)).map(move |word| of_word(word).expect("one of these"))
+fn sampling_parser() -> impl TypedValueParser<Value = Sampling> {
+    let sampling_of_word = |word: String| Sampling::ALL.into_iter().find(|sampling| sampling.word() == word);
+    PossibleValuesParser::new(Sampling::ALL.map(Sampling::word))
+        .map(move |word| sampling_of_word(word).expect("one of these"))
 }
 
 /// Parses a part of a whole, above 0 and up to 1: `99%` or `0.99`.
-fn fraction(text: &str) -> Result<f64, String> {
+fn parse_fraction(text: &str) -> Result<f64, String> {
     let (number, whole) = text.trim().strip_suffix('%').map_or((text, 1.0), |number| (number, 100.0));
     let fraction = number.trim().parse::<f64>().ok().map(|number| number / whole);
     let fraction = fraction.filter(|fraction| *fraction > 0.0 && *fraction <= 1.0);
@@ -70,10 +71,10 @@ mod tests {
     #[test]
     fn a_fraction_is_a_number_or_a_percentage() {
         for (text, value) in [("99%", 0.99), ("99 %", 0.99), ("0.5", 0.5), ("100%", 1.0)] {
-            assert_eq!(super::fraction(text), Ok(value));
+            assert_eq!(super::parse_fraction(text), Ok(value));
         }
         for bad in ["99", "0", "-1%", "101%", "%", "nan", "nan%", ""] {
-            assert!(super::fraction(bad).is_err(), "{bad}");
+            assert!(super::parse_fraction(bad).is_err(), "{bad}");
         }
     }
 }

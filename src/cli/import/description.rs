@@ -1,4 +1,4 @@
-//! What a robot description says, in the terms of a scene: bodies, joints, shapes, and what it says besides.
+//! A robot description in the terms of a scene: bodies, joints and shapes, with a list of the parts that a scene omits.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path};
@@ -6,22 +6,22 @@ use std::path::{Component, Path};
 use super::inertia::Inertial;
 use crate::machine::{Mat3, Quat, Vec3};
 
-/// A place: position, m, and orientation.
+/// Position, m, and orientation of an inner frame in an outer one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct Pose {
     /// Position of the origin, m.
     pub position: Vec3,
     /// Orientation.
     pub rotation: Quat,
 }
 
-impl Place {
-    /// The same frame.
+impl Pose {
+    /// The pose of a frame in itself.
     pub fn identity() -> Self {
         Self { position: Vec3::zeros(), rotation: Quat::identity() }
     }
 
-    /// The outer frame in this one.
+    /// The pose of the outer frame in the inner one.
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.inverse();
         Self { position: -(rotation * self.position), rotation }
@@ -32,12 +32,12 @@ impl Place {
         self.position + self.rotation * inner
     }
 
-    /// `inner`, a place in this one, in the outer frame.
-    pub fn then(&self, inner: &Self) -> Self {
+    /// Pose in the outer frame of `inner`, which is given in the inner frame.
+    pub fn compose(&self, inner: &Self) -> Self {
         Self { position: self.point(inner.position), rotation: self.rotation * inner.rotation }
     }
 
-    /// An inertial in this place, in the outer frame.
+    /// `inner`, given in the inner frame, in the outer frame.
     pub fn inertial(&self, inner: Inertial) -> Inertial {
         let turn: Mat3 = *self.rotation.to_rotation_matrix().matrix();
         Inertial {
@@ -48,7 +48,7 @@ impl Place {
     }
 }
 
-/// Form of a shape, with its centre and axes in its place.
+/// Form of a shape about the origin of its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
     /// Radius, m.
@@ -77,8 +77,8 @@ pub fn mesh_unit(scale: [f64; 3]) -> Result<f64, &'static str> {
 pub struct Shape {
     /// Form.
     pub form: Form,
-    /// Where it is on the body.
-    pub place: Place,
+    /// Pose on the body.
+    pub pose: Pose,
     /// Red, green, blue, 0 to 1.
     pub colour: Option<[f64; 3]>,
     /// Line of the description.
@@ -92,7 +92,7 @@ pub struct Body {
     pub name: String,
     /// Mass and its distribution, in the body's axes.
     pub inertial: Inertial,
-    /// What it looks like.
+    /// Visible shapes.
     pub shapes: Vec<Shape>,
     /// Line of the description.
     pub line: u32,
@@ -106,7 +106,7 @@ impl Body {
     }
 }
 
-/// How a joint moves; axes in the child's axes.
+/// Motion that a joint allows; axes are given in the child's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// About the axis.
@@ -119,7 +119,7 @@ pub enum Kind {
     Universal(Vec3, Vec3),
     /// About any axis.
     Ball,
-    /// In every way.
+    /// Six degrees of freedom.
     Free,
 }
 
@@ -128,14 +128,14 @@ pub enum Kind {
 pub struct Joint {
     /// Name in the description.
     pub name: String,
-    /// How it moves.
+    /// Motion that it allows.
     pub kind: Kind,
     /// Index of the body that carries it; `None` for the world.
     pub parent: Option<usize>,
     /// Index of the body that it carries.
     pub child: usize,
     /// Pose of the child in the parent where all coordinates are 0.
-    pub place: Place,
+    pub pose: Pose,
     /// Point of the child about which it turns, m, in the child.
     pub anchor: Vec3,
     /// Springs and dampers of its coordinates.
@@ -167,8 +167,8 @@ pub struct Closure {
     /// Both bodies; `None` for the world.
     pub bodies: [Option<usize>; 2],
     /// The common frame on each; a ball joint has only its origin in common.
-    pub frames: [Place; 2],
-    /// Whether it leaves no motion, in place of a ball joint between a socket on the first body and a ball on the second.
+    pub frames: [Pose; 2],
+    /// Whether it allows no motion. Otherwise it is a ball joint, with its socket on the first body and its ball on the second.
     pub is_fixed: bool,
     /// Line of the description.
     pub line: u32,
@@ -189,50 +189,50 @@ pub struct Description {
     pub closures: Vec<Closure>,
     /// Shapes that do not move.
     pub fixed: Vec<Shape>,
-    /// What is not taken: first line and number of times, by what it is.
-    left: BTreeMap<String, (u32, usize)>,
+    /// Omitted parts: first line and number of occurrences, by description.
+    omitted: BTreeMap<String, (u32, usize)>,
 }
 
 impl Description {
-    /// One without parts, under the gravity of the Earth along -z, as both formats have it.
+    /// A description without parts, under the gravity of the Earth along -z, the default of both formats.
     pub fn new(name: &str) -> Self {
         Self { name: name.to_owned(), gravity: Vec3::new(0.0, 0.0, -9.81), ..Self::default() }
     }
 
-    /// Notes that something on `line` is not taken.
-    pub fn leave_out(&mut self, line: u32, what: impl Into<String>) {
-        let (first, count) = self.left.entry(what.into()).or_insert((line, 0));
+    /// Records that `what`, on line `line`, is omitted.
+    pub fn omit(&mut self, line: u32, what: impl Into<String>) {
+        let (first, count) = self.omitted.entry(what.into()).or_insert((line, 0));
         *first = line.min(*first);
         *count += 1;
     }
 
     /// Whether a body needs no mass, because it lies between joints with one coordinate or two.
     pub fn only_connects(&self, body: usize) -> bool {
-        let bounds = |joint: &Joint| !matches!(joint.kind, Kind::Ball | Kind::Free);
+        let constrains = |joint: &Joint| !matches!(joint.kind, Kind::Ball | Kind::Free);
         let mut carried = self.joints.iter().filter(|joint| joint.parent == Some(body)).peekable();
-        bounds(&self.joints[body]) && carried.peek().is_some() && carried.all(bounds)
+        constrains(&self.joints[body]) && carried.peek().is_some() && carried.all(constrains)
     }
 
-    /// What is not taken, in the order of the file.
-    pub fn left_out(&self) -> Vec<String> {
-        let mut all: Vec<_> = self.left.iter().map(|(what, (line, count))| (*line, what, *count)).collect();
+    /// Messages about the omitted parts, in the order of the file.
+    pub fn omissions(&self) -> Vec<String> {
+        let mut all: Vec<_> = self.omitted.iter().map(|(what, (line, count))| (*line, what, *count)).collect();
         all.sort();
         let many = |count: usize| if count > 1 { format!(", and {} more", count - 1) } else { String::new() };
         all.into_iter().map(|(line, what, count)| format!("not taken: {what} (line {line}{})", many(count))).collect()
     }
 
     /// Pose in the world of each body where all coordinates are 0.
-    pub fn poses(&self) -> Vec<Place> {
-        let mut poses: Vec<Place> = Vec::new();
+    pub fn poses(&self) -> Vec<Pose> {
+        let mut poses: Vec<Pose> = Vec::new();
         for joint in &self.joints {
-            let parent = joint.parent.map_or_else(Place::identity, |parent| poses[parent]);
-            poses.push(parent.then(&joint.place));
+            let parent = joint.parent.map_or_else(Pose::identity, |parent| poses[parent]);
+            poses.push(parent.compose(&joint.pose));
         }
         poses
     }
 
-    /// Leaves out meshes that a scene in `folder` could not read.
-    pub fn keep_existing_meshes(&mut self, folder: &Path) {
+    /// Omits meshes that a scene in `folder` could not read.
+    pub fn omit_unreadable_meshes(&mut self, folder: &Path) {
         let mut missing = Vec::new();
         let mut keep = |shape: &Shape| {
             let Form::Mesh(file, _) = &shape.form else {
@@ -252,7 +252,7 @@ impl Description {
         self.fixed.retain(&mut keep);
         self.bodies.iter_mut().for_each(|body| body.shapes.retain(&mut keep));
         for (line, what) in missing {
-            self.leave_out(line, what);
+            self.omit(line, what);
         }
     }
 }

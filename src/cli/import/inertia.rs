@@ -34,7 +34,7 @@ pub enum Solid {
 
 impl Solid {
     /// Volume, m^3, and principal inertias about its centre over its mass, m^2.
-    fn measures(self) -> (f64, Vec3) {
+    fn volume_and_gyration(self) -> (f64, Vec3) {
         let ends = |half: f64| [-half, half].map(|z| Vec3::new(0.0, 0.0, z));
         let geometry = match self {
             Self::Ellipsoid([a, b, c]) => {
@@ -57,14 +57,14 @@ impl Solid {
 
     /// Volume, m^3.
     pub fn volume(self) -> f64 {
-        self.measures().0
+        self.volume_and_gyration().0
     }
 }
 
 impl Inertial {
     /// A solid of `mass` with its centre at `centre` and its axes turned by `rotation`.
     pub fn of_solid(solid: Solid, mass: f64, centre: Vec3, rotation: Mat3) -> Self {
-        let own = Mat3::from_diagonal(&(mass * solid.measures().1));
+        let own = Mat3::from_diagonal(&(mass * solid.volume_and_gyration().1));
         Self { mass, centre, inertia: rotation * own * rotation.transpose() }
     }
 
@@ -73,8 +73,8 @@ impl Inertial {
         Self { mass: density * solid.volume, centre: solid.centre, inertia: solid.inertia() * density }
     }
 
-    /// Why no part of a body has this mass and inertia, if so. A point mass has an inertia of 0.
-    pub fn fault(&self) -> Option<String> {
+    /// Error message if no part of a body can have this mass and inertia. A point mass has an inertia of 0.
+    pub fn error_message(&self) -> Option<String> {
         if self.mass < 0.0 {
             return Some(format!("the mass is {} kg; allowed from 0 kg", self.mass));
         }
@@ -93,8 +93,8 @@ impl Inertial {
         })
     }
 
-    /// Both together; `other` in the same axes.
-    pub fn plus(self, other: Self) -> Self {
+    /// Mass and inertia of both together; `other` is given in the same axes.
+    pub fn combined_with(self, other: Self) -> Self {
         let mass = self.mass + other.mass;
         if mass == 0.0 {
             return self;
@@ -130,7 +130,7 @@ mod tests {
         let cell = 8.0 * reach[0] * reach[1] * reach[2] / f64::from(N).powi(3);
         assert!((sums[0] * cell / solid.volume() - 1.0).abs() < 1e-2);
         let gyration = Vec3::new(sums[1], sums[2], sums[3]) / sums[0];
-        let own = solid.measures().1;
+        let own = solid.volume_and_gyration().1;
         let error = (gyration - own).component_div(&own);
         assert!(error.amax() < 1e-2, "{solid:?}: {error}");
     }
@@ -151,7 +151,7 @@ mod tests {
             let centre = Vec3::new(1.0, 0.25 * side, -2.0);
             Inertial::of_solid(Solid::Box([0.1, 0.25, 0.3]), 2.0, centre, Mat3::identity())
         };
-        let whole = half(1.0).plus(half(-1.0));
+        let whole = half(1.0).combined_with(half(-1.0));
         let expected =
             Inertial::of_solid(Solid::Box([0.1, 0.5, 0.3]), 4.0, Vec3::new(1.0, 0.0, -2.0), Mat3::identity());
         assert!((whole.inertia - expected.inertia).amax() < 1e-12 && (whole.centre - expected.centre).amax() < 1e-15);

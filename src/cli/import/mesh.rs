@@ -10,16 +10,16 @@ use crate::scene::mesh::Format;
 use crate::words::words;
 
 /// Largest number of pairs of a point and a face that are compared for a hull.
-const MOST_COMPARISONS: usize = 400_000_000;
-/// How far beyond a face of a hull a point may lie as if it were in its plane, in extents of the mesh: the rounding of files.
-const FLAT: f64 = 1e-9;
+const MAX_COMPARISONS: usize = 400_000_000;
+/// Distance from the plane of a hull's face within which a point counts as in it, in extents of the mesh: the rounding of files.
+const PLANE_TOLERANCE: f64 = 1e-9;
 
-/// What of a mesh has mass: the words of its attribute `inertia`.
+/// The part of a mesh that has mass: the values of its attribute `inertia`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Filling {
+pub enum MeshInertia {
     /// Its convex hull.
     Convex,
-    /// What it encloses.
+    /// The enclosed volume.
     Exact,
     /// The pyramids between its triangles and a point among them, those that the surface faces away from as well.
     Legacy,
@@ -27,7 +27,7 @@ pub enum Filling {
     Shell,
 }
 
-words!(Filling {
+words!(MeshInertia {
     Convex => "convex",
     Exact => "exact",
     Legacy => "legacy",
@@ -51,26 +51,32 @@ pub fn read(folder: &Path, file: &str) -> Result<Mesh, String> {
     if bytes.len() as u64 > MAX_MESH_SIZE {
         return Err(format!("{file} is too large; allowed at most {} MiB", MAX_MESH_SIZE >> 20));
     }
-    let alone = |other: &str| Err(format!("{other} is another file").into());
-    format.read(&bytes, &alone).map_err(|fault| format!("{file}: {}", fault.why))
+    let no_other_file = |other: &str| Err(format!("{other} is another file").into());
+    format.read(&bytes, &no_other_file).map_err(|fault| format!("{file}: {}", fault.why))
 }
 
-/// What of `mesh` has mass, with its vertices where `place` takes them, m; `mirrored` if that turns it inside out. The volume of a shell
-/// is its area, m^2.
+/// The solid of `mesh` that has mass. `transform` maps its vertices, m; `mirrored` if that turns the surface inside out. The volume
+/// of a shell is its area, m^2.
 ///
 /// # Errors
 /// A sentence about a mesh that is open, flat, or too large for a hull.
-pub fn solid(mesh: &Mesh, place: impl Fn(Vec3) -> Vec3, mirrored: bool, filling: Filling) -> Result<Solid, String> {
-    let vertices: Vec<Vec3> = mesh.vertices().iter().map(|vertex| place(Vec3::from(vertex.map(f64::from)))).collect();
+pub fn solid(
+    mesh: &Mesh,
+    transform: impl Fn(Vec3) -> Vec3,
+    mirrored: bool,
+    mesh_inertia: MeshInertia,
+) -> Result<Solid, String> {
+    let vertices: Vec<Vec3> =
+        mesh.vertices().iter().map(|vertex| transform(Vec3::from(vertex.map(f64::from)))).collect();
     let outward = |[a, b, c]: [u32; 3]| {
         let corners = if mirrored { [a, c, b] } else { [a, b, c] };
         corners.map(|corner| vertices[corner as usize])
     };
-    let triangles: Vec<[Vec3; 3]> = match filling {
-        Filling::Convex => hull(&vertices)?.into_iter().map(|face| face.map(|corner| vertices[corner])).collect(),
+    let triangles: Vec<[Vec3; 3]> = match mesh_inertia {
+        MeshInertia::Convex => hull(&vertices)?.into_iter().map(|face| face.map(|corner| vertices[corner])).collect(),
         _ => mesh.triangles().iter().map(|corners| outward(*corners)).collect(),
     };
-    if let (Filling::Exact | Filling::Legacy, Some(ends)) = (filling, mesh.open_edge()) {
+    if let (MeshInertia::Exact | MeshInertia::Legacy, Some(ends)) = (mesh_inertia, mesh.open_edge()) {
         let [from, to] = ends.map(|[x, y, z]| format!("({x}, {y}, {z})"));
         return Err(format!(
             "it is not closed: its edge from {from} to {to} does not lie between two triangles that face the same way; close it, or \
@@ -85,18 +91,18 @@ pub fn solid(mesh: &Mesh, place: impl Fn(Vec3) -> Vec3, mirrored: bool, filling:
         });
         Solid::of_tetrahedra(pyramids).moved(point)
     };
-    let solid = match filling {
-        Filling::Shell => surface,
-        Filling::Convex | Filling::Exact => about(surface.centre, false),
+    let solid = match mesh_inertia {
+        MeshInertia::Shell => surface,
+        MeshInertia::Convex | MeshInertia::Exact => about(surface.centre, false),
         // The centroid of the first pyramids is the tip of those that have mass, and the centre of mass, though it is not their
         // centroid: `ComputeVolume` and `ComputeInertia` of MuJoCo's user_mesh.cc.
-        Filling::Legacy => {
+        MeshInertia::Legacy => {
             let tip = about(surface.centre, true).centre;
             about(tip, true).about(tip)
         }
     };
-    let regular = solid.volume > 0.0 && solid.inertia().symmetric_eigenvalues().min() > 0.0;
-    if regular { Ok(solid) } else { Err("it encloses no volume".to_owned()) }
+    let has_volume = solid.volume > 0.0 && solid.inertia().symmetric_eigenvalues().min() > 0.0;
+    if has_volume { Ok(solid) } else { Err("it encloses no volume".to_owned()) }
 }
 
 /// Triangles of the convex hull of `points`, counter-clockwise seen from outside, as indices. Each point in turn replaces the faces that
@@ -109,18 +115,18 @@ fn hull(points: &[Vec3]) -> Result<Vec<[usize; 3]>, String> {
         all.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(size, _)| *size > 0.0).map(|(_, index)| index).ok_or_else(flat)
     };
     let a = points.first().ok_or_else(flat)?;
-    let one = farthest(&|p| (p - a).norm())?;
-    let a = points[one];
-    let two = farthest(&|p| (p - a).norm())?;
-    let (extent, along) = ((points[two] - a).norm(), (points[two] - a).normalize());
-    let three = farthest(&|p| (p - a).cross(&along).norm())?;
-    let normal = along.cross(&(points[three] - a)).try_normalize(0.0).ok_or_else(flat)?;
-    let four = farthest(&|p| (p - a).dot(&normal).abs())?;
-    let height = (points[four] - a).dot(&normal);
-    if height.abs() <= FLAT * extent {
+    let first = farthest(&|p| (p - a).norm())?;
+    let a = points[first];
+    let second = farthest(&|p| (p - a).norm())?;
+    let (extent, along) = ((points[second] - a).norm(), (points[second] - a).normalize());
+    let third = farthest(&|p| (p - a).cross(&along).norm())?;
+    let normal = along.cross(&(points[third] - a)).try_normalize(0.0).ok_or_else(flat)?;
+    let fourth = farthest(&|p| (p - a).dot(&normal).abs())?;
+    let height = (points[fourth] - a).dot(&normal);
+    if height.abs() <= PLANE_TOLERANCE * extent {
         return Err(flat());
     }
-    let [i, j, k, top] = if height > 0.0 { [one, three, two, four] } else { [one, two, three, four] };
+    let [i, j, k, top] = if height > 0.0 { [first, third, second, fourth] } else { [first, second, third, fourth] };
     let face = |corners: [usize; 3]| {
         let [a, b, c] = corners.map(|corner| points[corner]);
         let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vec3::zeros);
@@ -130,17 +136,18 @@ fn hull(points: &[Vec3]) -> Result<Vec<[usize; 3]>, String> {
     let mut comparisons = 0;
     for (index, point) in points.iter().enumerate() {
         comparisons += faces.len();
-        if comparisons > MOST_COMPARISONS {
+        if comparisons > MAX_COMPARISONS {
             return Err("its hull is too costly; choose inertia = \"exact\"".to_owned());
         }
-        let sees = |(_, normal, height): &([usize; 3], Vec3, f64)| normal.dot(point) - height > FLAT * extent;
-        if !faces.iter().any(sees) {
+        let is_visible =
+            |(_, normal, height): &([usize; 3], Vec3, f64)| normal.dot(point) - height > PLANE_TOLERANCE * extent;
+        if !faces.iter().any(is_visible) {
             continue;
         }
-        let (seen, hidden): (Vec<_>, Vec<_>) = faces.into_iter().partition(sees);
+        let (visible, hidden): (Vec<_>, Vec<_>) = faces.into_iter().partition(is_visible);
         faces = hidden;
         let edges: BTreeSet<[usize; 2]> =
-            seen.iter().flat_map(|([a, b, c], ..)| [[*a, *b], [*b, *c], [*c, *a]]).collect();
+            visible.iter().flat_map(|([a, b, c], ..)| [[*a, *b], [*b, *c], [*c, *a]]).collect();
         let outline = edges.iter().filter(|[from, to]| !edges.contains(&[*to, *from]));
         faces.extend(outline.map(|[from, to]| face([*from, *to, index])));
     }
@@ -164,8 +171,8 @@ mod tests {
         Mesh::new(layer(0.0).chain(layer(height)).collect(), faces)
     }
 
-    fn found(mesh: &Mesh, filling: Filling) -> Solid {
-        solid(mesh, |point| point * 1e-3, false, filling).unwrap()
+    fn found(mesh: &Mesh, mesh_inertia: MeshInertia) -> Solid {
+        solid(mesh, |point| point * 1e-3, false, mesh_inertia).unwrap()
     }
 
     fn is(solid: &Solid, volume: f64, centre: [f64; 3], inertia: [f64; 3]) {
@@ -181,10 +188,10 @@ mod tests {
         let mesh = prism(&corners, &[[0, 1, 2], [0, 2, 3]], 0.5);
         let (v, squares) = (0.2 * 0.3 * 0.5, [0.04, 0.09, 0.25]);
         let own = [squares[1] + squares[2], squares[0] + squares[2], squares[0] + squares[1]].map(|sum| v * sum / 12.0);
-        for filling in [Filling::Convex, Filling::Exact, Filling::Legacy] {
-            is(&found(&mesh, filling), v, [0.1, 0.15, 0.25], own);
+        for mesh_inertia in [MeshInertia::Convex, MeshInertia::Exact, MeshInertia::Legacy] {
+            is(&found(&mesh, mesh_inertia), v, [0.1, 0.15, 0.25], own);
         }
-        let shell = found(&mesh, Filling::Shell);
+        let shell = found(&mesh, MeshInertia::Shell);
         // Pairs of plates across each axis, half an edge from the centroid; along their own edges, the mean square is a twelfth.
         let [a, b, c] = [0.2, 0.3, 0.5];
         let (x, y, z) = (2.0 * b * c, 2.0 * a * c, 2.0 * a * b);
@@ -200,7 +207,7 @@ mod tests {
     fn an_angle_is_filled_up_only_by_its_hull() {
         let corners = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.1], [0.1, 0.1], [0.1, 0.2], [0.0, 0.2]];
         let mesh = prism(&corners, &[[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]], 0.1);
-        let exact = found(&mesh, Filling::Exact);
+        let exact = found(&mesh, MeshInertia::Exact);
         let square = |x: f64, y: f64| {
             let size = Vec3::repeat(0.1);
             let geometry = crate::machine::Geometry::Box { centre: Vec3::new(x, y, 0.05), size };
@@ -214,15 +221,15 @@ mod tests {
         });
         is(&exact, 3e-3, centre.into(), inertia.diagonal().into());
         assert!((exact.inertia() - inertia).amax() < 1e-5 * inertia.amax());
-        let hull = found(&mesh, Filling::Convex);
+        let hull = found(&mesh, MeshInertia::Convex);
         assert!((hull.volume / 3.5e-3 - 1.0).abs() < 1e-6, "{}", hull.volume);
         // Three squares and a triangle with its centroid a third of its edges from the inner corner.
         let x = (3e-3 * centre.x + 0.5e-3 * (0.1 + 0.1 / 3.0)) / 3.5e-3;
         assert!((hull.centre - Vec3::new(x, x, 0.05)).amax() < 1e-6, "{}", hull.centre);
         // The centroid sees the whole surface from inside.
-        assert!((found(&mesh, Filling::Legacy).volume / exact.volume - 1.0).abs() < 1e-9);
+        assert!((found(&mesh, MeshInertia::Legacy).volume / exact.volume - 1.0).abs() < 1e-9);
         let mirrored =
-            solid(&mesh, |point| Vec3::new(-point.x, point.y, point.z) * 1e-3, true, Filling::Exact).unwrap();
+            solid(&mesh, |point| Vec3::new(-point.x, point.y, point.z) * 1e-3, true, MeshInertia::Exact).unwrap();
         assert!((mirrored.volume / exact.volume - 1.0).abs() < 1e-12 && (mirrored.centre.x + centre.x).abs() < 1e-6);
     }
 
@@ -232,8 +239,8 @@ mod tests {
         let channel =
             [[0.0, 0.0], [0.3, 0.0], [0.3, 0.3], [0.25, 0.3], [0.25, 0.05], [0.05, 0.05], [0.05, 0.3], [0.0, 0.3]];
         let channel = prism(&channel, &[[0, 1, 4], [0, 4, 5], [1, 2, 4], [2, 3, 4], [0, 5, 6], [0, 6, 7]], 0.1);
-        assert!((found(&channel, Filling::Exact).volume / 4e-3 - 1.0).abs() < 1e-6);
-        let pyramids = found(&channel, Filling::Legacy);
+        assert!((found(&channel, MeshInertia::Exact).volume / 4e-3 - 1.0).abs() < 1e-6);
+        let pyramids = found(&channel, MeshInertia::Legacy);
         // The surface has its centroid at y = 0.125 m. The bases of the pyramids from there have theirs at 0.132 m, each counted by its
         // pyramid, and the pyramids a quarter of the way back.
         let y = 0.75 * 0.132 + 0.25 * 0.125;
@@ -287,11 +294,11 @@ mod tests {
     fn an_open_mesh_has_a_hull_and_a_surface_alone() {
         let vertices = vec![[0.0, 0.0, 0.0], [1e3, 0.0, 0.0], [0.0, 1e3, 0.0], [0.0, 0.0, 1e3]];
         let mesh = Mesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2]]);
-        let hull = found(&mesh, Filling::Convex);
+        let hull = found(&mesh, MeshInertia::Convex);
         // A tetrahedron with three edges of 1 m: 1/6, and 3/80 of its volume for the square of a coordinate about the centroid.
         is(&hull, 1.0 / 6.0, [0.25; 3], [2.0 / 6.0 * 3.0 / 80.0; 3]);
-        assert!((found(&mesh, Filling::Shell).volume - 1.5).abs() < 1e-6);
-        let fault = solid(&mesh, |point| point, false, Filling::Exact).unwrap_err();
+        assert!((found(&mesh, MeshInertia::Shell).volume - 1.5).abs() < 1e-6);
+        let fault = solid(&mesh, |point| point, false, MeshInertia::Exact).unwrap_err();
         assert!(fault.contains("it is not closed: its edge from"), "{fault}");
     }
 }

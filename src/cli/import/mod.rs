@@ -19,11 +19,11 @@ use description::Description;
 use xml::Source;
 
 /// Size limit for a description, bytes: that of a scene file.
-const LARGEST: u64 = 4 << 20;
+const MAX_BYTES: u64 = 4 << 20;
 /// Largest number of bodies that carry each other in a row.
-const DEEPEST: usize = 1000;
+const MAX_DEPTH: usize = 1000;
 /// Limit for its elements, attributes and texts.
-const MOST_NODES: u32 = 500_000;
+const MAX_NODES: u32 = 500_000;
 
 /// Runs `import`.
 ///
@@ -33,34 +33,34 @@ pub fn import(arguments: &ImportArguments) -> Result<(), Failure> {
     let path = &arguments.file;
     let name = path.display().to_string();
     let failed = |error: std::io::Error| Failure::io(format!("{name}: cannot read this file: {error}"));
-    if path.metadata().map_err(failed)?.len() > LARGEST {
-        return Err(Failure::usage(format!("{name}: too large; allowed at most {} MiB", LARGEST >> 20)));
+    if path.metadata().map_err(failed)?.len() > MAX_BYTES {
+        return Err(Failure::usage(format!("{name}: too large; allowed at most {} MiB", MAX_BYTES >> 20)));
     }
     let text = std::fs::read_to_string(path).map_err(failed)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut description = read(&name, folder, &text)?;
-    description.keep_existing_meshes(folder);
+    description.omit_unreadable_meshes(folder);
     let scene = write::scene(&description, &name)?;
     // The scene is read before anybody else reads it.
     Scene::parse_given(&scene.text, None, &Default::default(), Some(folder), &[])
         .map_err(|error| Failure::usage(in_description(&name, &scene, error)))?;
-    for left in description.left_out() {
-        warn(&format!("{name}: {left}"));
+    for omission in description.omissions() {
+        warn(&format!("{name}: {omission}"));
     }
     print(&scene.text)
 }
 
 /// An error of the scene that was written, with the line of the description `name` from which it comes if there is one.
-fn in_description(name: &str, scene: &write::Written, error: SceneError) -> String {
-    let written = error.position.filter(|_| error.file.is_none()).and_then(|(line, _)| scene.origin(line));
-    let Some(line) = written else {
+fn in_description(name: &str, scene: &write::SceneFile, error: SceneError) -> String {
+    let origin = error.position.filter(|_| error.file.is_none()).and_then(|(line, _)| scene.origin(line));
+    let Some(line) = origin else {
         return format!("{name}: what was read makes no scene: {error}");
     };
     SceneError { file: Some(format!("{name}:{line}")), position: None, line_text: None, ..error }.to_string()
 }
 
 fn too_deep(source: &Source, node: Node) -> Failure {
-    source.error(node, &format!("more than {DEEPEST} parts in a row"))
+    source.error(node, &format!("more than {MAX_DEPTH} parts in a row"))
 }
 
 fn read(name: &str, folder: &Path, text: &str) -> Result<Description, Failure> {
@@ -69,7 +69,7 @@ fn read(name: &str, folder: &Path, text: &str) -> Result<Description, Failure> {
         let line = text[..at].matches('\n').count() + 1;
         return Err(Failure::usage(format!("{name}:{line}: entities are not read: write their text in their places")));
     }
-    let options = ParsingOptions { allow_dtd: true, nodes_limit: MOST_NODES, ..ParsingOptions::default() };
+    let options = ParsingOptions { allow_dtd: true, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options)
         .map_err(|error| Failure::usage(format!("{name}: is not an XML file: {error}")))?;
     let root = document.root_element();

@@ -4,21 +4,21 @@ use std::collections::BTreeMap;
 
 use roxmltree::Node;
 
-use super::description::{Body, Description, Form, Joint, Kind, Place, Shape, Spring, mesh_unit};
+use super::description::{Body, Description, Form, Joint, Kind, Pose, Shape, Spring, mesh_unit};
 use super::inertia::Inertial;
 use super::xml::{Source, child};
-use super::{DEEPEST, too_deep};
+use super::{MAX_DEPTH, too_deep};
 use crate::cli::Failure;
 use crate::machine::{Mat3, Quat, Vec3};
 
-/// What is known of the parts while the tree is walked.
+/// State of the traversal of the tree of links.
 struct Tree<'s, 'n, 'i> {
     source: &'s Source<'s>,
     links: BTreeMap<&'n str, Node<'n, 'i>>,
     /// Joints by parent link, in the order of the file.
     joints: BTreeMap<&'n str, Vec<Node<'n, 'i>>>,
     colours: BTreeMap<&'n str, [f64; 3]>,
-    found: Description,
+    description: Description,
 }
 
 /// Reads `<robot>`.
@@ -31,7 +31,7 @@ pub fn read(source: &Source, robot: Node) -> Result<Description, Failure> {
         links: BTreeMap::new(),
         joints: BTreeMap::new(),
         colours: BTreeMap::new(),
-        found: Description::new(robot.attribute("name").unwrap_or("robot")),
+        description: Description::new(robot.attribute("name").unwrap_or("robot")),
     };
     let mut carried: BTreeMap<&str, Node> = BTreeMap::new();
     for node in robot.children().filter(Node::is_element) {
@@ -42,7 +42,7 @@ pub fn read(source: &Source, robot: Node) -> Result<Description, Failure> {
                 }
             }
             "joint" => {
-                let [parent, child] = ends(source, node)?;
+                let [parent, child] = link_names(source, node)?;
                 tree.joints.entry(parent).or_default().push(node);
                 if let Some(first) = carried.insert(child, node) {
                     let line = source.line(first);
@@ -52,7 +52,7 @@ pub fn read(source: &Source, robot: Node) -> Result<Description, Failure> {
                 }
             }
             "material" => {}
-            other => tree.found.leave_out(source.line(node), format!("<{other}>")),
+            other => tree.description.omit(source.line(node), format!("<{other}>")),
         }
     }
     // A material may be defined anywhere and is known by its name everywhere; the outermost definition counts.
@@ -80,19 +80,19 @@ pub fn read(source: &Source, robot: Node) -> Result<Description, Failure> {
         return Err(source
             .error(robot, &format!("one link must have no parent, and stands on the world; without parent: {what}")));
     };
-    tree.walk(root, None, &Place::identity(), 0)?;
-    if tree.found.bodies.is_empty() {
+    tree.walk(root, None, &Pose::identity(), 0)?;
+    if tree.description.bodies.is_empty() {
         return Err(source.error(robot, "no joint moves"));
     }
     let moving = tree.joints.values().flatten().filter(|joint| joint.attribute("type") != Some("fixed")).count();
-    if tree.found.bodies.len() < moving {
+    if tree.description.bodies.len() < moving {
         return Err(source.error(robot, "some links are carried by each other in a ring, and not by the world"));
     }
-    Ok(tree.found)
+    Ok(tree.description)
 }
 
 /// Names of the links that a joint connects.
-fn ends<'n>(source: &Source, joint: Node<'n, '_>) -> Result<[&'n str; 2], Failure> {
+fn link_names<'n>(source: &Source, joint: Node<'n, '_>) -> Result<[&'n str; 2], Failure> {
     let end = |tag: &str| -> Result<&'n str, Failure> {
         let node = joint.children().find(|node| node.has_tag_name(tag));
         let node = node.ok_or_else(|| source.error(joint, &format!("<{tag}> is missing")))?;
@@ -102,34 +102,34 @@ fn ends<'n>(source: &Source, joint: Node<'n, '_>) -> Result<[&'n str; 2], Failur
 }
 
 impl<'n> Tree<'_, 'n, '_> {
-    /// Adds `link` to the body `carrier`, where it lies at `place`, and what hangs on it.
-    fn walk(&mut self, link: &'n str, carrier: Option<usize>, place: &Place, depth: usize) -> Result<(), Failure> {
-        if depth > DEEPEST {
+    /// Adds `link`, which lies at `pose` in the body `carrier`, and the links that it carries.
+    fn walk(&mut self, link: &'n str, carrier: Option<usize>, pose: &Pose, depth: usize) -> Result<(), Failure> {
+        if depth > MAX_DEPTH {
             return Err(too_deep(self.source, self.links[link]));
         }
-        self.take(self.links[link], carrier, place)?;
+        self.add_link_contents(self.links[link], carrier, pose)?;
         for joint in self.joints.get(link).cloned().unwrap_or_default() {
-            let [_, child_link] = ends(self.source, joint)?;
-            let at = place.then(&self.origin(joint)?);
+            let [_, child_link] = link_names(self.source, joint)?;
+            let at = pose.compose(&self.origin(joint)?);
             let Some(kind) = self.kind(joint)? else {
                 self.walk(child_link, carrier, &at, depth + 1)?;
                 continue;
             };
-            let index = self.found.bodies.len();
-            self.found.bodies.push(Body::new(child_link, self.source.line(self.links[child_link])));
+            let index = self.description.bodies.len();
+            self.description.bodies.push(Body::new(child_link, self.source.line(self.links[child_link])));
             let springs = self.damper(joint, kind)?;
-            self.found.joints.push(Joint {
+            self.description.joints.push(Joint {
                 name: self.source.require(joint, "name")?.to_owned(),
                 kind,
                 parent: carrier,
                 child: index,
-                place: at,
+                pose: at,
                 anchor: Vec3::zeros(),
                 springs,
                 line: self.source.line(joint),
             });
-            self.walk(child_link, Some(index), &Place::identity(), depth + 1)?;
-            if !(self.found.bodies[index].inertial.mass > 0.0) && !self.found.only_connects(index) {
+            self.walk(child_link, Some(index), &Pose::identity(), depth + 1)?;
+            if !(self.description.bodies[index].inertial.mass > 0.0) && !self.description.only_connects(index) {
                 let message = "a moving link needs an <inertial> with a mass above 0 kg, unless it connects a hinge or slide with \
                                another";
                 return Err(self.source.error(self.links[child_link], message));
@@ -139,64 +139,64 @@ impl<'n> Tree<'_, 'n, '_> {
     }
 
     /// Adds mass and shapes of a link.
-    fn take(&mut self, link: Node, carrier: Option<usize>, place: &Place) -> Result<(), Failure> {
+    fn add_link_contents(&mut self, link: Node, carrier: Option<usize>, pose: &Pose) -> Result<(), Failure> {
         for node in link.children().filter(Node::is_element) {
             let line = self.source.line(node);
             match node.tag_name().name() {
                 "inertial" => {
-                    let inertial = place.inertial(self.inertial(node)?);
+                    let inertial = pose.inertial(self.inertial(node)?);
                     match carrier {
                         Some(body) => {
-                            let own = &mut self.found.bodies[body].inertial;
-                            *own = own.plus(inertial);
+                            let own = &mut self.description.bodies[body].inertial;
+                            *own = own.combined_with(inertial);
                         }
-                        None => self.found.leave_out(line, "mass of a link that does not move"),
+                        None => self.description.omit(line, "mass of a link that does not move"),
                     }
                 }
                 "visual" => {
-                    if let Some(shape) = self.shape(node, place)? {
+                    if let Some(shape) = self.shape(node, pose)? {
                         match carrier {
-                            Some(body) => self.found.bodies[body].shapes.push(shape),
-                            None => self.found.fixed.push(shape),
+                            Some(body) => self.description.bodies[body].shapes.push(shape),
+                            None => self.description.fixed.push(shape),
                         }
                     }
                 }
-                "collision" => self.found.leave_out(line, "<collision>: bodies do not touch each other"),
-                other => self.found.leave_out(line, format!("<{other}> of a link")),
+                "collision" => self.description.omit(line, "<collision>: bodies do not touch each other"),
+                other => self.description.omit(line, format!("<{other}> of a link")),
             }
         }
         Ok(())
     }
 
-    /// Place of a part in its link, or of a joint's child in its parent.
-    fn origin(&self, node: Node) -> Result<Place, Failure> {
+    /// Pose of a part in its link, or of a joint's child in its parent.
+    fn origin(&self, node: Node) -> Result<Pose, Failure> {
         let Some(origin) = child(node, "origin") else {
-            return Ok(Place::identity());
+            return Ok(Pose::identity());
         };
         let position = self.source.numbers(origin, "xyz")?.map_or_else(Vec3::zeros, Vec3::from);
         let [roll, pitch, yaw] = self.source.numbers(origin, "rpy")?.unwrap_or_default();
-        Ok(Place { position, rotation: Quat::from_euler_angles(roll, pitch, yaw) })
+        Ok(Pose { position, rotation: Quat::from_euler_angles(roll, pitch, yaw) })
     }
 
     fn inertial(&self, node: Node) -> Result<Inertial, Failure> {
-        let place = self.origin(node)?;
+        let pose = self.origin(node)?;
         let part = |tag: &str| child(node, tag).ok_or_else(|| self.source.error(node, &format!("<{tag}> is missing")));
         let mass_node = part("mass")?;
         self.source.require(mass_node, "value")?;
         let mass = self.source.number(mass_node, "value")?.unwrap_or_default();
         let tensor = part("inertia")?;
-        let mut found = [0.0; 6];
-        for (value, key) in found.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
+        let mut components = [0.0; 6];
+        for (value, key) in components.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
             self.source.require(tensor, key)?;
             *value = self.source.number(tensor, key)?.unwrap_or_default();
         }
-        let [xx, yy, zz, xy, xz, yz] = found;
+        let [xx, yy, zz, xy, xz, yz] = components;
         let inertia = Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         let own = Inertial { mass, centre: Vec3::zeros(), inertia };
-        own.fault().map_or(Ok(place.inertial(own)), |fault| Err(self.source.error(node, &fault)))
+        own.error_message().map_or(Ok(pose.inertial(own)), |fault| Err(self.source.error(node, &fault)))
     }
 
-    fn shape(&mut self, visual: Node, place: &Place) -> Result<Option<Shape>, Failure> {
+    fn shape(&mut self, visual: Node, pose: &Pose) -> Result<Option<Shape>, Failure> {
         let geometry = child(visual, "geometry").ok_or_else(|| self.source.error(visual, "<geometry> is missing"))?;
         let line = self.source.line(visual);
         let Some(node) = geometry.children().find(Node::is_element) else {
@@ -220,7 +220,7 @@ impl<'n> Tree<'_, 'n, '_> {
                 let unit = match mesh_unit(scale) {
                     Ok(unit) => unit,
                     Err(fault) => {
-                        self.found.leave_out(line, format!("mesh {file}, {fault}"));
+                        self.description.omit(line, format!("mesh {file}, {fault}"));
                         return Ok(None);
                     }
                 };
@@ -231,7 +231,7 @@ impl<'n> Tree<'_, 'n, '_> {
                 Form::Mesh(file.to_owned(), unit)
             }
             other => {
-                self.found.leave_out(line, format!("shape <{other}>"));
+                self.description.omit(line, format!("shape <{other}>"));
                 return Ok(None);
             }
         };
@@ -239,7 +239,7 @@ impl<'n> Tree<'_, 'n, '_> {
         let own = material.and_then(|m| child(m, "color")).map(|c| self.source.numbers::<4>(c, "rgba")).transpose()?;
         let known = material.and_then(|m| m.attribute("name")).and_then(|name| self.colours.get(name).copied());
         let colour = own.flatten().map(|[r, g, b, _]| [r, g, b]).or(known);
-        Ok(Some(Shape { form, place: place.then(&self.origin(visual)?), colour, line }))
+        Ok(Some(Shape { form, pose: pose.compose(&self.origin(visual)?), colour, line }))
     }
 
     /// How a joint moves; `None` for a fixed one.
@@ -268,9 +268,9 @@ impl<'n> Tree<'_, 'n, '_> {
             match node.tag_name().name() {
                 "origin" | "parent" | "child" | "axis" | "dynamics" => {}
                 "limit" if joint.attribute("type") == Some("continuous") => {}
-                "limit" => self.found.leave_out(line, "limits of a joint: a [[stop]] needs their stiffness, too"),
-                "mimic" => self.found.leave_out(line, "<mimic>: the joint moves by itself"),
-                other => self.found.leave_out(line, format!("<{other}> of a joint")),
+                "limit" => self.description.omit(line, "limits of a joint: a [[stop]] needs their stiffness, too"),
+                "mimic" => self.description.omit(line, "<mimic>: the joint moves by itself"),
+                other => self.description.omit(line, format!("<{other}> of a joint")),
             }
         }
         Ok(Some(kind))
@@ -282,14 +282,14 @@ impl<'n> Tree<'_, 'n, '_> {
         };
         let line = self.source.line(node);
         if self.source.number(node, "friction")?.unwrap_or_default() != 0.0 {
-            self.found.leave_out(line, "friction in a joint");
+            self.description.omit(line, "friction in a joint");
         }
         let damping = self.source.number(node, "damping")?.unwrap_or_default();
         let turns = match kind {
             Kind::Hinge(_) => true,
             Kind::Slide(_) => false,
             _ if damping != 0.0 => {
-                self.found.leave_out(line, "damping of a joint that is neither a hinge nor a slide");
+                self.description.omit(line, "damping of a joint that is neither a hinge nor a slide");
                 return Ok(Vec::new());
             }
             _ => return Ok(Vec::new()),

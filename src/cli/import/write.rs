@@ -3,14 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-use super::description::{Description, Form, Joint, Kind, Place, Shape, Spring};
+use super::description::{Description, Form, Joint, Kind, Pose, Shape, Spring};
 use crate::cli::Failure;
 use crate::machine::{Quat, Vec3};
 
-/// What turns leave of a component that is 0, m or of a direction; of products, over the inertia.
+/// Rounding error of a component that is 0: of positions, m, of directions, and of products relative to the inertia.
 const ROUNDING: f64 = 1e-14;
 /// Longest name in a scene file.
-const LONGEST_NAME: usize = 40;
+const MAX_NAME_LENGTH: usize = 40;
 
 /// Names of a scene file by those of the description, each once.
 #[derive(Default)]
@@ -20,10 +20,11 @@ struct Names {
 }
 
 impl Names {
-    /// A name that is not taken yet, as near as possible to `wanted`.
-    fn next(&mut self, wanted: &str) -> String {
-        let fine = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
-        let mut name: String = wanted.chars().map(|c| if fine(c) { c } else { '_' }).take(LONGEST_NAME).collect();
+    /// Assigns a name that is not taken yet, as close as possible to `requested`.
+    fn assign(&mut self, requested: &str) -> String {
+        let is_allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+        let mut name: String =
+            requested.chars().map(|c| if is_allowed(c) { c } else { '_' }).take(MAX_NAME_LENGTH).collect();
         if name.is_empty() {
             name.push_str("part");
         }
@@ -31,26 +32,26 @@ impl Names {
         let begin = name.clone();
         while name == "world" || self.taken.contains(&name) {
             let suffix = format!("_{number}");
-            name = begin.chars().take(LONGEST_NAME - suffix.len()).collect::<String>() + &suffix;
+            name = begin.chars().take(MAX_NAME_LENGTH - suffix.len()).collect::<String>() + &suffix;
             number += 1;
         }
-        if name != wanted {
-            self.renamed.insert(wanted.to_owned(), name.clone());
+        if name != requested {
+            self.renamed.insert(requested.to_owned(), name.clone());
         }
         self.taken.insert(name.clone());
         name
     }
 }
 
-/// A scene file and where its parts come from.
-pub struct Written {
+/// A scene file, with the lines of the description that its parts come from.
+pub struct SceneFile {
     /// The scene file.
     pub text: String,
-    /// Bytes of it from which on parts come from these lines of the description.
+    /// Byte at which each part begins, and its line in the description.
     origins: Vec<(usize, u32)>,
 }
 
-impl Written {
+impl SceneFile {
     /// Line of the description from which a line of the scene comes, both from 1.
     pub fn origin(&self, line: u32) -> Option<u32> {
         let before = |at: usize| u32::try_from(self.text[..at].matches('\n').count()).unwrap_or(u32::MAX);
@@ -62,9 +63,9 @@ impl Written {
 ///
 /// # Errors
 /// More parts than a scene has.
-pub fn scene(description: &Description, file: &str) -> Result<Written, Failure> {
+pub fn scene(description: &Description, file: &str) -> Result<SceneFile, Failure> {
     let mut bodies = Names::default();
-    let names: Vec<String> = description.bodies.iter().map(|body| bodies.next(&body.name)).collect();
+    let names: Vec<String> = description.bodies.iter().map(|body| bodies.assign(&body.name)).collect();
     let mut joints = Names::default();
     let poses = description.poses();
     let body = |index: Option<usize>| index.map_or("world", |index| &names[index]);
@@ -102,7 +103,7 @@ pub fn scene(description: &Description, file: &str) -> Result<Written, Failure> 
         write_joint(&mut text, joint, parent, &names[joint.child], &poses[joint.child], &mut joints);
     }
     for closure in &description.closures {
-        let name = joints.next(&closure.name);
+        let name = joints.assign(&closure.name);
         let ends = [0, 1].map(|end| (body(closure.bodies[end]), closure.frames[end]));
         origins.push((text.len(), closure.line));
         if closure.is_fixed {
@@ -118,33 +119,33 @@ pub fn scene(description: &Description, file: &str) -> Result<Written, Failure> 
     let _ = writeln!(
         out,
         "# From {}, by jointplay {}. Links without a joint of their own are parts of those that carry them.",
-        line(file),
+        comment_line(file),
         crate::VERSION
     );
-    for left in description.left_out() {
-        let _ = writeln!(out, "# {}", line(&left));
+    for omission in description.omissions() {
+        let _ = writeln!(out, "# {}", comment_line(&omission));
     }
     for (from, to) in bodies.renamed.iter().chain(&joints.renamed) {
-        let _ = writeln!(out, "# {} is called {to} here.", line(from));
+        let _ = writeln!(out, "# {} is called {to} here.", comment_line(from));
     }
-    let _ = writeln!(out, "\nname = \"{}\"\nstart = \"ideal\"", Names::default().next(&description.name));
+    let _ = writeln!(out, "\nname = \"{}\"\nstart = \"ideal\"", Names::default().assign(&description.name));
     let _ = writeln!(out, "\n[gravity]");
     for (axis, value) in ["x", "y", "z"].iter().zip(description.gravity.iter()) {
         let _ = writeln!(out, "{axis} = \"{value} m/s^2\"");
     }
-    let carries = description.joints.iter().any(|joint| joint.kind == Kind::Ball);
-    if carries || description.closures.iter().any(|closure| !closure.is_fixed) {
+    let has_ball_joint = description.joints.iter().any(|joint| joint.kind == Kind::Ball);
+    if has_ball_joint || description.closures.iter().any(|closure| !closure.is_fixed) {
         let _ = writeln!(
             out,
             "\n[contact]\n# A description has no play. A clearance above 0 gives it to all ball joints.\nclearance = \"0 mm\""
         );
     }
     let origins = origins.into_iter().map(|(at, line)| (out.len() + at, line)).collect();
-    Ok(Written { text: out + &text, origins })
+    Ok(SceneFile { text: out + &text, origins })
 }
 
-fn write_joint(text: &mut String, joint: &Joint, parent: Option<&str>, child: &str, pose: &Place, names: &mut Names) {
-    let at = joint.place.point(joint.anchor);
+fn write_joint(text: &mut String, joint: &Joint, parent: Option<&str>, child: &str, pose: &Pose, names: &mut Names) {
+    let at = joint.pose.point(joint.anchor);
     let (kind, axes) = match joint.kind {
         Kind::Hinge(axis) => ("revolute", vec![axis]),
         Kind::Slide(axis) => ("prismatic", vec![axis]),
@@ -153,13 +154,13 @@ fn write_joint(text: &mut String, joint: &Joint, parent: Option<&str>, child: &s
         Kind::Ball | Kind::Free => ("free", vec![]),
     };
     let is_ball = joint.kind == Kind::Ball;
-    let own = names.next(&joint.name);
-    let name = if is_ball { names.next(&format!("{own}_free")) } else { own.clone() };
+    let own = names.assign(&joint.name);
+    let name = if is_ball { names.assign(&format!("{own}_free")) } else { own.clone() };
     let _ = writeln!(text, "\n[[joint]]\nname = \"{name}\"\nkind = \"{kind}\"");
     if kind == "free" {
         let _ = writeln!(text, "child = \"{child}\"");
         let position = vector(pose.position, "m");
-        let _ = writeln!(text, "start = {{ position = {position}{} }}", turned(", rotation", &pose.rotation));
+        let _ = writeln!(text, "start = {{ position = {position}{} }}", rotation_key(", rotation", &pose.rotation));
         if is_ball {
             write_ball_joint(text, &own, [(parent.unwrap_or("world"), at), (child, joint.anchor)]);
         }
@@ -174,17 +175,17 @@ fn write_joint(text: &mut String, joint: &Joint, parent: Option<&str>, child: &s
         let _ = writeln!(text, "child_point = {}", vector(joint.anchor, "m"));
     }
     if let Some(axis) = axes.first() {
-        let _ = writeln!(text, "axis = {}", direction(joint.place.rotation * axis));
+        let _ = writeln!(text, "axis = {}", direction(joint.pose.rotation * axis));
     }
     if let Some(axis) = axes.get(1) {
         let _ = writeln!(text, "child_axis = {}", direction(*axis));
     }
-    let rotation = turned("rotation", &joint.place.rotation);
+    let rotation = rotation_key("rotation", &joint.pose.rotation);
     if !rotation.is_empty() {
         let _ = writeln!(text, "{rotation}");
     }
     for spring in &joint.springs {
-        write_spring(text, spring, &own, &names.next(&format!("{own}_spring")));
+        write_spring(text, spring, &own, &names.assign(&format!("{own}_spring")));
     }
 }
 
@@ -194,7 +195,7 @@ fn write_ball_joint(text: &mut String, name: &str, [socket, ball]: [(&str, Vec3)
 }
 
 /// A joint without motion; the world can only be its parent.
-fn write_weld(text: &mut String, name: &str, [one, other]: [(&str, Place); 2]) {
+fn write_weld(text: &mut String, name: &str, [one, other]: [(&str, Pose); 2]) {
     let [(parent, of_parent), (child, of_child)] = if other.0 == "world" { [other, one] } else { [one, other] };
     let _ = writeln!(text, "\n[[joint]]\nname = \"{name}\"\nkind = \"fixed\"");
     if parent != "world" {
@@ -202,7 +203,7 @@ fn write_weld(text: &mut String, name: &str, [one, other]: [(&str, Place); 2]) {
     }
     let _ = writeln!(text, "child = \"{child}\"\nparent_point = {}", vector(of_parent.position, "m"));
     let _ = writeln!(text, "child_point = {}", vector(of_child.position, "m"));
-    let rotation = turned("rotation", &(of_parent.rotation * of_child.rotation.inverse()));
+    let rotation = rotation_key("rotation", &(of_parent.rotation * of_child.rotation.inverse()));
     let _ = writeln!(text, "{rotation}{}closes_loop = true", if rotation.is_empty() { "" } else { "\n" });
 }
 
@@ -225,7 +226,7 @@ fn write_spring(text: &mut String, spring: &Spring, joint: &str, name: &str) {
 
 /// Keys of a shape.
 fn shape(shape: &Shape) -> Vec<String> {
-    let Place { position, rotation } = shape.place;
+    let Pose { position, rotation } = shape.pose;
     let axis = |half: f64| rotation * Vec3::new(0.0, 0.0, half);
     let ends = |half: f64| {
         let (from, to) = (position - axis(half), position + axis(half));
@@ -243,7 +244,7 @@ fn shape(shape: &Shape) -> Vec<String> {
         }
         // A box that is turned is a thick plate.
         Form::Box([a, b, c]) => {
-            let corner = |(x, y): (f64, f64)| vector(shape.place.point(Vec3::new(x * a, y * b, 0.0)), "m");
+            let corner = |(x, y): (f64, f64)| vector(shape.pose.point(Vec3::new(x * a, y * b, 0.0)), "m");
             let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(corner).join(", ");
             vec![form("plate"), format!("corners = [{corners}]"), format!("thickness = \"{} m\"", 2.0 * c)]
         }
@@ -251,7 +252,7 @@ fn shape(shape: &Shape) -> Vec<String> {
             let file = toml::Value::from(file.as_str());
             let mut keys = vec![form("mesh"), format!("file = {file}"), format!("unit = \"{unit} m\"")];
             keys.push(format!("position = {}", vector(position, "m")));
-            keys.extend(Some(turned("rotation", &rotation)).filter(|keys| !keys.is_empty()));
+            keys.extend(Some(rotation_key("rotation", &rotation)).filter(|keys| !keys.is_empty()));
             keys
         }
     };
@@ -263,7 +264,7 @@ fn shape(shape: &Shape) -> Vec<String> {
 }
 
 /// `key` with a rotation; empty for none.
-fn turned(key: &str, rotation: &Quat) -> String {
+fn rotation_key(key: &str, rotation: &Quat) -> String {
     if *rotation == Quat::identity() {
         return String::new();
     }
@@ -271,7 +272,7 @@ fn turned(key: &str, rotation: &Quat) -> String {
     format!("{key} = {{ quaternion = [{}, {}, {}, {}] }}", number(q.w), number(q.i), number(q.j), number(q.k))
 }
 
-/// A number as TOML wants it: one with a point.
+/// A number in TOML syntax, with a decimal point.
 fn number(value: f64) -> String {
     format!("{value:?}")
 }
@@ -290,12 +291,12 @@ fn direction(v: Vec3) -> String {
     format!("[{x}, {y}, {z}]")
 }
 
-/// Components, of which those that are rounding are 0 and not -0.
+/// The components; those within the rounding error become 0, never -0.
 fn rounded(v: Vec3) -> [f64; 3] {
     [v.x, v.y, v.z].map(|part| if part.abs() < ROUNDING { 0.0 } else { part })
 }
 
 /// One line of a comment.
-fn line(text: &str) -> String {
+fn comment_line(text: &str) -> String {
     crate::scene::visible_line(text).into_owned()
 }

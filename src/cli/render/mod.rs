@@ -152,7 +152,7 @@ fn common_reference(
         let instant = times.instants[number];
         while simulation.time() < instant {
             // Drawing the frames will report the reason.
-            if interrupt::asked() || simulation.step().is_err() {
+            if interrupt::is_requested() || simulation.step().is_err() {
                 return Ok(Some(marks.reference(arrows)));
             }
         }

@@ -110,7 +110,7 @@ impl SceneStudio {
 impl Studio for SceneStudio {
     fn go_to(&mut self, instant: f64) -> Result<(), Failure> {
         while self.simulation.time() < instant {
-            if interrupt::asked() {
+            if interrupt::is_requested() {
                 return Err(interrupted(self.simulation.time()));
             }
             self.simulation.step().map_err(|stopped| Failure::new(Failure::DIVERGED, stopped.to_string()))?;
@@ -220,7 +220,7 @@ impl ApplicationStudio {
 impl Studio for ApplicationStudio {
     fn go_to(&mut self, instant: f64) -> Result<(), Failure> {
         while self.simulation().time() < instant {
-            if interrupt::asked() {
+            if interrupt::is_requested() {
                 return Err(interrupted(self.simulation().time()));
             }
             let next = (self.simulation().time() + SLICE).min(instant);

@@ -55,7 +55,7 @@ fn fill(folder: &Folder, report: &Report, kept: &Kept) -> Result<(), Failure> {
     data::write(folder, report)?;
     let mut pictures = page::Pictures::new();
     for (name, sheet) in report.complete().into_iter().flat_map(figures::all) {
-        if interrupt::asked() {
+        if interrupt::is_requested() {
             return Err(kept.interrupted());
         }
         let drawing = |error: crate::chart::SheetError| Failure::io(format!("{name}: {error}"));

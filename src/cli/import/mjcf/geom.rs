@@ -4,18 +4,18 @@ use std::sync::Arc;
 
 use roxmltree::Node;
 
-use super::super::description::{Form, Place, Shape, mesh_unit};
+use super::super::description::{Form, Pose, Shape, mesh_unit};
 use super::super::inertia::{Inertial, Solid};
-use super::super::mesh::{self, Filling};
+use super::super::mesh::{self, MeshInertia};
 use super::{MAIN, Model, quaternion};
 use crate::cli::Failure;
 use crate::machine::{self, Quat, Vec3};
 use crate::words::Words;
 
 /// Density of a geom without one of its own, kg/m^3.
-const DENSITY: f64 = 1000.0;
+const DEFAULT_DENSITY: f64 = 1000.0;
 /// Attributes of a geom that are read, or noted elsewhere, or act on contacts alone.
-const GEOM: [&str; 19] = [
+const KNOWN_ATTRIBUTES: [&str; 19] = [
     "type",
     "size",
     "fromto",
@@ -38,19 +38,19 @@ const GEOM: [&str; 19] = [
 ];
 
 impl<'n, 'i> Model<'_, 'n, 'i> {
-    /// Shape and, if `weighs`, mass of a geom, in the axes of its body.
+    /// Shape and, if `has_mass`, mass of a geom, in the axes of its body.
     pub(super) fn geom(
         &mut self,
         node: Node<'n, 'i>,
         class: &str,
-        weighs: bool,
+        has_mass: bool,
     ) -> Result<(Option<Shape>, Option<Inertial>), Failure> {
         let line = self.source.line(node);
-        self.leave_out_attributes(node, &GEOM);
+        self.omit_unknown_attributes(node, &KNOWN_ATTRIBUTES);
         if ["contype", "conaffinity"].iter().any(|key| self.attribute(node, class, key) != Some("0")) {
-            self.found.leave_out(line, "contact between geoms: bodies do not touch each other");
+            self.description.omit(line, "contact between geoms: bodies do not touch each other");
         }
-        let place = self.place(node, class)?;
+        let pose = self.pose(node, class)?;
         if self.attribute(node, class, "shellinertia") == Some("true") {
             let message = "shellinertia = \"true\" is not read: give its body an <inertial>, or the geom mass = \"0\"";
             return Err(self.source.error(node, message));
@@ -62,8 +62,8 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             let size = sizes.get(at).copied().filter(|size| *size > 0.0);
             size.ok_or_else(|| self.source.error(node, &format!("size: a {kind} needs number {} above 0", at + 1)))
         };
-        let between = self.between(node, class)?;
-        let place = between.map_or(place, |(place, _)| place);
+        let between = self.from_to(node, class)?;
+        let pose = between.map_or(pose, |(pose, _)| pose);
         let half = between.map(|(_, half)| half);
         let length = |at: usize| half.map_or_else(|| size(at), Ok);
         let colour = self.attribute(node, class, "rgba");
@@ -89,13 +89,13 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                 if kind == "box" {
                     (Some(Form::Box(axes)), Some(Solid::Box(axes)))
                 } else {
-                    self.found.leave_out(line, "picture of an ellipsoid");
+                    self.description.omit(line, "picture of an ellipsoid");
                     (None, Some(Solid::Ellipsoid(axes)))
                 }
             }
             "mesh" => (self.mesh_form(node, class)?, None),
             "plane" | "hfield" => {
-                self.found.leave_out(line, format!("geom of type {kind}"));
+                self.description.omit(line, format!("geom of type {kind}"));
                 return Ok((None, None));
             }
             _ => {
@@ -104,22 +104,22 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             }
         };
         let mass = self.numbers::<1>(node, class, "mass")?.map(|[mass]| mass);
-        let density = self.numbers::<1>(node, class, "density")?.map_or(DENSITY, |[density]| density);
-        let mass = match (weighs, solid) {
+        let density = self.numbers::<1>(node, class, "density")?.map_or(DEFAULT_DENSITY, |[density]| density);
+        let mass = match (has_mass, solid) {
             (false, _) => None,
             _ if mass == Some(0.0) || (mass.is_none() && density == 0.0) => None,
             (true, Some(solid)) => {
                 let mass = mass.unwrap_or_else(|| density * solid.volume());
-                let turn = *place.rotation.to_rotation_matrix().matrix();
-                Some(Inertial::of_solid(solid, mass, place.position, turn))
+                let turn = *pose.rotation.to_rotation_matrix().matrix();
+                Some(Inertial::of_solid(solid, mass, pose.position, turn))
             }
             (true, None) => {
                 let solid = self.mesh_solid(node, class)?;
-                Some(place.inertial(Inertial::of_density(&solid, mass.map_or(density, |mass| mass / solid.volume))))
+                Some(pose.inertial(Inertial::of_density(&solid, mass.map_or(density, |mass| mass / solid.volume))))
             }
         };
         let form = form.filter(|_| !transparent);
-        Ok((form.map(|form| Shape { form, place, colour, line }), mass))
+        Ok((form.map(|form| Shape { form, pose, colour, line }), mass))
     }
 
     /// The mesh asset of a geom and its scale.
@@ -149,7 +149,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         };
         form.map(Some).or_else(|fault| {
             let name = self.attribute(node, class, "mesh").unwrap_or_default();
-            self.found.leave_out(self.source.line(node), format!("picture of mesh {name}, {fault}"));
+            self.description.omit(self.source.line(node), format!("picture of mesh {name}, {fault}"));
             Ok(None)
         })
     }
@@ -157,10 +157,10 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
     /// What a mesh encloses, in the axes of its geom.
     fn mesh_solid(&mut self, node: Node<'n, 'i>, class: &str) -> Result<machine::Solid, Failure> {
         let (asset, scale) = self.mesh_asset(node, class)?;
-        let filling = match self.attribute(asset, MAIN, "inertia") {
-            None => self.filling,
-            Some(word) => Filling::of_word(word).ok_or_else(|| {
-                self.source.error(asset, &format!("inertia = \"{word}\": allowed: {}", Filling::WORDS.join(", ")))
+        let mesh_inertia = match self.attribute(asset, MAIN, "inertia") {
+            None => self.mesh_inertia,
+            Some(word) => MeshInertia::of_word(word).ok_or_else(|| {
+                self.source.error(asset, &format!("inertia = \"{word}\": allowed: {}", MeshInertia::WORDS.join(", ")))
             })?,
         };
         let position = self.numbers(asset, MAIN, "refpos")?.map_or_else(Vec3::zeros, Vec3::from);
@@ -168,20 +168,20 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             Some(parts) => quaternion(parts).ok_or_else(|| self.source.error(asset, "refquat is 0"))?,
             None => Quat::identity(),
         };
-        let origin = Place { position, rotation }.inverse();
+        let origin = Pose { position, rotation }.inverse();
         let scale = Vec3::from(scale);
         let remedy = "give its body an <inertial>, or the geom mass = \"0\"";
         let failed =
             |what: String| self.source.error(node, &format!("mesh without a computable mass: {what}; {remedy}"));
         let file = self.mesh_file(asset).ok_or_else(|| failed("it has no file".to_owned()))?;
-        let mesh = match self.read.get(&file) {
+        let mesh = match self.loaded_meshes.get(&file) {
             Some(mesh) => mesh.clone(),
             None => Arc::new(mesh::read(self.source.folder, &file).map_err(failed)?),
         };
         let solid =
-            mesh::solid(&mesh, |point| scale.component_mul(&origin.point(point)), scale.product() < 0.0, filling);
+            mesh::solid(&mesh, |point| scale.component_mul(&origin.point(point)), scale.product() < 0.0, mesh_inertia);
         let solid = solid.map_err(|fault| failed(format!("{file}: {fault}")))?;
-        self.read.insert(file, mesh);
+        self.loaded_meshes.insert(file, mesh);
         Ok(solid)
     }
 }

@@ -2,18 +2,18 @@
 
 use roxmltree::Node;
 
-use super::super::description::{Body, Joint, Kind, Place, Spring};
+use super::super::description::{Body, Joint, Kind, Pose, Spring};
 use super::Model;
 use crate::cli::Failure;
 use crate::machine::Vec3;
 use crate::words::{Words, words};
 
-/// Cosine of the angle between two axes from which they count as parallel, and up to which as perpendicular.
+/// Cosine of the angle between two axes above which they count as parallel, and below which as perpendicular.
 const PARALLEL: f64 = 1.0 - 1e-10;
 const PERPENDICULAR: f64 = 1e-6;
 
 /// Attributes of a joint that are read, or noted elsewhere, or act on limits alone.
-const JOINT: [&str; 13] = [
+const KNOWN_ATTRIBUTES: [&str; 13] = [
     "type",
     "axis",
     "range",
@@ -31,14 +31,14 @@ const JOINT: [&str; 13] = [
 
 /// Values of the attribute `type`.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Type {
+enum JointType {
     Hinge,
     Slide,
     Ball,
     Free,
 }
 
-words!(Type {
+words!(JointType {
     Hinge => "hinge",
     Slide => "slide",
     Ball => "ball",
@@ -49,25 +49,27 @@ words!(Type {
 #[derive(Clone, Copy)]
 struct Element<'n, 'i> {
     node: Node<'n, 'i>,
-    of: Type,
+    joint_type: JointType,
     axis: Vec3,
     anchor: Vec3,
 }
 
-/// How a body moves that has these joint elements, if one joint of a scene does it.
-fn whole(elements: &[Element]) -> Option<Kind> {
+/// The kind of the one scene joint that is equivalent to these joint elements, if there is one.
+fn single_joint_kind(elements: &[Element]) -> Option<Kind> {
     match *elements {
-        [Element { of: Type::Hinge, axis, .. }] => Some(Kind::Hinge(axis)),
-        [Element { of: Type::Slide, axis, .. }] => Some(Kind::Slide(axis)),
-        [Element { of: Type::Ball, .. }] => Some(Kind::Ball),
-        [Element { of: Type::Free, .. }] => Some(Kind::Free),
+        [Element { joint_type: JointType::Hinge, axis, .. }] => Some(Kind::Hinge(axis)),
+        [Element { joint_type: JointType::Slide, axis, .. }] => Some(Kind::Slide(axis)),
+        [Element { joint_type: JointType::Ball, .. }] => Some(Kind::Ball),
+        [Element { joint_type: JointType::Free, .. }] => Some(Kind::Free),
         [a, b] => {
             let cosine = a.axis.dot(&b.axis).abs();
-            match (a.of, b.of) {
-                (Type::Hinge, Type::Slide) | (Type::Slide, Type::Hinge) if cosine > PARALLEL => {
+            match (a.joint_type, b.joint_type) {
+                (JointType::Hinge, JointType::Slide) | (JointType::Slide, JointType::Hinge) if cosine > PARALLEL => {
                     Some(Kind::Cylindrical(a.axis))
                 }
-                (Type::Hinge, Type::Hinge) if cosine < PERPENDICULAR && (a.anchor - b.anchor).norm() < 1e-9 => {
+                (JointType::Hinge, JointType::Hinge)
+                    if cosine < PERPENDICULAR && (a.anchor - b.anchor).norm() < 1e-9 =>
+                {
                     Some(Kind::Universal(a.axis, b.axis))
                 }
                 _ => None,
@@ -78,29 +80,29 @@ fn whole(elements: &[Element]) -> Option<Kind> {
 }
 
 impl<'n, 'i> Model<'_, 'n, 'i> {
-    /// Adds the body `name` with the joints `nodes`, at `place` in `carrier`, and gives its index. Hinges and slides that are not one
-    /// joint of a scene follow each other, between bodies without mass, as MuJoCo applies them.
-    pub(super) fn jointed(
+    /// Adds the body `body` with the joints `nodes`, at `pose` in `carrier`, and returns its index. Hinges and slides without an
+    /// equivalent scene joint become a chain of joints between massless bodies, in MuJoCo's order.
+    pub(super) fn add_jointed_body(
         &mut self,
         body: Node<'n, 'i>,
         nodes: &[Node<'n, 'i>],
         class: &str,
         carrier: Option<usize>,
-        place: &Place,
+        pose: &Pose,
     ) -> Result<usize, Failure> {
         let line = self.source.line(body);
         let name = body.attribute("name");
-        let name = name.map_or_else(|| format!("body{}", self.found.bodies.len() + 1), str::to_owned);
+        let name = name.map_or_else(|| format!("body{}", self.description.bodies.len() + 1), str::to_owned);
         let mut elements = Vec::new();
         for &node in nodes {
             elements.push(self.element(node, class)?);
         }
-        let steps: Vec<(Kind, &[Element])> = match whole(&elements) {
+        let steps: Vec<(Kind, &[Element])> = match single_joint_kind(&elements) {
             Some(kind) => vec![(kind, &elements)],
-            None => elements.chunks(1).filter_map(|one| Some((whole(one)?, one))).collect(),
+            None => elements.chunks(1).filter_map(|one| Some((single_joint_kind(one)?, one))).collect(),
         };
-        let alone = |kind: &Kind| matches!(kind, Kind::Ball | Kind::Free);
-        if steps.len() > 1 && steps.iter().any(|(kind, _)| alone(kind)) {
+        let is_only_joint = |kind: &Kind| matches!(kind, Kind::Ball | Kind::Free);
+        if steps.len() > 1 && steps.iter().any(|(kind, _)| is_only_joint(kind)) {
             let message =
                 "a ball or free joint is the only joint of its body in a scene: put a body with mass between them";
             return Err(self.source.error(body, message));
@@ -108,9 +110,9 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         if carrier.is_some() && steps.iter().any(|(kind, _)| *kind == Kind::Free) {
             return Err(self.source.error(body, "only a body of the world moves freely"));
         }
-        let (mut parent, mut at) = (carrier, *place);
+        let (mut parent, mut at) = (carrier, *pose);
         for (number, (kind, elements)) in (1..).zip(&steps) {
-            let index = self.found.bodies.len();
+            let index = self.description.bodies.len();
             let first = elements[0].node;
             let own = first.attribute("name");
             let body_name = match own {
@@ -118,17 +120,27 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                 Some(own) => own.to_owned(),
                 None => format!("{name}_{number}"),
             };
-            self.found.bodies.push(Body::new(&body_name, line));
+            self.description.bodies.push(Body::new(&body_name, line));
             let springs = self.springs(elements, class, *kind)?;
             // Of a cylindrical joint, the point on the axis of its hinge.
-            let anchor = elements.iter().find(|element| element.of == Type::Hinge).unwrap_or(&elements[0]).anchor;
+            let anchor =
+                elements.iter().find(|element| element.joint_type == JointType::Hinge).unwrap_or(&elements[0]).anchor;
             let anchor = if *kind == Kind::Free { Vec3::zeros() } else { anchor };
             let name = own.unwrap_or(&body_name).to_owned();
             let line = self.source.line(first);
-            self.found.joints.push(Joint { name, kind: *kind, parent, child: index, place: at, anchor, springs, line });
-            (parent, at) = (Some(index), Place::identity());
+            self.description.joints.push(Joint {
+                name,
+                kind: *kind,
+                parent,
+                child: index,
+                pose: at,
+                anchor,
+                springs,
+                line,
+            });
+            (parent, at) = (Some(index), Pose::identity());
         }
-        Ok(self.found.bodies.len() - 1)
+        Ok(self.description.bodies.len() - 1)
     }
 
     fn element(&mut self, node: Node<'n, 'i>, class: &str) -> Result<Element<'n, 'i>, Failure> {
@@ -136,37 +148,38 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             "freejoint" => "free",
             _ => self.attribute(node, class, "type").unwrap_or("hinge"),
         };
-        let allowed = || self.source.error(node, &format!("type = \"{word}\": allowed: {}", Type::WORDS.join(", ")));
-        let of = Type::of_word(word).ok_or_else(allowed)?;
+        let allowed =
+            || self.source.error(node, &format!("type = \"{word}\": allowed: {}", JointType::WORDS.join(", ")));
+        let joint_type = JointType::of_word(word).ok_or_else(allowed)?;
         let axis = self.numbers(node, class, "axis")?.map_or_else(Vec3::z, Vec3::from);
         let axis = axis.try_normalize(1e-12).ok_or_else(|| self.source.error(node, "axis has no direction"))?;
         let anchor = self.numbers(node, class, "pos")?.map_or_else(Vec3::zeros, Vec3::from);
-        self.leave_out_attributes(node, &JOINT);
+        self.omit_unknown_attributes(node, &KNOWN_ATTRIBUTES);
         let line = self.source.line(node);
         for key in ["armature", "frictionloss", "ref"] {
             if self.attribute(node, class, key).is_some_and(|value| value.trim() != "0") {
-                self.found.leave_out(line, format!("{key} of <joint>"));
+                self.description.omit(line, format!("{key} of <joint>"));
             }
         }
         if self.attribute(node, class, "range").is_some() {
-            self.found.leave_out(line, "range of a joint: a [[stop]] needs its stiffness, too");
+            self.description.omit(line, "range of a joint: a [[stop]] needs its stiffness, too");
         }
-        Ok(Element { node, of, axis, anchor })
+        Ok(Element { node, joint_type, axis, anchor })
     }
 
     /// Springs and dampers of the elements of one joint.
     fn springs(&mut self, elements: &[Element<'n, 'i>], class: &str, kind: Kind) -> Result<Vec<Spring>, Failure> {
-        let mut found = Vec::new();
-        for (at, &Element { node, of, axis, .. }) in elements.iter().enumerate() {
+        let mut springs = Vec::new();
+        for (at, &Element { node, joint_type, axis, .. }) in elements.iter().enumerate() {
             let (stiffness, damping) = (self.number(node, class, "stiffness")?, self.number(node, class, "damping")?);
             if stiffness == 0.0 && damping == 0.0 {
                 continue;
             }
-            if matches!(of, Type::Ball | Type::Free) {
-                self.found.leave_out(self.source.line(node), format!("stiffness and damping of a {of} joint"));
+            if matches!(joint_type, JointType::Ball | JointType::Free) {
+                self.description.omit(self.source.line(node), format!("stiffness and damping of a {joint_type} joint"));
                 continue;
             }
-            let turns = of == Type::Hinge;
+            let turns = joint_type == JointType::Hinge;
             let coordinate = match (kind, turns, at) {
                 (Kind::Cylindrical(_), true, _) | (Kind::Universal(..), _, 0) => Some("angle"),
                 (Kind::Cylindrical(_), false, _) => Some("position"),
@@ -180,9 +193,9 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             };
             // The scene's coordinate is 0 where MuJoCo's is `ref`.
             let rest = self.number(node, class, "springref")? - self.number(node, class, "ref")?;
-            let rest = sign * rest * if turns { self.angle } else { 1.0 };
-            found.push(Spring { coordinate, turns, stiffness, damping, rest });
+            let rest = sign * rest * if turns { self.angle_unit } else { 1.0 };
+            springs.push(Spring { coordinate, turns, stiffness, damping, rest });
         }
-        Ok(found)
+        Ok(springs)
     }
 }

@@ -9,11 +9,11 @@ use std::sync::Arc;
 
 use roxmltree::Node;
 
-use super::description::{Description, Place, Shape};
+use super::description::{Description, Pose, Shape};
 use super::inertia::Inertial;
-use super::mesh::Filling;
+use super::mesh::MeshInertia;
 use super::xml::{Source, child};
-use super::{DEEPEST, too_deep};
+use super::{MAX_DEPTH, too_deep};
 use crate::cli::Failure;
 use crate::machine::{Mat3, Mesh, Quat, Vec3};
 
@@ -22,38 +22,38 @@ type Defaults<'n> = BTreeMap<&'n str, BTreeMap<&'n str, &'n str>>;
 
 /// A site.
 struct Site {
-    /// The moving body, `None` for the world, and its place there.
-    at: (Option<usize>, Place),
+    /// The moving body, `None` for the world, and its pose there.
+    at: (Option<usize>, Pose),
     line: u32,
-    /// Whether a loop is closed there.
-    connected: bool,
+    /// Whether a loop is closed at this site.
+    is_connected: bool,
 }
 
 /// Settings and names of a file.
 struct Model<'s, 'n, 'i> {
     source: &'s Source<'s>,
     /// Radians in the file's unit of angles.
-    angle: f64,
+    angle_unit: f64,
     /// Axes of Euler angles.
-    sequence: &'n str,
+    euler_sequence: &'n str,
     mesh_folder: &'n str,
     inertia_from_geoms: Option<bool>,
-    /// How meshes are filled that do not say it.
-    filling: Filling,
+    /// Default part of a mesh that has mass.
+    mesh_inertia: MeshInertia,
     classes: BTreeMap<&'n str, Defaults<'n>>,
     /// Meshes by name, and those that have been read, by file.
     meshes: BTreeMap<String, Node<'n, 'i>>,
-    read: BTreeMap<String, Arc<Mesh>>,
+    loaded_meshes: BTreeMap<String, Arc<Mesh>>,
     colours: BTreeMap<&'n str, &'n str>,
-    /// Bodies by name: the moving body of which each is a part, `None` for the world, and its place there.
-    bodies: BTreeMap<&'n str, (Option<usize>, Place)>,
+    /// Bodies by name: the moving body of which each is a part, `None` for the world, and its pose there.
+    bodies: BTreeMap<&'n str, (Option<usize>, Pose)>,
     sites: BTreeMap<&'n str, Site>,
-    found: Description,
+    description: Description,
 }
 
-/// Ways to say an orientation, of which one alone counts.
+/// Attributes that state an orientation; an element has at most one of them.
 const ORIENTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
-/// What is said of a site where nothing is connected.
+/// Message about a site that closes no loop.
 const UNUSED_SITE: &str = "<site> of a body";
 /// Class of the defaults of a whole file.
 const MAIN: &str = "main";
@@ -65,18 +65,18 @@ const MAIN: &str = "main";
 pub fn read<'n, 'i>(source: &Source<'_>, root: Node<'n, 'i>) -> Result<Description, Failure> {
     let mut model = Model {
         source,
-        angle: 1.0_f64.to_radians(),
-        sequence: "xyz",
+        angle_unit: 1.0_f64.to_radians(),
+        euler_sequence: "xyz",
         mesh_folder: "",
         inertia_from_geoms: None,
-        filling: Filling::Legacy,
+        mesh_inertia: MeshInertia::Legacy,
         classes: BTreeMap::new(),
         meshes: BTreeMap::new(),
-        read: BTreeMap::new(),
+        loaded_meshes: BTreeMap::new(),
         colours: BTreeMap::new(),
         bodies: BTreeMap::new(),
         sites: BTreeMap::new(),
-        found: Description::new(root.attribute("model").unwrap_or("model")),
+        description: Description::new(root.attribute("model").unwrap_or("model")),
     };
     let sections = || root.children().filter(Node::is_element);
     // The order of the sections is free: settings first.
@@ -90,23 +90,23 @@ pub fn read<'n, 'i>(source: &Source<'_>, root: Node<'n, 'i>) -> Result<Descripti
         }
     }
     for node in sections().filter(|node| node.has_tag_name("worldbody")) {
-        model.body(node, None, &Place::identity(), MAIN, 0)?;
+        model.body(node, None, &Pose::identity(), MAIN, 0)?;
     }
     for node in sections() {
         match node.tag_name().name() {
             "compiler" | "option" | "default" | "asset" | "worldbody" => {}
             "equality" => model.equality(node)?,
             "include" => return Err(source.error(node, "put the contents of the file here: it is not read")),
-            other => model.found.leave_out(source.line(node), format!("<{other}>")),
+            other => model.description.omit(source.line(node), format!("<{other}>")),
         }
     }
-    if model.found.bodies.is_empty() {
+    if model.description.bodies.is_empty() {
         return Err(source.error(root, "no body has a joint"));
     }
-    for site in model.sites.values().filter(|site| !site.connected) {
-        model.found.leave_out(site.line, UNUSED_SITE);
+    for site in model.sites.values().filter(|site| !site.is_connected) {
+        model.description.omit(site.line, UNUSED_SITE);
     }
-    Ok(model.found)
+    Ok(model.description)
 }
 
 impl<'n, 'i> Model<'_, 'n, 'i> {
@@ -114,13 +114,13 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         for attribute in node.attributes() {
             let value = attribute.value();
             match (attribute.name(), value) {
-                ("angle", "degree") => self.angle = 1.0_f64.to_radians(),
-                ("angle", "radian") => self.angle = 1.0,
+                ("angle", "degree") => self.angle_unit = 1.0_f64.to_radians(),
+                ("angle", "radian") => self.angle_unit = 1.0,
                 ("eulerseq", sequence) if sequence.len() == 3 && sequence.chars().all(|c| "xyzXYZ".contains(c)) => {
-                    self.sequence = sequence;
+                    self.euler_sequence = sequence;
                 }
                 ("meshdir" | "assetdir", folder) => self.mesh_folder = folder,
-                ("exactmeshinertia", "true") => self.filling = Filling::Exact,
+                ("exactmeshinertia", "true") => self.mesh_inertia = MeshInertia::Exact,
                 ("exactmeshinertia", _) => {}
                 ("inertiafromgeom", "auto") => self.inertia_from_geoms = None,
                 ("inertiafromgeom", "true") => self.inertia_from_geoms = Some(true),
@@ -143,7 +143,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                 (key @ ("angle" | "eulerseq" | "inertiafromgeom" | "coordinate"), _) => {
                     return Err(self.source.error_in(node, key, "is not one of the choices"));
                 }
-                (key, _) => self.found.leave_out(self.source.line(node), format!("setting {key} of <compiler>")),
+                (key, _) => self.description.omit(self.source.line(node), format!("setting {key} of <compiler>")),
             }
         }
         Ok(())
@@ -151,18 +151,18 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
 
     fn option(&mut self, node: Node) -> Result<(), Failure> {
         if let Some(gravity) = self.source.numbers(node, "gravity")? {
-            self.found.gravity = Vec3::from(gravity);
+            self.description.gravity = Vec3::from(gravity);
         }
         let others = node.attributes().filter(|attribute| attribute.name() != "gravity");
         for attribute in others {
-            self.found.leave_out(self.source.line(node), format!("setting {} of <option>", attribute.name()));
+            self.description.omit(self.source.line(node), format!("setting {} of <option>", attribute.name()));
         }
         for flag in node.children().filter(|child| child.has_tag_name("flag")) {
             for attribute in flag.attributes() {
                 match (attribute.name(), attribute.value()) {
-                    ("gravity", "disable") => self.found.gravity = Vec3::zeros(),
+                    ("gravity", "disable") => self.description.gravity = Vec3::zeros(),
                     ("gravity", _) => {}
-                    (key, _) => self.found.leave_out(self.source.line(flag), format!("flag {key} of <option>")),
+                    (key, _) => self.description.omit(self.source.line(flag), format!("flag {key} of <option>")),
                 }
             }
         }
@@ -171,7 +171,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
 
     /// Reads a class of defaults, which begins with those of `parent`.
     fn defaults(&mut self, node: Node<'n, 'i>, parent: Option<&'n str>, depth: usize) -> Result<(), Failure> {
-        if depth > DEEPEST {
+        if depth > MAX_DEPTH {
             return Err(too_deep(self.source, node));
         }
         let class = match (node.attribute("class"), parent) {
@@ -183,7 +183,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         let mut own: Defaults = inherited.or_else(|| self.classes.get(class)).cloned().unwrap_or_default();
         for element in node.children().filter(|child| child.is_element() && !child.has_tag_name("default")) {
             let values = own.entry(element.tag_name().name()).or_default();
-            if turned(element) {
+            if has_orientation(element) {
                 values.retain(|key, _| !ORIENTATIONS.contains(key));
             }
             values.extend(element.attributes().map(|attribute| (attribute.name(), attribute.value())));
@@ -211,7 +211,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                         self.colours.insert(name, colour);
                     }
                 }
-                other => self.found.leave_out(self.source.line(asset), format!("<{other}> of <asset>")),
+                other => self.description.omit(self.source.line(asset), format!("<{other}> of <asset>")),
             }
         }
         Ok(())
@@ -220,8 +220,8 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
     /// The attribute `key` of an element: its own, or that of its class.
     fn attribute(&self, node: Node<'n, 'i>, class: &str, key: &str) -> Option<&'n str> {
         let class = node.attribute("class").unwrap_or(class);
-        let superseded = ORIENTATIONS.contains(&key) && turned(node);
-        let values = || self.classes.get(class)?.get(node.tag_name().name()).filter(|_| !superseded);
+        let is_superseded = ORIENTATIONS.contains(&key) && has_orientation(node);
+        let values = || self.classes.get(class)?.get(node.tag_name().name()).filter(|_| !is_superseded);
         let default = || values()?.get(key).copied();
         node.attribute(key).or_else(default)
     }
@@ -237,26 +237,26 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         Ok(self.numbers::<1>(node, class, key)?.map_or(0.0, |[number]| number))
     }
 
-    /// Notes attributes of an element that are not `known`; places, names and groups always are.
-    fn leave_out_attributes(&mut self, node: Node<'n, 'i>, known: &[&str]) {
+    /// Records attributes of an element that are not `known`; poses, names and groups always are.
+    fn omit_unknown_attributes(&mut self, node: Node<'n, 'i>, known: &[&str]) {
         const ALWAYS: [&str; 11] =
             ["name", "class", "childclass", "group", "user", "pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"];
         let tag = node.tag_name().name();
         for key in node.attributes().map(|attribute| attribute.name()) {
             if !ALWAYS.contains(&key) && !known.contains(&key) {
-                self.found.leave_out(self.source.line(node), format!("{key} of <{tag}>"));
+                self.description.omit(self.source.line(node), format!("{key} of <{tag}>"));
             }
         }
     }
 
-    /// Where an element is in its parent.
-    fn place(&self, node: Node<'n, 'i>, class: &str) -> Result<Place, Failure> {
+    /// Pose of an element in its parent.
+    fn pose(&self, node: Node<'n, 'i>, class: &str) -> Result<Pose, Failure> {
         let position = self.numbers(node, class, "pos")?.map_or_else(Vec3::zeros, Vec3::from);
-        Ok(Place { position, rotation: self.rotation(node, class)? })
+        Ok(Pose { position, rotation: self.rotation(node, class)? })
     }
 
-    /// The place between the two points of `fromto`, if an element has them, and half their distance, m.
-    fn between(&self, node: Node<'n, 'i>, class: &str) -> Result<Option<(Place, f64)>, Failure> {
+    /// The pose between the two points of `fromto`, if an element has them, and half their distance, m.
+    fn from_to(&self, node: Node<'n, 'i>, class: &str) -> Result<Option<(Pose, f64)>, Failure> {
         let Some([a, b, c, d, e, f]) = self.numbers(node, class, "fromto")? else {
             return Ok(None);
         };
@@ -264,7 +264,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         let along = (to - from).try_normalize(1e-12);
         let along = along.ok_or_else(|| self.source.error(node, "fromto: both points are the same"))?;
         // MuJoCo's z axis points from the second point to the first.
-        Ok(Some((Place { position: 0.5 * (from + to), rotation: to_z(-along) }, 0.5 * (to - from).norm())))
+        Ok(Some((Pose { position: 0.5 * (from + to), rotation: rotation_from_z(-along) }, 0.5 * (to - from).norm())))
     }
 
     fn rotation(&self, node: Node<'n, 'i>, class: &str) -> Result<Quat, Failure> {
@@ -275,21 +275,21 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             return quaternion(parts).ok_or_else(|| self.source.error(node, "quat is 0"));
         }
         if let Some([x, y, z, angle]) = self.numbers(node, class, "axisangle")? {
-            return Ok(turn(direction(Vec3::new(x, y, z), "axisangle")?, self.angle * angle));
+            return Ok(rotation_about(direction(Vec3::new(x, y, z), "axisangle")?, self.angle_unit * angle));
         }
         if let Some(angles) = self.numbers::<3>(node, class, "euler")? {
-            let mut found = Quat::identity();
-            for (axis, angle) in self.sequence.chars().zip(angles) {
+            let mut rotation = Quat::identity();
+            for (axis, angle) in self.euler_sequence.chars().zip(angles) {
                 let about = match axis.to_ascii_lowercase() {
                     'x' => Vec3::x(),
                     'y' => Vec3::y(),
                     _ => Vec3::z(),
                 };
-                let next = turn(about, self.angle * angle);
-                // Small letters turn about the axes that turn along, capitals about the fixed ones.
-                found = if axis.is_ascii_lowercase() { found * next } else { next * found };
+                let next = rotation_about(about, self.angle_unit * angle);
+                // Lower-case letters mean axes that rotate with the body, capitals fixed axes.
+                rotation = if axis.is_ascii_lowercase() { rotation * next } else { next * rotation };
             }
-            return Ok(found);
+            return Ok(rotation);
         }
         if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "xyaxes")? {
             let x = direction(Vec3::new(a, b, c), "xyaxes")?;
@@ -298,31 +298,31 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             return Ok(Quat::from_matrix(&Mat3::from_columns(&[x, y, x.cross(&y)])));
         }
         if let Some(z) = self.numbers(node, class, "zaxis")? {
-            return Ok(to_z(direction(Vec3::from(z), "zaxis")?));
+            return Ok(rotation_from_z(direction(Vec3::from(z), "zaxis")?));
         }
         Ok(Quat::identity())
     }
 
-    /// Reads a body, which lies at `place` in the body `carrier`, and those in it. Without joints it is a part of its parent.
+    /// Reads a body, which lies at `pose` in the body `carrier`, and those in it. Without joints it is a part of its parent.
     fn body(
         &mut self,
         node: Node<'n, 'i>,
         carrier: Option<usize>,
-        place: &Place,
+        pose: &Pose,
         class: &'n str,
         depth: usize,
     ) -> Result<(), Failure> {
-        if depth > DEEPEST {
+        if depth > MAX_DEPTH {
             return Err(too_deep(self.source, node));
         }
         let class = node.attribute("childclass").unwrap_or(class);
-        self.leave_out_attributes(node, &[]);
+        self.omit_unknown_attributes(node, &[]);
         let is_joint = |child: &Node| matches!(child.tag_name().name(), "joint" | "freejoint");
         let joints: Vec<_> = node.children().filter(is_joint).collect();
-        let (mut owner, mut at) = (carrier, *place);
+        let (mut owner, mut at) = (carrier, *pose);
         if !joints.is_empty() {
-            let index = self.jointed(node, &joints, class, carrier, place)?;
-            (owner, at) = (Some(index), Place::identity());
+            let index = self.add_jointed_body(node, &joints, class, carrier, pose)?;
+            (owner, at) = (Some(index), Pose::identity());
         }
         if let Some(name) = node.attribute("name") {
             self.bodies.insert(name, (owner, at));
@@ -330,12 +330,12 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         self.contents(node, owner, &at, class)?;
         for inner in node.children().filter(|child| child.has_tag_name("body")) {
             let class = inner.attribute("childclass").unwrap_or(class);
-            let inner_place = at.then(&self.place(inner, class)?);
-            self.body(inner, owner, &inner_place, class, depth + 1)?;
+            let inner_pose = at.compose(&self.pose(inner, class)?);
+            self.body(inner, owner, &inner_pose, class, depth + 1)?;
         }
         // Parts without joints have their mass here, too.
         if let Some(index) = owner.filter(|_| !joints.is_empty())
-            && !(self.found.bodies[index].inertial.mass > 0.0)
+            && !(self.description.bodies[index].inertial.mass > 0.0)
         {
             return Err(self
                 .source
@@ -344,12 +344,12 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         Ok(())
     }
 
-    /// Adds mass and shapes of a body to the body `owner`, in which it lies at `place`.
+    /// Adds mass and shapes of a body to the body `owner`, in which it lies at `pose`.
     fn contents(
         &mut self,
         node: Node<'n, 'i>,
         owner: Option<usize>,
-        place: &Place,
+        pose: &Pose,
         class: &'n str,
     ) -> Result<(), Failure> {
         let own = child(node, "inertial").filter(|_| self.inertia_from_geoms != Some(true));
@@ -359,50 +359,50 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             let line = self.source.line(part);
             match part.tag_name().name() {
                 "body" | "joint" | "freejoint" | "inertial" => {}
-                "site" => self.site_at(part, owner, place, class)?,
+                "site" => self.add_site(part, owner, pose, class)?,
                 "geom" => {
                     let (shape, mass) = self.geom(part, class, from_geoms)?;
                     if let Some(mass) = mass {
-                        total = Some(total.map_or(mass, |total| total.plus(mass)));
+                        total = Some(total.map_or(mass, |total| total.combined_with(mass)));
                     }
                     if let Some(shape) = shape {
-                        let shape = Shape { place: place.then(&shape.place), ..shape };
+                        let shape = Shape { pose: pose.compose(&shape.pose), ..shape };
                         match owner {
-                            Some(body) => self.found.bodies[body].shapes.push(shape),
-                            None => self.found.fixed.push(shape),
+                            Some(body) => self.description.bodies[body].shapes.push(shape),
+                            None => self.description.fixed.push(shape),
                         }
                     }
                 }
                 "frame" | "replicate" | "composite" | "flexcomp" | "attach" | "include" => {
                     return Err(self.source.error(part, "is not read: write the bodies that it stands for"));
                 }
-                other => self.found.leave_out(line, format!("<{other}> of a body")),
+                other => self.description.omit(line, format!("<{other}> of a body")),
             }
         }
         if let (Some(total), Some(body)) = (total, owner) {
-            let own = &mut self.found.bodies[body].inertial;
-            *own = own.plus(place.inertial(total));
+            let own = &mut self.description.bodies[body].inertial;
+            *own = own.combined_with(pose.inertial(total));
         }
         Ok(())
     }
 
-    /// Remembers a site of the body `owner`, or of a part of it that lies at `place`.
-    fn site_at(&mut self, node: Node<'n, 'i>, owner: Option<usize>, place: &Place, class: &str) -> Result<(), Failure> {
+    /// Records a site of the body `owner`, or of a part of it that lies at `pose`.
+    fn add_site(&mut self, node: Node<'n, 'i>, owner: Option<usize>, pose: &Pose, class: &str) -> Result<(), Failure> {
         let line = self.source.line(node);
         let Some(name) = node.attribute("name") else {
-            self.found.leave_out(line, UNUSED_SITE);
+            self.description.omit(line, UNUSED_SITE);
             return Ok(());
         };
-        let own = match self.between(node, class)? {
+        let own = match self.from_to(node, class)? {
             Some((own, _)) => own,
-            None => self.place(node, class)?,
+            None => self.pose(node, class)?,
         };
-        self.sites.insert(name, Site { at: (owner, place.then(&own)), line, connected: false });
+        self.sites.insert(name, Site { at: (owner, pose.compose(&own)), line, is_connected: false });
         Ok(())
     }
 
     fn inertial(&self, node: Node<'n, 'i>, class: &str) -> Result<Inertial, Failure> {
-        let place = self.place(node, class)?;
+        let pose = self.pose(node, class)?;
         self.source.require(node, "mass")?;
         let mass = self.source.number(node, "mass")?.unwrap_or_default();
         let inertia = match self.source.numbers(node, "fullinertia")? {
@@ -413,32 +413,32 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             }
         };
         let own = Inertial { mass, centre: Vec3::zeros(), inertia };
-        own.fault().map_or(Ok(place.inertial(own)), |fault| Err(self.source.error(node, &fault)))
+        own.error_message().map_or(Ok(pose.inertial(own)), |fault| Err(self.source.error(node, &fault)))
     }
 }
 
 /// Whether an element has an orientation of its own.
-fn turned(node: Node) -> bool {
+fn has_orientation(node: Node) -> bool {
     ORIENTATIONS.iter().any(|key| node.attribute(*key).is_some())
 }
 
-/// The turn of a quaternion w, x, y, z of any length; `None` for 0.
+/// The rotation of a quaternion w, x, y, z of any length; `None` for 0.
 fn quaternion([w, x, y, z]: [f64; 4]) -> Option<Quat> {
     // The double cover does not matter.
     let axis = Vec3::new(x, y, z);
     let angle = 2.0 * libm::atan2(axis.norm(), w);
-    let turned = axis.try_normalize(0.0).map_or_else(Quat::identity, |axis| turn(axis, angle));
-    (w != 0.0 || axis.norm() > 0.0).then_some(turned)
+    let rotation = axis.try_normalize(0.0).map_or_else(Quat::identity, |axis| rotation_about(axis, angle));
+    (w != 0.0 || axis.norm() > 0.0).then_some(rotation)
 }
 
-/// A turn about a unit axis, rad.
-fn turn(axis: Vec3, angle: f64) -> Quat {
+/// The rotation by `angle`, rad, about a unit axis.
+fn rotation_about(axis: Vec3, angle: f64) -> Quat {
     Quat::from_scaled_axis(angle * axis)
 }
 
-/// The shortest turn that takes z to the unit vector `direction`.
-fn to_z(direction: Vec3) -> Quat {
+/// The shortest rotation that takes z to the unit vector `direction`.
+fn rotation_from_z(direction: Vec3) -> Quat {
     let axis = Vec3::z().cross(&direction);
     let angle = libm::atan2(axis.norm(), direction.z);
-    turn(axis.try_normalize(1e-12).unwrap_or_else(Vec3::x), angle)
+    rotation_about(axis.try_normalize(1e-12).unwrap_or_else(Vec3::x), angle)
 }
