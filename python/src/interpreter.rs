@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 
 use crate::errors::exception;
 
-/// Steps of a simulation between two looks for Ctrl-C: some milliseconds.
-pub const STEPS_BETWEEN_LOOKS: u32 = 4096;
+/// Steps of a simulation between two checks for Ctrl-C; they take some milliseconds.
+pub const STEPS_BETWEEN_CHECKS: u32 = 4096;
 
 /// Runs `work` without the interpreter's lock.
 ///
@@ -38,11 +38,11 @@ fn internal_error(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
     exception(py, "InternalError", &message, None)
 }
 
-/// Calls `progress` with the part that is done, from 0 to 1, and lets Ctrl-C interrupt.
+/// Calls `progress` with the finished fraction, 0 to 1, and raises a pending `KeyboardInterrupt`.
 ///
 /// # Errors
 /// `KeyboardInterrupt`, or what `progress` raises.
-pub fn look(py: Python<'_>, progress: Option<&Bound<'_, PyAny>>, part: f64) -> PyResult<()> {
+pub fn report_progress(py: Python<'_>, progress: Option<&Bound<'_, PyAny>>, part: f64) -> PyResult<()> {
     py.check_signals()?;
     if let Some(progress) = progress {
         progress.call1((part.clamp(0.0, 1.0),))?;

@@ -10,7 +10,7 @@ use crate::errors::option_error;
 
 /// Where a value stands: the whole machine, and whether the coordinate that it belongs to is an angle, if that is known.
 #[derive(Clone, Copy)]
-struct Around<'a, 'py> {
+struct Context<'a, 'py> {
     machine: &'a Bound<'py, PyDict>,
     turns: Option<bool>,
 }
@@ -20,14 +20,14 @@ struct Around<'a, 'py> {
 /// # Errors
 /// `OptionError` with the place of what TOML cannot hold, or of a number whose unit depends on a joint that is not in `machine`.
 pub fn text_of(machine: &Bound<'_, PyDict>) -> PyResult<String> {
-    let table = table(machine, Some(&FILE), "", Around { machine, turns: None })?;
+    let table = table(machine, Some(&FILE), "", Context { machine, turns: None })?;
     toml::to_string(&table).map_err(|error| option_error(machine.py(), &error.to_string()))
 }
 
 /// `row` describes the keys of the table; `place` names it in errors.
-fn table(own: &Bound<'_, PyDict>, rows: Option<&FileTable>, place: &str, around: Around<'_, '_>) -> PyResult<Table> {
+fn table(own: &Bound<'_, PyDict>, rows: Option<&FileTable>, place: &str, context: Context<'_, '_>) -> PyResult<Table> {
     let variant = rows.and_then(|rows| variant(own, rows));
-    let turns = turns_of(own, around.machine).or(around.turns);
+    let turns = has_angle_coordinate(own, context.machine).or(context.turns);
     let mut all = Table::new();
     for (key, value) in own.iter() {
         let key: String = key.extract()?;
@@ -38,8 +38,8 @@ fn table(own: &Bound<'_, PyDict>, rows: Option<&FileTable>, place: &str, around:
         // The reader of the text refuses unknown keys, with the nearest one.
         let row = rows.and_then(|rows| row(rows, &key, variant));
         // Drives and starts of a joint with two coordinates have a table or a number for each, by its name.
-        let turns = turns.or_else(|| turns_word(&key));
-        all.insert(key, converted(&value, row.map(|row| (row, row.value_type)), &place, Around { turns, ..around })?);
+        let turns = turns.or_else(|| is_angle_name(&key));
+        all.insert(key, to_toml(&value, row.map(|row| (row, row.value_type)), &place, Context { turns, ..context })?);
     }
     Ok(all)
 }
@@ -60,7 +60,7 @@ fn variant(own: &Bound<'_, PyDict>, rows: &FileTable) -> Option<&'static str> {
 }
 
 /// Whether the coordinate of a joint, or of the joint on which a force element acts, is an angle; `None` if `own` does not say.
-fn turns_of(own: &Bound<'_, PyDict>, machine: &Bound<'_, PyDict>) -> Option<bool> {
+fn has_angle_coordinate(own: &Bound<'_, PyDict>, machine: &Bound<'_, PyDict>) -> Option<bool> {
     let word = |of: &Bound<'_, PyDict>, key: &str| -> Option<String> { of.get_item(key).ok()??.extract().ok() };
     let of_kind = |joint: &Bound<'_, PyDict>| match word(joint, "kind")?.as_str() {
         "prismatic" => Some(false),
@@ -68,7 +68,7 @@ fn turns_of(own: &Bound<'_, PyDict>, machine: &Bound<'_, PyDict>) -> Option<bool
         _ => None,
     };
     if let Some(coordinate) = word(own, "coordinate") {
-        return turns_word(&coordinate);
+        return is_angle_name(&coordinate);
     }
     let Some(name) = word(own, "joint") else {
         return of_kind(own);
@@ -79,7 +79,7 @@ fn turns_of(own: &Bound<'_, PyDict>, machine: &Bound<'_, PyDict>) -> Option<bool
 }
 
 /// Whether the coordinate of this name is an angle; `None` for another word.
-fn turns_word(word: &str) -> Option<bool> {
+fn is_angle_name(word: &str) -> Option<bool> {
     match word {
         "position" => Some(false),
         "angle" | "child_angle" => Some(true),
@@ -88,15 +88,15 @@ fn turns_word(word: &str) -> Option<bool> {
 }
 
 /// `value` in TOML; of a known key, as its row and its type say.
-fn converted(
+fn to_toml(
     value: &Bound<'_, PyAny>,
     row: Option<(&FileKey, ValueType)>,
     place: &str,
-    around: Around<'_, '_>,
+    context: Context<'_, '_>,
 ) -> PyResult<Toml> {
     let wrong = |why: &str| Err(option_error(value.py(), &format!("{place}: {why}")));
     if let Ok(own) = value.cast::<PyDict>() {
-        return Ok(Toml::Table(table(own, row.and_then(|(row, _)| row.table()), place, around)?));
+        return Ok(Toml::Table(table(own, row.and_then(|(row, _)| row.table()), place, context)?));
     }
     if let Ok(text) = value.cast::<PyString>() {
         return Ok(Toml::String(text.to_cow()?.into_owned()));
@@ -110,7 +110,7 @@ fn converted(
             let entry = entry?;
             let is_list = !entry.is_instance_of::<PyString>() && entry.try_iter().is_ok();
             let of_entry = row.map(|(row, takes)| (row, entry_of(takes, i, is_list)));
-            all.push(converted(&entry, of_entry, &format!("{place}[{i}]"), around)?);
+            all.push(to_toml(&entry, of_entry, &format!("{place}[{i}]"), context)?);
         }
         return Ok(Toml::Array(all));
     }
@@ -124,7 +124,7 @@ fn converted(
     }
     if let Some((row, takes)) = row {
         if let Some(dimension) = dimension(takes) {
-            let dimension = match (row.on_hinge, around.turns) {
+            let dimension = match (row.on_hinge, context.turns) {
                 (None, _) | (_, Some(false)) => dimension,
                 (Some((on_hinge, _)), Some(true)) => on_hinge,
                 (Some(_), None) => return wrong("the unit depends on the joint: give it, as in \"0.1 rad\""),

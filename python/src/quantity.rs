@@ -14,7 +14,7 @@ use crate::errors::option_error;
 /// `OptionError`.
 pub fn duration(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     let py = value.py();
-    let wrong = |why: &str| Err(option_error(py, &format!("{name} = {}: {why}", shown(value))));
+    let wrong = |why: &str| Err(option_error(py, &format!("{name} = {}: {why}", repr_of(value))));
     let seconds = if let Ok(text) = value.cast::<PyString>() {
         match parse_quantity(&text.to_cow()?, Dimension::Time) {
             Ok(seconds) => seconds,
@@ -35,7 +35,7 @@ pub fn duration(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
 }
 
 /// `value` for messages.
-fn shown(value: &Bound<'_, PyAny>) -> String {
+fn repr_of(value: &Bound<'_, PyAny>) -> String {
     value.repr().map_or_else(|_| "?".to_owned(), |words| words.to_string())
 }
 
@@ -48,7 +48,7 @@ fn number(value: &Bound<'_, PyAny>) -> Option<f64> {
 ///
 /// # Errors
 /// `OptionError`: neither text nor a number of this parameter.
-pub fn written(parameter: &Parameter, key: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
+pub fn to_text(parameter: &Parameter, key: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
     if value.is_none() {
         return Ok(None);
     }
@@ -63,14 +63,14 @@ pub fn written(parameter: &Parameter, key: &str, value: &Bound<'_, PyAny>) -> Py
     };
     let wrong = || {
         let message =
-            format!("{key} = {}: expected text or a number in SI units; {}", shown(value), parameter.allowed());
+            format!("{key} = {}: expected text or a number in SI units; {}", repr_of(value), parameter.allowed());
         option_error(value.py(), &message)
     };
     own.map(|own| Some(parameter.write(&own))).ok_or_else(wrong)
 }
 
 /// A value for Python: SI units, a whole number, a word, or `None`.
-pub fn of_value(py: Python<'_>, value: &Value) -> PyResult<Py<PyAny>> {
+pub fn to_python(py: Python<'_>, value: &Value) -> PyResult<Py<PyAny>> {
     Ok(match value {
         Value::Number(number) => number.into_pyobject(py)?.into_any().unbind(),
         Value::Count(count) => count.into_pyobject(py)?.into_any().unbind(),

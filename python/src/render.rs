@@ -13,7 +13,7 @@ use crate::interpreter::detached;
 use crate::simulation::PySimulation;
 
 /// Largest width and height, pixels.
-const LARGEST: u32 = 8192;
+const MAX_EDGE: u32 = 8192;
 
 /// The graphics adapter, found once.
 static ADAPTER: Mutex<Option<Offscreen>> = Mutex::new(None);
@@ -28,8 +28,8 @@ pub fn render<'py>(
     height: u32,
 ) -> PyResult<Bound<'py, PyArray3<u8>>> {
     for (name, value) in [("width", width), ("height", height)] {
-        if !(1..=LARGEST).contains(&value) {
-            return Err(option_error(py, &format!("{name} = {value}: allowed 1 to {LARGEST} pixels")));
+        if !(1..=MAX_EDGE).contains(&value) {
+            return Err(option_error(py, &format!("{name} = {value}: allowed 1 to {MAX_EDGE} pixels")));
         }
     }
     let picture = detached(py, || {
@@ -50,7 +50,7 @@ pub fn render<'py>(
 
 /// What is drawn of the instant at which `simulation` is.
 fn draw(simulation: &mut PySimulation, size: [u32; 2], list: &mut DrawList) {
-    let (scene, [start, frame]) = simulation.now();
+    let (scene, [start, frame]) = simulation.running_and_frames();
     let view = SceneView::new(scene, start);
     // A simulation keeps no path and no peaks.
     let options = ViewOptions { quality: Quality::FULL, trail: false, ..ViewOptions::default() };

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors::option_error;
-use crate::interpreter::{STEPS_BETWEEN_LOOKS, detached, look};
+use crate::interpreter::{STEPS_BETWEEN_CHECKS, detached, report_progress};
 use crate::quantity::duration as read_duration;
 use crate::report;
 use crate::scene::{PyScene, channels_at_start};
@@ -35,7 +35,7 @@ impl std::fmt::Display for Fault {
     }
 }
 
-/// A run under way and its rows.
+/// A run in progress and its rows.
 struct Recorder {
     live: LiveScene,
     duration: f64,
@@ -105,7 +105,7 @@ pub fn run<'py>(
     let times = RowTimes::new(duration, every).ok_or_else(positive)?;
     let mut live = scene.start(py)?;
     let (all, mut frame) = detached(py, || channels_at_start(&mut live))?;
-    let chosen = chosen(py, all, &channels)?;
+    let chosen = select_channels(py, all, &channels)?;
     let capacity = usize::try_from(times.last()).unwrap_or(usize::MAX).saturating_add(1);
     let values = allocate(capacity, chosen.len())?;
     if live.load_peaks().is_none() {
@@ -115,18 +115,18 @@ pub fn run<'py>(
     let mut run =
         Recorder { live, duration, times, channels: chosen, frame, values, capacity, rows: 0, impacts: Vec::new() };
     let fault = loop {
-        match detached(py, || run.advance(STEPS_BETWEEN_LOOKS))? {
+        match detached(py, || run.advance(STEPS_BETWEEN_CHECKS))? {
             Ok(true) => break None,
-            Ok(false) => look(py, progress, run.live.time() / duration)?,
+            Ok(false) => report_progress(py, progress, run.live.time() / duration)?,
             Err(fault) => break Some(fault),
         }
     };
-    look(py, progress, if fault.is_none() { 1.0 } else { run.live.time() / duration })?;
+    report_progress(py, progress, if fault.is_none() { 1.0 } else { run.live.time() / duration })?;
     describe(py, run, fault.as_ref())
 }
 
 /// The channels that match one of `patterns`, and the time; without patterns, those that are written unasked.
-fn chosen(py: Python<'_>, all: Vec<ChannelInfo>, patterns: &[String]) -> PyResult<Vec<ChannelInfo>> {
+fn select_channels(py: Python<'_>, all: Vec<ChannelInfo>, patterns: &[String]) -> PyResult<Vec<ChannelInfo>> {
     for pattern in patterns {
         let failed = |error| option_error(py, &format!("channels: {error}; Scene.channels() lists them"));
         matching(&all, pattern).map_err(failed)?;

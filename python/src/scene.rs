@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::errors::scene_error;
 use crate::interpreter::detached;
 use crate::machine::text_of;
-use crate::quantity::{of_value, written};
+use crate::quantity::{to_python, to_text};
 
 /// Names of the built-in scenes, then of the benchmarks.
 #[pyfunction]
@@ -139,9 +139,9 @@ impl PyScene {
         all.set_item("key", key)?;
         all.set_item("label", parameter.label)?;
         all.set_item("group", parameter.group)?;
-        all.set_item("value", of_value(py, &value)?)?;
+        all.set_item("value", to_python(py, &value)?)?;
         all.set_item("text", parameter.show(&value))?;
-        all.set_item("default", of_value(py, &parameter.default)?)?;
+        all.set_item("default", to_python(py, &parameter.default)?)?;
         all.set_item("allowed", parameter.allowed())?;
         let range = match parameter.kind {
             Kind::Number { min, max, .. } => Some((min, max)),
@@ -166,10 +166,10 @@ impl PyScene {
         let mut texts = Vec::new();
         for (key, value) in changes {
             let parameter = self.scene.parameter(&key).map_err(failed)?;
-            let text = written(parameter, &key, &value)?;
+            let text = to_text(parameter, &key, &value)?;
             texts.push((key, text));
         }
-        let scene = detached(py, || changed(&self.scene, &texts))?.map_err(failed)?;
+        let scene = detached(py, || with_changes(&self.scene, &texts))?.map_err(failed)?;
         Ok(Self { scene: Arc::new(scene) })
     }
 
@@ -210,7 +210,7 @@ impl PyScene {
 }
 
 /// `scene` with changes; `None` returns to the value of the file.
-fn changed(scene: &Scene, changes: &[(String, Option<String>)]) -> Result<Scene, SceneError> {
+fn with_changes(scene: &Scene, changes: &[(String, Option<String>)]) -> Result<Scene, SceneError> {
     let one_by_one = || {
         let mut scene = scene.clone();
         for (key, text) in changes {

@@ -12,8 +12,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
 use crate::errors::{exception, option_error, scene_error, set_error, stopped};
-use crate::interpreter::{STEPS_BETWEEN_LOOKS, detached, guarded};
-use crate::quantity::{duration, written};
+use crate::interpreter::{STEPS_BETWEEN_CHECKS, detached, guarded};
+use crate::quantity::{duration, to_text};
 use crate::report;
 use crate::scene::{PyScene, channels_at_start};
 
@@ -137,7 +137,7 @@ impl PySimulation {
         loop {
             let live = &mut self.live;
             let outcome = detached(py, || {
-                for _ in 0..STEPS_BETWEEN_LOOKS {
+                for _ in 0..STEPS_BETWEEN_CHECKS {
                     if is_over(live) {
                         return Ok(true);
                     }
@@ -154,7 +154,7 @@ impl PySimulation {
 
     /// The scene in effect, its first instant, and this one.
     #[cfg(feature = "render")]
-    pub fn now(&mut self) -> (&Scene, [&Frame; 2]) {
+    pub fn running_and_frames(&mut self) -> (&Scene, [&Frame; 2]) {
         self.sample();
         (self.live.running(), [&self.layout.start, &self.frame])
     }
@@ -229,7 +229,7 @@ impl PySimulation {
     fn change(&mut self, py: Python<'_>, key: &str, value: &Bound<'_, PyAny>) -> PyResult<&'static str> {
         let pending = self.live.pending().clone();
         let parameter = pending.parameter(key).map_err(|error| scene_error(py, Some(&pending), &error))?;
-        let Some(text) = written(parameter, key, value)? else {
+        let Some(text) = to_text(parameter, key, value)? else {
             return Err(option_error(py, &format!("{key} = None: a running simulation needs a value")));
         };
         let effect = detached(py, || self.live.set(key, &text))?.map_err(|error| set_error(py, &pending, &error))?;

@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors::option_error;
-use crate::interpreter::{guarded, look};
+use crate::interpreter::{guarded, report_progress};
 use crate::quantity::duration;
 use crate::report::constant;
 use crate::scene::PyScene;
@@ -35,20 +35,20 @@ pub struct PyStudy {
     span: RunSpan,
 }
 
-/// Why runs ended early.
-enum Ended {
+/// Reason why runs ended early.
+enum EarlyEnd {
     /// Ctrl-C, an error of the progress function, no memory, or a bug.
     Raised(PyErr),
     Study(StudyError),
 }
 
-impl From<StudyError> for Ended {
+impl From<StudyError> for EarlyEnd {
     fn from(error: StudyError) -> Self {
         Self::Study(error)
     }
 }
 
-impl Ended {
+impl EarlyEnd {
     fn raise(self, py: Python<'_>) -> PyErr {
         match self {
             Self::Raised(error) => error,
@@ -57,7 +57,7 @@ impl Ended {
     }
 }
 
-/// Runs that were made.
+/// Finished runs of one stage.
 struct Stage {
     name: String,
     /// Values of the inputs of each run, SI.
@@ -90,7 +90,7 @@ impl<'a, 'py> Runner<'a, 'py> {
 }
 
 impl StudyRunner for Runner<'_, '_> {
-    type Error = Ended;
+    type Error = EarlyEnd;
 
     fn inputs(&self) -> &[Input] {
         &self.study.inputs
@@ -100,12 +100,12 @@ impl StudyRunner for Runner<'_, '_> {
         &self.study.outputs
     }
 
-    fn run(&mut self, stage: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Ended> {
-        look(self.py, self.progress.as_ref(), 0.0).map_err(Ended::Raised)?;
+    fn run(&mut self, stage: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, EarlyEnd> {
+        report_progress(self.py, self.progress.as_ref(), 0.0).map_err(EarlyEnd::Raised)?;
         let PyStudy { scene, inputs, outputs, span } = self.study;
         let keys: Vec<String> = inputs.iter().map(|input| input.key.clone()).collect();
         let runs = StudyRuns::new(scene, &keys, outputs, *span, &rows)?;
-        let records = records(self.py, runs.sweep(), self.threads, self.progress.clone()).map_err(Ended::Raised)?;
+        let records = records(self.py, runs.sweep(), self.threads, self.progress.clone()).map_err(EarlyEnd::Raised)?;
         let length = runs.sweep().layout().record_length();
         let results: Vec<Vec<f64>> = records.chunks_exact(length).map(|record| runs.outputs_of(record)).collect();
         self.stages.push(Stage { name: stage.to_owned(), values: rows, results: results.clone() });
@@ -114,7 +114,7 @@ impl StudyRunner for Runner<'_, '_> {
 }
 
 /// An estimate as value, lower and upper end of its interval.
-fn triple(estimate: &Estimate) -> (f64, f64, f64) {
+fn estimate_tuple(estimate: &Estimate) -> (f64, f64, f64) {
     (estimate.value, estimate.low, estimate.high)
 }
 
@@ -122,17 +122,23 @@ fn triple(estimate: &Estimate) -> (f64, f64, f64) {
 type Changed<'a> = (Vec<(&'a str, f64)>, f64);
 
 impl PyStudy {
-    fn changed(&self, changes: &[Change], output: f64) -> Changed<'_> {
+    fn changes_with_output(&self, changes: &[Change], output: f64) -> Changed<'_> {
         let named = changes.iter().map(|change| (&self.inputs[change.input].key[..], change.value));
         (named.collect(), output)
     }
 
     fn target<'py>(&self, py: Python<'py>, answer: &TargetAnswer) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
-        let single = answer.single.iter().map(|(change, output)| self.changed(std::slice::from_ref(change), *output));
+        let single = answer
+            .single
+            .iter()
+            .map(|(change, output)| self.changes_with_output(std::slice::from_ref(change), *output));
         all.set_item("target", answer.target)?;
         all.set_item("single", single.collect::<Vec<_>>())?;
-        all.set_item("together", answer.together.as_ref().map(|(changes, output)| self.changed(changes, *output)))?;
+        all.set_item(
+            "together",
+            answer.together.as_ref().map(|(changes, output)| self.changes_with_output(changes, *output)),
+        )?;
         Ok(all)
     }
 
@@ -142,13 +148,13 @@ impl PyStudy {
         let best = found.search.best.as_ref().map(|best| {
             let chosen = of_candidates().zip(&best.candidates);
             let chosen = chosen.map(|(of, &chosen)| (&self.inputs[of.input].key[..], &of.list[chosen].text[..]));
-            (best.cost, chosen.collect::<Vec<_>>(), triple(&best.estimate))
+            (best.cost, chosen.collect::<Vec<_>>(), estimate_tuple(&best.estimate))
         });
         let unchecked = of_candidates().filter(|of| !of.is_ordered()).map(|of| &self.inputs[of.input].key[..]);
         all.set_item("best", best)?;
         all.set_item("is_proven", found.search.is_proven)?;
         all.set_item("evaluations", found.search.evaluations)?;
-        all.set_item("check", found.check.as_ref().map(|(check, verdict)| (triple(check), verdict.word())))?;
+        all.set_item("check", found.check.as_ref().map(|(check, verdict)| (estimate_tuple(check), verdict.word())))?;
         all.set_item("order_not_checked", unchecked.collect::<Vec<_>>())?;
         Ok(all)
     }
@@ -297,8 +303,8 @@ impl PyStudy {
                 Ok(found) => {
                     entry.set_item("mean", found.mean)?;
                     entry.set_item("variance", found.variance)?;
-                    entry.set_item("first", found.first.iter().map(triple).collect::<Vec<_>>())?;
-                    entry.set_item("total", found.total.iter().map(triple).collect::<Vec<_>>())?;
+                    entry.set_item("first", found.first.iter().map(estimate_tuple).collect::<Vec<_>>())?;
+                    entry.set_item("total", found.total.iter().map(estimate_tuple).collect::<Vec<_>>())?;
                 }
                 Err(error) => entry.set_item("fault", error.to_string())?,
             }
@@ -369,7 +375,7 @@ impl PyStudy {
         });
         let all = PyDict::new(py);
         runner.describe("lot", &all)?;
-        all.set_item("yield", triple(&found.lot.yielded))?;
+        all.set_item("yield", estimate_tuple(&found.lot.yielded))?;
         all.set_item("accepted", &found.lot.accepted)?;
         let qualities = found.qualities.iter().map(|own| quality(py, own)).collect::<PyResult<Vec<_>>>()?;
         all.set_item("qualities", qualities)?;
@@ -381,13 +387,13 @@ impl PyStudy {
 
 fn quality<'py>(py: Python<'py>, found: &Quality) -> PyResult<Bound<'py, PyDict>> {
     let own = PyDict::new(py);
-    own.set_item("yield", triple(&found.yielded))?;
+    own.set_item("yield", estimate_tuple(&found.yielded))?;
     own.set_item("mean", found.mean)?;
     own.set_item("deviation", found.deviation)?;
     for (p, value) in PERCENTILES.iter().zip(&found.percentiles) {
-        own.set_item(format!("percentile_{:.0}", 100.0 * p), value.as_ref().map(triple))?;
+        own.set_item(format!("percentile_{:.0}", 100.0 * p), value.as_ref().map(estimate_tuple))?;
     }
     own.set_item("cp", found.capability.as_ref().and_then(|capability| capability.cp))?;
-    own.set_item("cpk", found.capability.as_ref().map(|capability| triple(&capability.cpk)))?;
+    own.set_item("cpk", found.capability.as_ref().map(|capability| estimate_tuple(&capability.cpk)))?;
     Ok(own)
 }

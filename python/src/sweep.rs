@@ -21,13 +21,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
 use crate::errors::{exception, option_error, scene_error};
-use crate::interpreter::{STEPS_BETWEEN_LOOKS, detached, look};
-use crate::quantity::{duration, of_value, written};
+use crate::interpreter::{STEPS_BETWEEN_CHECKS, detached, report_progress};
+use crate::quantity::{duration, to_python, to_text};
 use crate::report::constant;
 use crate::scene::PyScene;
 
 /// Time between two looks for Ctrl-C while threads compute.
-const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
+const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// A sweep that is ready to be computed.
 #[pyclass(frozen, name = "Sweep", module = "jointplay._native")]
@@ -50,19 +50,19 @@ fn time(options: &Bound<'_, PyDict>, name: &str) -> PyResult<Option<f64>> {
 
 fn axis(scene: &Scene, key: &str, values: &Bound<'_, PyAny>) -> PyResult<Axis> {
     let py = values.py();
-    let wrong = |message: String| option_error(py, &message);
+    let invalid = |message: String| option_error(py, &message);
     if let Ok(text) = values.cast::<PyString>() {
-        return Axis::parse(scene, &format!("{key}={}", text.to_cow()?)).map_err(|error| wrong(format!("{error:#}")));
+        return Axis::parse(scene, &format!("{key}={}", text.to_cow()?)).map_err(|error| invalid(format!("{error:#}")));
     }
     let parameter = scene.parameter(key).map_err(|error| scene_error(py, Some(scene), &error))?;
     let mut listed = Vec::new();
     for value in values.try_iter()? {
         let value = value?;
-        let text = written(parameter, key, &value)?;
-        let text = text.ok_or_else(|| wrong(format!("{key} = None: a varied parameter needs values")))?;
-        listed.push(parameter.read(&text).map_err(|error| wrong(format!("{key} = {text}: {error}")))?);
+        let text = to_text(parameter, key, &value)?;
+        let text = text.ok_or_else(|| invalid(format!("{key} = None: a varied parameter needs values")))?;
+        listed.push(parameter.read(&text).map_err(|error| invalid(format!("{key} = {text}: {error}")))?);
     }
-    Axis::listed(scene, key, listed).map_err(|error| wrong(format!("{error:#}")))
+    Axis::listed(scene, key, listed).map_err(|error| invalid(format!("{error:#}")))
 }
 
 fn start(py: Python<'_>, word: &str) -> PyResult<Start> {
@@ -74,7 +74,7 @@ fn start(py: Python<'_>, word: &str) -> PyResult<Start> {
 }
 
 fn span(py: Python<'_>, scene: &Scene, options: &Bound<'_, PyDict>) -> PyResult<Span> {
-    let wrong = |message: &str| Err(option_error(py, message));
+    let invalid = |message: &str| Err(option_error(py, message));
     let (periods, discard) = (count(options, "periods")?, count(options, "discard")?);
     let (length, from) = (time(options, "duration")?, time(options, "start_after")?);
     if let Some(section) = option(options, "section")? {
@@ -83,7 +83,7 @@ fn span(py: Python<'_>, scene: &Scene, options: &Bound<'_, PyDict>) -> PyResult<
         let crossing = crossing.map_err(|error| option_error(py, &format!("section = {text:?}: {error}")))?;
         let (Some(count), Some(discard), Some(duration), None) = (count(options, "crossings")?, discard, length, from)
         else {
-            return wrong(
+            return invalid(
                 "section: give the number of crossings with crossings and discard, and duration to end the search",
             );
         };
@@ -92,36 +92,36 @@ fn span(py: Python<'_>, scene: &Scene, options: &Bound<'_, PyDict>) -> PyResult<
     match (periods, length) {
         (Some(periods), None) => {
             let Some(discard) = discard else {
-                return wrong("periods: give the number of initial periods to discard, with discard");
+                return invalid("periods: give the number of initial periods to discard, with discard");
             };
             let phase: f64 = option(options, "phase")?.map_or(Ok(0.0), |phase| phase.extract())?;
             if !(0.0..1.0).contains(&phase) {
-                return wrong(&format!(
+                return invalid(&format!(
                     "phase = {phase}: a drive phase is a fraction of the period, from 0 to below 1"
                 ));
             }
             let exponent = option(options, "exponent")?.map_or(Ok(true), |exponent| exponent.extract())?;
             let interval = time(options, "period")?;
             if interval == Some(0.0) {
-                return wrong("period = 0: the time must be above 0");
+                return invalid("period = 0: the time must be above 0");
             }
             Ok(Span::Sections { plan: Plan { periods, discard, phase, exponent }, interval })
         }
         (None, Some(duration)) => {
             let from = from.unwrap_or_default();
             if discard.is_some() {
-                return wrong(
+                return invalid(
                     "discard counts periods or crossings; with duration alone, start_after ends the transient",
                 );
             }
             if from >= duration {
-                return wrong(&format!(
+                return invalid(&format!(
                     "duration = {duration}, start_after = {from}: the statistics must begin before the end"
                 ));
             }
             Ok(Span::Duration { duration, from })
         }
-        _ => wrong("a sweep needs either periods and discard, or duration"),
+        _ => invalid("a sweep needs either periods and discard, or duration"),
     }
 }
 
@@ -138,19 +138,19 @@ impl PySweep {
         tried: bool,
     ) -> PyResult<Self> {
         let scene = &*scene.scene;
-        let wrong = |message: String| option_error(py, &message);
+        let invalid = |message: String| option_error(py, &message);
         let axes = vary.iter().map(|(key, values)| axis(scene, key, values)).collect::<PyResult<Vec<_>>>()?;
         let starts: Vec<String> = option(options, "start")?.map_or(Ok(Vec::new()), |starts| starts.extract())?;
         let starts = starts.iter().map(|word| start(py, word)).collect::<PyResult<Vec<_>>>()?;
         let zip = option(options, "zip")?.map_or(Ok(false), |zip| zip.extract())?;
         let combine = if zip { Design::zipped } else { Design::crossed };
-        let design = combine(scene, axes, &starts).map_err(|error| wrong(format!("{error:#}")))?;
+        let design = combine(scene, axes, &starts).map_err(|error| invalid(format!("{error:#}")))?;
         let keep = match option(options, "keep")? {
             None => Vec::new(),
             Some(keep) => {
                 let text: String = keep.extract()?;
                 let list = ChannelStatistic::parse_list(scene, &text);
-                list.map_err(|error| wrong(format!("keep: {error}; Scene.channels() lists the channels")))?
+                list.map_err(|error| invalid(format!("keep: {error}; Scene.channels() lists the channels")))?
             }
         };
         let protocol = Protocol { span: span(py, scene, options)?, keep, joints: false };
@@ -158,7 +158,7 @@ impl PySweep {
             let scene = scene.clone();
             if tried { Sweep::untried(scene, design, protocol) } else { Sweep::new(scene, design, protocol) }
         })?;
-        Ok(Self { sweep: sweep.map_err(|error| wrong(format!("{error:#}")))? })
+        Ok(Self { sweep: sweep.map_err(|error| invalid(format!("{error:#}")))? })
     }
 
     /// Number of blocks, which can be computed in any order and anywhere.
@@ -202,30 +202,30 @@ impl PySweep {
 
     /// Points of a block: the first, and the one after the last.
     fn block(&self, py: Python<'_>, block: usize) -> PyResult<(usize, usize)> {
-        self.known(py, block)?;
+        self.check_block(py, block)?;
         let points = self.sweep.design().block(block);
         Ok((points.start, points.end))
     }
 
     /// Key and value of each varied parameter at a point.
     fn settings(&self, py: Python<'_>, point: usize) -> PyResult<Vec<(String, Py<PyAny>)>> {
-        self.known_point(py, point)?;
+        self.check_point(py, point)?;
         let settings = self.sweep.design().settings(point).into_iter();
-        settings.map(|(key, value)| Ok((key.to_owned(), of_value(py, &value)?))).collect()
+        settings.map(|(key, value)| Ok((key.to_owned(), to_python(py, &value)?))).collect()
     }
 
     /// Parameters of a point in words.
     fn describe(&self, py: Python<'_>, point: usize) -> PyResult<String> {
-        self.known_point(py, point)?;
+        self.check_point(py, point)?;
         Ok(self.sweep.describe(point))
     }
 
     /// Computes one block: one row per point.
     fn compute<'py>(&self, py: Python<'py>, block: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.known(py, block)?;
+        self.check_block(py, block)?;
         let mut run = self.sweep.begin(block);
         while !run.is_done() {
-            detached(py, || run.advance(STEPS_BETWEEN_LOOKS))?;
+            detached(py, || run.advance(STEPS_BETWEEN_CHECKS))?;
             py.check_signals()?;
         }
         rows(py, run.records(), self.sweep.layout().record_length())
@@ -244,14 +244,14 @@ impl PySweep {
 }
 
 impl PySweep {
-    fn known(&self, py: Python<'_>, block: usize) -> PyResult<()> {
+    fn check_block(&self, py: Python<'_>, block: usize) -> PyResult<()> {
         if block < self.blocks() {
             return Ok(());
         }
         Err(option_error(py, &format!("block = {block}: the sweep has blocks 0 to {}", self.blocks() - 1)))
     }
 
-    fn known_point(&self, py: Python<'_>, point: usize) -> PyResult<()> {
+    fn check_point(&self, py: Python<'_>, point: usize) -> PyResult<()> {
         if point < self.points() {
             return Ok(());
         }
@@ -276,7 +276,8 @@ pub fn records(
     }
     records.resize(points * length, f64::NAN);
     let progress: Option<Py<PyAny>> = progress.map(Bound::unbind);
-    let report = |part: f64| Python::attach(|py| look(py, progress.as_ref().map(|progress| progress.bind(py)), part));
+    let report =
+        |part: f64| Python::attach(|py| report_progress(py, progress.as_ref().map(|progress| progress.bind(py)), part));
     let outcome = detached(py, || {
         compute(sweep, threads, report, |block, own| {
             let points = sweep.design().block(block);
@@ -285,8 +286,8 @@ pub fn records(
     })?;
     match outcome {
         Ok(()) => Ok(records),
-        Err(Ended::Raised(error)) => Err(error),
-        Err(Ended::Panicked) => {
+        Err(EarlyEnd::Raised(error)) => Err(error),
+        Err(EarlyEnd::Panicked) => {
             let message =
                 "internal error: a thread of the sweep panicked. This is a bug in the program; please report it.";
             Err(exception(py, "InternalError", message, None))
@@ -294,8 +295,8 @@ pub fn records(
     }
 }
 
-/// Why a sweep did not come to its end.
-enum Ended {
+/// Reason why a sweep ended early.
+enum EarlyEnd {
     /// Ctrl-C, or an error of the progress function.
     Raised(PyErr),
     Panicked,
@@ -308,7 +309,7 @@ fn compute(
     threads: usize,
     report: impl Fn(f64) -> PyResult<()>,
     mut receive: impl FnMut(usize, &[f64]),
-) -> Result<(), Ended> {
+) -> Result<(), EarlyEnd> {
     let blocks = sweep.design().blocks();
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
@@ -318,7 +319,7 @@ fn compute(
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
-            run.advance(STEPS_BETWEEN_LOOKS);
+            run.advance(STEPS_BETWEEN_CHECKS);
         }
         Some(run.records())
     };
@@ -346,17 +347,17 @@ fn compute(
         drop(send);
         let mut done = 0;
         let outcome = loop {
-            match results.recv_timeout(BETWEEN_LOOKS) {
+            match results.recv_timeout(CHECK_INTERVAL) {
                 Ok(Some((block, records))) => {
                     receive(block, &records);
                     done += 1;
                 }
-                Ok(None) => break Err(Ended::Panicked),
+                Ok(None) => break Err(EarlyEnd::Panicked),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break Ok(()),
             }
             if let Err(error) = report(done as f64 / blocks as f64) {
-                break Err(Ended::Raised(error));
+                break Err(EarlyEnd::Raised(error));
             }
         };
         stop.store(true, Ordering::Relaxed);

@@ -6,7 +6,7 @@ use jointplay_analysis::{AnalysisError, RunContext, WorkBudget, work_precision};
 use pyo3::prelude::*;
 
 use crate::errors::{option_error, scene_error, stopped};
-use crate::interpreter::{detached, look};
+use crate::interpreter::{detached, report_progress};
 use crate::scene::PyScene;
 
 /// Runs every method on `scene` over its steps or tolerances; `clock` returns the processor time of this thread, s. Returns the
@@ -26,7 +26,8 @@ pub fn tradeoff(
     let found = detached(py, || {
         let mut now = || Python::attach(|py| clock.call0(py)?.extract::<f64>(py)).unwrap_or(f64::NAN);
         let mut report = |part: f64| {
-            let outcome = Python::attach(|py| look(py, progress.as_ref().map(|progress| progress.bind(py)), part));
+            let outcome =
+                Python::attach(|py| report_progress(py, progress.as_ref().map(|progress| progress.bind(py)), part));
             match outcome {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(error) => {

@@ -10,7 +10,7 @@ use eframe::egui::{self, Ui, vec2};
 use eframe::egui_wgpu::{self, RenderState, RendererOptions, ScreenDescriptor};
 
 use super::theme;
-use crate::render::{self, Arrival, Image, Readback, RenderError, check_size, device_error, wgpu};
+use crate::render::{self, Image, PendingReadback, Readback, RenderError, check_size, device_error, wgpu};
 
 /// Time between two passes, s.
 const FRAME: f64 = 1.0 / 60.0;
@@ -157,7 +157,7 @@ type Fault = Pin<Box<dyn Future<Output = Option<wgpu::Error>>>>;
 pub struct Pending {
     device: wgpu::Device,
     readback: Readback,
-    arrival: Arrival,
+    arrival: PendingReadback,
     /// Error scopes of the device.
     faults: Vec<Fault>,
 }

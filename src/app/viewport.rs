@@ -102,7 +102,7 @@ pub struct Viewport {
     /// Whether only machine and time are shown for lack of room.
     pub(super) bare: bool,
     /// Place of the picture in the renderer.
-    place: render::Place,
+    place: render::PictureSlot,
 }
 
 impl Viewport {
@@ -141,13 +141,13 @@ impl Viewport {
             cloud: None,
             common: None,
             bare: false,
-            place: render::Place::Window,
+            place: render::PictureSlot::Window,
         }
     }
 
     /// A second viewport, for another run beside the first.
     pub fn beside(player: &Player) -> Self {
-        Self { place: render::Place::Beside, ..Self::new(player, ViewOptions::default()) }
+        Self { place: render::PictureSlot::Beside, ..Self::new(player, ViewOptions::default()) }
     }
 
     /// Force of the longest arrow, N.
@@ -432,7 +432,7 @@ impl Viewport {
     pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool, above: &[Rect]) {
         let (rect, response) =
             ui.allocate_exact_size(ui.available_size().max(vec2(16.0, 16.0)), Sense::click_and_drag());
-        let name = if self.place == render::Place::Window { "3D view" } else { "3D view before the change" };
+        let name = if self.place == render::PictureSlot::Window { "3D view" } else { "3D view before the change" };
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
         let screen = Screen::new(rect, ui.ctx().pixels_per_point());
         let size = screen.size;
@@ -531,7 +531,7 @@ impl Viewport {
             show_next(list, &mut self.next, revision);
         }
         let painter = ui.painter_at(rect);
-        painter.add(render::Viewport::revised(rect, list.clone(), Some(*revision), render::Place::Second));
+        painter.add(render::Viewport::revised(rect, list.clone(), Some(*revision), render::PictureSlot::Second));
         let Screen { scale, .. } = screen.drawn_with(quality);
         let overlay = self.overlay(player, said);
         let (list, theme) = (&self.second.0, self.options.theme);

@@ -4,7 +4,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::ink::{Canvas, FAINT, FINE, INK, Plot, SheetError, TEXT, failed, fine, rgb, style, write};
-use super::labels::{Area, arrange};
+use super::labels::{Area, place_labels};
 use super::ticks::Ruler;
 use super::{Chart, Colour, LINE, Marker, Series};
 use super::{heat, thin};
@@ -34,7 +34,7 @@ const HEADING: f64 = 14.0;
 /// Height of a row of the legend, length of its sample and its largest width, gap between entries, pixels.
 const ROW: f64 = 20.0;
 const SAMPLE: f64 = 26.0;
-const THICKEST: f64 = 10.0;
+const MAX_SAMPLE_WIDTH: f64 = 10.0;
 const GAP: f64 = 18.0;
 /// Half the size of a marker, pixels.
 const MARKER: f64 = 4.0;
@@ -150,7 +150,7 @@ fn draw_legend(root: &Canvas, row: &[&Series], left: f64, width: f64, y: f64) ->
     for series in row {
         if let Some(width) = series.line {
             let ends = vec![(fine(x), fine(y)), (fine(x + SAMPLE), fine(y))];
-            root.draw(&PathElement::new(ends, stroke(series.colour, width.min(THICKEST)))).map_err(failed)?;
+            root.draw(&PathElement::new(ends, stroke(series.colour, width.min(MAX_SAMPLE_WIDTH)))).map_err(failed)?;
         }
         if let Some(marker) = series.marker {
             draw_marker(root, (fine(x + 0.5 * SAMPLE), fine(y)), marker, series.colour)?;
@@ -181,7 +181,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
     }
     let beside = if chart.map.is_some() { heat::SCALE_WIDTH } else { 0.0 };
     // Room for the longest tick label on the left.
-    let longest = y.ticks.iter().map(|&tick| text_width(&y.word(tick), TEXT)).fold(0.0, f64::max);
+    let longest = y.ticks.iter().map(|&tick| text_width(&y.label(tick), TEXT)).fold(0.0, f64::max);
     let heading = style(HEADING, INK, HPos::Left, VPos::Top);
     let mut plot: Plot = ChartBuilder::on(area)
         .margin_top(fine(6.0))
@@ -201,15 +201,15 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
         .axis_desc_style(style(TEXT + 1.0, INK, HPos::Center, VPos::Center))
         .x_desc(described(&chart.x.label, &chart.x.unit))
         .y_desc(described(&chart.y.label, &chart.y.unit))
-        .x_label_formatter(&|tick| x.word(*tick))
-        .y_label_formatter(&|tick| y.word(*tick))
+        .x_label_formatter(&|tick| x.label(*tick))
+        .y_label_formatter(&|tick| y.label(*tick))
         .set_all_tick_mark_size(fine(4.0))
         .draw()
         .map_err(failed)?;
     let inside = |&(px, py): &(f64, f64)| {
-        let place = (x.place(px), y.place(py));
-        let good = (x.from..=x.to).contains(&place.0) && (y.from..=y.to).contains(&place.1);
-        good.then_some(place)
+        let position = (x.position(px), y.position(py));
+        let is_inside = (x.from..=x.to).contains(&position.0) && (y.from..=y.to).contains(&position.1);
+        is_inside.then_some(position)
     };
     let mut taken: Vec<Area> = Vec::new();
     if let Some(map) = &chart.map {
@@ -222,8 +222,10 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
     for series in &chart.series {
         if let Some(width) = series.line {
             for part in series.points.split(|point| inside(point).is_none()) {
-                let path: Vec<(i32, i32)> =
-                    part.iter().filter_map(|point| inside(point).map(|place| plot.backend_coord(&place))).collect();
+                let path: Vec<(i32, i32)> = part
+                    .iter()
+                    .filter_map(|point| inside(point).map(|position| plot.backend_coord(&position)))
+                    .collect();
                 // Detail below a quarter of a pixel is invisible.
                 let path = thin::line(&path, 1.0);
                 if !chart.labels.is_empty() {
@@ -235,7 +237,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
     }
     for series in &chart.series {
         let all = series.points.iter().filter_map(inside);
-        let mut all: Vec<_> = all.map(|place| plot.backend_coord(&place)).collect();
+        let mut all: Vec<_> = all.map(|position| plot.backend_coord(&position)).collect();
         if series.line.is_none() {
             all = thin::cloud(all.into_iter(), fine(1.0));
         }
@@ -286,12 +288,12 @@ fn draw_levels(
     taken: &mut Vec<Area>,
 ) -> Result<(), SheetError> {
     for level in &chart.levels {
-        let place = y.place(level.y);
-        if !(y.from..=y.to).contains(&place) {
+        let position = y.position(level.y);
+        if !(y.from..=y.to).contains(&position) {
             continue;
         }
-        let (left, at) = plot.backend_coord(&(x.from, place));
-        let (right, _) = plot.backend_coord(&(x.to, place));
+        let (left, at) = plot.backend_coord(&(x.from, position));
+        let (right, _) = plot.backend_coord(&(x.to, position));
         let dash = fine(5.0);
         let starts = (left..right).step_by(2 * dash.unsigned_abs() as usize);
         for from in starts {
@@ -333,7 +335,7 @@ fn draw_labels(
     let labels: Vec<_> = chart
         .labels
         .iter()
-        .filter_map(|label| inside(&label.at).map(|place| (label, plot.backend_coord(&place))))
+        .filter_map(|label| inside(&label.at).map(|position| (label, plot.backend_coord(&position))))
         .collect();
     let wanted: Vec<_> = labels
         .iter()
@@ -344,7 +346,7 @@ fn draw_labels(
         .collect();
     let unit = f64::from(fine(MARKER + 3.0));
     let centre = style(TEXT, INK, HPos::Center, VPos::Center);
-    for ((label, (x, y)), area) in labels.iter().zip(arrange(&wanted, taken, frame, unit)) {
+    for ((label, (x, y)), area) in labels.iter().zip(place_labels(&wanted, taken, frame, unit)) {
         let middle = ((area.x + 0.5 * area.width) as i32, (area.y + 0.5 * area.height) as i32);
         // A thin line connects a label to its point.
         let edge = (

@@ -9,15 +9,15 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 /// Width of the scale with its labels, pixels.
 pub(super) const SCALE_WIDTH: f64 = 92.0;
-const BAR: f64 = 16.0;
-const GROUND: Colour = (225, 225, 225);
+const BAR_WIDTH: f64 = 16.0;
+const NO_VALUE: Colour = (225, 225, 225);
 
 /// Mapping from a map's values to colours.
-pub(super) struct Legend {
+pub(super) struct ColourScale {
     ruler: Ruler,
 }
 
-impl Legend {
+impl ColourScale {
     pub(super) fn new(map: &Map) -> Self {
         let axis = Axis { label: String::new(), range: None, ..map.scale.clone() };
         let mut ruler = Ruler::new(&axis, map.values.iter().copied());
@@ -25,7 +25,7 @@ impl Legend {
         let (from, to) = map
             .values
             .iter()
-            .map(|v| ruler.place(*v))
+            .map(|v| ruler.position(*v))
             .filter(|v| v.is_finite())
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         if from < to {
@@ -38,13 +38,13 @@ impl Legend {
     fn colour(&self, map: &Map, value: f64) -> Colour {
         if !map.names.is_empty() {
             let place = map.names.iter().position(|(code, _)| *code == value);
-            return place.map_or(GROUND, |n| PALETTE[(n + 1) % PALETTE.len()]);
+            return place.map_or(NO_VALUE, |n| PALETTE[(n + 1) % PALETTE.len()]);
         }
-        let place = self.ruler.place(value);
-        if !place.is_finite() {
-            return GROUND;
+        let position = self.ruler.position(value);
+        if !position.is_finite() {
+            return NO_VALUE;
         }
-        let RGBColor(r, g, b) = ViridisRGB.get_color_normalized(place, self.ruler.from, self.ruler.to);
+        let RGBColor(r, g, b) = ViridisRGB.get_color_normalized(position, self.ruler.from, self.ruler.to);
         (r, g, b)
     }
 }
@@ -71,13 +71,13 @@ pub(super) fn ends(map: &Map) -> Vec<(f64, f64)> {
 
 /// Draws the cells.
 pub(super) fn cells(root: &Canvas, plot: &Plot, map: &Map, x: &Ruler, y: &Ruler) -> Result<(), SheetError> {
-    let legend = Legend::new(map);
+    let legend = ColourScale::new(map);
     let (xs, ys) = (edges(&map.xs), edges(&map.ys));
     for (j, rows) in ys.windows(2).enumerate() {
         for (i, columns) in xs.windows(2).enumerate() {
             let value = map.values.get(j * map.xs.len() + i).copied().unwrap_or(f64::NAN);
-            let a = plot.backend_coord(&(x.place(columns[0]), y.place(rows[0])));
-            let b = plot.backend_coord(&(x.place(columns[1]), y.place(rows[1])));
+            let a = plot.backend_coord(&(x.position(columns[0]), y.position(rows[0])));
+            let b = plot.backend_coord(&(x.position(columns[1]), y.position(rows[1])));
             let filled = rgb(legend.colour(map, value)).filled();
             // Overlaps the next cells, which are drawn on top, to avoid seams.
             let more = |edge: usize, cells: usize| if edge + 1 < cells { 2 } else { 0 };
@@ -90,17 +90,17 @@ pub(super) fn cells(root: &Canvas, plot: &Plot, map: &Map, x: &Ruler, y: &Ruler)
 
 /// Draws the scale in the column of width [`SCALE_WIDTH`] from `left`, between `top` and `bottom`, pixels.
 pub(super) fn scale(root: &Canvas, map: &Map, left: f64, top: f64, bottom: f64) -> Result<(), SheetError> {
-    let legend = Legend::new(map);
+    let legend = ColourScale::new(map);
     let words = style(TEXT, INK, HPos::Left, VPos::Center);
     let patch = |from: f64, to: f64, colour: Colour| {
-        let corners = [(fine(left), fine(from)), (fine(left + BAR), fine(to))];
+        let corners = [(fine(left), fine(from)), (fine(left + BAR_WIDTH), fine(to))];
         root.draw(&Rectangle::new(corners, rgb(colour).filled())).map_err(failed)
     };
     if !map.names.is_empty() {
         for (n, (code, name)) in map.names.iter().enumerate() {
             let y = top + 20.0 * n as f64;
             patch(y, y + 14.0, legend.colour(map, *code))?;
-            write(root, name, (left + BAR + 6.0, y + 7.0), &words)?;
+            write(root, name, (left + BAR_WIDTH + 6.0, y + 7.0), &words)?;
         }
         return Ok(());
     }
@@ -109,15 +109,15 @@ pub(super) fn scale(root: &Canvas, map: &Map, left: f64, top: f64, bottom: f64) 
     let ruler = &legend.ruler;
     for n in 0..PARTS {
         let (a, b) = (f64::from(n) / f64::from(PARTS), f64::from(n + 1) / f64::from(PARTS));
-        let place = ruler.from + (ruler.to - ruler.from) * 0.5 * (a + b);
-        let RGBColor(r, g, bl) = ViridisRGB.get_color_normalized(place, ruler.from, ruler.to);
+        let position = ruler.from + (ruler.to - ruler.from) * 0.5 * (a + b);
+        let RGBColor(r, g, bl) = ViridisRGB.get_color_normalized(position, ruler.from, ruler.to);
         patch((at(b) - 0.5).max(top), at(a), (r, g, bl))?;
     }
     for tick in &ruler.ticks {
         let y = at((tick - ruler.from) / (ruler.to - ruler.from));
-        let ends = vec![(fine(left + BAR), fine(y)), (fine(left + BAR + 4.0), fine(y))];
+        let ends = vec![(fine(left + BAR_WIDTH), fine(y)), (fine(left + BAR_WIDTH + 4.0), fine(y))];
         root.draw(&PathElement::new(ends, rgb(FAINT).stroke_width(FINE))).map_err(failed)?;
-        write(root, &ruler.word(*tick), (left + BAR + 7.0, y), &words)?;
+        write(root, &ruler.label(*tick), (left + BAR_WIDTH + 7.0, y), &words)?;
     }
     let unit = style(TEXT, INK, HPos::Left, VPos::Bottom);
     write(root, &map.scale.unit, (left, top - 6.0), &unit)

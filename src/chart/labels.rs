@@ -22,9 +22,9 @@ impl Area {
 
 /// Places each text, of the given size, as near to its point as possible without covering anything in `taken`, inside
 /// `frame`.
-pub(super) fn arrange(wanted: &[(Pair, Pair)], mut taken: Vec<Area>, frame: Area, unit: f64) -> Vec<Area> {
+pub(super) fn place_labels(requested: &[(Pair, Pair)], mut taken: Vec<Area>, frame: Area, unit: f64) -> Vec<Area> {
     let mut placed = Vec::new();
-    for &((x, y), (width, height)) in wanted {
+    for &((x, y), (width, height)) in requested {
         let mut best: Option<(f64, Area)> = None;
         for ring in 1..=6 {
             let gap = unit * f64::from(ring);
@@ -69,8 +69,8 @@ mod tests {
         let points = [(200.0, 150.0), (204.0, 152.0), (395.0, 5.0), (60.0, 150.0)];
         let marks: Vec<Area> =
             points.iter().map(|&(x, y)| Area { x: x - 3.0, y: y - 3.0, width: 6.0, height: 6.0 }).collect();
-        let wanted: Vec<_> = points.iter().map(|&p| (p, (50.0, 12.0))).collect();
-        let placed = arrange(&wanted, marks.clone(), frame, 6.0);
+        let requested: Vec<_> = points.iter().map(|&p| (p, (50.0, 12.0))).collect();
+        let placed = place_labels(&requested, marks.clone(), frame, 6.0);
         assert_eq!(placed.len(), points.len());
         for (i, a) in placed.iter().enumerate() {
             assert!((a.overlap(&frame) - 600.0).abs() < 1e-9, "{a:?} sticks out");

@@ -9,7 +9,7 @@ use super::ink::failed;
 use super::{Sheet, SheetError};
 
 /// Largest edge of a picture, pixels.
-const LARGEST: f32 = 16384.0;
+const MAX_EDGE: f32 = 16384.0;
 
 impl Sheet {
     /// The SVG as shapes and glyphs.
@@ -34,7 +34,7 @@ impl Sheet {
     pub fn png(&self, scale: f32) -> Result<Vec<u8>, SheetError> {
         let tree = self.tree()?;
         let (width, height) = (tree.size().width() * scale, tree.size().height() * scale);
-        let fits = |edge: f32| (1.0..=LARGEST).contains(&edge);
+        let fits = |edge: f32| (1.0..=MAX_EDGE).contains(&edge);
         let pixmap =
             (fits(width) && fits(height)).then(|| Pixmap::new(width.round() as u32, height.round() as u32)).flatten();
         let Some(mut pixmap) = pixmap else {

@@ -2,7 +2,7 @@
 
 use super::{Axis, Scale};
 
-/// An axis as drawn: positions are linear in `place`.
+/// An axis as drawn: positions are linear in [`Self::position`].
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Ruler {
     scale: Scale,
@@ -20,17 +20,17 @@ pub(super) struct Ruler {
 }
 
 /// Most ticks on an axis.
-const MOST: f64 = 8.0;
+const MAX_TICKS: f64 = 8.0;
 
 impl Ruler {
     /// The ruler of `axis` for data at `values`.
     pub(super) fn new(axis: &Axis, values: impl Iterator<Item = f64>) -> Self {
         let scale = axis.scale;
-        let place = |value: f64| place(scale, value);
+        let position_of = |value: f64| position(scale, value);
         let (mut from, mut to) = match axis.range {
-            Some((a, b)) => (place(a), place(b)),
+            Some((a, b)) => (position_of(a), position_of(b)),
             None => values
-                .map(place)
+                .map(position_of)
                 .filter(|v| v.is_finite())
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v))),
         };
@@ -58,7 +58,7 @@ impl Ruler {
             minor: Vec::new(),
             step,
             powers: scale == Scale::Logarithmic && (from < -3.5 || to > 4.5),
-            names: axis.names.iter().map(|(value, name)| (place(*value), name.clone())).collect(),
+            names: axis.names.iter().map(|(value, name)| (position_of(*value), name.clone())).collect(),
         };
         if !ruler.names.is_empty() {
             ruler.ticks = ruler.names.iter().map(|name| name.0).filter(|p| (from..=to).contains(p)).collect();
@@ -87,19 +87,19 @@ impl Ruler {
 
     /// Sets the ends to these values.
     pub(super) fn narrow(&mut self, from: f64, to: f64) {
-        (self.from, self.to) = (self.place(from), self.place(to));
+        (self.from, self.to) = (self.position(from), self.position(to));
         let inside = |tick: &f64| (self.from..=self.to).contains(tick);
         self.ticks.retain(inside);
         self.minor.retain(inside);
     }
 
     /// Position of `value`; not finite where the axis has none.
-    pub(super) fn place(&self, value: f64) -> f64 {
-        place(self.scale, value)
+    pub(super) fn position(&self, value: f64) -> f64 {
+        position(self.scale, value)
     }
 
     /// Label of a tick.
-    pub(super) fn word(&self, tick: f64) -> String {
+    pub(super) fn label(&self, tick: f64) -> String {
         if let Some((_, name)) = self.names.iter().find(|name| name.0 == tick) {
             return name.clone();
         }
@@ -124,7 +124,7 @@ impl Ruler {
     }
 }
 
-fn place(scale: Scale, value: f64) -> f64 {
+fn position(scale: Scale, value: f64) -> f64 {
     match scale {
         Scale::Linear => value,
         Scale::Logarithmic if value > 0.0 => value.log10(),
@@ -142,7 +142,7 @@ fn multiples(step: f64, from: f64, to: f64) -> Vec<f64> {
 
 /// Step between major ticks, and between minor ones: 1, 2 or 5 times a power of ten.
 fn linear_step(span: f64) -> (f64, f64) {
-    let least = span / MOST;
+    let least = span / MAX_TICKS;
     let unit = 10f64.powf(least.log10().floor());
     let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * unit >= least).unwrap_or(10.0);
     let parts = if factor == 2.0 { 4.0 } else { 5.0 };
@@ -151,7 +151,7 @@ fn linear_step(span: f64) -> (f64, f64) {
 
 /// The same for a logarithmic axis, in decades.
 fn logarithmic_step(span: f64) -> (f64, f64) {
-    let step = (span / MOST).ceil().max(1.0);
+    let step = (span / MAX_TICKS).ceil().max(1.0);
     (step, 1.0)
 }
 
@@ -183,7 +183,7 @@ mod tests {
 
     fn words(axis: &Axis, values: &[f64]) -> Vec<String> {
         let ruler = Ruler::new(axis, values.iter().copied());
-        ruler.ticks.iter().map(|&tick| ruler.word(tick)).collect()
+        ruler.ticks.iter().map(|&tick| ruler.label(tick)).collect()
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value as Json, json};
 use tempfile::TempDir;
 
-use super::names::{parent, place};
+use super::names::{parent, resolve};
 use super::output::OutputFile;
 use super::temporary::{self, OLD};
 use super::{FileError, PROGRAM};
@@ -21,7 +21,7 @@ pub const MANIFEST: &str = "manifest.json";
 const NEW: &str = "new";
 
 /// Largest number of foreign files that an error names.
-const MOST_NAMED: usize = 4;
+const MAX_NAMED: usize = 4;
 
 /// A folder to be filled.
 #[derive(Debug)]
@@ -29,7 +29,7 @@ pub struct Folder {
     /// The path as requested.
     path: PathBuf,
     /// The path with links resolved.
-    place: PathBuf,
+    location: PathBuf,
     replace: bool,
     temporary: TempDir,
     /// Lock on the temporary folder, held while the folder is in use.
@@ -47,24 +47,24 @@ impl Folder {
     /// not writable.
     pub fn claim(path: &Path, replace: bool) -> Result<Self, FileError> {
         let failed = |error: io::Error| FileError::of(path, &error);
-        let place = place(path).map_err(failed)?;
-        temporary::clear(&place);
-        if place.exists() && !place.is_dir() {
+        let location = resolve(path).map_err(failed)?;
+        temporary::remove_leftovers(&location);
+        if location.exists() && !location.is_dir() {
             return Err(FileError::cannot(path, "it is a file, not a folder"));
         }
         let here = std::env::current_dir().and_then(fs::canonicalize);
-        if here.is_ok_and(|here| here.starts_with(&place)) {
+        if here.is_ok_and(|here| here.starts_with(&location)) {
             return Err(FileError::cannot(path, "the command runs in it; name a folder in it"));
         }
-        if has_content(&place) {
+        if has_content(&location) {
             if !replace {
                 return Err(FileError::NotEmpty(path.to_owned()));
             }
-            check_own(path, &place)?;
+            check_replaceable(path, &location)?;
         }
-        let (temporary, lock) = temporary::folder(&place).map_err(failed)?;
+        let (temporary, lock) = temporary::folder(&location).map_err(failed)?;
         fs::create_dir(temporary.path().join(NEW)).map_err(failed)?;
-        Ok(Self { path: path.to_owned(), place, replace, temporary, _lock: lock, files: RefCell::default() })
+        Ok(Self { path: path.to_owned(), location, replace, temporary, _lock: lock, files: RefCell::default() })
     }
 
     /// A file to be written in it.
@@ -72,10 +72,10 @@ impl Folder {
     /// # Errors
     /// Input/output.
     pub fn file(&self, name: &str) -> Result<OutputFile, FileError> {
-        let (path, place) = (self.path.join(name), self.temporary.path().join(NEW).join(name));
-        fs::create_dir_all(parent(&place)).map_err(|error| FileError::of(&path, &error))?;
+        let (path, location) = (self.path.join(name), self.temporary.path().join(NEW).join(name));
+        fs::create_dir_all(parent(&location)).map_err(|error| FileError::of(&path, &error))?;
         self.files.borrow_mut().insert(name.to_owned());
-        Ok(OutputFile { path, place, replace: false })
+        Ok(OutputFile { path, location, replace: false })
     }
 
     /// Writes a file in it.
@@ -84,8 +84,8 @@ impl Folder {
     /// Input/output.
     pub fn write(&self, name: &str, content: &[u8]) -> Result<(), FileError> {
         // The folder appears as a whole, so its files need no temporary names.
-        let OutputFile { path, place, .. } = self.file(name)?;
-        fs::write(place, content).map_err(|error| FileError::of(&path, &error))
+        let OutputFile { path, location, .. } = self.file(name)?;
+        fs::write(location, content).map_err(|error| FileError::of(&path, &error))
     }
 
     /// Writes the manifest, with the names of the files, and gives the folder its final name.
@@ -98,20 +98,20 @@ impl Folder {
         self.write(MANIFEST, text.as_bytes())?;
         let failed = |error: io::Error| FileError::of(&self.path, &error);
         let [new, old] = [NEW, OLD].map(|name| self.temporary.path().join(name));
-        if !has_content(&self.place) {
+        if !has_content(&self.location) {
             // A rename replaces an empty folder on Unix; elsewhere the folder must be removed first.
-            if cfg!(not(unix)) && self.place.is_dir() {
-                fs::remove_dir(&self.place).map_err(failed)?;
+            if cfg!(not(unix)) && self.location.is_dir() {
+                fs::remove_dir(&self.location).map_err(failed)?;
             }
-            return fs::rename(&new, &self.place).map_err(failed);
+            return fs::rename(&new, &self.location).map_err(failed);
         }
         if !self.replace {
             return Err(FileError::NotEmpty(self.path.clone()));
         }
-        fs::rename(&self.place, &old).map_err(failed)?;
+        fs::rename(&self.location, &old).map_err(failed)?;
         // Checked under the temporary name, where nobody adds files any more.
-        let named = check_own(&self.path, &old).and_then(|()| fs::rename(&new, &self.place).map_err(failed));
-        if named.is_err() && fs::rename(&old, &self.place).is_err() {
+        let named = check_replaceable(&self.path, &old).and_then(|()| fs::rename(&new, &self.location).map_err(failed));
+        if named.is_err() && fs::rename(&old, &self.location).is_err() {
             // Keeps the old folder; the next run gives it its name back.
             self.temporary.disable_cleanup(true);
         }
@@ -123,22 +123,22 @@ fn has_content(path: &Path) -> bool {
     fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some())
 }
 
-/// Fails if the folder at `place` contains anything that this program did not write.
-fn check_own(path: &Path, place: &Path) -> Result<(), FileError> {
-    let manifest = fs::read(place.join(MANIFEST)).unwrap_or_default();
+/// Fails if the folder at `location` contains anything that this program did not write.
+fn check_replaceable(path: &Path, location: &Path) -> Result<(), FileError> {
+    let manifest = fs::read(location.join(MANIFEST)).unwrap_or_default();
     let manifest: Json = serde_json::from_slice(&manifest).unwrap_or_default();
     // Other programs also write manifests of that name.
     let own = manifest["program"] == PROGRAM;
     let listed = manifest["files"].as_array().into_iter().flatten().filter_map(Json::as_str);
     let listed: BTreeSet<&str> = listed.chain([MANIFEST]).filter(|_| own).collect();
     let mut foreign = Vec::new();
-    collect(place, "", &mut foreign);
+    collect(location, "", &mut foreign);
     foreign.retain(|name| !listed.contains(name.as_str()));
     if own && foreign.is_empty() {
         return Ok(());
     }
     foreign.sort();
-    let more = foreign.len().saturating_sub(MOST_NAMED);
+    let more = foreign.len().saturating_sub(MAX_NAMED);
     let mut names = foreign[..foreign.len() - more].join(", ");
     if more > 0 {
         names += &format!(" and {more} more");

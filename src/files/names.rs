@@ -8,13 +8,13 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// No such folder; circular links.
-pub(super) fn place(path: &Path) -> io::Result<PathBuf> {
+pub(super) fn resolve(path: &Path) -> io::Result<PathBuf> {
     // Going through components drops a trailing slash.
     let path: PathBuf = path.components().collect();
     match fs::canonicalize(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => match (fs::read_link(&path), path.file_name()) {
             // A link to something that does not exist yet.
-            (Ok(target), _) => place(&parent(&path).join(target)),
+            (Ok(target), _) => resolve(&parent(&path).join(target)),
             (Err(_), Some(name)) => Ok(fs::canonicalize(parent(&path))?.join(name)),
             (Err(_), None) => Err(error),
         },

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 use super::FileError;
-use super::names::{parent, place};
+use super::names::{parent, resolve};
 use super::temporary;
 
 /// Writer for the content of a file.
@@ -19,7 +19,7 @@ pub struct OutputFile {
     /// The path as requested.
     pub(super) path: PathBuf,
     /// Where it is written: the path with links resolved.
-    pub(super) place: PathBuf,
+    pub(super) location: PathBuf,
     pub(super) replace: bool,
 }
 
@@ -34,16 +34,16 @@ impl OutputFile {
             return Err(FileError::cannot(path, "it names a folder"));
         }
         let failed = |error: io::Error| FileError::of(path, &error);
-        let place = place(path).map_err(failed)?;
-        temporary::clear(&place);
+        let location = resolve(path).map_err(failed)?;
+        temporary::remove_leftovers(&location);
         if !replace && is_taken(path) {
             return Err(FileError::Exists(path.to_owned()));
         }
         if path.metadata().is_ok_and(|it| !it.is_file()) {
             return Err(FileError::cannot(path, "it exists and is not a regular file"));
         }
-        temporary::file(&place).map_err(failed)?;
-        Ok(Self { path: path.to_owned(), place, replace })
+        temporary::file(&location).map_err(failed)?;
+        Ok(Self { path: path.to_owned(), location, replace })
     }
 
     /// The requested name.
@@ -57,7 +57,7 @@ impl OutputFile {
     /// Input/output.
     pub fn fill(self, fill: impl FnOnce(&mut Content) -> io::Result<()>) -> Result<PendingFile, FileError> {
         let content = || {
-            let file = temporary::file(&self.place)?;
+            let file = temporary::file(&self.location)?;
             {
                 let mut content = BufWriter::new(file.as_file());
                 fill(&mut content)?;
@@ -85,7 +85,7 @@ impl OutputFile {
     /// # Errors
     /// Input/output.
     pub fn spool(&self) -> Result<File, FileError> {
-        tempfile::tempfile_in(parent(&self.place)).map_err(|error| FileError::of(&self.path, &error))
+        tempfile::tempfile_in(parent(&self.location)).map_err(|error| FileError::of(&self.path, &error))
     }
 }
 
@@ -106,11 +106,12 @@ pub struct PendingFile {
 /// # Errors
 /// Input/output; files before the failed one then have their final names.
 pub fn publish(files: Vec<PendingFile>) -> Result<(), FileError> {
-    for PendingFile { target: OutputFile { path, place, replace }, file } in files {
-        let named = if replace { file.persist(&place) } else { file.persist_noclobber(&place) };
+    for PendingFile { target: OutputFile { path, location, replace }, file } in files {
+        let named = if replace { file.persist(&location) } else { file.persist_noclobber(&location) };
         // Some file systems support neither a rename without replacement nor hard links. Only another program could create the
         // file in between.
-        let named = named.or_else(|failed| if is_taken(&place) { Err(failed) } else { failed.file.persist(&place) });
+        let named =
+            named.or_else(|failed| if is_taken(&location) { Err(failed) } else { failed.file.persist(&location) });
         named.map_err(|failed| FileError::of(&path, &failed.error))?;
     }
     Ok(())

@@ -3,14 +3,14 @@
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-use super::names::{parent, place};
+use super::names::{parent, resolve};
 use super::temporary;
 
 /// The first of `others` that would be the same file as `path`: by a link, by another route, or by a spelling that its
 /// file system treats as equal.
 pub fn same_file(path: &Path, others: &[&Path]) -> Option<usize> {
-    let own = place(path).ok()?;
-    let others: Vec<_> = others.iter().map(|other| place(other).ok()).collect();
+    let own = resolve(path).ok()?;
+    let others: Vec<_> = others.iter().map(|other| resolve(other).ok()).collect();
     if let Some(same) = others.iter().position(|other| other.as_ref() == Some(&own)) {
         return Some(same);
     }
@@ -24,7 +24,7 @@ pub fn same_file(path: &Path, others: &[&Path]) -> Option<usize> {
     // One level down, where no name means anything to the run that removes what a killed one left.
     let names = trial.path().join("names");
     fs::create_dir(&names).ok()?;
-    let at = |place: &Path| place.file_name().map(|name| names.join(name));
+    let at = |location: &Path| location.file_name().map(|name| names.join(name));
     File::create_new(at(&own)?).ok()?;
     beside.iter().position(|other| other.as_deref().and_then(at).is_some_and(|trial| trial.exists()))
 }

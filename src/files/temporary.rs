@@ -47,7 +47,7 @@ pub(super) fn folder(target: &Path) -> io::Result<(TempDir, Option<File>)> {
 
 /// Removes leftovers of killed runs with this target, except those locked by a live run. A folder that was about to be replaced
 /// gets its name back.
-pub(super) fn clear(target: &Path) {
+pub(super) fn remove_leftovers(target: &Path) {
     let prefix = prefix(target);
     for entry in fs::read_dir(parent(target)).into_iter().flatten().flatten() {
         let path = entry.path();

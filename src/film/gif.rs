@@ -5,7 +5,7 @@ use gif::{Encoder, Frame, Repeat};
 use super::{Encode, FilmError};
 
 /// Largest frame rate, 1/s: browsers take delays below 2 hundredths of a second for errors and play such films slowly.
-const MOST_RATE: f64 = 50.0;
+const MAX_RATE: f64 = 50.0;
 /// Trade-off of the palette search, 1 (best) to 30.
 const SPEED: i32 = 10;
 
@@ -26,21 +26,21 @@ pub struct Gif {
 /// # Errors
 /// A size or rate beyond the limits of GIF.
 pub fn check([width, height]: [u32; 2], rate: f64) -> Result<[u16; 2], FilmError> {
-    let too_much = |limit| FilmError::TooMuch { width, height, rate, limit };
-    if !(rate > 0.0 && rate <= MOST_RATE) {
-        return Err(too_much("a GIF shows at most 50 frames a second"));
+    let beyond_limit = |limit| FilmError::BeyondLimit { width, height, rate, limit };
+    if !(rate > 0.0 && rate <= MAX_RATE) {
+        return Err(beyond_limit("a GIF shows at most 50 frames a second"));
     }
     match (u16::try_from(width), u16::try_from(height)) {
         (Ok(across), Ok(down)) => Ok([across, down]),
-        _ => Err(too_much("an edge of a GIF has at most 65535 pixels")),
+        _ => Err(beyond_limit("an edge of a GIF has at most 65535 pixels")),
     }
 }
 
 impl Gif {
     pub fn new(size: [u32; 2], rate: f64) -> Result<Self, FilmError> {
         let [across, down] = check(size, rate)?;
-        let mut encoder = Encoder::new(Vec::new(), across, down, &[]).map_err(refused)?;
-        encoder.set_repeat(Repeat::Infinite).map_err(refused)?;
+        let mut encoder = Encoder::new(Vec::new(), across, down, &[]).map_err(encoder_error)?;
+        encoder.set_repeat(Repeat::Infinite).map_err(encoder_error)?;
         Ok(Self {
             encoder,
             size: size.map(|edge| edge as usize),
@@ -94,7 +94,7 @@ impl Encode for Gif {
         // Rounding times rather than intervals preserves the pace of the whole film.
         let hundredths = |frames: u64| (100.0 * frames as f64 / self.rate).round();
         frame.delay = (hundredths(self.frames + 1) - hundredths(self.frames)) as u16;
-        self.encoder.write_frame(&frame).map_err(refused)?;
+        self.encoder.write_frame(&frame).map_err(encoder_error)?;
         self.frames += 1;
         self.before.clear();
         self.before.extend_from_slice(rgba);
@@ -110,6 +110,6 @@ impl Encode for Gif {
     }
 }
 
-fn refused(error: gif::EncodingError) -> FilmError {
+fn encoder_error(error: gif::EncodingError) -> FilmError {
     FilmError::Encoder(error.to_string())
 }

@@ -62,7 +62,7 @@ pub fn check([width, height]: [u32; 2], rate: f64) -> Result<u8, FilmError> {
         return Err(FilmError::Odd { width, height });
     }
     let found = level([width, height], rate).filter(|_| rate > 0.0);
-    found.ok_or(FilmError::TooMuch {
+    found.ok_or(FilmError::BeyondLimit {
         width,
         height,
         rate,

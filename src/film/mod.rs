@@ -8,7 +8,7 @@ mod mp4;
 use crate::words::words;
 
 /// Size limit of a film, bytes, which fits in the memory of a page.
-const MOST_BYTES: usize = 1 << 30;
+const MAX_BYTES: usize = 1 << 30;
 
 /// Kind of file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,7 +66,7 @@ pub enum FilmError {
     },
     /// More than any level of H.264 allows, or than GIF can represent.
     #[error("a film of {width}x{height} pixels with {rate} frames a second: {limit}")]
-    TooMuch {
+    BeyondLimit {
         /// Requested width.
         width: u32,
         /// Requested height.
@@ -77,7 +77,7 @@ pub enum FilmError {
         limit: &'static str,
     },
     /// The file grows beyond 1 GiB.
-    #[error("the film is larger than {} MB; make it shorter, smaller or with fewer frames a second", MOST_BYTES >> 20)]
+    #[error("the film is larger than {} MB; make it shorter, smaller or with fewer frames a second", MAX_BYTES >> 20)]
     TooLong,
     /// No frame was added.
     #[error("a film needs at least one frame")]
@@ -128,7 +128,7 @@ impl Film {
     pub fn add(&mut self, rgba: &[u8]) -> Result<(), FilmError> {
         self.encoder.add(rgba)?;
         self.frames += 1;
-        if self.encoder.bytes() > MOST_BYTES {
+        if self.encoder.bytes() > MAX_BYTES {
             return Err(FilmError::TooLong);
         }
         Ok(())

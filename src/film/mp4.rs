@@ -31,7 +31,7 @@ pub struct Mp4 {
 impl Mp4 {
     pub fn new(size: [u32; 2], rate: f64) -> Result<Self, FilmError> {
         let encoder = H264::new(size, rate)?;
-        let muxer = Mp4FileMuxer::new().map_err(refused)?;
+        let muxer = Mp4FileMuxer::new().map_err(encoder_error)?;
         let timescale = (rate * f64::from(TICKS)).round().max(1.0) as u32;
         Ok(Self {
             encoder,
@@ -47,7 +47,7 @@ impl Encode for Mp4 {
     fn add(&mut self, rgba: &[u8]) -> Result<(), FilmError> {
         let (unit, keyframe) = self.encoder.encode(rgba)?;
         let first = self.file.len();
-        let parts = parse_annexb_nal_units(&unit).map_err(refused)?;
+        let parts = parse_annexb_nal_units(&unit).map_err(encoder_error)?;
         for part in &parts {
             // Parameter sets are stored in the sample entry.
             if !matches!(part.nal_unit_type, H264NalUnitType::Sps | H264NalUnitType::Pps) {
@@ -58,7 +58,7 @@ impl Encode for Mp4 {
         }
         let sample_entry = if self.samples == 0 {
             let config = H264SampleEntryConfig { length_size: LengthSize::FourBytes };
-            let mut entry = build_avc1_box_from_annexb(&unit, &config).map_err(refused)?;
+            let mut entry = build_avc1_box_from_annexb(&unit, &config).map_err(encoder_error)?;
             entry.unknown_boxes.push(UnknownBox {
                 box_type: BoxType::Normal(*b"colr"),
                 box_size: BoxSize::U32(8 + COLOURS.len() as u32),
@@ -79,7 +79,7 @@ impl Encode for Mp4 {
             data_offset: first as u64,
             data_size: self.file.len() - first,
         };
-        self.muxer.append_sample(&sample).map_err(refused)
+        self.muxer.append_sample(&sample).map_err(encoder_error)
     }
 
     fn bytes(&self) -> usize {
@@ -87,7 +87,7 @@ impl Encode for Mp4 {
     }
 
     fn finish(mut self: Box<Self>) -> Result<Vec<u8>, FilmError> {
-        let boxes = self.muxer.finalize().map_err(refused)?;
+        let boxes = self.muxer.finalize().map_err(encoder_error)?;
         for (offset, bytes) in boxes.offset_and_bytes_pairs() {
             let from = offset as usize;
             let end = from + bytes.len();
@@ -100,6 +100,6 @@ impl Encode for Mp4 {
     }
 }
 
-fn refused(error: impl std::fmt::Display) -> FilmError {
+fn encoder_error(error: impl std::fmt::Display) -> FilmError {
     FilmError::Encoder(error.to_string())
 }

@@ -15,13 +15,13 @@ struct Resources {
     finish: Finish,
     /// Last pass for pictures in egui's textures.
     still: Option<Finish>,
-    /// One for each [`Place`].
-    shown: [Option<Shown>; 3],
+    /// One for each [`PictureSlot`].
+    shown: [Option<CachedPicture>; 3],
 }
 
-/// Where a picture is shown; all places share one renderer.
+/// Where a picture is shown; all slots share one renderer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum PictureSlot {
     /// In the window.
     Window,
     /// Beside the first picture in the window.
@@ -31,7 +31,7 @@ pub enum Place {
 }
 
 /// A target, and the revision of the picture in it.
-struct Shown {
+struct CachedPicture {
     target: RenderTarget,
     group: wgpu::BindGroup,
     revision: Option<u64>,
@@ -71,32 +71,37 @@ pub fn draw_still(state: &egui_wgpu::RenderState, list: &DrawList) -> Option<egu
 pub struct Viewport {
     list: Arc<DrawList>,
     revision: Option<u64>,
-    place: Place,
+    slot: PictureSlot,
 }
 
 impl Viewport {
     /// Shape for `egui::Painter::add`: draws `list` at `list.size` and shows it in `rect`.
     pub fn shape(rect: egui::Rect, list: Arc<DrawList>) -> egui::Shape {
-        Self::revised(rect, list, None, Place::Window)
+        Self::revised(rect, list, None, PictureSlot::Window)
     }
 
-    /// The same, but a picture with the same `revision` as the previous one in this `place` is shown again without redrawing.
-    pub fn revised(rect: egui::Rect, list: Arc<DrawList>, revision: Option<u64>, place: Place) -> egui::Shape {
-        egui_wgpu::Callback::new_paint_callback(rect, Self { list, revision, place }).into()
+    /// The same, but a picture with the same `revision` as the previous one in this `slot` is shown again without redrawing.
+    pub fn revised(rect: egui::Rect, list: Arc<DrawList>, revision: Option<u64>, slot: PictureSlot) -> egui::Shape {
+        egui_wgpu::Callback::new_paint_callback(rect, Self { list, revision, slot }).into()
     }
 }
 
 impl Resources {
-    /// The renderer, and the target for `list` in `place`.
-    fn target_for(&mut self, device: &wgpu::Device, list: &DrawList, place: Place) -> (&mut Renderer, &mut Shown) {
+    /// The renderer, and the target for `list` in `slot`.
+    fn target_for(
+        &mut self,
+        device: &wgpu::Device,
+        list: &DrawList,
+        slot: PictureSlot,
+    ) -> (&mut Renderer, &mut CachedPicture) {
         // A window can briefly be 0 pixels wide, or wider than the largest texture.
         let limit = device.limits().max_texture_dimension_2d;
         let size = list.size.map(|n| n.clamp(1, limit));
-        let fits = |shown: &Shown| shown.target.fits(list, size);
-        let before = &mut self.shown[place as usize];
+        let fits = |shown: &CachedPicture| shown.target.fits(list, size);
+        let before = &mut self.shown[slot as usize];
         let shown = before.take().filter(fits).unwrap_or_else(|| {
             let target = self.renderer.target(device, size, list.quality.samples);
-            Shown { group: self.finish.group(device, &target.light), target, revision: None }
+            CachedPicture { group: self.finish.group(device, &target.light), target, revision: None }
         });
         (&mut self.renderer, before.insert(shown))
     }
@@ -115,12 +120,12 @@ impl egui_wgpu::CallbackTrait for Viewport {
         let Some(resources) = resources.get_mut::<Resources>() else {
             return Vec::new();
         };
-        let (renderer, shown) = resources.target_for(device, &self.list, self.place);
+        let (renderer, shown) = resources.target_for(device, &self.list, self.slot);
         let before = std::mem::replace(&mut shown.revision, self.revision);
         if before.is_none() || before != self.revision {
             // The first picture does not wait for other pipelines.
             if before.is_some() {
-                renderer.make_another_pipeline(device, &shown.target);
+                renderer.create_next_pipeline(device, &shown.target);
             }
             // A submission of its own: the pictures of a window share the renderer's buffers.
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("picture") });
@@ -139,7 +144,7 @@ impl egui_wgpu::CallbackTrait for Viewport {
         let Some(resources) = resources.get::<Resources>() else {
             return;
         };
-        if let Some(shown) = &resources.shown[self.place as usize] {
+        if let Some(shown) = &resources.shown[self.slot as usize] {
             resources.finish.draw(pass, &shown.group);
         }
     }

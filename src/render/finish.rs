@@ -10,8 +10,8 @@ pub(super) struct Finish {
 }
 
 impl Finish {
-    /// The pass from light encoded as `keeping` to an attachment of format `to`.
-    pub fn new(device: &wgpu::Device, keeping: ColorEncoding, to: wgpu::TextureFormat) -> Self {
+    /// The pass from light encoded as `encoding` to an attachment of format `to`.
+    pub fn new(device: &wgpu::Device, encoding: ColorEncoding, to: wgpu::TextureFormat) -> Self {
         let shader = shaders::module(device, &shaders::FINISH);
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("finish"),
@@ -32,7 +32,7 @@ impl Finish {
             immediate_size: 0,
         });
         // A surface of an sRGB format encodes by itself.
-        let entry = match (keeping, to.is_srgb()) {
+        let entry = match (encoding, to.is_srgb()) {
             (ColorEncoding::Linear, false) => "fs_encode",
             (ColorEncoding::Linear, true) => "fs_display",
             (ColorEncoding::Encoded, false) => "fs_copy",

@@ -6,12 +6,12 @@ use crate::view::{Eye, Instance};
 
 /// A sphere around an instance, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ball {
+pub(super) struct BoundingSphere {
     pub centre: Vec3,
     pub radius: f32,
 }
 
-impl Ball {
+impl BoundingSphere {
     /// Bounding sphere of an instance of a mesh with these `bounds`, centre and half size; `round`: a part of the unit sphere.
     pub fn around(instance: &Instance, bounds: &[Vec3; 2], round: bool) -> Self {
         let rows = instance.world_from_mesh.map(Vec4::from);
@@ -30,11 +30,11 @@ impl Ball {
 }
 
 /// View frustum: planes through the eye.
-pub(super) struct Sight {
+pub(super) struct Frustum {
     planes: [Vec4; 5],
 }
 
-impl Sight {
+impl Frustum {
     pub fn new(eye: &Eye) -> Self {
         let row = |i| eye.clip_from_world.row(i);
         let planes = [row(3) + row(0), row(3) - row(0), row(3) + row(1), row(3) - row(1), row(3)];
@@ -42,9 +42,9 @@ impl Sight {
         Self { planes: planes.map(unit) }
     }
 
-    /// Whether part of `ball` may be in the picture; true for a position that is NaN.
-    pub fn shows(&self, ball: &Ball) -> bool {
-        let outside = |plane: &Vec4| plane.dot(ball.centre.extend(1.0)) < -ball.radius;
+    /// Whether part of `sphere` may be in the picture; true for a position that is NaN.
+    pub fn may_contain(&self, sphere: &BoundingSphere) -> bool {
+        let outside = |plane: &Vec4| plane.dot(sphere.centre.extend(1.0)) < -sphere.radius;
         !self.planes.iter().any(outside)
     }
 }
@@ -59,31 +59,36 @@ pub(super) struct Region {
 
 /// The region needed for the view: all `casters` in view (the flag), and those whose shadows on the floor (a point of it, and
 /// up) are in view.
-pub(super) fn shadow_region(casters: &[(Ball, bool)], light: Vec3, floor: Option<(Vec3, Vec3)>, eye: &Eye) -> Region {
-    let sight = Sight::new(eye);
+pub(super) fn shadow_region(
+    casters: &[(BoundingSphere, bool)],
+    light: Vec3,
+    floor: Option<(Vec3, Vec3)>,
+    eye: &Eye,
+) -> Region {
+    let sight = Frustum::new(eye);
     let steep = floor.filter(|(_, up)| light.dot(*up) > 0.05);
-    let on_floor = |ball: &Ball| {
+    let on_floor = |sphere: &BoundingSphere| {
         let (point, up) = steep?;
-        let along = (ball.centre - point).dot(up) / light.dot(up);
-        let shadow = Ball {
-            centre: ball.centre - light * along,
+        let along = (sphere.centre - point).dot(up) / light.dot(up);
+        let shadow = BoundingSphere {
+            centre: sphere.centre - light * along,
             // Elongated by a low light.
-            radius: ball.radius / light.dot(up),
+            radius: sphere.radius / light.dot(up),
         };
-        sight.shows(&shadow).then_some(())
+        sight.may_contain(&shadow).then_some(())
     };
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let mut depths = [f32::INFINITY, f32::NEG_INFINITY];
-    for (ball, seen) in casters {
-        if !(ball.centre.is_finite() && ball.radius.is_finite()) {
+    for (sphere, seen) in casters {
+        if !(sphere.centre.is_finite() && sphere.radius.is_finite()) {
             continue;
         }
-        let depth = ball.centre.dot(light);
-        depths[0] = depths[0].min(depth - ball.radius);
-        depths[1] = depths[1].max(depth + ball.radius);
-        if *seen || on_floor(ball).is_some() {
-            low = low.min(ball.centre - ball.radius);
-            high = high.max(ball.centre + ball.radius);
+        let depth = sphere.centre.dot(light);
+        depths[0] = depths[0].min(depth - sphere.radius);
+        depths[1] = depths[1].max(depth + sphere.radius);
+        if *seen || on_floor(sphere).is_some() {
+            low = low.min(sphere.centre - sphere.radius);
+            high = high.max(sphere.centre + sphere.radius);
         }
     }
     if !(low.cmple(high).all() && depths[0] < depths[1]) {
@@ -92,20 +97,20 @@ pub(super) fn shadow_region(casters: &[(Ball, bool)], light: Vec3, floor: Option
     let centre = (low + high) / 2.0;
     let farthest = casters
         .iter()
-        .filter(|(ball, seen)| *seen || on_floor(ball).is_some())
-        .map(|(ball, _)| (ball.centre - centre).reject_from_normalized(light).length() + ball.radius)
+        .filter(|(sphere, seen)| *seen || on_floor(sphere).is_some())
+        .map(|(sphere, _)| (sphere.centre - centre).reject_from_normalized(light).length() + sphere.radius)
         .filter(|radius| radius.is_finite())
         .fold(f32::MIN_POSITIVE, f32::max);
     Region {
         centre,
-        // In steps, so that shadows keep their texels while things move a little.
-        radius: STEP.powf(farthest.log(STEP).ceil()).max(1e-4),
+        // In steps, so that shadows keep their texels during small motions.
+        radius: SIZE_RATIO.powf(farthest.log(SIZE_RATIO).ceil()).max(1e-4),
         depths,
     }
 }
 
 /// Ratio of neighbouring sizes of the region.
-const STEP: f32 = 1.1;
+const SIZE_RATIO: f32 = 1.1;
 
 impl Region {
     /// Orthographic view from the light on a map with a side of `texels`.
@@ -138,10 +143,10 @@ mod tests {
         let (scene, frame) = fixture::pendulum();
         let camera = SceneView::new(&scene, &frame).camera();
         let eye = camera.view([640, 360]);
-        let sight = Sight::new(&eye);
+        let sight = Frustum::new(&eye);
         let (right, up, back) = camera.axes();
         let half = camera.distance * (camera.field_of_view / 2.0).tan();
-        let shows = |centre, radius| sight.shows(&Ball { centre, radius });
+        let shows = |centre, radius| sight.may_contain(&BoundingSphere { centre, radius });
         assert!(shows(camera.target, 1e-3));
         for (axis, edge) in [(right, half * 640.0 / 360.0), (up, half)] {
             for side in [-1.0, 1.0] {
@@ -159,20 +164,20 @@ mod tests {
         let camera = SceneView::new(&scene, &frame).camera();
         let eye = camera.view([640, 360]);
         let light = Vec3::new(0.3, -0.4, 0.8).normalize();
-        let ball = |offset: Vec3, radius| Ball { centre: camera.target + offset * camera.distance, radius };
+        let sphere = |offset: Vec3, radius| BoundingSphere { centre: camera.target + offset * camera.distance, radius };
         let (right, _, _) = camera.axes();
         let casters = [
-            (ball(Vec3::ZERO, 0.01), true),
-            (ball(0.1 * right, 0.002), true),
+            (sphere(Vec3::ZERO, 0.01), true),
+            (sphere(0.1 * right, 0.002), true),
             // Far outside, but between them and the light.
-            (ball(20.0 * light, 0.01), false),
+            (sphere(20.0 * light, 0.01), false),
         ];
         let region = shadow_region(&casters, light, None, &eye);
         let map = region.light_from_world(light, 1024);
         let mut widest = 0.0_f32;
-        for (k, (ball, seen)) in casters.iter().enumerate() {
+        for (k, (sphere, seen)) in casters.iter().enumerate() {
             for side in [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z] {
-                let at = map.project_point3(ball.centre + side * ball.radius);
+                let at = map.project_point3(sphere.centre + side * sphere.radius);
                 assert!((0.0..=1.0).contains(&at.z), "{k}: {at}");
                 if *seen {
                     assert!(at.x.abs() <= 1.01 && at.y.abs() <= 1.01, "{k}: {at}");

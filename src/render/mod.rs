@@ -21,11 +21,11 @@ mod target;
 #[cfg(test)]
 mod tests;
 
-pub use callback::{Place, Viewport, draw_still, install};
+pub use callback::{PictureSlot, Viewport, draw_still, install};
 pub use eframe::egui_wgpu::wgpu;
 pub use image::{Image, RenderError};
 #[cfg(not(target_arch = "wasm32"))]
 pub use offscreen::{NoAdapter, Offscreen};
-pub use readback::{Arrival, Readback, check_size, device_error};
+pub use readback::{PendingReadback, Readback, check_size, device_error};
 pub use renderer::Renderer;
 pub use target::RenderTarget;

@@ -4,14 +4,14 @@ use super::wgpu;
 use wgpu::CompareFunction::{Always, Greater, Less, LessEqual};
 use wgpu::Face::{self, Back, Front};
 
-/// What a pass draws.
+/// Content that a pass draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Draws {
+pub(super) enum PassContent {
     /// The whole picture.
     Everywhere,
     /// The floor, where the list has one.
     Floor,
-    /// Lines among the solid things.
+    /// Lines, hidden by solids in front of them.
     Lines,
     /// Lines in front of everything.
     Marks,
@@ -34,16 +34,16 @@ pub(super) enum Group {
     GhostEdges,
     Arrows,
     Overlay,
-    /// Shadow casters: all solid, faded and clear things, seen from the light.
+    /// Shadow casters: all solid, faded and clear instances, seen from the light.
     Casters,
 }
 
 impl Group {
-    /// How many there are.
+    /// Number of groups.
     pub const COUNT: usize = Self::Casters as usize + 1;
 }
 
-/// How a pass changes a pixel.
+/// Blending of a pass with the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Blend {
     /// Depth only.
@@ -60,7 +60,7 @@ pub(super) enum Blend {
 #[derive(Debug)]
 pub(super) struct Pass {
     pub label: &'static str,
-    pub draws: Draws,
+    pub draws: PassContent,
     pub vertex: &'static str,
     /// `None`: depth seen from the light, to the shadow map.
     pub fragment: Option<&'static str>,
@@ -74,7 +74,7 @@ pub(super) struct Pass {
 const fn solid(label: &'static str, group: Group, fragment: &'static str) -> Pass {
     Pass {
         label,
-        draws: Draws::Meshes(group),
+        draws: PassContent::Meshes(group),
         vertex: "vs_mesh",
         fragment: Some(fragment),
         blend: Blend::Opaque,
@@ -90,7 +90,7 @@ const fn clear(label: &'static str, group: Group, fragment: &'static str, blend:
 }
 
 /// A pass without meshes.
-const fn flat(label: &'static str, draws: Draws, vertex: &'static str, fragment: &'static str) -> Pass {
+const fn flat(label: &'static str, draws: PassContent, vertex: &'static str, fragment: &'static str) -> Pass {
     Pass { draws, vertex, cull: None, ..clear(label, Group::Solid, fragment, Blend::Given) }
 }
 
@@ -100,12 +100,12 @@ pub(super) const PASSES: &[Pass] = &[
     Pass {
         blend: Blend::Opaque,
         compare: Always,
-        ..flat("background", Draws::Everywhere, "vs_background", "fs_background")
+        ..flat("background", PassContent::Everywhere, "vs_background", "fs_background")
     },
     solid("solid", Group::Solid, "fs_solid"),
     Pass { vertex: "vs_joint", ..solid("balls", Group::Balls, "fs_ball") },
-    flat("floor", Draws::Floor, "vs_floor", "fs_floor"),
-    flat("lines", Draws::Lines, "vs_line", "fs_line"),
+    flat("floor", PassContent::Floor, "vs_floor", "fs_floor"),
+    flat("lines", PassContent::Lines, "vs_line", "fs_line"),
     clear("faded", Group::Faded, "fs_faded", Blend::Light),
     clear("halos", Group::Halos, "fs_halo", Blend::Given),
     // The mesh has both sides of its faces, in an order that is from far to near for any line of sight.
@@ -129,7 +129,7 @@ pub(super) const PASSES: &[Pass] = &[
         ..solid("ghost, outline", Group::GhostEdges, "fs_ghost_edge")
     },
     // After the sockets, so that glass does not dim a force.
-    Pass { compare: Always, ..flat("marks", Draws::Marks, "vs_line", "fs_line") },
+    Pass { compare: Always, ..flat("marks", PassContent::Marks, "vs_line", "fs_line") },
     Pass { compare: Greater, ..clear("arrows behind others", Group::Arrows, "fs_mark_behind", Blend::Given) },
     solid("arrows", Group::Arrows, "fs_mark"),
     Pass { vertex: "vs_overlay", ..solid("overlay", Group::Overlay, "fs_overlay") },
@@ -137,7 +137,7 @@ pub(super) const PASSES: &[Pass] = &[
 
 impl Pass {
     /// Whether it draws to the shadow map.
-    pub fn casts(&self) -> bool {
+    pub fn is_shadow_pass(&self) -> bool {
         self.fragment.is_none()
     }
 

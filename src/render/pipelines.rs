@@ -3,7 +3,7 @@
 use std::mem::size_of;
 use std::sync::OnceLock;
 
-use super::passes::{Blend, Draws, PASSES, Pass};
+use super::passes::{Blend, PASSES, Pass, PassContent};
 use super::shaders;
 use super::target::{ColorEncoding, DEPTH};
 use super::wgpu;
@@ -19,13 +19,13 @@ pub(super) struct Pipelines {
     pub globals: wgpu::BindGroupLayout,
     pub shadow: wgpu::BindGroupLayout,
     shader: wgpu::ShaderModule,
-    keeping: ColorEncoding,
+    encoding: ColorEncoding,
     /// Pipelines by pass, for one sample per pixel and for several.
     passes: [[OnceLock<wgpu::RenderPipeline>; PASSES.len()]; 2],
 }
 
 impl Pipelines {
-    pub fn new(device: &wgpu::Device, keeping: ColorEncoding) -> Self {
+    pub fn new(device: &wgpu::Device, encoding: ColorEncoding) -> Self {
         let globals = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("globals"),
             entries: &[wgpu::BindGroupLayoutEntry {
@@ -59,7 +59,7 @@ impl Pipelines {
                 entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
             ],
         });
-        let module = match keeping {
+        let module = match encoding {
             ColorEncoding::Linear => shaders::LINEAR,
             ColorEncoding::Encoded => shaders::ENCODED,
         };
@@ -67,7 +67,7 @@ impl Pipelines {
             globals,
             shadow,
             shader: shaders::module(device, &module),
-            keeping,
+            encoding,
             passes: [const { [const { OnceLock::new() }; PASSES.len()] }; 2],
         }
     }
@@ -79,7 +79,7 @@ impl Pipelines {
     }
 
     /// Creates the next pipeline not used yet, so that a later picture need not wait for it.
-    pub fn make_another(&self, device: &wgpu::Device, samples: u32) {
+    pub fn create_next(&self, device: &wgpu::Device, samples: u32) {
         let made = &self.passes[usize::from(samples > 1)];
         if let Some(index) = made.iter().position(|made| made.get().is_none()) {
             self.pass(device, samples, index);
@@ -88,7 +88,7 @@ impl Pipelines {
 }
 
 fn pipeline(device: &wgpu::Device, common: &Pipelines, samples: u32, pass: &Pass) -> wgpu::RenderPipeline {
-    let Pipelines { globals, shadow, shader, keeping, .. } = common;
+    let Pipelines { globals, shadow, shader, encoding, .. } = common;
     let vertex = wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x3];
     let instance = wgpu::vertex_attr_array![
         2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Float32x4, 6 => Float32x4, 7 => Float32x4, 8 => Float32x4
@@ -104,21 +104,21 @@ fn pipeline(device: &wgpu::Device, common: &Pipelines, samples: u32, pass: &Pass
     let lines = [buffer(size_of::<Line>() as u64, Step::Instance, &line_ends[..])];
     use wgpu::PrimitiveTopology::{TriangleList, TriangleStrip};
     let (buffers, topology) = match pass.draws {
-        Draws::Everywhere => (&[][..], TriangleList),
-        Draws::Floor => (&[][..], TriangleStrip),
-        Draws::Lines | Draws::Marks => (&lines[..], TriangleStrip),
-        Draws::Meshes(_) => (&meshes[..], TriangleList),
+        PassContent::Everywhere => (&[][..], TriangleList),
+        PassContent::Floor => (&[][..], TriangleStrip),
+        PassContent::Lines | PassContent::Marks => (&lines[..], TriangleStrip),
+        PassContent::Meshes(_) => (&meshes[..], TriangleList),
     };
     // The shadow map cannot be read while being drawn.
     let both = [Some(globals), Some(shadow)];
-    let groups = if pass.casts() { &both[..1] } else { &both[..] };
+    let groups = if pass.is_shadow_pass() { &both[..1] } else { &both[..] };
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(pass.label),
         bind_group_layouts: groups,
         immediate_size: 0,
     });
     let colour = [Some(wgpu::ColorTargetState {
-        format: keeping.format(),
+        format: encoding.format(),
         blend: pass.blend_state(),
         write_mask: match pass.blend {
             Blend::Nothing => wgpu::ColorWrites::empty(),
@@ -136,18 +136,21 @@ fn pipeline(device: &wgpu::Device, common: &Pipelines, samples: u32, pass: &Pass
         },
         primitive: wgpu::PrimitiveState { topology, cull_mode: pass.cull, ..Default::default() },
         depth_stencil: Some(wgpu::DepthStencilState {
-            format: if pass.casts() { SHADOW } else { DEPTH },
+            format: if pass.is_shadow_pass() { SHADOW } else { DEPTH },
             depth_write_enabled: Some(pass.write_depth),
             depth_compare: Some(pass.compare),
             stencil: Default::default(),
             // A little farther away than it is: keeps a surface from shadowing itself.
-            bias: if pass.casts() {
+            bias: if pass.is_shadow_pass() {
                 wgpu::DepthBiasState { constant: 2, slope_scale: 2.0, clamp: 0.0 }
             } else {
                 Default::default()
             },
         }),
-        multisample: wgpu::MultisampleState { count: if pass.casts() { 1 } else { samples }, ..Default::default() },
+        multisample: wgpu::MultisampleState {
+            count: if pass.is_shadow_pass() { 1 } else { samples },
+            ..Default::default()
+        },
         fragment: pass.fragment.map(|entry| wgpu::FragmentState {
             module: shader,
             entry_point: Some(entry),

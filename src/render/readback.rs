@@ -12,7 +12,7 @@ pub struct Readback {
 }
 
 /// Result of a readback; empty until the picture arrives.
-pub type Arrival = Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>;
+pub type PendingReadback = Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>;
 
 /// Largest side of a picture that the device can draw, pixels.
 ///
@@ -67,8 +67,8 @@ impl Readback {
     }
 
     /// Requests the picture, after the copy was submitted. It arrives while the device is polled.
-    pub fn request(&self) -> Arrival {
-        let arrival = Arrival::default();
+    pub fn request(&self) -> PendingReadback {
+        let arrival = PendingReadback::default();
         let report = arrival.clone();
         self.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
             // The callback runs once.

@@ -8,9 +8,9 @@ use glam::{Vec3, Vec4};
 use wgpu::util::DeviceExt as _;
 
 use super::finish::Finish;
-use super::fit::{self, Ball, shadow_region};
+use super::fit::{self, BoundingSphere, shadow_region};
 use super::meshes::{self, LEVELS};
-use super::passes::{Draws, Group, PASSES};
+use super::passes::{Group, PASSES, PassContent};
 use super::pipelines::{Pipelines, SHADOW};
 use super::target::{ColorEncoding, extent};
 use super::{RenderTarget, wgpu};
@@ -19,8 +19,8 @@ use crate::view::{Colour, DrawList, Eye, Instance, Line, Mesh, MeshData};
 /// Side of the shadow map, pixels: within the 2048 that WebGL2 guarantees.
 const SHADOW_SIZE: u32 = 1536;
 /// Half width of a shadow's edge, in radii of the scene; and its limits in texels, within which nine comparisons are smooth.
-const SOFT: f32 = 0.003;
-const SOFT_TEXELS: [f32; 2] = [1.2, 2.5];
+const SHADOW_EDGE: f32 = 0.003;
+const SHADOW_EDGE_TEXELS: [f32; 2] = [1.2, 2.5];
 
 /// `Globals` of `shaders/scene.wgsl`.
 #[repr(C)]
@@ -45,7 +45,7 @@ struct Globals {
 }
 
 /// A mesh on the device.
-struct Loaded {
+struct GpuMesh {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     count: u32,
@@ -54,7 +54,7 @@ struct Loaded {
 }
 
 /// A buffer that grows as needed.
-struct Growing {
+struct GrowableBuffer {
     label: &'static str,
     buffer: wgpu::Buffer,
 }
@@ -98,7 +98,7 @@ struct Batch {
     level: usize,
     mesh: usize,
     first: u64,
-    seen: u32,
+    in_view: u32,
     count: u32,
 }
 
@@ -110,23 +110,23 @@ pub struct Renderer {
     shadow: Shadow,
     sampler: wgpu::Sampler,
     /// Meshes by level of detail, the finest first, then by [`Mesh::index`]; only the finest level has the plates.
-    meshes: Vec<Vec<Loaded>>,
+    meshes: Vec<Vec<GpuMesh>>,
     plates: Arc<[MeshData]>,
-    instances: Growing,
-    lines: Growing,
-    marks: Growing,
+    instances: GrowableBuffer,
+    lines: GrowableBuffer,
+    marks: GrowableBuffer,
     /// All instances of a picture, group by group.
     packed: Vec<Instance>,
     /// Bounding spheres of shadow casters, and whether they are in view.
-    casters: Vec<(Ball, bool)>,
-    keeping: ColorEncoding,
+    casters: Vec<(BoundingSphere, bool)>,
+    encoding: ColorEncoding,
 }
 
 impl Renderer {
     /// Creates pipelines and shared meshes on `device`, which belongs to `adapter`.
     pub fn new(device: &wgpu::Device, adapter: &wgpu::Adapter) -> Self {
-        let keeping = ColorEncoding::on(adapter);
-        let pipelines = Pipelines::new(device, keeping);
+        let encoding = ColorEncoding::supported_by(adapter);
+        let pipelines = Pipelines::new(device, encoding);
         let globals = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("globals"),
             size: size_of::<Globals>() as u64,
@@ -159,24 +159,24 @@ impl Renderer {
                 })
                 .collect(),
             plates: Arc::new([]),
-            instances: Growing::new(device, "instances"),
-            lines: Growing::new(device, "lines"),
-            marks: Growing::new(device, "marks"),
+            instances: GrowableBuffer::new(device, "instances"),
+            lines: GrowableBuffer::new(device, "lines"),
+            marks: GrowableBuffer::new(device, "marks"),
             packed: Vec::new(),
             casters: Vec::new(),
-            keeping,
+            encoding,
             pipelines,
         }
     }
 
     /// A target for pictures of `size` pixels with 4 samples or 1 per pixel.
     pub fn target(&self, device: &wgpu::Device, size: [u32; 2], samples: u32) -> RenderTarget {
-        RenderTarget::new(device, size, samples, self.keeping)
+        RenderTarget::new(device, size, samples, self.encoding)
     }
 
     /// The last pass, from its targets to attachments of `format`.
     pub(super) fn finish(&self, device: &wgpu::Device, format: wgpu::TextureFormat) -> Finish {
-        Finish::new(device, self.keeping, format)
+        Finish::new(device, self.encoding, format)
     }
 
     /// Records the passes that draw `list` to `target`. One picture per submission: the buffers are shared.
@@ -206,7 +206,7 @@ impl Renderer {
         queue.write_buffer(&self.globals, 0, bytemuck::bytes_of(&globals));
 
         let passes = PASSES.iter().enumerate().filter(|(_, pass)| draws_something(pass.draws, list, &batches));
-        let (shadow, picture): (Vec<_>, Vec<_>) = passes.partition(|(_, pass)| pass.casts());
+        let (shadow, picture): (Vec<_>, Vec<_>) = passes.partition(|(_, pass)| pass.is_shadow_pass());
         let pipeline = |index| self.pipelines.pass(device, target.samples(), index);
         {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -245,8 +245,8 @@ impl Renderer {
     }
 
     /// Creates one pipeline that no picture for `target` has needed so far, so that a later one need not wait for it.
-    pub(super) fn make_another_pipeline(&self, device: &wgpu::Device, target: &RenderTarget) {
-        self.pipelines.make_another(device, target.samples());
+    pub(super) fn create_next_pipeline(&self, device: &wgpu::Device, target: &RenderTarget) {
+        self.pipelines.create_next(device, target.samples());
     }
 
     /// Number of triangles of meshes that the passes of `list` draw.
@@ -262,8 +262,8 @@ impl Renderer {
             drawn.sum::<u64>()
         };
         let drawn = PASSES.iter().map(|pass| match pass.draws {
-            Draws::Meshes(Group::Casters) => CASTERS.iter().map(|group| of(*group, |batch| batch.count)).sum(),
-            Draws::Meshes(group) => of(group, |batch| batch.seen),
+            PassContent::Meshes(Group::Casters) => CASTERS.iter().map(|group| of(*group, |batch| batch.count)).sum(),
+            PassContent::Meshes(group) => of(group, |batch| batch.in_view),
             _ => 0,
         });
         drawn.sum()
@@ -272,29 +272,29 @@ impl Renderer {
     fn step(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        draws: Draws,
+        draws: PassContent,
         list: &DrawList,
         batches: &[Vec<Batch>; Group::COUNT],
     ) {
         match draws {
-            Draws::Everywhere => pass.draw(0..3, 0..1),
-            Draws::Floor => pass.draw(0..4, 0..1),
-            Draws::Lines => draw_lines(pass, &self.lines, &list.lines),
-            Draws::Marks => draw_lines(pass, &self.marks, &list.marks),
-            Draws::Meshes(Group::Casters) => {
+            PassContent::Everywhere => pass.draw(0..3, 0..1),
+            PassContent::Floor => pass.draw(0..4, 0..1),
+            PassContent::Lines => draw_lines(pass, &self.lines, &list.lines),
+            PassContent::Marks => draw_lines(pass, &self.marks, &list.marks),
+            PassContent::Meshes(Group::Casters) => {
                 for group in CASTERS {
                     self.draw_meshes(pass, &batches[group as usize], |batch| batch.count);
                 }
             }
-            Draws::Meshes(group) => {
-                self.draw_meshes(pass, &batches[group as usize], |batch| batch.seen);
+            PassContent::Meshes(group) => {
+                self.draw_meshes(pass, &batches[group as usize], |batch| batch.in_view);
             }
         }
     }
 
     /// Packs all instances of `list` for a picture of `size`, and collects the shadow casters.
     fn pack(&mut self, list: &DrawList, size: [u32; 2]) -> [Vec<Batch>; Group::COUNT] {
-        let mut packing = Packing {
+        let mut packing = InstancePacker {
             eye: &list.eye,
             height: size[1],
             meshes: &self.meshes,
@@ -315,7 +315,7 @@ impl Renderer {
         ] {
             let casts = CASTERS.contains(&group);
             for (mesh, all) in layer.by_mesh.iter().enumerate() {
-                let plain = all.iter().filter(|one| group != Group::Solid || !faces(one));
+                let plain = all.iter().filter(|one| group != Group::Solid || !has_facing_sphere(one));
                 packing.mesh(mesh, plain, casts, &mut batches[group as usize]);
             }
         }
@@ -325,7 +325,7 @@ impl Renderer {
             [(Group::Balls, solid), (Group::Halos, &list.halos[..]), (Group::ClearBalls, &list.clear_balls[..])]
         {
             let casts = CASTERS.contains(&group);
-            let balls = balls.iter().filter(|one| group != Group::Balls || faces(one));
+            let balls = balls.iter().filter(|one| group != Group::Balls || has_facing_sphere(one));
             packing.mesh(sphere, balls, casts, &mut batches[group as usize]);
         }
         packing.in_order(Mesh::Socket.index(), &list.sockets, &mut batches[Group::Sockets as usize]);
@@ -355,7 +355,7 @@ impl Renderer {
         let region = shadow_region(&self.casters, light.direction, plane, &list.eye);
         let texels = self.shadow.size;
         let texel = 2.0 * region.radius / texels as f32;
-        let soft = (SOFT * light.radius / texel).clamp(SOFT_TEXELS[0], SOFT_TEXELS[1]);
+        let soft = (SHADOW_EDGE * light.radius / texel).clamp(SHADOW_EDGE_TEXELS[0], SHADOW_EDGE_TEXELS[1]);
         let flag = |on: bool| f32::from(u8::from(on));
         let around = flag(list.quality.fine_shadows);
         Globals {
@@ -380,7 +380,7 @@ impl Renderer {
 }
 
 /// Whether it is a ball shaded by its socket's wall or marked at its contact point.
-fn faces(instance: &&Instance) -> bool {
+fn has_facing_sphere(instance: &&Instance) -> bool {
     instance.other[3] > 0.0 || instance.touch[3] > 0.0
 }
 
@@ -388,15 +388,15 @@ fn faces(instance: &&Instance) -> bool {
 const CASTERS: [Group; 4] = [Group::Solid, Group::Balls, Group::Faded, Group::ClearBalls];
 
 /// Sorts instances by mesh, level of detail and whether they are in view.
-struct Packing<'a> {
+struct InstancePacker<'a> {
     eye: &'a Eye,
     height: u32,
-    meshes: &'a [Vec<Loaded>],
+    meshes: &'a [Vec<GpuMesh>],
     packed: &'a mut Vec<Instance>,
-    casters: &'a mut Vec<(Ball, bool)>,
+    casters: &'a mut Vec<(BoundingSphere, bool)>,
 }
 
-impl Packing<'_> {
+impl InstancePacker<'_> {
     /// Packs instances of one mesh in any order; those out of view are packed only if they cast shadows.
     fn mesh<'i>(
         &mut self,
@@ -405,27 +405,27 @@ impl Packing<'_> {
         casts: bool,
         batches: &mut Vec<Batch>,
     ) {
-        let Some(Loaded { bounds, .. }) = self.meshes[0].get(mesh) else {
+        let Some(GpuMesh { bounds, .. }) = self.meshes[0].get(mesh) else {
             return;
         };
-        let sight = fit::Sight::new(self.eye);
+        let sight = fit::Frustum::new(self.eye);
         let place = |instance: &'i Instance| {
-            let ball = Ball::around(instance, bounds, Mesh::is_round(mesh));
-            let seen = sight.shows(&ball);
-            (instance, self.level(mesh, instance, seen), seen, ball)
+            let ball = BoundingSphere::around(instance, bounds, Mesh::is_round(mesh));
+            let in_view = sight.may_contain(&ball);
+            (instance, self.level(mesh, instance, in_view), in_view, ball)
         };
-        let places: Vec<(&Instance, usize, bool, Ball)> = all.map(place).collect();
+        let places: Vec<(&Instance, usize, bool, BoundingSphere)> = all.map(place).collect();
         if places.is_empty() {
             return;
         }
         if casts {
-            self.casters.extend(places.iter().map(|(.., seen, ball)| (*ball, *seen)));
+            self.casters.extend(places.iter().map(|(.., in_view, ball)| (*ball, *in_view)));
         }
         for level in 0..LEVELS.len() {
             let first = self.packed.len();
             let mut count = 0;
             for wanted in [true, false].into_iter().filter(|wanted| *wanted || casts) {
-                let chosen = places.iter().filter(|(_, of, seen, _)| (*of, *seen) == (level, wanted));
+                let chosen = places.iter().filter(|(_, of, in_view, _)| (*of, *in_view) == (level, wanted));
                 self.packed.extend(chosen.map(|(instance, ..)| linear(instance)));
                 if wanted {
                     count = self.packed.len() - first;
@@ -437,11 +437,11 @@ impl Packing<'_> {
 
     /// Packs instances of one mesh in the given order: translucent ones run from far to near.
     fn in_order(&mut self, mesh: usize, all: &[Instance], batches: &mut Vec<Batch>) {
-        let sight = fit::Sight::new(self.eye);
+        let sight = fit::Frustum::new(self.eye);
         let bounds = self.meshes[0][mesh].bounds;
         let (mut first, mut run) = (self.packed.len(), 0);
         for instance in all {
-            if !sight.shows(&Ball::around(instance, &bounds, Mesh::is_round(mesh))) {
+            if !sight.may_contain(&BoundingSphere::around(instance, &bounds, Mesh::is_round(mesh))) {
                 continue;
             }
             let level = self.level(mesh, instance, true);
@@ -454,22 +454,22 @@ impl Packing<'_> {
         self.push(batches, run, mesh, first, self.packed.len() - first);
     }
 
-    fn push(&self, batches: &mut Vec<Batch>, level: usize, mesh: usize, first: usize, seen: usize) {
+    fn push(&self, batches: &mut Vec<Batch>, level: usize, mesh: usize, first: usize, in_view: usize) {
         batches.push(Batch {
             level,
             mesh,
             first: (first * size_of::<Instance>()) as u64,
-            seen: seen as u32,
+            in_view: in_view as u32,
             count: (self.packed.len() - first) as u32,
         });
     }
 
     /// Level of detail for an instance: the coarsest whose corners do not show.
-    fn level(&self, mesh: usize, instance: &Instance, seen: bool) -> usize {
+    fn level(&self, mesh: usize, instance: &Instance, in_view: bool) -> usize {
         if mesh >= Mesh::SHARED {
             return 0;
         }
-        let radius = radius_on_screen(self.eye, self.height, instance, seen);
+        let radius = radius_on_screen(self.eye, self.height, instance, in_view);
         let fits = LEVELS.iter().rposition(|level| radius <= level.pixels);
         fits.unwrap_or(0)
     }
@@ -481,12 +481,12 @@ fn linear(instance: &Instance) -> Instance {
     Instance { colour: [r, g, b, instance.colour[3]], ..*instance }
 }
 
-impl Growing {
+impl GrowableBuffer {
     fn new(device: &wgpu::Device, label: &'static str) -> Self {
-        Self { label, buffer: Self::make(device, label, 4096) }
+        Self { label, buffer: Self::create(device, label, 4096) }
     }
 
-    fn make(device: &wgpu::Device, label: &str, size: u64) -> wgpu::Buffer {
+    fn create(device: &wgpu::Device, label: &str, size: u64) -> wgpu::Buffer {
         let usage = wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST;
         device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
     }
@@ -497,7 +497,7 @@ impl Growing {
         }
         let needed = bytes.len() as u64;
         if self.buffer.size() < needed {
-            self.buffer = Self::make(device, self.label, needed.next_power_of_two());
+            self.buffer = Self::create(device, self.label, needed.next_power_of_two());
         }
         queue.write_buffer(&self.buffer, 0, bytes);
     }
@@ -505,20 +505,20 @@ impl Growing {
 
 /// Whether a pass over `draws` changes the picture. Most passes are empty in most pictures, and a software driver needs a tenth
 /// of a second to create each pipeline.
-fn draws_something(draws: Draws, list: &DrawList, batches: &[Vec<Batch>; Group::COUNT]) -> bool {
+fn draws_something(draws: PassContent, list: &DrawList, batches: &[Vec<Batch>; Group::COUNT]) -> bool {
     match draws {
-        Draws::Everywhere => true,
-        Draws::Floor => list.floor.is_some(),
-        Draws::Lines => !list.lines.is_empty(),
-        Draws::Marks => !list.marks.is_empty(),
-        Draws::Meshes(Group::Casters) => {
+        PassContent::Everywhere => true,
+        PassContent::Floor => list.floor.is_some(),
+        PassContent::Lines => !list.lines.is_empty(),
+        PassContent::Marks => !list.marks.is_empty(),
+        PassContent::Meshes(Group::Casters) => {
             CASTERS.iter().any(|group| batches[*group as usize].iter().any(|batch| batch.count > 0))
         }
-        Draws::Meshes(group) => batches[group as usize].iter().any(|batch| batch.seen > 0),
+        PassContent::Meshes(group) => batches[group as usize].iter().any(|batch| batch.in_view > 0),
     }
 }
 
-fn draw_lines(pass: &mut wgpu::RenderPass<'_>, buffer: &Growing, lines: &[Line]) {
+fn draw_lines(pass: &mut wgpu::RenderPass<'_>, buffer: &GrowableBuffer, lines: &[Line]) {
     let bytes = size_of_val(lines) as u64;
     pass.set_vertex_buffer(0, buffer.buffer.slice(..bytes));
     pass.draw(0..4, 0..lines.len() as u32);
@@ -532,12 +532,12 @@ fn depth_attachment(view: &wgpu::TextureView, store: wgpu::StoreOp) -> wgpu::Ren
     }
 }
 
-fn load(device: &wgpu::Device, mesh: &MeshData) -> Loaded {
+fn load(device: &wgpu::Device, mesh: &MeshData) -> GpuMesh {
     let vertices: Vec<f32> = mesh.vertices.iter().flat_map(|(p, n)| p.iter().chain(n).copied()).collect();
     let buffer = |label, contents, usage| {
         device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
     };
-    Loaded {
+    GpuMesh {
         vertices: buffer("vertices", bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
         indices: buffer("indices", bytemuck::cast_slice(&mesh.indices), wgpu::BufferUsages::INDEX),
         count: mesh.indices.len() as u32,
@@ -546,12 +546,12 @@ fn load(device: &wgpu::Device, mesh: &MeshData) -> Loaded {
 }
 
 /// Radius across an instance's axis, pixels, at the nearer of its origin and its tip (0, 0, 1): the size of its visible
-/// curvature. Infinite if either is not in front of the eye. For an instance that is not `seen` but casts a shadow, the radius
+/// curvature. Infinite if either is not in front of the eye. For an instance that is not `in_view` but casts a shadow, the radius
 /// if it were looked at.
-fn radius_on_screen(eye: &Eye, height: u32, instance: &Instance, seen: bool) -> f32 {
+fn radius_on_screen(eye: &Eye, height: u32, instance: &Instance, in_view: bool) -> f32 {
     let rows = instance.world_from_mesh.map(Vec4::from);
     let column = |j: usize| Vec3::new(rows[0][j], rows[1][j], rows[2][j]);
-    let away = |at: Vec3| match seen {
+    let away = |at: Vec3| match in_view {
         true => eye.clip_from_world.row(3).dot(at.extend(1.0)),
         false => at.distance(eye.position),
     };
@@ -582,7 +582,7 @@ mod tests {
             let linear = turn * Mat3::from_diagonal(Vec3::new(radius, radius, 1e-6));
             let rows = [0, 1, 2].map(|i| linear.row(i).extend(origin[i]).to_array());
             let instance = Instance { world_from_mesh: rows, ..Instance::zeroed() };
-            [true, false].map(|seen| radius_on_screen(&eye, SIZE[1], &instance, seen))
+            [true, false].map(|in_view| radius_on_screen(&eye, SIZE[1], &instance, in_view))
         };
         let (right, _, back) = camera.axes();
         for radius in [1e-4_f32, 1e-3, 1e-2] {
@@ -595,7 +595,7 @@ mod tests {
                 assert!((found / spanned - 1.0).abs() < 1e-2, "{found} {spanned}");
             }
         }
-        let [seen, unseen] = at(camera.eye() + back, 1e-3);
-        assert!(seen.is_infinite() && unseen.is_finite());
+        let [in_view, unseen] = at(camera.eye() + back, 1e-3);
+        assert!(in_view.is_infinite() && unseen.is_finite());
     }
 }

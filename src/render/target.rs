@@ -17,7 +17,7 @@ pub(super) enum ColorEncoding {
 
 impl ColorEncoding {
     /// The encoding that `adapter` supports.
-    pub fn on(adapter: &wgpu::Adapter) -> Self {
+    pub fn supported_by(adapter: &wgpu::Adapter) -> Self {
         Self::with(&adapter.get_texture_format_features(Self::Linear.format()))
     }
 
@@ -54,7 +54,7 @@ pub struct RenderTarget {
 impl RenderTarget {
     /// A target of `size` pixels (each at least 1 and at most the device's `max_texture_dimension_2d`) with 1 or 4 samples per
     /// pixel; every backend supports four.
-    pub(super) fn new(device: &wgpu::Device, size: [u32; 2], samples: u32, keeping: ColorEncoding) -> Self {
+    pub(super) fn new(device: &wgpu::Device, size: [u32; 2], samples: u32, encoding: ColorEncoding) -> Self {
         use wgpu::TextureUsages as Usage;
         let texture = |label, format, sample_count, usage| {
             let texture = device.create_texture(&wgpu::TextureDescriptor {
@@ -69,7 +69,7 @@ impl RenderTarget {
             });
             texture.create_view(&Default::default())
         };
-        let (format, drawn) = (keeping.format(), Usage::RENDER_ATTACHMENT);
+        let (format, drawn) = (encoding.format(), Usage::RENDER_ATTACHMENT);
         Self {
             size,
             samples,
