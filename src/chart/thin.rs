@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corners_and_peaks_stay_and_straight_parts_go() {
+    fn corners_and_peaks_are_kept_and_straight_parts_thinned() {
         let mut path: Vec<Point> = (0..100).map(|k| (k, 0)).collect();
         path[40].1 = 9;
         let thin = line(&path, 0.5);

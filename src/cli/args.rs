@@ -616,7 +616,7 @@ mod tests {
     use clap::CommandFactory;
 
     #[test]
-    fn the_declarations_hold_together() {
+    fn the_argument_declarations_are_consistent() {
         super::Arguments::command().debug_assert();
     }
 

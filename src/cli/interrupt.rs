@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_echo_is_no_second_request_and_a_third_is_final() {
+    fn an_echoed_signal_is_no_second_request_and_a_third_exits() {
         let start = Instant::now();
         let exits = |after: &[u64]| {
             let mut signals = Signals::default();

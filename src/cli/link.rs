@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_run_that_is_not_stopped_where_its_link_was_ends_there() {
+    fn a_run_that_is_not_stopped_where_the_links_run_was_ends_with_an_error() {
         let mut link = Link::parse("?scene=pendulum&steps=9").expect("a link");
         link.log.push(3, Event::Stop);
         let mut simulation = crate::cli::start(&link.load().expect("built in")).expect("starts");

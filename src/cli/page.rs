@@ -35,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_option_beats_the_variable_and_what_is_no_address_is_refused() {
+    fn the_option_overrides_the_variable_and_invalid_addresses_are_refused() {
         let (lab, other) = ("https://example.org/lab/", "http://localhost:8000");
         let of = |option, variable: Option<&str>| choose(option, variable.map(str::to_owned), None);
         assert_eq!(of(None, None).expect("none"), "");

@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_says_how_far_it_is_at_each_look_until_the_work_is_over() {
+    fn progress_is_reported_at_each_interval_until_the_work_is_finished() {
         let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::hidden());
         let told = bar.downgrade();
         // Half of it was done by an earlier run.
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_said_of_work_that_is_finished_at_the_first_look() {
+    fn work_finished_before_the_first_interval_reports_nothing() {
         let bar = ProgressBar::with_draw_target(Some(10), ProgressDrawTarget::hidden());
         bar.finish_and_clear();
         tell(&bar.downgrade(), || INTERVAL, |line| panic!("it says {line}"));

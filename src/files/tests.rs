@@ -27,7 +27,7 @@ fn count(folder: &Path) -> usize {
 }
 
 #[test]
-fn a_file_appears_only_when_it_is_whole() {
+fn a_file_appears_only_when_complete() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("rows.csv");
     let target = OutputFile::claim(&path, false).unwrap();
@@ -84,7 +84,7 @@ fn an_unwritable_place_is_refused_at_once() {
 }
 
 #[test]
-fn a_growing_file_begins_whole_and_is_never_begun_twice() {
+fn a_growing_file_is_created_once_with_its_beginning() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("a.partial");
     open_or_create(&path, b"one").unwrap();
@@ -147,7 +147,7 @@ fn links_are_followed() {
 }
 
 #[test]
-fn one_file_is_one_under_all_its_names() {
+fn different_names_of_one_file_are_recognised() {
     let folder = tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     fs::create_dir(at("sub")).unwrap();
@@ -168,7 +168,7 @@ fn one_file_is_one_under_all_its_names() {
 
 #[cfg(unix)]
 #[test]
-fn leftovers_of_a_killed_run_go_and_those_of_a_live_one_stay() {
+fn leftovers_of_a_killed_run_are_removed_and_those_of_a_live_run_stay() {
     let folder = tempdir().unwrap();
     let [a, out] = ["a", "out"].map(|name| folder.path().canonicalize().unwrap().join(name));
     let pending = OutputFile::claim(&a, true).unwrap().fill(|file| file.write_all(b"live")).unwrap();
@@ -190,7 +190,7 @@ fn leftovers_of_a_killed_run_go_and_those_of_a_live_one_stay() {
 
 #[cfg(unix)]
 #[test]
-fn a_folder_that_a_killed_run_was_about_to_replace_comes_back() {
+fn a_folder_that_a_killed_run_was_replacing_is_restored() {
     let folder = tempdir().unwrap();
     let out = folder.path().join("out");
     fill(&out, "old", false).unwrap();

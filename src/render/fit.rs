@@ -139,7 +139,7 @@ mod tests {
     use crate::view::{SceneView, fixture};
 
     #[test]
-    fn what_is_in_the_picture_is_shown_and_what_is_far_beside_it_is_not() {
+    fn spheres_in_view_are_kept_and_distant_ones_are_culled() {
         let (scene, frame) = fixture::pendulum();
         let camera = SceneView::new(&scene, &frame).camera();
         let eye = camera.view([640, 360]);
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shadow_map_holds_every_caster_in_view_with_room_for_no_more() {
+    fn the_shadow_map_fits_the_casters_in_view_tightly() {
         let (scene, frame) = fixture::pendulum();
         let camera = SceneView::new(&scene, &frame).camera();
         let eye = camera.view([640, 360]);

@@ -169,7 +169,7 @@ mod tests {
     use glam::Vec3;
 
     #[test]
-    fn no_circle_is_a_tenth_of_a_pixel_off() {
+    fn circles_deviate_by_less_than_a_tenth_of_a_pixel() {
         for level in &LEVELS[1..] {
             let half_side = PI / level.sectors as f32;
             assert!(level.pixels * (1.0 - half_side.cos()) < 0.09);

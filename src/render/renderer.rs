@@ -572,7 +572,7 @@ mod tests {
     use crate::view::{SceneView, fixture};
 
     #[test]
-    fn the_radius_on_the_screen_is_the_one_that_points_span() {
+    fn the_radius_on_the_screen_equals_that_of_projected_points() {
         const SIZE: [u32; 2] = [480, 360];
         let (scene, frame) = fixture::pendulum();
         let camera = SceneView::new(&scene, &frame).camera();

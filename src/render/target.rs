@@ -106,7 +106,7 @@ mod tests {
     use wgpu::{TextureFormatFeatureFlags as Flags, TextureUsages as Usage};
 
     #[test]
-    fn light_is_kept_linear_only_where_floats_blend_and_resolve() {
+    fn light_stays_linear_only_where_floats_blend_and_resolve() {
         let all = Flags::BLENDABLE | Flags::MULTISAMPLE_X4 | Flags::MULTISAMPLE_RESOLVE;
         let usages = Usage::RENDER_ATTACHMENT | Usage::TEXTURE_BINDING;
         let of = |flags, allowed_usages| ColorEncoding::with(&wgpu::TextureFormatFeatures { allowed_usages, flags });

@@ -431,7 +431,7 @@ fn differing(a: &Image, b: &Image, by: u8) -> Vec<[u32; 2]> {
 }
 
 #[test]
-fn an_arrow_across_the_sight_covers_as_many_pixels_as_the_ruler_says() {
+fn an_arrow_across_the_line_of_sight_has_the_length_of_the_ruler() {
     let (scene, mut frame) = fixture::pendulum();
     let view = SceneView::new(&scene, &frame);
     let mut options = ViewOptions { sockets: false, floor: false, joint_names: false, ..bare() };
@@ -470,7 +470,7 @@ fn an_arrow_across_the_sight_covers_as_many_pixels_as_the_ruler_says() {
 }
 
 #[test]
-fn a_ghost_in_the_same_place_is_not_seen_in_patches() {
+fn a_coincident_ghost_does_not_show_in_patches() {
     let options = ViewOptions { sockets: false, floor: false, ..bare() };
     let (scene, frame, camera) = close_up(&options);
     let view = SceneView::new(&scene, &frame);
@@ -509,7 +509,7 @@ fn a_ghost_in_the_same_place_is_not_seen_in_patches() {
 }
 
 #[test]
-fn ghosts_are_outlined_and_two_in_one_place_take_no_turns() {
+fn ghosts_are_outlined_and_coincident_ghosts_do_not_flicker() {
     let options = ViewOptions { sockets: false, floor: false, ..bare() };
     let (scene, frame, camera) = close_up(&options);
     let view = SceneView::new(&scene, &frame);
@@ -574,7 +574,7 @@ fn ghosts_are_outlined_and_two_in_one_place_take_no_turns() {
 }
 
 #[test]
-fn every_standard_view_shows_what_moves() {
+fn every_standard_view_shows_the_moving_parts() {
     let mut device = offscreen();
     let mut draw = |list: &DrawList| device.render(list).expect("a picture");
     let options = ViewOptions { floor: false, ..bare() };
@@ -664,7 +664,7 @@ impl eframe::App for OnlyViewport {
 }
 
 #[test]
-fn struck_cells_have_the_colour_of_their_value_and_others_none() {
+fn cells_with_contact_have_the_colour_of_their_value_and_others_none() {
     let scene = Scene::load("pendulum", &[]).expect("built in");
     let mut simulation = Simulation::new(&scene.machine).expect("starts");
     simulation.track_wear();
@@ -744,7 +744,7 @@ fn struck_cells_have_the_colour_of_their_value_and_others_none() {
 }
 
 #[test]
-fn the_interface_shows_the_very_picture_that_is_drawn_without_a_window() {
+fn the_interface_shows_the_same_picture_as_headless_rendering() {
     let (scene, frame) = fixture::three_legs();
     let view = SceneView::new(&scene, &frame);
     let options = ViewOptions { magnification: 10.0, ..Default::default() };
@@ -799,7 +799,7 @@ fn arrows_and_outlines_have_the_themes_colours_on_any_ground() {
 }
 
 #[test]
-fn a_halo_joins_the_picture_in_linear_light() {
+fn a_halo_is_blended_in_linear_light() {
     let options = ViewOptions { floor: false, ..bare() };
     let (scene, frame, camera) = close_up(&options);
     let mut list = picture(&scene, &frame, &options, &camera, true);
@@ -822,7 +822,7 @@ fn a_halo_joins_the_picture_in_linear_light() {
 }
 
 #[test]
-fn a_rim_is_seen_about_the_touching_point_and_only_while_it_touches() {
+fn a_rim_marks_the_contact_point_only_during_contact() {
     let options = ViewOptions { floor: false, sockets: false, ..bare() };
     let (scene, touching, mut camera) = close_up(&options);
     let report = &touching.joints[0];
@@ -860,7 +860,7 @@ fn a_rim_is_seen_about_the_touching_point_and_only_while_it_touches() {
 }
 
 #[test]
-fn a_ball_is_darker_the_nearer_its_wall_is() {
+fn a_ball_is_darker_near_its_wall() {
     let options = ViewOptions { floor: false, ..bare() };
     let (scene, frame, camera) = close_up(&options);
     let mut list = picture(&scene, &frame, &options, &camera, false);
@@ -905,7 +905,7 @@ fn neutral(light: [f64; 3]) -> [f64; 3] {
 }
 
 #[test]
-fn light_is_mapped_by_the_neutral_curve_and_given_colours_are_left() {
+fn light_is_tone_mapped_and_theme_colours_are_unchanged() {
     let values = [0.0, 0.0625, 0.125, 0.375, 0.75, 1.0, 2.5, 12.0];
     let mut texels = Vec::new();
     for r in values {
@@ -931,7 +931,7 @@ fn light_is_mapped_by_the_neutral_curve_and_given_colours_are_left() {
 }
 
 #[test]
-fn the_longest_chain_asks_for_few_triangles_from_afar_and_from_within() {
+fn the_longest_chain_needs_few_triangles_from_afar_and_from_within() {
     let links = [("chain.links".to_owned(), "4096".to_owned())];
     let scene = Scene::load("chain", &links).expect("as many are allowed");
     let mut frame = Frame::default();
@@ -983,7 +983,7 @@ fn moved(scene: &Scene, frame: &Frame, by: Vec3d) -> (Scene, Frame) {
 }
 
 #[test]
-fn a_machine_far_from_the_origin_has_the_picture_of_one_there_and_does_not_shake() {
+fn a_machine_far_from_the_origin_is_drawn_as_at_the_origin_without_jitter() {
     let mut options = bare();
     (options.arrows.normal, options.joint_names) = (true, false);
     options.floor = false;

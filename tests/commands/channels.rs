@@ -12,7 +12,7 @@ fn lines(text: &str) -> Vec<Vec<&str>> {
 }
 
 #[test]
-fn chosen_columns_are_those_of_the_whole_run() {
+fn selected_columns_equal_those_of_a_full_run() {
     let folder = folder();
     let run = |more: &str| {
         let line = format!("run spcmm --duration 10ms --every 1ms --quiet {more}");
@@ -48,7 +48,7 @@ fn chosen_columns_are_those_of_the_whole_run() {
 }
 
 #[test]
-fn every_kind_of_file_takes_chosen_columns() {
+fn every_file_format_accepts_selected_columns() {
     let folder = folder();
     for out in ["a.json", "a.npz"] {
         let line = format!("run pendulum --duration 2ms --every 1ms --channels S1 --out {out}");
@@ -69,7 +69,7 @@ fn every_kind_of_file_takes_chosen_columns() {
 }
 
 #[test]
-fn a_channel_that_no_scene_has_is_refused_with_the_nearest() {
+fn an_unknown_channel_is_refused_with_the_nearest_name() {
     let folder = folder();
     let run = "run pendulum --duration 1ms --every 1ms --out a.csv --channels";
     for (patterns, words) in [

@@ -56,7 +56,7 @@ fn sheet(size: (u32, u32)) -> Sheet {
 }
 
 #[test]
-fn text_and_picture_follow_from_the_description_alone() {
+fn svg_and_picture_depend_only_on_the_description() {
     let sheet = sheet((900, 420));
     let svg = sheet.svg().unwrap();
     assert_eq!(svg, sheet.svg().unwrap());
@@ -138,7 +138,7 @@ fn a_pdf_has_the_page_and_every_line_mark_and_letter_of_the_svg() {
 }
 
 #[test]
-fn words_that_xml_cannot_hold_are_shown_and_drawn() {
+fn characters_that_xml_cannot_hold_are_escaped() {
     let mut sheet = sheet((600, 300));
     sheet.title = "</text><script>\u{1b}]0;x\u{7}\u{202e}".to_owned();
     let svg = sheet.svg().unwrap();
@@ -195,7 +195,7 @@ fn a_map_has_a_cell_for_each_value_and_a_scale() {
 }
 
 #[test]
-fn a_hundred_thousand_points_make_no_large_file() {
+fn a_hundred_thousand_points_produce_a_small_file() {
     let sheet = |line: bool| {
         let place = |k: i32| {
             let a = f64::from(k) * 1e-3;
@@ -239,7 +239,7 @@ fn blue(series: Series) -> Vec<(u32, u32)> {
 }
 
 #[test]
-fn a_bar_is_as_long_as_its_values_and_as_thick_as_it_says() {
+fn a_bar_has_the_length_of_its_values_and_the_given_thickness() {
     let extent = |from: f64, to: f64, width: f64| {
         let found = blue(Series::bar("", (from, to), 5.0, width, PALETTE[1]));
         let span = |of: fn(&(u32, u32)) -> u32| {
@@ -256,7 +256,7 @@ fn a_bar_is_as_long_as_its_values_and_as_thick_as_it_says() {
 }
 
 #[test]
-fn a_line_stands_no_higher_than_its_peak() {
+fn a_line_does_not_overshoot_its_peak() {
     // The highest coloured row of a line through `points`.
     let top = |points: &[(f64, f64)]| blue(Series::line("", points.to_vec(), PALETTE[1]))[0].1;
     let level = top(&[(1.0, 8.0), (9.0, 8.0)]);

@@ -23,7 +23,7 @@ fn example(folder: &Path, line: &str) -> Output {
 }
 
 #[test]
-fn gnu_parallel_spreads_a_sweep_and_goes_on_after_a_failure() {
+fn gnu_parallel_distributes_a_sweep_and_resumes_after_a_failure() {
     let version = Command::new("parallel").arg("--version").output();
     let there = version.is_ok_and(|v| String::from_utf8_lossy(&v.stdout).contains("GNU parallel"));
     assert!(there, "GNU parallel is missing: ./test installs it (Debian, Ubuntu: parallel)");

@@ -126,7 +126,7 @@ fn sampling_never_changes_the_steps_and_the_same_run_gives_the_same_bits() {
 }
 
 #[test]
-fn the_summary_has_what_scripts_rely_on() {
+fn the_summary_contains_the_documented_keys() {
     let folder = folder();
     let line = "run spcmm --duration 12ms --summary json --set contact.clearance=0.4mm --set contact.clearance=0.5mm";
     let run = jointplay(folder.path(), line).expect(0);
@@ -157,7 +157,7 @@ fn the_summary_has_what_scripts_rely_on() {
 }
 
 #[test]
-fn the_three_formats_hold_the_same_values_and_say_what_made_them() {
+fn the_three_formats_hold_the_same_values_and_their_provenance() {
     let folder = folder();
     for out in ["a.csv", "a.json", "a.npz"] {
         let line = format!("run pendulum --duration 30ms --every 1ms --out {out} --set contact.friction=0.25");
@@ -219,7 +219,7 @@ fn misplaced(folder: &Path) {
 }
 
 #[test]
-fn what_the_assembly_moved_is_printed_and_warned_of() {
+fn displacements_by_the_assembly_are_printed_and_warned_of() {
     let folder = folder();
     misplaced(folder.path());
     let check = jointplay(folder.path(), "check moved.toml").expect(0).stdout;
@@ -292,7 +292,7 @@ fn a_probe_is_compared_with_the_same_scene_with_every_ball_joint_closed() {
 }
 
 #[test]
-fn existing_files_are_replaced_only_by_force_and_nothing_runs_in_vain() {
+fn existing_files_are_refused_before_the_run_unless_force_is_given() {
     let folder = folder();
     let long = "run pendulum --duration 1000000s --every 1s";
     fs::write(folder.path().join("mine.csv"), "mine").unwrap();
@@ -365,7 +365,7 @@ fn each_kind_of_failure_has_its_exit_code_and_a_clear_line() {
 }
 
 #[test]
-fn a_stopped_run_keeps_its_rows_and_says_why() {
+fn a_stopped_run_keeps_its_rows_and_reports_the_reason() {
     let folder = folder();
     // Explicit steps a hundred times longer than an impact cannot hold the contact.
     let line =
@@ -414,7 +414,7 @@ fn an_interrupted_run_keeps_its_complete_rows() {
 /// `timeout -s INT` sends two.
 #[cfg(target_os = "linux")]
 #[test]
-fn an_interruption_that_is_told_again_while_rows_are_written_changes_nothing() {
+fn a_repeated_signal_while_rows_are_written_changes_nothing() {
     interrupted_run("100s --every 10us", &|child, folder| {
         // Rows wait in a file without a name.
         let waiting = || {
@@ -431,7 +431,7 @@ fn an_interruption_that_is_told_again_while_rows_are_written_changes_nothing() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn what_nohup_started_outlives_its_terminal() {
+fn a_run_started_by_nohup_outlives_its_terminal() {
     let folder = folder();
     let run = format!(
         "trap '' HUP; exec {} run pendulum --duration 1000000s --summary json",
@@ -488,7 +488,7 @@ fn lessons_are_listed_and_a_file_is_checked() {
 }
 
 #[test]
-fn cases_with_known_answers_make_their_page() {
+fn validation_cases_produce_their_page() {
     let folder = folder();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation.md");
     let kept = fs::read_to_string(path).unwrap();
@@ -591,7 +591,7 @@ fn a_file_works_wherever_a_name_does() {
 
 #[cfg(unix)]
 #[test]
-fn a_name_need_be_no_text() {
+fn a_file_name_need_not_be_unicode() {
     use std::os::unix::ffi::OsStrExt;
     let folder = folder();
     let name = |bytes: &[u8]| PathBuf::from(std::ffi::OsStr::from_bytes(bytes));
@@ -614,7 +614,7 @@ fn a_name_need_be_no_text() {
 /// The shell has every write beyond a few kilobytes fail, as on a full disk.
 #[cfg(unix)]
 #[test]
-fn a_full_disk_is_told_in_one_line_and_leaves_nothing() {
+fn a_full_disk_is_reported_in_one_line_and_leaves_no_file() {
     let folder = folder();
     let run = "run spcmm --duration 20ms --every 50us --quiet --out";
     let sweep =
@@ -635,7 +635,7 @@ fn a_full_disk_is_told_in_one_line_and_leaves_nothing() {
 }
 
 #[test]
-fn what_would_take_for_ever_is_refused_with_the_largest_that_does_not() {
+fn excessive_requests_are_refused_with_the_largest_allowed_value() {
     let folder = folder();
     let sweep = "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:2 --out a.npz";
     for (line, words) in [
@@ -653,7 +653,7 @@ fn what_would_take_for_ever_is_refused_with_the_largest_that_does_not() {
 }
 
 #[test]
-fn help_version_and_the_reference_page_are_results() {
+fn help_version_and_reference_go_to_standard_output() {
     let folder = folder();
     let version = jointplay(folder.path(), "--version").expect(0).stdout;
     assert_eq!(version.trim(), concat!("jointplay ", env!("CARGO_PKG_VERSION")));
@@ -756,7 +756,7 @@ mod frames {
     }
 
     #[test]
-    fn a_wear_map_is_that_of_the_run_so_far_whatever_the_frames() {
+    fn a_wear_map_of_a_frame_covers_the_run_so_far() {
         let folder = folder();
         let common = "--size 160x120 --close-up S1 --magnification 20 --arrows none --hide trail,flash";
         let slow = "--fps 1000 --slow 0.1111111111111111";
@@ -779,7 +779,7 @@ mod frames {
 
     #[cfg(unix)]
     #[test]
-    fn frames_that_are_killed_at_any_instant_are_the_old_or_the_new() {
+    fn frames_of_a_render_killed_at_any_instant_are_the_old_or_the_new_folder() {
         let work = folder();
         let render = |friction: &str| {
             format!(
@@ -848,7 +848,7 @@ mod frames {
     /// Mesa's Wayland client complains without one.
     #[cfg(target_os = "linux")]
     #[test]
-    fn without_a_runtime_folder_standard_error_holds_our_own_words_alone() {
+    fn without_a_runtime_folder_drivers_write_nothing_to_standard_error() {
         let folder = folder();
         for (line, runtime) in [
             ("render pendulum --at 0s --size 64x64 --out plain --quiet", None),
@@ -868,7 +868,7 @@ mod frames {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_window_without_a_display_says_what_works_instead() {
+    fn a_window_without_a_display_reports_the_alternative() {
         let folder = folder();
         let view = jointplay(folder.path(), "view pendulum").expect(1);
         assert!(view.stderr.contains("display") && view.stderr.contains("jointplay render"), "{}", view.stderr);
@@ -912,7 +912,7 @@ fn a_bad_link_is_refused_before_any_window_opens() {
 
 /// Everything that a person can write, with what would set a terminal's title, clear it, or turn its direction.
 #[test]
-fn no_words_of_others_steer_the_terminal() {
+fn control_characters_of_foreign_text_do_not_reach_the_terminal() {
     const STEERING: &str = "\u{1b}]0;title\u{7}\u{9b}2J\u{7f}\r\u{202e}\u{2066}";
     let folder = folder();
     let good = fs::read_to_string("assets/scenes/pendulum.toml").unwrap();

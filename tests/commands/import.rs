@@ -48,7 +48,7 @@ fn arms() -> [(Scene, String); 2] {
 }
 
 #[test]
-fn one_arm_in_two_formats_is_one_machine() {
+fn the_same_arm_in_both_formats_gives_the_same_machine() {
     let [(urdf, _), (mjcf, _)] = arms();
     for (a, b) in urdf.machine.bodies.iter().zip(&mjcf.machine.bodies) {
         assert_eq!(a.name, b.name);
@@ -120,7 +120,7 @@ fn geoms_give_a_body_its_mass() {
 }
 
 #[test]
-fn every_way_to_say_an_orientation_says_the_same() {
+fn all_notations_of_an_orientation_agree() {
     let turned = |how: &str| {
         let text =
             mujoco(&format!("<body {how}><joint type=\"free\"/><geom type=\"box\" size=\"0.1 0.2 0.3\"/></body>"));
@@ -161,7 +161,7 @@ fn a_connection_closes_a_loop() {
 }
 
 #[test]
-fn what_is_not_taken_is_named_and_nothing_else() {
+fn only_omitted_parts_are_listed() {
     let [(urdf, said), (mjcf, too)] = arms();
     for expected in [
         "mass of a link that does not move (line 9)",
@@ -198,7 +198,7 @@ fn what_is_not_taken_is_named_and_nothing_else() {
 }
 
 #[test]
-fn classes_of_defaults_reach_the_elements_that_they_are_for() {
+fn default_classes_apply_to_their_elements() {
     let text = r#"<mujoco><compiler angle="radian"/>
         <default><joint damping="1"/><default class="stiff"><joint stiffness="20" axis="0 1 0"/></default></default>
         <worldbody><body name="a" childclass="stiff"><joint name="one"/><geom size="0.1"/>
@@ -217,7 +217,7 @@ fn classes_of_defaults_reach_the_elements_that_they_are_for() {
 }
 
 #[test]
-fn a_description_that_would_be_another_machine_is_refused_with_its_line() {
+fn a_description_that_changes_the_machine_if_ignored_is_refused_with_its_line() {
     let robot = |inside: &str| format!("<robot name=\"r\">\n<link name=\"base\"/>\n{inside}\n</robot>");
     let joint = |kind: &str, more: &str| {
         robot(&format!(
@@ -268,7 +268,7 @@ fn turning(settings: &str, inside: &str) -> (f64, f64) {
 }
 
 #[test]
-fn an_orientation_supersedes_every_other_way_to_say_one_in_a_class() {
+fn an_orientation_overrides_every_notation_in_its_default_class() {
     let inertia = |defaults: &str, own: &str| {
         let body = format!("<body><joint/><geom type=\"box\" size=\"0.1 0.2 0.3\" {own}/></body>");
         let text = mujoco(&body).replace("<worldbody>", &format!("<default>{defaults}</default><worldbody>"));
@@ -323,7 +323,7 @@ fn a_loop_closes_at_sites_and_on_parts_without_joints() {
 }
 
 #[test]
-fn springs_pull_from_where_the_file_draws_the_machine() {
+fn springs_act_relative_to_the_pose_drawn_in_the_file() {
     let geom = "<geom type=\"box\" size=\"0.1 0.2 0.3\"/>";
     let hinge = "<joint stiffness=\"5\" springref=\"30\" ref=\"10\"/>";
     let (found, inertia) = turning("", &format!("<body>{hinge}{geom}</body>"));
@@ -337,7 +337,7 @@ fn springs_pull_from_where_the_file_draws_the_machine() {
 }
 
 #[test]
-fn flags_of_the_option_are_named_and_gravity_goes_with_its_own() {
+fn option_flags_are_listed_and_the_gravity_flag_is_applied() {
     let text = mujoco("<body><joint axis=\"0 1 0\"/><geom size=\"0.1\" pos=\"1 0 0\"/></body>");
     let with = |flags: &str| {
         imported(
@@ -353,7 +353,7 @@ fn flags_of_the_option_are_named_and_gravity_goes_with_its_own() {
 }
 
 #[test]
-fn a_grain_has_its_inertia() {
+fn a_tiny_body_keeps_its_inertia() {
     let (scene, _) = imported(&mujoco("<body><joint type=\"free\"/><geom size=\"0.0001\" mass=\"1e-9\"/></body>"));
     let expected = 0.4 * 1e-9 * 1e-8;
     assert!((scene.machine.bodies[0].inertia.m11 / expected - 1.0).abs() < 1e-12);

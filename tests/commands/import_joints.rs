@@ -31,7 +31,7 @@ fn later(scene: &Scene, time: f64) -> Frame {
 
 /// Three hinges through one point leave what a ball joint leaves.
 #[test]
-fn three_hinges_of_a_body_are_a_chain_that_moves_as_a_ball_joint() {
+fn three_hinges_of_a_body_form_a_chain_that_moves_like_a_ball_joint() {
     let (chain, said) = imported(&leg(HINGES).replace("stiffness=\"3\"", "").replace("damping=\"2\"", ""));
     assert_eq!(said.lines().count(), 1, "only the contact is not taken: {said}");
     let names: Vec<&str> = chain.machine.bodies.iter().map(|body| body.name.as_str()).collect();
@@ -120,7 +120,7 @@ fn links_without_mass_connect_the_joints_of_a_urdf() {
 
 /// A pendulum with a free weight welded to it swings as one with the weight as a part of it.
 #[test]
-fn a_weld_holds_a_body_as_if_it_were_a_part() {
+fn a_welded_body_moves_as_part_of_the_other() {
     let rod = "<geom type=\"capsule\" fromto=\"0 0 0 0.5 0 0\" size=\"0.02\"/><site name=\"tip\" pos=\"0.5 0 0\" euler=\"0 30 0\"/>";
     let weight = "<geom type=\"box\" size=\"0.1 0.05 0.02\"/><site name=\"eye\" pos=\"-0.1 0 0\"/>";
     // Assembly moves both to where the weld closes: the same at the angle of the rod that it finds.

@@ -34,7 +34,7 @@ fn outcome(text: &str, mesh: &str, status: i32) -> (String, String) {
 }
 
 #[test]
-fn a_mesh_weighs_what_it_encloses_where_its_geom_is() {
+fn a_mesh_has_the_mass_of_its_volume_at_the_pose_of_its_geom() {
     let body = |asset: &str, geom: &str| {
         let (text, _) = outcome(&with_mesh(asset, geom), &cuboid(false), 0);
         Scene::parse(&text, None, &[]).unwrap().machine.bodies.remove(0)
@@ -96,7 +96,7 @@ fn link(mass: &str, [xx, yy, zz]: [&str; 3], more: &str) -> String {
 }
 
 #[test]
-fn what_no_body_has_is_refused_with_the_line_of_the_description() {
+fn impossible_inertias_are_refused_with_their_line() {
     let diagonal = |values: &str| {
         mujoco(&format!("<body>\n<joint/>\n<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"{values}\"/></body>"))
     };

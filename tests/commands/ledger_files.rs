@@ -26,7 +26,7 @@ const LAST_COLUMNS: &str = "drive_work_J,gravity_work_J,restitution_loss_J,frict
                             clearance_work_J,energy_residual_J";
 
 #[test]
-fn rows_carry_the_ledger_and_balance() {
+fn rows_contain_an_energy_ledger_that_balances() {
     let folder = tempfile::tempdir().unwrap();
     let run = "run spcmm --duration 30ms --every 0.1ms";
     let summary = done(folder.path(), &format!("{run} --out run.json --summary json"));

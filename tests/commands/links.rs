@@ -28,7 +28,7 @@ fn link() -> (String, u64) {
 }
 
 #[test]
-fn run_follows_a_link_to_the_same_bits_and_says_where_they_differ() {
+fn run_replays_a_link_to_the_same_bits_and_reports_differences() {
     let (link, hash) = link();
     let folder = folder();
     let run = |line: &str| jointplay(folder.path(), line);

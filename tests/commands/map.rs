@@ -27,7 +27,7 @@ fn doubles(file: &[u8], head: &str, count: usize) -> Vec<f64> {
 }
 
 #[test]
-fn the_polygon_of_two_rods_at_every_position_is_in_the_files() {
+fn the_files_contain_the_error_polygon_of_two_rods_at_every_position() {
     let folder = folder();
     scene(folder.path());
     let line = format!("{OVER} --directions 24 --out map.npz --out map.vtk");
@@ -127,7 +127,7 @@ fn threads_change_no_byte_and_json_has_the_worst_point() {
 }
 
 #[test]
-fn built_in_machines_with_free_tips_say_so() {
+fn built_in_machines_with_free_tips_are_reported() {
     let folder = folder();
     let said =
         jointplay(folder.path(), "map pendulum --over contact.clearance=0.1mm..0.2mm:2 --directions 4").expect(0);

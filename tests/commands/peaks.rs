@@ -28,7 +28,7 @@ fn largest(file: &Json, stem: &str, unit: &str) -> (f64, f64) {
 }
 
 #[test]
-fn peaks_are_those_of_the_rows_or_higher() {
+fn peaks_are_at_least_those_of_the_rows() {
     let folder = folder();
     let cases = [
         // The first blow of its dampers and the first impacts.

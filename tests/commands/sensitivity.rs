@@ -46,7 +46,7 @@ fn results(path: &Path) -> Json {
 }
 
 #[test]
-fn joints_pulled_straight_share_the_variance_equally() {
+fn joints_in_a_straight_chain_share_the_variance_equally() {
     let folder = folder();
     hung(folder.path());
     let said = jointplay(folder.path(), &format!("{HUNG} --output link3.pose.z:end --rows 128 --out out")).expect(0);
@@ -79,7 +79,7 @@ fn joints_pulled_straight_share_the_variance_equally() {
 }
 
 #[test]
-fn a_target_is_answered_by_runs_that_reach_it() {
+fn suggested_changes_for_a_target_reach_it() {
     let folder = folder();
     hung(folder.path());
     let ask = |excess: &str, out: &str| {
@@ -124,7 +124,7 @@ fn threads_change_no_byte() {
 }
 
 #[test]
-fn the_job_of_the_window_has_the_bits_of_the_command() {
+fn the_window_computes_the_same_bits_as_the_command() {
     let folder = folder();
     let outputs = ["tip-error", "tip-error-rms", "peak-force", "energy-lost", "impacts"];
     let line = format!(
@@ -162,7 +162,7 @@ fn the_job_of_the_window_has_the_bits_of_the_command() {
 }
 
 #[test]
-fn a_screening_leaves_out_what_does_not_matter() {
+fn a_screening_drops_parameters_without_influence() {
     let folder = folder();
     hung(folder.path());
     let line = format!(
@@ -180,7 +180,7 @@ fn a_screening_leaves_out_what_does_not_matter() {
 }
 
 #[test]
-fn what_cannot_be_computed_is_refused_before_it_runs() {
+fn invalid_studies_are_refused_before_any_run() {
     let folder = folder();
     hung(folder.path());
     let bad = [
@@ -225,7 +225,7 @@ fn what_cannot_be_computed_is_refused_before_it_runs() {
 }
 
 #[test]
-fn a_range_that_nobody_gave_is_stated() {
+fn assumed_ranges_are_stated() {
     let folder = folder();
     let options = "four-bar --over contact.restitution --over contact.friction=0.1..0.2 --duration 1ms --quiet";
     let said = "Range not given   contact.restitution: 0.45 to 1, half to one and a half of its value, within what is allowed\n";
@@ -245,7 +245,7 @@ fn a_range_that_nobody_gave_is_stated() {
 
 /// Where a mass rests on a spring: -m g / k, from a number of the file and a parameter of the scene's own.
 #[test]
-fn numbers_of_the_file_vary_as_parameters_do() {
+fn numbers_of_the_scene_file_can_vary_like_parameters() {
     let folder = folder();
     let text = r#"
 start = "equilibrium"

@@ -51,7 +51,7 @@ fn check(scene: &str, options: &str) {
 
 /// Every method in every scene goes on from a state as text in `tests/physics/promises.rs`; here in processes.
 #[test]
-fn built_in_scenes_go_on_with_the_same_bits() {
+fn built_in_scenes_resume_with_the_same_bits() {
     for (scene, method) in [
         ("spcmm", "automatic"),
         ("pendulum", "rk4"),
@@ -68,7 +68,7 @@ fn built_in_scenes_go_on_with_the_same_bits() {
 }
 
 #[test]
-fn machines_go_on_with_the_same_bits() {
+fn machines_resume_with_the_same_bits() {
     // Longer steps are too long for the light rods of the delta.
     let fixed = "--set solver.method=semi-implicit-euler --set solver.step=1us";
     for (name, options) in MACHINES.into_iter().zip(["--set solver.tolerance=1e-4", fixed].into_iter().cycle()) {
@@ -77,7 +77,7 @@ fn machines_go_on_with_the_same_bits() {
 }
 
 #[test]
-fn the_ideal_motion_beside_a_probe_goes_on_too() {
+fn the_ideal_reference_motion_of_a_probe_resumes_too() {
     let folder = folder();
     for (name, body) in [("pendulum", "rod"), ("slider-crank", "slider")] {
         let text = jointplay::scene::built_in_text(name).unwrap();
@@ -95,7 +95,7 @@ fn the_ideal_motion_beside_a_probe_goes_on_too() {
 }
 
 #[test]
-fn a_chain_of_states_and_a_wear_map_are_the_run_without_a_break() {
+fn repeatedly_resumed_runs_and_wear_maps_equal_an_uninterrupted_run() {
     let folder = folder();
     let run = |more: &str| {
         let line = format!("run spcmm --quiet --force --summary json {more}");
@@ -119,7 +119,7 @@ fn a_chain_of_states_and_a_wear_map_are_the_run_without_a_break() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn an_interrupted_run_leaves_a_state_to_go_on_from() {
+fn an_interrupted_run_saves_a_state_to_resume_from() {
     use crate::command_line::{signal, start_and_listen};
     let folder = folder();
     let line = "run spcmm --duration 1000000s --save-state s --summary json";
@@ -138,7 +138,7 @@ fn an_interrupted_run_leaves_a_state_to_go_on_from() {
 }
 
 #[test]
-fn a_state_that_does_not_belong_is_refused_in_words() {
+fn a_state_of_another_scene_is_refused_with_the_reason() {
     let folder = folder();
     let path = folder.path().join("s");
     let save = "run pendulum --duration 3ms --set contact.friction=0.2 --save-state s --quiet";
@@ -218,7 +218,7 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
 }
 
 #[test]
-fn a_run_goes_on_only_with_the_files_that_its_scene_named() {
+fn a_run_resumes_only_with_the_files_that_its_scene_named() {
     let folder = folder();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     let load = |mass: &str| format!("[[parameter]]\nname = \"load\"\nvalue = \"{mass}\"\n");
@@ -277,7 +277,7 @@ fn a_run_goes_on_only_with_the_files_that_its_scene_named() {
 
 /// A mesh is no text: its bytes are kept with the state, and must be the same for the run to go on.
 #[test]
-fn a_state_belongs_to_the_mesh_that_its_scene_names() {
+fn a_state_is_refused_if_a_mesh_of_its_scene_has_changed() {
     let folder = folder();
     let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
     let mut stl = vec![b's'; 80];

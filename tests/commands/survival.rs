@@ -109,7 +109,7 @@ fn two_runs() -> [(String, Tree); 2] {
 }
 
 #[test]
-fn rows_that_are_killed_at_any_instant_are_the_old_or_the_new() {
+fn rows_of_a_run_killed_at_any_instant_are_the_old_or_the_new_file() {
     let [(_, old), (line, new)] = two_runs();
     let work = folder();
     let started = std::time::Instant::now();
@@ -139,7 +139,7 @@ fn two_writers_at_once_leave_whole_files() {
 }
 
 #[test]
-fn an_account_that_lost_its_rows_stands_in_no_way() {
+fn metadata_without_its_rows_can_be_replaced() {
     let folder = folder();
     let line = format!("{RUN} --out a.csv");
     let at = |name: &str| folder.path().join(name);

@@ -168,7 +168,7 @@ fn shards_of_different_files_beside_the_scene_are_not_merged() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused() {
+fn an_interrupted_sweep_resumes_and_a_damaged_partial_file_is_refused() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     let sweep = |points: usize, out: &str| {
@@ -253,7 +253,7 @@ fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused()
 
 #[cfg(unix)]
 #[test]
-fn a_sweep_that_is_killed_at_any_instant_ends_in_the_same_bytes() {
+fn a_sweep_killed_at_any_instant_resumes_to_the_same_bytes() {
     let folder = folder();
     let over_periods =
         "spcmm --vary contact.clearance=0.2mm..0.3mm:12 --periods 2 --discard 1 --no-exponent --out a.npz";
@@ -280,7 +280,7 @@ fn a_sweep_that_is_killed_at_any_instant_ends_in_the_same_bytes() {
 }
 
 #[test]
-fn a_point_that_diverges_is_recorded_and_the_rest_goes_on() {
+fn a_diverging_point_is_recorded_and_the_others_are_computed() {
     let folder = folder();
     let line =
         "sweep spcmm --set solver.method=rk4 --vary solver.step=20us..10ms:2 --periods 1 --discard 0 --out a.npz";
@@ -298,7 +298,7 @@ fn a_point_that_diverges_is_recorded_and_the_rest_goes_on() {
 }
 
 #[test]
-fn warnings_come_from_within_the_ranges_and_each_kind_once() {
+fn each_kind_of_warning_within_the_ranges_is_printed_once() {
     let folder = folder();
     // Singular poses lie in the middle of this range and at neither end.
     let line = "sweep spcmm --vary contact.clearance=0.01mm..0.2mm:2 --vary spcmm.slider_plane=20mm..300mm:15 --periods 1 \
@@ -400,7 +400,7 @@ fn records(sweep: &Sweep, b: usize, steps: u32) -> Vec<u64> {
 }
 
 #[test]
-fn blocks_depend_on_no_order_and_no_neighbour() {
+fn blocks_are_independent_of_order_and_of_each_other() {
     let sweep = small(Start::Cold, 3);
     let forwards: Vec<_> = (0..3).map(|b| records(&sweep, b, 1000)).collect();
     let backwards: Vec<_> = (0..3).rev().map(|b| records(&sweep, b, 77)).collect();

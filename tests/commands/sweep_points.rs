@@ -85,7 +85,7 @@ fn a_duration_needs_no_drive_and_threads_and_shards_change_no_bit_of_it() {
 }
 
 #[test]
-fn statistics_are_those_of_the_rows_of_a_run() {
+fn statistics_equal_those_of_the_rows_of_a_run() {
     let folder = folder();
     let keep = "S1.normal:max,S1.normal:min,S1.normal:mean,*.force.x:rms,tip_error:max,tip_error:end,P1.rate:range,P1.rate:std";
     let line = format!("sweep spcmm --vary solver.method=dopri5,radau5 --duration 0.2s --keep {keep} --out a.npz");
@@ -133,7 +133,7 @@ fn statistics_are_those_of_the_rows_of_a_run() {
 }
 
 #[test]
-fn points_of_a_file_zipped_and_crossed_are_the_same_points() {
+fn points_from_a_file_zipped_and_crossed_agree() {
     let folder = folder();
     let points = "contact.clearance,contact.friction,contact.normal_law\n0.2mm,0.1,hertz\n\"0.8 mm\",0.3,flores\n";
     fs::write(folder.path().join("points.csv"), points).unwrap();
@@ -198,7 +198,7 @@ fn sections_at_crossings_lie_at_the_value_and_repeat_with_the_drive() {
 }
 
 #[test]
-fn every_start_has_its_part_of_the_result() {
+fn each_start_has_its_own_slice_of_the_result() {
     let folder = folder();
     let line = "sweep spcmm --set spcmm.frequency=5Hz --vary contact.friction=0.1..0.3:3 --periods 2 --discard 1 --no-exponent";
     let run = |rest: &str| jointplay(folder.path(), &format!("{line} {rest}")).expect(0);

@@ -100,7 +100,7 @@ fn a_yield_counts_the_runs_that_hold_all_limits() {
 }
 
 #[test]
-fn methods_and_seeds_give_other_lots_and_options_refine_the_file() {
+fn sampling_methods_and_seeds_change_the_lot_and_options_override_the_file() {
     let folder = folder();
     fs::write(folder.path().join("tolerances.csv"), TOLERANCES).unwrap();
     let line = format!("{FOUR_BAR} --limit peak-force=140 --tolerances tolerances.csv --runs 16 --force");
@@ -120,7 +120,7 @@ fn methods_and_seeds_give_other_lots_and_options_refine_the_file() {
 }
 
 #[test]
-fn the_cheapest_fits_are_those_of_trying_all() {
+fn the_cheapest_fits_equal_those_of_an_exhaustive_search() {
     let folder = folder();
     fs::write(folder.path().join("tolerances.csv"), TOLERANCES).unwrap();
     let fits = ["0.05mm..0.2mm", "0.05mm..0.1mm"];
@@ -206,7 +206,7 @@ fn units_that_cannot_start_are_rejects() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_line() {
+fn errors_are_named_with_their_line() {
     let folder = folder();
     let line = format!("{FOUR_BAR} --runs 2 --limit peak-force=140");
     let tolerances = "parameter,distribution\n";

@@ -78,7 +78,7 @@ fn the_command_writes_all_files_or_none() {
 }
 
 #[test]
-fn bad_input_is_answered_with_what_would_be_right() {
+fn errors_about_bad_input_state_what_is_allowed() {
     let folder = tempfile::tempdir().unwrap();
     for (line, said) in [
         ("tradeoff", "--all"),
@@ -135,7 +135,7 @@ fn error_at(found: &WorkPrecision, method: Method, value: f64) -> f64 {
 }
 
 #[test]
-fn finer_steps_and_tolerances_err_less_and_cost_more() {
+fn finer_steps_and_tolerances_reduce_the_error_and_raise_the_cost() {
     let scene = crate::common::scene("spcmm", &[]);
     let budget = WorkBudget {
         evaluations: 40_000,
@@ -182,7 +182,7 @@ fn finer_steps_and_tolerances_err_less_and_cost_more() {
 }
 
 #[test]
-fn presets_can_be_measured_on_any_scene_and_broken_off() {
+fn presets_can_be_measured_on_any_scene_and_cancelled() {
     let scene = crate::common::scene("pendulum", &[("contact.clearance", "0.5 mm")]);
     let of = |scene: &Scene, most: u64| measure(|context| presets::measure(scene, &Preset::ALL, context), most);
     let points = of(&scene, u64::MAX).unwrap();
@@ -201,7 +201,7 @@ fn presets_can_be_measured_on_any_scene_and_broken_off() {
 }
 
 #[test]
-fn the_presets_in_the_program_are_those_that_were_measured() {
+fn the_built_in_presets_equal_the_measured_ones() {
     let record = presets::record();
     for preset in Preset::ALL {
         // Whether it has all built-in scenes, `tests/texts/documents.rs` checks.

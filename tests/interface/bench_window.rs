@@ -249,7 +249,7 @@ fn the_diagram_comes_into_sight_when_a_sweep_starts() {
 }
 
 #[test]
-fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_on_show() {
+fn a_sweep_of_another_scene_is_labelled_and_a_click_asks_before_replacing_the_current_one() {
     let mut harness = window("spcmm", &[FAST]);
     harness.get_by_label_contains("Running: spcmm, drive frequency 5 Hz");
     sweep(&mut harness, "0.2 mm", "0.4", 3.0);
@@ -382,7 +382,7 @@ fn a_scene_without_a_drive_says_that_it_has_no_phase() {
 }
 
 #[test]
-fn a_twin_parts_from_the_run_and_leaves_it_alone() {
+fn a_twin_diverges_from_the_run_without_affecting_it() {
     let changes = [FAST, ("contact.friction", "0")];
     let mut harness = window("spcmm", &changes);
     click(&mut harness, Role::CheckBox, "Twin run");

@@ -149,7 +149,7 @@ fn a_gif_keeps_its_pace_and_draws_what_changed() {
 }
 
 #[test]
-fn what_no_player_shows_is_refused() {
+fn films_that_no_player_shows_are_refused() {
     let refused = |format, size, rate| Film::new(format, size, rate).err().unwrap().to_string();
     assert!(refused(Format::Mp4, [201, 90], 30.0).contains("must be even"));
     assert!(refused(Format::Mp4, [16_384, 16_384], 30.0).contains("8192x4320"));

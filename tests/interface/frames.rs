@@ -88,7 +88,7 @@ fn spcmm_in_the_window() {
 }
 
 #[test]
-fn what_is_missing_is_found() {
+fn a_missing_golden_picture_is_found() {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let whole = Picture::read(&draw(folder.path(), IMPACT));
     assert!(objection(&whole, &whole).is_none());

@@ -131,7 +131,7 @@ fn keys_go_from_impact_to_impact_to_both_ends_and_backwards() {
 }
 
 #[test]
-fn going_on_from_the_past_with_another_clearance_leaves_a_pale_future_that_a_link_does_not_carry() {
+fn resuming_from_the_past_with_another_clearance_leaves_a_pale_future_that_a_link_omits() {
     let mut harness = window("spcmm");
     run_to(&mut harness, 10e-3);
     harness.state_mut().player_mut().set("contact.friction", "0").expect("in range");
@@ -215,7 +215,7 @@ fn camera(harness: &Harness<'_, App>) -> String {
 }
 
 #[test]
-fn plots_come_nearer_shift_and_go_where_they_are_clicked() {
+fn plots_zoom_pan_and_go_to_the_clicked_instant() {
     let mut harness = window("spcmm");
     run_to(&mut harness, 30e-3);
     let place = |harness: &mut Harness<'_, App>, time: f64| {

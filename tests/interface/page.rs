@@ -203,7 +203,7 @@ fn a_copied_link_opens_the_same_state_with_the_same_bits() {
 }
 
 #[test]
-fn a_long_way_shows_how_far_it_is_and_can_be_stopped() {
+fn a_long_replay_shows_its_progress_and_can_be_stopped() {
     let link = "?scene=pendulum&method=rk4&solver.step=1us&t=100s";
     let options = AppOptions::from_link(link).expect("a link");
     let (mut harness, _) = open(options, LARGE);
@@ -265,7 +265,7 @@ fn a_bad_link_is_explained_and_the_default_scene_waits_behind_it() {
 }
 
 #[test]
-fn who_wants_little_motion_and_much_contrast_has_them() {
+fn reduced_motion_and_high_contrast_are_respected() {
     let link = "?scene=slider-crank&t=20ms&play=1";
     let options = AppOptions { calm: true, contrast: true, ..AppOptions::from_link(link).expect("opens") };
     let (mut harness, _) = open(options, LARGE);
@@ -315,7 +315,7 @@ fn camera(harness: &Harness<'_, App>) -> Option<CameraPose> {
 }
 
 #[test]
-fn one_finger_turns_and_two_shift_and_come_nearer() {
+fn one_finger_orbits_and_two_pan_and_zoom() {
     let (mut harness, _) = window("spcmm", UPRIGHT);
     let opened = camera(&harness).expect("a link carries the camera");
     assert!(opened.fitted.is_some(), "as the scene opens");
@@ -888,7 +888,7 @@ fn keys_and_tab_work_before_anything_was_clicked() {
 }
 
 #[test]
-fn what_goes_on_is_told_to_who_does_not_see_it() {
+fn events_are_announced_to_assistive_software() {
     let (mut harness, calls) = window("pendulum", LARGE);
     harness.state_mut().player_mut().pacer.set_scale(0.02);
     assert_eq!(harness.state().announcement(), "Pendulum on a ball joint. Paused at the start. S1 free.");
@@ -1143,7 +1143,7 @@ fn copied_from(harness: &mut Harness<'_, App>, page: &str) -> String {
 }
 
 #[test]
-fn a_visitor_meets_a_machine_that_goes_on_and_is_one_click_from_the_papers() {
+fn a_first_visit_shows_a_lasting_motion_one_click_from_the_papers_machine() {
     for link in ["", "?", "?theme=light", "?renderer=webgl"] {
         let options = AppOptions::from_link(link).expect("a link");
         assert_eq!(options.scene.changes.len(), 2, "{link}");

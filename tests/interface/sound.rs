@@ -110,7 +110,7 @@ fn while_it_plays_the_clicks_are_the_impacts_of_the_run_at_any_speed() {
 }
 
 #[test]
-fn nothing_sounds_that_is_not_played_forward_with_sound_on() {
+fn only_forward_play_with_sound_on_is_audible() {
     let (mut harness, heard) = with_ears("pendulum");
     let silent = |harness: &mut Harness<'_, App>, frames: usize, what: &str| {
         for _ in 0..frames {

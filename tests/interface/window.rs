@@ -655,7 +655,7 @@ fn the_wear_map_comes_with_its_scale_and_goes_with_the_reset() {
 }
 
 #[test]
-fn after_a_reset_or_a_step_back_no_force_is_on_show_that_is_yet_to_come() {
+fn after_a_reset_or_a_step_back_no_future_force_is_displayed() {
     let mut harness = window("spcmm");
     harness.state_mut().player_mut().run_to(9.0e-3);
     harness.run();
@@ -959,7 +959,7 @@ fn plotted_peaks_are_those_of_the_run() {
 }
 
 #[test]
-fn a_doubt_that_stands_beside_a_slider_is_not_denied_below() {
+fn a_doubt_beside_a_slider_is_not_contradicted_below() {
     let mut harness = window("spcmm");
     harness.get_by_label("Accuracy").click();
     harness.run();
@@ -1029,7 +1029,7 @@ fn the_clearance_of_the_past_stays_where_it_was() {
 }
 
 #[test]
-fn units_are_printed_alike_everywhere() {
+fn units_are_printed_the_same_everywhere() {
     let mut harness = window("spcmm");
     for group in ["Solver", "Gravity", "Contact"] {
         harness.get_by_label(group).click();

@@ -176,7 +176,7 @@ fn a_body_on_a_bushing_does_not_fly_freely() {
 }
 
 #[test]
-fn bad_bushings_are_refused_where_they_stand() {
+fn bad_bushings_are_refused_with_their_position() {
     let start = "position = [0, 0, 0]";
     for (text, said) in [
         (one(start, "").replace("200 300 500 N/m", "200 -300 500 N/m"), ["bushing.b.stiffness", "allowed 0 N/m to"]),

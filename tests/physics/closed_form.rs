@@ -45,7 +45,7 @@ fn off_by(fault: &str, length: &str) -> Scene {
 }
 
 #[test]
-fn a_scene_of_its_own_follows_its_path() {
+fn a_user_scene_follows_its_closed_form() {
     let mut simulation = Simulation::new(&slider_crank("100 mm").machine).expect("starts");
     let mut frame = Frame::default();
     let mut travel = (f64::INFINITY, 0.0_f64);
@@ -64,7 +64,7 @@ fn a_scene_of_its_own_follows_its_path() {
 }
 
 #[test]
-fn a_path_that_is_not_that_of_the_machine_is_named() {
+fn a_closed_form_that_contradicts_the_machine_is_named() {
     let refused =
         Simulation::new(&off_by("5 mm", "100 mm").machine).expect_err("its tip error would be 5 mm").to_string();
     assert!(
@@ -91,7 +91,7 @@ fn a_path_that_is_not_that_of_the_machine_is_named() {
 }
 
 #[test]
-fn a_run_without_play_stops_where_it_leaves_its_path() {
+fn a_run_without_play_stops_where_it_leaves_its_closed_form() {
     let right = "x = \"across + (slider_plane + driving_rod)\"";
     let text = include_str!("../../assets/scenes/spcmm.toml");
     assert!(text.contains(right));

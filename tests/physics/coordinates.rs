@@ -138,7 +138,7 @@ impl Case {
 }
 
 #[test]
-fn a_spring_on_one_coordinate_swings_as_it_should_in_every_method_and_formulation() {
+fn a_spring_on_one_coordinate_has_its_natural_frequency_in_every_method_and_formulation() {
     for_every(cases(), |case, way| {
         let (m, bound) = (case.inertia(), way.bound());
         let k = 400.0 * m;
@@ -331,7 +331,7 @@ const TUMBLING: &str = "[gravity]\nx = 0\ny = 0\nz = 0\n\
     torque = \"1 N m\"\ndepth = \"2 deg\"\n";
 
 #[test]
-fn what_acts_on_coordinates_of_two_keeps_momentum_and_its_energy_balance_closes() {
+fn elements_on_one_of_two_coordinates_conserve_momentum_and_balance_their_energy() {
     let mut ends = Vec::new();
     for (formulation, method) in
         [("tree", "dopri5"), ("lagrange", "dopri5"), ("tree", "radau5"), ("lagrange", "radau5")]

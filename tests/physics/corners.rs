@@ -4,7 +4,7 @@ use crate::common::{frame_now, simulation};
 use jointplay::contact::FrictionBranch;
 
 #[test]
-fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
+fn settled_sliding_keeps_its_law_branch_and_corners_cost_few_rejections() {
     for method in ["radau5", "automatic"] {
         let mut simulation = simulation("spcmm", &[("solver.method", method), ("solver.tolerance", "1e-5")]);
         // Joints slide about slip_speed_high between 1.1 s and 1.3 s.
@@ -35,7 +35,7 @@ fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
 }
 
 #[test]
-fn a_largest_rate_is_found_wherever_in_a_step_it_lies() {
+fn a_largest_rate_is_found_anywhere_within_a_step() {
     // An impact that the spring goes on pushing: its rate rises at first. Steps of many tolerances have its maximum in many places.
     let rate_in_memory = |tolerance: f64| {
         let solver = [("solver.method", "dopri5"), ("solver.tolerance", &tolerance.to_string())];
@@ -65,7 +65,7 @@ fn a_largest_rate_is_found_wherever_in_a_step_it_lies() {
 }
 
 #[test]
-fn methods_agree_where_friction_reads_a_part_of_the_velocity() {
+fn methods_agree_where_friction_depends_on_part_of_the_velocity() {
     // Printed friction has corners of its own, at |e|/delta times the speeds of the others.
     let printed = ("contact.friction_velocity", "printed");
     let end = 0.02;

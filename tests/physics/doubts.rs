@@ -15,7 +15,7 @@ fn ran(scene: &str, changes: &Changes, duration: f64) -> Simulation {
 }
 
 #[test]
-fn nothing_speaks_against_the_built_in_scenes_with_any_preset() {
+fn the_built_in_scenes_raise_no_doubt_with_any_preset() {
     for scene in crate::common::SCENES {
         for preset in ["preview", "real-time", "accurate"] {
             let simulation = ran(scene, &[("solver.preset", preset)], 0.03);
@@ -29,7 +29,7 @@ fn nothing_speaks_against_the_built_in_scenes_with_any_preset() {
 }
 
 #[test]
-fn nothing_speaks_against_the_default_settings_for_longer() {
+fn longer_runs_with_default_settings_raise_no_doubt() {
     for scene in crate::common::SCENES {
         let simulation = ran(scene, &[], 0.1);
         assert_eq!(simulation.doubts(), [], "{scene}");
@@ -42,7 +42,7 @@ fn nothing_speaks_against_the_default_settings_for_longer() {
 type Case<'a> = (&'a str, &'a Changes<'a>, f64, fn(&Doubt) -> bool);
 
 #[test]
-fn energy_that_is_wrong_is_marked() {
+fn a_wrong_energy_raises_a_doubt() {
     let coarse = [("solver.method", "semi-implicit-euler"), ("solver.step", "40 us")];
     let loose = [("solver.method", "dopri5"), ("solver.tolerance", "1e-3")];
     let heavy = [("solver.method", "rk4"), ("gravity.x", "981 m/s^2")];
@@ -91,7 +91,7 @@ fn damping_beyond_its_domain_names_joint_and_instant() {
 }
 
 #[test]
-fn each_doubt_is_told_once_and_names_its_joint() {
+fn each_doubt_is_reported_once_with_its_joint() {
     let rk4 = ("solver.method", "rk4");
     let cases: [(&str, &Changes, &str); 6] = [
         ("pendulum", &[rk4, ("solver.step", "40 us")], "lasted fewer than 5 steps"),
@@ -117,7 +117,7 @@ fn each_doubt_is_told_once_and_names_its_joint() {
 }
 
 #[test]
-fn a_reset_forgets_what_the_run_met_and_a_snapshot_keeps_it() {
+fn a_reset_clears_doubts_and_a_snapshot_keeps_them() {
     let changes = [("contact.impact_speed_floor", "10 m/s")];
     let mut simulation = crate::common::live("pendulum", &changes);
     run_until(&mut simulation, 0.03);

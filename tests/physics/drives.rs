@@ -121,7 +121,7 @@ fn no_step_passes_over_a_pulse_after_a_second_of_rest() {
 
 /// The same, without an instant at which the run was looked at.
 #[test]
-fn no_step_passes_over_a_pulse_between_two_looks() {
+fn no_step_passes_over_a_pulse_between_two_samples() {
     let law = "law = \"pulse\", height = \"0.2 mm\", start = \"1.0037 s\", duration = \"0.5 ms\"";
     for method in ["dopri5", "automatic"] {
         let changes = [("contact.clearance", "0"), ("solver.method", method)];
@@ -177,7 +177,7 @@ fn libm_sin(x: f64) -> f64 {
 }
 
 #[test]
-fn a_hinge_turns_by_a_ramp_to_where_it_should() {
+fn a_hinge_follows_a_ramp_to_its_end_angle() {
     let law = "law = \"ramp\", from = \"10 deg\", to = \"70 deg\", duration = \"0.1 s\"";
     let mut simulation = kinematic(law, &[]);
     let bodies = &simulation.machine().bodies;

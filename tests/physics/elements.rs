@@ -35,7 +35,7 @@ const SPRING: &str = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto 
                       length = \"100 mm\"\nstiffness = \"200 N/m\"\n";
 
 #[test]
-fn a_mass_on_a_spring_swings_as_it_should_in_every_method_and_formulation() {
+fn a_mass_on_a_spring_has_its_natural_frequency_in_every_method_and_formulation() {
     let omega = (200.0 / MASS).sqrt();
     for way in every_way() {
         let bound = way.bound();
@@ -55,7 +55,7 @@ fn a_mass_on_a_spring_swings_as_it_should_in_every_method_and_formulation() {
 }
 
 #[test]
-fn a_damper_takes_what_the_closed_solution_says() {
+fn a_damper_dissipates_as_the_closed_solution() {
     // Underdamped: x = 0.1 + e^(-d t) (A cos w t + B sin w t) with d = c / 2m, w^2 = k/m - d^2, started at rest.
     let (k, c): (f64, f64) = (200.0, 4.0);
     let d = c / (2.0 * MASS);
@@ -183,7 +183,7 @@ fn elements_are_fixed_to_links_of_a_chain() {
 }
 
 #[test]
-fn a_harmonic_load_drives_as_it_should() {
+fn a_harmonic_load_drives_as_the_closed_solution() {
     let load = "[[load]]\nname = \"f\"\non = { body = \"mass\" }\nforce = \"2 0 0 N\"\nfrequency = \"5 Hz\"\nphase = \"90 deg\"\n";
     let mut simulation = floating(load, &[("solver.tolerance", "1e-10")]);
     let omega = std::f64::consts::TAU * 5.0;
@@ -253,7 +253,7 @@ fn where_nothing_moves_by_itself_a_quick_load_is_still_followed() {
 }
 
 #[test]
-fn bad_elements_are_refused_where_they_stand() {
+fn bad_elements_are_refused_with_their_position() {
     let error = |more: &str| {
         let text = format!(
             "[[body]]\nname = \"mass\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = {{ position = [0, 0, 0] }}\n{more}"

@@ -126,7 +126,7 @@ const RANDOM: [(&str, &str, u64); 6] = [
 ];
 
 #[test]
-fn seconds_of_changes_with_every_frame() {
+fn seconds_with_a_change_in_every_frame_stay_sane() {
     for (name, preset, seed) in RANDOM {
         random_changes(name, preset, seed, 400, SLOW_MOTION);
     }
@@ -303,7 +303,7 @@ fn drifts_nowhere(of: &Long, duration: f64) {
 }
 
 #[test]
-fn a_hundred_settled_seconds_drift_nowhere() {
+fn a_hundred_settled_seconds_do_not_drift() {
     short_list().iter().for_each(|of| drifts_nowhere(of, 100.0));
 }
 

@@ -15,7 +15,7 @@ fn touches(simulation: &Simulation, frame: &Frame, b: usize) -> bool {
 }
 
 #[test]
-fn what_touches_nothing_is_on_its_parabola_at_every_instant_of_a_step() {
+fn a_body_without_contact_follows_its_parabola_within_each_step() {
     let mut simulation = simulation("chain", &CHAIN);
     let gravity = simulation.conditions().gravity;
     let mut inside = Frame::default();
@@ -49,7 +49,7 @@ fn what_touches_nothing_is_on_its_parabola_at_every_instant_of_a_step() {
 }
 
 #[test]
-fn bodies_in_flight_cost_no_evaluation_and_the_rest_is_as_with_all() {
+fn bodies_in_free_flight_cost_no_evaluation_and_leave_the_others_unchanged() {
     // Dormand-Prince evaluates every body at every stage.
     let peaks = |method: &str| {
         let mut simulation = simulation("chain", &[CHAIN[0], ("solver.tolerance", "1e-8"), ("solver.method", method)]);
@@ -71,7 +71,7 @@ fn bodies_in_flight_cost_no_evaluation_and_the_rest_is_as_with_all() {
 }
 
 #[test]
-fn gravity_that_changes_turns_flights() {
+fn a_change_of_gravity_changes_free_flights() {
     let mut simulation = simulation("chain", &CHAIN);
     simulation.advance_to(5e-3).expect("runs");
     let before = frame_now(&mut simulation);

@@ -69,7 +69,7 @@ fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
 }
 
 #[test]
-fn advice_taken_in_mid_run_lets_it_go_on() {
+fn following_the_advice_in_mid_run_lets_the_run_continue() {
     let mut simulation = live("pendulum", &[("solver.method", "rk4"), ("solver.step", "10 ms")]);
     let stopped = run_to_stop(&mut simulation);
     simulation.set("solver.step", "1 us").unwrap();
@@ -160,7 +160,7 @@ fn a_start_in_a_singular_pose_is_refused() {
 }
 
 #[test]
-fn a_drive_beyond_all_measure_stops_the_adaptive_method_too() {
+fn an_excessive_drive_stops_the_adaptive_method_too() {
     let text = built_in_text("slider-crank-driven").unwrap();
     let wild = text.replace("velocity = \"6 rad/s\"", "velocity = \"300000 rad/s\"");
     assert_ne!(wild, text);
@@ -174,7 +174,7 @@ fn a_drive_beyond_all_measure_stops_the_adaptive_method_too() {
 }
 
 #[test]
-fn loops_that_pass_a_singular_pose_say_so() {
+fn loops_that_pass_a_singular_pose_are_reported() {
     // Inside the range of slider planes in which the Jacobian changes its sign.
     let changes = [("contact.clearance", "0"), ("spcmm.slider_plane", "165 mm")];
     let mut simulation = simulation("spcmm", &changes);
@@ -193,7 +193,7 @@ fn loops_that_pass_a_singular_pose_say_so() {
 }
 
 #[test]
-fn the_other_form_stops_before_a_singular_pose_too() {
+fn the_lagrange_formulation_stops_before_a_singular_pose_too() {
     let changes = [
         ("formulation", "lagrange"),
         ("contact.clearance", "0"),

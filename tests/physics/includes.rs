@@ -142,7 +142,7 @@ fn written(prefix: &str, length: &str, turned: bool) -> String {
 }
 
 #[test]
-fn a_file_that_is_included_twice_is_as_if_it_were_written_twice() {
+fn including_a_file_twice_equals_writing_it_twice() {
     let included = read(TWO, LEG, &[]).unwrap();
     let text = CHASSIS.to_owned() + &written("left", "200 mm", false) + &written("right", "300 mm", true);
     let whole = Scene::parse(&text, None, &[]).unwrap();
@@ -214,7 +214,7 @@ fn parts_of_an_included_file_are_reached_by_their_full_names() {
 }
 
 #[test]
-fn bad_includes_are_refused_where_they_stand() {
+fn bad_includes_are_refused_with_their_position() {
     let one = |more: &str| format!("[[include]]\nfile = \"leg.toml\"\n{more}\n");
     for (top, leg, said) in [
         (

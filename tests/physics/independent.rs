@@ -85,7 +85,7 @@ fn same_contacts(what: &str, ours: &[Contact], theirs: &[Contact]) {
 const TIGHT: (&str, &str) = ("solver.tolerance", "1e-11");
 
 #[test]
-fn the_pendulum_is_that_of_other_equations_and_another_solver() {
+fn the_pendulum_agrees_with_other_equations_and_another_solver() {
     let end = 0.03;
     for solver in ["Tsitouras", "Bdf"] {
         let theirs = theirs("pendulum", &[], "again", solver, end);
@@ -106,7 +106,7 @@ fn the_pendulum_is_that_of_other_equations_and_another_solver() {
 }
 
 #[test]
-fn the_measuring_mechanism_is_that_of_other_equations_with_either_friction_velocity() {
+fn the_measuring_mechanism_agrees_with_other_equations_for_either_friction_velocity() {
     let end = 0.025;
     let mut ends = Vec::new();
     for word in ["centres", "printed"] {

@@ -105,7 +105,7 @@ fn swing([m, c, k]: [f64; 3], [x, v]: [f64; 2], t: f64) -> [f64; 2] {
 }
 
 #[test]
-fn a_joint_spring_swings_as_it_should_in_every_method_and_formulation() {
+fn a_joint_spring_has_its_natural_frequency_in_every_method_and_formulation() {
     for_every([Slide, Hinge], |on, way| {
         let (m, bound) = (on.inertia(), way.bound());
         let k = 400.0 * m;
@@ -232,7 +232,7 @@ pub fn momenta(frame: &Frame, machine: &Machine) -> [Vec3; 2] {
 }
 
 #[test]
-fn what_acts_on_joints_keeps_momentum_and_its_energy_balance_closes() {
+fn elements_on_joints_conserve_momentum_and_balance_their_energy() {
     let springs = "[[joint_spring]]\nname = \"t\"\njoint = \"elbow\"\nstiffness = \"3 N m/rad\"\ndamping = \"DT N m s/rad\"\n\
         [[joint_spring]]\nname = \"s\"\njoint = \"slide\"\nstiffness = \"500 N/m\"\ndamping = \"DS N s/m\"\npreload = \"2 N\"\n\
         [[stop]]\nname = \"u\"\njoint = \"elbow\"\nlower = \"-15 deg\"\nupper = \"25 deg\"\ntorque = \"1 N m\"\ndepth = \"2 deg\"\n\
@@ -353,7 +353,7 @@ fn rebound_beyond(chi: f64, restitution: f64) -> bool {
 }
 
 #[test]
-fn a_stop_rebounds_as_its_law_says_at_any_speed() {
+fn a_stop_rebounds_by_its_law_at_any_speed() {
     let chi = bisect(1e-3, 1.0 / 0.6 - 1e-9, |chi| rebound_beyond(chi, 0.6));
     for_every([Slide, Hinge], |on, way| {
         let m = on.inertia();
@@ -393,7 +393,7 @@ fn a_stop_rebounds_as_its_law_says_at_any_speed() {
 }
 
 #[test]
-fn a_weight_settles_on_a_stop_as_deep_as_hertz_says() {
+fn a_weight_settles_on_a_stop_at_the_hertz_penetration() {
     let stop = "[[stop]]\nname = \"s\"\njoint = \"j\"\nlower = \"-5 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n\
                 restitution = 0.2\nspeed = \"0.1 m/s\"\n";
     let text = Slide.text([0.0, 0.0], stop).replace("x = 0\n", "x = \"-9.81 m/s^2\"\n");
@@ -455,7 +455,7 @@ fn a_motor_follows_its_target_like_a_spring_and_its_work_is_the_drives() {
 }
 
 #[test]
-fn a_motor_gives_no_more_than_its_limit() {
+fn a_motor_does_not_exceed_its_limit() {
     for on in [Slide, Hinge] {
         let m = on.inertia();
         let [position, speed, force, by_position, _] = on.units();
@@ -493,7 +493,7 @@ fn a_motor_gives_no_more_than_its_limit() {
 }
 
 #[test]
-fn a_motor_does_not_sleep_through_a_pulse_of_its_target() {
+fn a_motor_does_not_step_over_a_pulse_of_its_target() {
     // Nothing moves before: an adaptive step would grow beyond the pulse, which is there and back.
     let m = Slide.inertia();
     let motor = format!(
@@ -529,7 +529,7 @@ fn columns_and_pictures_follow_what_the_joint_is() {
 }
 
 #[test]
-fn bad_elements_on_joints_are_refused_where_they_stand() {
+fn bad_elements_on_joints_are_refused_with_their_position() {
     let text = TUMBLING.to_owned()
         + "[[body]]\nname = \"wheel\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
            [[joint]]\nname = \"crank\"\nkind = \"revolute\"\nchild = \"wheel\"\naxis = [0, 0, 1]\n\

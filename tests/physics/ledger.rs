@@ -186,7 +186,7 @@ fn the_residual_is_the_error_of_the_integration() {
 }
 
 #[test]
-fn live_changes_are_booked() {
+fn live_changes_are_entered_in_the_ledger() {
     for method in ["automatic", "rk4"] {
         // Fixed steps that keep up with the hard impacts at the end.
         let changes = [("solver.method", method), ("solver.step", "2 us")];
@@ -225,7 +225,7 @@ fn live_changes_are_booked() {
 }
 
 #[test]
-fn a_contact_under_load_books_what_softening_releases() {
+fn softening_a_loaded_contact_is_entered_in_the_ledger() {
     // Soft enough that the stored energy is no trifle.
     let mut simulation = live("pendulum", &[("contact.youngs_modulus", "1 GPa")]);
     simulation.advance_to(0.3).unwrap();
@@ -238,7 +238,7 @@ fn a_contact_under_load_books_what_softening_releases() {
 }
 
 #[test]
-fn it_starts_anew_at_a_reset_which_its_switch_waits_for() {
+fn the_ledger_restarts_at_a_reset_and_its_switch_waits_for_one() {
     let mut simulation = live("pendulum", &[]);
     simulation.advance_to(0.05).unwrap();
     let here = ledger(&simulation);

@@ -135,7 +135,7 @@ fn friction_changes_the_angular_momentum_of_a_machine_in_space() {
 }
 
 #[test]
-fn what_a_law_gives_and_how_large_a_patch_is() {
+fn contact_laws_and_patch_radii_have_their_known_values() {
     let given = |law, asked| undisturbed_restitution(damping_factor(law, asked));
     is_said(&format!(
         "gives {:.3} when asked for 0.9 and {:.3} when asked for 0.8",

@@ -101,7 +101,7 @@ fn a_clearance_that_closes_on_a_ball_moves_at_a_bounded_rate_and_arrives() {
 }
 
 #[test]
-fn a_clearance_under_way_can_change_its_mind() {
+fn a_changing_clearance_can_be_changed_again() {
     let mut simulation = settled();
     simulation.set("contact.clearance", "0.1 mm").unwrap();
     let start = simulation.time();
@@ -128,7 +128,7 @@ fn a_clearance_under_way_can_change_its_mind() {
 }
 
 #[test]
-fn a_clearance_that_grows_lets_the_balls_fall_no_more() {
+fn a_growing_clearance_does_not_drop_the_balls() {
     let mut simulation = settled();
     let before = frame_now(&mut simulation);
     assert_eq!(simulation.set("contact.clearance", "0.4 mm"), Ok(Effect::Now));
@@ -195,7 +195,7 @@ fn the_step_of_a_fixed_method_changes_at_once() {
 }
 
 #[test]
-fn restitution_zero_is_calmer_than_one() {
+fn restitution_zero_gives_fewer_impacts_than_one() {
     let kinetic_excess = |restitution: &str| {
         let mut simulation = live("spcmm", &[("contact.friction", "0")]);
         simulation.advance_to(0.012).unwrap();
@@ -263,7 +263,7 @@ fn drives_and_equations_wait_for_the_reset() {
 }
 
 #[test]
-fn an_earlier_state_goes_on_with_the_method_that_it_had() {
+fn an_earlier_state_resumes_with_its_own_method() {
     let mut simulation = live("spcmm", &[]);
     simulation.advance_to(0.03).unwrap();
     let state = simulation.snapshot();
@@ -377,7 +377,7 @@ fn two_hundred_changes_in_half_a_second_leave_a_sane_state() {
 }
 
 #[test]
-fn a_force_that_jumps_with_a_change_has_no_peak_that_never_was() {
+fn a_force_jump_at_a_change_creates_no_spurious_peak() {
     // Gravity turned up pulls the reactions of the ideal joints up at once; a parabola through both sides of that
     // jump would overshoot it by an eighth.
     let mut simulation = live("spcmm", &[("contact.clearance", "0")]);

@@ -115,7 +115,7 @@ fn a_torque_that_is_switched_on_smoothly_turns_with_its_body() {
 }
 
 #[test]
-fn bad_factors_are_refused_where_they_stand() {
+fn bad_factors_are_refused_with_their_position() {
     let beside: Texts = [
         ("no-header.csv".to_owned(), "0,1\n1,2\n".into()),
         ("falls.csv".to_owned(), "time_s,factor\n0,1\n0.2,x\n".into()),

@@ -334,7 +334,7 @@ fn scotch_yoke(crank: &str) -> String {
 }
 
 #[test]
-fn a_scotch_yoke_moves_as_its_closed_form() {
+fn a_scotch_yoke_follows_its_closed_form() {
     let inertia = |angle: f64| 4e-4 + YOKE * YOKE * (0.2 + 1.5 * angle.sin().powi(2));
     for formulation in FORMULATIONS {
         let bound = if formulation == "tree" { 1e-9 } else { 1e-6 };
@@ -409,7 +409,7 @@ fn a_universal_joint_turns_a_shaft_at_its_known_ratio() {
 
 /// Four hinges that no general loop could turn: opposite links alike, sines of twists as lengths.
 #[test]
-fn a_bennett_linkage_turns_as_its_closed_form() {
+fn a_bennett_linkage_follows_its_closed_form() {
     let (alpha, beta) = (30_f64.to_radians(), 70_f64.to_radians());
     let a = 0.1;
     let b = a * beta.sin() / alpha.sin();
@@ -610,7 +610,7 @@ fn a_loop_that_does_not_close_is_refused_by_joint_and_direction() {
 }
 
 #[test]
-fn a_guess_is_assembled_and_what_moved_is_known() {
+fn a_guessed_pose_is_assembled_and_displacements_are_reported() {
     let off = 8_f64.to_radians();
     let guess = Bar { start: "ideal", driven: [Some(12.0), None], off, ..PLAIN };
     for start in ["ideal", "settled"] {

@@ -13,7 +13,7 @@ const IDEAL: (&str, &str) = ("contact.clearance", "0");
 const PROMISE: f64 = 1e-4;
 
 #[test]
-fn they_and_the_others_are_all_there_are() {
+fn the_list_of_built_in_scenes_is_complete() {
     assert_eq!([SCENES, MACHINES].concat(), BUILT_IN);
 }
 
@@ -494,7 +494,7 @@ fn each_machine_with_one_loose_joint_moves_the_same_under_another_solver() {
 }
 
 #[test]
-fn each_balances_its_energy_in_both_formulations() {
+fn each_machine_balances_its_energy_in_both_formulations() {
     for name in MACHINES {
         for (form, end) in [("tree", 0.015), ("lagrange", 0.009)] {
             let changes = [("formulation", form)];
@@ -511,7 +511,7 @@ fn each_balances_its_energy_in_both_formulations() {
 }
 
 #[test]
-fn nothing_speaks_against_their_default_settings() {
+fn the_machines_raise_no_doubt_with_their_default_settings() {
     for name in MACHINES {
         let mut simulation = simulation(name, &[]);
         run_until(&mut simulation, 0.04);
@@ -523,7 +523,7 @@ fn nothing_speaks_against_their_default_settings() {
 
 /// At every corner of the ranges of its parameters a machine is put together, with play and without.
 #[test]
-fn each_assembles_at_the_ends_of_its_parameters() {
+fn each_machine_assembles_at_the_ends_of_its_parameters() {
     for name in MACHINES {
         let plain = scene(name, &[]);
         let mut own = plain.parameters();

@@ -54,7 +54,7 @@ fn equal_discrete_steps(m: &mut Mechanism, start: &[f64], duration: f64, steps: 
 
 /// The platform with its rods, all contacts open, flung into a tumble: nine coupled coordinates, no event.
 #[test]
-fn slopes_of_the_error_are_the_orders() {
+fn slopes_of_the_error_equal_the_orders() {
     const DURATION: f64 = 0.32;
     let scene = scene("spcmm", &[]);
     let mut mechanism = Mechanism::new(&scene.machine).unwrap();

@@ -96,7 +96,7 @@ fn frictionless_scenes_evaluate_no_friction() {
 }
 
 #[test]
-fn links_of_a_chain_are_blocks_of_their_own() {
+fn links_of_a_chain_are_separate_blocks() {
     for links in ["1", "8", "64"] {
         let count: usize = links.parse().unwrap();
         let chain = summary("chain", &[("chain.links", links)]);

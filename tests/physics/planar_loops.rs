@@ -220,7 +220,7 @@ fn start_error(scene: &Scene) -> String {
 }
 
 #[test]
-fn a_four_bar_closed_by_an_ideal_ball_joint_moves_as_its_geometry_and_energy_say() {
+fn a_four_bar_closed_by_an_ideal_ball_joint_obeys_geometry_and_energy() {
     let bar = GRASHOF;
     for (turn, form) in
         [(Quat::identity(), "tree"), (Quat::identity(), "lagrange"), (tilted(), "tree"), (tilted(), "lagrange")]
@@ -264,7 +264,7 @@ fn a_four_bar_closed_by_an_ideal_ball_joint_moves_as_its_geometry_and_energy_say
 }
 
 #[test]
-fn every_method_takes_a_planar_loop_ideal_driven_and_with_play() {
+fn every_method_steps_a_planar_loop_ideal_driven_and_with_play() {
     for (clearance, driven) in [("0", &[][..]), ("0", &[0]), ("0.3 mm", &[])] {
         let with = Extras { start: "ideal", clearance, driven, ..PLAIN };
         let reference = {
@@ -338,7 +338,7 @@ fn a_parallelogram_passes_its_flat_poses_and_does_not_start_in_one() {
 }
 
 #[test]
-fn what_no_motion_closes_is_refused_by_joint_and_direction() {
+fn unclosable_loops_are_refused_with_joint_and_direction() {
     for start in ["as-given", "ideal"] {
         let aside = Extras { start, offset: 5e-3, ..PLAIN };
         let error = start_error(&GRASHOF.scene(Quat::identity(), aside, &[]));
@@ -431,7 +431,7 @@ fn two_ball_joints_make_a_hinge() {
 }
 
 #[test]
-fn what_the_assembly_moved_is_known() {
+fn displacements_by_the_assembly_are_reported() {
     let degrees = std::f64::consts::PI / 180.0;
     let close = GRASHOF.angles(GRASHOF.angle);
     let guess = [close[0], close[1] + 8.0 * degrees, close[2]];
@@ -450,7 +450,7 @@ fn what_the_assembly_moved_is_known() {
 
 /// The side on which coupler and rocker lie tells the mode.
 #[test]
-fn another_assembly_mode_than_the_guess_s_is_told() {
+fn an_assembly_mode_other_than_the_guessed_one_is_reported() {
     let (mut told, mut kept) = (0, 0);
     for k in 0..20 {
         for l in 0..20 {

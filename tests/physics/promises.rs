@@ -154,7 +154,7 @@ fn case(name: &str, scene: &Scene, way: Way) -> u64 {
 }
 
 #[test]
-fn every_built_in_scene_keeps_them_by_every_method_in_both_formulations() {
+fn every_built_in_scene_keeps_the_promises_with_every_method_and_formulation() {
     for name in SCENES {
         let mut hashes = BTreeSet::new();
         for way in every_way() {
@@ -166,7 +166,7 @@ fn every_built_in_scene_keeps_them_by_every_method_in_both_formulations() {
 }
 
 #[test]
-fn scenes_without_play_keep_them_too() {
+fn scenes_without_play_keep_the_promises() {
     for_every(SCENES, |name, way| {
         let [method, formulation] = way.changes();
         let mut changes = vec![method, formulation, ("contact.clearance", "0")];
@@ -183,7 +183,7 @@ fn four_ways() -> [Way; 4] {
 }
 
 #[test]
-fn machines_and_loops_keep_them_too() {
+fn machines_and_loops_keep_the_promises() {
     for (name, way) in MACHINES.into_iter().zip(four_ways().into_iter().cycle()) {
         case(name, &scene(name, &way.changes()), way);
     }
@@ -201,7 +201,7 @@ fn machines_and_loops_keep_them_too() {
 
 /// Scenes that between them have every key of the format.
 #[test]
-fn scenes_of_the_corpus_keep_them_too() {
+fn scenes_of_the_corpus_keep_the_promises() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
     let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
@@ -253,7 +253,7 @@ fn a_state_is_restored_where_no_start_would_be_accepted() {
 }
 
 #[test]
-fn what_waits_in_a_snapshot_takes_effect_at_the_reset_of_a_copy() {
+fn pending_changes_of_a_snapshot_take_effect_at_the_reset_of_a_copy() {
     let mut simulation = crate::common::live("spcmm", &[]);
     run_until(&mut simulation, 0.05);
     simulation.set("contact.clearance", "0.1 mm").unwrap();

@@ -262,7 +262,7 @@ proptest! {
     }
 
     #[test]
-    fn any_changes_of_a_running_scene_are_taken_or_refused_and_stay_finite((name, changes) in changed_scenes(&SCENES)) {
+    fn any_live_changes_are_accepted_or_refused_and_stay_finite((name, changes) in changed_scenes(&SCENES)) {
         let mut simulation = LiveScene::new(built_in(name)).unwrap();
         // Somewhere in the first impacts.
         simulation.advance_to(8e-3).map_err(|stopped| fail(stopped.to_string()))?;

@@ -87,7 +87,7 @@ fn opposite_errors_are_equal_but_for_the_square_of_the_play() {
 }
 
 #[test]
-fn rods_that_share_a_load_leave_what_the_tightest_leave() {
+fn parallel_rods_err_as_the_tightest_allows() {
     // Along a line: the tighter rod alone.
     let along = |play: [f64; 2]| Rod { from: [0.3, 0.0], play };
     for (a, b) in [(0.1e-3, 0.25e-3), (0.3e-3, 0.2e-3), (0.2e-3, 0.2e-3)] {
@@ -182,7 +182,7 @@ fn with_balls_at(machine: &Machine, places: &[Vec3]) -> Option<Vec3> {
 }
 
 #[test]
-fn no_position_of_the_balls_takes_the_tip_farther() {
+fn no_position_of_the_balls_exceeds_the_computed_error() {
     let mut random = 1_u64;
     let mut next = || {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -220,7 +220,7 @@ fn no_position_of_the_balls_takes_the_tip_farther() {
 }
 
 #[test]
-fn without_play_nothing_moves_and_idle_spin_changes_nothing() {
+fn without_play_nothing_moves_and_idle_spin_has_no_effect() {
     let tight = TWO.map(|rod| Rod { play: [0.0; 2], ..rod });
     let mut held = held(&parse(&truss(&tight, TIP, Guide::Plane, ""), &[]), &[]);
     let freedoms = held.freedoms();
@@ -250,7 +250,7 @@ fn the_tip_rests_where_a_long_run_leaves_it() {
 }
 
 #[test]
-fn drives_that_do_not_get_there_say_how_far_they_get() {
+fn unreachable_drive_positions_report_how_far_they_get() {
     let scene = parse(&truss(&TWO, TIP, Guide::Plane, ""), &[]);
     // The fixed end of the first rod moves 0.1 m, and the tip with it.
     let mut moved = held(&scene, &[Some(0.1)]);

@@ -206,7 +206,7 @@ fn machine() -> String {
 }
 
 #[test]
-fn with_them_every_body_obeys_newton_and_euler() {
+fn reactions_satisfy_newton_and_euler_for_every_body() {
     let text = format!("start = \"ideal\"\n{}", machine());
     let mut found = Vec::new();
     for formulation in FORMULATIONS {
@@ -235,7 +235,7 @@ fn with_them_every_body_obeys_newton_and_euler() {
 }
 
 #[test]
-fn contacts_load_them_too() {
+fn contacts_load_the_reactions_too() {
     for name in ["slider-crank", "suspension", "delta"] {
         for formulation in FORMULATIONS {
             let changes = [("formulation", formulation), ("solver.method", "dopri5"), ("solver.tolerance", "1e-8")];

@@ -72,7 +72,7 @@ fn an_undisturbed_impact_gives_what_its_law_gives() {
 }
 
 #[test]
-fn an_impact_tells_its_depth_force_and_time() {
+fn an_impact_reports_its_depth_force_and_time() {
     let mut simulation = flung(&[("contact.normal_law", "hertz"), ("solver.tolerance", "1e-10")]);
     let first = impacts(&mut simulation, 0.01)[0];
     let k = simulation.mechanism().contacts.coefficients(0).stiffness;

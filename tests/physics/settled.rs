@@ -42,7 +42,7 @@ fn a_resumed_implicit_run_gives_the_same_bits() {
 }
 
 #[test]
-fn both_formulations_settle_alike_under_the_implicit_method() {
+fn both_formulations_settle_equally_under_the_implicit_method() {
     let run = |formulation: &str| {
         let mut simulation = simulation(
             "spcmm",

@@ -184,7 +184,7 @@ fn points_on_a_line_are_the_spring_of_that_line() {
 }
 
 #[test]
-fn a_buffer_that_only_pushes_gives_back_what_it_took() {
+fn a_one_sided_buffer_returns_its_energy() {
     // Thrown off a buffer that hardens, a mass falls back on it; over the top it flies freely.
     let text = "[gravity]\nz = \"-9.81 m/s^2\"\n\
         [[body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
@@ -232,7 +232,7 @@ fn a_characteristic_may_lie_in_a_file_beside_the_scene() {
 }
 
 #[test]
-fn what_is_wrong_with_a_characteristic_is_named() {
+fn errors_in_a_characteristic_are_named() {
     let start = "[[body]]\nname = \"mass\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
         [[joint]]\nname = \"h\"\nkind = \"revolute\"\naxis = [0, 0, 1]\nchild = \"mass\"\n";
     let spring = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"1 m\"\n";

@@ -55,7 +55,7 @@ fn move_alike(name: &str, [plain, turned]: [Scene; 2], time: f64) {
 }
 
 #[test]
-fn a_built_in_scene_moves_alike_wherever_it_lies() {
+fn a_built_in_scene_moves_equally_in_any_pose() {
     for (name, time) in
         [("pendulum", 0.01), ("slider-crank", 0.01), ("chain", 0.01), ("four-bar", 5e-3), ("suspension", 2e-3)]
     {
@@ -128,7 +128,7 @@ fn a_file_in_a_turned_scene_turns_with_it() {
 }
 
 #[test]
-fn a_machine_with_a_closed_form_moves_alike_and_its_path_with_it() {
+fn a_machine_and_its_closed_form_move_equally_in_any_pose() {
     let text = built_in_text("spcmm").unwrap();
     let (along_x, along_z) = ("[gravity]\nx = \"9.81 m/s^2\"\n", GRAVITY);
     assert!(text.contains(along_x));

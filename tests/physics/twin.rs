@@ -14,7 +14,7 @@ fn moved(simulation: &mut Simulation, i: usize, by: f64) {
 }
 
 #[test]
-fn a_displaced_state_goes_on_from_where_it_was_put() {
+fn a_displaced_state_continues_from_its_displacement() {
     let mut simulation = simulation("spcmm", &[]);
     run_until(&mut simulation, 0.005);
     let before = frame_now(&mut simulation);
@@ -34,7 +34,7 @@ fn a_displaced_state_goes_on_from_where_it_was_put() {
 }
 
 #[test]
-fn contacts_follow_the_displacement_and_keep_their_memory() {
+fn contacts_follow_the_displacement_and_keep_their_state() {
     let mut simulation = simulation("spcmm", &[]);
     run_until(&mut simulation, 1.0);
     let memory = |simulation: &Simulation| [0, 1, 2].map(|j| simulation.contact_state(j));
@@ -124,7 +124,7 @@ fn an_ideal_mechanism_repeats_exactly_and_has_no_neighbours() {
 
 /// The twin never disturbs the run it follows.
 #[test]
-fn sections_are_those_of_the_run_without_a_twin() {
+fn sections_equal_those_of_a_run_without_a_twin() {
     let scene = scene("spcmm", &[]);
     let period = drive_period(&scene).unwrap();
     let sections = |exponent: bool| {
@@ -146,7 +146,7 @@ fn sections_are_those_of_the_run_without_a_twin() {
 }
 
 #[test]
-fn drives_tell_their_common_period() {
+fn drives_report_their_common_period() {
     assert_eq!(drive_period(&scene("spcmm", &[])), Ok(2.0));
     let crank = drive_period(&scene("slider-crank-driven", &[])).unwrap();
     assert!((crank - std::f64::consts::TAU / 6.0).abs() < 1e-15);
@@ -193,7 +193,7 @@ fn a_motion_that_repeats_has_no_positive_exponent() {
 /// Exponents that independent computations give (SciPy DOP853 at 1e-12 with located contacts, eight neighbours): of a mass between
 /// two stops on a shaken carriage, and of the frictionless slider-crank of Flores & Ambrosio (2004) with 0.5 mm of play.
 #[test]
-fn exponents_are_those_of_independent_computations() {
+fn exponents_equal_those_of_independent_computations() {
     let shaken = |rate: &str| {
         let text = format!(
             r#"

@@ -94,7 +94,7 @@ fn momenta(frame: &Frame) -> [Vec3; 2] {
 }
 
 #[test]
-fn a_train_of_both_starts_where_its_coordinates_put_it() {
+fn a_chain_of_both_joints_starts_at_its_coordinates() {
     for formulation in FORMULATIONS {
         let mut simulation = started(&train(0.0), &[("formulation", formulation)]);
         let summary = simulation.mechanism().summary();
@@ -131,7 +131,7 @@ fn a_train_of_both_starts_where_its_coordinates_put_it() {
 }
 
 #[test]
-fn a_free_train_keeps_its_momenta_and_its_energy_in_both_forms() {
+fn a_free_chain_conserves_momenta_and_energy_in_both_formulations() {
     let mut ends = Vec::new();
     for formulation in FORMULATIONS {
         let changes = [("formulation", formulation), ("solver.tolerance", "1e-11")];

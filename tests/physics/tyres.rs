@@ -123,7 +123,7 @@ fn no_bump_is_stepped_over() {
 }
 
 #[test]
-fn it_is_a_spring_on_a_driven_road_that_only_pushes() {
+fn a_tyre_is_a_one_sided_spring_on_a_driven_road() {
     let law = "{ law = \"harmonic\", amplitude = \"12 mm\", frequency = \"7 Hz\" }";
     let text = wheel(REST, &format!("damping = \"300 N s/m\"\nground = {law}"));
     let road = text[..text.find("[[tyre]]").unwrap()].to_owned()
@@ -169,7 +169,7 @@ fn up_is_against_the_gravity_of_the_file_or_given() {
 }
 
 #[test]
-fn what_is_wrong_with_a_tyre_is_named() {
+fn errors_in_a_tyre_are_named() {
     let error = |text: &str| Scene::parse(text, Some("mine.toml"), &[]).unwrap_err().to_string();
     let still = wheel(REST, "").replace("z = \"-9.81 m/s^2\"", "x = 0\ny = 0\nz = 0");
     for (text, said) in [

@@ -104,7 +104,7 @@ fn impulses_are_time_integrals_of_the_normal_force() {
 }
 
 #[test]
-fn the_ledger_is_not_needed_for_it_and_a_reset_ends_it() {
+fn a_wear_map_needs_no_ledger_and_ends_at_a_reset() {
     let alone = after("pendulum", &[("solver.energy_ledger", "off")], 0.05);
     let mut paid = after("pendulum", &[], 0.05);
     assert!(wear(&alone).cells(0) == wear(&paid).cells(0));

@@ -223,7 +223,7 @@ proptest! {
     }
 
     #[test]
-    fn an_expression_is_what_it_computes((text, value) in lengths()) {
+    fn an_expression_equals_its_value((text, value) in lengths()) {
         let scene = format!("{ARM}{}", machine(false, &format!("start = {{ position = \"{text}\" }}\n")));
         match Scene::parse(&scene, None, &[]) {
             Ok(scene) => {
@@ -290,7 +290,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_included_is_as_if_it_stood_in_the_scene(element in elements(), cut in 0..5_usize) {
+    fn including_equals_writing_into_the_scene(element in elements(), cut in 0..5_usize) {
         // Included after all of its own: the order of a list that stands in both is the same then.
         let parts: Vec<&str> = element.split_inclusive("\n\n").collect();
         let (here, there) = parts.split_at(cut.min(parts.len()));
@@ -304,7 +304,7 @@ proptest! {
     }
 
     #[test]
-    fn a_body_of_a_density_weighs_in_proportion_wherever_its_shapes_lie(
+    fn the_mass_of_a_body_is_proportional_to_its_density(
         form in proptest::sample::select(&FORMS[..]),
         density in 1.0..1e4_f64,
         shift in proptest::array::uniform3(-0.5..0.5_f64),

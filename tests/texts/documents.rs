@@ -187,7 +187,7 @@ fn documents_name_files_that_exist() {
 }
 
 #[test]
-fn the_first_page_lists_every_document() {
+fn the_readme_lists_every_document() {
     let readme = read("README.md");
     for page in pages() {
         assert!(readme.contains(&format!("[`{page}`]({page})")), "README.md does not list {page}");

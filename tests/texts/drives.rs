@@ -156,7 +156,7 @@ fn a_formula_may_be_one_of_the_scenes_parameters() {
 }
 
 #[test]
-fn what_is_wrong_with_a_law_is_named() {
+fn errors_in_a_drive_law_are_named() {
     let cases: &[(&str, &[&str])] = &[
         (
             "law = \"ramps\", to = 1",
@@ -283,7 +283,7 @@ fn a_file_beside_the_scene_is_read_once() {
 }
 
 #[test]
-fn what_is_wrong_with_a_file_beside_the_scene_is_named_in_it() {
+fn errors_in_a_referenced_file_are_named_with_that_file() {
     let folder = tempfile::tempdir().unwrap();
     let cases: &[(&[u8], &[&str])] = &[
         (b"", &["joint.P.drive.file = \"bump.csv\"", "has 0 points"]),

@@ -234,7 +234,7 @@ fn every_row_is_read_and_nothing_else_is() {
 }
 
 #[test]
-fn rows_say_what_they_are() {
+fn rows_of_the_format_table_describe_their_values() {
     let tables = file_tables();
     let names: BTreeSet<&str> = tables.iter().map(|table| table.name).collect();
     assert_eq!(names.len(), tables.len(), "two tables of one name");

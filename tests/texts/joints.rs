@@ -61,7 +61,7 @@ fn start_values_of_two_degrees_are_keys() {
 }
 
 #[test]
-fn what_is_refused_says_what_is_allowed() {
+fn errors_state_what_is_allowed() {
     let hinge = "kind = \"revolute\"\naxis = [0, 1, 0]\n";
     refused(&text(hinge), &["joint.j.child = \"rod\"", "already the child of joint `free`", "`closes_loop = true`"]);
     let closing = |more: &str| text(&format!("{hinge}closes_loop = true\n{more}"));

@@ -51,7 +51,7 @@ impl Folder {
 }
 
 #[test]
-fn a_body_weighs_what_its_mesh_encloses() {
+fn a_body_has_the_mass_of_the_volume_of_its_mesh() {
     let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
     let place = format!("{OBJ}, position = \"0 5 0 mm\", rotation = {{ axis = [0, 0, 1], angle = \"90 deg\" }}");
     let scene = folder.read(&scene(&place, HEAVY)).unwrap();
@@ -161,7 +161,7 @@ fn a_fixed_mesh_follows_a_pattern() {
 }
 
 #[test]
-fn what_is_wrong_with_a_mesh_is_said_with_its_place() {
+fn errors_in_a_mesh_are_reported_with_their_position() {
     let bad = BOX.replace("v 10 20 30", "v 10 2O 30");
     let open = BOX.replace("f 5 6 8 7\n", "");
     let cut = stl(7);
@@ -216,7 +216,7 @@ fn colours_are_read_and_refused() {
 }
 
 #[test]
-fn without_a_role_a_shape_has_that_of_its_body() {
+fn a_shape_without_a_role_has_that_of_its_body() {
     let body = |name: &str| format!("[[body]]\nname = \"{name}\"\n{GIVEN}\n");
     let joint = |name: &str, kind: &str, more: &str| {
         format!("[[joint]]\nname = \"{name}\"\nchild = \"{name}\"\nkind = \"{kind}\"\n{more}\n")

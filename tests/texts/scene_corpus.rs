@@ -212,7 +212,7 @@ fn survives(what: &str, bytes: &[u8]) -> Fate {
 }
 
 #[test]
-fn the_corpus_ends_as_its_names_say() {
+fn each_scene_of_the_corpus_ends_as_its_name_states() {
     let corpus = corpus();
     assert!(corpus.len() > 30);
     let mut wrong = Vec::new();
@@ -232,7 +232,7 @@ fn the_corpus_ends_as_its_names_say() {
 }
 
 #[test]
-fn mutations_of_the_corpus_break_nothing() {
+fn mutations_of_the_corpus_cause_no_panic() {
     let times = std::env::var("SCENE_MUTATIONS").ok();
     let times = times.map_or(1, |times| times.parse::<u64>().expect("a number"));
     let mut seeds: Vec<(String, Vec<u8>, u64)> =

@@ -406,7 +406,7 @@ fn changes_are_refused_with_key_value_and_range() {
 }
 
 #[test]
-fn what_is_no_scene_file_at_all_is_said_plainly() {
+fn a_file_that_is_no_scene_is_reported_as_such() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let write = |name: &str, bytes: &[u8]| {

@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn two_halves_make_a_whole() {
+    fn two_halves_combine_to_the_whole() {
         let half = |side: f64| {
             let centre = Vec3::new(1.0, 0.25 * side, -2.0);
             Inertial::of_solid(Solid::Box([0.1, 0.25, 0.3]), 2.0, centre, Mat3::identity())

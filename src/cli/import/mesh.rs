@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_has_the_moments_of_a_box_whatever_the_filling_and_a_shell_those_of_six_plates() {
+    fn every_filled_box_mesh_has_the_moments_of_a_box_and_a_shell_those_of_six_plates() {
         let corners = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.3], [0.0, 0.3]];
         let mesh = prism(&corners, &[[0, 1, 2], [0, 2, 3]], 0.5);
         let (v, squares) = (0.2 * 0.3 * 0.5, [0.04, 0.09, 0.25]);
@@ -204,7 +204,7 @@ mod tests {
 
     /// An L of three squares: its hull has half a square more.
     #[test]
-    fn an_angle_is_filled_up_only_by_its_hull() {
+    fn only_the_hull_fills_an_l_shaped_mesh() {
         let corners = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.1], [0.1, 0.1], [0.1, 0.2], [0.0, 0.2]];
         let mesh = prism(&corners, &[[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]], 0.1);
         let exact = found(&mesh, MeshInertia::Exact);
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn an_open_mesh_has_a_hull_and_a_surface_alone() {
+    fn an_open_mesh_has_only_a_hull_and_a_surface() {
         let vertices = vec![[0.0, 0.0, 0.0], [1e3, 0.0, 0.0], [0.0, 1e3, 0.0], [0.0, 0.0, 1e3]];
         let mesh = Mesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2]]);
         let hull = found(&mesh, MeshInertia::Convex);

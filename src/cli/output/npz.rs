@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn an_archive_on_a_full_disk_ends_without_a_word_of_its_own() {
+    fn an_archive_on_a_full_disk_prints_nothing_of_its_own() {
         let values = Array1::from(vec![1.0; 10_000]);
         for writes in 0.. {
             let disk = || Disk { content: Cursor::default(), writes_left: writes };

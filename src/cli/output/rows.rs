@@ -111,7 +111,7 @@ mod tests {
     use crate::files::OutputFile;
 
     #[test]
-    fn spooled_rows_are_the_rows() {
+    fn spooled_rows_read_back_unchanged() {
         let folder = tempfile::tempdir().unwrap();
         let target = OutputFile::claim(&folder.path().join("a.csv"), false).unwrap();
         let mut rows = Rows::new(3);

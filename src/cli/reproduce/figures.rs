@@ -288,7 +288,7 @@ mod tests {
     use super::capital;
 
     #[test]
-    fn labels_begin_with_a_capital_but_for_coordinates() {
+    fn labels_begin_with_a_capital_except_for_coordinates() {
         for (text, set) in [("rate of beta", "Rate of beta"), ("x", "x"), ("beta less ideal", "beta less ideal")] {
             assert_eq!(capital(text), set);
         }

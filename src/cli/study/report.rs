@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_that_differ_little_have_the_digits_that_tell_them_apart() {
+    fn values_that_differ_little_have_enough_digits_to_distinguish_them() {
         let cells = |values: [f64; 3]| {
             let digits = digits_apart(values[0], values.into_iter());
             values.map(|value| shown_with(value, "m", digits))

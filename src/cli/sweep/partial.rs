@@ -334,7 +334,7 @@ mod tests {
     use crate::scene::Scene;
 
     #[test]
-    fn a_cut_costs_the_block_it_is_in_and_other_damage_is_refused() {
+    fn a_truncated_block_is_recomputed_and_other_damage_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("a.npz");
         let path = Partial::path_of(&out);

@@ -61,7 +61,7 @@ mod tests {
     use crate::scene::{Kind, table};
 
     #[test]
-    fn words_of_every_parameter_fit_and_return() {
+    fn words_of_every_parameter_fit_and_read_back() {
         let choices = table().iter().filter_map(|parameter| match parameter.kind {
             Kind::Choice(words) => Some(words),
             _ => None,

@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_error_below_the_floor_says_so() {
+    fn an_error_below_the_floor_is_marked() {
         assert_eq!(error(Some(3e-9), Some(1e-8)), "< 1.0e-8");
         assert_eq!(error(Some(3.14e-5), Some(1e-8)), "3.1e-5");
         assert_eq!(error(Some(0.0314), None), "0.031");
