@@ -76,10 +76,10 @@ pub fn main() -> u8 {
     }
 }
 
-/// Number of threads: `asked`, or one per core.
-fn threads(asked: Option<u16>) -> usize {
+/// Number of threads: `requested`, or one per core.
+fn threads(requested: Option<u16>) -> usize {
     let cores = || std::thread::available_parallelism().map_or(1, NonZero::get);
-    asked.map_or_else(cores, usize::from)
+    requested.map_or_else(cores, usize::from)
 }
 
 fn dispatch(arguments: Arguments) -> Result<(), Failure> {

@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e-12;
 
 impl Part<'_> {
     /// Kind and peaks, in words.
-    pub fn words(&self) -> String {
+    pub fn description(&self) -> String {
         let known = self.peaks.iter().zip(self.rounding).zip(LOADS);
         let known =
             known.filter_map(|((peak, least), (unit, ..))| Some((peak.filter(|(size, _)| *size > least)?, unit)));

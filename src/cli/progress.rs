@@ -9,20 +9,22 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle, W
 /// Time between two lines.
 const INTERVAL: Duration = Duration::from_secs(10);
 
-/// A bar of `length`, hidden unless `wanted`.
-pub fn bar(wanted: bool, length: u64) -> ProgressBar {
-    if !wanted {
+/// A bar of `length`, hidden unless `is_visible`.
+pub fn bar(is_visible: bool, length: u64) -> ProgressBar {
+    if !is_visible {
         return ProgressBar::hidden();
     }
     if !std::io::stderr().is_terminal() {
         let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::hidden());
-        let (told, start) = (bar.downgrade(), Instant::now());
+        let (weak_bar, start) = (bar.downgrade(), Instant::now());
         let wait = move || {
             thread::sleep(INTERVAL);
             start.elapsed()
         };
         // Without the thread the command continues silently.
-        let _ = thread::Builder::new().name("progress".to_owned()).spawn(move || tell(&told, wait, super::complain));
+        let _ = thread::Builder::new()
+            .name("progress".to_owned())
+            .spawn(move || report_periodically(&weak_bar, wait, super::complain));
         return bar;
     }
     let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
@@ -34,7 +36,7 @@ pub fn bar(wanted: bool, length: u64) -> ProgressBar {
 }
 
 /// Reports the progress of `bar` until the work is over, whenever `wait` returns; `wait` gives the time since the start.
-fn tell(bar: &WeakProgressBar, mut wait: impl FnMut() -> Duration, mut say: impl FnMut(&str)) {
+fn report_periodically(bar: &WeakProgressBar, mut wait: impl FnMut() -> Duration, mut print: impl FnMut(&str)) {
     // Progress before the first report may be from an earlier run, and says nothing about the speed.
     let mut first = None;
     loop {
@@ -56,7 +58,7 @@ fn tell(bar: &WeakProgressBar, mut wait: impl FnMut() -> Duration, mut say: impl
                 line.push_str(&format!(", about {} to go", HumanDuration(left)));
             }
         }
-        say(&line);
+        print(&line);
     }
 }
 
@@ -67,7 +69,7 @@ mod tests {
     #[test]
     fn progress_is_reported_at_each_interval_until_the_work_is_finished() {
         let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::hidden());
-        let told = bar.downgrade();
+        let weak_bar = bar.downgrade();
         // Half of it was done by an earlier run.
         bar.set_position(500);
         let mut held = Some(bar);
@@ -81,7 +83,7 @@ mod tests {
             now
         };
         let mut lines = Vec::new();
-        tell(&told, wait, |line| lines.push(line.to_owned()));
+        report_periodically(&weak_bar, wait, |line| lines.push(line.to_owned()));
         assert_eq!(
             lines,
             [
@@ -97,6 +99,6 @@ mod tests {
     fn work_finished_before_the_first_interval_reports_nothing() {
         let bar = ProgressBar::with_draw_target(Some(10), ProgressDrawTarget::hidden());
         bar.finish_and_clear();
-        tell(&bar.downgrade(), || INTERVAL, |line| panic!("it says {line}"));
+        report_periodically(&bar.downgrade(), || INTERVAL, |line| panic!("it says {line}"));
     }
 }

@@ -28,7 +28,7 @@ pub fn fill(page: &str) -> Result<String, String> {
     for part in parts {
         let gap = part.split_once(" -->").and_then(|(name, rest)| {
             let (_, rest) = rest.split_once(END)?;
-            Some((name, draw(name)?, rest))
+            Some((name, table_content(name)?, rest))
         });
         let Some((name, table, rest)) = gap else {
             return Err(part.lines().next().unwrap_or_default().to_owned());
@@ -39,7 +39,7 @@ pub fn fill(page: &str) -> Result<String, String> {
 }
 
 /// Content of the table `name` in the page; `None` for an unknown name.
-fn draw(name: &str) -> Option<String> {
+fn table_content(name: &str) -> Option<String> {
     Some(match name {
         "units" => unit_table(),
         "frames" => frames(),
@@ -50,7 +50,7 @@ fn draw(name: &str) -> Option<String> {
 }
 
 /// Whether the page shows this table, under its own name or among the force elements.
-pub fn has(page: &str, table: &FileTable) -> bool {
+pub fn contains_table(page: &str, table: &FileTable) -> bool {
     is_element(table) || page.contains(&format!("{START}{} -->", table.name))
 }
 
@@ -76,13 +76,13 @@ fn keys(table: &FileTable) -> String {
             value(key, table),
             absent(key),
             key.frame.to_owned(),
-            what(key),
+            description(key),
         ])
     };
     let own = own(table);
     let mut rows: Vec<Vec<String>> = own.map(row).collect();
     if let Some(also) = table.also {
-        let any = format!("any key of {}", called(also));
+        let any = format!("any key of {}", markdown_name(also));
         let there = || "as there".to_owned();
         let own = String::new;
         rows.push(shown([any, own(), there(), there(), own(), "For this one only".to_owned()]));
@@ -98,7 +98,7 @@ fn own(table: &FileTable) -> impl Iterator<Item = &FileKey> {
 }
 
 /// Description of a key; only the first sentence for a parameter, whose own page says more.
-fn what(key: &FileKey) -> String {
+fn description(key: &FileKey) -> String {
     match key.value_type {
         ValueType::Parameter(_) => {
             let (first, _) = key.help.split_once(". ").unwrap_or((key.help, ""));
@@ -116,7 +116,7 @@ pub fn capital(text: &str) -> String {
 }
 
 /// Name of a table in Markdown.
-fn called(table: &FileTable) -> String {
+fn markdown_name(table: &FileTable) -> String {
     match table.head.starts_with('[') {
         true => format!("`{}`", table.head),
         false => table.head.to_owned(),
@@ -159,17 +159,17 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
             Kind::Count { .. } => format!("whole number, {}", parameter.range()),
             Kind::Choice(of) => words(of),
         }),
-        ValueType::Table(of) => called(of),
+        ValueType::Table(of) => markdown_name(of),
         ValueType::List(of, _) if table.head.starts_with("[[") && of.head.starts_with("[[") => {
             format!("`[[{}.{}]]`", table.name, key.name)
         }
-        ValueType::List(of, _) if of.head.starts_with("[[") => called(of),
+        ValueType::List(of, _) if of.head.starts_with("[[") => markdown_name(of),
         ValueType::List(_, limit) => format!("list of {}", limit.entries),
         ValueType::Vectors(of, _) => format!("list of vectors, {}", number(of)),
         ValueType::Pairs([first, second], limit) => {
             format!("list of pairs, {} and {}, at most {}", dimension(first), number(second), limit.max)
         }
-        ValueType::Files(of, _) => format!("list of names of files, or {}", called(of)),
+        ValueType::Files(of, _) => format!("list of names of files, or {}", markdown_name(of)),
         ValueType::Values => "table of quantities".to_owned(),
     }
 }
@@ -222,7 +222,7 @@ fn laws() -> String {
 fn elements() -> String {
     let tables = FILE.keys.iter().filter_map(FileKey::table);
     let part = |table: &FileTable| {
-        let (head, help) = (called(table), capital(table.help));
+        let (head, help) = (markdown_name(table), capital(table.help));
         format!("### {head}\n\n{help}.\n\n{}", keys(table))
     };
     let parts: Vec<String> = tables.filter(|table| is_element(table)).map(part).collect();
@@ -241,7 +241,7 @@ fn frames() -> String {
             }
         }
         for (frame, names) in of_table {
-            let keys = format!("`{}` of {}", names.join("`, `"), called(table));
+            let keys = format!("`{}` of {}", names.join("`, `"), markdown_name(table));
             match frames.iter_mut().find(|(of, _)| *of == frame) {
                 Some((_, all)) => all.push(keys),
                 None => frames.push((frame, vec![keys])),

@@ -136,7 +136,7 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
     for (i, joint) in scene.machine.ball_joints.iter().enumerate() {
         let (force, at) = simulation.peak(i);
         let peak = format!("peak {} N at {} s", significant(force, 6), significant(at, 6));
-        let story = if joint.contact.clearance == 0.0 {
+        let description = if joint.contact.clearance == 0.0 {
             format!("ideal, {peak}")
         } else if force == 0.0 {
             "no contact".to_owned()
@@ -148,11 +148,11 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
                 slow => format!("{impacts} ({slow} slower than impact_speed_floor), {peak}"),
             }
         };
-        line(&format!("Joint {}", joint.name), story);
+        line(&format!("Joint {}", joint.name), description);
         let check = impacts.map(|impacts| Restitution::of(impacts, i));
         if let Some(check) = check.filter(|check| check.impacts > 0) {
             let undisturbed = count(check.undisturbed as u64, "undisturbed impact");
-            let story = match check.median_excess {
+            let description = match check.median_excess {
                 Some(excess) => format!(
                     "{} {} than asked for, median of {undisturbed}",
                     significant(excess.abs(), 3),
@@ -160,11 +160,11 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
                 ),
                 None => undisturbed,
             };
-            line("  restitution", story);
+            line("  restitution", description);
         }
     }
     for part in parts(simulation) {
-        line(&part.label, part.words());
+        line(&part.label, part.description());
     }
     if let Some(ledger) = simulation.ledger() {
         let joules = |value: f64| significant(value, 4);
@@ -180,8 +180,8 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
         );
         if !scene.machine.elements.is_empty() {
             let (given, lost) = (joules(ledger.external_work), joules(ledger.damping_loss));
-            let story = format!("loads from outside {given} J, lost in dampers {lost} J");
-            line("  elements", story);
+            let description = format!("loads from outside {given} J, lost in dampers {lost} J");
+            line("  elements", description);
         }
         line(
             "  residual",

@@ -135,7 +135,7 @@ fn friction_changes_the_angular_momentum_of_a_machine_in_space() {
 }
 
 #[test]
-fn contact_laws_and_patch_radii_have_their_known_values() {
+fn contact_laws_and_patch_radii_have_the_documented_values() {
     let given = |law, asked| undisturbed_restitution(damping_factor(law, asked));
     is_said(&format!(
         "gives {:.3} when asked for 0.9 and {:.3} when asked for 0.8",

@@ -195,7 +195,7 @@ fn the_step_of_a_fixed_method_changes_at_once() {
 }
 
 #[test]
-fn restitution_zero_gives_fewer_impacts_than_one() {
+fn restitution_zero_leaves_less_motion_than_one() {
     let kinetic_excess = |restitution: &str| {
         let mut simulation = live("spcmm", &[("contact.friction", "0")]);
         simulation.advance_to(0.012).unwrap();

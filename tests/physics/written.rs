@@ -223,7 +223,7 @@ proptest! {
     }
 
     #[test]
-    fn an_expression_equals_its_value((text, value) in lengths()) {
+    fn an_expression_reads_as_its_computed_value((text, value) in lengths()) {
         let scene = format!("{ARM}{}", machine(false, &format!("start = {{ position = \"{text}\" }}\n")));
         match Scene::parse(&scene, None, &[]) {
             Ok(scene) => {

@@ -78,7 +78,7 @@ fn the_page_of_scenes_has_the_tables_of_the_rows() {
     let page = reference::fill(&read(path)).unwrap_or_else(|name| panic!("no table `{name}`"));
     is_page(path, &page, "jointplay reference");
     for table in file_tables() {
-        assert!(reference::has(&page, table), "no table `{}`", table.name);
+        assert!(reference::contains_table(&page, table), "no table `{}`", table.name);
     }
     for unit in ["µm", "kg·m²", "60 rpm", "15°"] {
         assert!(page.contains(unit), "{unit}");

@@ -25,18 +25,18 @@ pub struct Results {
 const UNKNOWN: Vec3 = Vec3::new(f64::NAN, f64::NAN, f64::NAN);
 
 impl Results {
-    fn known(&self, point: usize) -> Option<&MapPoint> {
+    fn computed(&self, point: usize) -> Option<&MapPoint> {
         self.points[point].as_ref().ok()
     }
 
     /// Tip without play, m; NaN without a pose.
     pub fn ideal_tip(&self, point: usize) -> Vec3 {
-        self.known(point).map_or(UNKNOWN, |own| own.ideal_tip)
+        self.computed(point).map_or(UNKNOWN, |own| own.ideal_tip)
     }
 
     /// Error at rest, m; NaN if there is none.
     pub fn settled(&self, point: usize) -> Vec3 {
-        self.known(point).and_then(|own| own.settled.as_ref().ok().copied()).unwrap_or(UNKNOWN)
+        self.computed(point).and_then(|own| own.settled.as_ref().ok().copied()).unwrap_or(UNKNOWN)
     }
 
     /// Largest error in the bounded directions, m: 0 where play moves the tip nowhere, NaN without a pose.
@@ -46,18 +46,18 @@ impl Results {
             None if own.farthest.iter().all(|farthest| farthest.error.is_some()) => Vec3::zeros(),
             None => UNKNOWN,
         };
-        self.known(point).map_or(UNKNOWN, of_point)
+        self.computed(point).map_or(UNKNOWN, of_point)
     }
 
     /// Direction of the largest error; NaN without one.
     pub fn largest_direction(&self, point: usize) -> Vec3 {
-        self.known(point).and_then(|own| own.largest.as_ref()).map_or(UNKNOWN, |largest| largest.direction)
+        self.computed(point).and_then(|own| own.largest.as_ref()).map_or(UNKNOWN, |largest| largest.direction)
     }
 
     /// Part of each ball joint in the support along the direction of the largest error, m; NaN without one.
     pub fn shares(&self, point: usize) -> Vec<f64> {
         let joints = self.map.scene().machine.ball_joints.len();
-        let own = self.known(point).and_then(|own| own.largest.as_ref());
+        let own = self.computed(point).and_then(|own| own.largest.as_ref());
         let mut shares = own.map_or_else(Vec::new, |largest| largest.shares.clone());
         shares.resize(joints, f64::NAN);
         shares
@@ -72,7 +72,7 @@ impl Results {
 
     /// Directions in which nothing bounds the error.
     pub fn unbounded(&self, point: usize) -> &[Vec3] {
-        self.known(point).map_or(&[], |own| &own.freedoms.unbounded)
+        self.computed(point).map_or(&[], |own| &own.freedoms.unbounded)
     }
 
     /// Most directions that a point has.

@@ -19,7 +19,7 @@ use super::failure::Failure;
 use crate::files::{OutputFile, PendingFile, same_file};
 
 /// Largest number of values in a file of rows: 4 GiB.
-const MOST_VALUES: u64 = 1 << 29;
+const MAX_VALUES: u64 = 1 << 29;
 
 /// File format of a run's rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +56,7 @@ pub struct RowsFile {
     format: Format,
     rows: OutputFile,
     /// Metadata of a CSV file, which cannot hold any: a plain reader takes every line after the header for data.
-    beside: Option<OutputFile>,
+    metadata: Option<OutputFile>,
 }
 
 impl RowsFile {
@@ -68,18 +68,18 @@ impl RowsFile {
         let format = Format::of(path)?;
         // The user's own name is claimed first, so that an error names it.
         let rows = OutputFile::claim(path, force)?;
-        let beside = match format {
-            Format::Csv => Some(claim_account(path, force)?),
+        let metadata = match format {
+            Format::Csv => Some(claim_metadata(path, force)?),
             Format::Json | Format::Npz => None,
         };
-        Ok(Self { format, rows, beside })
+        Ok(Self { format, rows, metadata })
     }
 
     /// The files that `option` with `path` writes, for [`check_distinct`].
     pub fn names(option: &str, path: &Path) -> Vec<(String, PathBuf)> {
         let mut names = vec![(option.to_owned(), path.to_owned())];
         if Format::of(path) == Ok(Format::Csv) {
-            names.push((format!("the .meta.json of {option}"), account_path(path)));
+            names.push((format!("the .meta.json of {option}"), metadata_path(path)));
         }
         names
     }
@@ -105,13 +105,13 @@ impl RowsFile {
             Format::Json => json::write(file, table, &meta),
             Format::Npz => npz::write(file, table, &meta),
         })?;
-        let Some(beside) = self.beside else {
+        let Some(metadata) = self.metadata else {
             return Ok(vec![rows]);
         };
         meta.insert("rows_crc32".into(), checksum.into());
-        let account = beside.fill(|file| json::write_meta(file, &meta))?;
+        let metadata_file = metadata.fill(|file| json::write_meta(file, &meta))?;
         // In this order, a kill between the two renames never leaves rows without metadata.
-        Ok(vec![account, rows])
+        Ok(vec![metadata_file, rows])
     }
 }
 
@@ -119,19 +119,19 @@ impl RowsFile {
 ///
 /// # Errors
 /// It exists without `force`, or its folder is unwritable.
-pub fn claim_account(path: &Path, force: bool) -> Result<OutputFile, Failure> {
-    let meta = account_path(path);
+pub fn claim_metadata(path: &Path, force: bool) -> Result<OutputFile, Failure> {
+    let meta = metadata_path(path);
     // Metadata left by a run that was killed between its two renames is worthless and may be replaced.
-    let alone = !path.exists() && is_account(&meta);
-    Ok(OutputFile::claim(&meta, force || alone)?)
+    let is_orphan = !path.exists() && is_metadata(&meta);
+    Ok(OutputFile::claim(&meta, force || is_orphan)?)
 }
 
-fn account_path(path: &Path) -> PathBuf {
+fn metadata_path(path: &Path) -> PathBuf {
     path.with_added_extension("meta.json")
 }
 
 /// Whether the file is metadata that this program wrote beside rows or a film.
-fn is_account(path: &Path) -> bool {
+fn is_metadata(path: &Path) -> bool {
     let meta = std::fs::read(path).unwrap_or_default();
     let meta: Json = serde_json::from_slice(&meta).unwrap_or_default();
     let checked = |key: &str| meta[key].is_string();
@@ -162,14 +162,14 @@ pub fn check_distinct(named: &[(String, PathBuf)]) -> Result<(), Failure> {
 /// Usage, with the numbers.
 pub fn check_size(rows: u64, columns: usize) -> Result<(), Failure> {
     let values = rows.saturating_mul(columns as u64);
-    if values <= MOST_VALUES {
+    if values <= MAX_VALUES {
         return Ok(());
     }
     Err(Failure::usage(format!(
         "{rows} rows of {columns} columns are {:.0} GiB of numbers, more than the limit of {} GiB; \
          choose a longer --every or a shorter --duration (at most {} rows)",
         values as f64 * 8.0 / f64::from(1u32 << 30),
-        MOST_VALUES * 8 / (1 << 30),
-        MOST_VALUES / columns as u64,
+        MAX_VALUES * 8 / (1 << 30),
+        MAX_VALUES / columns as u64,
     )))
 }

@@ -7,7 +7,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::labels;
 use crate::cli::args::RenderArguments;
-use crate::cli::output::{claim_account, write_meta};
+use crate::cli::output::{claim_metadata, write_meta};
 use crate::cli::{Failure, print};
 use crate::files::{Folder, MANIFEST, OutputFile, publish};
 use crate::film::{Film, FilmError, Format};
@@ -24,7 +24,7 @@ pub(in crate::cli) enum Destination {
         /// The file.
         file: OutputFile,
         /// Its metadata.
-        account: OutputFile,
+        metadata: OutputFile,
     },
 }
 
@@ -49,8 +49,8 @@ impl Destination {
         let rate = arguments.fps.unwrap_or_default();
         let film = Film::new(format, size, rate).map_err(unfilmable)?;
         let file = OutputFile::claim(path, arguments.force)?;
-        let account = claim_account(path, arguments.force)?;
-        Ok(Self::Film { film: Box::new(film), file, account })
+        let metadata = claim_metadata(path, arguments.force)?;
+        Ok(Self::Film { film: Box::new(film), file, metadata })
     }
 
     /// Adds frame `number` and returns its description for the manifest. `meta` is the provenance of all frames.
@@ -63,7 +63,7 @@ impl Destination {
         image: &Image,
         meta: &Map<String, Json>,
     ) -> Result<Map<String, Json>, Failure> {
-        let mut told = Map::new();
+        let mut entry = Map::new();
         match self {
             Self::Pictures(folder) => {
                 let labels = labels(meta);
@@ -71,16 +71,16 @@ impl Destination {
                 let png = image.png(&labels).map_err(|error| Failure::io(error.to_string()))?;
                 let file = format!("frame_{number:05}.png");
                 folder.write(&file, &png)?;
-                told.insert("file".into(), json!(file));
+                entry.insert("file".into(), json!(file));
             }
             Self::Film { film, .. } => {
                 film.add(&image.rgba).map_err(unfilmable)?;
                 // Checksum of the pixels before encoding, as in a PNG.
                 let checksum = format!("{:08x}", crc32fast::hash(&image.rgba));
-                told.insert("pixels_crc32".into(), json!(checksum));
+                entry.insert("pixels_crc32".into(), json!(checksum));
             }
         }
-        Ok(told)
+        Ok(entry)
     }
 
     /// Gives everything its final name.
@@ -99,14 +99,14 @@ impl Destination {
                 let place = arguments.out.as_deref().unwrap_or(Path::new(""));
                 print(&format!("{written} and {MANIFEST} in {}\n", place.display()))
             }
-            Self::Film { film, file, account } => {
+            Self::Film { film, file, metadata } => {
                 let bytes = film.finish().map_err(unfilmable)?;
                 let checksum = format!("{:08x}", crc32fast::hash(&bytes));
                 manifest.insert("film_crc32".into(), json!(checksum));
                 let place = file.path().to_owned();
-                let account = account.fill(|out| write_meta(out, &manifest))?;
+                let metadata = metadata.fill(|out| write_meta(out, &manifest))?;
                 let film = file.fill(|out| out.write_all(&bytes))?;
-                publish(vec![account, film])?;
+                publish(vec![metadata, film])?;
                 print(&format!("{written} in {}\n", place.display()))
             }
         }

@@ -108,12 +108,12 @@ fn fill(
             break;
         }
         let image = studio.draw(instant, times.time_scale)?;
-        let mut told = destination.add(number, &image, &meta)?;
-        told.insert("time_s".into(), json!(instant));
-        told.insert("state_time_s".into(), json!(studio.simulation().time()));
+        let mut entry = destination.add(number, &image, &meta)?;
+        entry.insert("time_s".into(), json!(instant));
+        entry.insert("state_time_s".into(), json!(studio.simulation().time()));
         let hash = hash_text(studio.simulation().state_hash());
-        told.insert("state_hash".into(), json!(hash));
-        frames[number] = Json::Object(told);
+        entry.insert("state_hash".into(), json!(hash));
+        frames[number] = Json::Object(entry);
         bar.set_position(done as u64 + 1);
     }
     bar.finish_and_clear();

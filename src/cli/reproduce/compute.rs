@@ -13,12 +13,12 @@ use crate::cli::{Failure, warn};
 use crate::files::{create_dir_all, remove_dir};
 
 /// The finished blocks: one file per sweep, in a folder of their own.
-pub(super) struct Kept {
+pub(super) struct FinishedBlocks {
     folder: PathBuf,
     parts: Vec<Partial>,
 }
 
-impl Kept {
+impl FinishedBlocks {
     /// Opens or creates the folder beside `out`.
     ///
     /// # Errors
@@ -38,15 +38,15 @@ impl Kept {
     }
 
     /// The folder, if an earlier run left anything there.
-    pub(super) fn begun(&self) -> Option<&Path> {
-        self.parts.iter().any(Partial::is_begun).then_some(&self.folder)
+    pub(super) fn resumed_folder(&self) -> Option<&Path> {
+        self.parts.iter().any(Partial::has_finished_blocks).then_some(&self.folder)
     }
 
     /// The error of a report interrupted by Ctrl-C.
     pub(super) fn interrupted(&self) -> Failure {
         let folder = self.folder.display();
-        let words = format!("interrupted; no report was written, and the same command resumes from {folder}");
-        Failure::new(Failure::INTERRUPTED, words)
+        let message = format!("interrupted; no report was written, and the same command resumes from {folder}");
+        Failure::new(Failure::INTERRUPTED, message)
     }
 
     /// Removes the folder once the report has its content.
@@ -58,39 +58,44 @@ impl Kept {
     }
 }
 
-/// Runs the jobs of `work` that `kept` lacks; their outcomes depend neither on the number of threads nor on interruptions.
+/// Runs the jobs of `work` that `finished` lacks; their outcomes depend neither on the number of threads nor on interruptions.
 ///
 /// # Errors
 /// Ctrl-C; the file system; the first failed run in job order, among those started.
-pub(super) fn compute(work: Agenda, kept: &mut Kept, threads: usize, bar: &ProgressBar) -> Result<Report, Failure> {
+pub(super) fn compute(
+    work: Agenda,
+    finished: &mut FinishedBlocks,
+    threads: usize,
+    bar: &ProgressBar,
+) -> Result<Report, Failure> {
     let mut outcomes: Vec<Option<Outcome>> = (0..work.jobs()).map(|_| None).collect();
-    let mut blocks = kept.parts.iter().map(Partial::blocks).collect::<Result<Vec<_>, _>>()?;
+    let mut blocks = finished.parts.iter().map(Partial::blocks).collect::<Result<Vec<_>, _>>()?;
     for (job, outcome) in outcomes.iter_mut().enumerate() {
         *outcome = work.block(job).and_then(|(s, b)| Some(Outcome::Block(blocks[s].remove(&b)?)));
         bar.inc(if outcome.is_some() { work.length(job).round() as u64 } else { 0 });
     }
     bar.reset_eta();
-    let left: Vec<usize> = (0..work.jobs()).filter(|&job| outcomes[job].is_none()).collect();
-    let run = |job: usize, go_on: &dyn Fn() -> bool| {
-        let mut told = 0.0;
+    let remaining: Vec<usize> = (0..work.jobs()).filter(|&job| outcomes[job].is_none()).collect();
+    let run = |job: usize, may_continue: &dyn Fn() -> bool| {
+        let mut reported = 0.0;
         let outcome = work.run(job, |now| {
-            bar.inc((now - told) as u64);
-            told += f64::floor(now - told);
-            go_on()
+            bar.inc((now - reported) as u64);
+            reported += f64::floor(now - reported);
+            may_continue()
         });
-        bar.inc((work.length(job) - told).max(0.0).round() as u64);
+        bar.inc((work.length(job) - reported).max(0.0).round() as u64);
         match outcome {
             Err(RunError { error, .. }) if matches!(*error, ResponseError::Cancelled) => None,
             outcome => Some(outcome.map_err(|error| Failure::new(Failure::DIVERGED, error.to_string()))),
         }
     };
-    run_jobs(&left, threads, run, |job, outcome| {
+    run_jobs(&remaining, threads, run, |job, outcome| {
         if let (Some((s, b)), Outcome::Block(records)) = (work.block(job), &outcome) {
-            kept.parts[s].append(b, records)?;
+            finished.parts[s].append(b, records)?;
         }
         outcomes[job] = Some(outcome);
         Ok(())
     })?;
     let outcomes: Option<Vec<Outcome>> = outcomes.into_iter().collect();
-    outcomes.map(|outcomes| work.gather(outcomes)).ok_or_else(|| kept.interrupted())
+    outcomes.map(|outcomes| work.gather(outcomes)).ok_or_else(|| finished.interrupted())
 }

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use serde_json::{Map, Value as Json, json};
 
-use self::compute::Kept;
+use self::compute::FinishedBlocks;
 use super::args::ReproduceArguments;
 use super::tables::lines;
 use super::{Failure, interrupt, print, progress, threads, warn};
@@ -35,28 +35,28 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
 fn make(folder: Folder, arguments: &ReproduceArguments) -> Result<Report, Failure> {
     let extent = if arguments.quick { Extent::QUICK } else { Extent::FULL };
     let work = Agenda::new(extent);
-    let mut kept = Kept::open(&arguments.out, &work)?;
-    if let Some(begun) = kept.begun().filter(|_| !arguments.quiet) {
-        warn(&format!("resuming where {} stopped", begun.display()));
+    let mut finished = FinishedBlocks::open(&arguments.out, &work)?;
+    if let Some(folder) = finished.resumed_folder().filter(|_| !arguments.quiet) {
+        warn(&format!("resuming where {} stopped", folder.display()));
     }
     let length = (0..work.jobs()).map(|job| work.length(job)).sum::<f64>();
     let bar = progress::bar(!arguments.quiet, length.ceil() as u64);
-    let report = compute::compute(work, &mut kept, threads(arguments.threads), &bar);
+    let report = compute::compute(work, &mut finished, threads(arguments.threads), &bar);
     bar.finish_and_clear();
     let report = report?;
-    fill(&folder, &report, &kept)?;
+    fill(&folder, &report, &finished)?;
     folder.finish(meta(&report))?;
-    kept.remove();
+    finished.remove();
     Ok(report)
 }
 
 /// Writes all files into `folder`.
-fn fill(folder: &Folder, report: &Report, kept: &Kept) -> Result<(), Failure> {
+fn fill(folder: &Folder, report: &Report, finished: &FinishedBlocks) -> Result<(), Failure> {
     data::write(folder, report)?;
     let mut pictures = page::Pictures::new();
     for (name, sheet) in report.complete().into_iter().flat_map(figures::all) {
         if interrupt::is_requested() {
-            return Err(kept.interrupted());
+            return Err(finished.interrupted());
         }
         let drawing = |error: crate::chart::SheetError| Failure::io(format!("{name}: {error}"));
         let svg = sheet.svg().map_err(drawing)?;

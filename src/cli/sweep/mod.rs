@@ -41,7 +41,7 @@ use crate::scene::{Scene, insert_texts};
 use crate::simulate::Doubt;
 
 /// Steps between two checks for Ctrl-C.
-const STEPS_BETWEEN_LOOKS: u32 = 4096;
+const STEPS_BETWEEN_CHECKS: u32 = 4096;
 
 /// Runs `sweep`.
 ///
@@ -181,7 +181,7 @@ fn axis_meta(scene: &Scene, axis: &Axis) -> Json {
 }
 
 /// Largest number of points examined for warnings, spread over the ranges, so that the check stays fast.
-const MOST_WARNED: usize = 64;
+const MAX_EXAMINED: usize = 64;
 
 /// Kind of a warning; each kind is reported once.
 #[derive(PartialEq, Eq, Hash)]
@@ -195,7 +195,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
     let mut all = Vec::new();
     let mut kinds = HashSet::new();
     let last = sweep.design().points() - 1;
-    let step = sweep.design().points().div_ceil(MOST_WARNED);
+    let step = sweep.design().points().div_ceil(MAX_EXAMINED);
     for point in (0..last).step_by(step).chain([last]) {
         let Ok(scene) = sweep.design().scene(sweep.scene(), point) else {
             continue;
@@ -242,17 +242,17 @@ pub(super) fn compute(
     partial: &mut Partial,
     bar: &ProgressBar,
 ) -> Result<(), Failure> {
-    let work = |b: usize, go_on: &dyn Fn() -> bool| {
+    let work = |b: usize, may_continue: &dyn Fn() -> bool| {
         let mut block = sweep.begin(b);
-        let mut told = 0;
+        let mut reported = 0;
         while !block.is_done() {
-            if !go_on() {
+            if !may_continue() {
                 return None;
             }
-            block.advance(STEPS_BETWEEN_LOOKS);
+            block.advance(STEPS_BETWEEN_CHECKS);
             let finished = block.finished().len();
-            bar.inc((finished - told) as u64);
-            told = finished;
+            bar.inc((finished - reported) as u64);
+            reported = finished;
         }
         Some(Ok(block.records()))
     };

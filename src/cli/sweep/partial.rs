@@ -35,7 +35,7 @@ pub struct Partial {
     done: Vec<bool>,
     record: usize,
     /// Index of each point in the output; `usize::MAX` for a point of another shard.
-    place: Vec<usize>,
+    output_index: Vec<usize>,
 }
 
 impl Partial {
@@ -61,11 +61,11 @@ impl Partial {
             Err(TryLockError::Error(error)) => log::warn!("no lock: {error}"),
         }
         let design = sweep.design();
-        let mut place = vec![usize::MAX; design.points()];
+        let mut output_index = vec![usize::MAX; design.points()];
         let mut next = 0;
         for &b in blocks {
             for point in design.block(b) {
-                place[point] = next;
+                output_index[point] = next;
                 next += 1;
             }
         }
@@ -76,7 +76,7 @@ impl Partial {
             points: (0..design.blocks()).map(|b| design.block(b)).collect(),
             done: vec![false; design.blocks()],
             record: sweep.layout().record_length(),
-            place,
+            output_index,
             path,
         };
         partial.read(&settings)?;
@@ -94,7 +94,7 @@ impl Partial {
     }
 
     /// Whether any block is done.
-    pub fn is_begun(&self) -> bool {
+    pub fn has_finished_blocks(&self) -> bool {
         self.done.contains(&true)
     }
 
@@ -235,7 +235,7 @@ impl Partial {
         let expected = usize::try_from(b)
             .ok()
             .filter(|&b| b < self.points.len())
-            .filter(|&b| self.place[self.points[b].start] != usize::MAX)
+            .filter(|&b| self.output_index[self.points[b].start] != usize::MAX)
             .map(|b| (b, self.points[b].len() * self.record));
         let (block, expected) = expected.ok_or_else(foreign)?;
         let Some(values) = self.number(reader)? else {
@@ -292,7 +292,7 @@ impl Source for Partial {
             let b = self.read_block(&mut reader, &mut records)?;
             let points = self.points[b].clone();
             for (point, record) in points.zip(records.chunks_exact(self.record)) {
-                let at = self.place[point] * length;
+                let at = self.output_index[point] * length;
                 out[at..at + length].copy_from_slice(&record[offset..offset + length]);
             }
         }

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::archive::{Archive, Source};
 use super::{csv, parquet};
 use crate::cli::Failure;
-use crate::cli::output::{ChecksumWriter, claim_account, write_meta};
+use crate::cli::output::{ChecksumWriter, claim_metadata, write_meta};
 use crate::files::{OutputFile, publish};
 
 /// The file to be written, claimed before the sweep runs.
@@ -46,7 +46,7 @@ impl Target {
         }
         let file = OutputFile::claim(path, force)?;
         let format = match &*ending {
-            "csv" => Format::Csv(claim_account(path, force)?),
+            "csv" => Format::Csv(claim_metadata(path, force)?),
             "parquet" => Format::Parquet,
             _ => Format::Npz,
         };
