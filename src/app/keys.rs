@@ -129,7 +129,13 @@ pub const BINDINGS: [Binding; 42] = [
     bind(Group::Window, Key::Questionmark, Action::Help, "?", "This list"),
     bind(Group::Window, Key::Slash, Action::Help, "", ""),
     bind(Group::Window, Key::F1, Action::Help, "", ""),
-    bind(Group::Window, Key::Escape, Action::Close, "Esc", "Close"),
+    bind(
+        Group::Window,
+        Key::Escape,
+        Action::Close,
+        "Esc",
+        "Leave a text field; otherwise close the menu, dialog or message; otherwise the presentation or microscope",
+    ),
 ];
 
 /// Action of `key`.
@@ -204,6 +210,9 @@ enum Finger {
 /// Leaves a touch that started on the slider `own` to the enclosing scroll area, unless it moves sideways. `place`: ID of the
 /// stored state. Call it before adding the slider; returns whether the slider may receive the touch.
 fn follow_finger(ui: &Ui, place: Id, own: Id) -> bool {
+/// Key under which is stored whether a text field had the focus in the previous frame.
+const TYPING: &str = "text field with the focus";
+
     let (touched, origin, way) = ui.input(|input| {
         let pointer = &input.pointer;
         let way = pointer.total_drag_delta().unwrap_or_default();
@@ -279,7 +288,11 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
 /// Actions of the keys pressed since the last frame. An active text field captures all keys, a focused slider the arrows, and any
 /// other focused control also the space bar.
 pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
-    if ctx.text_edit_focused() {
+    // Esc has already taken the focus from a text field, and does nothing else.
+    let typing = ctx.text_edit_focused();
+    let before = Id::unique(TYPING).with(ctx.viewport_id());
+    let typed = ctx.data_mut(|data| std::mem::replace(data.get_temp_mut_or_default::<bool>(before), typing));
+    if typing || (typed && ctx.input(|input| input.key_pressed(Key::Escape))) {
         return Vec::new();
     }
     let focused = ctx.memory(egui::Memory::focused);

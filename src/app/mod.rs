@@ -943,18 +943,24 @@ impl App {
             Action::Help => {
                 self.dialog = if self.dialog == Some(Dialog::Help) { None } else { Some(Dialog::Help) };
             }
-            Action::Close => {
-                let told = self.problem.is_some() || self.is_under_way() || egui::Popup::is_any_open(ctx);
-                if self.dialog.take().is_none() {
-                    self.cancel_replay();
-                    self.problem = None;
-                    if !told && self.is_presenting() {
-                        self.present(ctx, false);
-                    } else if !told {
-                        self.microscope.set_open(false);
-                    }
-                }
-            }
+            Action::Close => self.close_innermost(ctx),
+        }
+    }
+
+    /// Closes what lies innermost: a menu, the dialog, what is under way, the message, the presentation, the microscope.
+    fn close_innermost(&mut self, ctx: &egui::Context) {
+        // A menu and a list close themselves.
+        if egui::Popup::is_any_open(ctx) || self.dialog.take().is_some() {
+            return;
+        }
+        if self.is_under_way() {
+            self.cancel_replay();
+        } else if self.problem.take().is_some() {
+            // Only the message closes.
+        } else if self.is_presenting() {
+            self.present(ctx, false);
+        } else {
+            self.microscope.set_open(false);
         }
     }
 

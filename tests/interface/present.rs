@@ -200,3 +200,70 @@ fn a_presentation_shows_what_is_stored() {
         compare_window(&mut harness, name);
     }
 }
+
+#[test]
+fn esc_leaves_what_lies_innermost_and_only_then_microscope_and_presentation() {
+    let mut harness = sized("spcmm", SCREEN.into(), egui::Theme::Light);
+    let esc = |harness: &mut Harness<'_, App>| {
+        harness.key_press(Key::Escape);
+        harness.run();
+    };
+    let shows = |harness: &Harness<'_, App>| harness.state().microscope().is_open();
+    harness.state_mut().microscope_mut().set_open(true);
+    harness.run();
+    // A text field.
+    harness.get_by_role_and_label(Role::TextInput, "Clearance").focus();
+    harness.run();
+    assert!(harness.ctx.text_edit_focused());
+    esc(&mut harness);
+    assert!(!harness.ctx.text_edit_focused() && shows(&harness));
+    // A menu.
+    click(&mut harness, "Choose plots");
+    esc(&mut harness);
+    assert!(harness.query_by_label("Search channels").is_none() && shows(&harness));
+    // A list in a dialog, then the dialog.
+    click(&mut harness, "Save");
+    click(&mut harness, "Film…");
+    harness.get_by_role_and_label(Role::ComboBox, "Size of the film").click();
+    harness.run();
+    esc(&mut harness);
+    assert!(harness.query_by_label("Make film").is_some());
+    esc(&mut harness);
+    assert!(harness.query_by_label("Make film").is_none() && shows(&harness));
+    // A message.
+    let ctx = harness.ctx.clone();
+    harness.state_mut().open_link(&ctx, "#scene=nowhere").expect_err("no such scene");
+    harness.run();
+    esc(&mut harness);
+    assert!(harness.query_by_label("Dismiss").is_none() && shows(&harness));
+    esc(&mut harness);
+    assert!(!shows(&harness));
+    // The list of time scales in a presentation.
+    f5(&mut harness, SCREEN);
+    harness.get_by_role_and_label(Role::ComboBox, "Time scale preset").click();
+    harness.run();
+    esc(&mut harness);
+    assert!(harness.state().is_presenting());
+    esc(&mut harness);
+    assert!(!harness.state().is_presenting());
+}
+
+#[test]
+fn nothing_beside_the_clock_moves_as_its_digits_change() {
+    for presents in [false, true] {
+        let mut harness = sized("spcmm", SCREEN.into(), egui::Theme::Light);
+        if presents {
+            f5(&mut harness, SCREEN);
+        }
+        let places = |harness: &Harness<'_, App>| {
+            ["Reset", "Play", "Step", "Next impact", "Timeline, s", "Time scale preset"]
+                .map(|name| harness.get_by_label(name).rect())
+        };
+        let before = places(&harness);
+        for time in [0.9e-6, 3.3e-6, 0.9999e-3, 1e-3, 9.9999e-3, 10.0001e-3, 111.1111e-3] {
+            harness.state_mut().player_mut().run_to(time);
+            harness.run();
+            assert_eq!(places(&harness), before, "{time}");
+        }
+    }
+}
