@@ -192,9 +192,13 @@ fn help(ui: &mut Ui) -> bool {
     ui.spacing_mut().interact_size.y = 18.0;
     ui.spacing_mut().item_spacing.y = 4.0;
     let columns: &[&[Group]] = match ui.available_width() {
-        width if width >= 3.0 * COLUMN => &[&[Group::Run, Group::Window], &[Group::Picture], &[Group::Pointer]],
-        width if width >= 2.0 * COLUMN => &[&[Group::Run, Group::Picture], &[Group::Window, Group::Pointer]],
-        _ => &[&[Group::Run, Group::Picture, Group::Window, Group::Pointer]],
+        width if width >= 3.0 * COLUMN => {
+            &[&[Group::Run, Group::Window], &[Group::Picture, Group::Focus], &[Group::Pointer]]
+        }
+        width if width >= 2.0 * COLUMN => {
+            &[&[Group::Run, Group::Picture, Group::Focus], &[Group::Window, Group::Pointer]]
+        }
+        _ => &[&[Group::Run, Group::Picture, Group::Window, Group::Pointer, Group::Focus]],
     };
     ui.columns(columns.len(), |uis| {
         for (ui, groups) in uis.iter_mut().zip(columns) {

@@ -126,7 +126,7 @@ pub const BINDINGS: [Binding; 42] = [
     ),
     bind(Group::Window, Key::PageUp, Action::TurnPage { forward: false }, "", ""),
     bind(Group::Window, Key::T, Action::Theme, "T", "Light or dark"),
-    bind(Group::Window, Key::Questionmark, Action::Help, "?", "This list"),
+    bind(Group::Window, Key::Questionmark, Action::Help, "?, F1", "This list"),
     bind(Group::Window, Key::Slash, Action::Help, "", ""),
     bind(Group::Window, Key::F1, Action::Help, "", ""),
     bind(
@@ -144,7 +144,7 @@ pub fn action(key: Key) -> Option<Action> {
 }
 
 /// Mouse and touch gestures for the overlay.
-pub const POINTER: [(&str, &str); 13] = [
+pub const POINTER: [(&str, &str); 10] = [
     ("Drag beside the machine, one finger", "Turn the view"),
     ("Drag on a body; with a finger, hold first", "Pull it by a spring; with shift along the line of sight"),
     ("Right or middle drag, shift-drag, two fingers", "Pan the view"),
@@ -153,11 +153,19 @@ pub const POINTER: [(&str, &str); 13] = [
     ("Click, tap on a ball joint", "Centre it and show it under the microscope"),
     ("Double-click, double tap", "Follow a body or joint; on the ground: stop following"),
     ("Double-click, double tap on the lowest bar", "Presentation, as F5"),
-    ("Ctrl +, Ctrl -, Ctrl 0", "Larger, smaller and default type"),
-    ("Ctrl Z, Ctrl Shift Z", "Undo and redo a change of a parameter or of the view"),
     ("Drop a file", "Open a scene"),
     ("Paste", "Open a link"),
-    ("Arrows after a drag on a slider", "Move that slider"),
+];
+
+/// Keys of the control with the focus, and key combinations, for the overlay.
+pub const FOCUS: [(&str, &str); 7] = [
+    ("Tab, Shift Tab", "Next and previous control, from Play on; a drag on a slider also gives it the focus"),
+    ("Arrows on a slider", "Move that slider"),
+    ("Left, right arrow on a plot", "Move its cursor, which reads all curves at an instant"),
+    ("Left, right arrow on the timeline", "Show the instant a hundredth of the range earlier or later"),
+    ("Space, Enter", "Press the button with the focus"),
+    ("Ctrl +, Ctrl -, Ctrl 0", "Larger, smaller and default type"),
+    ("Ctrl Z, Ctrl Shift Z, Ctrl Y", "Undo and redo a change of a parameter or of the view"),
 ];
 
 /// Groups of the overlay.
@@ -171,6 +179,8 @@ pub enum Group {
     Window,
     /// Mouse and touch.
     Pointer,
+    /// The control with the focus, and combinations.
+    Focus,
 }
 
 impl Group {
@@ -181,19 +191,27 @@ impl Group {
             Self::Picture => "Picture",
             Self::Window => "Window",
             Self::Pointer => "Mouse and touch",
+            Self::Focus => "Control with the focus, combinations",
         }
     }
 
     /// Rows of the group: key or gesture, and its action.
     pub fn rows(self) -> impl Iterator<Item = (&'static str, &'static str)> {
         let keys = BINDINGS.iter().filter(move |b| !b.written.is_empty() && b.group == self);
-        let pointer = POINTER.into_iter().filter(move |_| self == Self::Pointer);
-        keys.map(|b| (b.written, b.help)).chain(pointer)
+        let others: &[_] = match self {
+            Self::Pointer => &POINTER,
+            Self::Focus => &FOCUS,
+            _ => &[],
+        };
+        keys.map(|b| (b.written, b.help)).chain(others.iter().copied())
     }
 }
 
 /// Key under which the focused slider's ID is stored.
 const SLIDER: &str = "slider with the focus";
+
+/// Key under which is stored whether a text field had the focus in the previous frame.
+const TYPING: &str = "text field with the focus";
 
 /// Finger travel that determines the direction of a drag, points.
 const SLACK: f32 = 8.0;
@@ -210,9 +228,6 @@ enum Finger {
 /// Leaves a touch that started on the slider `own` to the enclosing scroll area, unless it moves sideways. `place`: ID of the
 /// stored state. Call it before adding the slider; returns whether the slider may receive the touch.
 fn follow_finger(ui: &Ui, place: Id, own: Id) -> bool {
-/// Key under which is stored whether a text field had the focus in the previous frame.
-const TYPING: &str = "text field with the focus";
-
     let (touched, origin, way) = ui.input(|input| {
         let pointer = &input.pointer;
         let way = pointer.total_drag_delta().unwrap_or_default();
@@ -339,6 +354,33 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_overlay_names_every_key_that_acts() {
+        let mut written = "";
+        for binding in &BINDINGS {
+            if !binding.written.is_empty() {
+                written = binding.written;
+            }
+            let name = match binding.key {
+                Key::ArrowRight => "Right arrow",
+                Key::ArrowLeft => "Left arrow",
+                Key::ArrowUp => "Up arrow",
+                Key::ArrowDown => "Down arrow",
+                // One key with shift and without.
+                Key::Plus | Key::Equals => "+",
+                Key::Questionmark | Key::Slash => "?",
+                Key::Minus => "-",
+                Key::Comma => ",",
+                Key::Period => ".",
+                Key::PageDown => "Page Down",
+                Key::PageUp => "Page Up",
+                Key::Escape => "Esc",
+                other => other.name(),
+            };
+            assert!(written.split(", ").chain(written.split(" and ")).any(|part| part == name), "{name}: {written}");
+        }
+    }
 
     #[test]
     fn no_key_does_two_things_and_every_action_is_listed() {

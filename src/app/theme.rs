@@ -229,7 +229,17 @@ mod tests {
         output.textures_delta.clear();
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
         let mut shown = vec![crate::scene::reference_page()];
-        for folder in ["src/app", "assets/scenes", "assets/benchmarks", "assets/lessons"] {
+        for folder in [
+            "src/app",
+            "src/session",
+            "src/view",
+            "crates/analysis/src",
+            "crates/physics/src/machine",
+            "crates/physics/src/simulate",
+            "assets/scenes",
+            "assets/benchmarks",
+            "assets/lessons",
+        ] {
             texts(&root.join(folder), &mut shown);
         }
         let shown: std::collections::BTreeSet<char> = shown.iter().flat_map(|text| text.chars()).collect();
