@@ -41,6 +41,8 @@ const COLUMNS: [Column; 9] = [
 #[derive(Default)]
 pub struct ImpactList {
     open: bool,
+    /// Height of the window without its rows in the latest frame, points.
+    frame: f32,
 }
 
 /// Formats a duration to three digits.
@@ -102,12 +104,12 @@ fn row(ui: &mut Ui, mut cell: impl FnMut(&mut Ui, usize)) {
 }
 
 impl ImpactList {
-    /// The table. Returns the instant of a clicked row, s.
-    fn table(ui: &mut Ui, player: &Player) -> Option<f64> {
+    /// The table with rows up to `height`, points. Returns the instant of a clicked row, s, and the height of the rows.
+    fn table(ui: &mut Ui, player: &Player, height: f32) -> (Option<f64>, f32) {
         let (shown, known) = (player.pacer.shown(), player.reached());
         let record = player.impact_record();
         let count = record.until(known).count();
-        let mut asked = None;
+        let (mut asked, mut of_rows) = (None, 0.0);
         ui.spacing_mut().interact_size.y = ROW;
         ui.spacing_mut().item_spacing.y = 0.0;
         let width = COLUMNS.iter().map(|(_, width, _)| width + 4.0).sum::<f32>();
@@ -122,8 +124,9 @@ impl ImpactList {
                 ui.label(RichText::new("No impact has ended yet").weak());
                 return;
             }
-            let place = ScrollArea::vertical().id_salt("impacts").auto_shrink([false, true]).max_height(ROWS * ROW);
-            place.show_rows(ui, ROW, count, |ui, rows| {
+            let place = ScrollArea::vertical().id_salt("impacts").auto_shrink([false, true]);
+            let place = place.max_height(height).min_scrolled_height(height);
+            let seen = place.show_rows(ui, ROW, count, |ui, rows| {
                 let seen = record.until(known).rev().skip(rows.start).take(rows.len());
                 for (number, own, impact) in seen {
                     let words = cells(player, number, impact);
@@ -131,7 +134,8 @@ impl ImpactList {
                     let top = ui.cursor().min;
                     let place = egui::Rect::from_min_size(top, vec2(width, ROW));
                     let response = ui.interact(place, ui.scope_id().with(("impact", number)), Sense::click());
-                    if response.hovered() {
+                    let hovered = response.hovered();
+                    if hovered {
                         ui.painter().rect_filled(place, 3.0, ui.visuals().widgets.hovered.weak_bg_fill);
                     }
                     let all = format!("Impact {}", words.join(", "));
@@ -141,19 +145,20 @@ impl ImpactList {
                     }
                     row(ui, |ui, index| {
                         let mut text = RichText::new(&words[index]).small();
-                        if later {
+                        if later && !hovered {
                             text = text.weak();
                         }
                         ui.add(Label::new(text).truncate().selectable(false));
                     });
                 }
             });
+            of_rows = seen.inner_rect.height();
         });
         if record.dropped() > 0 {
             let words = format!("The first {} impacts are no longer stored", record.dropped());
             ui.label(RichText::new(words).small().weak());
         }
-        asked
+        (asked, of_rows)
     }
 }
 
@@ -175,21 +180,26 @@ impl App {
         );
     }
 
-    /// The list, in a window over the lower left of the picture.
+    /// The list, in a window over the lower left of the picture, never over the transport below it.
     pub(super) fn impact_list_ui(&mut self, ctx: &egui::Context) {
         let (mut open, mut asked, mut save) = (self.impact_list.open, None, false);
         let area = self.picture_rect;
+        let room = egui::Rect::from_x_y_ranges(ctx.content_rect().x_range(), area.y_range());
+        let rows = ((room.height() - self.impact_list.frame) / ROW).floor().clamp(1.0, ROWS);
+        let mut of_rows = 0.0;
         let free = !self.is_under_way() && self.dialog.is_none();
-        egui::Window::new("Impacts")
+        let shown = egui::Window::new("Impacts")
+            .id(egui::Id::unique("impact list"))
             .open(&mut open)
             .resizable([true, false])
             .collapsible(false)
             .pivot(egui::Align2::LEFT_BOTTOM)
             .default_pos(area.left_bottom() + vec2(10.0, -10.0))
             .default_width((area.width() - 40.0).clamp(220.0, 680.0))
+            .constrain_to(room)
             .enabled(free)
             .show(ctx, |ui| {
-                asked = ImpactList::table(ui, &self.player);
+                (asked, of_rows) = ImpactList::table(ui, &self.player, rows * ROW);
                 ui.add_space(4.0);
                 save = ui
                     .button("Save impacts…")
@@ -197,6 +207,13 @@ impl App {
                     .clicked();
             });
         self.impact_list.open = open;
+        if let Some(shown) = shown {
+            let frame = shown.response.rect.height() - of_rows;
+            if (frame - self.impact_list.frame).abs() > 0.5 {
+                self.impact_list.frame = frame;
+                ctx.request_repaint();
+            }
+        }
         if save {
             self.save_impacts();
         }

@@ -91,6 +91,47 @@ fn the_list_has_the_impacts_of_the_run_and_a_row_goes_to_its_peak() {
 }
 
 #[test]
+fn the_list_lies_above_the_transport_in_windows_of_every_size() {
+    for (size, presents) in [
+        ([1280.0, 800.0], false),
+        ([1280.0, 720.0], true),
+        ([800.0, 500.0], false),
+        ([390.0, 844.0], false),
+        ([844.0, 390.0], false),
+        ([640.0, 360.0], false),
+    ] {
+        let mut harness = sized("spcmm", size, egui::Theme::Light);
+        harness.state_mut().player_mut().run_to(40e-3);
+        harness.run();
+        if presents {
+            harness.key_press(Key::F5);
+            harness.step();
+            harness.set_size(egui::Vec2::from(size) / harness.ctx.zoom_factor());
+            harness.run();
+        }
+        harness.key_press(Key::I);
+        harness.run();
+        let list = |harness: &egui_kittest::Harness<'_, App>| {
+            let list = harness.ctx.memory(|memory| memory.area_rect(egui::Id::unique("impact list")));
+            list.expect("the list")
+        };
+        let bar = harness.get_by_label("Transport bar").rect();
+        let before = list(&harness);
+        assert!(before.bottom() <= bar.top() && before.top() >= 0.0, "{size:?}: {before:?}, {bar:?}");
+        // Nor can it be drawn there.
+        let title = before.center_top() + egui::vec2(0.0, 20.0);
+        harness.drag_at(title);
+        harness.step();
+        harness.hover_at(title + egui::vec2(0.0, 300.0));
+        harness.step();
+        harness.drop_at(title + egui::vec2(0.0, 300.0));
+        harness.run();
+        let after = list(&harness);
+        assert!(after.bottom() <= bar.top(), "{size:?}: {after:?}, {bar:?}");
+    }
+}
+
+#[test]
 fn the_badge_at_an_impact_says_what_the_run_recorded() {
     for presenting in [false, true] {
         let mut harness = sized("spcmm", [1280.0, 720.0], egui::Theme::Light);
