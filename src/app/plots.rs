@@ -18,6 +18,7 @@ use crate::scene::Scene;
 use crate::session::link::settings::PlotWindow;
 use crate::simulate::{Bin, ChannelInfo, MAX_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
 
+mod cut;
 #[cfg(not(target_arch = "wasm32"))]
 mod sheet;
 
@@ -65,6 +66,8 @@ pub struct Plots {
     zoomed: Option<(f64, f64)>,
     /// ID of the focused plot, and its cursor position set by arrow keys, s.
     cursor: Option<(Id, f64)>,
+    /// Whether tall first peaks are cut; `None` if only brief ones are.
+    cut: Option<bool>,
 }
 
 /// Selection of the plots: quantities, channels, time window, hidden lines.
@@ -223,6 +226,7 @@ impl Plots {
             places: Vec::new(),
             zoomed: None,
             cursor: None,
+            cut: None,
         }
     }
 
@@ -501,6 +505,11 @@ impl Plots {
             let edges = bands.iter().flat_map(|band| band.low.iter().chain(&band.high));
             edges.fold(None, |all, &edge| widened(all, edge, edge))
         };
+        let first_peaks = (kind == PlotKind::FromZero && self.zoomed.is_none())
+            .then(|| cut::peaks(self.traces.iter().chain(self.before.iter().flatten())))
+            .flatten();
+        let cut_off = first_peaks.filter(|peaks| self.cut.unwrap_or(peaks.brief));
+        let values = values.map(|(least, most)| (least, cut_off.map_or(most, |peaks| peaks.most() / size)));
         let (least, greatest) = range(values, from_zero);
         self.readings.resize_with(members.len(), Vec::new);
         for (trace, readings) in self.traces.iter().zip(&mut self.readings) {
@@ -645,6 +654,11 @@ impl Plots {
                 transform.position_from_point(&point).x
             };
             let frame = *transform.frame();
+            if cut_off.is_some() {
+                for trace in self.before.iter().flatten().chain(&self.traces) {
+                    cut::mark(ui, frame, trace, greatest * size, x);
+                }
+            }
             if (from..to).contains(&now)
                 && (player.has_future() || self.zoomed.is_some() || player.abandoned_future().is_some())
             {
@@ -666,6 +680,12 @@ impl Plots {
                 let words = painter.layout_no_wrap(words, font, colour);
                 let left = (x(time) + 4.0).min(frame.right() - words.size().x);
                 painter.galley(egui::pos2(left, frame.top()), words, colour);
+            }
+            if let Some(peaks) = first_peaks {
+                let cut = cut_off.is_some();
+                if cut::switch(ui, frame, &panel.name(), peaks.largest, panel.unit, cut) {
+                    self.cut = Some(!cut);
+                }
             }
             asked
         })

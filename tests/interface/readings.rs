@@ -8,7 +8,7 @@ use egui_kittest::{
     Harness,
     kittest::{NodeT as _, Queryable as _},
 };
-use jointplay::app::App;
+use jointplay::app::{App, PlotWindow};
 use jointplay::scene::LiveScene;
 use jointplay::simulate::{Frame, Quantity};
 
@@ -118,4 +118,41 @@ fn the_box_under_the_pointer_has_the_values_of_the_run_s_rows() {
         told.push(at);
     }
     assert!(told.windows(2).all(|pair| pair[1] < pair[0]), "{told:?}");
+}
+
+#[test]
+fn tall_first_peaks_are_cut_from_a_plot_of_forces_and_it_says_how_tall_they_are() {
+    let mut harness = sized("hexapod", [1280.0, 800.0], egui::Theme::Light);
+    harness.state_mut().player_mut().run_to(0.2);
+    harness.state_mut().plots_mut().window = PlotWindow::Everything;
+    harness.run();
+    let player = harness.state().player();
+    let mut largest = [0.0_f64; 2];
+    let forces = player.channels().list().iter().enumerate().filter(|(_, own)| own.quantity == Quantity::NormalForce);
+    for (channel, _) in forces {
+        let mut bins = Vec::new();
+        player.bins(channel, 0.0, 0.2, 1000, &mut bins);
+        for bin in bins {
+            let part = &mut largest[usize::from(bin.from > 0.05)];
+            *part = part.max(bin.greatest);
+        }
+    }
+    let [first, later] = largest;
+    assert!(first > 4.0 * later && later > 1.0, "{first} N, {later} N");
+    // Where a force stands, measured from the upper edge of the plot upwards.
+    let above = |harness: &mut Harness<'_, App>, force: f64| {
+        let top = harness.get_by_label("Plot of Normal force").rect().top();
+        top - harness.state_mut().plots_mut().place(Quantity::NormalForce, 0.1, force).expect("on show").y
+    };
+    assert!(above(&mut harness, first) > 0.0 && above(&mut harness, later) < 0.0);
+    let button = harness.get_by_label_contains("N above, Normal force");
+    let words = button.accesskit_node().label().expect("a label");
+    let said: f64 = words.split_whitespace().nth(1).and_then(|word| word.parse().ok()).expect("a number");
+    assert!((said / first - 1.0).abs() < 5.1e-3, "{words}: {first} N");
+    button.click();
+    harness.run();
+    assert!(above(&mut harness, first) < 0.0, "the whole range");
+    harness.get_by_label("Cut first peaks, Normal force").click();
+    harness.run();
+    assert!(above(&mut harness, first) > 0.0);
 }

@@ -1,0 +1,129 @@
+//! Peaks cut off: tall blows as a run begins must not flatten the rest of a plot. Each is marked, and none is cut without a word.
+
+use eframe::egui::{self, Align, Button, Layout, Pos2, Rect, RichText, Shape, Stroke, Ui, UiBuilder, vec2};
+
+use super::{GRAIN, Trace, theme, value};
+
+/// Shares of the recorded time in view, from its beginning: peaks that come within the first are cut, within the second they can be.
+const EARLY: [f64; 2] = [0.25, 0.5];
+/// Least ratio of such a peak to the largest later value.
+const TALL: f64 = 4.0;
+/// Room for the button above the largest later value, as a factor of that value.
+const HEADROOM: f64 = 1.2;
+/// Least distance between two marks of a curve, points.
+const APART: f32 = 9.0;
+/// Width and height of a mark, points.
+const MARK: egui::Vec2 = vec2(8.0, 7.0);
+
+/// First peaks far above all later values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peaks {
+    /// The largest, and the largest later value, SI.
+    pub largest: f64,
+    pub later: f64,
+    /// Whether all come so early that they are cut unless the user wants to see them.
+    pub brief: bool,
+}
+
+/// First peaks of `traces`, if they would flatten the rest.
+pub fn peaks<'a>(traces: impl Iterator<Item = &'a Trace> + Clone) -> Option<Peaks> {
+    EARLY.into_iter().find_map(|share| {
+        let (largest, later) = within(traces.clone(), share)?;
+        Some(Peaks { largest, later, brief: share == EARLY[0] })
+    })
+}
+
+/// Largest values of `traces` in the first `share` of their time and after it, SI, if the first is far above the second.
+fn within<'a>(traces: impl Iterator<Item = &'a Trace> + Clone, share: f64) -> Option<(f64, f64)> {
+    let bins = traces.flat_map(|trace| &trace.bins).filter(|bin| !bin.greatest.is_nan());
+    let ends = |(from, to): (f64, f64), bin: &crate::simulate::Bin| (from.min(bin.from), to.max(bin.to));
+    let (from, to) = bins.clone().fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    let until = from + share * (to - from);
+    let (mut early, mut later) = (0.0_f64, 0.0_f64);
+    for bin in bins {
+        let part = if bin.to <= until { &mut early } else { &mut later };
+        *part = part.max(bin.greatest);
+    }
+    (early > TALL * later && later > GRAIN * early).then_some((early, later))
+}
+
+impl Peaks {
+    /// The largest value on a cut axis, SI.
+    pub fn most(&self) -> f64 {
+        HEADROOM * self.later
+    }
+}
+
+/// Marks in `colour` at the upper edge of `frame` above what `trace` has beyond `most`, SI; `x` places an instant.
+pub fn mark(ui: &Ui, frame: Rect, trace: &Trace, most: f64, x: impl Fn(f64) -> f32) {
+    let mut last = f32::NEG_INFINITY;
+    for bin in trace.bins.iter().filter(|bin| bin.greatest > most) {
+        let tip = egui::pos2(x(0.5 * (bin.from + bin.to)), frame.top() + 1.0);
+        if tip.x - last < APART || !frame.x_range().contains(tip.x) {
+            continue;
+        }
+        last = tip.x;
+        let foot = |side: f32| -> Pos2 { tip + vec2(side * MARK.x, MARK.y) };
+        let edge = Stroke::new(1.0, ui.visuals().panel_fill);
+        ui.painter().add(Shape::convex_polygon(vec![tip, foot(0.5), foot(-0.5)], trace.colour, edge));
+    }
+}
+
+/// The button at the upper right of `frame` that says how high the `peak` is, in units of `unit`, and shows or cuts it. Returns
+/// whether it was clicked.
+pub fn switch(ui: &mut Ui, frame: Rect, plot: &str, peak: f64, unit: (&str, f64), cut: bool) -> bool {
+    let peak = format!("{} {}", value::number(peak / unit.1, 3), unit.0);
+    let words = if cut { format!("Peak {peak} above") } else { "Cut first peaks".to_owned() };
+    let place = UiBuilder::new().id_salt("first peaks").max_rect(frame.shrink(2.0));
+    let mut corner = ui.new_child(place.layout(Layout::right_to_left(Align::TOP)));
+    corner.spacing_mut().button_padding = vec2(5.0, 1.0);
+    corner.spacing_mut().interact_size.y = if theme::has_fingers(ui) { 30.0 } else { 18.0 };
+    let help = format!(
+        "The largest value in the first half of the recorded range, {peak}, is more than four times any later one, so it would \
+         flatten the rest. Cut: the axis ends at 1.26 times the largest later value, and a mark at the upper edge stands for each \
+         peak above it; readings and saved files have the whole values. In all plots"
+    );
+    let button = corner.add(Button::new(RichText::new(&words).small())).on_hover_text(help);
+    let clicked = button.clicked();
+    button.accessible_name(format!("{words}, {plot}"));
+    clicked
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::Bin;
+
+    fn trace(values: &[f64]) -> Trace {
+        let bin =
+            |(at, &value): (usize, &f64)| Bin { from: at as f64, to: at as f64 + 1.0, least: 0.0, greatest: value };
+        Trace { bins: values.iter().enumerate().map(bin).collect(), ..Trace::default() }
+    }
+
+    fn found(values: &[f64]) -> Option<Peaks> {
+        peaks([trace(values)].iter())
+    }
+
+    #[test]
+    fn only_blows_far_above_all_that_follows_are_cut_and_only_as_the_range_begins() {
+        assert_eq!(
+            found(&[0.0, 900.0, 30.0, 20.0, 35.0, 30.0, 30.0, 30.0]),
+            Some(Peaks { largest: 900.0, later: 35.0, brief: true })
+        );
+        let until_the_middle = found(&[0.0, 900.0, 30.0, 700.0, 35.0, 30.0, 30.0, 30.0]);
+        assert_eq!(until_the_middle, Some(Peaks { largest: 900.0, later: 35.0, brief: false }));
+        // Blows that go on are what the plot shows.
+        assert_eq!(found(&[0.0, 900.0, 30.0, 20.0, 300.0, 30.0, 30.0, 30.0]), None);
+        assert_eq!(found(&[0.0, 30.0, 30.0, 30.0, 900.0, 30.0, 30.0, 30.0]), None);
+        // A single blow with nothing after it.
+        assert_eq!(found(&[0.0, 900.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), None);
+        assert_eq!(found(&[]), None);
+    }
+
+    #[test]
+    fn the_curves_of_a_plot_are_judged_together() {
+        let (first, second) = (trace(&[0.0, 900.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]), trace(&[300.0; 8]));
+        assert_eq!(peaks([first.clone(), second].iter()), None);
+        assert!(peaks([first.clone(), first].iter()).is_some());
+    }
+}
