@@ -227,7 +227,6 @@ impl Comparison {
 
     /// Legend of a plot's grey curves, in the rest of a row `height` points high.
     pub fn legend(&mut self, ui: &mut Ui, player: &Player, height: f32, plot: &str) {
-        let dark = ui.visuals().dark_mode;
         let count = self.kept.len().max(1) as f32;
         let width = (ui.available_width() / count - 6.0).min(170.0);
         if width < LEAST_LEGEND {
@@ -239,7 +238,7 @@ impl Comparison {
                 text += &format!(" (computed to {})", value::time(kept.run.reached()));
             }
             let name = format!("{text} in {plot}");
-            let mut text = RichText::new(text).small().color(kept.colour(Color32::GRAY, dark));
+            let mut text = RichText::new(text).small().weak();
             if !kept.shown {
                 text = text.strikethrough();
             }

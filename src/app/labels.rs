@@ -157,7 +157,8 @@ pub(super) fn paint(
             break;
         }
         let Wanted { label, at, .. } = wanted;
-        let ink = colour(label.colour);
+        // A mark that fades with age has legible words until it is gone.
+        let ink = colour(label.colour.with_opacity(1.0));
         let words = painter.layout_no_wrap(label.text.to_string(), FontId::proportional(wanted.size), ink);
         let size = words.size() + 2.0 * PAD;
         let free = |place: Place| {
@@ -190,7 +191,7 @@ pub(super) fn paint(
             painter.line_segment(line, Stroke::new(1.0, ink.gamma_multiply(0.7)));
         }
         // A separate plate, since the text often lies over a dark part.
-        painter.rect_filled(plate, 4.0, halo.gamma_multiply(0.8 * label.colour.0[3]));
+        painter.rect_filled(plate, 4.0, halo.gamma_multiply(0.8));
         painter.galley(pos2(plate.min.x, plate.min.y) + PAD, words, ink);
     }
 }

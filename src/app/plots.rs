@@ -789,7 +789,7 @@ impl Plots {
             ui.add_space(4.0);
             for (index, (channel, member)) in panel.members.iter().enumerate() {
                 let on = !self.hidden.contains(channel);
-                let colour = theme::series(index, ui.visuals().dark_mode);
+                let colour = theme::series_text(index, ui.visuals().dark_mode);
                 let mut text = RichText::new(*member).small().strong().color(colour);
                 if !on {
                     text = text.strikethrough().color(ui.visuals().weak_text_color());

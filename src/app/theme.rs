@@ -36,6 +36,12 @@ pub fn series(index: usize, dark: bool) -> Color32 {
     if dark { on_dark } else { on_light }
 }
 
+/// The same for a text: a little darker on white, for a contrast of 4.5.
+pub fn series_text(index: usize, dark: bool) -> Color32 {
+    let colour = series(index, dark);
+    if dark { colour } else { colour.lerp_to_gamma(Color32::BLACK, 0.13) }
+}
+
 /// The egui preference for a theme choice.
 pub fn preference(choice: ThemeChoice) -> ThemePreference {
     match choice {
@@ -177,7 +183,7 @@ fn visuals(dark: bool) -> Visuals {
     visuals.extreme_bg_color = pick(0xFFFFFF, 0x12161A);
     visuals.faint_bg_color = pick(0xF0F3F6, 0x242A31);
     visuals.selection.bg_fill = pick(0xB5D5F5, 0x1F4E7D);
-    visuals.selection.stroke = Stroke::new(1.0, pick(0x1562B8, 0x6CB8FF));
+    visuals.selection.stroke = Stroke::new(1.0, pick(0x1058A8, 0x80C2FF));
     visuals.hyperlink_color = pick(0x1562B8, 0x6CB8FF);
     visuals.warn_fg_color = pick(0x9A5500, 0xFFB84D);
     visuals.error_fg_color = pick(0xC01C28, 0xFF7B72);

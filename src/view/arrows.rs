@@ -195,11 +195,11 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         // On the wall that was hit.
         let contact = joint.socket_centre - mark.force.normalize_or_zero() * joint.inner;
         if let Some(arrow) = arrow(mark.force, contact) {
-            let colour = palette.normal.with_opacity(mark.strength.sqrt());
+            let [colour, ink] = [palette.normal, palette.text].map(|colour| colour.with_opacity(mark.strength.sqrt()));
             let width = OUTLINE_WIDTH * shot.options.arrows.thickness * shot.pixels_per_point;
             arrow.outline(ruler.eye, colour, width, &mut out.marks);
             let kind = LabelKind::Peak(mark.joint);
-            push_label(out, &peak_label(&mark).into(), kind, arrow.tail + arrow.along, colour);
+            push_label(out, &peak_label(&mark).into(), kind, arrow.tail + arrow.along, ink);
         }
     }
     let marks: &[f32] = match options.scaling {

@@ -169,7 +169,7 @@ impl Palette {
                 external: Colour::hex(0x00796B),
                 flash: Colour::hex(0xFFC61A),
                 gravity: Colour::hex(0x6B3FA0),
-                axes: [Colour::hex(0xC92A2A), Colour::hex(0x2B8A3E), Colour::hex(0x1864AB)],
+                axes: [Colour::hex(0xC92A2A), Colour::hex(0x27803A), Colour::hex(0x1864AB)],
                 trail: Colour::hex(0xA61E4D),
                 ball: material(0xD8DCE0, 0.22, 0.75),
                 socket: glass(0x6FA8DC, 0.20),

@@ -8,6 +8,7 @@ mod bench_window;
 mod claims;
 mod clicks;
 mod compare;
+mod contrast;
 mod costs;
 mod desktop;
 mod embed;

@@ -203,7 +203,7 @@ impl Diagram {
                 let points = swept.points.iter().flatten();
                 let count = points.filter(|point| point.regime_code == regime.code()).count();
                 let help = "Kind of motion, and at how many values it was found";
-                (count, regime.word(), theme::series(*colour, dark), help)
+                (count, regime.word(), theme::series_text(*colour, dark), help)
             })
             .collect();
         let help = "Values at which the divergence guard stopped the run, or that could not start";

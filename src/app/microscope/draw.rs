@@ -285,7 +285,7 @@ pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
     let above = pos2(rect.center().x, rect.top() + 5.0);
     sheet.words(above, Align2::CENTER_TOP, "ball", sheet.ink);
     let below = pos2(rect.left() + 8.0, wall + 3.0);
-    sheet.words(below, Align2::LEFT_TOP, "wall", blue);
+    sheet.words(below, Align2::LEFT_TOP, "wall", sheet.ink);
     let times = value::number(deep / wide, 2);
     let words = format!("depths ×{times}");
     // Inside the ball during penetration; otherwise beside its lowest point.
