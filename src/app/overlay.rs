@@ -17,6 +17,9 @@ const MARGIN: f32 = 14.0;
 /// Font size of the time in a picture with enough room, points.
 const TIME: f32 = 18.0;
 
+/// Usual longest line of the time, and of the notes on joints below it, points.
+const LONGEST: [f32; 2] = [150.0, 230.0];
+
 /// Longest axis of the legend relative to the picture's width.
 const LONGEST_AXIS: f32 = 0.4;
 
@@ -79,7 +82,12 @@ fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = St
     let notes = notes.take(if large { usize::MAX } else { 1 });
     lines.extend(notes.map(|note| line(note, small_size)));
     lines.retain(|line| line.size().x + 2.0 * margin <= rect.width());
-    let width = lines.iter().map(|l| l.size().x).fold(0.0, f32::max);
+    let mut width = lines.iter().map(|l| l.size().x).fold(0.0, f32::max);
+    if large {
+        // Otherwise the plate would jump as digits change.
+        let usual = LONGEST[usize::from(lines.len() > 2)];
+        width = width.max(usual.min(rect.width() - 2.0 * margin));
+    }
     let height: f32 = lines.iter().map(|l| l.size().y + 1.0).sum();
     let corner = rect.min + vec2(margin, margin);
     let plate = Rect::from_min_size(corner, vec2(width, height)).expand2(vec2(8.0, 4.0));
@@ -102,7 +110,6 @@ pub fn reach(painter: &Painter) -> f32 {
 
 /// Approximate width and height of the time with one note per joint, whatever the text; points.
 pub fn plate(joints: usize) -> [f32; 2] {
-    const LONGEST: [f32; 2] = [150.0, 230.0];
     const LINE: f32 = 16.0;
     // The first lines are time and magnification.
     let longest = LONGEST[usize::from(joints > 0)];
@@ -390,6 +397,20 @@ mod tests {
                 assert!(arrives, "{i}");
             }
         }
+    }
+
+    #[test]
+    fn the_plate_of_the_time_does_not_move_as_digits_change() {
+        let rect = Rect::from_min_size(Pos2::ZERO, vec2(800.0, 600.0));
+        let plates =
+            [(0.0, "free"), (9.9e-3, "normal 1 N, friction 0.2 N"), (10e-3, "normal 812.4 N, friction 121.9 N")];
+        let plates = plates.map(|(at, words)| {
+            let notes = [format!("S1  {words}"), "S2  free".to_owned()];
+            let found = std::cell::Cell::new(Rect::NOTHING);
+            shapes(rect, |painter| found.set(time(painter, rect, at, notes.clone().into_iter(), Theme::Light)));
+            found.get()
+        });
+        assert!(plates.iter().all(|plate| *plate == plates[0]), "{plates:?}");
     }
 
     #[test]
