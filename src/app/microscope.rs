@@ -22,8 +22,9 @@ const USUAL: f32 = 330.0;
 const MOST: f32 = 0.5;
 /// Least remainder of the picture, points; the microscope stays hidden if there is less.
 const LEFT: f32 = 120.0;
-/// Height of the section of the contact, points.
+/// Height of the section of the contact, and least height in a low panel, points.
 const SECTION: f32 = 112.0;
+const LEAST_SECTION: f32 = 76.0;
 /// Width from which pictures and numbers are side by side, points.
 const WIDE: f32 = 430.0;
 /// Width of the numbers beside the pictures, points.
@@ -145,7 +146,7 @@ impl Microscope {
                 self.sphere(ui, player, &sight, axes, vec2(side, side));
                 ui.vertical(|ui| {
                     scrolled(ui, |ui| {
-                        section(ui, &sight);
+                        section(ui, &sight, SECTION);
                         numbers(ui, player, &sight, axes);
                     });
                 });
@@ -155,7 +156,8 @@ impl Microscope {
                 let width = ui.available_width();
                 let side = draw::side(vec2(width, space.y), 150.0);
                 self.sphere(ui, player, &sight, axes, vec2(width, side));
-                section(ui, &sight);
+                let left = space.y - side - ui.spacing().item_spacing.y;
+                section(ui, &sight, left.clamp(LEAST_SECTION, SECTION));
                 numbers(ui, player, &sight, axes);
             });
         }
@@ -204,9 +206,9 @@ fn scrolled(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
     });
 }
 
-/// The picture of the contact.
-fn section(ui: &mut Ui, sight: &Sight) {
-    let size = vec2(ui.available_width(), SECTION);
+/// The picture of the contact, `height` points high.
+fn section(ui: &mut Ui, sight: &Sight, height: f32) {
+    let size = vec2(ui.available_width(), height);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let Some(patch) = &sight.patch else {
         draw::empty(ui, rect, "No contact patch");

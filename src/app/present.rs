@@ -259,9 +259,16 @@ impl App {
             let width = if size > SMALLEST { f32::INFINITY } else { room };
             ui.painter().layout(text.clone(), FontId::proportional(size), ink, width)
         };
-        let mut words = lay(full);
-        if words.size().x > room {
-            words = lay((full * room / words.size().x).max(SMALLEST));
+        let fitting = |size: f32| {
+            let words = lay(size);
+            let width = words.size().x;
+            if width > room { lay((size * room / width).max(SMALLEST)) } else { words }
+        };
+        let beside = |words: &Galley| inside.right() - words.size().x >= area.left() + TIME;
+        let mut words = fitting(full);
+        if presenting && !beside(&words) {
+            // Below the time, large type would cover the joint under the microscope.
+            words = fitting(BADGE);
         }
         let middle = Align2::CENTER_TOP.align_size_within_rect(words.size(), inside);
         // Beside a lesson the middle is too narrow, so the time is on the left. Beside the microscope, too, there is room only
@@ -269,7 +276,7 @@ impl App {
         let place = if !presenting || middle.left() >= area.left() + TIME {
             middle
         } else {
-            if inside.right() - words.size().x < area.left() + TIME {
+            if !beside(&words) {
                 inside.min.y += overlay::plate(1)[1];
             }
             Align2::RIGHT_TOP.align_size_within_rect(words.size(), inside)

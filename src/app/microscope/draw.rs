@@ -16,6 +16,9 @@ const CIRCLE: f32 = 0.39;
 const CENTRE: f32 = 4.5;
 /// Length of the arrow at the reference speed, points.
 const ARROW: f32 = 40.0;
+/// Width of the words at the left edge of the sphere's picture, and of the scale at its right edge, points.
+const WORDS: f32 = 86.0;
+const SCALE: f32 = 34.0;
 /// Path points closer than this on the screen are merged, points.
 const APART: f32 = 0.8;
 /// Least scale of the section, m; typical penetrations are some micrometres.
@@ -152,7 +155,11 @@ pub struct Circle {
 pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, speed: f64) -> Circle {
     let Sheet { painter, rect, palette, sight, .. } = sheet;
     let report = &sight.report;
-    let circle = Circle { centre: rect.center(), radius: CIRCLE * rect.size().min_elem() };
+    let radius = CIRCLE * rect.size().min_elem();
+    // To the right of the words at the left edge, as far as the scale beside it permits.
+    let beside = 0.5 * rect.width() - radius;
+    let shift = (WORDS - beside).clamp(0.0, (beside - SCALE).max(0.0));
+    let circle = Circle { centre: rect.center() + vec2(shift, 0.0), radius };
     let clearance = report.clearance as f32;
     let scale = circle.radius / clearance;
     let flat = |v: Vec3| vec2(v.dot(axes[0]), -v.dot(axes[1]));
