@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{Key, TextStyle, accesskit::Role, vec2};
+use eframe::egui::{Key, Shape, TextStyle, accesskit::Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, AppOptions, BUILT_IN_LESSONS, Lesson, Link, Verdict};
 use jointplay::integrate::Method;
@@ -399,5 +399,38 @@ fn a_presented_lesson_has_the_plots_that_it_speaks_of() {
         harness.run_steps(5);
         assert!(harness.state().is_presenting());
         assert!(says(&harness, plot), "{name}: no {plot}");
+    }
+}
+
+#[test]
+fn in_a_presented_lesson_the_microscope_shows_circle_and_section_whole_and_the_caption_leaves_the_ball_free() {
+    for size in [WIDE, [1920.0, 1080.0]] {
+        let mut harness = taught("rattle", 5, size);
+        press(&mut harness, Key::F5);
+        harness.set_size(vec2(size[0], size[1]) / harness.ctx.zoom_factor());
+        harness.run_steps(5);
+        let app = harness.state();
+        let circle = app.microscope().circle().expect("open");
+        let place = |words: &str| harness.get_by_label_contains(words).rect();
+        let (view, lesson) = (place("3D view"), place("Every impact and every slide"));
+        let (sphere, section) = (place("under the microscope."), place("Section of the contact"));
+        assert!(view.right() <= sphere.left() && sphere.right() <= lesson.left(), "{view:?} {sphere:?} {lesson:?}");
+        assert!(section.bottom() <= view.bottom() + 1.0, "{section:?} {view:?}");
+        // The words beside the circle.
+        let mut beside = 0;
+        for part in &harness.output().shapes {
+            let Shape::Text(text) = &part.shape else { continue };
+            let rect = text.visual_bounding_rect();
+            if sphere.contains_rect(rect) && !rect.contains(circle.centre) {
+                beside += 1;
+                let off = rect.distance_to_pos(circle.centre);
+                assert!(off > circle.radius, "{:?} {rect:?} {circle:?}", text.galley.text());
+            }
+        }
+        assert!(beside > 5, "{beside}");
+        let ball = app.player().frame().joints[0].ball_centre;
+        let ball = app.place_in_view(&ball).expect("in sight");
+        let caption = place(&app.last_impact().expect("an impact"));
+        assert!(caption.distance_to_pos(ball) > 10.0, "{caption:?} {ball:?}");
     }
 }
