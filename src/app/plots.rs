@@ -32,6 +32,8 @@ const LEAST_HEIGHT: f32 = 110.0;
 const MARKS_APART: f32 = 16.0;
 /// Upper estimate of the width of a label's character, points.
 const LETTER: f64 = 7.0;
+/// Least room for the switch of the cut in a title, points.
+const LEAST_SWITCH: f32 = 70.0;
 /// Fraction of the time range by which an arrow key moves the cursor.
 const NUDGE: f64 = 0.01;
 /// Approximate maximum number of marks on an axis.
@@ -522,7 +524,7 @@ impl Plots {
         }
 
         ui.vertical(|ui| {
-            self.title(ui, player, panel);
+            self.title(ui, player, panel, cut_off.is_some());
             let font = egui::TextStyle::Small.resolve(ui.style());
             let axis = |hints: AxisHints<'static>| hints.tick_label_color(faint).tick_label_font(font.clone());
             let width = space.x - 12.0;
@@ -681,11 +683,8 @@ impl Plots {
                 let left = (x(time) + 4.0).min(frame.right() - words.size().x);
                 painter.galley(egui::pos2(left, frame.top()), words, colour);
             }
-            if let Some(peaks) = first_peaks {
-                let cut = cut_off.is_some();
-                if cut::switch(ui, frame, &panel.name(), peaks.largest, panel.unit, cut) {
-                    self.cut = Some(!cut);
-                }
+            if let Some(peaks) = cut_off {
+                cut::note(ui, frame, peaks.largest, panel.unit);
             }
             asked
         })
@@ -778,8 +777,8 @@ impl Plots {
         bands
     }
 
-    /// Title with unit, and switches of the members in the colours of their lines.
-    fn title(&mut self, ui: &mut Ui, player: &Player, panel: &Panel<'_>) {
+    /// Title with unit, and switches of the members in the colours of their lines. `is_cut`: whether first peaks are cut.
+    fn title(&mut self, ui: &mut Ui, player: &Player, panel: &Panel<'_>, is_cut: bool) {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().button_padding = vec2(4.0, 1.0);
@@ -805,6 +804,12 @@ impl Plots {
                     } else {
                         self.hidden.retain(|hidden| hidden != channel);
                     }
+                }
+            }
+            if panel.kind == PlotKind::FromZero && ui.available_width() > LEAST_SWITCH {
+                let on = is_cut || self.cut == Some(true);
+                if cut::switch(ui, &panel.name(), on) {
+                    self.cut = Some(!on);
                 }
             }
             if panel.kind != PlotKind::Bands {

@@ -130,7 +130,7 @@ fn windows_that_are_stored_have_few_and_small_pictures() {
 }
 
 /// The texts of `shape` that are in sight within `clip`, a line each.
-fn add_texts(shape: &Shape, clip: egui::Rect, out: &mut String) {
+pub fn add_texts(shape: &Shape, clip: egui::Rect, out: &mut String) {
     match shape {
         Shape::Vec(shapes) => shapes.iter().for_each(|shape| add_texts(shape, clip, out)),
         Shape::Text(text) if clip.intersects(text.visual_bounding_rect()) => {

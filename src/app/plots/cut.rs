@@ -1,14 +1,16 @@
 //! Peaks cut off: tall blows as a run begins must not flatten the rest of a plot. Each is marked, and none is cut without a word.
 
-use eframe::egui::{self, Align, Button, Layout, Pos2, Rect, RichText, Shape, Stroke, Ui, UiBuilder, vec2};
+use eframe::egui::{self, Align2, Button, Pos2, Rect, RichText, Shape, Stroke, TextStyle, Ui, vec2};
 
-use super::{GRAIN, Trace, theme, value};
+use super::{GRAIN, Trace, value};
 
 /// Shares of the recorded time in view, from its beginning: peaks that come within the first are cut, within the second they can be.
 const EARLY: [f64; 2] = [0.25, 0.5];
 /// Least ratio of such a peak to the largest later value.
 const TALL: f64 = 4.0;
-/// Room for the button above the largest later value, as a factor of that value.
+/// Padding of the note about the largest, points.
+const PAD: egui::Vec2 = vec2(5.0, 1.0);
+/// Room for the note above the largest later value, as a factor of that value.
 const HEADROOM: f64 = 1.2;
 /// Least distance between two marks of a curve, points.
 const APART: f32 = 9.0;
@@ -69,24 +71,26 @@ pub fn mark(ui: &Ui, frame: Rect, trace: &Trace, most: f64, x: impl Fn(f64) -> f
     }
 }
 
-/// The button at the upper right of `frame` that says how high the `peak` is, in units of `unit`, and shows or cuts it. Returns
-/// whether it was clicked.
-pub fn switch(ui: &mut Ui, frame: Rect, plot: &str, peak: f64, unit: (&str, f64), cut: bool) -> bool {
-    let peak = format!("{} {}", value::number(peak / unit.1, 3), unit.0);
-    let words = if cut { format!("Peak {peak} above") } else { "Cut first peaks".to_owned() };
-    let place = UiBuilder::new().id_salt("first peaks").max_rect(frame.shrink(2.0));
-    let mut corner = ui.new_child(place.layout(Layout::right_to_left(Align::TOP)));
-    corner.spacing_mut().button_padding = vec2(5.0, 1.0);
-    corner.spacing_mut().interact_size.y = if theme::has_fingers(ui) { 30.0 } else { 18.0 };
-    let help = format!(
-        "The largest value in the first half of the recorded range, {peak}, is more than four times any later one, so it would \
-         flatten the rest. Cut: the axis ends at 1.26 times the largest later value, and a mark at the upper edge stands for each \
-         peak above it; readings and saved files have the whole values. In all plots"
-    );
-    let button = corner.add(Button::new(RichText::new(&words).small())).on_hover_text(help);
-    let clicked = button.clicked();
-    button.accessible_name(format!("{words}, {plot}"));
-    clicked
+/// Says at the upper right of `frame` how high the `peak` is, in units of `unit`.
+pub fn note(ui: &Ui, frame: Rect, peak: f64, unit: (&str, f64)) {
+    let words = format!("Peak {} {} above", value::number(peak / unit.1, 3), unit.0);
+    let ink = ui.visuals().strong_text_color();
+    let words = ui.painter().layout_no_wrap(words, TextStyle::Small.resolve(ui.style()), ink);
+    let plate = Align2::RIGHT_TOP.align_size_within_rect(words.size() + 2.0 * PAD, frame.shrink(2.0));
+    ui.painter().rect_filled(plate, 4.0, ui.visuals().widgets.inactive.weak_bg_fill);
+    ui.painter().galley(plate.min + PAD, words, ink);
+}
+
+/// The button that cuts first peaks in all plots, in the title of `plot`; `on`: whether they are cut. Returns whether it was clicked.
+pub fn switch(ui: &mut Ui, plot: &str, on: bool) -> bool {
+    let help = "Cuts off peaks in the first half of the range that are more than four times any later value, so that they do not \
+                flatten the rest. Until clicked, only those in the first quarter are cut. The axis then ends at 1.26 times the \
+                largest later value; a mark at the upper edge stands for each peak beyond it. Readings and saved files have the \
+                whole values, and a range that was zoomed is not cut";
+    let button = Button::selectable(on, RichText::new("Cut peaks").small());
+    let button = ui.add(button).on_hover_text(help);
+    ui.ctx().accesskit_node_builder(button.id, |node| node.set_label(format!("Cut first peaks in {plot}")));
+    button.clicked()
 }
 
 #[cfg(test)]
