@@ -16,8 +16,8 @@ const CIRCLE: f32 = 0.39;
 const CENTRE: f32 = 4.5;
 /// Length of the arrow at the reference speed, points.
 const ARROW: f32 = 40.0;
-/// Width of the words at the left edge of the sphere's picture, and of the scale at its right edge, points.
-const WORDS: f32 = 86.0;
+/// Width and height of the words in the left corners of the sphere's picture, and room beside it for the scale, points.
+const WORDS: [f32; 2] = [86.0, 40.0];
 const SCALE: f32 = 34.0;
 /// Path points closer than this on the screen are merged, points.
 const APART: f32 = 0.8;
@@ -156,9 +156,11 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     let Sheet { painter, rect, palette, sight, .. } = sheet;
     let report = &sight.report;
     let radius = CIRCLE * rect.size().min_elem();
-    // To the right of the words at the left edge, as far as the scale beside it permits.
-    let beside = 0.5 * rect.width() - radius;
-    let shift = (WORDS - beside).clamp(0.0, (beside - SCALE).max(0.0));
+    // To the right of the words in the left corners, as far as the scale in the right one permits.
+    let off = 0.5 * rect.height() - WORDS[1];
+    let chord = (radius * radius - off * off).max(0.0).sqrt();
+    let most = (0.5 * rect.width() - radius - SCALE).max(0.0);
+    let shift = (WORDS[0] - (0.5 * rect.width() - chord)).clamp(0.0, most);
     let circle = Circle { centre: rect.center() + vec2(shift, 0.0), radius };
     let clearance = report.clearance as f32;
     let scale = circle.radius / clearance;
