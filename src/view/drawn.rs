@@ -232,7 +232,7 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
             Some(Form::Mesh { triangles, pose_in_body })
         }
         Geometry::Mesh { mesh, unit, position, rotation } => Some(Form::Mesh {
-            triangles: meshes.from_file(mesh, *unit)?,
+            triangles: meshes.file_mesh(mesh, *unit)?,
             pose_in_body: Pose::new(position, &rotation.to_rotation_matrix().into_inner()),
         }),
     }
@@ -256,7 +256,7 @@ impl Meshes {
     }
 
     /// The mesh of a file: one for all shapes that name it.
-    fn from_file(&mut self, file: &Arc<mesh::Mesh>, unit: f64) -> Option<SceneMesh> {
+    fn file_mesh(&mut self, file: &Arc<mesh::Mesh>, unit: f64) -> Option<SceneMesh> {
         let same =
             |(other, length, _): &&(Arc<mesh::Mesh>, f64, SceneMesh)| Arc::ptr_eq(other, file) && *length == unit;
         if let Some((_, _, known)) = self.from_files.iter().find(same) {

@@ -62,7 +62,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             let size = sizes.get(at).copied().filter(|size| *size > 0.0);
             size.ok_or_else(|| self.source.error(node, &format!("size: a {kind} needs number {} above 0", at + 1)))
         };
-        let between = self.from_to(node, class)?;
+        let between = self.fromto_pose(node, class)?;
         let pose = between.map_or(pose, |(pose, _)| pose);
         let half = between.map(|(_, half)| half);
         let length = |at: usize| half.map_or_else(|| size(at), Ok);

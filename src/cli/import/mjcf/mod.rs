@@ -256,7 +256,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
     }
 
     /// The pose between the two points of `fromto`, if an element has them, and half their distance, m.
-    fn from_to(&self, node: Node<'n, 'i>, class: &str) -> Result<Option<(Pose, f64)>, Failure> {
+    fn fromto_pose(&self, node: Node<'n, 'i>, class: &str) -> Result<Option<(Pose, f64)>, Failure> {
         let Some([a, b, c, d, e, f]) = self.numbers(node, class, "fromto")? else {
             return Ok(None);
         };
@@ -393,7 +393,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             self.description.omit(line, UNUSED_SITE);
             return Ok(());
         };
-        let own = match self.from_to(node, class)? {
+        let own = match self.fromto_pose(node, class)? {
             Some((own, _)) => own,
             None => self.pose(node, class)?,
         };
