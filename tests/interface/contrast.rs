@@ -6,7 +6,7 @@ use egui_kittest::{
     kittest::{NodeT as _, Queryable as _},
 };
 use jointplay::app::App;
-use jointplay::view::{Palette, Theme};
+use jointplay::view::{Colour, Palette, Theme};
 
 use crate::window::{click, sized};
 
@@ -15,11 +15,8 @@ const LEAST: f64 = 4.5;
 
 /// Relative luminance, WCAG 2.2.
 fn luminance(colour: Color32) -> f64 {
-    let linear = |channel: u8| {
-        let c = f64::from(channel) / 255.0;
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    };
-    0.2126 * linear(colour.r()) + 0.7152 * linear(colour.g()) + 0.0722 * linear(colour.b())
+    let [r, g, b] = Colour(colour.to_normalized_gamma_f32()).linear().map(f64::from);
+    0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
 fn contrast(a: Color32, b: Color32) -> f64 {

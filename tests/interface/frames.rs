@@ -34,10 +34,14 @@ pub fn draw(folder: &Path, what: &str) -> PathBuf {
 
 #[track_caller]
 fn golden(name: &str, what: &str) {
-    let folder = tempfile::tempdir().expect("a scratch folder");
-    let actual = Picture::read(&draw(folder.path(), what));
-    let words = format!("jointplay render {what}");
-    compare("tests/golden", name, &actual, &words);
+    golden_in("tests/golden", name, what);
+}
+
+#[track_caller]
+fn golden_in(folder: &str, name: &str, what: &str) {
+    let scratch = tempfile::tempdir().expect("a scratch folder");
+    let actual = Picture::read(&draw(scratch.path(), what));
+    compare(folder, name, &actual, &format!("jointplay render {what}"));
 }
 
 /// The default scene in the middle of its first impacts.
@@ -85,6 +89,11 @@ fn spcmm_dark_near_a_ball_joint() {
 #[test]
 fn spcmm_in_the_window() {
     golden("spcmm_window", "spcmm --at 7.85ms --size 800x500 --ui");
+}
+
+#[test]
+fn the_readme_shows_the_window_as_it_is() {
+    golden_in("assets", "window", "spcmm --at 26ms --size 1200x740 --ui");
 }
 
 #[test]
