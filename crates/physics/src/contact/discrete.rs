@@ -9,6 +9,8 @@ use super::{Coefficients, FrictionBranch, FrictionVelocity, Mat3, Vec3};
 
 /// Change of penetration, relative to the larger one, below which Simpson's rule replaces the quotient.
 const NEARLY_EQUAL: f64 = 1e-3;
+/// Sliding speed over [`Coefficients::slip_high`] from which the derivative of friction may be the tangent.
+const FAR_FROM_RAMP: f64 = 20.0;
 
 /// A contact over one step: the quantities that stay constant while its force is solved for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -56,8 +58,9 @@ impl StepForce {
 
 impl Coefficients {
     /// Force over `step` for the mean velocity `velocity` of the centres (m/s), so that e1 = e0 + h u, and the mean velocity
-    /// `slip` used by friction (m/s).
-    pub fn step_force(&self, step: &ContactStep, velocity: &Vec3, slip: &Vec3) -> StepForce {
+    /// `slip` used by friction (m/s). `slip_change` is the change of `slip` by the latest iteration, m/s, infinite before the first:
+    /// the derivatives depend on it, the force does not.
+    pub fn step_force(&self, step: &ContactStep, velocity: &Vec3, slip: &Vec3, slip_change: f64) -> StepForce {
         let ContactStep { h, start, clearances, .. } = *step;
         let end = start + velocity * h;
         let (before, after) = (start.norm(), end.norm());
@@ -93,13 +96,15 @@ impl Coefficients {
             let speed = sliding.norm();
             let per_speed = self.friction_per_speed(FrictionBranch::Unfrozen, speed);
             direction -= sliding * per_speed;
-            // Where friction is full, the secant: a correction can stop the sliding but not reverse it. Within the dead band, the
-            // slope of the ramp.
+            // Where friction is full, the secant: a correction can stop the sliding but not reverse it. It converges linearly, and
+            // slowly where friction nearly stops the sliding. The tangent converges quadratically once the direction is known.
+            // Within the dead band, the slope of the ramp.
             let full = per_speed.max(0.0);
+            let direction_is_known = speed > 2.0 * slip_ratio * slip_change && speed > FAR_FROM_RAMP * self.slip_high;
             let mut resistance = tangent * full;
             if speed < self.slip_low {
                 resistance = tangent * (self.friction / (self.slip_high - self.slip_low));
-            } else if speed < self.slip_high {
+            } else if speed < self.slip_high || direction_is_known {
                 let along = sliding / speed;
                 resistance += along * along.transpose() * (self.friction_slope(speed) - full);
             }
@@ -151,7 +156,7 @@ mod tests {
         for (depth, speed) in [(-1e-6, 0.1), (2e-6, -0.2), (2e-6, -0.05), (3e-6, 0.02), (3e-6, 1e-6)] {
             let step = step(2e-5, depth);
             let velocity = step.start.normalize() * speed + Vec3::new(0.01, 0.02, 0.0);
-            let result = elastic.step_force(&step, &velocity, &Vec3::zeros());
+            let result = elastic.step_force(&step, &velocity, &Vec3::zeros(), 0.0);
             let end = (step.start + velocity * step.h).norm() - 3e-4;
             let gain = elastic.elastic_energy(end) - elastic.elastic_energy(depth);
             let work = result.force.dot(&velocity) * step.h;
@@ -163,19 +168,20 @@ mod tests {
     fn derivatives_are_those_of_central_differences() {
         for friction_velocity in FrictionVelocity::ALL {
             for approach_speed in ApproachSpeed::ALL {
-                // On the ramp of friction.
-                let parameters =
-                    Parameters { friction_velocity, approach_speed, slip_speed_high: 10.0, ..Parameters::default() };
-                let law = law(parameters);
-                for (depth, speed) in [(-1e-6, 0.12), (2e-6, 0.03), (2e-6, -0.02), (3e-6, 1e-6)] {
+                // On the ramp of friction, and in full sliding.
+                let cases = [(-1e-6, 0.12), (2e-6, 0.03), (2e-6, -0.02), (3e-6, 1e-6)];
+                for ((depth, speed), slip_speed_high) in cases.into_iter().flat_map(|case| [(case, 10.0), (case, 2e-6)])
+                {
+                    let law =
+                        law(Parameters { friction_velocity, approach_speed, slip_speed_high, ..Parameters::default() });
                     let step = step(2e-5, depth);
                     let velocity = step.start.normalize() * speed + Vec3::new(0.01, 0.02, 0.0);
                     let slip = Vec3::new(0.05, -0.1, 0.2);
-                    let result = law.step_force(&step, &velocity, &slip);
+                    let result = law.step_force(&step, &velocity, &slip, 0.0);
                     assert!(result.force.norm() > 0.1);
                     for k in 0..3 {
                         let d = Vec3::ith(k, 1e-7);
-                        let force = |u: Vec3, s: Vec3| law.step_force(&step, &u, &s).force;
+                        let force = |u: Vec3, s: Vec3| law.step_force(&step, &u, &s, 0.0).force;
                         let by_velocity = (force(velocity + d, slip) - force(velocity - d, slip)) / 2e-7;
                         let by_slip = (force(velocity, slip + d) - force(velocity, slip - d)) / 2e-7;
                         let off = (by_velocity - result.by_velocity.column(k)).norm() / result.by_velocity.norm();

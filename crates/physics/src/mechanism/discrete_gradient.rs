@@ -380,7 +380,9 @@ impl DiscreteGradient {
                 let [u, s] = [row.free[0] + row.added[0], row.free[1] + row.added[1]];
                 row.law_force = match &row.law {
                     Law::Contact(law) => {
-                        let step_force = law.step_force(&row.step, &u, &s);
+                        let slip_change =
+                            if iteration > 0 { (row.added[1] - row.before[1]).norm() } else { f64::INFINITY };
+                        let step_force = law.step_force(&row.step, &u, &s, slip_change);
                         counts.friction += u64::from(step_force.force != Vec3::zeros() && law.friction > 0.0);
                         step_force
                     }
