@@ -10,7 +10,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use eframe::egui;
-use jointplay::app::{App, AppOptions, Click, Headless, MOST_CLICKS, PITCHES, TimeWindow, Voice, clicks};
+use jointplay::app::{App, AppOptions, Click, Headless, MAX_CLICKS, PITCHES, TimeWindow, Voice, clicks};
 use jointplay::render::Offscreen;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Impact, Simulation};
@@ -154,7 +154,7 @@ fn sound(watch: &Stopwatch) {
     let mut heard: Vec<Click> = Vec::new();
     watch.time("clicks of a frame", || clicks(black_box(&impacts).iter(), &stretch, 1.0, &mut heard));
     clicks(impacts.iter(), &stretch, 1.0, &mut heard);
-    assert_eq!(heard.len(), MOST_CLICKS);
+    assert_eq!(heard.len(), MAX_CLICKS);
     watch.time("samples of the clicks of a frame", || -> usize {
         let samples = |click| Voice::new(click, 48_000.0).collect::<Vec<f32>>().len();
         black_box(&heard).iter().map(samples).sum()

@@ -1,6 +1,6 @@
 //! Numbers and texts of Python as values of parameters and as times.
 
-use jointplay_physics::simulate::LONGEST_RUN;
+use jointplay_physics::simulate::MAX_RUN_DURATION;
 use jointplay_physics::units::{Dimension, parse_quantity};
 use jointplay_scene::{Kind, Parameter, Value};
 use pyo3::prelude::*;
@@ -28,8 +28,8 @@ pub fn duration(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     if !seconds.is_finite() || seconds < 0.0 {
         return wrong("the time must be a number and not negative");
     }
-    if seconds > LONGEST_RUN {
-        return wrong(&format!("the time must be at most {LONGEST_RUN:e} s"));
+    if seconds > MAX_RUN_DURATION {
+        return wrong(&format!("the time must be at most {MAX_RUN_DURATION:e} s"));
     }
     Ok(seconds)
 }

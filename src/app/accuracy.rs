@@ -2,8 +2,8 @@
 
 use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
 
-use super::host::{Host, Running};
-use super::layout::reserved;
+use super::host::{BackgroundTask, Host};
+use super::layout::reserve_lines;
 use super::player::Player;
 use super::{theme, value};
 use crate::analysis::presets::{self, Measured};
@@ -14,20 +14,20 @@ use crate::machine::Preset;
 use crate::simulate::Impact;
 
 /// Width of the labels, points.
-const LABELS: f32 = 138.0;
+const LABEL_WIDTH: f32 = 138.0;
 /// Height of a row, points, and lines reserved for doubts.
-const ROW: f32 = 20.0;
-const DOUBTS: usize = 3;
+const ROW_HEIGHT: f32 = 20.0;
+const DOUBT_LINES: usize = 3;
 /// Width of the measure button, points; fixed, so that it does not move.
-const MEASURE: f32 = 130.0;
+const BUTTON_WIDTH: f32 = 130.0;
 /// Placeholder before the first impact.
-const NONE: &str = "—";
+const PLACEHOLDER: &str = "—";
 /// Minimum number of steps to resolve an impact.
-const STEPS_OF_AN_IMPACT: u64 = 10;
+const MIN_STEPS_PER_IMPACT: u64 = 10;
 /// Error above which a measured preset is doubtful.
 const DOUBTFUL_ERROR: f64 = 0.05;
 /// Energy residual, relative to stored and dissipated energy, above which the balance is doubtful.
-const BALANCED: f64 = 1e-3;
+const MAX_RESIDUAL: f64 = 1e-3;
 
 /// A row: label, value, whether the value is doubtful, and tooltip. The set of rows is fixed, so that nothing moves during
 /// playback.
@@ -41,10 +41,10 @@ struct AccuracyLine {
 impl AccuracyLine {
     fn ui(&self, ui: &mut Ui) {
         // Not a control; needs no touch height.
-        ui.spacing_mut().interact_size.y = ROW;
+        ui.spacing_mut().interact_size.y = ROW_HEIGHT;
         ui.horizontal(|ui| {
-            ui.allocate_ui(vec2(LABELS, ROW), |ui| {
-                ui.set_width(LABELS);
+            ui.allocate_ui(vec2(LABEL_WIDTH, ROW_HEIGHT), |ui| {
+                ui.set_width(LABEL_WIDTH);
                 ui.label(self.label).on_hover_text(&self.help);
             });
             let mut text = RichText::new(&self.value);
@@ -57,7 +57,7 @@ impl AccuracyLine {
 }
 
 /// Measured accuracy of a preset on a scene.
-struct Found {
+struct MeasuredAccuracy {
     scene: SceneSource,
     preset: Preset,
     measured: Measured,
@@ -67,9 +67,9 @@ struct Found {
 #[derive(Default)]
 pub struct Accuracy {
     asked: Option<(Job, SceneSource, Preset)>,
-    running: Option<(Box<dyn Running>, SceneSource, Preset)>,
+    running: Option<(Box<dyn BackgroundTask>, SceneSource, Preset)>,
     progress: f64,
-    found: Option<Found>,
+    found: Option<MeasuredAccuracy>,
     problem: Option<String>,
 }
 
@@ -89,7 +89,7 @@ impl Accuracy {
                 None => return true,
                 Some(Message::Progress(done)) => self.progress = done,
                 Some(Message::Presets(list)) => {
-                    self.found = list.first().map(|(_, measured)| Found {
+                    self.found = list.first().map(|(_, measured)| MeasuredAccuracy {
                         scene: scene.clone(),
                         preset: *preset,
                         measured: *measured,
@@ -133,7 +133,7 @@ impl Accuracy {
                                                                          controls"
         };
         doubts.retain(|doubt| !said.contains(&&**doubt));
-        reserved(ui, "doubts", DOUBTS, |ui| {
+        reserve_lines(ui, "doubts", DOUBT_LINES, |ui| {
             if let Some(problem) = &self.problem {
                 theme::error(ui, problem);
             }
@@ -159,7 +159,7 @@ impl Accuracy {
             )
         };
         ui.horizontal(|ui| {
-            let button = Button::new(name).min_size(vec2(MEASURE, 0.0));
+            let button = Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0));
             let clicked = ui
                 .add_enabled(running || preset.is_some(), button)
                 .on_hover_text(help)
@@ -291,7 +291,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
     let impact = player.impact_record().last_ended(player.pacer.shown(), f64::INFINITY);
     let row = |label, value: Option<String>, doubtful, help: String| AccuracyLine {
         label,
-        value: value.unwrap_or_else(|| NONE.to_owned()),
+        value: value.unwrap_or_else(|| PLACEHOLDER.to_owned()),
         doubtful,
         help,
     };
@@ -320,9 +320,9 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
         row(
             "Steps during impact",
             impact.map(|impact| impact.steps.to_string()),
-            impact.is_some_and(|impact| impact.steps < STEPS_OF_AN_IMPACT),
+            impact.is_some_and(|impact| impact.steps < MIN_STEPS_PER_IMPACT),
             format!(
-                "Steps of the solver from the beginning to the end of the latest impact. Fewer than {STEPS_OF_AN_IMPACT} \
+                "Steps of the solver from the beginning to the end of the latest impact. Fewer than {MIN_STEPS_PER_IMPACT} \
                  (amber) do not resolve its force (19)."
             ),
         ),
@@ -361,12 +361,13 @@ fn residual(player: &Player) -> AccuracyLine {
     );
     AccuracyLine {
         label: "Energy residual",
-        value: share.map_or_else(|| NONE.to_owned(), |share| format!("{}, relative", value::power_of_ten(share))),
-        doubtful: share.is_some_and(|share| share > BALANCED),
+        value: share
+            .map_or_else(|| PLACEHOLDER.to_owned(), |share| format!("{}, relative", value::power_of_ten(share))),
+        doubtful: share.is_some_and(|share| share > MAX_RESIDUAL),
         help: format!(
             "Unaccounted energy since the start, relative to the largest energy that the machine held at once plus \
              its losses since then. {exchanged} Amber beyond {}.",
-            value::power_of_ten(BALANCED)
+            value::power_of_ten(MAX_RESIDUAL)
         ),
     }
 }

@@ -6,9 +6,9 @@ use crate::simulate::ContactMode;
 use crate::units::format_quantity_digits;
 
 /// Least time between two reports without an event, s.
-const INTERVAL: f64 = 1.0;
+const MIN_INTERVAL: f64 = 1.0;
 /// Most ball joints reported individually; beyond that, only counts are reported.
-const MOST_JOINTS: usize = 6;
+const MAX_JOINTS: usize = 6;
 
 /// Reports about once a second, and immediately after an event.
 #[derive(Debug, Default)]
@@ -55,7 +55,7 @@ impl Announcer {
         if standing == self.standing && self.strongest.is_none() {
             return (false, None);
         }
-        let wait = self.reported + INTERVAL - now;
+        let wait = self.reported + MIN_INTERVAL - now;
         if !event && wait > 0.0 {
             return (false, Some(wait));
         }
@@ -105,7 +105,7 @@ fn joints(player: &Player) -> Option<String> {
     if reports.is_empty() {
         return None;
     }
-    if reports.len() > MOST_JOINTS {
+    if reports.len() > MAX_JOINTS {
         let free = reports.iter().filter(|joint| joint.state == ContactMode::Free);
         let free = free.count();
         return Some(format!(

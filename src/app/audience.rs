@@ -9,7 +9,7 @@ use super::keys::Action;
 use super::{App, keys, present, theme};
 
 /// Initial size, points at zoom 1.
-const SIZE: egui::Vec2 = vec2(1280.0, 720.0);
+const INITIAL_SIZE: egui::Vec2 = vec2(1280.0, 720.0);
 
 /// State of the window in its latest frame.
 pub struct Audience {
@@ -19,7 +19,7 @@ pub struct Audience {
 }
 
 /// Results of a frame.
-struct Seen {
+struct FrameResults {
     height: f32,
     closed: bool,
     tapped: bool,
@@ -51,7 +51,7 @@ pub fn choose_plot(ui: &mut Ui, titles: &[String], chosen: &mut Option<usize>) {
 impl App {
     /// Opens or closes the audience window.
     pub fn show_audience(&mut self, on: bool) {
-        self.audience = on.then_some(Audience { height: SIZE.y, fills_screen: false });
+        self.audience = on.then_some(Audience { height: INITIAL_SIZE.y, fills_screen: false });
     }
 
     /// Whether it is open.
@@ -78,7 +78,7 @@ impl App {
         };
         let zoom = present::legible(audience.height);
         // In points at the initial zoom; a changed size would resize the window.
-        let size = SIZE / present::legible(SIZE.y);
+        let size = INITIAL_SIZE / present::legible(INITIAL_SIZE.y);
         let builder = ViewportBuilder::default()
             .with_title("Jointplay: window for the class")
             .with_app_id("jointplay")
@@ -99,7 +99,7 @@ impl App {
         for key in seen.keys {
             match key {
                 Action::Present => self.fill_class_screen(ctx),
-                Action::Plots => self.turn_plot(),
+                Action::Plots => self.show_next_plot(),
                 // Leaves full screen, as in the first window.
                 Action::Close if self.audience.as_ref().is_some_and(|audience| audience.fills_screen) => {
                     self.fill_class_screen(ctx);
@@ -124,14 +124,18 @@ impl App {
     }
 
     /// Contents of the window.
-    fn audience_contents(&mut self, ui: &mut Ui) -> Seen {
+    fn audience_contents(&mut self, ui: &mut Ui) -> FrameResults {
         let ctx = ui.ctx().clone();
         let seen = ctx.input(|input| {
             let tapped = input.pointer.button_double_clicked(PointerButton::Primary);
             (input.viewport().close_requested(), tapped)
         });
-        let seen =
-            Seen { height: present::screen_height(&ctx), closed: seen.0, tapped: seen.1, keys: keys::pressed(&ctx) };
+        let seen = FrameResults {
+            height: present::screen_height(&ctx),
+            closed: seen.0,
+            tapped: seen.1,
+            keys: keys::pressed(&ctx),
+        };
         ui.visuals_mut().disabled_alpha = 1.0;
         ui.disable();
         if let Some(index) = self.single_plot() {
@@ -147,7 +151,7 @@ impl App {
             let area = ui.available_rect_before_wrap();
             let caption = self.caption_plate(ui, area, true);
             let above = caption.as_ref().map(|(_, plate)| *plate);
-            self.viewport.second_ui(ui, &self.player, present::THICKNESS, above);
+            self.viewport.second_ui(ui, &self.player, present::ARROW_THICKNESS, above);
             self.caption(ui, area, caption);
         });
         seen

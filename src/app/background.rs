@@ -8,11 +8,11 @@ use std::time::Duration;
 
 use web_time::Instant;
 
-use super::host::Running;
+use super::host::BackgroundTask;
 use crate::analysis::task::{Job, Message, perform};
 
 /// Computing time between two rests, if the thread must rest.
-const SPELL: Duration = Duration::from_millis(40);
+const BUSY_TIME: Duration = Duration::from_millis(40);
 
 /// A thread that runs a job. Dropping it cancels the job.
 pub struct Thread {
@@ -40,7 +40,7 @@ impl Thread {
                     return ControlFlow::Break(());
                 }
                 let computed = spell.elapsed();
-                if computed >= SPELL {
+                if computed >= BUSY_TIME {
                     let rest = f64::from_bits(resting.load(Ordering::Relaxed));
                     std::thread::sleep(computed.mul_f64(rest));
                     spell = Instant::now();
@@ -54,7 +54,7 @@ impl Thread {
     }
 }
 
-impl Running for Thread {
+impl BackgroundTask for Thread {
     fn poll(&mut self) -> Option<Message> {
         match self.messages.as_ref()?.try_recv() {
             Ok(message) => {

@@ -1,7 +1,6 @@
 //! The bench beside the picture: the chaos bench (phase portrait and Poincaré section of the running scene, sweeps in the background,
 //! a twin run), or what play costs.
 
-mod asked;
 mod coordinate;
 mod cost_study;
 mod costs;
@@ -9,6 +8,7 @@ mod diagram;
 mod divergence;
 mod plane;
 mod portrait;
+mod request;
 mod shares;
 mod sweep;
 mod swept;
@@ -24,13 +24,13 @@ use super::spoken;
 use crate::analysis::ready::ReadySweep;
 use crate::scene::Scene;
 use crate::view::Cloud;
-pub use asked::Asked;
 use coordinate::Coordinate;
 pub use cost_study::CostStudy;
 use costs::Costs;
 use portrait::Portrait;
+pub use request::BenchRequest;
 use sweep::SweepPanel;
-pub use swept::Swept;
+pub use swept::SweepResults;
 use workspace::MapPanel;
 
 /// The panel.
@@ -47,7 +47,7 @@ pub struct Bench {
 impl Bench {
     /// Takes messages from computations; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
-        self.costs.take_if(|costs| !costs.stays_open());
+        self.costs.take_if(|costs| !costs.was_shown());
         let computes = self.costs.as_mut().is_some_and(|costs| costs.update(host));
         let maps = self.map.update(host);
         self.sweep.update(host) || computes || maps
@@ -73,13 +73,13 @@ impl Bench {
 
     /// Whether what play costs is shown.
     pub fn shows_costs(&self) -> bool {
-        self.costs.as_ref().is_some_and(|costs| !costs.is_aside())
+        self.costs.as_ref().is_some_and(|costs| !costs.is_set_aside())
     }
 
     /// Keeps the results of what play costs while a slider in a small window, or a presentation, takes its place.
-    pub(super) fn step_aside(&mut self) {
+    pub(super) fn set_aside(&mut self) {
         if let Some(costs) = &mut self.costs {
-            costs.step_aside();
+            costs.set_aside();
         }
     }
 
@@ -101,7 +101,7 @@ impl Bench {
     }
 
     /// The latest sweep.
-    pub fn swept(&self) -> Option<&Swept> {
+    pub fn swept(&self) -> Option<&SweepResults> {
         self.sweep.swept()
     }
 
@@ -129,7 +129,7 @@ impl Bench {
     }
 
     /// The whole bench; returns the user's request to the run.
-    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<Asked> {
+    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<BenchRequest> {
         if let Some((tab, title)) = ui.horizontal_wrapped(|ui| self.tabs(ui)).inner {
             spoken::titled(ui, &tab, title);
         }

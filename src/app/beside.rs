@@ -35,7 +35,7 @@ impl App {
 
     /// Saves the record of a reference run on request.
     pub(super) fn save_kept(&mut self) {
-        if let Some(kept) = self.plots.comparison.take_to_save() {
+        if let Some(kept) = self.plots.comparison.take_run_to_save() {
             let files = record_files(kept.run());
             self.save(files);
         }
@@ -43,14 +43,14 @@ impl App {
 
     /// Advances the reference runs, and the picture of the displayed one, by `dt` seconds. Returns whether one of them still lags
     /// behind.
-    pub(super) fn advance_kept(&mut self, dt: f32) -> bool {
+    pub(super) fn advance_earlier_runs(&mut self, dt: f32) -> bool {
         let Self { plots, player, beside, .. } = self;
         let before = plots.comparison.beside().map(|(kept, _)| kept.run().pacer.shown());
         let lags = plots.comparison.advance(player, f64::from(dt));
         if let (Some((kept, _)), Some((_, picture))) = (plots.comparison.beside(), beside) {
             picture.advance(kept.run(), dt);
             if !player.is_playing() && before != Some(kept.run().pacer.shown()) {
-                picture.revisit(kept.run());
+                picture.restore_marks(kept.run());
             }
         }
         lags
@@ -72,7 +72,7 @@ impl App {
             Some(shown) => beside.insert(shown),
             None => {
                 let mut picture = Box::new(Viewport::beside(kept.run()));
-                picture.revisit(kept.run());
+                picture.restore_marks(kept.run());
                 beside.insert((number, picture))
             }
         };
@@ -85,14 +85,14 @@ impl App {
         let close =
             Rect::from_min_size(before.right_top() + vec2(-80.0, 10.0), vec2(70.0, ui.spacing().interact_size.y));
         picture.ui(&mut place, kept.run(), plain, if plain { &[] } else { std::slice::from_ref(&close) });
-        viewport.look_as(picture);
+        viewport.copy_camera(picture);
         picture.take_clicked();
         if let Some(pull) = picture.take_pull() {
             // A body that cannot be pulled stays unchanged.
             let _ = kept.run_mut().pull(pull);
         }
         if !plain && ui.put(close, Button::new("Close")).on_hover_text("Show only the current machine").clicked() {
-            plots.comparison.show_alone();
+            plots.comparison.hide_comparison();
         }
         now
     }

@@ -124,9 +124,9 @@ fn has_dialogs() -> bool {
 #[cfg(all(unix, not(target_os = "macos")))]
 async fn has_portal() -> zbus::Result<()> {
     /// Timeout for starting the portal, s.
-    const PATIENCE: u64 = 5;
+    const TIMEOUT: u64 = 5;
     let bus = zbus::connection::Builder::session()?;
-    let bus = bus.method_timeout(std::time::Duration::from_secs(PATIENCE)).build().await?;
+    let bus = bus.method_timeout(std::time::Duration::from_secs(TIMEOUT)).build().await?;
     let (portal, object) = ("org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop");
     let asked = ("org.freedesktop.portal.FileChooser", "version");
     bus.call_method(Some(portal), object, Some("org.freedesktop.DBus.Properties"), "Get", &asked).await?;

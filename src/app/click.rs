@@ -11,16 +11,16 @@ use crate::simulate::Impact;
 /// Lowest and highest pitch, Hz: the range of small loudspeakers and most ears.
 pub const PITCHES: (f64, f64) = (150.0, 8000.0);
 /// Wall impact speed of the scene's total mass that gives full loudness, m/s.
-const LOUDEST_SPEED: f64 = 0.1;
+const FULL_LOUDNESS_SPEED: f64 = 0.1;
 /// Exponent of the loudness over the impulse: ten times the impulse is two and a half times as loud.
 const COMPRESSION: f64 = 0.4;
 /// Amplitude of the loudest click relative to the device's full scale; leaves headroom for several at once.
 const AMPLITUDE: f64 = 0.4;
 /// Most clicks per frame; the loudest are played.
-pub const MOST_CLICKS: usize = 8;
+pub const MAX_CLICKS: usize = 8;
 /// Vibrations until the amplitude has decayed to 1/e, and the shortest decay time, s.
 const VIBRATIONS: f64 = 3.0;
-const SHORTEST_DECAY: f64 = 4e-3;
+const MIN_DECAY: f64 = 4e-3;
 /// Relative amplitude at which a click ends.
 const SILENCE: f64 = 3e-3;
 
@@ -67,16 +67,16 @@ pub fn clicks<'a>(impacts: impl Iterator<Item = &'a Impact>, window: &TimeWindow
     out.extend(impacts.filter(within).map(|impact| {
         let part = (impact.end - window.from) / (window.to - window.from);
         let lasted = impact.end - impact.start;
-        let loudness = impulse(impact, mass) / (mass * LOUDEST_SPEED);
+        let loudness = impulse(impact, mass) / (mass * FULL_LOUDNESS_SPEED);
         Click {
             after: part * window.lasts,
             pitch: (0.5 / lasted).clamp(PITCHES.0, PITCHES.1),
             loudness: libm::pow(loudness, COMPRESSION).min(1.0),
         }
     }));
-    if out.len() > MOST_CLICKS {
+    if out.len() > MAX_CLICKS {
         out.sort_by(|a, b| b.loudness.total_cmp(&a.loudness));
-        out.truncate(MOST_CLICKS);
+        out.truncate(MAX_CLICKS);
         out.sort_by(|a, b| a.after.total_cmp(&b.after));
     }
 }
@@ -97,7 +97,7 @@ impl Voice {
     pub fn new(click: &Click, rate: f64) -> Self {
         // The pitch is limited by the device's sample rate.
         let pitch = click.pitch.min(0.45 * rate);
-        let decay = (VIBRATIONS / pitch).max(SHORTEST_DECAY);
+        let decay = (VIBRATIONS / pitch).max(MIN_DECAY);
         let angle = std::f64::consts::TAU * pitch / rate;
         let kept = libm::exp(-1.0 / (decay * rate));
         Self {
@@ -197,12 +197,12 @@ mod tests {
         let impacts: Vec<Impact> =
             (1..=40).map(|k| impact(1.0 + f64::from(k) / 50.0, 1e-4, 1e-3 * f64::from(k * 7 % 41))).collect();
         let heard = of(&impacts, SECOND);
-        assert_eq!(heard.len(), MOST_CLICKS);
+        assert_eq!(heard.len(), MAX_CLICKS);
         assert!(heard.is_sorted_by(|a, b| a.after < b.after));
         let alone: Vec<Click> = impacts.iter().flat_map(|i| of(&[*i], SECOND)).collect();
         let softest = heard.iter().map(|c| c.loudness).fold(1.0, f64::min);
         let louder = alone.iter().filter(|click| click.loudness >= softest);
-        assert_eq!(louder.count(), MOST_CLICKS);
+        assert_eq!(louder.count(), MAX_CLICKS);
         assert!(heard.iter().all(|click| alone.contains(click)));
     }
 
@@ -274,7 +274,7 @@ mod tests {
             assert!(near > 0.7, "{pitch} Hz: {near}");
             assert!((peak / pitch - 1.0).abs() < 0.05, "{pitch} Hz: {peak} Hz");
             // Closed form of a decaying sine at every sample.
-            let decay = (VIBRATIONS / pitch).max(SHORTEST_DECAY) * RATE;
+            let decay = (VIBRATIONS / pitch).max(MIN_DECAY) * RATE;
             for (n, sample) in samples.iter().enumerate() {
                 let (n, angle) = (n as f64, std::f64::consts::TAU * pitch / RATE);
                 let exact = AMPLITUDE * (-n / decay).exp() * (angle * n).sin();

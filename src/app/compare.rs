@@ -7,27 +7,27 @@ use super::player::Player;
 use super::{layout, value};
 
 /// Most pinned runs, in addition to the latest run before a change.
-const MOST_PINNED: usize = 3;
+const MAX_PINNED: usize = 3;
 /// Stepping time per frame for all of them: fraction of the frame time, and least value, s, during playback and while waiting for
 /// one of them.
-const SHARE: f64 = 0.2;
-const LEAST_BUDGET: f64 = 3e-3;
+const BUDGET_FRACTION: f64 = 0.2;
+const MIN_BUDGET: f64 = 3e-3;
 /// Upper limit at low frame rates; keeps the interface responsive.
-const MOST_BUDGET: f64 = 16e-3;
-const WAITED_FOR: f64 = 3.0;
+const MAX_BUDGET: f64 = 16e-3;
+const WAITING_FACTOR: f64 = 3.0;
 /// Share of a member's colour in the grey of its old curve: enough to distinguish members.
-const HUE: f32 = 0.3;
+const HUE_FRACTION: f32 = 0.3;
 /// Dash lengths of pinned curves, points.
-const DASHES: [f32; MOST_PINNED] = [8.0, 4.0, 2.0];
+const DASHES: [f32; MAX_PINNED] = [8.0, 4.0, 2.0];
 /// Least width of a name in a legend, points.
-const LEAST_LEGEND: f32 = 30.0;
+const MIN_LEGEND_WIDTH: f32 = 30.0;
 /// Line symbols in a legend.
-const LINES: [&str; 1 + MOST_PINNED] = ["—", "– –", "- -", "· ·"];
+const LINE_SYMBOLS: [&str; 1 + MAX_PINNED] = ["—", "– –", "- -", "· ·"];
 /// Grey levels of the latest and the pinned curves; 0 is the background.
-const GREYS: [f32; 1 + MOST_PINNED] = [0.55, 0.7, 0.6, 0.5];
+const GREY_LEVELS: [f32; 1 + MAX_PINNED] = [0.55, 0.7, 0.6, 0.5];
 
 /// A run from before a change.
-pub struct Kept {
+pub struct EarlierRun {
     /// The parameter that was changed.
     key: String,
     /// Name given by the user.
@@ -41,7 +41,7 @@ pub struct Kept {
     number: u64,
 }
 
-impl Kept {
+impl EarlierRun {
     /// Its name; by default the changed parameter with its value in this run.
     pub fn name(&self) -> String {
         let given = self.name.as_ref().filter(|name| !name.trim().is_empty());
@@ -65,9 +65,9 @@ impl Kept {
 
     /// Grey of the old curve whose current version has `colour`.
     pub fn colour(&self, colour: Color32, dark: bool) -> Color32 {
-        let level = GREYS[self.place];
+        let level = GREY_LEVELS[self.place];
         let grey = Color32::from_gray((255.0 * if dark { level } else { 1.0 - level }) as u8);
-        grey.lerp_to_gamma(colour, HUE)
+        grey.lerp_to_gamma(colour, HUE_FRACTION)
     }
 
     /// Dash length of its curves, points; `None` for a solid line.
@@ -109,7 +109,7 @@ fn named(run: &Player, key: &str) -> String {
 pub struct Comparison {
     /// Whether the run before a change is retained.
     on: bool,
-    kept: Vec<Kept>,
+    kept: Vec<EarlierRun>,
     /// Place of the run displayed beside the picture, and of the run whose record is to be saved.
     beside: Option<usize>,
     to_save: Option<usize>,
@@ -124,7 +124,7 @@ impl Default for Comparison {
 }
 
 /// A request from the menu.
-enum Wish {
+enum Request {
     Pin,
     Save,
     Remove,
@@ -144,31 +144,31 @@ impl Comparison {
     /// Stores `run`, from before `key` was changed, as the latest.
     pub fn add(&mut self, run: Box<Player>, key: String) {
         self.kept.retain(|kept| kept.place != 0);
-        self.kept.insert(0, Kept { key, name: None, place: 0, shown: true, run, number: self.count });
+        self.kept.insert(0, EarlierRun { key, name: None, place: 0, shown: true, run, number: self.count });
         self.count += 1;
     }
 
     /// The stored runs, latest first.
-    pub fn kept(&self) -> &[Kept] {
+    pub fn kept(&self) -> &[EarlierRun] {
         &self.kept
     }
 
     /// The runs with visible curves.
-    pub fn shown(&self) -> impl Iterator<Item = &Kept> {
+    pub fn shown(&self) -> impl Iterator<Item = &EarlierRun> {
         self.kept.iter().filter(|kept| kept.shown)
     }
 
     /// Whether the run displayed beside that of `player` has not reached the displayed instant.
-    pub fn is_waited_for(&self, player: &Player) -> bool {
+    pub fn is_behind(&self, player: &Player) -> bool {
         let beside = self.kept.iter().find(|kept| Some(kept.place) == self.beside);
         beside.is_some_and(|kept| kept.lags(player))
     }
 
     /// Advances the runs to the time of `player` in a frame of `dt` seconds; returns whether one of them still lags behind.
     pub fn advance(&mut self, player: &Player, dt: f64) -> bool {
-        let waited = !player.is_playing() || self.is_waited_for(player);
-        let budget = (SHARE * dt).max(LEAST_BUDGET) * if waited { WAITED_FOR } else { 1.0 };
-        let lags = self.follow(player, budget.min(MOST_BUDGET));
+        let waited = !player.is_playing() || self.is_behind(player);
+        let budget = (BUDGET_FRACTION * dt).max(MIN_BUDGET) * if waited { WAITING_FACTOR } else { 1.0 };
+        let lags = self.follow(player, budget.min(MAX_BUDGET));
         for kept in &mut self.kept {
             kept.run.publish_peaks();
             kept.run.update_ghosts();
@@ -206,7 +206,7 @@ impl Comparison {
     }
 
     fn pin(&mut self, at: usize) {
-        let free = (1..=MOST_PINNED).find(|place| self.kept.iter().all(|kept| kept.place != *place));
+        let free = (1..=MAX_PINNED).find(|place| self.kept.iter().all(|kept| kept.place != *place));
         let Some(kept) = self.kept.get_mut(at) else {
             return;
         };
@@ -229,11 +229,11 @@ impl Comparison {
     pub fn legend(&mut self, ui: &mut Ui, player: &Player, height: f32, plot: &str) {
         let count = self.kept.len().max(1) as f32;
         let width = (ui.available_width() / count - 6.0).min(170.0);
-        if width < LEAST_LEGEND {
+        if width < MIN_LEGEND_WIDTH {
             return;
         }
         for kept in &mut self.kept {
-            let mut text = format!("{} {}", LINES[kept.place], kept.name());
+            let mut text = format!("{} {}", LINE_SYMBOLS[kept.place], kept.name());
             if kept.lags(player) {
                 text += &format!(" (computed to {})", value::time(kept.run.reached()));
             }
@@ -275,7 +275,7 @@ impl Comparison {
             ui.weak("Change a parameter to compare");
         }
         let mut wish = None;
-        let full = self.kept.iter().filter(|kept| kept.place > 0).count() == MOST_PINNED;
+        let full = self.kept.iter().filter(|kept| kept.place > 0).count() == MAX_PINNED;
         for (at, kept) in self.kept.iter_mut().enumerate() {
             ui.separator();
             ui.push_id(at, |ui| {
@@ -292,9 +292,9 @@ impl Comparison {
                     ui.checkbox(&mut kept.shown, "Curves").on_hover_text("Show its curves in the plots, in grey");
                     let pinned = kept.place > 0;
                     let pin = egui::Button::new("Pin").selected(pinned);
-                    let help = format!("Keep this run when another parameter changes; at most {MOST_PINNED}");
+                    let help = format!("Keep this run when another parameter changes; at most {MAX_PINNED}");
                     if ui.add_enabled(pinned || !full, pin).on_hover_text(help).clicked() {
-                        wish = Some((at, Wish::Pin));
+                        wish = Some((at, Request::Pin));
                     }
                     let beside = self.beside == Some(kept.place);
                     let help =
@@ -304,18 +304,18 @@ impl Comparison {
                         self.beside = (!beside).then_some(kept.place);
                     }
                     if ui.button("Save").on_hover_text("Save its record as CSV").clicked() {
-                        wish = Some((at, Wish::Save));
+                        wish = Some((at, Request::Save));
                     }
                     if ui.button("Remove").on_hover_text("Discard this run").clicked() {
-                        wish = Some((at, Wish::Remove));
+                        wish = Some((at, Request::Remove));
                     }
                 });
             });
         }
         match wish {
-            Some((at, Wish::Save)) => self.to_save = Some(self.kept[at].place),
-            Some((at, Wish::Pin)) => self.pin(at),
-            Some((at, Wish::Remove)) => {
+            Some((at, Request::Save)) => self.to_save = Some(self.kept[at].place),
+            Some((at, Request::Pin)) => self.pin(at),
+            Some((at, Request::Remove)) => {
                 let removed = self.kept.remove(at);
                 self.beside = self.beside.filter(|place| *place != removed.place);
             }
@@ -324,12 +324,12 @@ impl Comparison {
     }
 
     /// Displays the current machine alone again.
-    pub(super) fn show_alone(&mut self) {
+    pub(super) fn hide_comparison(&mut self) {
         self.beside = None;
     }
 
     /// The run whose machine is displayed beside the current one, and its number.
-    pub fn beside(&mut self) -> Option<(&mut Kept, u64)> {
+    pub fn beside(&mut self) -> Option<(&mut EarlierRun, u64)> {
         let place = self.beside?;
         let kept = self.kept.iter_mut().find(|kept| kept.place == place)?;
         let number = kept.number;
@@ -337,7 +337,7 @@ impl Comparison {
     }
 
     /// The run whose record is to be saved; clears the request.
-    pub fn take_to_save(&mut self) -> Option<&Kept> {
+    pub fn take_run_to_save(&mut self) -> Option<&EarlierRun> {
         let place = self.to_save.take()?;
         self.kept.iter().find(|kept| kept.place == place)
     }

@@ -22,12 +22,12 @@ const PRESET: &str = "solver.preset";
 pub(super) const FIRST: [&str; 3] = ["contact.clearance", "contact.friction", "contact.restitution"];
 
 /// Width from which a touch slider has its value beside it, points.
-const BESIDE: f32 = 220.0;
+const MIN_WIDTH_WITH_VALUE: f32 = 220.0;
 /// Side of the undo button, points.
-const UNDO: f32 = 22.0;
+const UNDO_SIDE: f32 = 22.0;
 /// Width of a text field, and its margin on either side, points.
-const ENTRY: f32 = 84.0;
-const MARGIN: i8 = 6;
+const ENTRY_WIDTH: f32 = 84.0;
+const ENTRY_MARGIN: i8 = 6;
 
 /// State of the controls outside the simulation: partially typed values and their errors.
 #[derive(Default)]
@@ -104,7 +104,7 @@ impl Controls {
         }
         for group in groups {
             let rest = || {
-                let apart = |p: &Parameter| FIRST.contains(&p.key) || p.key == PRESET || shows_first(p);
+                let apart = |p: &Parameter| FIRST.contains(&p.key) || p.key == PRESET || is_scene_parameter(p);
                 table.iter().filter(move |p| p.group == group && !apart(p))
             };
             if rest().next().is_none() {
@@ -129,7 +129,7 @@ impl Controls {
             }
         }
         // Parameters defined by the scene's author.
-        for parameter in table.iter().filter(|p| shows_first(p)) {
+        for parameter in table.iter().filter(|p| is_scene_parameter(p)) {
             self.control(ui, player, parameter, parameter.key);
             ui.add_space(4.0);
         }
@@ -223,7 +223,7 @@ impl Controls {
         let Value::Number(si) = row.now else {
             return;
         };
-        if theme::has_fingers(ui) && ui.available_width() > BESIDE {
+        if theme::has_fingers(ui) && ui.available_width() > MIN_WIDTH_WITH_VALUE {
             // Slider and value share a row, so that a phone shows three controls.
             ui.spacing_mut().item_spacing.y = 0.0;
             label(ui, player, row);
@@ -236,8 +236,8 @@ impl Controls {
             });
             return;
         }
-        theme::tighten(ui);
-        let room = 92.0 + theme::side(ui, UNDO);
+        theme::use_dense_rows(ui);
+        let room = 92.0 + theme::side(ui, UNDO_SIDE);
         self.heading(ui, player, room, row, |this, ui, player| {
             this.default_button(ui, player, row);
             this.entry(ui, player, row);
@@ -276,7 +276,7 @@ impl Controls {
     }
 
     fn choice(&mut self, ui: &mut Ui, player: &mut Player, row: &Row, words: &[&'static str]) {
-        let room = 168.0 + theme::side(ui, UNDO);
+        let room = 168.0 + theme::side(ui, UNDO_SIDE);
         self.heading(ui, player, room, row, |this, ui, player| {
             this.default_button(ui, player, row);
             let mut chosen = None;
@@ -311,7 +311,7 @@ impl Controls {
         let Value::Count(mut count) = row.now else {
             return;
         };
-        let room = 78.0 + theme::side(ui, UNDO);
+        let room = 78.0 + theme::side(ui, UNDO_SIDE);
         self.heading(ui, player, room, row, |this, ui, player| {
             this.default_button(ui, player, row);
             let response = ui.add(DragValue::new(&mut count).range(min..=max).update_while_editing(false));
@@ -356,15 +356,15 @@ impl Controls {
     fn entry(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
         let shown = row.shown();
         let mut text = self.drafts.get(row.key).map_or_else(|| shown.clone(), |draft| draft.text.clone());
-        let font = fitting(ui, &text, ENTRY - 2.0 * f32::from(MARGIN));
+        let font = fitting(ui, &text, ENTRY_WIDTH - 2.0 * f32::from(ENTRY_MARGIN));
         let response = ui.add(
             TextEdit::singleline(&mut text)
                 .font(font)
-                .desired_width(ENTRY)
+                .desired_width(ENTRY_WIDTH)
                 .min_size(egui::vec2(0.0, ui.spacing().interact_size.y))
                 .align(egui::Align2::RIGHT_CENTER)
                 .background_color(ui.visuals().faint_bg_color)
-                .margin(egui::Margin::symmetric(MARGIN, 3)),
+                .margin(egui::Margin::symmetric(ENTRY_MARGIN, 3)),
         );
         if response.changed() {
             self.drafts.insert(row.key.to_owned(), Draft { text: text.clone(), error: None });
@@ -384,7 +384,7 @@ impl Controls {
     }
 
     fn default_button(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
-        let size = theme::side(ui, UNDO);
+        let size = theme::side(ui, UNDO_SIDE);
         // Reserves the space without a button, so that rows stay aligned.
         let Some(original) = player.original(row.key).filter(|original| *original != row.now) else {
             ui.allocate_space(egui::Vec2::splat(size));
@@ -483,7 +483,7 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
 }
 
 /// Whether a parameter is the scene's own, in no group.
-fn shows_first(parameter: &Parameter) -> bool {
+fn is_scene_parameter(parameter: &Parameter) -> bool {
     parameter.scope == Scope::Own && parameter.group == OWN_GROUP
 }
 
@@ -496,7 +496,7 @@ mod tests {
         let ctx = egui::Context::default();
         theme::apply(&ctx, false);
         let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
-            let room = ENTRY - 2.0 * f32::from(MARGIN);
+            let room = ENTRY_WIDTH - 2.0 * f32::from(ENTRY_MARGIN);
             let width = |text: &str| {
                 let font = fitting(ui, text, room);
                 let galley = ui.painter().layout_no_wrap(text.to_owned(), font.clone(), egui::Color32::BLACK);

@@ -15,7 +15,7 @@ pub const WIDTH: f32 = 1.4;
 pub const DASH: f32 = 6.0;
 
 /// Most pixels over which a steep curve fades into the next column.
-const SOFTEST: f32 = 6.0;
+const MAX_FADE: f32 = 6.0;
 
 /// A recorded curve in SI units.
 #[derive(Clone, Debug, Default)]
@@ -145,7 +145,7 @@ struct Span {
 }
 
 impl Span {
-    const NOTHING: Self = Self { top: f32::INFINITY, bottom: f32::NEG_INFINITY };
+    const EMPTY: Self = Self { top: f32::INFINITY, bottom: f32::NEG_INFINITY };
 
     fn reach(&mut self, y: f64) {
         self.top = self.top.min(y as f32);
@@ -159,7 +159,7 @@ impl Span {
 
 /// Spans of the `count` pixel columns from `first` for a curve through `bins`; `place` maps time and value to pixels.
 fn spans(bins: &[Bin], place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: usize) -> Vec<Span> {
-    let mut spans = vec![Span::NOTHING; count];
+    let mut spans = vec![Span::EMPTY; count];
     let column = |x: f64| {
         let at = x.floor() as i64 - first;
         usize::try_from(at).ok().filter(|at| *at < count)
@@ -226,7 +226,7 @@ struct Bar {
 }
 
 impl Bar {
-    const NOTHING: Self = Self { top: 0.0, bottom: 0.0, soft_top: 0.0, soft_bottom: 0.0 };
+    const EMPTY: Self = Self { top: 0.0, bottom: 0.0, soft_top: 0.0, soft_bottom: 0.0 };
 
     fn height(&self) -> f32 {
         self.bottom - self.top
@@ -273,18 +273,18 @@ fn bars(spans: &[Span], width: f32) -> Vec<Bar> {
     let wide = |at: usize| {
         let last = spans.len() - 1;
         let near = spans[at.saturating_sub(beside)..=(at + beside).min(last)].iter();
-        near.fold(Span::NOTHING, |all, span| all.join(*span))
+        near.fold(Span::EMPTY, |all, span| all.join(*span))
     };
     let wide: Vec<Span> = (0..spans.len()).map(wide).collect();
     let bar = |at: usize| {
         let Span { top, bottom } = wide[at];
         if top > bottom {
-            return Bar::NOTHING;
+            return Bar::EMPTY;
         }
-        let before = at.checked_sub(1).map_or(Span::NOTHING, |at| wide[at]);
-        let around = before.join(wide.get(at + 1).copied().unwrap_or(Span::NOTHING));
+        let before = at.checked_sub(1).map_or(Span::EMPTY, |at| wide[at]);
+        let around = before.join(wide.get(at + 1).copied().unwrap_or(Span::EMPTY));
         // Extent of the curve beyond this column, limited to its slope here.
-        let goes_on = |by: f32| by.clamp(0.0, (bottom - top).min(SOFTEST));
+        let goes_on = |by: f32| by.clamp(0.0, (bottom - top).min(MAX_FADE));
         let (up, down) = (goes_on(top - around.top), goes_on(around.bottom - bottom));
         let more = |beyond: f32| (0.5 * rest * beyond).min(1.0);
         let (mut top, mut bottom) = (top - more(up), bottom + more(down));

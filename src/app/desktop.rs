@@ -10,7 +10,7 @@ use super::background::Thread;
 use super::chooser::{Answer, Chooser};
 #[cfg(feature = "sound")]
 use super::click::Click;
-use super::host::{Dropped, Host, OpenedFile, Running, SaveFile};
+use super::host::{BackgroundTask, DroppedFile, Host, OpenedFile, SaveFile};
 use super::saved::Watcher;
 #[cfg(feature = "sound")]
 use super::speaker::Speaker;
@@ -83,8 +83,8 @@ impl Host for DesktopHost {
         Ok(format!("Saved {}", names.join(" and ")))
     }
 
-    fn read_dropped(&mut self, files: Vec<Dropped>) {
-        let read = |file: Dropped| read(file.path(), || file.bytes());
+    fn read_dropped(&mut self, files: Vec<DroppedFile>) {
+        let read = |file: DroppedFile| read(file.path(), || file.bytes());
         self.opened.push_back(files.into_iter().map(read).collect());
     }
 
@@ -137,7 +137,7 @@ impl Host for DesktopHost {
         cores.map_or(1, |cores| (cores.get() - 1).max(1))
     }
 
-    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+    fn start(&mut self, job: Job) -> Option<Box<dyn BackgroundTask>> {
         Some(Box::new(Thread::start(job)?))
     }
 

@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Id, Label, Modal, RichText, ScrollArea, TextEdit, Ui};
 
-use super::film::{self, Wanted};
+use super::film::{self, FilmSettings};
 use super::host::SaveFile;
 use super::keys::Group;
 use super::load::Load;
@@ -14,10 +14,10 @@ use code::SharedLink;
 mod code;
 
 /// Least width of a column of the list of keys, and width of its keys, points.
-const COLUMN: f32 = 340.0;
-const KEYS: f32 = 126.0;
+const MIN_COLUMN_WIDTH: f32 = 340.0;
+const KEYS_WIDTH: f32 = 126.0;
 /// Column width below which keys and descriptions are stacked, points.
-const NARROW: f32 = 300.0;
+const MIN_WIDTH_SIDE_BY_SIDE: f32 = 300.0;
 
 /// The open dialog.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +47,7 @@ pub enum Dialog {
     /// Settings of a film.
     Film {
         /// Settings so far.
-        wanted: Wanted,
+        wanted: FilmSettings,
     },
     /// Runs to a section of a sweep whose scene differs from the displayed one.
     Load {
@@ -192,10 +192,10 @@ fn help(ui: &mut Ui) -> bool {
     ui.spacing_mut().interact_size.y = 18.0;
     ui.spacing_mut().item_spacing.y = 4.0;
     let columns: &[&[Group]] = match ui.available_width() {
-        width if width >= 3.0 * COLUMN => {
+        width if width >= 3.0 * MIN_COLUMN_WIDTH => {
             &[&[Group::Run, Group::Window], &[Group::Picture, Group::Focus], &[Group::Pointer]]
         }
-        width if width >= 2.0 * COLUMN => {
+        width if width >= 2.0 * MIN_COLUMN_WIDTH => {
             &[&[Group::Run, Group::Picture, Group::Focus], &[Group::Window, Group::Pointer]]
         }
         _ => &[&[Group::Run, Group::Picture, Group::Window, Group::Pointer, Group::Focus]],
@@ -217,15 +217,15 @@ fn help(ui: &mut Ui) -> bool {
 fn key_row(ui: &mut Ui, key: &str, help: &str) {
     let key = Label::new(RichText::new(key).strong()).wrap();
     let help = Label::new(help).wrap();
-    if ui.available_width() < NARROW {
+    if ui.available_width() < MIN_WIDTH_SIDE_BY_SIDE {
         // Stacked, since the longer part of each line would be cut off otherwise.
         ui.add(key);
         ui.indent("help", |ui| ui.add(help));
         return;
     }
     ui.horizontal_top(|ui| {
-        ui.allocate_ui(egui::vec2(KEYS, 0.0), |ui| {
-            ui.set_width(KEYS);
+        ui.allocate_ui(egui::vec2(KEYS_WIDTH, 0.0), |ui| {
+            ui.set_width(KEYS_WIDTH);
             ui.add(key);
         });
         ui.add(help);

@@ -6,12 +6,12 @@ use super::{App, spoken, transport};
 use crate::session::embedded::{Embedded, Part};
 
 /// Width of the controls beside the picture, points.
-const CONTROLS: f32 = 250.0;
+const CONTROLS_WIDTH: f32 = 250.0;
 /// Height of the plots, and of the controls below the picture, as shares of the window's.
-const PLOTS: f32 = 0.34;
-const BELOW: f32 = 0.4;
+const PLOTS_FRACTION: f32 = 0.34;
+const CONTROLS_FRACTION: f32 = 0.4;
 /// Size of the frame that [`App::embedding`] writes, CSS pixels.
-const FRAME: [u32; 2] = [800, 500];
+const FRAME_SIZE: [u32; 2] = [800, 500];
 
 impl App {
     /// Panels of an embedded window; `None` for a stand-alone window.
@@ -24,7 +24,7 @@ impl App {
         let Some(panels) = self.embedded.clone() else {
             return;
         };
-        self.lesson_beside(ui, bar);
+        self.lesson_panel(ui, bar);
         let free = !self.is_under_way();
         let wide = ui.available_width() > ui.available_height();
         let asked = Panel::bottom("transport")
@@ -39,9 +39,9 @@ impl App {
             .inner;
         if panels.contains(Part::Controls) {
             let panel = if wide {
-                Panel::left("controls").exact_size(CONTROLS.min(0.45 * ui.available_width()))
+                Panel::left("controls").exact_size(CONTROLS_WIDTH.min(0.45 * ui.available_width()))
             } else {
-                Panel::bottom("controls below").exact_size(BELOW * ui.available_height())
+                Panel::bottom("controls below").exact_size(CONTROLS_FRACTION * ui.available_height())
             };
             panel.frame(bar).resizable(false).show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -52,7 +52,7 @@ impl App {
         }
         if panels.contains(Part::Bench) {
             let panel = Panel::right("bench").exact_size(0.45 * ui.available_width());
-            let wish = panel.frame(bar).resizable(false).show(ui, |ui| {
+            let request = panel.frame(bar).resizable(false).show(ui, |ui| {
                 ScrollArea::vertical()
                     .id_salt("bench")
                     .auto_shrink(false)
@@ -63,12 +63,12 @@ impl App {
                     })
                     .inner
             });
-            if let Some(wish) = wish.inner {
-                self.bench_asks(wish);
+            if let Some(request) = request.inner {
+                self.apply_bench_request(request);
             }
         }
         if panels.contains(Part::Plots) {
-            let panel = Panel::bottom("plots").exact_size(PLOTS * ui.available_height());
+            let panel = Panel::bottom("plots").exact_size(PLOTS_FRACTION * ui.available_height());
             let asked = panel.frame(bar).resizable(false).show(ui, |ui| {
                 ui.take_available_space();
                 self.plots.ui(ui, &self.player)
@@ -99,7 +99,7 @@ impl App {
             let text = text.replace('&', "&amp;").replace('"', "&quot;");
             text.replace('<', "&lt;")
         };
-        let [width, height] = FRAME;
+        let [width, height] = FRAME_SIZE;
         Ok(format!(
             "<iframe src=\"{}\" width=\"{width}\" height=\"{height}\" style=\"border: 0\" loading=\"lazy\" \
              allow=\"fullscreen; clipboard-write\" title=\"{}\"></iframe>",

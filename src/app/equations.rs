@@ -13,7 +13,7 @@ const PAPER: &str = "Sheng & Chen (2024)";
 
 /// A law as shown in a tooltip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stated {
+pub struct ShownLaw {
     /// Name of the law.
     pub law: &'static str,
     /// Its formula.
@@ -22,14 +22,14 @@ pub struct Stated {
     pub elsewhere: Option<&'static str>,
 }
 
-impl Stated {
+impl ShownLaw {
     const fn new(law: &'static str, formula: &'static str) -> Self {
         Self { law, formula, elsewhere: None }
     }
 }
 
 /// The law of `scene` that uses the parameter `key`; `None` unless it is a contact parameter.
-pub fn law(key: &str, scene: &Scene) -> Option<Stated> {
+pub fn law(key: &str, scene: &Scene) -> Option<ShownLaw> {
     let (group, last) = key.rsplit_once('.')?;
     let contact = match group.strip_prefix("joint.") {
         Some(name) => &scene.machine.ball_joints.iter().find(|joint| joint.name == name)?.contact,
@@ -40,24 +40,24 @@ pub fn law(key: &str, scene: &Scene) -> Option<Stated> {
 }
 
 /// The same for the last part of its key.
-fn law_of(last: &str, contact: &Parameters) -> Option<Stated> {
+fn law_of(last: &str, contact: &Parameters) -> Option<ShownLaw> {
     let without = contact.friction_law == FrictionLaw::None;
     Some(match last {
         "clearance" | "ball_radius" | "youngs_modulus" | "poisson_ratio" => {
-            Stated::new("Stiffness of the contact", HERTZ)
+            ShownLaw::new("Stiffness of the contact", HERTZ)
         }
         "friction" | "friction_law" | "slip_speed_low" | "slip_speed_high" if without => {
-            Stated::new("No friction", "F = 0")
+            ShownLaw::new("No friction", "F = 0")
         }
-        "friction" | "friction_law" => Stated::new("Coulomb friction with dynamic correction", COULOMB),
-        "slip_speed_low" | "slip_speed_high" => Stated::new("Dynamic correction of friction", CORRECTION),
+        "friction" | "friction_law" => ShownLaw::new("Coulomb friction with dynamic correction", COULOMB),
+        "slip_speed_low" | "slip_speed_high" => ShownLaw::new("Dynamic correction of friction", CORRECTION),
         "restitution" | "normal_law" => normal(contact.normal_law),
         _ => return None,
     })
 }
 
 /// The damping factors match `contact::damping_factor`.
-fn normal(law: NormalLaw) -> Stated {
+fn normal(law: NormalLaw) -> ShownLaw {
     let (law, formula, elsewhere) = match law {
         NormalLaw::LankaraniNikravesh => (
             "Lankarani–Nikravesh normal force",
@@ -83,7 +83,7 @@ fn normal(law: NormalLaw) -> Stated {
             Some("Gonthier et al. (2004)"),
         ),
     };
-    Stated { law, formula, elsewhere }
+    ShownLaw { law, formula, elsewhere }
 }
 
 /// The source of a parameter, `Paper eqs. (9), (10)`, with the paper's name: `Sheng & Chen (2024), eqs. 9, 10`.

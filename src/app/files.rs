@@ -8,9 +8,9 @@ use serde_json::{Map, json};
 
 use super::dialogs::Dialog;
 use super::host::{Host, OpenedFile, SaveFile};
-use super::lesson::Course;
+use super::lesson::RunningLesson;
 use super::player::Player;
-use super::reload::{Given, SceneFile};
+use super::reload::{FileContents, SceneFile};
 use super::{App, Notice, value};
 use crate::session::link::settings::{self as link_settings, Instruments};
 use crate::session::link::{Link, SceneText, is_link};
@@ -33,7 +33,7 @@ impl App {
     /// A link to the present state.
     pub fn link(&self) -> Link {
         if let Some(replay) = &self.replay {
-            let (lesson, step) = self.course().and_then(Course::shared).unzip();
+            let (lesson, step) = self.course().and_then(RunningLesson::shared).unzip();
             return Link { lesson, step, embedded: self.embedded.clone(), ..replay.link().clone() };
         }
         let player = &self.player;
@@ -46,7 +46,7 @@ impl App {
             ideal: player.ideal().is_some(),
             wear: self.viewport.options.wear,
         };
-        let (lesson, step) = self.course().and_then(Course::shared).unzip();
+        let (lesson, step) = self.course().and_then(RunningLesson::shared).unzip();
         Link {
             lesson,
             step,
@@ -91,7 +91,7 @@ impl App {
             return Some(false);
         }
         let changed = !self.scene_file.is_saved_with(&wanted.changes)?;
-        (changed || self.scene_file.is_in_file()).then_some(changed)
+        (changed || self.scene_file.has_file()).then_some(changed)
     }
 
     /// Address of the page for links; "" for none.
@@ -133,11 +133,11 @@ impl App {
     /// # Errors
     /// The content is not text or not a valid scene.
     pub fn open_bytes(&mut self, name: &str, bytes: Vec<u8>) -> Result<(), String> {
-        self.open_given(name, bytes, &Given::new())
+        self.open_given(name, bytes, &FileContents::new())
     }
 
     /// The same for a scene that may refer to the files `given` with it.
-    fn open_given(&mut self, name: &str, bytes: Vec<u8>, given: &Given) -> Result<(), String> {
+    fn open_given(&mut self, name: &str, bytes: Vec<u8>, given: &FileContents) -> Result<(), String> {
         let opened = String::from_utf8(bytes)
             .map_err(|_| format!("{name}: not a text file"))
             .and_then(|text| self.parse_file(name, &text, given, &[]).map_err(|error| error.to_string()))
@@ -149,12 +149,12 @@ impl App {
     /// Opens the dialog for a scene file.
     pub(super) fn choose_file(&mut self) {
         if !self.host.pick_file() {
-            self.ask_what_to_open();
+            self.show_open_dialog();
         }
     }
 
     /// Opens the dialog for a link, a file or a built-in scene.
-    pub(super) fn ask_what_to_open(&mut self) {
+    pub(super) fn show_open_dialog(&mut self) {
         self.dialog = Some(Dialog::Open { path: String::new(), error: None });
     }
 
@@ -203,7 +203,7 @@ impl App {
             let bytes = content.map_err(|reason| format!("{name}: {reason}"))?;
             read.push((name, bytes));
         }
-        let Some(scene) = scene_among(&read) else {
+        let Some(scene) = scene_index(&read) else {
             let names: Vec<&str> = read.iter().map(|(name, _)| name.as_str()).collect();
             return Err(format!(
                 "{}: no scene among them; open the scene's .toml file with the files that it names",
@@ -211,8 +211,8 @@ impl App {
             ));
         };
         let (name, bytes) = read.swap_remove(scene);
-        let own = |(name, bytes): (String, Vec<u8>)| (own_name(&name).to_owned(), bytes);
-        let given: Given = read.into_iter().map(own).collect();
+        let own = |(name, bytes): (String, Vec<u8>)| (file_name_of(&name).to_owned(), bytes);
+        let given: FileContents = read.into_iter().map(own).collect();
         self.open_given(&name, bytes, &given)?;
         self.scene_file = SceneFile::opened(name, given);
         Ok(())
@@ -295,7 +295,7 @@ impl App {
     fn note_saved(&mut self, files: &[SaveFile]) {
         if files.iter().any(|file| file.mime == SCENE_TYPE) {
             let changes = self.player.pending().changes.clone();
-            self.scene_file.saved_with(changes);
+            self.scene_file.record_saved(changes);
         }
     }
 
@@ -315,7 +315,7 @@ impl App {
     }
 
     /// The application's current message in one sentence; "" for none.
-    pub(super) fn news(&self) -> String {
+    pub(super) fn current_message(&self) -> String {
         if let Some(problem) = &self.problem {
             // The other lines show the position in the file.
             return problem.lines().next().unwrap_or("").to_owned();
@@ -338,14 +338,14 @@ impl App {
 }
 
 /// Index of the scene among these files (name, content): the only file, or the last `.toml` file that no other file includes.
-fn scene_among(files: &[(String, Vec<u8>)]) -> Option<usize> {
+fn scene_index(files: &[(String, Vec<u8>)]) -> Option<usize> {
     if files.len() == 1 {
         return Some(0);
     }
     let scenes = (0..files.len()).filter(|&i| files[i].0.ends_with(".toml"));
     let scenes: Vec<usize> = scenes.collect();
     let included = |&&i: &&usize| {
-        let named = format!("{}\"", own_name(&files[i].0));
+        let named = format!("{}\"", file_name_of(&files[i].0));
         let names = |&other: &usize| String::from_utf8_lossy(&files[other].1).contains(&named);
         scenes.iter().any(|other| *other != i && names(other))
     };
@@ -355,12 +355,12 @@ fn scene_among(files: &[(String, Vec<u8>)]) -> Option<usize> {
 }
 
 /// File name without folders.
-fn own_name(name: &str) -> &str {
+fn file_name_of(name: &str) -> &str {
     Path::new(name).file_name().and_then(|own| own.to_str()).unwrap_or(name)
 }
 
 /// Whether a verdict needs no action; it then disappears after some seconds.
-pub fn is_right(verdict: &Verdict) -> bool {
+pub fn needs_no_action(verdict: &Verdict) -> bool {
     matches!(verdict, Verdict::Agrees(_) | Verdict::Reached)
 }
 

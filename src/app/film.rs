@@ -20,11 +20,11 @@ const SIZES: [([u32; 2], &str); 4] = [
 /// Frames per second to choose from.
 const RATES: [f64; 4] = [15.0, 25.0, 30.0, 60.0];
 /// Most frames of a film: more than five minutes at the highest rate.
-const MOST_FRAMES: f64 = 20_000.0;
+const MAX_FRAMES: f64 = 20_000.0;
 
 /// Settings of the next film.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Wanted {
+pub struct FilmSettings {
     /// First and last instant, s.
     pub span: [f64; 2],
     /// Simulated seconds per second of film.
@@ -39,7 +39,7 @@ pub struct Wanted {
     pub format: Format,
 }
 
-impl Wanted {
+impl FilmSettings {
     /// The run from 0 to `reached`, s, at time scale `scale`.
     pub fn all(reached: f64, scale: f64) -> Self {
         Self { span: [0.0, reached], scale, rate: 30.0, size: SIZES[1].0, plots: false, format: Format::Mp4 }
@@ -65,9 +65,9 @@ impl Wanted {
         if self.span[0] > self.span[1] {
             return Some("The film ends before it begins".to_owned());
         }
-        if self.frames() > MOST_FRAMES {
+        if self.frames() > MAX_FRAMES {
             return Some(format!(
-                "More than {MOST_FRAMES} frames: choose a shorter range, a faster time scale or fewer frames per second"
+                "More than {MAX_FRAMES} frames: choose a shorter range, a faster time scale or fewer frames per second"
             ));
         }
         let fault = self.format.check(self.size, self.rate).err();
@@ -76,8 +76,8 @@ impl Wanted {
 }
 
 /// A film being made.
-pub struct Making {
-    wanted: Wanted,
+pub struct RunningFilm {
+    wanted: FilmSettings,
     film: Film,
     canvas: Canvas,
     pending: Option<Pending>,
@@ -87,7 +87,7 @@ pub struct Making {
     before: (f64, f64, bool),
 }
 
-impl Making {
+impl RunningFilm {
     /// Progress, 0 to 1.
     pub fn fraction(&self) -> f32 {
         (self.film.frames() as f64 / self.wanted.frames()) as f32
@@ -95,7 +95,7 @@ impl Making {
 }
 
 /// Controls of the settings.
-pub fn choose(ui: &mut Ui, wanted: &mut Wanted, reached: f64) -> bool {
+pub fn choose(ui: &mut Ui, wanted: &mut FilmSettings, reached: f64) -> bool {
     egui::Grid::new("film").num_columns(2).show(ui, |ui| {
         let ends = [
             ("From", "First instant of the film, on the timeline"),
@@ -176,9 +176,9 @@ fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, help: &str, value: &mut 
 
 impl App {
     /// Settings of the next film: the run so far, unless chosen otherwise before.
-    pub(super) fn film_to_make(&self) -> Wanted {
+    pub(super) fn film_to_make(&self) -> FilmSettings {
         let reached = self.player.reached();
-        let all = Wanted::all(reached, self.player.pacer.scale());
+        let all = FilmSettings::all(reached, self.player.pacer.scale());
         let mut wanted = self.film_wanted.clone().unwrap_or(all);
         wanted.span = wanted.span.map(|end| end.min(reached));
         if wanted.span[0] == wanted.span[1] {
@@ -191,7 +191,7 @@ impl App {
     ///
     /// # Errors
     /// Why it cannot be made, as a message.
-    pub fn make_film(&mut self, wanted: Wanted) -> Result<(), String> {
+    pub fn make_film(&mut self, wanted: FilmSettings) -> Result<(), String> {
         if let Some(objection) = wanted.objection() {
             return Err(format!("No film: {objection}"));
         }
@@ -206,7 +206,7 @@ impl App {
         self.player.go_to(wanted.span[0]);
         self.viewport.arrive(&self.player);
         self.film_wanted = Some(wanted.clone());
-        self.film = Some(Making { wanted, film, canvas, pending: None, next: 0, before });
+        self.film = Some(RunningFilm { wanted, film, canvas, pending: None, next: 0, before });
         Ok(())
     }
 
@@ -257,7 +257,7 @@ impl App {
     }
 
     /// One pass over `making`; returns whether frames are missing.
-    fn film_on(&mut self, ctx: &egui::Context, making: &mut Making) -> Result<bool, String> {
+    fn film_on(&mut self, ctx: &egui::Context, making: &mut RunningFilm) -> Result<bool, String> {
         if let Some(pending) = &mut making.pending {
             let Some(image) = pending.take() else {
                 return Ok(true);

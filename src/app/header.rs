@@ -8,36 +8,36 @@ use eframe::egui::{
 
 use super::App;
 use super::dialogs::Dialog;
-use super::files::is_right;
+use super::files::needs_no_action;
 use super::{layout, opening, spoken, theme};
 use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
 use crate::session::replay::Verdict;
 
 /// Window width from which the header shows the program's name, points.
-const NAMED: f32 = 900.0;
+const MIN_WIDTH_WITH_NAME: f32 = 900.0;
 
 /// Width of the list of scenes, points.
-const SCENES: f32 = 560.0;
+const LIST_WIDTH: f32 = 560.0;
 
 /// Entry of a built-in scene in the list.
-struct AboutScene {
+struct SceneEntry {
     name: &'static str,
     title: String,
     /// The first sentence of its description.
     sentence: String,
 }
 
-static ABOUT_SCENES: LazyLock<Vec<AboutScene>> = LazyLock::new(|| {
+static ABOUT_SCENES: LazyLock<Vec<SceneEntry>> = LazyLock::new(|| {
     let about = |name| {
         let scene = Scene::load(name, &[]).ok()?;
         let description = scene.description.trim();
         let end = description.find(". ").map_or(description.len(), |end| end + 1);
-        Some(AboutScene { name, sentence: description[..end].to_owned(), title: scene.title })
+        Some(SceneEntry { name, sentence: description[..end].to_owned(), title: scene.title })
     };
     BUILT_IN.into_iter().filter_map(about).collect()
 });
 
-impl AboutScene {
+impl SceneEntry {
     /// Draws the entry: picture, title, and the sentence below it.
     fn entry(&self, ui: &mut Ui, picture: Atom<'_>, chosen: bool, width: f32) -> egui::Response {
         let mut words = LayoutJob::default();
@@ -60,7 +60,7 @@ impl App {
         spoken::landmark(ui, "Scene and files");
         ui.horizontal(|ui| {
             // In a narrow window the buttons need the space.
-            if !compact && ui.available_width() > NAMED {
+            if !compact && ui.available_width() > MIN_WIDTH_WITH_NAME {
                 ui.label(RichText::new("Jointplay").heading().strong());
                 ui.add_space(8.0);
             }
@@ -137,7 +137,7 @@ impl App {
                 link = other.clicked();
                 ui.separator();
                 // Stays within the edges of a narrow window.
-                let width = SCENES.min(ui.ctx().content_rect().width() - 60.0);
+                let width = LIST_WIDTH.min(ui.ctx().content_rect().width() - 60.0);
                 ui.set_width(width);
                 // Textures of the window are invalid on another canvas.
                 let graphics = self.graphics.as_ref().filter(|_| !self.picture.is_drawn());
@@ -156,7 +156,7 @@ impl App {
             self.problem = self.open(wanted).err();
         }
         if link {
-            self.ask_what_to_open();
+            self.show_open_dialog();
         }
     }
 
@@ -235,7 +235,7 @@ impl App {
     /// Menu of a small header, with everything that does not fit into the bar.
     fn menu(&mut self, ui: &mut Ui) {
         ui.set_min_width(180.0);
-        theme::tighten(ui);
+        theme::use_dense_rows(ui);
         self.open_button(ui, "Open…");
         #[cfg(not(target_arch = "wasm32"))]
         self.desktop_entries(ui);
@@ -261,11 +261,11 @@ impl App {
 
     /// Whether [`Self::strips`] has messages.
     pub(super) fn has_messages(&self) -> bool {
-        self.problem.is_some() || self.shows_verdict() || self.is_under_way() || self.tells_changes()
+        self.problem.is_some() || self.shows_verdict() || self.is_under_way() || self.shows_first_notice()
     }
 
     /// Whether the first-time scene is displayed and its notice not yet dismissed.
-    fn tells_changes(&self) -> bool {
+    fn shows_first_notice(&self) -> bool {
         let here = self.embedded().is_none() && self.course().is_none() && !self.is_presenting();
         here && !self.changes_seen && opening::is_rattling(self.player.pending())
     }
@@ -300,13 +300,13 @@ impl App {
     /// Whether the verdict on a link is displayed. An embedded window omits verdicts that need no action, to save space.
     fn shows_verdict(&self) -> bool {
         let framed = self.embedded().is_some();
-        let told = self.verdict.as_ref().is_some_and(|verdict| !(framed && is_right(verdict)));
+        let told = self.verdict.as_ref().is_some_and(|verdict| !(framed && needs_no_action(verdict)));
         told && self.verdict_shown != Some(f64::NEG_INFINITY)
     }
 
     /// Errors, the progress of a replay, and the verdict on a link.
     pub(super) fn strips(&mut self, ui: &mut Ui) {
-        if self.tells_changes() {
+        if self.shows_first_notice() {
             self.changes_strip(ui);
         }
         if let Some(problem) = self.problem.clone() {
@@ -327,7 +327,7 @@ impl App {
             } else {
                 ("Stop here", "Stay at the time that the run has reached (Esc)")
             };
-            if fraction.is_some_and(|fraction| under_way(ui, words, fraction, stop)) {
+            if fraction.is_some_and(|fraction| progress_row(ui, words, fraction, stop)) {
                 self.cancel_replay();
             }
         }
@@ -353,7 +353,7 @@ fn plate(ui: &Ui, colour: egui::Color32) -> Frame {
 
 /// Progress of a run to its target; returns whether it was cancelled. The last argument is the label and tooltip of the stop
 /// button.
-fn under_way(ui: &mut Ui, words: &str, fraction: f32, (stop, help): (&str, &str)) -> bool {
+fn progress_row(ui: &mut Ui, words: &str, fraction: f32, (stop, help): (&str, &str)) -> bool {
     let plate = plate(ui, ui.visuals().panel_fill);
     let row = plate.show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {

@@ -6,7 +6,7 @@ use eframe::egui_wgpu::{self, RenderState, RendererOptions, WgpuConfiguration, W
 use std::sync::Arc;
 
 use super::canvas::Canvas;
-use super::labels::Places;
+use super::labels::LabelPositions;
 use super::overlay::{self, Overlay};
 use super::{App, AppOptions, theme};
 use crate::render::{self, Image, NoAdapter, RenderError, wgpu};
@@ -17,7 +17,7 @@ use crate::view::{DrawList, Theme};
 pub struct Headless {
     canvas: Canvas,
     /// Label positions of the latest picture; the next picture reuses them.
-    places: Places,
+    places: LabelPositions,
 }
 
 impl Headless {
@@ -34,7 +34,7 @@ impl Headless {
             log::info!("no graphics adapter: {error}");
             NoAdapter
         })?;
-        Ok(Self { canvas: Canvas::new(state), places: Places::default() })
+        Ok(Self { canvas: Canvas::new(state), places: LabelPositions::default() })
     }
 
     /// Name of the adapter.

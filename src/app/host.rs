@@ -10,7 +10,7 @@ use crate::analysis::task::{Job, Message};
 pub use crate::session::clock::{Clock, wall};
 
 /// A background computation.
-pub trait Running {
+pub trait BackgroundTask {
     /// Its next message, if any; none follows [`Message::Done`] or [`Message::Failed`].
     fn poll(&mut self) -> Option<Message>;
 
@@ -42,7 +42,7 @@ pub struct OpenedFile {
 }
 
 /// A file that is dropped on the window.
-pub type Dropped = Arc<dyn egui::DroppedFile + Send + Sync>;
+pub type DroppedFile = Arc<dyn egui::DroppedFile + Send + Sync>;
 
 /// Services of the desktop or the page. The application works without any ([`NoHost`]).
 ///
@@ -91,7 +91,7 @@ pub trait Host {
     }
 
     /// Reads files that were dropped together, now or later.
-    fn read_dropped(&mut self, files: Vec<Dropped>);
+    fn read_dropped(&mut self, files: Vec<DroppedFile>);
 
     /// The next group of files chosen together, or dropped and read.
     fn opened(&mut self) -> Option<Vec<OpenedFile>>;
@@ -117,7 +117,7 @@ pub trait Host {
     }
 
     /// Starts a long background computation; `None` if that is impossible.
-    fn start(&mut self, _job: Job) -> Option<Box<dyn Running>> {
+    fn start(&mut self, _job: Job) -> Option<Box<dyn BackgroundTask>> {
         None
     }
 
@@ -147,7 +147,7 @@ pub trait Host {
 pub struct NoHost;
 
 impl Host for NoHost {
-    fn read_dropped(&mut self, _files: Vec<Dropped>) {}
+    fn read_dropped(&mut self, _files: Vec<DroppedFile>) {}
 
     fn opened(&mut self) -> Option<Vec<OpenedFile>> {
         None

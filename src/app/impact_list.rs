@@ -12,9 +12,9 @@ use crate::analysis::impact_row;
 use crate::simulate::{ContactMode, Impact};
 
 /// Height of a row, points.
-const ROW: f32 = 20.0;
+const ROW_HEIGHT: f32 = 20.0;
 /// Most visible rows at first.
-const ROWS: f32 = 9.0;
+const MAX_VISIBLE_ROWS: f32 = 9.0;
 
 /// A column: heading, width in points, tooltip.
 type Column = (&'static str, f32, &'static str);
@@ -95,7 +95,7 @@ fn row(ui: &mut Ui, mut cell: impl FnMut(&mut Ui, usize)) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         for (index, (_, width, _)) in COLUMNS.iter().enumerate() {
-            ui.allocate_ui_with_layout(vec2(*width, ROW), Layout::left_to_right(Align::Center), |ui| {
+            ui.allocate_ui_with_layout(vec2(*width, ROW_HEIGHT), Layout::left_to_right(Align::Center), |ui| {
                 ui.set_width(*width);
                 cell(ui, index);
             });
@@ -110,7 +110,7 @@ impl ImpactList {
         let record = player.impact_record();
         let count = record.until(known).count();
         let (mut asked, mut of_rows) = (None, 0.0);
-        ui.spacing_mut().interact_size.y = ROW;
+        ui.spacing_mut().interact_size.y = ROW_HEIGHT;
         ui.spacing_mut().item_spacing.y = 0.0;
         let width = COLUMNS.iter().map(|(_, width, _)| width + 4.0).sum::<f32>();
         ScrollArea::horizontal().id_salt("impacts sideways").auto_shrink([false, true]).show(ui, |ui| {
@@ -126,13 +126,13 @@ impl ImpactList {
             }
             let place = ScrollArea::vertical().id_salt("impacts").auto_shrink([false, true]);
             let place = place.max_height(height).min_scrolled_height(height);
-            let seen = place.show_rows(ui, ROW, count, |ui, rows| {
+            let seen = place.show_rows(ui, ROW_HEIGHT, count, |ui, rows| {
                 let seen = record.until(known).rev().skip(rows.start).take(rows.len());
                 for (number, own, impact) in seen {
                     let words = cells(player, number, impact);
                     let later = impact.end > shown;
                     let top = ui.cursor().min;
-                    let place = egui::Rect::from_min_size(top, vec2(width, ROW));
+                    let place = egui::Rect::from_min_size(top, vec2(width, ROW_HEIGHT));
                     let response = ui.interact(place, ui.scope_id().with(("impact", number)), Sense::click());
                     let hovered = response.hovered();
                     if hovered {
@@ -185,7 +185,7 @@ impl App {
         let (mut open, mut asked, mut save) = (self.impact_list.open, None, false);
         let area = self.picture_rect;
         let room = egui::Rect::from_x_y_ranges(ctx.content_rect().x_range(), area.y_range());
-        let rows = ((room.height() - self.impact_list.frame) / ROW).floor().clamp(1.0, ROWS);
+        let rows = ((room.height() - self.impact_list.frame) / ROW_HEIGHT).floor().clamp(1.0, MAX_VISIBLE_ROWS);
         let mut of_rows = 0.0;
         let free = !self.is_under_way() && self.dialog.is_none();
         let shown = egui::Window::new("Impacts")
@@ -199,7 +199,7 @@ impl App {
             .constrain_to(room)
             .enabled(free)
             .show(ctx, |ui| {
-                (asked, of_rows) = ImpactList::table(ui, &self.player, rows * ROW);
+                (asked, of_rows) = ImpactList::table(ui, &self.player, rows * ROW_HEIGHT);
                 ui.add_space(4.0);
                 save = ui
                     .button("Save impacts…")
@@ -218,7 +218,7 @@ impl App {
             self.save_impacts();
         }
         if let Some(time) = asked {
-            self.look_back(time);
+            self.show_instant(time);
         }
     }
 

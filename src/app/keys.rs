@@ -208,13 +208,13 @@ impl Group {
 }
 
 /// Key under which the focused slider's ID is stored.
-const SLIDER: &str = "slider with the focus";
+const SLIDER_KEY: &str = "slider with the focus";
 
 /// Key under which is stored whether a text field had the focus in the previous frame.
-const TYPING: &str = "text field with the focus";
+const TYPING_KEY: &str = "text field with the focus";
 
 /// Finger travel that determines the direction of a drag, points.
-const SLACK: f32 = 8.0;
+const DRAG_THRESHOLD: f32 = 8.0;
 
 /// State of a touch that started on a slider.
 #[derive(Clone, Copy, PartialEq)]
@@ -227,7 +227,7 @@ enum Finger {
 
 /// Leaves a touch that started on the slider `own` to the enclosing scroll area, unless it moves sideways. `place`: ID of the
 /// stored state. Call it before adding the slider; returns whether the slider may receive the touch.
-fn follow_finger(ui: &Ui, place: Id, own: Id) -> bool {
+fn slider_receives_touch(ui: &Ui, place: Id, own: Id) -> bool {
     let (touched, origin, way) = ui.input(|input| {
         let pointer = &input.pointer;
         let way = pointer.total_drag_delta().unwrap_or_default();
@@ -243,7 +243,7 @@ fn follow_finger(ui: &Ui, place: Id, own: Id) -> bool {
             ctx.stop_dragging();
             (Finger::Waits, false)
         }
-        Some(Finger::Waits) if way.length() >= SLACK => {
+        Some(Finger::Waits) if way.length() >= DRAG_THRESHOLD => {
             let sideways = way.x.abs() >= way.y.abs();
             let below = origin.filter(|_| !sideways);
             let below = below.and_then(|origin| scrolling_at(ui, origin));
@@ -278,7 +278,7 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
     let place = ui.next_auto_id().with("finger");
     let own = place.with("slider");
     let before: Option<Id> = ui.data(|data| data.get_temp(own));
-    let hears = before.is_none_or(|before| follow_finger(ui, place, before));
+    let hears = before.is_none_or(|before| slider_receives_touch(ui, place, before));
     let response = if hears {
         ui.add(slider)
     } else {
@@ -293,7 +293,7 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
         response.request_focus();
     }
     if response.has_focus() {
-        ui.data_mut(|data| data.insert_temp(Id::unique(SLIDER), response.id));
+        ui.data_mut(|data| data.insert_temp(Id::unique(SLIDER_KEY), response.id));
         let arrows = EventFilter { horizontal_arrows: true, vertical_arrows: true, ..EventFilter::default() };
         ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
     }
@@ -305,13 +305,13 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
 pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     // Esc has already taken the focus from a text field, and does nothing else.
     let typing = ctx.text_edit_focused();
-    let before = Id::unique(TYPING).with(ctx.viewport_id());
+    let before = Id::unique(TYPING_KEY).with(ctx.viewport_id());
     let typed = ctx.data_mut(|data| std::mem::replace(data.get_temp_mut_or_default::<bool>(before), typing));
     if typing || (typed && ctx.input(|input| input.key_pressed(Key::Escape))) {
         return Vec::new();
     }
     let focused = ctx.memory(egui::Memory::focused);
-    let slider = focused.is_some() && focused == ctx.data(|data| data.get_temp(Id::unique(SLIDER)));
+    let slider = focused.is_some() && focused == ctx.data(|data| data.get_temp(Id::unique(SLIDER_KEY)));
     if slider {
         // egui's slider handles only the arrows in its own direction.
         ctx.input_mut(|input| {

@@ -9,30 +9,30 @@ use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Vec2, p
 use crate::view::{Colour, Cover, DrawList, Label, LabelKind};
 
 /// Most plates in a picture; number of names without room after which no more are tried.
-pub(super) const MOST_PLATES: usize = 256;
-const MOST_MISSED: usize = 256;
+pub(super) const MAX_PLATES: usize = 256;
+const MAX_UNPLACED: usize = 256;
 /// Distances of a plate from its anchor, points; a plate further away would seem to belong to something else.
-const GAPS: [f32; 6] = [8.0, 16.0, 28.0, 42.0, 57.0, FURTHEST];
-pub(super) const FURTHEST: f32 = 72.0;
+const GAPS: [f32; 6] = [8.0, 16.0, 28.0, 42.0, 57.0, MAX_GAP];
+pub(super) const MAX_GAP: f32 = 72.0;
 /// Directions from the anchor to the plate, from the preferred to the opposite direction.
-const TURNS: [f32; 12] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0, 5.0, -5.0, 6.0];
+const DIRECTIONS: [f32; 12] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0, 5.0, -5.0, 6.0];
 /// Distance beyond which a leader line connects the plate to its anchor, points.
-pub(super) const LED: f32 = 14.0;
+pub(super) const MIN_LEADER: f32 = 14.0;
 /// Padding around the text of a plate, points.
-const PAD: Vec2 = vec2(4.0, 1.0);
+const PADDING: Vec2 = vec2(4.0, 1.0);
 /// Cell size of the coverage map of bodies, points.
-const CELL: f32 = 5.0;
+const CELL_SIZE: f32 = 5.0;
 /// Cost of a place: share of the plate over balls, over bodies; each further distance, each further direction.
-const BALL: f32 = 8.0;
-const BODY: f32 = 1.0;
-const FURTHER: f32 = 0.08;
-const TURNED: f32 = 0.015;
+const BALL_COST: f32 = 8.0;
+const BODY_COST: f32 = 1.0;
+const GAP_COST: f32 = 0.08;
+const DIRECTION_COST: f32 = 0.015;
 /// Cost of a leader that crosses another plate, or crosses this one.
-const CROSSED: f32 = 2.0;
+const CROSSING_COST: f32 = 2.0;
 /// Cost difference from the best place at which a label moves.
-const BETTER: f32 = 0.6;
+const MOVING_THRESHOLD: f32 = 0.6;
 /// Opacity below which a peak mark has no label.
-const FAINT: f32 = 0.25;
+const MIN_OPACITY: f32 = 0.25;
 
 /// A view colour as a painter colour.
 pub(super) fn colour(colour: Colour) -> Color32 {
@@ -59,11 +59,11 @@ pub(super) fn text(
 }
 
 /// Smallest edge of a picture with room for more than the time, points.
-pub(super) const SMALL: f32 = 200.0;
+pub(super) const SMALL_PICTURE: f32 = 200.0;
 
 /// Whether a picture is large enough for a legend, names and forces.
-pub fn has_room(rect: Rect) -> bool {
-    rect.size().min_elem() >= SMALL
+pub fn fits_labels(rect: Rect) -> bool {
+    rect.size().min_elem() >= SMALL_PICTURE
 }
 
 /// Indices of distance and direction.
@@ -71,10 +71,10 @@ type Place = (usize, usize);
 
 /// Label positions of a picture, reused in the next.
 #[derive(Clone, Debug, Default)]
-pub struct Places(pub(super) HashMap<LabelKind, Place>);
+pub struct LabelPositions(pub(super) HashMap<LabelKind, Place>);
 
 /// A label to place.
-struct Wanted<'a> {
+struct LabelRequest<'a> {
     label: &'a Label,
     /// Its anchor, points of the window.
     at: eframe::egui::Pos2,
@@ -84,7 +84,7 @@ struct Wanted<'a> {
     direction: f32,
 }
 
-impl<'a> Wanted<'a> {
+impl<'a> LabelRequest<'a> {
     fn of(label: &'a Label, rect: Rect, scale: f32) -> Option<Self> {
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
         let (size, direction) = match label.kind {
@@ -93,13 +93,13 @@ impl<'a> Wanted<'a> {
             LabelKind::Error => (12.0, FRAC_PI_2),
             LabelKind::Axis | LabelKind::Gravity => return None,
         };
-        let faint = matches!(label.kind, LabelKind::Peak(_)) && label.colour.0[3] < FAINT;
+        let faint = matches!(label.kind, LabelKind::Peak(_)) && label.colour.0[3] < MIN_OPACITY;
         (rect.contains(at) && !faint).then_some(Self { label, at, size, direction })
     }
 
     /// The plate of `size` at a place.
     fn plate(&self, size: Vec2, (gap, turn): Place) -> Rect {
-        let (sin, cos) = (self.direction + TURNS[turn] * PI / 6.0).sin_cos();
+        let (sin, cos) = (self.direction + DIRECTIONS[turn] * PI / 6.0).sin_cos();
         let half = size / 2.0;
         // A side or a corner faces the anchor.
         let out = vec2(cos, sin) / cos.abs().max(sin.abs());
@@ -110,11 +110,11 @@ impl<'a> Wanted<'a> {
 /// The leader line from an anchor to its plate, if that is far away.
 fn leader(at: Pos2, plate: Rect) -> Option<[Pos2; 2]> {
     let end = plate.clamp(at);
-    (end.distance(at) > LED).then_some([at, end])
+    (end.distance(at) > MIN_LEADER).then_some([at, end])
 }
 
 /// Whether a line crosses a plate.
-fn runs_over([from, to]: [Pos2; 2], plate: Rect) -> bool {
+fn crosses([from, to]: [Pos2; 2], plate: Rect) -> bool {
     const POINTS: usize = 12;
     (0..=POINTS).any(|k| plate.contains(from.lerp(to, k as f32 / POINTS as f32)))
 }
@@ -126,9 +126,9 @@ pub(super) fn paint(
     scale: f32,
     list: &DrawList,
     mut taken: Vec<Rect>,
-    places: &mut Places,
+    places: &mut LabelPositions,
 ) {
-    if !has_room(rect) {
+    if !fits_labels(rect) {
         return;
     }
     let before = std::mem::take(&mut places.0);
@@ -137,47 +137,47 @@ pub(super) fn paint(
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
         text(painter, at, Align2::CENTER_CENTER, &label.text, 12.0, colour(label.colour), halo);
     }
-    let cover = Cover::of(list, CELL * scale);
+    let cover = Cover::of(list, CELL_SIZE * scale);
     let cost = |plate: Rect, (gap, turn): Place| {
         let [min, max] = [plate.min, plate.max].map(|corner| (corner - rect.min) * scale);
         let [bodies, balls] = cover.covered_fractions(glam::Vec2::new(min.x, min.y), glam::Vec2::new(max.x, max.y));
-        BODY * bodies + BALL * balls + FURTHER * gap as f32 + TURNED * turn as f32
+        BODY_COST * bodies + BALL_COST * balls + GAP_COST * gap as f32 + DIRECTION_COST * turn as f32
     };
     let is_peak = |label: &&Label| matches!(label.kind, LabelKind::Peak(_));
     // Peaks are short-lived, so names have priority.
     let labels = list.labels.iter().filter(|label| !is_peak(label)).chain(list.labels.iter().filter(is_peak));
-    let most = taken.len() + MOST_PLATES;
-    let mut may_miss = MOST_MISSED;
+    let most = taken.len() + MAX_PLATES;
+    let mut may_miss = MAX_UNPLACED;
     let mut leaders: Vec<[Pos2; 2]> = Vec::new();
     // Labels with a previous place come first, so that a new label displaces none.
-    let mut wanted: Vec<_> = labels.filter_map(|label| Wanted::of(label, rect, scale)).collect();
+    let mut wanted: Vec<_> = labels.filter_map(|label| LabelRequest::of(label, rect, scale)).collect();
     wanted.sort_by_key(|wanted| (is_peak(&wanted.label), !before.contains_key(&wanted.label.kind)));
     for wanted in wanted {
         if taken.len() == most || may_miss == 0 {
             break;
         }
-        let Wanted { label, at, .. } = wanted;
+        let LabelRequest { label, at, .. } = wanted;
         // A mark that fades with age has legible words until it is gone.
         let ink = colour(label.colour.with_opacity(1.0));
         let words = painter.layout_no_wrap(label.text.to_string(), FontId::proportional(wanted.size), ink);
-        let size = words.size() + 2.0 * PAD;
+        let size = words.size() + 2.0 * PADDING;
         let free = |place: Place| {
             let plate = wanted.plate(size, place);
             let clear = rect.contains_rect(plate) && !taken.iter().any(|other| other.intersects(plate));
             let crosses = || {
                 let own = leader(at, plate);
-                let over = own.is_some_and(|line| taken.iter().any(|other| runs_over(line, *other)));
-                over || leaders.iter().any(|line| runs_over(*line, plate))
+                let over = own.is_some_and(|line| taken.iter().any(|other| crosses(line, *other)));
+                over || leaders.iter().any(|line| crosses(*line, plate))
             };
-            clear.then(|| (cost(plate, place) + if crosses() { CROSSED } else { 0.0 }, place, plate))
+            clear.then(|| (cost(plate, place) + if crosses() { CROSSING_COST } else { 0.0 }, place, plate))
         };
         let stays = before.get(&label.kind).and_then(|place| free(*place));
-        let all = || (0..GAPS.len()).flat_map(|gap| (0..TURNS.len()).map(move |turn| (gap, turn)));
+        let all = || (0..GAPS.len()).flat_map(|gap| (0..DIRECTIONS.len()).map(move |turn| (gap, turn)));
         let best = || all().filter_map(free).min_by(|a, b| a.0.total_cmp(&b.0));
         let found = match stays {
             // No place can be better by more than `BETTER`.
-            Some(there) if there.0 <= BETTER => Some(there),
-            Some(there) => best().filter(|best| best.0 < there.0 - BETTER).or(Some(there)),
+            Some(there) if there.0 <= MOVING_THRESHOLD => Some(there),
+            Some(there) => best().filter(|best| best.0 < there.0 - MOVING_THRESHOLD).or(Some(there)),
             None => best(),
         };
         let Some((_, place, plate)) = found else {
@@ -192,7 +192,7 @@ pub(super) fn paint(
         }
         // A separate plate, since the text often lies over a dark part.
         painter.rect_filled(plate, 4.0, halo.gamma_multiply(0.8));
-        painter.galley(pos2(plate.min.x, plate.min.y) + PAD, words, ink);
+        painter.galley(pos2(plate.min.x, plate.min.y) + PADDING, words, ink);
     }
 }
 
@@ -231,7 +231,7 @@ mod tests {
         }
     }
 
-    fn place(list: &DrawList, places: &mut Places) -> Place {
+    fn place(list: &DrawList, places: &mut LabelPositions) -> Place {
         let rect = Rect::from_min_size(Pos2::ZERO, vec2(400.0, 300.0));
         let ctx = Context::default();
         theme::apply(&ctx, false);
@@ -247,13 +247,13 @@ mod tests {
     #[test]
     fn a_name_gives_way_to_a_body_once_and_does_not_flicker_beside_it() {
         let name = [200.0, 150.0];
-        let free = place(&list(name, [60.0, 60.0]), &mut Places::default());
+        let free = place(&list(name, [60.0, 60.0]), &mut LabelPositions::default());
         assert_eq!(free, (0, 0), "nothing is in the way");
         let over = list(name, [225.0, 130.0]);
-        let beside = place(&over, &mut Places::default());
+        let beside = place(&over, &mut LabelPositions::default());
         assert_ne!(beside, free, "a body is where it would stand");
         // A body that approaches slowly and jitters.
-        let mut places = Places::default();
+        let mut places = LabelPositions::default();
         let mut seen = Vec::new();
         for frame in 0..120 {
             let shake = [-3.0, 3.0][frame % 2];
@@ -263,6 +263,6 @@ mod tests {
         seen.dedup();
         assert_eq!((seen[0], seen.len()), (free, 2), "{seen:?}");
         // The same pictures give the same places.
-        assert_eq!(place(&over, &mut Places::default()), beside);
+        assert_eq!(place(&over, &mut LabelPositions::default()), beside);
     }
 }

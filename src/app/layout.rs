@@ -8,17 +8,17 @@ use super::{App, overlay, present, spoken, theme, transport};
 use crate::view::Preset;
 
 /// A window below this width or height is small, points.
-const NARROW: f32 = 760.0;
-const SHORT: f32 = 480.0;
+const SMALL_WIDTH: f32 = 760.0;
+const SMALL_HEIGHT: f32 = 480.0;
 /// Width below which time and buttons do not fit side by side in a picture, points.
-const SLIM: f32 = 250.0;
+const MIN_WIDTH_SIDE_BY_SIDE: f32 = 250.0;
 /// Width below which an embedded picture shows only machine and time, points.
-const BARE: f32 = 280.0;
+const MIN_WIDTH_WITH_CONTROLS: f32 = 280.0;
 /// Width of a lesson panel beside the picture, points.
-const LESSON: f32 = 340.0;
+const LESSON_WIDTH: f32 = 340.0;
 
 /// Key under which the height of the messages is stored.
-const MESSAGES: &str = "height of the messages";
+const MESSAGES_KEY: &str = "height of the messages";
 
 /// Arrangement of the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,7 +110,7 @@ pub(super) fn close_menu(ui: &Ui) {
 }
 
 /// Reserves `lines` lines of small text; longer content scrolls, and nothing below moves.
-pub(super) fn reserved(ui: &mut Ui, id: &str, lines: usize, add: impl FnOnce(&mut Ui)) {
+pub(super) fn reserve_lines(ui: &mut Ui, id: &str, lines: usize, add: impl FnOnce(&mut Ui)) {
     let line = ui.text_style_height(&egui::TextStyle::Small) + 2.0;
     let height = lines as f32 * line;
     let size = egui::vec2(ui.available_width(), height);
@@ -149,9 +149,9 @@ impl App {
     /// The whole interface, in the available space.
     pub fn show(&mut self, ui: &mut Ui) {
         let size = ui.available_size();
-        let arrangement = if size.y < SHORT || (size.x < NARROW && size.x > size.y) {
+        let arrangement = if size.y < SMALL_HEIGHT || (size.x < SMALL_WIDTH && size.x > size.y) {
             Arrangement::Landscape
-        } else if size.x < NARROW {
+        } else if size.x < SMALL_WIDTH {
             Arrangement::Portrait
         } else {
             Arrangement::Large
@@ -169,7 +169,7 @@ impl App {
         self.summary(ui);
         // An embedded window shares its keys with the surrounding page.
         if self.embedded().is_none() {
-            transport::first_of_tab(ui);
+            transport::set_first_tab_stop(ui);
         }
         if self.dialog.is_some() {
             // Disabling closes tooltips above the dialog; the dialog's backdrop does the dimming.
@@ -178,12 +178,12 @@ impl App {
         }
         if self.is_presenting() {
             self.presentation_ui(ui);
-            return self.over_all(ui);
+            return self.floating_elements(ui);
         }
         if self.embedded().is_some() {
             let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(8, 4));
             self.embedded_ui(ui, bar);
-            return self.over_all(ui);
+            return self.floating_elements(ui);
         }
         let margin = if arrangement == Arrangement::Landscape {
             egui::Margin::symmetric(12, 4)
@@ -197,24 +197,24 @@ impl App {
             Arrangement::Portrait => self.portrait(ui, bar),
             Arrangement::Landscape => self.landscape(ui, bar),
         }
-        self.over_all(ui);
+        self.floating_elements(ui);
     }
 
     /// Elements above all panels.
-    fn over_all(&mut self, ui: &Ui) {
+    fn floating_elements(&mut self, ui: &Ui) {
         self.save_kept();
         self.impact_list_ui(ui.ctx());
-        self.point_out(ui);
+        self.ring_highlights(ui);
         self.dialog_ui(ui.ctx());
     }
 
     /// Lesson panel at the side of a wide window. A small window shows lessons in its sheet instead.
-    pub(super) fn lesson_beside(&mut self, ui: &mut Ui, bar: Frame) {
+    pub(super) fn lesson_panel(&mut self, ui: &mut Ui, bar: Frame) {
         if self.course().is_none() {
             return;
         }
         let panel = if ui.available_width() > ui.available_height() {
-            let width = LESSON.min(0.42 * ui.available_width());
+            let width = LESSON_WIDTH.min(0.42 * ui.available_width());
             Panel::right("lesson").exact_size(width)
         } else {
             Panel::bottom("lesson").exact_size(0.42 * ui.available_height())
@@ -223,7 +223,7 @@ impl App {
     }
 
     fn side_by_side(&mut self, ui: &mut Ui, bar: Frame) {
-        self.lesson_beside(ui, bar);
+        self.lesson_panel(ui, bar);
         let free = !self.is_under_way();
         let teaching = self.course().is_some();
         let Self {
@@ -257,7 +257,7 @@ impl App {
                 });
             },
         );
-        let of_bench = Panel::right("bench")
+        let bench_request = Panel::right("bench")
             .frame(bar)
             .resizable(true)
             .default_size(400.0)
@@ -293,7 +293,7 @@ impl App {
                 });
                 if let Some(time) = plots.ui(ui, player).filter(|_| free) {
                     player.go_to(time);
-                    viewport.revisit(player);
+                    viewport.restore_marks(player);
                 }
             });
         for (panel, name) in
@@ -307,7 +307,7 @@ impl App {
                 present = present::double_tapped(ui);
                 let contents = ui.add_enabled_ui(free, |ui| {
                     if timeline.ui(ui, player, viewport.focus()) {
-                        viewport.revisit(player);
+                        viewport.restore_marks(player);
                     }
                     transport::ui(ui, player)
                 });
@@ -318,8 +318,8 @@ impl App {
         if present {
             self.present(ui.ctx(), true);
         }
-        if let Some(wish) = of_bench.and_then(|shown| shown.inner) {
-            self.bench_asks(wish);
+        if let Some(request) = bench_request.and_then(|shown| shown.inner) {
+            self.apply_bench_request(request);
         }
     }
 
@@ -341,7 +341,7 @@ impl App {
                 ui.horizontal(|ui| {
                     self.sheet_tabs(ui, false);
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
-                    ui.with_layout(backwards, |ui| transport::reached_beside(ui, &self.player));
+                    ui.with_layout(backwards, |ui| transport::achieved_pace_below(ui, &self.player));
                 });
                 asked.inner
             })
@@ -363,7 +363,7 @@ impl App {
                 ui.horizontal(|ui| {
                     let tabs = if self.course().is_some() { 350.0 } else { 270.0 };
                     // Tabs that would cover the buttons become a menu.
-                    let folded = ui.available_width() < tabs + transport::LEAST;
+                    let folded = ui.available_width() < tabs + transport::MIN_WIDTH;
                     let tabs = if folded { 90.0 } else { tabs };
                     let room = ui.available_width() - tabs;
                     let asked = ui
@@ -405,7 +405,7 @@ impl App {
     pub(super) fn timeline_ui(&mut self, ui: &mut Ui) {
         let focus = self.viewport.focus();
         if self.timeline.ui(ui, &mut self.player, focus) {
-            self.viewport.revisit(&self.player);
+            self.viewport.restore_marks(&self.player);
         }
     }
 
@@ -443,7 +443,7 @@ impl App {
         }
         let free = !self.is_under_way();
         let Self { player, controls, accuracy, plots, bench, sheet, viewport, .. } = self;
-        let mut of_bench = None;
+        let mut bench_request = None;
         ScrollArea::vertical().id_salt("sheet").auto_shrink(false).show(ui, |ui| {
             // Space for the scroll bar.
             ui.set_max_width(ui.available_width() - 14.0);
@@ -458,24 +458,24 @@ impl App {
                     let asked = ui.allocate_ui(size, |ui| plots.ui(ui, player)).inner;
                     if let Some(time) = asked.filter(|_| free) {
                         player.go_to(time);
-                        viewport.revisit(player);
+                        viewport.restore_marks(player);
                     }
                 }
                 Some(Sheet::Bench) => {
-                    of_bench = ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner;
+                    bench_request = ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner;
                 }
                 Some(Sheet::Lesson) | None => {}
             }
         });
-        if let Some(wish) = of_bench {
-            self.bench_asks(wish);
+        if let Some(request) = bench_request {
+            self.apply_bench_request(request);
         }
     }
 
     /// The 3D view with its buttons and, after a stop, the reason. Returns whether the user asked for a reset.
     pub(super) fn picture(&mut self, ui: &mut Ui) -> bool {
         spoken::landmark(ui, "The machine");
-        let plain = self.picture.is_plain();
+        let plain = self.picture.hides_controls();
         if !plain {
             self.microscope_beside(ui);
         }
@@ -500,16 +500,16 @@ impl App {
         let gap = ui.spacing().item_spacing.x;
         let narrow = area.width() < overlay::reach(ui.painter()) + cameras + options - gap + 10.0;
         // Beside the microscope on a phone, the time needs the full upper edge.
-        let edge = if area.width() < SLIM { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
+        let edge = if area.width() < MIN_WIDTH_SIDE_BY_SIDE { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
         if !plain && !presenting {
             let size = egui::vec2(if narrow { options } else { options + cameras }, row.y);
             above.push(edge.align_size_within_rect(size, inner));
         }
         if !plain && self.has_messages() {
-            above.push(self.messages_place(ui, inner));
+            above.push(self.messages_area(ui, inner));
         }
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
-        self.viewport.bare = self.embedded().is_some() && area.width() < BARE;
+        self.viewport.bare = self.embedded().is_some() && area.width() < MIN_WIDTH_WITH_CONTROLS;
         self.viewport.ui(&mut place, &self.player, plain, &above);
         ui.advance_cursor_after_rect(whole);
         if let Some(joint) = self.viewport.take_clicked() {
@@ -556,9 +556,9 @@ impl App {
     }
 
     /// Area of the messages at the lower edge of `area`.
-    fn messages_place(&self, ui: &Ui, area: egui::Rect) -> egui::Rect {
+    fn messages_area(&self, ui: &Ui, area: egui::Rect) -> egui::Rect {
         // Height in the previous frame; initially one line with a button.
-        let height = ui.data(|data| data.get_temp(Id::unique(MESSAGES)));
+        let height = ui.data(|data| data.get_temp(Id::unique(MESSAGES_KEY)));
         let height = height.unwrap_or(ui.spacing().interact_size.y + 16.0);
         Align2::CENTER_BOTTOM.align_size_within_rect(egui::vec2(area.width().min(640.0), height), area)
     }
@@ -566,7 +566,7 @@ impl App {
     /// Messages over the lower edge of the picture; they appear and disappear without affecting the layout. Returns the free part
     /// of `area`.
     fn messages(&mut self, ui: &mut Ui, area: egui::Rect) -> egui::Rect {
-        let id = Id::unique(MESSAGES);
+        let id = Id::unique(MESSAGES_KEY);
         if !self.has_messages() {
             ui.data_mut(|data| data.remove_temp::<f32>(id));
             return area;
@@ -580,7 +580,7 @@ impl App {
         } else {
             (area.height() - row - 8.0).max(60.0)
         };
-        let place = self.messages_place(ui, area);
+        let place = self.messages_area(ui, area);
         let shown = ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
             ScrollArea::vertical()
                 .id_salt("messages")
@@ -602,7 +602,7 @@ impl App {
         let Some(notice) = &mut self.notice else {
             return;
         };
-        let left = notice.time_left(now);
+        let left = notice.remaining_time(now);
         if left <= 0.0 {
             self.notice = None;
             return;

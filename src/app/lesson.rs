@@ -20,19 +20,19 @@ use super::log::Event;
 use super::player::Player;
 use super::{App, replay_budget};
 use crate::session::replay::Verdict;
-pub(super) use before::WindowBefore;
+pub(super) use before::PreviousWindow;
 pub use built_in::{BUILT_IN_LESSONS, lesson_titles};
 pub use format::Lesson;
-use format::{Look, PanelName, Step};
-use measure::Measured;
+use format::{CameraTarget, PanelName, Step};
+use measure::LessonMeasures;
 use names::{Names, comparisons};
-use spots::Spots;
+use spots::ControlFinder;
 
 /// Latest time of a live change after its nominal instant, s: the longest solver step.
-const LATE: f64 = 10e-3;
+const MAX_DELAY: f64 = 10e-3;
 
 /// A lesson in progress.
-pub struct Course {
+pub struct RunningLesson {
     lesson: Arc<Lesson>,
     step: usize,
     /// The machine is being brought to the state of the step.
@@ -45,10 +45,10 @@ pub struct Course {
     fresh: bool,
     /// Whether the panel hides the lower part of the step.
     more: bool,
-    measured: Measured,
+    measured: LessonMeasures,
 }
 
-impl Course {
+impl RunningLesson {
     /// Starts at step `step`, counted from 0, or at the last step if there are fewer.
     pub fn new(lesson: Arc<Lesson>, step: usize) -> Self {
         Self {
@@ -58,7 +58,7 @@ impl Course {
             reached: false,
             fresh: false,
             more: false,
-            measured: Measured::new(lesson.clone()),
+            measured: LessonMeasures::new(lesson.clone()),
             lesson,
         }
     }
@@ -198,7 +198,7 @@ impl Course {
     }
 
     /// Whether the displayed run belongs to the step, i.e. the user has not changed the machine.
-    fn is_own(&self, player: &Player) -> bool {
+    fn is_run_of_step(&self, player: &Player) -> bool {
         let run = &self.lesson.runs[self.now().run];
         let log = player.log();
         let begin = &self.lesson.steps[self.lesson.beginning(self.step)];
@@ -208,7 +208,7 @@ impl Course {
             && log.entries.len() == run.changes.len();
         let mut pairs = log.entries.iter().zip(player.flags()).zip(&run.changes);
         same && pairs.all(|((entry, flag), (time, key, value))| {
-            entry.event == Event::set(key, value) && (0.0..=LATE).contains(&(flag.time - time))
+            entry.event == Event::set(key, value) && (0.0..=MAX_DELAY).contains(&(flag.time - time))
         })
     }
 }
@@ -229,14 +229,14 @@ fn known_values(condition: &str, names: &Names<'_>) -> String {
 
 impl App {
     /// The lesson in progress.
-    pub fn course(&self) -> Option<&Course> {
+    pub fn course(&self) -> Option<&RunningLesson> {
         self.course.as_deref()
     }
 
     /// Continues `lesson` at step `step`, counted from 0; if `begins`, the machine is set for that step.
-    pub(super) fn join_lesson(&mut self, lesson: Arc<Lesson>, step: usize, begins: bool) {
+    pub(super) fn resume_lesson(&mut self, lesson: Arc<Lesson>, step: usize, begins: bool) {
         self.remember_window();
-        self.course = Some(Box::new(Course::new(lesson, step)));
+        self.course = Some(Box::new(RunningLesson::new(lesson, step)));
         self.sheet = Some(Sheet::Lesson);
         if begins {
             self.set_step();
@@ -246,7 +246,7 @@ impl App {
     /// Starts a built-in lesson.
     pub(super) fn open_lesson(&mut self, name: &str) {
         match Lesson::built_in(name) {
-            Ok(lesson) => self.join_lesson(lesson, 0, true),
+            Ok(lesson) => self.resume_lesson(lesson, 0, true),
             Err(error) => self.problem = Some(error.to_string()),
         }
     }
@@ -254,7 +254,7 @@ impl App {
     /// Ends the lesson and restores the window.
     pub(super) fn leave_lesson(&mut self) {
         if let Some(course) = self.course.take() {
-            self.give_back_window(&course.lesson);
+            self.restore_window(&course.lesson);
         }
         if self.sheet == Some(Sheet::Lesson) {
             self.sheet = None;
@@ -262,7 +262,7 @@ impl App {
     }
 
     /// Goes to the next or the previous step of the lesson.
-    pub(super) fn turn_page(&mut self, forward: bool) {
+    pub(super) fn change_step(&mut self, forward: bool) {
         let Some(course) = &mut self.course else {
             return;
         };
@@ -281,11 +281,11 @@ impl App {
         };
         let in_place = end(course.step).is_none_or(|end| shown >= end) && end(step).is_none_or(|end| shown < end);
         let begins = course.lesson.steps[step].begins;
-        let goes_on = forward && !begins && in_place && course.is_own(&self.player);
+        let goes_on = forward && !begins && in_place && course.is_run_of_step(&self.player);
         (course.step, course.predicted, course.reached) = (step, None, false);
         if goes_on {
             self.player.set_playing(false);
-            self.look_at_step(false);
+            self.apply_camera_of_step(false);
         } else {
             self.set_step();
         }
@@ -333,7 +333,7 @@ impl App {
 
     /// Applies the view settings of the step; the machine is unchanged. `anew`: the machine was just set, so the settings of
     /// earlier steps apply as well.
-    fn look_at_step(&mut self, anew: bool) {
+    fn apply_camera_of_step(&mut self, anew: bool) {
         let Some(course) = &self.course else {
             return;
         };
@@ -353,8 +353,8 @@ impl App {
         // The latest camera setting applies.
         let places = |step: &&Step| step.view.is_some() || step.link.camera.is_some();
         match steps.iter().rev().find(places).and_then(|step| step.view) {
-            Some(Look::From(preset)) => self.viewport.preset(preset),
-            Some(Look::At(joint)) => {
+            Some(CameraTarget::From(preset)) => self.viewport.preset(preset),
+            Some(CameraTarget::At(joint)) => {
                 self.viewport.close_up(&self.player, joint);
             }
             None => {}
@@ -394,7 +394,7 @@ impl App {
             if begin.twin {
                 self.player.set_twin(true);
             }
-            self.look_at_step(true);
+            self.apply_camera_of_step(true);
             ctx.request_repaint();
             return;
         }
@@ -409,18 +409,18 @@ impl App {
         {
             (course.reached, course.fresh) = (true, true);
             if self.player.is_playing() {
-                self.look_back(until);
+                self.show_instant(until);
             }
             ctx.request_repaint();
         }
     }
 
     /// Draws rings around the step's highlighted items, over everything, without affecting the layout.
-    pub(super) fn point_out(&self, ui: &egui::Ui) {
+    pub(super) fn ring_highlights(&self, ui: &egui::Ui) {
         let wanted = self.course().map_or(&[][..], |course| &course.now().highlight);
         let joints = &self.player.running().machine.ball_joints;
         let joint = |name: &String| joints.iter().position(|joint| joint.name == *name);
-        let places = Spots::places(ui.ctx(), &self.pointed_controls());
+        let places = ControlFinder::places(ui.ctx(), &self.pointed_controls());
         let stroke = egui::Stroke::new(3.0, super::theme::series(1, ui.visuals().dark_mode));
         let layer = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("rings"));
         let painter = ui.ctx().layer_painter(layer);
@@ -437,9 +437,9 @@ impl App {
     }
 
     /// Whether all highlighted items of the step are visible.
-    pub fn points_out(&self, ctx: &egui::Context) -> bool {
+    pub fn shows_highlights(&self, ctx: &egui::Context) -> bool {
         let labels = self.pointed_controls();
-        Spots::places(ctx, &labels).len() == labels.len()
+        ControlFinder::places(ctx, &labels).len() == labels.len()
     }
 
     /// Names of the highlighted controls of the step.

@@ -11,26 +11,26 @@ use super::{App, layout, spoken, theme, value};
 use crate::simulate::ContactMode;
 pub use draw::Circle;
 use draw::{Plane, Sheet};
-use sight::Sight;
+use sight::MagnifiedJoint;
 
 /// Least width and height, points.
-const LEAST: egui::Vec2 = vec2(200.0, 150.0);
+const MIN_SIZE: egui::Vec2 = vec2(200.0, 150.0);
 /// Initial fraction of the picture, and upper limit, points.
-const SHARE: f32 = 0.4;
-const USUAL: f32 = 330.0;
+const INITIAL_FRACTION: f32 = 0.4;
+const MAX_INITIAL_SIDE: f32 = 330.0;
 /// Largest fraction of the picture.
-const MOST: f32 = 0.5;
+const MAX_FRACTION: f32 = 0.5;
 /// Least remainder of the picture, points; the microscope stays hidden if there is less.
-const LEFT: f32 = 120.0;
+const MIN_REMAINDER: f32 = 120.0;
 /// Height of the section of the contact, and least height in a low panel, points.
-const SECTION: f32 = 112.0;
-const LEAST_SECTION: f32 = 76.0;
+const SECTION_HEIGHT: f32 = 112.0;
+const MIN_SECTION_HEIGHT: f32 = 76.0;
 /// Width from which pictures and numbers are side by side, points.
-const WIDE: f32 = 430.0;
+const MIN_WIDTH_SIDE_BY_SIDE: f32 = 430.0;
 /// Width of the numbers beside the pictures, points.
-const NUMBERS: f32 = 215.0;
+const NUMBERS_WIDTH: f32 = 215.0;
 /// Least reference speed of the velocity arrow, m/s.
-const SLOWEST: f64 = 1e-4;
+const MIN_REFERENCE_SPEED: f64 = 1e-4;
 
 /// State of the panel.
 #[derive(Default)]
@@ -73,17 +73,17 @@ impl Microscope {
         self.circle = None;
         let room = ui.available_size();
         let (room, least, panel) = if room.x > room.y {
-            (room.x, LEAST.x, Panel::right("microscope"))
+            (room.x, MIN_SIZE.x, Panel::right("microscope"))
         } else {
-            (room.y, LEAST.y, Panel::bottom("microscope below"))
+            (room.y, MIN_SIZE.y, Panel::bottom("microscope below"))
         };
-        if !self.open || room < least + LEFT {
+        if !self.open || room < least + MIN_REMAINDER {
             // Keeps the picture's automatic ID.
             ui.skip_ahead_auto_ids(1);
             return None;
         }
-        let size = (SHARE * room).min(USUAL).max(least);
-        let panel = panel.default_size(size).size_range(least..=(MOST * room).max(least));
+        let size = (INITIAL_FRACTION * room).min(MAX_INITIAL_SIDE).max(least);
+        let panel = panel.default_size(size).size_range(least..=(MAX_FRACTION * room).max(least));
         let shown = panel
             .resizable(true)
             .frame(theme::panel(ui).inner_margin(8.0))
@@ -134,19 +134,19 @@ impl Microscope {
             }
         });
         self.joint = chosen.unwrap_or(self.joint);
-        let Some(sight) = Sight::of(player, self.joint) else {
+        let Some(sight) = MagnifiedJoint::of(player, self.joint) else {
             ui.label("This scene has no ball joint");
             return chosen;
         };
         let space = ui.available_size();
         let axes = self.plane.axes(player.running().view.down, view);
-        if space.x >= WIDE && space.x > space.y {
+        if space.x >= MIN_WIDTH_SIDE_BY_SIDE && space.x > space.y {
             ui.horizontal_top(|ui| {
-                let side = (space.x - NUMBERS - 8.0).min(space.y).max(96.0);
+                let side = (space.x - NUMBERS_WIDTH - 8.0).min(space.y).max(96.0);
                 self.sphere(ui, player, &sight, axes, vec2(side, side));
                 ui.vertical(|ui| {
                     scrolled(ui, |ui| {
-                        section(ui, &sight, SECTION);
+                        section(ui, &sight, SECTION_HEIGHT);
                         numbers(ui, player, &sight, axes);
                     });
                 });
@@ -157,7 +157,7 @@ impl Microscope {
                 let side = draw::side(vec2(width, space.y), 150.0);
                 self.sphere(ui, player, &sight, axes, vec2(width, side));
                 let left = space.y - side - ui.spacing().item_spacing.y;
-                section(ui, &sight, left.clamp(LEAST_SECTION, SECTION));
+                section(ui, &sight, left.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT));
                 numbers(ui, player, &sight, axes);
             });
         }
@@ -165,7 +165,7 @@ impl Microscope {
     }
 
     /// The picture of the clearance sphere.
-    fn sphere(&mut self, ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2], size: egui::Vec2) {
+    fn sphere(&mut self, ui: &mut Ui, player: &Player, sight: &MagnifiedJoint, axes: [Vec3; 2], size: egui::Vec2) {
         let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
         let report = &sight.report;
         let name = player.running().machine.ball_joints.get(self.joint);
@@ -185,7 +185,7 @@ impl Microscope {
         let path = player.paths().between(self.joint, sight.since, now);
         let approach = sight.impact.map_or(0.0, |impact| impact.approach_speed);
         let fastest = sight.sliding.unwrap_or(sight.velocity).norm();
-        let speed = draw::round_up(approach.max(fastest).max(SLOWEST));
+        let speed = draw::round_up(approach.max(fastest).max(MIN_REFERENCE_SPEED));
         let sheet = Sheet::new(ui, rect, sight);
         self.circle = Some(draw::sphere(&sheet, axes, path, now, speed));
         response.on_hover_text(
@@ -207,7 +207,7 @@ fn scrolled(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
 }
 
 /// The picture of the contact, `height` points high.
-fn section(ui: &mut Ui, sight: &Sight, height: f32) {
+fn section(ui: &mut Ui, sight: &MagnifiedJoint, height: f32) {
     let size = vec2(ui.available_width(), height);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let Some(patch) = &sight.patch else {
@@ -232,7 +232,7 @@ fn section(ui: &mut Ui, sight: &Sight, height: f32) {
 }
 
 /// Numeric values of the pictures' contents.
-fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
+fn numbers(ui: &mut Ui, player: &Player, sight: &MagnifiedJoint, axes: [Vec3; 2]) {
     const NONE: &str = "—";
     let report = &sight.report;
     ui.label(RichText::new(value::contact(sight.report.state)).strong());
@@ -326,7 +326,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
         }
         _ => "",
     };
-    layout::reserved(ui, "remark under the microscope", 3, |ui| {
+    layout::reserve_lines(ui, "remark under the microscope", 3, |ui| {
         ui.label(RichText::new(remark).small());
     });
 }

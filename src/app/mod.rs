@@ -80,25 +80,25 @@ use crate::view::{Preset, Quality, ViewOptions};
 pub use crate::session::embedded::Embedded;
 pub use crate::session::link::settings::PlotWindow;
 pub use crate::session::link::{
-    CameraPose, LONGEST_LINK, Link, LinkError, NOT_A_PAGE_ADDRESS, SceneText, is_page_address,
+    CameraPose, Link, LinkError, MAX_LINK_LENGTH, NOT_A_PAGE_ADDRESS, SceneText, is_page_address,
 };
 pub use crate::session::replay::{Replay, Verdict};
 use accuracy::Accuracy;
 use announce::Announcer;
 use bench::Bench;
-pub use click::{Click, MOST_CLICKS, PITCHES, TimeWindow, Voice, clicks};
-pub use compare::{Comparison, Kept};
+pub use click::{Click, MAX_CLICKS, PITCHES, TimeWindow, Voice, clicks};
+pub use compare::{Comparison, EarlierRun};
 use controls::Controls;
 #[cfg(not(target_arch = "wasm32"))]
 pub use desktop::DesktopHost;
 use dialogs::{Answer, Dialog};
-pub use film::Wanted as WantedFilm;
+pub use film::FilmSettings;
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::Headless;
-pub use host::{Clock, Dropped, Host, NoHost, OpenedFile, Running, SaveFile};
+pub use host::{BackgroundTask, Clock, DroppedFile, Host, NoHost, OpenedFile, SaveFile};
 use keys::Action;
 use layout::Sheet;
-pub use lesson::{BUILT_IN_LESSONS, Course, Lesson, lesson_titles};
+pub use lesson::{BUILT_IN_LESSONS, Lesson, RunningLesson, lesson_titles};
 use load::Load;
 pub use log::{Entry, Event, Log};
 pub use microscope::{Circle, Microscope};
@@ -108,7 +108,7 @@ pub use player::Player;
 pub use plots::Plots;
 use reload::SceneFile;
 #[cfg(not(target_arch = "wasm32"))]
-pub use remembered::{Remembered, Store};
+pub use remembered::{Store, StoredSettings};
 use scene_pictures::ScenePictures;
 use sound::Sound;
 use timeline::Timeline;
@@ -126,10 +126,10 @@ fn replay_budget(clock: Clock) -> impl Fn() -> bool {
 }
 
 /// Display time of a verdict that needs no action, s.
-const VERDICT: f64 = 6.0;
+const VERDICT_TIME: f64 = 6.0;
 
 /// Polling period of background computations for progress.
-const POLL: std::time::Duration = std::time::Duration::from_millis(100);
+const POLL_PERIOD: std::time::Duration = std::time::Duration::from_millis(100);
 
 /// Start options of the application.
 #[derive(Clone, Debug)]
@@ -186,7 +186,7 @@ impl AppOptions {
     }
 
     /// Starts `lesson` at step `step`, counted from 0.
-    pub fn of_lesson(lesson: Arc<Lesson>, step: usize) -> Self {
+    pub fn for_lesson(lesson: Arc<Lesson>, step: usize) -> Self {
         Self { playing: false, lesson: Some((lesson.clone(), step)), ..Self::new(lesson.runs[0].scene.clone()) }
     }
 
@@ -210,7 +210,7 @@ impl AppOptions {
             return Ok(Self {
                 theme: link.theme.map_or(ThemePreference::System, theme::preference),
                 embedded: link.embedded.clone(),
-                ..Self::of_lesson(lesson.clone(), *step)
+                ..Self::for_lesson(lesson.clone(), *step)
             });
         }
         if link.requests_nothing(text) {
@@ -263,7 +263,7 @@ impl Notice {
     }
 
     /// Longer messages take longer to read.
-    fn time_left(&mut self, now: f64) -> f64 {
+    fn remaining_time(&mut self, now: f64) -> f64 {
         let length = 3.0 + 0.05 * self.text.len() as f64;
         *self.since.get_or_insert(now) + length - now
     }
@@ -316,9 +316,9 @@ pub struct App {
     picture: Picture,
     scene_pictures: ScenePictures,
     /// The film in progress.
-    film: Option<film::Making>,
+    film: Option<film::RunningFilm>,
     /// Settings of the last film.
-    film_wanted: Option<film::Wanted>,
+    film_wanted: Option<film::FilmSettings>,
     presentation: Option<present::Presentation>,
     /// The zoom before it was reduced for a tiny window.
     squeezed: Option<f32>,
@@ -336,9 +336,9 @@ pub struct App {
     embedded: Option<Embedded>,
     sound: Sound,
     /// The lesson in progress.
-    course: Option<Box<Course>>,
+    course: Option<Box<RunningLesson>>,
     /// Snapshot of the window before the lesson.
-    before_lesson: Option<Box<lesson::WindowBefore>>,
+    before_lesson: Option<Box<lesson::PreviousWindow>>,
     /// Area of the 3D view, points.
     picture_rect: egui::Rect,
     /// Whether texts and edges are black and white.
@@ -436,7 +436,7 @@ impl App {
             app.show_link(link);
         }
         if let Some((lesson, step)) = options.lesson {
-            app.join_lesson(lesson, step, begins);
+            app.resume_lesson(lesson, step, begins);
         }
         app.attach(ctx, state, options.theme);
         Ok(app)
@@ -582,22 +582,22 @@ impl App {
     }
 
     /// Handles a request of the bench.
-    fn bench_asks(&mut self, asked: bench::Asked) {
+    fn apply_bench_request(&mut self, asked: bench::BenchRequest) {
         match asked {
-            bench::Asked::Section(load) => self.start_load(load),
-            bench::Asked::Value { key, text } => match self.player.set(&key, &text) {
+            bench::BenchRequest::Section(load) => self.start_load(load),
+            bench::BenchRequest::Value { key, text } => match self.player.set(&key, &text) {
                 Err(error) => self.problem = Some(error.to_string()),
                 Ok(_) => {
                     self.controls.reveal(&key);
                     if self.compact {
-                        self.bench.step_aside();
+                        self.bench.set_aside();
                         self.sheet = Some(Sheet::Controls);
                     } else {
                         self.show_controls = true;
                     }
                 }
             },
-            bench::Asked::Ready(sweep) => match sweep.scene() {
+            bench::BenchRequest::Ready(sweep) => match sweep.scene() {
                 Err(error) => self.problem = Some(error.to_string()),
                 Ok(scene) => {
                     let lost = value::changes(self.player.pending());
@@ -606,7 +606,7 @@ impl App {
                     let mut known = opened.chain([scene]);
                     let same = known.any(|scene| value::differences(&scene, self.player.pending(), &[]).is_empty());
                     if same || lost.is_empty() {
-                        self.start_ready(sweep);
+                        self.start_ready_sweep(sweep);
                     } else {
                         self.dialog = Some(Dialog::Ready { sweep, lost });
                     }
@@ -616,7 +616,7 @@ impl App {
     }
 
     /// Opens the scene of a ready sweep and starts the sweep.
-    fn start_ready(&mut self, sweep: &'static ReadySweep) {
+    fn start_ready_sweep(&mut self, sweep: &'static ReadySweep) {
         let scene = sweep.scene().map_err(|error| error.to_string());
         self.problem = scene.and_then(|scene| self.show_scene(&scene)).err();
         if self.problem.is_none() {
@@ -747,7 +747,7 @@ impl App {
                 self.show_link(link);
             }
             if let Some((lesson, step)) = options.lesson {
-                self.join_lesson(lesson, step, begins);
+                self.resume_lesson(lesson, step, begins);
             }
             Ok(())
         });
@@ -756,9 +756,9 @@ impl App {
     }
 
     /// Pauses and shows `time`, s: any previously displayed instant.
-    pub fn look_back(&mut self, time: f64) {
+    pub fn show_instant(&mut self, time: f64) {
         self.player.go_to(time);
-        self.viewport.revisit(&self.player);
+        self.viewport.restore_marks(&self.player);
     }
 
     /// Ball joint, force in N and age in s of every marked peak.
@@ -806,14 +806,14 @@ impl App {
         }
         let sought = self.player.is_seeking();
         // Two machines side by side show the same instant: the current one waits for the other.
-        let waits = self.plots.comparison.is_waited_for(&self.player);
-        self.advance_heard(if waits { 0.0 } else { dt });
+        let waits = self.plots.comparison.is_behind(&self.player);
+        self.advance_with_sound(if waits { 0.0 } else { dt });
         if sought && !self.player.is_seeking() {
-            self.viewport.revisit(&self.player);
+            self.viewport.restore_marks(&self.player);
         }
         self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
-        let moves = self.advance_kept(dt as f32) || moves;
+        let moves = self.advance_earlier_runs(dt as f32) || moves;
         moves || sought || self.player.is_seeking() || self.player.is_playing() || self.player.is_ideal_behind()
     }
 
@@ -823,7 +823,7 @@ impl App {
             return None;
         }
         let comparison = &mut self.plots.comparison;
-        let waits = comparison.is_waited_for(&self.player);
+        let waits = comparison.is_behind(&self.player);
         let behind = if waits { None } else { self.player.step_between(since) };
         let lags = comparison.follow(&self.player, SPELL);
         behind.or(lags.then_some(true)).map(|behind| behind || lags)
@@ -884,17 +884,17 @@ impl App {
             Action::Step => player.single_step(),
             Action::StepBack => {
                 player.step_back();
-                self.viewport.revisit(&self.player);
+                self.viewport.restore_marks(&self.player);
             }
             Action::Backwards if player.is_playing_backwards() => player.set_playing(false),
             Action::Backwards => player.play_backwards(),
             Action::Impact { forward } => {
                 player.go_to_impact(self.viewport.focus(), forward);
-                self.viewport.revisit(&self.player);
+                self.viewport.restore_marks(&self.player);
             }
             Action::Home | Action::End => {
                 let end = player.reached();
-                self.look_back(if action == Action::End { end } else { 0.0 });
+                self.show_instant(if action == Action::End { end } else { 0.0 });
             }
             Action::Reset => self.reset(),
             Action::Slower | Action::Faster => {
@@ -926,12 +926,12 @@ impl App {
                 let on = !(arrows.normal || arrows.friction);
                 (arrows.normal, arrows.friction) = (on, on);
             }
-            Action::TurnPage { forward } => self.turn_page(forward),
+            Action::TurnPage { forward } => self.change_step(forward),
             Action::Present => self.present(ctx, !self.is_presenting()),
             Action::Costs => self.show_costs(!self.shows_costs()),
             Action::Bench if self.compact => self.fold(Sheet::Bench),
             Action::Bench => self.show_bench = !self.show_bench,
-            Action::Plots if self.is_presenting() => self.turn_plot(),
+            Action::Plots if self.is_presenting() => self.show_next_plot(),
             Action::Panel if self.compact => self.fold(Sheet::Controls),
             Action::Plots if self.compact => self.fold(Sheet::Plots),
             Action::Panel => self.show_controls = !self.show_controls,
@@ -965,12 +965,12 @@ impl App {
     }
 
     /// Expires a verdict that needs no action after some seconds.
-    fn age_verdict(&mut self, ctx: &egui::Context) {
-        if !self.verdict.as_ref().is_some_and(files::is_right) {
+    fn expire_verdict(&mut self, ctx: &egui::Context) {
+        if !self.verdict.as_ref().is_some_and(files::needs_no_action) {
             return;
         }
         let now = ctx.input(|input| input.time);
-        let left = *self.verdict_shown.get_or_insert(now) + VERDICT - now;
+        let left = *self.verdict_shown.get_or_insert(now) + VERDICT_TIME - now;
         if left <= 0.0 {
             self.verdict_shown = Some(f64::NEG_INFINITY);
         } else {
@@ -981,7 +981,7 @@ impl App {
     /// Makes an announcement if one is due.
     fn announce(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|input| input.time);
-        let (told, wait) = self.announcer.update(now, &self.player, &self.news());
+        let (told, wait) = self.announcer.update(now, &self.player, &self.current_message());
         if told {
             let event = self.announcer.is_event();
             self.host.announce(self.announcer.text(), event);
@@ -1018,7 +1018,7 @@ impl App {
             Some(Answer::Copy) => {
                 if let Dialog::Link(shared) = dialog {
                     self.copy(ctx, shared.link());
-                    if shared.is_typed() {
+                    if shared.is_editable() {
                         self.page = shared.page().to_owned();
                     }
                 }
@@ -1030,11 +1030,11 @@ impl App {
             }
             Some(Answer::Sweep) => {
                 if let Dialog::Ready { sweep, .. } = dialog {
-                    self.start_ready(sweep);
+                    self.start_ready_sweep(sweep);
                 }
             }
             #[cfg(not(target_arch = "wasm32"))]
-            Some(Answer::StartAsNew) => self.start_as_new(ctx),
+            Some(Answer::StartAsNew) => self.reset_to_first_start(ctx),
             Some(Answer::Load) => {
                 if let Dialog::Load { load, .. } = dialog {
                     self.go_to_section(*load);
@@ -1073,7 +1073,7 @@ impl eframe::App for App {
         self.check_sound();
         let measuring = self.accuracy.update(self.host.as_mut());
         if self.bench.update(self.host.as_mut()) || measuring {
-            ctx.request_repaint_after(POLL);
+            ctx.request_repaint_after(POLL_PERIOD);
         }
         self.viewport.cloud = self.bench.take_cloud(&self.player);
         let (now, dt) = ctx.input(|input| (input.time, input.stable_dt));
@@ -1083,7 +1083,7 @@ impl eframe::App for App {
         }
         self.bench.seen(now, moves);
         self.advance_lesson(ctx);
-        self.age_verdict(ctx);
+        self.expire_verdict(ctx);
         self.announce(ctx);
         #[cfg(not(target_arch = "wasm32"))]
         self.remember(ctx);

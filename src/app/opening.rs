@@ -5,13 +5,13 @@ use crate::scene::{DEFAULT_SCENE, Scene};
 use crate::simulate::{Quantity, SCALE_RANGE};
 
 /// Viewing time of one drive period, s, if the scene has no time scale.
-const TURN: f64 = 4.0;
+const PERIOD_VIEWING_TIME: f64 = 4.0;
 /// Time scale if neither the scene nor a drive defines one.
-const UNDRIVEN: f64 = 0.1;
+const UNDRIVEN_SCALE: f64 = 0.1;
 
 /// Changes to the default scene that keep its joints rattling: with the paper's drive they come to rest after 70 ms. A ball that
 /// is hit again during contact also needs the changed approach speed.
-const RATTLING: [(&str, &str); 2] = [("spcmm.frequency", "6 Hz"), ("contact.approach_speed", "largest")];
+const RATTLING_CHANGES: [(&str, &str); 2] = [("spcmm.frequency", "6 Hz"), ("contact.approach_speed", "largest")];
 /// Time scale of the rattling scene, simulated seconds per second: a turn takes 3.3 s.
 pub const RATTLING_SCALE: f64 = 0.05;
 
@@ -23,7 +23,7 @@ pub fn time_scale(scene: &Scene) -> f64 {
         Err(NoPeriod::Different { first, second, .. }) => Some(first.max(second)),
         Err(NoPeriod::None { .. }) => None,
     };
-    let own = || period.map_or(UNDRIVEN, |period| round(period / TURN));
+    let own = || period.map_or(UNDRIVEN_SCALE, |period| round(period / PERIOD_VIEWING_TIME));
     scene.view.time_scale.unwrap_or_else(own).clamp(SCALE_RANGE.0, SCALE_RANGE.1)
 }
 
@@ -49,14 +49,14 @@ pub fn plots(scene: &Scene) -> Vec<Quantity> {
 
 /// The default scene for first-time visitors, whose joints keep rattling.
 pub fn rattling() -> Scene {
-    let changes = RATTLING.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let changes = RATTLING_CHANGES.map(|(key, value)| (key.to_owned(), value.to_owned()));
     Scene::load(DEFAULT_SCENE, &changes).expect("built-in scenes are right")
 }
 
 /// Whether `scene` is the scene of [`rattling`] without further changes.
 pub fn is_rattling(scene: &Scene) -> bool {
     let asked = scene.changes.iter().map(|(key, value)| (key.as_str(), value.as_str()));
-    scene.name == DEFAULT_SCENE && asked.eq(RATTLING)
+    scene.name == DEFAULT_SCENE && asked.eq(RATTLING_CHANGES)
 }
 
 #[cfg(test)]

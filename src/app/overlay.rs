@@ -3,8 +3,8 @@
 use eframe::egui::epaint::RectShape;
 use eframe::egui::{Align2, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
-use super::labels::{self, Places};
-pub(super) use super::labels::{SMALL, colour, has_room, text};
+use super::labels::{self, LabelPositions};
+pub(super) use super::labels::{SMALL_PICTURE, colour, fits_labels, text};
 use super::value;
 use crate::scene::Scene;
 use crate::simulate::{ContactMode, Frame};
@@ -15,13 +15,13 @@ use crate::view::{ARROW_LENGTH, DrawList, Legend, Palette, Scaling, Theme, ViewO
 const MARGIN: f32 = 14.0;
 
 /// Font size of the time in a picture with enough room, points.
-const TIME: f32 = 18.0;
+const TIME_FONT_SIZE: f32 = 18.0;
 
 /// Usual longest line of the time, and of the notes on joints below it, points.
-const LONGEST: [f32; 2] = [150.0, 230.0];
+const LINE_LENGTHS: [f32; 2] = [150.0, 230.0];
 
 /// Longest axis of the legend relative to the picture's width.
-const LONGEST_AXIS: f32 = 0.4;
+const MAX_AXIS_FRACTION: f32 = 0.4;
 
 /// Contents of the overlay.
 #[derive(Clone, Debug, Default)]
@@ -47,7 +47,7 @@ pub fn paint(
     theme: Theme,
     overlay: &Overlay,
     above: &[Rect],
-    places: &mut Places,
+    places: &mut LabelPositions,
 ) {
     let mut taken = above.to_vec();
     if !list.overlay.is_empty() {
@@ -56,7 +56,7 @@ pub fn paint(
     if let Some(scale) = &list.wear_scale {
         taken.extend(wear_scale(painter, rect, scale, theme));
     }
-    if let Some(shown) = list.legend.as_ref().filter(|_| overlay.legend && has_room(rect)) {
+    if let Some(shown) = list.legend.as_ref().filter(|_| overlay.legend && fits_labels(rect)) {
         taken.push(legend(painter, rect, scale, shown, theme));
     }
     if let Some(at) = overlay.time {
@@ -74,8 +74,8 @@ fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = St
     let palette = Palette::of(theme);
     let ink = colour(palette.text);
     let line = |words: String, size: f32| painter.layout_no_wrap(words, FontId::proportional(size), ink);
-    let large = has_room(rect);
-    let (size, small_size, margin) = if large { (TIME, 13.0, MARGIN) } else { (11.0, 10.0, 6.0) };
+    let large = fits_labels(rect);
+    let (size, small_size, margin) = if large { (TIME_FONT_SIZE, 13.0, MARGIN) } else { (11.0, 10.0, 6.0) };
     let mut lines = vec![line(format!("t = {}", value::time(time)), size)];
     // The first note states the magnification of the play and is never omitted for lack of room alone.
     let notes = notes.filter(|note| !note.is_empty());
@@ -85,7 +85,7 @@ fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = St
     let mut width = lines.iter().map(|l| l.size().x).fold(0.0, f32::max);
     if large {
         // Otherwise the plate would jump as the digits of the time change.
-        width = width.max(LONGEST[0].min(rect.width() - 2.0 * margin));
+        width = width.max(LINE_LENGTHS[0].min(rect.width() - 2.0 * margin));
     }
     let height: f32 = lines.iter().map(|l| l.size().y + 1.0).sum();
     let corner = rect.min + vec2(margin, margin);
@@ -102,8 +102,9 @@ fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = St
 
 /// Right edge of the longest possible time in a picture, points.
 pub fn reach(painter: &Painter) -> f32 {
-    let longest = format!("t = {} ms", "0".repeat(value::LONGEST_TIME - 3));
-    let words = painter.layout_no_wrap(longest, FontId::proportional(TIME), colour(Palette::of(Theme::Light).text));
+    let longest = format!("t = {} ms", "0".repeat(value::MAX_TIME_CHARACTERS - 3));
+    let words =
+        painter.layout_no_wrap(longest, FontId::proportional(TIME_FONT_SIZE), colour(Palette::of(Theme::Light).text));
     MARGIN + words.size().x + 8.0
 }
 
@@ -111,7 +112,7 @@ pub fn reach(painter: &Painter) -> f32 {
 pub fn plate(joints: usize) -> [f32; 2] {
     const LINE: f32 = 16.0;
     // The first lines are time and magnification.
-    let longest = LONGEST[usize::from(joints > 0)];
+    let longest = LINE_LENGTHS[usize::from(joints > 0)];
     [MARGIN + longest + 8.0, MARGIN + 38.0 + LINE * joints as f32 + 8.0]
 }
 
@@ -124,7 +125,7 @@ fn triad(rect: Rect) -> Rect {
 
 /// Approximate areas of the time with one note per joint, the axes and the legend in a picture in `rect`.
 pub fn plates(rect: Rect, joints: usize, options: &ViewOptions) -> Vec<Rect> {
-    let large = has_room(rect);
+    let large = fits_labels(rect);
     let [width, height] = if large { plate(joints) } else { [130.0, 36.0] };
     let mut plates = vec![Align2::LEFT_TOP.align_size_within_rect(vec2(width, height), rect)];
     if options.triad && large {
@@ -135,7 +136,7 @@ pub fn plates(rect: Rect, joints: usize, options: &ViewOptions) -> Vec<Rect> {
             Scaling::Linear => [112.0, 88.0],
             Scaling::Logarithmic => [190.0, 88.0],
         };
-        let axis = (ARROW_LENGTH * rect.height()).min(LONGEST_AXIS * rect.width()) + 24.0;
+        let axis = (ARROW_LENGTH * rect.height()).min(MAX_AXIS_FRACTION * rect.width()) + 24.0;
         let size = vec2(axis.max(least) + MARGIN + 6.0, rows + MARGIN);
         plates.push(Align2::RIGHT_BOTTOM.align_size_within_rect(size, rect));
     }
@@ -170,7 +171,7 @@ fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: The
     let palette = Palette::of(theme);
     let (ink, halo) = (colour(palette.text), colour(palette.sky));
     let full = legend.pixels / scale;
-    let longest = rect.width() * LONGEST_AXIS;
+    let longest = rect.width() * MAX_AXIS_FRACTION;
     // In a close-up the reference arrow may be wider than the view; only the part that fits is drawn.
     let shown = full.min(longest);
     // Space for half a number beyond the last mark.
@@ -259,19 +260,19 @@ fn wear_note(list: &DrawList) -> Option<String> {
 
 /// Colour scale of a wear map, at the right edge above the legend of the arrows; returns its area. Omitted if there is no room.
 fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme) -> Option<Rect> {
-    const BAR: [f32; 2] = [12.0, 110.0];
+    const BAR_SIZE: [f32; 2] = [12.0, 110.0];
     const PARTS: u32 = 48;
     // Above: title, time with notes, buttons of the window. Below: legend of the arrows.
-    const FREE: [f32; 2] = [100.0, 122.0];
+    const MARGINS: [f32; 2] = [100.0, 122.0];
     let (what, unit) = wear_words(scale.map).filter(|_| scale.largest > 0.0)?;
-    let room = rect.height() - FREE[0] - FREE[1];
-    if room < 0.5 * BAR[1] || !has_room(rect) {
+    let room = rect.height() - MARGINS[0] - MARGINS[1];
+    if room < 0.5 * BAR_SIZE[1] || !fits_labels(rect) {
         return None;
     }
     let palette = Palette::of(theme);
     let (ink, halo) = (colour(palette.text), colour(palette.sky));
-    let corner = lower_right(rect, MARGIN) - vec2(0.0, FREE[1] - MARGIN);
-    let bar = Rect::from_min_max(corner - vec2(BAR[0], BAR[1].min(room)), corner);
+    let corner = lower_right(rect, MARGIN) - vec2(0.0, MARGINS[1] - MARGIN);
+    let bar = Rect::from_min_max(corner - vec2(BAR_SIZE[0], BAR_SIZE[1].min(room)), corner);
     let at = |place: f32| bar.max.y - place * bar.height();
     for part in 0..PARTS {
         let [from, to] = [part, part + 1].map(|part| part as f32 / PARTS as f32);
@@ -307,7 +308,7 @@ pub(super) fn lower_right(rect: Rect, margin: f32) -> Pos2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::labels::{FURTHEST, LED, MOST_PLATES};
+    use crate::app::labels::{MAX_GAP, MAX_PLATES, MIN_LEADER};
     use crate::app::theme;
     use crate::view::{Label, LabelKind, PeakMarks, SceneView, Shot, ViewOptions};
     use eframe::egui::{Context, LayerId, RawInput};
@@ -335,7 +336,7 @@ mod tests {
 
     /// Shapes painted for the labels of `list`.
     fn shapes_of(list: &DrawList, rect: Rect) -> Vec<Shape> {
-        shapes(rect, |painter| labels::paint(painter, rect, 1.0, list, Vec::new(), &mut Places::default()))
+        shapes(rect, |painter| labels::paint(painter, rect, 1.0, list, Vec::new(), &mut LabelPositions::default()))
     }
 
     fn shapes(rect: Rect, paint: impl Fn(&Painter)) -> Vec<Shape> {
@@ -389,7 +390,7 @@ mod tests {
                 let others = &plates[i + 1..];
                 assert!(!others.iter().any(|other| other.intersects(*plate)), "{i}");
                 let at = list.labels[i].pixel;
-                let (at, led) = (pos2(at.x, at.y), plate.distance_to_pos(pos2(at.x, at.y)) > LED);
+                let (at, led) = (pos2(at.x, at.y), plate.distance_to_pos(pos2(at.x, at.y)) > MIN_LEADER);
                 let line = ends.iter().find(|[from, _]| from.distance(at) < 0.01);
                 assert_eq!(line.is_some(), led, "{i}");
                 let arrives = line.is_none_or(|[_, to]| plate.distance_to_pos(*to) < 0.01);
@@ -439,7 +440,7 @@ mod tests {
         let overlay = Overlay { time: Some(0.0), legend: true, labels: true, ..Overlay::default() };
         let texts = |overlay: &Overlay| {
             let shapes = shapes(rect, |painter| {
-                let mut places = Places::default();
+                let mut places = LabelPositions::default();
                 paint(painter, rect, 1.0, &list, Theme::Light, overlay, &[caption], &mut places);
             });
             let texts = shapes.into_iter().filter_map(|shape| match shape {
@@ -469,12 +470,12 @@ mod tests {
         assert_eq!(names.len(), 8, "each has room");
         // 4096 joints on 400 points.
         let names = painted(4096, 400.0 / 4096.0);
-        assert!((20..=MOST_PLATES).contains(&names.len()), "{}", names.len());
+        assert!((20..=MAX_PLATES).contains(&names.len()), "{}", names.len());
         for (name, at) in names {
             let joint: f32 = name[1..].parse().expect("a number");
             let wanted = 100.0 + joint * 400.0 / 4096.0;
             let off = (at.y - wanted).abs();
-            assert!(off <= FURTHEST + 30.0, "{name}: {off} points from its joint");
+            assert!(off <= MAX_GAP + 30.0, "{name}: {off} points from its joint");
         }
     }
 }

@@ -4,25 +4,25 @@ use crate::simulate::REST;
 use crate::view::Quality;
 
 /// A longer frame, s, counts as slow if drawing takes most of it.
-const SLOW: f64 = 1.0 / 24.0;
+const SLOW_FRAME: f64 = 1.0 / 24.0;
 /// Number or total duration, s, of consecutive slow frames that lowers the quality.
-const PATIENCE: (u32, f64) = (12, 1.2);
+const MAX_SLOW: (u32, f64) = (12, 1.2);
 /// A frame with a shorter drawing time, s, has headroom.
-const ROOM: f64 = 1.0 / 45.0;
+const HEADROOM_FRAME: f64 = 1.0 / 45.0;
 /// Headroom time before the quality is raised, s: initial value, and maximum after failed attempts. Each failure multiplies it by
 /// a factor, which prevents oscillation.
-const WAIT: (f64, f64) = (3.0, 120.0);
-const GROWTH: f64 = 4.0;
+const RAISE_AFTER: (f64, f64) = (3.0, 120.0);
+const RAISE_AFTER_GROWTH: f64 = 4.0;
 /// A raised quality that lasts this long, s, has succeeded.
 const TRIAL: f64 = 10.0;
 /// Weight of a frame without headroom when it is subtracted from the headroom time.
-const LOSS: f64 = 8.0;
+const HEADROOM_LOSS: f64 = 8.0;
 /// A picture unchanged for this time, s, is at rest.
-const STILL: f64 = 0.2;
+const REST_TIME: f64 = 0.2;
 
 /// A displayed frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct ShownFrame {
     /// Pixels of the picture.
     pub size: [u32; 2],
     /// Whether it differs from the previous frame.
@@ -58,7 +58,7 @@ impl Default for Pace {
             row: 0,
             slow: (0, 0.0),
             room: 0.0,
-            wait: WAIT.0,
+            wait: RAISE_AFTER.0,
             trial: None,
             size: [0; 2],
             latest: f64::NEG_INFINITY,
@@ -69,10 +69,10 @@ impl Default for Pace {
 
 impl Pace {
     /// Takes a frame; returns the quality to draw it with.
-    pub fn frame(&mut self, seen: &Seen) -> Quality {
+    pub fn frame(&mut self, seen: &ShownFrame) -> Quality {
         if seen.size != self.size {
             // Another size may have more headroom.
-            (self.size, self.wait) = (seen.size, WAIT.0);
+            (self.size, self.wait) = (seen.size, RAISE_AFTER.0);
         }
         if seen.now > self.latest {
             let goes_on = self.moved == self.latest;
@@ -86,32 +86,32 @@ impl Pace {
         if seen.moves {
             self.moved = seen.now;
         }
-        match self.until_still(seen.now) {
+        match self.time_to_rest(seen.now) {
             Some(_) => Quality::LADDER[self.row],
             None => Quality::FULL,
         }
     }
 
     /// Remaining time until the unchanged picture counts as at rest, s; `None` if it does already.
-    pub fn until_still(&self, now: f64) -> Option<f64> {
-        let left = self.moved + STILL - now;
+    pub fn time_to_rest(&self, now: f64) -> Option<f64> {
+        let left = self.moved + REST_TIME - now;
         (left > 0.0).then_some(left)
     }
 
     /// Counts a frame between moving frames.
     fn count(&mut self, dt: f64, drawing: f64) {
-        self.slow = if dt > SLOW && 2.0 * drawing >= dt { (self.slow.0 + 1, self.slow.1 + dt) } else { (0, 0.0) };
-        self.room = if drawing < ROOM { self.room + dt } else { (self.room - LOSS * dt).max(0.0) };
+        self.slow = if dt > SLOW_FRAME && 2.0 * drawing >= dt { (self.slow.0 + 1, self.slow.1 + dt) } else { (0, 0.0) };
+        self.room = if drawing < HEADROOM_FRAME { self.room + dt } else { (self.room - HEADROOM_LOSS * dt).max(0.0) };
         let trial = self.trial.map(|trial| trial + dt);
         self.trial = trial.filter(|trial| *trial < TRIAL);
         if trial.is_some() && self.trial.is_none() {
-            self.wait = WAIT.0;
+            self.wait = RAISE_AFTER.0;
         }
         let (frames, time) = self.slow;
         // A single slow frame is a hitch.
-        if frames >= PATIENCE.0 || (frames > 1 && time >= PATIENCE.1) {
+        if frames >= MAX_SLOW.0 || (frames > 1 && time >= MAX_SLOW.1) {
             if self.trial.take().is_some() {
-                self.wait = (GROWTH * self.wait).min(WAIT.1);
+                self.wait = (RAISE_AFTER_GROWTH * self.wait).min(RAISE_AFTER.1);
             }
             self.go_to((self.row + 1).min(Quality::LADDER.len() - 1));
         } else if self.row > 0 && self.room >= self.wait {
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     const SIZE: [u32; 2] = [500, 400];
-    const LEAST: usize = Quality::LADDER.len() - 1;
+    const LOWEST: usize = Quality::LADDER.len() - 1;
 
     /// A window with a moving picture.
     #[derive(Default)]
@@ -156,7 +156,7 @@ mod tests {
 
         fn show(&mut self, moves: bool, dt: f64, drawing: f64) -> Quality {
             let before = self.pace.row;
-            let quality = self.pace.frame(&Seen { size: SIZE, moves, now: self.now, dt, drawing });
+            let quality = self.pace.frame(&ShownFrame { size: SIZE, moves, now: self.now, dt, drawing });
             if self.pace.row != before {
                 self.changes.push((self.now, self.pace.row));
             }
@@ -187,7 +187,7 @@ mod tests {
             }
         }
         assert_eq!(rows[0], ([false; 3], 100));
-        assert_eq!(Quality::LADDER[LEAST].sharpness, 0.5, "the stated floor");
+        assert_eq!(Quality::LADDER[LOWEST].sharpness, 0.5, "the stated floor");
     }
 
     #[test]
@@ -201,19 +201,19 @@ mod tests {
             window.show(true, 2.0, 2.0);
         }
         assert_eq!(window.changes, []);
-        for row in 1..=LEAST {
+        for row in 1..=LOWEST {
             window.run(1.15, FREE, 0.0, |_| 0.1);
             assert_eq!(window.pace.row, row);
         }
         window.run(100.0, FREE, 0.0, |_| 0.1);
-        assert_eq!(window.pace.row, LEAST);
+        assert_eq!(window.pace.row, LOWEST);
     }
 
     #[test]
     fn at_three_frames_a_second_it_falls_within_seconds() {
         let mut window = Window::default();
         window.run(9.0, FREE, 0.0, |_| 1.0 / 3.0);
-        assert_eq!(window.pace.row, LEAST);
+        assert_eq!(window.pace.row, LOWEST);
     }
 
     #[test]
@@ -228,7 +228,7 @@ mod tests {
         for tick in [SCREEN, FREE] {
             let mut window = Window::default();
             window.run(20.0, tick, 0.0, |_| 0.1);
-            assert_eq!(window.pace.row, LEAST);
+            assert_eq!(window.pace.row, LOWEST);
             window.run(20.0, tick, 0.0, |_| 0.01);
             assert_eq!(window.pace.row, 0, "tick {tick} s");
             // Occasional hitches delay it only briefly.
@@ -281,16 +281,16 @@ mod tests {
         let mut window = Window::default();
         window.run(20.0, FREE, 0.0, |_| 0.1);
         window.now += 0.1;
-        assert_eq!(window.show(true, 0.1, 0.1), Quality::LADDER[LEAST]);
-        let wait = window.pace.until_still(window.now).expect("soon at rest");
+        assert_eq!(window.show(true, 0.1, 0.1), Quality::LADDER[LOWEST]);
+        let wait = window.pace.time_to_rest(window.now).expect("soon at rest");
         window.now += 0.5 * wait;
-        assert_eq!(window.show(false, 0.1, 0.1), Quality::LADDER[LEAST]);
+        assert_eq!(window.show(false, 0.1, 0.1), Quality::LADDER[LOWEST]);
         window.now += 0.6 * wait;
         assert_eq!(window.show(false, 0.1, 0.1), Quality::FULL);
-        assert_eq!(window.pace.until_still(window.now), None);
+        assert_eq!(window.pace.time_to_rest(window.now), None);
         // Moving again restores the quality at once; the gap is not a frame.
         window.now += 1.0;
-        assert_eq!(window.show(true, 1.0, 1.0), Quality::LADDER[LEAST]);
+        assert_eq!(window.show(true, 1.0, 1.0), Quality::LADDER[LOWEST]);
         assert_eq!(window.pace.slow.0, 0);
     }
 }

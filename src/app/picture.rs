@@ -8,18 +8,18 @@ use super::App;
 use super::canvas::{Canvas, Pending};
 use super::host::SaveFile;
 use super::layout;
-use super::overlay::SMALL;
+use super::overlay::SMALL_PICTURE;
 use super::theme;
 use crate::render::RenderError;
 
 /// Height of the plots below the view, points.
-const PLOTS: f32 = 230.0;
+const PLOTS_HEIGHT: f32 = 230.0;
 /// Least edge of a picture of the view, points, if its pixels permit: a small view is enlarged to fit names and legend.
-const LEAST_EDGE: f32 = 1.1 * SMALL;
+const MIN_EDGE: f32 = 1.1 * SMALL_PICTURE;
 /// Sizes to choose from, as multiples of the size on the screen.
-const TIMES: [u32; 3] = [1, 2, 4];
+const SCALES: [u32; 3] = [1, 2, 4];
 /// Range of a typed edge, pixels. The adapter's own limit is reported when it is exceeded.
-const EDGE: std::ops::RangeInclusive<u32> = 16..=65_536;
+const EDGE_RANGE: std::ops::RangeInclusive<u32> = 16..=65_536;
 /// Timeout for a picture that does not arrive, s.
 const TIMEOUT: f64 = 20.0;
 
@@ -60,7 +60,7 @@ impl Default for Picture {
     fn default() -> Self {
         Self {
             contents: Contents::View,
-            times: Some(TIMES[0]),
+            times: Some(SCALES[0]),
             own: [1920, 1080],
             asked: false,
             pending: None,
@@ -76,7 +76,7 @@ impl Picture {
     }
 
     /// Whether the view is drawn without its buttons and hints.
-    pub fn is_plain(&self) -> bool {
+    pub fn hides_controls(&self) -> bool {
         self.drawn.is_some_and(|drawn| drawn != Contents::Window)
     }
 
@@ -104,7 +104,7 @@ impl Picture {
         let readable = screen.min(1.0);
         let room = match self.contents {
             Contents::Window => f32::INFINITY,
-            Contents::View | Contents::Plots => pixels[0].min(pixels[1]) as f32 / LEAST_EDGE,
+            Contents::View | Contents::Plots => pixels[0].min(pixels[1]) as f32 / MIN_EDGE,
         };
         (pixels, scale.min(room).max(readable))
     }
@@ -126,7 +126,7 @@ impl App {
             }
         });
         ui.horizontal(|ui| {
-            for times in TIMES {
+            for times in SCALES {
                 let help = format!("{times} times as many pixels along each edge as on the screen");
                 ui.selectable_value(&mut picture.times, Some(times), format!("{times}×")).on_hover_text(help);
             }
@@ -139,7 +139,7 @@ impl App {
             ui.horizontal(|ui| {
                 for (edge, name) in picture.own.iter_mut().zip(["Width", "Height"]) {
                     ui.label(name);
-                    ui.add(DragValue::new(edge).range(EDGE).suffix(" px"))
+                    ui.add(DragValue::new(edge).range(EDGE_RANGE).suffix(" px"))
                         .on_hover_text("Edge of the picture, pixels")
                         .accessible_name(format!("{name} of the picture"));
                 }
@@ -154,7 +154,7 @@ impl App {
         let view = self.picture_rect.size();
         let points = match self.picture.contents {
             Contents::View => view,
-            Contents::Plots => view + vec2(0.0, PLOTS),
+            Contents::Plots => view + vec2(0.0, PLOTS_HEIGHT),
             Contents::Window => ctx.content_rect().size(),
         };
         points.max(Vec2::splat(1.0))
@@ -276,7 +276,7 @@ impl App {
             let bar = theme::panel(ui);
             Panel::bottom("plots of a picture")
                 .frame(bar.inner_margin(egui::Margin::symmetric(12, 8)))
-                .exact_size(PLOTS)
+                .exact_size(PLOTS_HEIGHT)
                 .show(ui, |ui| self.plots.ui(ui, &self.player));
         }
         CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
@@ -305,6 +305,6 @@ mod tests {
         assert_eq!(of(Some(1), [0, 0], small, 1.0), ([390, 150], 1.0));
         let (pixels, scale) = of(Some(4), [0, 0], small, 1.0);
         assert_eq!(pixels, [1560, 600]);
-        assert!((pixels[1] as f32 / scale - LEAST_EDGE).abs() < 0.1, "{scale}");
+        assert!((pixels[1] as f32 / scale - MIN_EDGE).abs() < 0.1, "{scale}");
     }
 }

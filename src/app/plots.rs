@@ -7,7 +7,7 @@ use eframe::egui::{
 };
 use egui_plot::{AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform};
 
-use super::compare::{Comparison, Kept};
+use super::compare::{Comparison, EarlierRun};
 use super::curve::{Curves, Path, Trace};
 use super::player::Player;
 use super::stack::stack;
@@ -25,21 +25,21 @@ mod sheet;
 /// Selectable windows, s.
 const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
 /// The shortest zoomed time range, s.
-const SHORTEST_WINDOW: f64 = 1e-6;
+const MIN_WINDOW: f64 = 1e-6;
 /// Least useful height of a plot, points.
-const LEAST_HEIGHT: f32 = 110.0;
+const MIN_HEIGHT: f32 = 110.0;
 /// Least distance between two marks on an axis, points: the text height of their labels.
-const MARKS_APART: f32 = 16.0;
+const MIN_MARK_DISTANCE: f32 = 16.0;
 /// Upper estimate of the width of a label's character, points.
-const LETTER: f64 = 7.0;
+const LETTER_WIDTH: f64 = 7.0;
 /// Least room for the switch of the cut in a title, points.
-const LEAST_SWITCH: f32 = 70.0;
+const MIN_SWITCH_WIDTH: f32 = 70.0;
 /// Fraction of the time range by which an arrow key moves the cursor.
-const NUDGE: f64 = 0.01;
+const KEY_FRACTION: f64 = 0.01;
 /// Approximate maximum number of marks on an axis.
-const MARKS: f64 = 5.0;
+const MAX_MARKS: f64 = 5.0;
 /// A range below this fraction of the values, or below this in axis units, is rounding error rather than motion.
-const GRAIN: f64 = 1e-9;
+const ROUNDING: f64 = 1e-9;
 
 /// The plots and their settings.
 pub struct Plots {
@@ -102,7 +102,7 @@ struct Panel<'a> {
 
 impl<'a> Panel<'a> {
     /// Panel of `quantity`; `None` if the scene does not have it.
-    fn of_quantity(quantity: Quantity, player: &'a Player) -> Option<Self> {
+    fn for_quantity(quantity: Quantity, player: &'a Player) -> Option<Self> {
         let list = player.channels().list().iter().enumerate();
         let members: Vec<(usize, &str)> = list
             .filter(|(_, channel)| channel.quantity == quantity)
@@ -119,7 +119,7 @@ impl<'a> Panel<'a> {
     }
 
     /// Panels of the channels picked by `name`, one per unit.
-    fn of_pick(name: &'a str, player: &'a Player) -> Vec<Self> {
+    fn for_pick(name: &'a str, player: &'a Player) -> Vec<Self> {
         let mut panels: Vec<Self> = Vec::new();
         let picked = player.channels().picked().iter().zip(player.picked());
         for (channel, index) in picked.filter(|(channel, _)| channel.is_matched_by(name)) {
@@ -167,7 +167,7 @@ fn axis_unit(channel: &ChannelInfo) -> (&'static str, f64) {
 }
 
 /// Maximum length of the channel list.
-const MOST_FOUND: usize = 60;
+const MAX_LISTED: usize = 60;
 
 /// Names of channels that contain `search` or match it as a pattern; all component groups if it is empty.
 fn find(player: &Player, search: &str) -> Vec<Entry> {
@@ -179,7 +179,7 @@ fn find(player: &Player, search: &str) -> Vec<Entry> {
             if !entry.units.split(", ").any(|own| own == unit) {
                 entry.units += &format!(", {unit}");
             }
-        } else if entries.len() < MOST_FOUND {
+        } else if entries.len() < MAX_LISTED {
             entries.push(Entry { name: name.to_owned(), units: unit.to_owned() });
         }
     };
@@ -441,7 +441,7 @@ impl Plots {
         let gap = ui.spacing().item_spacing;
         // The last mark of the lower axis extends beyond the plot.
         let width = (space.x - 16.0 - gap.x * (columns - 1) as f32) / columns as f32;
-        let height = ((space.y - gap.y * (rows - 1) as f32) / rows as f32).max(LEAST_HEIGHT);
+        let height = ((space.y - gap.y * (rows - 1) as f32) / rows as f32).max(MIN_HEIGHT);
         egui::ScrollArea::vertical().id_salt("plots").show(ui, |ui| {
             for row in chosen.chunks(columns) {
                 ui.horizontal_top(|ui| {
@@ -535,7 +535,7 @@ impl Plots {
                 let words = time_mark(&mark);
                 let beyond = (range.end() - mark.value) / (range.end() - range.start()) * frame;
                 // Omits a mark that would extend into the next plot.
-                if 0.5 * LETTER * words.chars().count() as f64 > beyond + 28.0 {
+                if 0.5 * LETTER_WIDTH * words.chars().count() as f64 > beyond + 28.0 {
                     return String::new();
                 }
                 words
@@ -549,10 +549,10 @@ impl Plots {
             // Marks at late times have long labels, so fewer fit side by side.
             let letters = |mark: &GridMark| time_mark(mark).chars().count();
             let marks_across = move |input: GridInput| {
-                let marks = marks(&input, MARKS);
+                let marks = marks(&input, MAX_MARKS);
                 let longest = marks.iter().map(letters).max().unwrap_or(1);
-                let room = frame / (LETTER * longest as f64 + 8.0);
-                if room < MARKS { self::marks(&input, room.max(1.0)) } else { marks }
+                let room = frame / (LETTER_WIDTH * longest as f64 + 8.0);
+                if room < MAX_MARKS { self::marks(&input, room.max(1.0)) } else { marks }
             };
             let finest = value::digits_within(greatest - least, least.abs().max(greatest.abs()));
             let earliest = value::digits_within(length, to);
@@ -569,8 +569,8 @@ impl Plots {
                 .custom_x_axes(vec![across])
                 .custom_y_axes(vec![up])
                 .x_grid_spacer(marks_across)
-                .y_grid_spacer(|input| marks(&input, MARKS))
-                .grid_spacing(Rangef::new(MARKS_APART, 300.0))
+                .y_grid_spacer(|input| marks(&input, MAX_MARKS))
+                .grid_spacing(Rangef::new(MIN_MARK_DISTANCE, 300.0))
                 .grid_color(faint.gamma_multiply(0.35))
                 .grid_fade(0.0);
             let Self { traces, levels, readings, hidden, comparison, before, .. } = &*self;
@@ -704,7 +704,7 @@ impl Plots {
         if by != 0.0 {
             let (from, to) = self.range(player);
             let before = self.cursor.map_or(player.pacer.shown(), |(_, time)| time);
-            let wanted = before + by * NUDGE * (to - from);
+            let wanted = before + by * KEY_FRACTION * (to - from);
             // A recorded instant, and always a new one.
             let all = self.traces.iter().flat_map(|trace| &trace.bins).map(|bin| 0.5 * (bin.from + bin.to));
             let ahead = all.filter(|time| (time - before) * by > 0.0);
@@ -734,7 +734,7 @@ impl Plots {
         }
         if let Some(zoom) = Zoom::over(ui, response) {
             let width = transform.frame().width();
-            let range = zoom.apply((from, to), time(zoom.place), width, SHORTEST_WINDOW);
+            let range = zoom.apply((from, to), time(zoom.place), width, MIN_WINDOW);
             let part = range.1 - range.0 < end.max(self.window_length(player));
             self.zoomed = part.then(|| zoom::within(range, f64::INFINITY));
         }
@@ -806,7 +806,7 @@ impl Plots {
                     }
                 }
             }
-            if panel.kind == PlotKind::FromZero && ui.available_width() > LEAST_SWITCH {
+            if panel.kind == PlotKind::FromZero && ui.available_width() > MIN_SWITCH_WIDTH {
                 let on = is_cut || self.cut == Some(true);
                 if cut::switch(ui, &panel.name(), on) {
                     self.cut = Some(!on);
@@ -838,7 +838,7 @@ fn largest<'a>(members: &[(usize, &'a str)], traces: &[Trace]) -> Option<(&'a st
 
 /// Record of the members of `panel` in `kept` between two instants, s, with a limited number of bins.
 fn before(
-    kept: &Kept,
+    kept: &EarlierRun,
     player: &Player,
     panel: &Panel<'_>,
     hidden: &[usize],
@@ -858,8 +858,8 @@ fn before(
 
 /// Panels of the `chosen` quantities and of the channels `picked` by name.
 fn panels<'a>(chosen: &[Quantity], picked: &'a [String], player: &'a Player) -> Vec<Panel<'a>> {
-    let of_quantity = |quantity: &Quantity| Panel::of_quantity(*quantity, player);
-    let of_picks = picked.iter().flat_map(|name| Panel::of_pick(name, player));
+    let of_quantity = |quantity: &Quantity| Panel::for_quantity(*quantity, player);
+    let of_picks = picked.iter().flat_map(|name| Panel::for_pick(name, player));
     chosen.iter().filter_map(of_quantity).chain(of_picks).collect()
 }
 
@@ -891,9 +891,9 @@ fn range(values: Option<(f64, f64)>, from_zero: bool) -> (f64, f64) {
         (least, greatest) = (least.min(0.0), greatest.max(0.0));
     }
     let size = least.abs().max(greatest.abs());
-    if !size.is_finite() || size <= GRAIN {
+    if !size.is_finite() || size <= ROUNDING {
         (least, greatest) = (if from_zero { 0.0 } else { -1.0 }, 1.0);
-    } else if greatest - least <= GRAIN * size {
+    } else if greatest - least <= ROUNDING * size {
         let middle = 0.5 * (least + greatest);
         let half = 0.05 * 10_f64.powf(size.log10().floor());
         (least, greatest) = (middle - half, middle + half);
@@ -993,10 +993,10 @@ mod tests {
     fn words(least: f64, greatest: f64, height: f64) -> Vec<String> {
         let input = GridInput {
             bounds: (least, greatest),
-            base_step_size: f64::from(MARKS_APART) * (greatest - least) / height,
+            base_step_size: f64::from(MIN_MARK_DISTANCE) * (greatest - least) / height,
         };
         let most = least.abs().max(greatest.abs());
-        let marks = marks(&input, MARKS);
+        let marks = marks(&input, MAX_MARKS);
         assert!(marks.iter().all(|m| (least..=greatest).contains(&m.value)));
         let apart = marks.windows(2).all(|w| w[1].value - w[0].value >= 0.99 * input.base_step_size);
         assert!(apart, "{marks:?}");

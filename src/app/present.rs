@@ -8,27 +8,27 @@ use eframe::egui::{self, Align2, FontId, Galley, Id, Panel, Rect, Sense, Ui, Vec
 use super::{App, overlay, spoken, theme, transport, value};
 
 /// Least text height as a fraction of the screen height, legible from the last row of a lecture hall.
-const LEAST_TEXT: f32 = 1.0 / 40.0;
+const MIN_TEXT_HEIGHT: f32 = 1.0 / 40.0;
 /// Smallest type of the interface, points: tick labels of the arrows' legend.
-const SMALLEST: f32 = 11.0;
+const SMALLEST_FONT: f32 = 11.0;
 /// Type of the caption, points.
-const CAPTION: f32 = 24.0;
+const CAPTION_FONT: f32 = 24.0;
 /// Type of the badge of an impact in a window, points.
-const BADGE: f32 = 15.0;
+const BADGE_FONT: f32 = 15.0;
 /// Padding around its text, points.
-const PAD: Vec2 = vec2(12.0, 4.0);
+const BADGE_PADDING: Vec2 = vec2(12.0, 4.0);
 /// Width of the time in the corner of the picture, points.
-const TIME: f32 = 170.0;
+const TIME_WIDTH: f32 = 170.0;
 /// Least height of the plots, points.
-const LEAST_PLOTS: f32 = 130.0;
+const MIN_PLOTS_HEIGHT: f32 = 130.0;
 /// Least width of a bar with transport and timeline side by side, points.
-const BESIDE: f32 = 700.0;
+const MIN_BAR_WIDTH: f32 = 700.0;
 /// Width of the buttons at the right end of the bar, points.
-const BUTTONS: f32 = 150.0;
+const BUTTONS_WIDTH: f32 = 150.0;
 /// Thickness of arrows relative to the normal view.
-pub(super) const THICKNESS: f32 = 2.0;
+pub(super) const ARROW_THICKNESS: f32 = 2.0;
 /// Least relative change of the screen height that changes the type size.
-const FOLLOWED: f32 = 0.02;
+const MIN_HEIGHT_CHANGE: f32 = 0.02;
 
 /// Settings to restore, and the screen height.
 pub struct Presentation {
@@ -42,12 +42,12 @@ pub struct Presentation {
 
 /// Height of the plots below the picture in the rest of `ui`, points.
 pub(super) fn plots_height(ui: &Ui) -> f32 {
-    (0.36 * ui.available_height()).max(LEAST_PLOTS)
+    (0.36 * ui.available_height()).max(MIN_PLOTS_HEIGHT)
 }
 
 /// Least size for controls and picture, points, and smallest zoom that makes room for them.
-const LEAST_WINDOW: egui::Vec2 = egui::vec2(320.0, 300.0);
-const LEAST_ZOOM: f32 = 0.5;
+const MIN_WINDOW_SIZE: egui::Vec2 = egui::vec2(320.0, 300.0);
+const MIN_ZOOM: f32 = 0.5;
 
 /// Height of the screen, points at zoom 1.
 pub(super) fn screen_height(ctx: &egui::Context) -> f32 {
@@ -56,7 +56,7 @@ pub(super) fn screen_height(ctx: &egui::Context) -> f32 {
 
 /// Zoom at which the smallest type is legible from the last row of a screen `height` points high.
 pub(super) fn legible(height: f32) -> f32 {
-    (height * LEAST_TEXT / SMALLEST).max(1.0)
+    (height * MIN_TEXT_HEIGHT / SMALLEST_FONT).max(1.0)
 }
 
 impl App {
@@ -71,7 +71,7 @@ impl App {
                 self.viewport.options.arrows.thickness = before.thickness;
             }
             None => {
-                self.bench.step_aside();
+                self.bench.set_aside();
                 let height = screen_height(ctx);
                 self.presentation = Some(Presentation {
                     zoom: ctx.zoom_factor(),
@@ -79,7 +79,7 @@ impl App {
                     height,
                 });
                 ctx.set_zoom_factor(legible(height));
-                self.viewport.options.arrows.thickness = THICKNESS;
+                self.viewport.options.arrows.thickness = ARROW_THICKNESS;
             }
         }
         self.host.fill_screen(ctx, on);
@@ -103,7 +103,7 @@ impl App {
     }
 
     /// Shows the next of the chosen plots, or none after the last; in a presented lesson toggles between all and none.
-    pub(super) fn turn_plot(&mut self) {
+    pub(super) fn show_next_plot(&mut self) {
         if self.is_presenting() && self.course().is_some() {
             self.show_plots = !self.show_plots;
             return;
@@ -122,7 +122,7 @@ impl App {
         let change = (height - presentation.height).abs();
         // The new zoom takes effect a pass later; only then the height is that of the screen.
         let settled = (ctx.zoom_factor() - legible(presentation.height)).abs() < 1e-3;
-        if settled && change > FOLLOWED * presentation.height {
+        if settled && change > MIN_HEIGHT_CHANGE * presentation.height {
             presentation.height = height;
             ctx.set_zoom_factor(legible(height));
         }
@@ -132,8 +132,8 @@ impl App {
     fn squeeze(&mut self, ctx: &egui::Context) {
         let now = ctx.zoom_factor();
         let own = self.squeezed.unwrap_or(now);
-        let room = ctx.content_rect().size() * now / LEAST_WINDOW;
-        let zoom = own.min(room.min_elem().max(LEAST_ZOOM));
+        let room = ctx.content_rect().size() * now / MIN_WINDOW_SIZE;
+        let zoom = own.min(room.min_elem().max(MIN_ZOOM));
         self.squeezed = (zoom < own).then_some(own);
         if (zoom - now).abs() > 1e-3 {
             ctx.set_zoom_factor(zoom);
@@ -156,18 +156,18 @@ impl App {
                 }
                 let backwards = egui::Layout::right_to_left(egui::Align::Center);
                 let width = ui.available_width();
-                if width < transport::LEAST + BUTTONS {
+                if width < transport::MIN_WIDTH + BUTTONS_WIDTH {
                     let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner;
                     let size = vec2(width, ui.spacing().interact_size.y);
                     ui.allocate_ui_with_layout(size, backwards, |ui| leave |= self.presentation_buttons(ui));
                     return asked;
                 }
-                let size = vec2(width, theme::side(ui, transport::PLAY));
+                let size = vec2(width, theme::side(ui, transport::PLAY_SIDE));
                 ui.allocate_ui_with_layout(size, backwards, |ui| {
                     leave |= self.presentation_buttons(ui);
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                         ui.add_enabled_ui(free, |ui| {
-                            if !teaching || width < BESIDE {
+                            if !teaching || width < MIN_BAR_WIDTH {
                                 return transport::row(ui, &mut self.player);
                             }
                             ui.horizontal(|ui| {
@@ -184,7 +184,7 @@ impl App {
                 .inner
             })
             .inner;
-        self.lesson_beside(ui, bar);
+        self.lesson_panel(ui, bar);
         self.presented_plots(ui, bar);
         self.lesson_twin(ui, bar);
         self.central(ui, asked);
@@ -200,7 +200,7 @@ impl App {
         let on = if self.course().is_some() { self.show_plots } else { self.single_plot().is_some() };
         let help = "The next of the chosen plots, after the last none (key P)";
         if ui.add(egui::Button::selectable(on, "Plot")).on_hover_text(help).clicked() {
-            self.turn_plot();
+            self.show_next_plot();
         }
         leave
     }
@@ -223,7 +223,7 @@ impl App {
             };
             if let Some(time) = asked.filter(|_| free) {
                 player.go_to(time);
-                viewport.revisit(player);
+                viewport.restore_marks(player);
             }
         });
     }
@@ -243,7 +243,7 @@ impl App {
     /// otherwise, the last finished one.
     pub(super) fn caption_plate(&self, ui: &Ui, area: Rect, presenting: bool) -> Option<(Arc<Galley>, Rect)> {
         let ink = ui.visuals().strong_text_color();
-        if !presenting && (!overlay::has_room(area) || self.picture.is_plain()) {
+        if !presenting && (!overlay::fits_labels(area) || self.picture.hides_controls()) {
             return None;
         }
         let text = self.impact_badge().or_else(|| self.last_impact().filter(|_| presenting))?;
@@ -252,28 +252,28 @@ impl App {
             // Below the buttons and the time.
             inside.min.y += overlay::plate(2)[1].max(ui.spacing().interact_size.y + 8.0);
         }
-        let full = if presenting { CAPTION } else { BADGE };
-        let room = inside.width() - 2.0 * PAD.x;
+        let full = if presenting { CAPTION_FONT } else { BADGE_FONT };
+        let room = inside.width() - 2.0 * BADGE_PADDING.x;
         let lay = |size: f32| {
             // Text too long in the smallest type wraps to a second line.
-            let width = if size > SMALLEST { f32::INFINITY } else { room };
+            let width = if size > SMALLEST_FONT { f32::INFINITY } else { room };
             ui.painter().layout(text.clone(), FontId::proportional(size), ink, width)
         };
         let fitting = |size: f32| {
             let words = lay(size);
             let width = words.size().x;
-            if width > room { lay((size * room / width).max(SMALLEST)) } else { words }
+            if width > room { lay((size * room / width).max(SMALLEST_FONT)) } else { words }
         };
-        let beside = |words: &Galley| inside.right() - words.size().x >= area.left() + TIME;
+        let beside = |words: &Galley| inside.right() - words.size().x >= area.left() + TIME_WIDTH;
         let mut words = fitting(full);
         if presenting && !beside(&words) {
             // Below the time, large type would cover the joint under the microscope.
-            words = fitting(BADGE);
+            words = fitting(BADGE_FONT);
         }
         let middle = Align2::CENTER_TOP.align_size_within_rect(words.size(), inside);
         // Beside a lesson the middle is too narrow, so the time is on the left. Beside the microscope, too, there is room only
         // below the time.
-        let place = if !presenting || middle.left() >= area.left() + TIME {
+        let place = if !presenting || middle.left() >= area.left() + TIME_WIDTH {
             middle
         } else {
             if !beside(&words) {
@@ -281,7 +281,7 @@ impl App {
             }
             Align2::RIGHT_TOP.align_size_within_rect(words.size(), inside)
         };
-        Some((words, place.expand2(PAD)))
+        Some((words, place.expand2(BADGE_PADDING)))
     }
 
     /// Draws the caption over the picture in `area`.
@@ -292,7 +292,7 @@ impl App {
         let painter = ui.painter_at(area);
         painter.rect_filled(plate, 6.0, ui.visuals().window_fill.gamma_multiply(0.85));
         let text = words.text().to_owned();
-        painter.galley(plate.min + PAD, words, ui.visuals().strong_text_color());
+        painter.galley(plate.min + BADGE_PADDING, words, ui.visuals().strong_text_color());
         let response = ui.interact(plate, Id::unique("last impact"), Sense::hover());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &text));
         let help = if self.impact_badge().is_some() {

@@ -9,7 +9,7 @@ use super::host::OpenedFile;
 use crate::scene::{Scene, SceneError};
 
 /// Longest stepping time, s, to reach the previously displayed instant again; otherwise the run restarts at 0.
-const QUICK: f64 = 0.4;
+const MAX_REPLAY_TIME: f64 = 0.4;
 
 /// The file of the displayed scene, if any.
 #[derive(Debug, Default)]
@@ -20,7 +20,7 @@ pub(super) struct SceneFile {
     /// The referenced file with an error. The displayed scene may lack it.
     wrong: Option<String>,
     /// Files opened together with the scene file.
-    given: Given,
+    given: FileContents,
     /// Changes stored in a file or delivered with the scene: those at the first check.
     saved: Option<Changes>,
     /// Whether the user saved the scene in this window.
@@ -31,7 +31,7 @@ pub(super) struct SceneFile {
 type Changes = Vec<(String, String)>;
 
 /// Contents of files by their names without folders.
-pub(super) type Given = BTreeMap<String, Vec<u8>>;
+pub(super) type FileContents = BTreeMap<String, Vec<u8>>;
 
 impl SceneFile {
     /// The file `name` as entered by the user; the host is not told yet.
@@ -40,12 +40,12 @@ impl SceneFile {
     }
 
     /// The file `name`, opened together with the files `given`.
-    pub(super) fn opened(name: String, given: Given) -> Self {
+    pub(super) fn opened(name: String, given: FileContents) -> Self {
         Self { given, ..Self::named(Some(name)) }
     }
 
     /// Records that the scene was saved with `changes`.
-    pub(super) fn saved_with(&mut self, changes: Changes) {
+    pub(super) fn record_saved(&mut self, changes: Changes) {
         self.saved = Some(changes);
         self.saved_here = true;
     }
@@ -56,7 +56,7 @@ impl SceneFile {
     }
 
     /// Whether the scene is stored in a file.
-    pub(super) fn is_in_file(&self) -> bool {
+    pub(super) fn has_file(&self) -> bool {
         self.saved_here || self.name.is_some()
     }
 
@@ -101,7 +101,7 @@ impl App {
         &self,
         name: &str,
         text: &str,
-        given: &Given,
+        given: &FileContents,
         changes: &[(String, String)],
     ) -> Result<Scene, SceneError> {
         let folder = self.host.folder(name);
@@ -154,7 +154,7 @@ impl App {
         self.scene_file = SceneFile { told, ..SceneFile::opened(name, given) };
         self.player.set_phase(phase);
         let (clock, start) = (self.player.clock, (self.player.clock)());
-        let reached = self.player.run_towards(time, || clock() - start < QUICK);
+        let reached = self.player.run_towards(time, || clock() - start < MAX_REPLAY_TIME);
         if !reached {
             self.reset();
         }

@@ -17,19 +17,19 @@ use crate::simulate::Simulation;
 use crate::words::Words as _;
 
 /// Length of the list of recent files.
-const MOST_RECENT: usize = 8;
+const MAX_RECENT: usize = 8;
 /// Least time between two writes while the window changes, s.
-const PAUSE: f64 = 5.0;
+const MIN_WRITE_INTERVAL: f64 = 5.0;
 /// Plausible window lengths, points, and zoom factors.
-const SIZES: std::ops::RangeInclusive<f32> = 200.0..=20_000.0;
-const ZOOMS: std::ops::RangeInclusive<f32> = 0.2..=5.0;
+const WINDOW_LENGTHS: std::ops::RangeInclusive<f32> = 200.0..=20_000.0;
+const ZOOM_FACTORS: std::ops::RangeInclusive<f32> = 0.2..=5.0;
 /// Initial size of the window, points.
-pub(super) const FIRST_SIZE: [f32; 2] = [1280.0, 800.0];
+pub(super) const INITIAL_SIZE: [f32; 2] = [1280.0, 800.0];
 
 /// The stored settings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Remembered {
+pub struct StoredSettings {
     /// Inner size of the window, points at zoom 1.
     pub size: Option<[f32; 2]>,
     /// Outer position of the window, points at zoom 1; unavailable on some platforms.
@@ -46,13 +46,13 @@ pub struct Remembered {
     pub recent: Vec<String>,
 }
 
-impl Remembered {
+impl StoredSettings {
     /// Discards implausible values.
-    fn believed(mut self) -> Self {
-        self.size = self.size.filter(|size| size.iter().all(|length| SIZES.contains(length)));
-        self.position = self.position.filter(|place| place.iter().all(|place| place.abs() <= *SIZES.end()));
-        self.zoom = self.zoom.filter(|zoom| ZOOMS.contains(zoom));
-        self.recent.truncate(MOST_RECENT);
+    fn plausible(mut self) -> Self {
+        self.size = self.size.filter(|size| size.iter().all(|length| WINDOW_LENGTHS.contains(length)));
+        self.position = self.position.filter(|place| place.iter().all(|place| place.abs() <= *WINDOW_LENGTHS.end()));
+        self.zoom = self.zoom.filter(|zoom| ZOOM_FACTORS.contains(zoom));
+        self.recent.truncate(MAX_RECENT);
         self
     }
 
@@ -64,7 +64,7 @@ impl Remembered {
     fn add_recent(&mut self, file: String) {
         self.recent.retain(|other| *other != file);
         self.recent.insert(0, file);
-        self.recent.truncate(MOST_RECENT);
+        self.recent.truncate(MAX_RECENT);
     }
 }
 
@@ -72,8 +72,8 @@ impl Remembered {
 pub struct Store {
     path: PathBuf,
     /// Current settings, and those in the file.
-    now: Remembered,
-    written: Remembered,
+    now: StoredSettings,
+    written: StoredSettings,
     /// Earliest time of the next write, s of viewing.
     due: f64,
     /// Zoom in the previous frame.
@@ -82,7 +82,7 @@ pub struct Store {
 
 impl Store {
     /// The settings file of the current user; `None` if there is no folder for it.
-    pub fn of_user() -> Option<Self> {
+    pub fn for_current_user() -> Option<Self> {
         let folder = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
         let data = if cfg!(windows) {
             folder("APPDATA")
@@ -96,19 +96,19 @@ impl Store {
 
     /// The settings in the file `path`. An unreadable file counts as missing.
     pub fn at(path: PathBuf) -> Self {
-        let read = || -> Option<Remembered> { serde_json::from_slice(&std::fs::read(&path).ok()?).ok() };
-        let now = read().unwrap_or_default().believed();
+        let read = || -> Option<StoredSettings> { serde_json::from_slice(&std::fs::read(&path).ok()?).ok() };
+        let now = read().unwrap_or_default().plausible();
         Self { path, written: now.clone(), now, due: f64::NEG_INFINITY, scale: 0.0 }
     }
 
     /// The current settings.
-    pub fn remembered(&self) -> &Remembered {
+    pub fn remembered(&self) -> &StoredSettings {
         &self.now
     }
 
     /// Resets all settings.
     pub fn forget(&mut self) {
-        self.now = Remembered::default();
+        self.now = StoredSettings::default();
         self.write();
     }
 
@@ -119,7 +119,7 @@ impl Store {
             return AppOptions::first();
         };
         let load = || Scene::load(name, &[]).map_err(|error| error.to_string());
-        let opened = is_there(name).and_then(|()| load());
+        let opened = check_exists(name).and_then(|()| load());
         let started = opened.and_then(|scene| match Simulation::new(&scene.machine) {
             Ok(_) => Ok(AppOptions::new(scene)),
             Err(error) => Err(scene.locate(&error).to_string()),
@@ -151,7 +151,7 @@ impl Store {
 
 impl App {
     /// Applies theme and type size from `store`, unless other values were requested, and records settings in it from now on.
-    pub fn remember_in(&mut self, ctx: &egui::Context, store: Store) {
+    pub fn store_settings_in(&mut self, ctx: &egui::Context, store: Store) {
         let theme = ctx.options(|options| options.theme_preference);
         if let Some(wanted) = store.now.theme().filter(|_| theme == ThemePreference::System) {
             ctx.set_theme(wanted);
@@ -209,7 +209,7 @@ impl App {
             && (before != (store.now.scene.clone(), store.now.recent.len()) || time >= store.due)
         {
             store.write();
-            store.due = time + PAUSE;
+            store.due = time + MIN_WRITE_INTERVAL;
         }
     }
 
@@ -241,7 +241,7 @@ impl App {
             }
         }
         if let Some(file) = chosen {
-            self.problem = is_there(&file).and_then(|()| self.open(&file)).err();
+            self.problem = check_exists(&file).and_then(|()| self.open(&file)).err();
             layout::close_menu(ui);
         }
     }
@@ -256,7 +256,7 @@ impl App {
     }
 
     /// Resets all settings and opens the first-time scene.
-    pub(super) fn start_as_new(&mut self, ctx: &egui::Context) {
+    pub(super) fn reset_to_first_start(&mut self, ctx: &egui::Context) {
         self.present(ctx, false);
         let options = AppOptions { clock: self.player.clock, ..AppOptions::first() };
         let mut new = match Self::with_context(ctx, self.graphics.as_ref(), options) {
@@ -276,13 +276,13 @@ impl App {
         ctx.set_zoom_factor(1.0);
         ctx.send_viewport_cmd(egui::ViewportCommand::Maximized(false));
         // In points at the zoom still in effect when the command arrives.
-        let size = egui::Vec2::from(FIRST_SIZE) / ctx.zoom_factor();
+        let size = egui::Vec2::from(INITIAL_SIZE) / ctx.zoom_factor();
         ctx.send_viewport_cmd(egui::ViewportCommand::InnerSize(size));
     }
 }
 
 /// Checks that the scene `name` exists; its file may have been removed.
-fn is_there(name: &str) -> Result<(), String> {
+fn check_exists(name: &str) -> Result<(), String> {
     let path = Path::new(name);
     if path.is_absolute() && !path.exists() { Err(format!("{name} is no longer there")) } else { Ok(()) }
 }
@@ -301,7 +301,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("deep").join("window.json");
         let mut store = Store::at(path.clone());
-        assert_eq!(*store.remembered(), Remembered::default());
+        assert_eq!(*store.remembered(), StoredSettings::default());
         store.write();
         assert!(!path.exists(), "nothing to write");
         store.now.size = Some([900.0, 700.5]);
@@ -313,17 +313,17 @@ mod tests {
         store.write();
         let again = Store::at(path.clone());
         assert_eq!(*again.remembered(), *store.remembered());
-        assert_eq!(again.remembered().recent.len(), MOST_RECENT);
+        assert_eq!(again.remembered().recent.len(), MAX_RECENT);
         assert_eq!(again.remembered().recent[..2], ["/scenes/5.toml", "/scenes/9.toml"]);
         store.forget();
-        assert_eq!(*Store::at(path.clone()).remembered(), Remembered::default());
+        assert_eq!(*Store::at(path.clone()).remembered(), StoredSettings::default());
 
         std::fs::write(&path, r#"{"size": [1e9, 3.0], "zoom": 0.0, "theme": "dark", "later": 1}"#).expect("writable");
         let remembered = Store::at(path.clone()).now;
         assert_eq!((remembered.size, remembered.zoom), (None, None));
         assert_eq!(remembered.theme(), Some(ThemePreference::Dark));
         std::fs::write(&path, "{").expect("writable");
-        assert_eq!(*Store::at(path).remembered(), Remembered::default());
+        assert_eq!(*Store::at(path).remembered(), StoredSettings::default());
     }
 
     #[test]

@@ -13,7 +13,7 @@ use crate::scene::{MAX_FILE_SIZE, too_large};
 /// Polling period; short in tests.
 const PERIOD: Duration = Duration::from_millis(if cfg!(test) { 20 } else { 500 });
 /// A file unchanged for this time is completely written.
-const SETTLED: Duration = Duration::from_millis(50);
+const UNCHANGED_TIME: Duration = Duration::from_millis(50);
 
 /// Watch on a scene file and the files beside it; ends when dropped.
 #[derive(Debug)]
@@ -38,7 +38,7 @@ impl Watcher {
             while !asked.load(Ordering::Relaxed) {
                 let now = stamps();
                 if now != seen {
-                    std::thread::sleep(SETTLED);
+                    std::thread::sleep(UNCHANGED_TIME);
                     if stamps() != now {
                         continue;
                     }

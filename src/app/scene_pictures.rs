@@ -11,9 +11,9 @@ use crate::view::{ArrowOptions, DrawList, PeakMarks, SceneView, Shot, Theme, Vie
 /// Size of a picture, points.
 pub const SIZE: Vec2 = vec2(108.0, 72.0);
 /// Camera distance relative to the one that fits the scene with room for arrows.
-const CLOSER: f32 = 0.88;
+const CAMERA_DISTANCE: f32 = 0.88;
 /// Texture coordinates of the whole picture.
-const WHOLE: Rect = Rect { min: Pos2::ZERO, max: pos2(1.0, 1.0) };
+const WHOLE_PICTURE: Rect = Rect { min: Pos2::ZERO, max: pos2(1.0, 1.0) };
 
 /// Cache of drawn thumbnails.
 #[derive(Default)]
@@ -45,7 +45,7 @@ impl ScenePictures {
         let empty = ui.visuals().faint_bg_color;
         Atom::paint(SIZE, move |ui, part| match texture {
             Some(texture) => {
-                ui.painter().image(texture, part.rect, WHOLE, Color32::WHITE);
+                ui.painter().image(texture, part.rect, WHOLE_PICTURE, Color32::WHITE);
             }
             None => {
                 ui.painter().rect_filled(part.rect, 0.0, empty);
@@ -101,7 +101,7 @@ fn list(scene: &Scene, theme: Theme, size: [u32; 2], pixels_per_point: f32) -> O
     let mut camera = view.camera();
     view.fit(&mut camera, scene, &frame, &options, size);
     // Arrows are not drawn and need no room.
-    camera.distance *= CLOSER;
+    camera.distance *= CAMERA_DISTANCE;
     let marks = PeakMarks::new();
     let shot = Shot {
         scene,

@@ -51,7 +51,7 @@ impl App {
     }
 
     /// Advances the run by `dt` seconds and plays the impacts that end meanwhile. Jumps back in time or to an impact are silent.
-    pub(super) fn advance_heard(&mut self, dt: f64) {
+    pub(super) fn advance_with_sound(&mut self, dt: f64) {
         let player = &mut self.player;
         let plays = player.is_playing() && !player.is_playing_backwards() && !player.is_seeking();
         let from = player.pacer.shown_before();

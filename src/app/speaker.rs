@@ -11,7 +11,7 @@ use super::click::{Click, Voice};
 /// Delay from a frame to its sound: longer than a device's buffer, so that the clicks of a frame keep their spacing.
 const LATENCY: Duration = Duration::from_millis(40);
 /// Most simultaneous clicks; more than the ear can distinguish.
-const MOST_VOICES: usize = 64;
+const MAX_VOICES: usize = 64;
 
 /// A device that is open or being opened; dropping it closes the device.
 pub struct Speaker {
@@ -112,14 +112,14 @@ impl Mixer {
             clicks,
             rate,
             // Preallocated: the audio thread must not wait for memory.
-            voices: Vec::with_capacity(MOST_VOICES),
+            voices: Vec::with_capacity(MAX_VOICES),
         }
     }
 
     /// Writes the next samples, starting at `now`, identical on all channels.
     fn fill<T: SizedSample + FromSample<f32>>(&mut self, out: &mut [T], channels: usize, now: Instant) {
         for (due, click) in self.clicks.try_iter() {
-            if self.voices.len() < MOST_VOICES {
+            if self.voices.len() < MAX_VOICES {
                 let wait = due.saturating_duration_since(now).as_secs_f64() * self.rate;
                 let voice = Voice::new(&click, self.rate);
                 self.voices.push((wait as usize, voice));
@@ -183,14 +183,14 @@ mod tests {
         let (send, clicks) = channel();
         let mut mixer = Mixer::new(clicks, 48_000.0);
         let now = Instant::now();
-        for _ in 0..10 * MOST_VOICES {
+        for _ in 0..10 * MAX_VOICES {
             let click = Click { after: 0.0, pitch: 440.0, loudness: 1.0 };
             send.send((now, click)).expect("is heard");
         }
         let mut block = [0_i16; 256];
         mixer.fill(&mut block, 1, now);
-        assert_eq!(mixer.voices.len(), MOST_VOICES);
-        assert_eq!(mixer.voices.capacity(), MOST_VOICES);
+        assert_eq!(mixer.voices.len(), MAX_VOICES);
+        assert_eq!(mixer.voices.capacity(), MAX_VOICES);
         assert!(block.contains(&i16::MAX));
     }
 }

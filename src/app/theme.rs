@@ -61,7 +61,7 @@ pub fn panel(ui: &Ui) -> Frame {
 /// Least side of a touch target, points.
 pub const FINGER: f32 = 44.0;
 /// Side of a touch target in dense rows, points; WCAG 2.2 requires 24 (2.5.8).
-const TIGHT: f32 = 30.0;
+const DENSE_FINGER: f32 = 30.0;
 
 /// Sizes the controls for a mouse or for touch.
 pub fn apply_size(ctx: &egui::Context, fingers: bool) {
@@ -88,10 +88,10 @@ pub fn side(ui: &Ui, mouse: f32) -> f32 {
 }
 
 /// Uses dense rows in the rest of `ui`, so that a phone shows all answers of a question and most of a menu.
-pub fn tighten(ui: &mut Ui) {
+pub fn use_dense_rows(ui: &mut Ui) {
     if has_fingers(ui) {
         let spacing = ui.spacing_mut();
-        (spacing.interact_size.y, spacing.item_spacing.y) = (TIGHT, 4.0);
+        (spacing.interact_size.y, spacing.item_spacing.y) = (DENSE_FINGER, 4.0);
     }
 }
 
@@ -108,13 +108,13 @@ pub fn error(ui: &mut Ui, words: impl Into<String>) -> Response {
 }
 
 /// Ubuntu Light, as `build.rs` writes it.
-const FACE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/ubuntu-light.ttf"));
+const FONT: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/ubuntu-light.ttf"));
 
 /// One font for everything: its digits have equal widths, so a running clock does not jitter.
 pub fn fonts() -> FontDefinitions {
     const NAME: &str = "Ubuntu-Light";
     let mut fonts = FontDefinitions::empty();
-    let face = FontData::from_static(FACE);
+    let face = FontData::from_static(FONT);
     fonts.font_data.insert(NAME.to_owned(), Arc::new(face));
     for family in fonts.families.values_mut() {
         family.push(NAME.to_owned());
@@ -282,7 +282,7 @@ mod tests {
             (ctx.fonts(|fonts| fonts.image()), size)
         };
         let whole = epaint_default_fonts::UBUNTU_LIGHT;
-        assert!(FACE.len() + 40_000 < whole.len(), "{} bytes", FACE.len());
-        assert!(picture(FACE) == picture(whole));
+        assert!(FONT.len() + 40_000 < whole.len(), "{} bytes", FONT.len());
+        assert!(picture(FONT) == picture(whole));
     }
 }

@@ -15,18 +15,18 @@ use super::{spoken, theme, value};
 use crate::simulate::{ContactMode, RECORDED_JOINTS};
 
 /// Height of the row of flags, and total height of the lanes, points.
-const FLAGS: f32 = 9.0;
-const LANES: f32 = 24.0;
+const FLAGS_HEIGHT: f32 = 9.0;
+const LANES_HEIGHT: f32 = 24.0;
 /// Window height below which only a low strip is shown, points.
-const LOW: f32 = 360.0;
+const MIN_WINDOW_HEIGHT: f32 = 360.0;
 /// The shortest time range shown, s.
-const SHORTEST: f64 = 1e-6;
+const MIN_RANGE: f64 = 1e-6;
 /// Opacity of abandoned and future parts.
-const PALE: f32 = 0.35;
+const PALE_OPACITY: f32 = 0.35;
 /// Fraction of the shown time range per arrow key press.
-const NUDGE: f64 = 0.01;
+const KEY_FRACTION: f64 = 0.01;
 /// Largest distance at which the pointer hits a flag, points.
-const NEAR: f32 = 6.0;
+const HIT_DISTANCE: f32 = 6.0;
 
 /// State of the timeline strip.
 #[derive(Default)]
@@ -44,8 +44,8 @@ impl Timeline {
     /// The row: buttons for previous impact, next impact and reverse playback, and the strip. `focus`: the ball joint whose
     /// impacts are visited. Returns whether the displayed instant changed.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, focus: Option<usize>) -> bool {
-        if ui.ctx().content_rect().height() < LOW {
-            return self.strip(ui, player, FLAGS + 0.6 * LANES);
+        if ui.ctx().content_rect().height() < MIN_WINDOW_HEIGHT {
+            return self.strip(ui, player, FLAGS_HEIGHT + 0.6 * LANES_HEIGHT);
         }
         let side = theme::side(ui, 26.0);
         let mut moved = false;
@@ -80,14 +80,14 @@ impl Timeline {
                     moved = true;
                 }
             });
-            moved |= self.strip(ui, player, side.max(FLAGS + LANES));
+            moved |= self.strip(ui, player, side.max(FLAGS_HEIGHT + LANES_HEIGHT));
         });
         moved
     }
 
     /// Time range shown, s.
     fn range(&self, player: &Player) -> (f64, f64) {
-        let end = player.known_to().max(SHORTEST);
+        let end = player.known_to().max(MIN_RANGE);
         let Some((from, to)) = self.zoomed else {
             return (0.0, end);
         };
@@ -146,7 +146,7 @@ impl Timeline {
             by += pressed(Key::ArrowRight) - pressed(Key::ArrowLeft);
         }
         if by != 0.0 {
-            return Some(player.pacer.shown() + by * NUDGE * length);
+            return Some(player.pacer.shown() + by * KEY_FRACTION * length);
         }
         let wanted = ui.input(|input| {
             let mut requests = input.accesskit_action_requests(response.id, Action::SetValue);
@@ -160,7 +160,7 @@ impl Timeline {
         }
         if let Some(zoom) = Zoom::over(ui, response) {
             let (end, width) = (player.known_to(), scale.rect.width());
-            let range = zoom.apply(scale.range, scale.time(zoom.place.x), width, SHORTEST);
+            let range = zoom.apply(scale.range, scale.time(zoom.place.x), width, MIN_RANGE);
             let part = range.1 - range.0 < end;
             self.zoomed = part.then(|| zoom::within(range, end));
         }
@@ -192,7 +192,7 @@ impl Scale {
     }
 
     fn lanes(&self) -> Rect {
-        self.rect.with_min_y(self.rect.top() + FLAGS)
+        self.rect.with_min_y(self.rect.top() + FLAGS_HEIGHT)
     }
 
     /// The lane of ball joint `joint` out of `joints`.
@@ -213,14 +213,14 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     let shown = player.pacer.shown();
     let (_, end) = scale.range;
     if let Some(left) = player.abandoned_future() {
-        contact_lanes(ui, &left.contact_history, scale, (player.reached(), end), PALE);
+        contact_lanes(ui, &left.contact_history, scale, (player.reached(), end), PALE_OPACITY);
     }
     contact_lanes(ui, player.contact_history(), scale, (0.0, shown), 1.0);
-    contact_lanes(ui, player.contact_history(), scale, (shown, player.reached()), PALE);
+    contact_lanes(ui, player.contact_history(), scale, (shown, player.reached()), PALE_OPACITY);
     let flags = |flags: &mut dyn Iterator<Item = Flag>, pale: bool| {
         for flag in flags {
             let later = pale || flag.time > shown;
-            let part = if later { PALE } else { 1.0 };
+            let part = if later { PALE_OPACITY } else { 1.0 };
             flag_at(ui, scale, flag.time, part);
         }
     };
@@ -328,7 +328,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
     };
     if let (Some(joint), Some(contacts)) = (under, contacts) {
         let name = &player.running().machine.ball_joints[joint].name;
-        let state = contacts.states(joint, time, time + SHORTEST).next();
+        let state = contacts.states(joint, time, time + MIN_RANGE).next();
         let words = match state {
             None => "not recorded",
             Some((.., ContactMode::Free)) => "free",
@@ -340,7 +340,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
     }
     let left = player.abandoned_future().into_iter().flat_map(|left| left.flags.iter().cloned());
     for flag in player.flags().chain(left) {
-        if (scale.x(flag.time) - pos.x).abs() <= NEAR {
+        if (scale.x(flag.time) - pos.x).abs() <= HIT_DISTANCE {
             ui.label(format!("{}: {}", value::time(flag.time), flag.text));
         }
     }

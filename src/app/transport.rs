@@ -15,18 +15,18 @@ pub const SCALES: [f64; 8] = [1.0, 0.5, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4];
 /// Width of the list of time scales, points: fits the longest entry.
 const SCALES_WIDTH: f32 = 94.0;
 /// Width of the display of the achieved time scale, points.
-const REACHED: f32 = 120.0;
+const PACE_WIDTH: f32 = 120.0;
 /// Drag distance from one time scale to the next, points.
-const SCALE_APART: f32 = 20.0;
+const SCALE_DISTANCE: f32 = 20.0;
 
 /// Width of [`row`] with its buttons and the list of time scales in touch size, points.
-pub const LEAST: f32 = 270.0;
+pub const MIN_WIDTH: f32 = 270.0;
 
 /// Key under which the play button's ID is stored between frames.
-const FIRST: &str = "first stop of Tab";
+const FIRST_STOP_KEY: &str = "first stop of Tab";
 
 /// Size of the play button, points.
-pub const PLAY: f32 = 40.0;
+pub const PLAY_SIDE: f32 = 40.0;
 
 /// The neighbour of `scale` in [`SCALES`], faster or slower.
 pub fn next_scale(scale: f64, faster: bool) -> f64 {
@@ -42,7 +42,7 @@ pub fn next_scale(scale: f64, faster: bool) -> f64 {
 pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
     let narrow = ui.available_width() < 620.0;
     let row = egui::Layout::left_to_right(egui::Align::Center);
-    let size = egui::vec2(ui.available_width(), theme::side(ui, PLAY));
+    let size = egui::vec2(ui.available_width(), theme::side(ui, PLAY_SIDE));
     let asked = ui
         .allocate_ui_with_layout(size, row, |ui| {
             let asked = buttons(ui, player);
@@ -75,7 +75,7 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
         if ui.available_width() >= SCALES_WIDTH {
             scales(ui, player);
         }
-        if ui.available_width() > REACHED {
+        if ui.available_width() > PACE_WIDTH {
             reached(ui, player);
         }
         settled(ui, player);
@@ -108,8 +108,8 @@ fn settled(ui: &mut Ui, player: &Player) {
 
 /// Focuses the play button on Tab if nothing has the focus: most users come to play, and header and parameters are many stops
 /// away. From there Tab cycles through all controls. Call it before any widget is shown.
-pub fn first_of_tab(ui: &Ui) {
-    let play = ui.data_mut(|data| data.remove_temp::<Option<Id>>(Id::unique(FIRST)).flatten());
+pub fn set_first_tab_stop(ui: &Ui) {
+    let play = ui.data_mut(|data| data.remove_temp::<Option<Id>>(Id::unique(FIRST_STOP_KEY)).flatten());
     let tab = ui.input(|input| input.key_pressed(Key::Tab) && !input.modifiers.shift);
     if let Some(play) = play.filter(|_| tab && ui.memory(|memory| memory.focused().is_none())) {
         ui.memory_mut(|memory| {
@@ -121,7 +121,7 @@ pub fn first_of_tab(ui: &Ui) {
 
 /// Reset, play and step. Returns as [`ui`].
 fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
-    let (small, large) = (theme::side(ui, 30.0), theme::side(ui, PLAY));
+    let (small, large) = (theme::side(ui, 30.0), theme::side(ui, PLAY_SIDE));
     let help = if player.has_pending_changes() {
         "Back to t = 0; applies the changes that wait for it (key R)"
     } else {
@@ -137,7 +137,7 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
     ui.add_enabled_ui(runs, |ui| {
         let play = icon_button(ui, icon, name, help, large, true);
         if ui.is_enabled() {
-            ui.data_mut(|data| data.insert_temp(Id::unique(FIRST), Some(play.id)));
+            ui.data_mut(|data| data.insert_temp(Id::unique(FIRST_STOP_KEY), Some(play.id)));
         }
         if play.clicked() {
             player.set_playing(!player.is_playing());
@@ -154,7 +154,7 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
 /// Fixed size for any time, so that neighbours do not move when digits change.
 fn clock(ui: &Ui) -> Vec2 {
     let font = egui::TextStyle::Monospace.resolve(ui.style());
-    let digits = "0".repeat(value::LONGEST_TIME);
+    let digits = "0".repeat(value::MAX_TIME_CHARACTERS);
     let galley = ui.painter().layout_no_wrap(digits, font, egui::Color32::PLACEHOLDER);
     galley.size().ceil()
 }
@@ -209,17 +209,17 @@ fn scales(ui: &mut Ui, player: &mut Player) {
     let used: Option<f32> = ui.data(|data| data.get_temp(drag.id));
     let mut used = used.filter(|_| !drag.drag_started()).unwrap_or(0.0);
     let way = drag.total_drag_delta().unwrap_or_default().x;
-    while (way - used).abs() >= SCALE_APART {
+    while (way - used).abs() >= SCALE_DISTANCE {
         let faster = way > used;
         player.pacer.set_scale(next_scale(player.pacer.scale(), faster));
-        used += SCALE_APART.copysign(way - used);
+        used += SCALE_DISTANCE.copysign(way - used);
     }
     ui.data_mut(|data| data.insert_temp(drag.id, used));
 }
 
 /// The achieved time scale, in the rest of the row below a narrow [`row`], which has no space for it.
-pub fn reached_beside(ui: &mut Ui, player: &Player) {
-    if ui.available_width() < REACHED {
+pub fn achieved_pace_below(ui: &mut Ui, player: &Player) {
+    if ui.available_width() < PACE_WIDTH {
         // Smaller text beside an additional tab.
         let styles = &mut ui.style_mut().text_styles;
         if let Some(small) = styles.get(&egui::TextStyle::Small).cloned() {

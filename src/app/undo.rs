@@ -15,11 +15,11 @@ use crate::simulate::Quantity;
 use crate::view::{Quality, ScenePart, ViewOptions};
 
 /// Length of the history; the oldest changes are dropped.
-const KEPT: usize = 200;
+const MAX_CHANGES: usize = 200;
 /// Successive changes of one parameter within this time are merged, s: wheel notches, arrow keys on a slider.
-const TOGETHER: f64 = 0.5;
+const MERGE_TIME: f64 = 0.5;
 /// Side of a button in the header, points.
-const BUTTON: f32 = 26.0;
+const BUTTON_SIDE: f32 = 26.0;
 /// This key sets several parameters at once and must be applied first.
 const PRESET: &str = "solver.preset";
 
@@ -105,12 +105,12 @@ impl Entry {
     }
 
     /// Whether `later` continues this change.
-    fn goes_on_in(&self, later: &Self) -> bool {
+    fn is_continued_by(&self, later: &Self) -> bool {
         self.name == later.name && self.keys() == later.keys()
     }
 
     /// Whether the change has no effect.
-    fn is_nothing(&self) -> bool {
+    fn has_no_effect(&self) -> bool {
         match &self.change {
             Change::Parameters(edits) => edits.iter().all(|edit| edit.before == edit.after),
             Change::View(ends) => ends[0].difference(&ends[1]).is_none(),
@@ -155,14 +155,14 @@ impl Undo {
 
     fn note(&mut self, entry: Entry, held: bool) {
         self.undone.clear();
-        let last = self.done.last_mut().filter(|last| last.goes_on_in(&entry));
-        match last.filter(|last| self.held || entry.at - last.at < TOGETHER) {
+        let last = self.done.last_mut().filter(|last| last.is_continued_by(&entry));
+        match last.filter(|last| self.held || entry.at - last.at < MERGE_TIME) {
             Some(last) => last.extend(entry),
             None => self.done.push(entry),
         }
         self.held = held;
-        self.done.pop_if(|last| last.is_nothing());
-        if self.done.len() > KEPT {
+        self.done.pop_if(|last| last.has_no_effect());
+        if self.done.len() > MAX_CHANGES {
             self.done.remove(0);
         }
     }
@@ -246,7 +246,7 @@ impl App {
             self.undo.view = None;
             return;
         }
-        self.compare(!held && self.undo.last().is_none_or(|at| now - at > TOGETHER));
+        self.compare(!held && self.undo.last().is_none_or(|at| now - at > MERGE_TIME));
         if let Some(edit) = edits.iter().find(|edit| edit.key == PRESET).or(edits.first()) {
             let original = self.player.original(&edit.key);
             let scene = self.player.pending();
@@ -296,7 +296,7 @@ impl App {
 
     /// Undo and redo buttons of the header.
     pub(super) fn undo_buttons(&mut self, ui: &mut Ui) {
-        let side = theme::side(ui, BUTTON);
+        let side = theme::side(ui, BUTTON_SIDE);
         for (redo, icon, name, key) in
             [(false, Icon::Undo, "Undo", "Ctrl+Z"), (true, Icon::Redo, "Redo", "Ctrl+Shift+Z")]
         {

@@ -9,9 +9,9 @@ use eframe::egui::{
 };
 use glam::{Vec2, Vec3};
 
-use super::labels::Places;
+use super::labels::LabelPositions;
 use super::overlay::{self, Overlay};
-use super::pace::{Pace, Seen};
+use super::pace::{Pace, ShownFrame};
 use super::player::Player;
 use super::pull::Grip;
 use super::{ghosts, keys, spoken, value, zoom};
@@ -25,14 +25,14 @@ use crate::view::{
 };
 
 /// Length of the probe's trail, points.
-const TRAIL: usize = 1500;
+const TRAIL_LENGTH: usize = 1500;
 
 /// Largest camera distance by zooming, in radii of the machine.
-const FARTHEST: f32 = 30.0;
+const MAX_CAMERA_DISTANCE: f32 = 30.0;
 
 /// A touch that stays this long, s, within this distance, points, grips the body under it.
-const HOLD: f64 = 0.5;
-const STILL: f32 = 6.0;
+const GRIP_TIME: f64 = 0.5;
+const GRIP_DISTANCE: f32 = 6.0;
 
 /// The shot of the player's displayed instant. A macro, because the draw list is borrowed at the same time.
 macro_rules! shot {
@@ -67,9 +67,9 @@ pub struct Viewport {
     /// Aspect ratio of the view on the screen, while a picture is drawn off screen.
     frozen: Option<f32>,
     marks: PeakMarks,
-    places: Places,
+    places: LabelPositions,
     #[cfg(not(target_arch = "wasm32"))]
-    second_places: Places,
+    second_places: LabelPositions,
     /// The displayed list; the next one reuses the buffers of the previous.
     list: Arc<DrawList>,
     next: DrawList,
@@ -119,9 +119,9 @@ impl Viewport {
             view,
             options,
             marks: PeakMarks::new(),
-            places: Places::default(),
+            places: LabelPositions::default(),
             #[cfg(not(target_arch = "wasm32"))]
-            second_places: Places::default(),
+            second_places: LabelPositions::default(),
             list: Arc::new(DrawList::default()),
             next: DrawList::default(),
             revision: 0,
@@ -156,7 +156,7 @@ impl Viewport {
     }
 
     /// Copies the camera of `other`.
-    pub fn look_as(&mut self, other: &Self) {
+    pub fn copy_camera(&mut self, other: &Self) {
         (self.camera, self.goal) = (other.camera, other.goal);
         (self.fit_pending, self.fitted, self.moved) = (other.fit_pending, other.fitted, other.moved);
         (self.frozen, self.followed, self.fits) = (other.frozen, other.followed, other.fits);
@@ -166,7 +166,7 @@ impl Viewport {
     pub fn link(&mut self, other: &Self) {
         self.options.clone_from(&other.options);
         self.options.quality = other.quality();
-        self.look_as(other);
+        self.copy_camera(other);
     }
 
     /// Camera pose, or its target while the camera moves; `None` before the first picture.
@@ -218,7 +218,7 @@ impl Viewport {
     }
 
     /// As [`Self::arrive`] for an instant reached before: shows the preceding blows as in playback.
-    pub fn revisit(&mut self, player: &Player) {
+    pub fn restore_marks(&mut self, player: &Player) {
         self.arrive(player);
         self.recall(player);
     }
@@ -387,11 +387,11 @@ impl Viewport {
     /// The camera for a picture of `aspect` (width by height): it shows at least the width for which the camera was placed, and
     /// off screen at least the view on the screen.
     fn framed(&self, aspect: f32) -> Camera {
-        self.framed_as(self.frozen, aspect)
+        self.framed_for_aspect(self.frozen, aspect)
     }
 
     /// The same for a picture that contains everything visible in a view of aspect `shape`.
-    fn framed_as(&self, shape: Option<f32>, aspect: f32) -> Camera {
+    fn framed_for_aspect(&self, shape: Option<f32>, aspect: f32) -> Camera {
         let mut camera = self.camera;
         let shape = shape.unwrap_or(aspect);
         let wider = self.fitted.max(shape) / shape.min(aspect);
@@ -403,7 +403,7 @@ impl Viewport {
     }
 
     /// Applies a manual camera movement in a picture of `size`.
-    fn by_hand(&mut self, size: [u32; 2], act: impl FnOnce(&mut Camera)) {
+    fn move_camera_manually(&mut self, size: [u32; 2], act: impl FnOnce(&mut Camera)) {
         let aspect = size[0] as f32 / size[1] as f32;
         let framed = self.framed(aspect).field_of_view;
         let field_of_view = std::mem::replace(&mut self.camera.field_of_view, framed);
@@ -486,7 +486,7 @@ impl Viewport {
         let list = self.list.clone();
         painter.add(render::Viewport::revised(rect, list, revision, self.place));
         // Scale of the drawn picture, which may have fewer pixels than the screen.
-        let Screen { scale, .. } = screen.drawn_with(self.list.quality);
+        let Screen { scale, .. } = screen.with_quality(self.list.quality);
         let overlay = self.overlay(player, said);
         let theme = self.options.theme;
         overlay::paint(&painter, rect, scale, &self.list, theme, &overlay, above, &mut self.places);
@@ -521,7 +521,7 @@ impl Viewport {
         let screen = Screen::new(rect, ui.ctx().pixels_per_point());
         let aspect = |[width, height]: [u32; 2]| width as f32 / height.max(1) as f32;
         let shape = self.frozen.unwrap_or(aspect(self.list.size));
-        let camera = self.framed_as(Some(shape), aspect(screen.size));
+        let camera = self.framed_for_aspect(Some(shape), aspect(screen.size));
         let own = std::mem::replace(&mut self.options.arrows.thickness, thickness);
         let quality = self.list.quality;
         let said = self.list_next(player, &camera, &screen, quality);
@@ -532,7 +532,7 @@ impl Viewport {
         }
         let painter = ui.painter_at(rect);
         painter.add(render::Viewport::revised(rect, list.clone(), Some(*revision), render::PictureSlot::Second));
-        let Screen { scale, .. } = screen.drawn_with(quality);
+        let Screen { scale, .. } = screen.with_quality(quality);
         let overlay = self.overlay(player, said);
         let (list, theme) = (&self.second.0, self.options.theme);
         overlay::paint(&painter, rect, scale, list, theme, &overlay, above.as_slice(), &mut self.second_places);
@@ -541,7 +541,7 @@ impl Viewport {
     /// Builds the draw list for `screen` at `quality` in `self.next`; returns the notes on ghosts.
     fn list_next(&mut self, player: &Player, camera: &Camera, screen: &Screen, quality: Quality) -> Vec<String> {
         let mut list = std::mem::take(&mut self.next);
-        let drawn = screen.drawn_with(quality);
+        let drawn = screen.with_quality(quality);
         let own = self.options.arrows.reference;
         self.options.arrows.reference = own.or(self.common);
         let shot = shot!(self, player, camera, drawn);
@@ -576,8 +576,8 @@ impl Viewport {
             return said;
         };
         let (now, dt) = ui.input(|input| (input.time, f64::from(input.stable_dt)));
-        let quality = pace.frame(&Seen { size: screen.size, moves, now, dt, drawing: player.drawing(dt) });
-        if let Some(wait) = pace.until_still(now).filter(|_| quality != Quality::FULL) {
+        let quality = pace.frame(&ShownFrame { size: screen.size, moves, now, dt, drawing: player.drawing(dt) });
+        if let Some(wait) = pace.time_to_rest(now).filter(|_| quality != Quality::FULL) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(wait));
         }
         if quality != before {
@@ -602,7 +602,7 @@ impl Viewport {
         {
             self.pinched = true;
             let shift = fingers.translation_delta * scale;
-            self.by_hand(size, |camera| camera.pan(Vec2::new(shift.x, shift.y), size));
+            self.move_camera_manually(size, |camera| camera.pan(Vec2::new(shift.x, shift.y), size));
             self.zoom(player, fingers.zoom_delta, fingers.center_pos, screen);
         }
         if self.pinched {
@@ -618,9 +618,9 @@ impl Viewport {
             || response.dragged_by(PointerButton::Middle)
             || (shift && response.dragged_by(PointerButton::Primary));
         if pans {
-            self.by_hand(size, |camera| camera.pan(delta, size));
+            self.move_camera_manually(size, |camera| camera.pan(delta, size));
         } else if response.dragged_by(PointerButton::Primary) {
-            self.by_hand(size, |camera| camera.orbit(delta));
+            self.move_camera_manually(size, |camera| camera.orbit(delta));
         }
         if let Some(pos) = response.hover_pos() {
             self.zoom(player, zoom::factor(ui), pos, screen);
@@ -631,7 +631,7 @@ impl Viewport {
     fn pull(&mut self, ui: &Ui, response: &egui::Response, player: &Player, screen: &Screen) -> bool {
         let (finger, shift, origin) = ui.input(|i| (i.any_touches(), i.modifiers.shift, i.pointer.press_origin()));
         let taken =
-            if finger { self.finger_stays(ui, response) } else { response.drag_started_by(PointerButton::Primary) };
+            if finger { self.is_long_touch(ui, response) } else { response.drag_started_by(PointerButton::Primary) };
         if let Some(origin) = origin.filter(|_| taken) {
             let camera = self.framed(screen.aspect());
             let shot = shot!(self, player, &camera, screen);
@@ -663,7 +663,7 @@ impl Viewport {
     }
 
     /// Whether a touch has just stayed in place long enough. (egui's own long touch is not reported to draggable widgets.)
-    fn finger_stays(&mut self, ui: &Ui, response: &egui::Response) -> bool {
+    fn is_long_touch(&mut self, ui: &Ui, response: &egui::Response) -> bool {
         if !response.is_pointer_button_down_on() {
             self.finger_since = None;
             return false;
@@ -673,10 +673,10 @@ impl Viewport {
             (i.time, way.map_or(0.0, |(pos, origin)| pos.distance(origin)))
         });
         let since = self.finger_since.get_or_insert(now);
-        if way > STILL {
+        if way > GRIP_DISTANCE {
             *since = f64::INFINITY;
         }
-        let left = *since + HOLD - now;
+        let left = *since + GRIP_TIME - now;
         if left > 0.0 {
             if left.is_finite() {
                 ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(left));
@@ -700,11 +700,11 @@ impl Viewport {
         let point = hit.map_or(bounds.centre, |hit| hit.point);
         let from = self.camera.eye().distance(bounds.centre);
         let lost = match hit {
-            _ if factor < 1.0 => from > FARTHEST * bounds.radius,
+            _ if factor < 1.0 => from > MAX_CAMERA_DISTANCE * bounds.radius,
             Some(_) => false,
             None => from < bounds.radius,
         };
-        self.by_hand(screen.size, |camera| {
+        self.move_camera_manually(screen.size, |camera| {
             if !lost {
                 camera.zoom_about(factor, point, screen.size);
             }
@@ -828,9 +828,9 @@ impl Viewport {
         let (Some(probe), Some(body)) = (output.probe, player.frame().bodies.get(output.body)) else {
             return;
         };
-        if self.trail.len() == TRAIL {
+        if self.trail.len() == TRAIL_LENGTH {
             // Drops half at once: shifting the trail for every point would be too costly.
-            self.trail.drain(..TRAIL / 2);
+            self.trail.drain(..TRAIL_LENGTH / 2);
         }
         self.trail.push(to_f32(&(body.position + body.rotation * probe)));
     }
@@ -867,7 +867,7 @@ impl Screen {
     }
 
     /// The same area with the resolution of `quality`.
-    fn drawn_with(&self, quality: Quality) -> Self {
+    fn with_quality(&self, quality: Quality) -> Self {
         Self::new(self.rect, self.scale * quality.sharpness)
     }
 
@@ -944,7 +944,7 @@ mod tests {
 
     /// Plates of a picture: time, legend, labels.
     #[derive(Default)]
-    struct Seen {
+    struct Plates {
         time: Option<Rect>,
         legend: Option<Rect>,
         labels: Vec<Rect>,
@@ -966,7 +966,7 @@ mod tests {
         }
 
         /// Draws picture `at` with `size`, points.
-        fn draw(&mut self, at: usize, size: egui::Vec2) -> Seen {
+        fn draw(&mut self, at: usize, size: egui::Vec2) -> Plates {
             let Self { player, viewports, ctx } = self;
             let viewport = &mut viewports[at];
             let input = egui::RawInput {
@@ -975,7 +975,7 @@ mod tests {
             };
             let mut output = ctx.run_ui(input, |ui| viewport.ui(ui, player, false, &[]));
             output.textures_delta.clear();
-            let mut seen = Seen { list: viewport.list.clone(), ..Seen::default() };
+            let mut seen = Plates { list: viewport.list.clone(), ..Plates::default() };
             for shape in output.shapes {
                 let egui::Shape::Rect(plate) = shape.shape else {
                     continue;
@@ -1091,7 +1091,7 @@ mod tests {
 
         settled(&mut watched, wide);
         while watched.viewports[0].advance(&watched.player, 0.1) {}
-        watched.viewports[0].by_hand([980, 432], |camera| camera.orbit(Vec2::new(40.0, 10.0)));
+        watched.viewports[0].move_camera_manually([980, 432], |camera| camera.orbit(Vec2::new(40.0, 10.0)));
         let placed = watched.viewports[0].camera;
         let across = |viewport: &Viewport, size: [u32; 2]| {
             let camera = viewport.framed(size[0] as f32 / size[1] as f32);
@@ -1106,7 +1106,7 @@ mod tests {
         }
         // Manual camera movement makes nothing jump.
         let before = across(&watched.viewports[0], [300, 900]);
-        watched.viewports[0].by_hand([300, 900], |camera| camera.pan(Vec2::ZERO, [300, 900]));
+        watched.viewports[0].move_camera_manually([300, 900], |camera| camera.pan(Vec2::ZERO, [300, 900]));
         assert_eq!(across(&watched.viewports[0], [300, 900]), before);
     }
 

@@ -3,7 +3,7 @@
 use eframe::egui;
 use eframe::egui_wgpu;
 
-use super::remembered::FIRST_SIZE;
+use super::remembered::INITIAL_SIZE;
 use super::{App, AppOptions, DesktopHost, Player, Store};
 use crate::render;
 use crate::scene::SceneError;
@@ -32,7 +32,7 @@ pub fn run_native(options: Option<AppOptions>, page: String, store: Option<Store
     let mut viewport = egui::ViewportBuilder::default()
         .with_title("Jointplay")
         .with_app_id("jointplay")
-        .with_inner_size(remembered.size.unwrap_or(FIRST_SIZE))
+        .with_inner_size(remembered.size.unwrap_or(INITIAL_SIZE))
         .with_maximized(remembered.maximized)
         .with_min_inner_size([360.0, 480.0]);
     if let Some(position) = remembered.position {
@@ -48,9 +48,9 @@ pub fn run_native(options: Option<AppOptions>, page: String, store: Option<Store
         let mut app = App::new(cc, options)?;
         app.set_host(Box::new(DesktopHost::new(page).with_dialogs()));
         app.follow_frame_rate();
-        bring_back(cc);
+        move_onto_screen(cc);
         if let Some(store) = store {
-            app.remember_in(&cc.egui_ctx, store);
+            app.store_settings_in(&cc.egui_ctx, store);
         }
         Ok(Box::new(app))
     });
@@ -61,7 +61,7 @@ pub fn run_native(options: Option<AppOptions>, page: String, store: Option<Store
 }
 
 /// Moves a window that lies off all screens, e.g. after one was unplugged, to the first remaining screen.
-fn bring_back(cc: &eframe::CreationContext<'_>) {
+fn move_onto_screen(cc: &eframe::CreationContext<'_>) {
     let Some(window) = cc.winit_window() else {
         return;
     };

@@ -53,7 +53,7 @@ use crate::scene::LiveScene;
 use crate::scene::{BENCHMARKS, BUILT_IN, Scene, reference_page, visible};
 
 /// Size limit of a table that is read, in bytes.
-const LARGEST_TABLE: u64 = 64 << 20;
+const MAX_TABLE_SIZE: u64 = 64 << 20;
 
 /// Runs the command line; returns the exit code.
 pub fn main() -> u8 {
@@ -120,14 +120,14 @@ fn view(arguments: &ViewArguments) -> Result<(), Failure> {
     let page = page::address(arguments.page.as_deref())?;
     let options = match (&arguments.link, &arguments.lesson) {
         (Some(link), _) => Some(AppOptions::from_link(link).map_err(Failure::usage)?),
-        (_, Some(lesson)) => Some(AppOptions::of_lesson(Lesson::load(lesson)?, 0)),
+        (_, Some(lesson)) => Some(AppOptions::for_lesson(Lesson::load(lesson)?, 0)),
         (None, None) if arguments.scene.is_none() && arguments.changes.is_empty() => None,
         (None, None) => {
             let scene = arguments.scene.as_deref().unwrap_or(DEFAULT_SCENE.as_ref());
             Some(AppOptions::new(Scene::load(scene, &arguments.changes)?))
         }
     };
-    let mut store = Store::of_user();
+    let mut store = Store::for_current_user();
     if let Some(store) = store.as_mut().filter(|_| arguments.fresh) {
         store.forget();
     }
@@ -174,9 +174,9 @@ fn scenes() -> Result<String, Failure> {
 
 #[cfg(feature = "gui")]
 fn lessons(arguments: &LessonArguments) -> Result<String, Failure> {
-    use crate::app::{Course, Lesson, lesson_titles};
+    use crate::app::{Lesson, RunningLesson, lesson_titles};
     if let Some(lesson) = &arguments.lesson {
-        let mut course = Course::new(Lesson::load(lesson)?, 0);
+        let mut course = RunningLesson::new(Lesson::load(lesson)?, 0);
         return course.print().map_err(Failure::usage);
     }
     let mut out = String::new();
@@ -214,8 +214,8 @@ fn start(scene: &Scene) -> Result<LiveScene, Failure> {
 fn read_text(path: &Path) -> Result<String, Failure> {
     let unreadable = |why: String| Failure::io(format!("cannot read {}: {why}", path.display()));
     let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
-    if size > LARGEST_TABLE {
-        return Err(unreadable(format!("it has {size} bytes, more than the limit of {LARGEST_TABLE}")));
+    if size > MAX_TABLE_SIZE {
+        return Err(unreadable(format!("it has {size} bytes, more than the limit of {MAX_TABLE_SIZE}")));
     }
     std::fs::read_to_string(path).map_err(|error| unreadable(error.to_string()))
 }

@@ -1,7 +1,7 @@
 //! Quantities as options: `20ms`, `7.85 ms`, `0`, `30deg`, `500N`.
 
 use super::Failure;
-use crate::simulate::LONGEST_RUN;
+use crate::simulate::MAX_RUN_DURATION;
 use crate::units::{Dimension, parse_quantity};
 
 /// A time of a run, s: not negative, and not beyond the longest.
@@ -14,8 +14,8 @@ pub fn duration(option: &str, text: &str) -> Result<f64, Failure> {
     if seconds < 0.0 {
         return Err(Failure::usage(format!("{option} {text}: the time must not be negative")));
     }
-    if seconds > LONGEST_RUN {
-        return Err(Failure::usage(format!("{option} {text}: the time must be at most {LONGEST_RUN:e} s")));
+    if seconds > MAX_RUN_DURATION {
+        return Err(Failure::usage(format!("{option} {text}: the time must be at most {MAX_RUN_DURATION:e} s")));
     }
     Ok(seconds)
 }

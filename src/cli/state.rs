@@ -14,7 +14,7 @@ use crate::scene::{LiveScene, SavedState, Scene, visible_line};
 use crate::simulate::State;
 
 /// Size limit of a state file, bytes.
-const LARGEST: u64 = 1 << 30;
+const MAX_SIZE: u64 = 1 << 30;
 
 /// Output file for the state of a run, claimed and known to be writable before the run starts.
 pub struct StateFile {
@@ -70,11 +70,11 @@ pub fn read(path: &Path, scene: &Scene) -> Result<SavedState, Failure> {
     let name = path.display();
     let mut text = Vec::new();
     File::open(path)
-        .and_then(|file| file.take(LARGEST + 1).read_to_end(&mut text))
+        .and_then(|file| file.take(MAX_SIZE + 1).read_to_end(&mut text))
         .map_err(|cause| Failure::io(format!("--from-state: cannot read {name}: {cause}")))?;
     let refuse = |why: String| Failure::usage(format!("--from-state {name}: {why}"));
-    if text.len() as u64 > LARGEST {
-        return Err(refuse(format!("larger than {} GiB: not a state that `run --save-state` wrote", LARGEST >> 30)));
+    if text.len() as u64 > MAX_SIZE {
+        return Err(refuse(format!("larger than {} GiB: not a state that `run --save-state` wrote", MAX_SIZE >> 30)));
     }
     let saved = SavedState::read(WRITER, &text).map_err(|why| refuse(why.to_string()))?;
     check_scene(&saved.meta, scene).map_err(&refuse)?;

@@ -5,7 +5,7 @@
 use crate::simulate::{Frame, Simulation, State, Stopped};
 
 /// Largest number of saved states; at this number every second one is dropped.
-pub(super) const MOST_STATES: usize = 32;
+pub(super) const MAX_STATES: usize = 32;
 /// Initial interval between them, s.
 const INITIAL_INTERVAL: f64 = 1e-2;
 
@@ -89,7 +89,7 @@ impl Companion {
         if self.simulation.time() < newest + self.interval {
             return;
         }
-        if self.states.len() == MOST_STATES {
+        if self.states.len() == MAX_STATES {
             drop_every_second(&mut self.states);
             self.interval *= 2.0;
         }

@@ -153,7 +153,7 @@ impl Ideal {
 mod tests {
     use super::*;
     use crate::scene::{BUILT_IN, Scene};
-    use crate::session::companion::MOST_STATES;
+    use crate::session::companion::MAX_STATES;
     use crate::session::player::Player;
     use crate::simulate::Quantity;
 
@@ -300,7 +300,7 @@ mod tests {
         let gravity = Gravity::new(scene.machine.gravity);
         let at = |ideal: &mut Ideal, time: f64| {
             ideal.move_to(time, &gravity, || true);
-            assert!(ideal.motion.as_ref().expect("starts").states.len() <= MOST_STATES);
+            assert!(ideal.motion.as_ref().expect("starts").states.len() <= MAX_STATES);
             output_point(&scene.machine.output, ideal.frame(time).expect("reached")).expect("a body")
         };
         let times: Vec<f64> = (0..60).map(|k| 0.05 * f64::from(k)).collect();

@@ -20,9 +20,9 @@ use crate::words::{Words as _, words};
 use settings::{Instruments, PlotWindow};
 
 /// Length limit of links, characters: e-mail, chats and every browser accept this length.
-pub const LONGEST_LINK: usize = 32_000;
+pub const MAX_LINK_LENGTH: usize = 32_000;
 /// Size limit of an unpacked part of a link, bytes: that of a scene file.
-const LARGEST_UNPACKED: usize = MAX_FILE_SIZE as usize;
+const MAX_UNPACKED_LINK: usize = MAX_FILE_SIZE as usize;
 
 /// Short names of parameters.
 pub const ALIASES: [(&str, &str); 4] = [
@@ -59,7 +59,7 @@ const KEYWORDS: [&str; 22] = [
 ];
 
 /// Latest instant that a link may name, s; a run to it takes days.
-const LATEST_TIME: f64 = 1e6;
+const MAX_LINK_TIME: f64 = 1e6;
 /// Renderers that a page accepts; the desktop window chooses its own.
 const RENDERERS: [&str; 2] = ["webgpu", "webgl"];
 
@@ -219,8 +219,8 @@ impl Link {
             return storage::read(kept);
         }
         let length = text.chars().count();
-        if length > LONGEST_LINK {
-            let message = format!("has {length} characters; allowed at most {LONGEST_LINK}");
+        if length > MAX_LINK_LENGTH {
+            let message = format!("has {length} characters; allowed at most {MAX_LINK_LENGTH}");
             return Err(link_error("", "", message));
         }
         Self::read(text)
@@ -264,7 +264,7 @@ impl Link {
                 "log" => log = Some(unpack(key, value)?),
                 "t" => {
                     let time = parse_quantity(value, Dimension::Time).map_err(|error| wrong(&error.to_string()))?;
-                    if !(0.0..=LATEST_TIME).contains(&time) {
+                    if !(0.0..=MAX_LINK_TIME).contains(&time) {
                         return Err(wrong("allowed 0 to 1000000 s"));
                     }
                     link.time = Some(time);
@@ -420,7 +420,7 @@ impl Link {
             ));
         }
         let whole = self.format();
-        if whole.len() <= LONGEST_LINK {
+        if whole.len() <= MAX_LINK_LENGTH {
             return Ok((whole, None));
         }
         let start = Self {
@@ -432,16 +432,16 @@ impl Link {
             ..self.clone()
         }
         .format();
-        if start.len() <= LONGEST_LINK {
+        if start.len() <= MAX_LINK_LENGTH {
             let note = format!(
-                "This run has more changes than fit in a link of {LONGEST_LINK} characters ({}): the link starts the \
+                "This run has more changes than fit in a link of {MAX_LINK_LENGTH} characters ({}): the link starts the \
                  scene with the values as they are now, at t = 0",
                 whole.len()
             );
             return Ok((start, Some(note)));
         }
         Err(format!(
-            "The scene file is too large for a link: {} characters packed, {LONGEST_LINK} fit. Save the scene file and \
+            "The scene file is too large for a link: {} characters packed, {MAX_LINK_LENGTH} fit. Save the scene file and \
              share it instead",
             start.len()
         ))
@@ -603,7 +603,7 @@ fn pack(text: &str) -> String {
 }
 
 fn unpack(key: &str, packed: &str) -> Result<String, LinkError> {
-    unpack_within(key, packed, LARGEST_UNPACKED)
+    unpack_within(key, packed, MAX_UNPACKED_LINK)
 }
 
 /// The reverse of [`pack`] for a text of at most `most` bytes.

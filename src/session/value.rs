@@ -180,7 +180,7 @@ pub fn percent(share: f64) -> String {
 }
 
 /// Most characters of [`time`] up to 10^9 s: the width reserved for a clock.
-pub const LONGEST_TIME: usize = 11;
+pub const MAX_TIME_CHARACTERS: usize = 11;
 
 /// A time in a suitable unit; a long one has fewer decimals, so that the width stays bounded.
 pub fn time(seconds: f64) -> String {
@@ -287,7 +287,7 @@ mod tests {
         assert_eq!(time(12_345.678_9), "12345.679 s");
         let longest = (-90..90).map(|k| time(libm::pow(10.0, f64::from(k) / 10.0) * 0.999_999_99));
         let longest = longest.map(|words| words.chars().count()).max();
-        assert_eq!(longest, Some(LONGEST_TIME));
+        assert_eq!(longest, Some(MAX_TIME_CHARACTERS));
         assert_eq!(time_scale(1.0), "1:1");
         assert_eq!(time_scale(0.4), "1:2.5");
         assert_eq!(time_scale(0.02), "1:50");

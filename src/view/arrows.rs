@@ -14,7 +14,7 @@ use crate::units::format_quantity_digits;
 /// Reference length of arrows, as a fraction of the picture height.
 pub const ARROW_LENGTH: f32 = 0.22;
 /// Longest arrow, in reference lengths.
-const LONGEST_ARROW: f32 = 2.5;
+const MAX_RELATIVE_LENGTH: f32 = 2.5;
 /// Radius of the thickest shaft, as a fraction of the picture height.
 const MAX_SHAFT_RADIUS: f32 = 0.0055;
 /// Shortest arrow with the full thickness, in shaft radii; a shorter one is proportionally thinner.
@@ -128,7 +128,7 @@ fn arrow_length(force: f32, reference: f32, scaling: Scaling) -> (f32, bool) {
         Scaling::Linear => ratio,
         Scaling::Logarithmic => (1.0 + 999.0 * ratio).log10() / 3.0,
     };
-    (length.min(LONGEST_ARROW), length > LONGEST_ARROW)
+    (length.min(MAX_RELATIVE_LENGTH), length > MAX_RELATIVE_LENGTH)
 }
 
 /// Arrows of the current forces, marks of past peaks, and their legend.

@@ -46,9 +46,9 @@ pub struct SceneView {
 }
 
 /// Smallest picture edge that leaves room for the triad, points.
-const SMALLEST_WITH_TRIAD: f32 = 200.0;
+const MIN_SIZE_WITH_TRIAD: f32 = 200.0;
 /// Smallest width that leaves room for the gravity arrow between axes and legend, points.
-const SMALLEST_WITH_GRAVITY: f32 = 300.0;
+const MIN_SIZE_WITH_GRAVITY: f32 = 300.0;
 /// Radius of the halo of a joint that was hit, in radii of its socket; and largest width of its ring, points.
 const HALO: f32 = 1.7;
 const WIDEST_HALO: f32 = 22.0;
@@ -435,7 +435,7 @@ impl SceneView {
         let camera = shot.camera;
         let points = shot.size.map(|n| n as f32 / shot.pixels_per_point);
         // In a small picture it would cover the machine.
-        if points[0].min(points[1]) < SMALLEST_WITH_TRIAD {
+        if points[0].min(points[1]) < MIN_SIZE_WITH_TRIAD {
             return;
         }
         let scale = shot.pixels_per_point * camera.metres_per_pixel(shot.size);
@@ -454,7 +454,7 @@ impl SceneView {
             push_label(out, &self.axis_names[i], LabelKind::Axis, sheared(corner + axis * (47.0 * scale)), colour);
         }
         let gravity = to_f32(&shot.scene.machine.gravity).try_normalize();
-        if let Some(gravity) = gravity.filter(|_| points[0] >= SMALLEST_WITH_GRAVITY) {
+        if let Some(gravity) = gravity.filter(|_| points[0] >= MIN_SIZE_WITH_GRAVITY) {
             let length = gravity * (34.0 * scale);
             let start = corner + right * (74.0 * scale) - length * 0.5;
             push_arrow(&mut out.overlay, start, length, 1.9 * scale, palette.gravity);

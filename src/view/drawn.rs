@@ -19,7 +19,7 @@ use crate::scene::Scene;
 use crate::simulate::{BodyMotion, Frame};
 
 /// Largest drawn inner radius of a socket, in ball radii: it limits the magnification.
-const LARGEST_SOCKET: f32 = 4.2;
+const MAX_SOCKET_RADIUS: f32 = 4.2;
 /// Thickness of a drawn socket, in ball radii.
 const WALL_THICKNESS: f32 = 0.26;
 /// Gap drawn in an ideal joint, in ball radii: ball and socket must not coincide.
@@ -282,7 +282,7 @@ fn joint_at_end(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<JointEn
             return Some(JointEnd::Ball(i));
         }
         if joint.socket.body == body
-            && to_f32(&joint.socket.point).distance(end) < (LARGEST_SOCKET + WALL_THICKNESS) * radius
+            && to_f32(&joint.socket.point).distance(end) < (MAX_SOCKET_RADIUS + WALL_THICKNESS) * radius
         {
             return Some(JointEnd::Socket(i));
         }
@@ -322,7 +322,7 @@ fn plate(corners: &[Vec3], triangles: &[[usize; 3]], thickness: f32) -> Option<M
     Some(mesh)
 }
 
-/// Magnification as drawn, at most `requested`: no socket exceeds [`LARGEST_SOCKET`] ball radii, or its limit in
+/// Magnification as drawn, at most `requested`: no socket exceeds [`MAX_SOCKET_RADIUS`] ball radii, or its limit in
 /// `max_outer_radii`, m.
 pub(super) fn magnification(scene: &Scene, frame: &Frame, max_outer_radii: &[f32], requested: f32) -> f32 {
     let requested = if requested.is_finite() { requested.clamp(1.0, 100.0) } else { 1.0 };
@@ -330,7 +330,7 @@ pub(super) fn magnification(scene: &Scene, frame: &Frame, max_outer_radii: &[f32
         let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
         let radius = joint.contact.ball_radius as f32;
         let room = max_outer_radii.get(i).copied().unwrap_or(f32::INFINITY) - WALL_THICKNESS * radius;
-        if gap > 0.0 { (room.min(LARGEST_SOCKET * radius) - radius) / gap } else { f32::INFINITY }
+        if gap > 0.0 { (room.min(MAX_SOCKET_RADIUS * radius) - radius) / gap } else { f32::INFINITY }
     });
     limits.fold(requested, f32::min).max(1.0)
 }

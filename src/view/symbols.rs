@@ -23,7 +23,7 @@ const RAIL: [f32; 2] = [0.012, 0.022];
 const BEARING: [f32; 2] = [1.5, 1.35];
 const CROSS_PIN: [f32; 3] = [0.3, 1.6, 0.6];
 /// Most shapes of a body examined for each of its joints: set-up time stays proportional to the scene.
-const MOST_SHAPES: usize = 500;
+const MAX_SHAPES: usize = 500;
 /// Largest sine of the angle between an axis and a bar that lies along it.
 const MAX_SINE: f32 = 0.02;
 
@@ -71,7 +71,7 @@ pub(super) fn symbols(
     let index_of = |body: Option<usize>| body.unwrap_or(scene.machine.bodies.len());
     for part in parts {
         let shapes = &mut shapes[index_of(part.body)];
-        if shapes.len() < MOST_SHAPES {
+        if shapes.len() < MAX_SHAPES {
             shapes.push((part.role, part.place(frame, joints)));
         }
     }

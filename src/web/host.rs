@@ -10,7 +10,7 @@ use wasm_bindgen::prelude::*;
 
 use super::work::Worker;
 use crate::analysis::task::Job;
-use crate::app::{Click, Dropped, Host, OpenedFile, Running, SaveFile, Voice};
+use crate::app::{BackgroundTask, Click, DroppedFile, Host, OpenedFile, SaveFile, Voice};
 use crate::scene::{max_file_size, too_large};
 
 #[wasm_bindgen]
@@ -123,7 +123,7 @@ impl Host for WebHost {
         true
     }
 
-    fn read_dropped(&mut self, files: Vec<Dropped>) {
+    fn read_dropped(&mut self, files: Vec<DroppedFile>) {
         let files = files.iter().filter_map(|file| file.web_file().cloned());
         self.inbox.clone().take(files.collect());
     }
@@ -138,7 +138,7 @@ impl Host for WebHost {
         (cores.unwrap_or(1.0) as usize).saturating_sub(1).max(1)
     }
 
-    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+    fn start(&mut self, job: Job) -> Option<Box<dyn BackgroundTask>> {
         Some(Box::new(Worker::start(&job)?))
     }
 

@@ -8,7 +8,7 @@ use wasm_bindgen_futures::js_sys::Promise;
 use web_time::Instant;
 
 use crate::analysis::task::{self, Job, Message};
-use crate::app::Running;
+use crate::app::BackgroundTask;
 
 #[wasm_bindgen]
 extern "C" {
@@ -77,7 +77,7 @@ impl Worker {
     }
 }
 
-impl Running for Worker {
+impl BackgroundTask for Worker {
     fn poll(&mut self) -> Option<Message> {
         if self.finished {
             return None;

@@ -6,11 +6,11 @@ use jointplay::scene::{Scene, Value, visible};
 use jointplay::simulate::{Frame, Simulation};
 
 /// Bodies beyond which a scene is only started: stepping costs time, not insight.
-const MOST_BODIES: usize = 16;
+const MAX_BODIES: usize = 16;
 /// Steps that are taken in each formulation.
 const STEPS: usize = 4;
 /// Most changes that are applied.
-const MOST_CHANGES: usize = 8;
+const MAX_CHANGES: usize = 8;
 
 /// What became of the bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ fn changes(text: &str) -> Vec<(String, String)> {
     text.lines()
         .filter_map(|line| line.strip_prefix("#set ")?.split_once('='))
         .map(|(key, value)| (key.to_owned(), value.to_owned()))
-        .take(MOST_CHANGES)
+        .take(MAX_CHANGES)
         .collect()
 }
 
@@ -111,7 +111,7 @@ fn run(scene: &Scene) -> Fate {
     for body in &frame.bodies {
         assert!(body.position.iter().all(|x| x.is_finite()));
     }
-    if scene.machine.bodies.len() > MOST_BODIES {
+    if scene.machine.bodies.len() > MAX_BODIES {
         return Fate::Starts;
     }
     for _ in 0..STEPS {

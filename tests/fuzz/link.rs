@@ -6,7 +6,7 @@ use jointplay::scene::visible;
 use jointplay::simulate::Simulation;
 
 /// Bodies beyond which a scene is only read.
-const MOST_BODIES: usize = 16;
+const MAX_BODIES: usize = 16;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let Ok(text) = std::str::from_utf8(bytes) else {
@@ -23,7 +23,7 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     // What is given out is what was read.
     assert_eq!(Link::parse(&link.format()).as_ref(), Ok(&link));
     match link.load() {
-        Ok(scene) if scene.machine.bodies.len() <= MOST_BODIES => {
+        Ok(scene) if scene.machine.bodies.len() <= MAX_BODIES => {
             if let Ok(mut simulation) = Simulation::new(&scene.machine) {
                 let _ = simulation.step();
             }

@@ -16,7 +16,7 @@ use egui_kittest::{
 use jointplay::analysis::drive::observed;
 use jointplay::analysis::ready::READY;
 use jointplay::analysis::task::{Job, Message, perform};
-use jointplay::app::{App, DesktopHost, Host, Link, OpenedFile, Player, Replay, Running, Verdict};
+use jointplay::app::{App, BackgroundTask, DesktopHost, Host, Link, OpenedFile, Player, Replay, Verdict};
 
 /// Computes at once, shared by so many, and is heard of as many points of a sweep, or runs of a study, as the test allows: it is neither too quick nor
 /// too slow.
@@ -36,7 +36,7 @@ impl Host for Held {
         self.1
     }
 
-    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+    fn start(&mut self, job: Job) -> Option<Box<dyn BackgroundTask>> {
         let mut said = VecDeque::new();
         perform(&job, &mut || 0.0, &mut |message| {
             said.push_back(message);
@@ -46,7 +46,7 @@ impl Host for Held {
     }
 }
 
-impl Running for Saying {
+impl BackgroundTask for Saying {
     fn poll(&mut self) -> Option<Message> {
         let Self(said, points) = self;
         if let Message::Point(_) | Message::Run(_) = said.front()? {
@@ -493,7 +493,7 @@ impl Host for Asking {
         None
     }
 
-    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+    fn start(&mut self, job: Job) -> Option<Box<dyn BackgroundTask>> {
         self.0.borrow_mut().push(job);
         Some(Box::new(Saying(VecDeque::new(), Rc::default())))
     }

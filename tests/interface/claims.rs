@@ -119,7 +119,7 @@ impl Shown {
             self.harness.run_steps(2);
         }
         let found = look(self);
-        self.harness.state_mut().look_back(link);
+        self.harness.state_mut().show_instant(link);
         self.harness.run_steps(2);
         if self.app().course().is_some_and(|course| course.is_reached()) {
             // It went past the end of the step, which begins anew.
@@ -396,7 +396,7 @@ fn check_panel(shown: &Shown, at: &str, now: When) {
     let course = shown.app().course().expect("a lesson");
     assert!(!says(&shown.harness, "The machine has been changed"), "{at}");
     if now == Begins {
-        let points_out = shown.mode != Mode::Window || shown.app().points_out(&shown.harness.ctx);
+        let points_out = shown.mode != Mode::Window || shown.app().shows_highlights(&shown.harness.ctx);
         assert!(points_out, "{at}: something pointed at is not there");
         assert!(!says(&shown.harness, "Answer:"), "{at}: the answer shows too early");
     } else if course.lesson().steps[course.step()].question.is_some() {

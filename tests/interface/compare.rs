@@ -169,7 +169,7 @@ fn two_machines_of_the_same_parameters_are_the_same_picture() {
     set(&mut harness, "Clearance", 0.3);
     harness.state_mut().reset();
     harness.state_mut().run_to(0.06);
-    harness.state_mut().look_back(0.05);
+    harness.state_mut().show_instant(0.05);
     harness.run_steps(200);
     let app = harness.state();
     let kept = &app.comparison().kept()[1];

@@ -141,7 +141,7 @@ fn every_text_stands_out_from_what_lies_behind_it_in_both_themes() {
         see(&mut harness, "list");
         harness.key_press(Key::Escape);
         assert!(harness.state_mut().open("no such scene").is_err());
-        harness.state_mut().look_back(20e-3);
+        harness.state_mut().show_instant(20e-3);
         see(&mut harness, "past");
         harness.key_press(Key::F5);
         see(&mut harness, "presentation");

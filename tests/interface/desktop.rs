@@ -8,7 +8,7 @@ use eframe::egui::{
     self, Context, ImmediateViewport, Key, Pos2, RawInput, Rect, Shape, ThemePreference, ViewportEvent, vec2,
 };
 use egui_kittest::{Harness, kittest::Queryable as _};
-use jointplay::app::{App, Host, OpenedFile, Remembered, SaveFile, Store};
+use jointplay::app::{App, Host, OpenedFile, SaveFile, Store, StoredSettings};
 use jointplay::scene::{DEFAULT_SCENE, built_in_text};
 
 use crate::hands::type_over;
@@ -126,7 +126,7 @@ fn the_window_for_the_class_shows_the_same_instant_in_large_type_and_gives_every
     press(Key::Comma);
     harness.run_steps(3);
     assert!(shown(&harness) < 30e-3);
-    harness.state_mut().look_back(30e-3);
+    harness.state_mut().show_instant(30e-3);
 
     SECOND.with_borrow_mut(|second| second.close = true);
     harness.run();
@@ -149,12 +149,12 @@ fn remembering(path: &std::path::Path) -> Harness<'static, App> {
     let mut harness = window("pendulum");
     let ctx = harness.ctx.clone();
     ctx.set_theme(ThemePreference::System);
-    harness.state_mut().remember_in(&ctx, Store::at(path.to_owned()));
+    harness.state_mut().store_settings_in(&ctx, Store::at(path.to_owned()));
     harness.run();
     harness
 }
 
-fn stored(path: &std::path::Path) -> Remembered {
+fn stored(path: &std::path::Path) -> StoredSettings {
     Store::at(path.to_owned()).remembered().clone()
 }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use eframe::egui::{self, Key, PointerButton, Pos2, accesskit::Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::analysis::task::{Job, Message};
-use jointplay::app::{App, Event, Host, Link, Log, OpenedFile, Player, Replay, Running, SceneText, Verdict};
+use jointplay::app::{App, BackgroundTask, Event, Host, Link, Log, OpenedFile, Player, Replay, SceneText, Verdict};
 use jointplay::simulate::{ContactMode, Quantity};
 
 use crate::hands::{compare_window, fingers, fingers_down, give_graphics, lift, plain};
@@ -364,12 +364,12 @@ impl Host for Patient {
         None
     }
 
-    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
-        matches!(job, Job::Sweep(..)).then(|| Box::new(Self) as Box<dyn Running>)
+    fn start(&mut self, job: Job) -> Option<Box<dyn BackgroundTask>> {
+        matches!(job, Job::Sweep(..)).then(|| Box::new(Self) as Box<dyn BackgroundTask>)
     }
 }
 
-impl Running for Patient {
+impl BackgroundTask for Patient {
     fn poll(&mut self) -> Option<Message> {
         None
     }
@@ -757,7 +757,7 @@ fn going_back_to_just_after_an_impact_shows_its_peak_again() {
     harness.run();
     // The peak of the first impacts, 60 to 80 us after the touch.
     harness.state_mut().player_mut().pacer.set_scale(1e-3);
-    harness.state_mut().look_back(8.2e-3);
+    harness.state_mut().show_instant(8.2e-3);
     harness.run_steps(3);
     let there = marks(&harness);
     assert_eq!(there.len(), 3, "{there:?}");
@@ -765,7 +765,7 @@ fn going_back_to_just_after_an_impact_shows_its_peak_again() {
     // A step back keeps them; before the impact there are none.
     key(&mut harness, Key::ArrowLeft);
     assert_eq!(marks(&harness).len(), 3);
-    harness.state_mut().look_back(7.5e-3);
+    harness.state_mut().show_instant(7.5e-3);
     harness.run_steps(3);
     assert!(marks(&harness).is_empty());
 }

@@ -29,7 +29,7 @@ pub fn taught(name: &str, step: usize, size: [f32; 2]) -> Harness<'static, App> 
 }
 
 fn in_lesson(lesson: Arc<Lesson>, step: usize, size: [f32; 2]) -> Harness<'static, App> {
-    let (mut harness, _) = page::paced(AppOptions::of_lesson(lesson, step), size, DT);
+    let (mut harness, _) = page::paced(AppOptions::for_lesson(lesson, step), size, DT);
     settle(&mut harness);
     harness
 }

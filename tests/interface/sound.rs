@@ -8,7 +8,7 @@ use egui_kittest::{
     Harness,
     kittest::{NodeT as _, Queryable as _},
 };
-use jointplay::app::{App, Click, Dropped, Host, MOST_CLICKS, OpenedFile, PITCHES};
+use jointplay::app::{App, Click, DroppedFile, Host, MAX_CLICKS, OpenedFile, PITCHES};
 use jointplay::simulate::{Impact, Simulation};
 
 use crate::window::{click, shown, sized, window};
@@ -25,7 +25,7 @@ struct Heard {
 struct Ears(Rc<Heard>);
 
 impl Host for Ears {
-    fn read_dropped(&mut self, _files: Vec<Dropped>) {}
+    fn read_dropped(&mut self, _files: Vec<DroppedFile>) {}
 
     fn opened(&mut self) -> Option<Vec<OpenedFile>> {
         None
@@ -88,8 +88,8 @@ fn while_it_plays_the_clicks_are_the_impacts_of_the_run_at_any_speed() {
         for (from, to, clicks) in stretches {
             let within = |impact: &&Impact| from < impact.end && impact.end <= to;
             let ended: Vec<&Impact> = all.iter().filter(within).collect();
-            assert_eq!(clicks.len(), ended.len().min(MOST_CLICKS), "{scene} at {to} s");
-            if ended.len() > MOST_CLICKS {
+            assert_eq!(clicks.len(), ended.len().min(MAX_CLICKS), "{scene} at {to} s");
+            if ended.len() > MAX_CLICKS {
                 continue;
             }
             for (click, impact) in clicks.iter().zip(ended) {

@@ -8,7 +8,7 @@ use super::orbit::Orbit as _;
 use super::source::{SceneSource, TaskFault};
 use super::study::{Alone, Output, RunSpan, StudyRuns, outputs};
 use super::sweep_task::{STEPS, Share};
-use jointplay_physics::simulate::{LONGEST_RUN, Simulation};
+use jointplay_physics::simulate::{MAX_RUN_DURATION, Simulation};
 
 /// Runs to be computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,7 +63,7 @@ pub(super) async fn run(
         ControlFlow::Break(()) => Err(TaskFault::Cancelled),
     };
     let RunSpan { duration, from } = task.span;
-    if !(0.0 <= from && from < duration && duration <= LONGEST_RUN) {
+    if !(0.0 <= from && from < duration && duration <= MAX_RUN_DURATION) {
         return Err(TaskFault::Span { duration, from });
     }
     let scene = task.scene.scene()?;

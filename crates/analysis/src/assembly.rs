@@ -11,7 +11,7 @@ use jointplay_physics::units::format_quantity_digits;
 use jointplay_scene::Scene;
 
 /// A body moved or turned by more than this during assembly gets a warning: m, rad.
-const FAR: Placement = Placement { moved: 5e-3, turned: 5.0 * DEGREE };
+const WARNING_DISTANCE: Placement = Placement { moved: 5e-3, turned: 5.0 * DEGREE };
 
 /// A body moved and turned by less than this counts as not moved: m, rad.
 const NEAR: Placement = Placement { moved: 1e-6, turned: 1e-3 * DEGREE };
@@ -71,7 +71,7 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
     let machine = simulation.machine();
     let assembly = simulation.mechanism().assembly();
     let far = machine.bodies.iter().zip(&assembly.bodies);
-    let far = far.filter(|(_, placement)| exceeds(placement, &FAR));
+    let far = far.filter(|(_, placement)| exceeds(placement, &WARNING_DISTANCE));
     let far: Vec<String> = far.map(|(body, placement)| format!("{} {}", body.name, words(placement))).collect();
     let mut warnings = Vec::new();
     if !far.is_empty() {

@@ -10,9 +10,9 @@ use super::orbit::Orbit;
 /// Between sections the twin is rescaled once its separation has changed by more than this factor.
 const RENORMALISE_AT: f64 = 100.0;
 /// Beyond this multiple of the nominal separation, growth is no longer that of a small separation.
-const LOST_AT: f64 = 1e5;
+const MAX_GROWTH: f64 = 1e5;
 /// A separation lost in rounding counts as this fraction of the nominal one.
-const VANISHED: f64 = 1e-9;
+const MIN_SEPARATION: f64 = 1e-9;
 /// Sections that a newly placed twin runs before its growth counts, so that its offset aligns with the fastest-growing direction.
 pub const ALIGNMENT: usize = 5;
 /// Blocks for the standard error.
@@ -92,7 +92,7 @@ impl Benettin {
         self.open += usize::from(at_section);
         let off = distance(orbit, twin) / self.separation;
         if !orbit.is_comparable(twin) {
-            if at_section && !(off < LOST_AT) {
+            if at_section && !(off < MAX_GROWTH) {
                 *twin = orbit.twin();
                 self.place_twin(orbit, twin);
                 self.aligning = ALIGNMENT;
@@ -116,9 +116,9 @@ impl Benettin {
 
     /// Records growth to `off` times the nominal separation, and rescales the twin to that.
     fn renormalise<O: Orbit>(&mut self, orbit: &O, twin: &mut O, off: f64) {
-        let reached = self.separation * if off.is_finite() { off.max(VANISHED) } else { VANISHED };
+        let reached = self.separation * if off.is_finite() { off.max(MIN_SEPARATION) } else { MIN_SEPARATION };
         self.grown += libm::log(reached / self.from);
-        if off > VANISHED && off.is_finite() {
+        if off > MIN_SEPARATION && off.is_finite() {
             self.difference.clear();
             let pairs = orbit.state().iter().zip(twin.state());
             self.difference.extend(pairs.map(|(a, b)| (b - a) / off));
@@ -134,7 +134,7 @@ impl Benettin {
         let away: Vec<f64> = self.difference.iter().zip(states).map(|(d, (a, b))| d + (a - b)).collect();
         twin.displace(&away);
         // The actual separation differs from the requested one because loops are closed again.
-        self.from = distance(orbit, twin).max(VANISHED * self.separation);
+        self.from = distance(orbit, twin).max(MIN_SEPARATION * self.separation);
     }
 
     /// The exponent so far; `None` before the first section that counts.

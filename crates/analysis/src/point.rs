@@ -20,7 +20,7 @@ const SAMPLES_OF_DURATION: f64 = 1000.0;
 const OVER_TOLERANCE: f64 = 1.0;
 const SEPARATIONS: (f64, f64) = (1e-6, 1e-5);
 /// Loosest tolerance at which a run stays close enough to the motion of its scene to have the same exponent.
-pub const LOOSEST_FOR_EXPONENT: f64 = 1e-5;
+pub const MAX_EXPONENT_TOLERANCE: f64 = 1e-5;
 /// Resolution of the coordinates of a section, and of its rates, over the tolerance: the errors of many steps add up, and a stiff
 /// contact turns coordinate errors into larger rate errors.
 const RESOLUTION: [f64; 2] = [10.0, 100.0];

@@ -8,7 +8,7 @@ use super::AnalysisError;
 use super::axis::RangeError;
 use super::study::StudyError;
 use super::sweep::SweepError;
-use jointplay_physics::simulate::LONGEST_RUN;
+use jointplay_physics::simulate::MAX_RUN_DURATION;
 use jointplay_scene::{Scene, SceneError};
 
 /// A scene in transferable form: its text and changes, to be parsed again.
@@ -64,7 +64,7 @@ pub(super) enum TaskFault {
     Study(#[from] StudyError),
     #[error(
         "runs of {duration} s, observed from {from} s on: the observation must begin before the end, and a run may take at most \
-         {LONGEST_RUN:e} s"
+         {MAX_RUN_DURATION:e} s"
     )]
     Span { duration: f64, from: f64 },
     #[error("drive phase {0}: allowed 0 to below 1 period")]

@@ -8,7 +8,7 @@ use super::design::{Design, Start};
 use super::drive::{NoPeriod, ObservedRun};
 use super::layout::Layout;
 use super::point::{PointResult, PointRun, Protocol};
-use jointplay_physics::simulate::{LONGEST_RUN, Simulation};
+use jointplay_physics::simulate::{MAX_RUN_DURATION, Simulation};
 use jointplay_scene::{Scene, SceneError, Value};
 
 /// Largest total number of kept sections: an array of them takes 512 MiB.
@@ -77,7 +77,7 @@ fn nothing_kept(counted: &Argument, all: &usize, discard: &usize, f: &mut Format
 
 fn too_long(periods: &usize, point: &str, period: &f64, most: &usize, f: &mut Formatter<'_>) -> std::fmt::Result {
     Argument::Periods.write(periods, f)?;
-    write!(f, ": at {point} the longest run allowed, {LONGEST_RUN:e} s, covers {most} periods of {period} s")
+    write!(f, ": at {point} the longest run allowed, {MAX_RUN_DURATION:e} s, covers {most} periods of {period} s")
 }
 
 /// A sweep.
@@ -131,11 +131,11 @@ impl Sweep {
         let infeasible = |error| SweepError::Infeasible { point: self.describe(point), error: Box::new(error) };
         let interval = self.protocol.interval(&started.map_err(infeasible)?)?;
         match self.protocol.plan() {
-            Some(plan) if plan.periods > (LONGEST_RUN / interval) as usize => Err(SweepError::TooLong {
+            Some(plan) if plan.periods > (MAX_RUN_DURATION / interval) as usize => Err(SweepError::TooLong {
                 periods: plan.periods,
                 point: self.describe(point),
                 period: interval,
-                most: (LONGEST_RUN / interval) as usize,
+                most: (MAX_RUN_DURATION / interval) as usize,
             }),
             _ => Ok(()),
         }

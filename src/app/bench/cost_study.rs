@@ -9,10 +9,10 @@ use crate::scene::{Kind, Parameter, Scene, Value};
 use crate::units::{from_display, to_display};
 
 /// Parts of its value by which a parameter varies at first, per cent.
-const USUAL: f64 = 50.0;
+const INITIAL_VARIATION: f64 = 50.0;
 
 /// A contact parameter that every ball joint has.
-pub struct Varied {
+pub struct VariedParameter {
     /// Its row in the table, under the key of the whole scene.
     pub parameter: &'static Parameter,
     /// Whether it varies.
@@ -24,7 +24,7 @@ pub struct Varied {
 /// Settings of the next study.
 pub struct CostSettings {
     /// Parameters to choose from.
-    pub varied: Vec<Varied>,
+    pub varied: Vec<VariedParameter>,
     /// Whether every joint takes the same range, in place of a part of its own value.
     pub ranges: bool,
     /// That part, per cent.
@@ -43,15 +43,16 @@ impl CostSettings {
             let Kind::Number { slider, min, max, display, .. } = parameter.kind else {
                 return None;
             };
-            let own = [1.0 - USUAL / 100.0, 1.0 + USUAL / 100.0].map(|part| (part * now).clamp(min, max));
+            let own = [1.0 - INITIAL_VARIATION / 100.0, 1.0 + INITIAL_VARIATION / 100.0]
+                .map(|part| (part * now).clamp(min, max));
             let range = if own[0] < own[1] { own } else { [slider.0, slider.1] };
-            Some(Varied { parameter, on: false, range: range.map(|si| to_display(si, display)) })
+            Some(VariedParameter { parameter, on: false, range: range.map(|si| to_display(si, display)) })
         });
-        let mut varied: Vec<Varied> = varied.collect();
+        let mut varied: Vec<VariedParameter> = varied.collect();
         if let Some(first) = varied.first_mut() {
             first.on = true;
         }
-        Self { varied, ranges: false, percent: USUAL, span: RunSpan::of(scene) }
+        Self { varied, ranges: false, percent: INITIAL_VARIATION, span: RunSpan::of(scene) }
     }
 
     /// The study that they describe.
@@ -60,12 +61,12 @@ impl CostSettings {
     /// As a message: a reversed range, or nothing that varies.
     pub fn task(&self, scene: &Scene) -> Result<AloneTask, String> {
         let mut over = Vec::new();
-        let reversed = |varied: &&Varied| self.ranges && varied.on && varied.range[0] >= varied.range[1];
-        if let Some(Varied { parameter, .. }) = self.varied.iter().find(reversed) {
+        let reversed = |varied: &&VariedParameter| self.ranges && varied.on && varied.range[0] >= varied.range[1];
+        if let Some(VariedParameter { parameter, .. }) = self.varied.iter().find(reversed) {
             return Err(format!("{}: the first value must be below the second", parameter.label));
         }
         for joint in &scene.machine.ball_joints {
-            for Varied { parameter, range, .. } in self.varied.iter().filter(|varied| varied.on) {
+            for VariedParameter { parameter, range, .. } in self.varied.iter().filter(|varied| varied.on) {
                 let part = parameter.key.rsplit('.').next().unwrap_or_default();
                 let key = format!("joint.{}.{part}", joint.name);
                 let (Ok(Value::Number(now)), Kind::Number { min, max, display, .. }) =
@@ -136,7 +137,7 @@ impl CostStudy {
     }
 
     /// Inputs by their effect on `output`, the largest first; those with a run without result before all others.
-    pub fn by_effect(&self, output: usize) -> Vec<usize> {
+    pub fn ranked_by_effect(&self, output: usize) -> Vec<usize> {
         let spread = |input: usize| {
             let ends = [0, 1].map(|end| self.end(output, input, end).flatten());
             let all: Option<Vec<f64>> = [self.base(output), ends[0], ends[1]].into_iter().collect();

@@ -2,26 +2,26 @@
 
 use eframe::egui::{Align, Button, ComboBox, DragValue, RichText, Ui, vec2};
 
-use super::asked::Asked;
-use super::cost_study::{CostSettings, CostStudy, Varied};
-use super::shares::Shares;
+use super::cost_study::{CostSettings, CostStudy, VariedParameter};
+use super::request::BenchRequest;
+use super::shares::SharedJob;
 use super::tornado::Tornado;
 use crate::analysis::alone_task::AloneTask;
 use crate::analysis::study::NAMED;
 use crate::analysis::task::{Job, Message};
 use crate::app::host::Host;
-use crate::app::layout::reserved;
+use crate::app::layout::reserve_lines;
 use crate::app::player::Player;
 use crate::app::{theme, value};
 use crate::scene::{Kind, Scene, Value};
-use crate::simulate::LONGEST_RUN;
+use crate::simulate::MAX_RUN_DURATION;
 
 /// Width of the start/stop button, points; fixed, so that it does not move.
-const GO: f32 = 120.0;
+const BUTTON_WIDTH: f32 = 120.0;
 /// Largest part of a run that is a transient.
-const LATEST: f64 = 0.99;
+const MAX_TRANSIENT: f64 = 0.99;
 /// Shortest run, s.
-const SHORTEST: f64 = 1e-3;
+const MIN_DURATION: f64 = 1e-3;
 
 /// The panel. It exists while it is open.
 pub struct Costs {
@@ -33,7 +33,7 @@ pub struct Costs {
     scene: String,
     settings: Option<CostSettings>,
     asked: Option<AloneTask>,
-    running: Option<Running>,
+    running: Option<RunningStudy>,
     study: Option<CostStudy>,
     problem: Option<String>,
     /// Index of the output on show.
@@ -44,9 +44,9 @@ pub struct Costs {
 }
 
 /// A study being computed.
-struct Running {
+struct RunningStudy {
     task: AloneTask,
-    shares: Shares,
+    shares: SharedJob,
     begun: bool,
 }
 
@@ -70,7 +70,7 @@ impl Default for Costs {
 
 impl Costs {
     /// Whether it is still open: drawn since the last call, or aside. What is not drawn computes nothing.
-    pub fn stays_open(&mut self) -> bool {
+    pub fn was_shown(&mut self) -> bool {
         let drawn = std::mem::take(&mut self.drawn);
         if !drawn {
             (self.asked, self.running) = (None, None);
@@ -79,12 +79,12 @@ impl Costs {
     }
 
     /// Leaves its place to something else until it is drawn again.
-    pub fn step_aside(&mut self) {
+    pub fn set_aside(&mut self) {
         self.aside = true;
     }
 
     /// Whether something else has its place.
-    pub fn is_aside(&self) -> bool {
+    pub fn is_set_aside(&self) -> bool {
         self.aside
     }
 
@@ -108,13 +108,13 @@ impl Costs {
         if let Some(task) = self.asked.take() {
             self.problem = None;
             let most = 1 + 2 * task.over.len();
-            let shares = Shares::start(host, most, |share| Job::Alone(task.clone(), share));
-            self.running = shares.map(|shares| Running { task, shares, begun: false });
+            let shares = SharedJob::start(host, most, |share| Job::Alone(task.clone(), share));
+            self.running = shares.map(|shares| RunningStudy { task, shares, begun: false });
             if self.running.is_none() {
                 self.problem = Some("Runs cannot be computed here".to_owned());
             }
         }
-        let Some(Running { task, shares, begun }) = &mut self.running else {
+        let Some(RunningStudy { task, shares, begun }) = &mut self.running else {
             return false;
         };
         let polled = shares.poll(|message| match message {
@@ -150,7 +150,7 @@ impl Costs {
     }
 
     /// Settings, progress and tornado; returns the user's request to the run.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<Asked> {
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<BenchRequest> {
         (self.drawn, self.aside) = (true, false);
         let scene = player.pending();
         if self.scene != scene.source.text {
@@ -163,13 +163,13 @@ impl Costs {
         }
         ui.scope(|ui| {
             // All settings and the first bars fit on a phone.
-            theme::tighten(ui);
+            theme::use_dense_rows(ui);
             self.settings_ui(ui, scene);
         });
         let progress = ui.cursor().top();
         self.go_ui(ui, scene);
         let differences = self.study.as_ref().map_or_else(Vec::new, |study| study.differences(player));
-        reserved(ui, "costs say", 3, |ui| self.state_ui(ui, &differences));
+        reserve_lines(ui, "costs say", 3, |ui| self.state_ui(ui, &differences));
         let study = self.study.as_ref()?;
         let choice = ui.cursor().top();
         output_ui(ui, &mut self.output, study);
@@ -185,14 +185,14 @@ impl Costs {
         let (input, end) = clicked?;
         let (key, ends) = &study.task.over[input];
         let text = study.parameter(input)?.write(&Value::Number(ends[end]));
-        Some(Asked::Value { key: key.clone(), text })
+        Some(BenchRequest::Value { key: key.clone(), text })
     }
 
     fn settings_ui(&mut self, ui: &mut Ui, scene: &Scene) {
         let settings = self.settings.get_or_insert_with(|| CostSettings::new(scene));
         ui.horizontal_wrapped(|ui| {
             ui.label("Vary");
-            for Varied { parameter, on, .. } in &mut settings.varied {
+            for VariedParameter { parameter, on, .. } in &mut settings.varied {
                 let help = format!("Of each ball joint alone. {}", value::typeset(parameter.help));
                 ui.checkbox(on, parameter.label).on_hover_text(help);
             }
@@ -209,7 +209,8 @@ impl Costs {
                     .accessible_name("Part of each value");
             }
         });
-        for Varied { parameter, range, .. } in settings.varied.iter_mut().filter(|varied| settings.ranges && varied.on)
+        for VariedParameter { parameter, range, .. } in
+            settings.varied.iter_mut().filter(|varied| settings.ranges && varied.on)
         {
             ui.horizontal_wrapped(|ui| {
                 let Kind::Number { min, max, display, slider, .. } = parameter.kind else {
@@ -237,9 +238,9 @@ impl Costs {
                     .accessible_name(name);
             };
             let help = "Length of each run, from the scene's own start; at first three periods of its drives, or 1 s";
-            time("Duration", &mut span.duration, SHORTEST..=LONGEST_RUN, help);
+            time("Duration", &mut span.duration, MIN_DURATION..=MAX_RUN_DURATION, help);
             let help = "End of the transient: what happens before it does not count; energy is counted from the start";
-            time("Observed from", &mut span.from, 0.0..=LATEST * span.duration, help);
+            time("Observed from", &mut span.from, 0.0..=MAX_TRANSIENT * span.duration, help);
         });
     }
 
@@ -255,7 +256,7 @@ impl Costs {
             )
         };
         let clicked = ui.horizontal(|ui| {
-            let clicked = ui.add(Button::new(name).min_size(vec2(GO, 0.0))).on_hover_text(help).clicked();
+            let clicked = ui.add(Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0))).on_hover_text(help).clicked();
             if let Some(running) = &self.running {
                 running.shares.ui(ui, "Computed so far", "runs");
             }

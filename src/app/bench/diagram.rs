@@ -6,7 +6,7 @@ use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, 
 use super::coordinate::Coordinate;
 use super::plane::{AxisLabel, named, plane};
 use super::portrait::title;
-use super::swept::Swept;
+use super::swept::SweepResults;
 use crate::analysis::regime::Regime;
 use crate::analysis::sweep_task::SweptPoint;
 use crate::app::{theme, value};
@@ -15,7 +15,7 @@ use crate::units::to_display;
 
 const HEIGHT: f32 = 230.0;
 /// Largest distance of a click from a point, points.
-const NEAR: f32 = 16.0;
+const HIT_DISTANCE: f32 = 16.0;
 
 /// Quantity plotted over the varied parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -87,7 +87,7 @@ impl Diagram {
     }
 
     /// Invalidates the marks after a point has arrived.
-    pub fn renew(&mut self) {
+    pub fn invalidate(&mut self) {
         self.made = None;
     }
 
@@ -109,7 +109,7 @@ impl Diagram {
     }
 
     /// The diagram of `swept`; returns the clicked point and its retained section.
-    pub fn ui(&mut self, ui: &mut Ui, swept: &Swept, coordinate: Coordinate) -> Option<(usize, usize)> {
+    pub fn ui(&mut self, ui: &mut Ui, swept: &SweepResults, coordinate: Coordinate) -> Option<(usize, usize)> {
         let parameter = swept.parameter();
         let unit = parameter.map_or("", |parameter| parameter.display_unit());
         let label = parameter.map_or(swept.range.key.as_str(), |parameter| parameter.label);
@@ -168,14 +168,14 @@ impl Diagram {
             .iter()
             .map(|mark| (response.transform.position_from_point(&mark.0).distance(at), mark))
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
-        if nearest.0 > theme::side(ui, NEAR) {
+        if nearest.0 > theme::side(ui, HIT_DISTANCE) {
             return None;
         }
         self.picked = Some((nearest.1.1, nearest.1.2));
         self.picked
     }
 
-    fn head(&mut self, ui: &mut Ui, swept: &Swept) {
+    fn head(&mut self, ui: &mut Ui, swept: &SweepResults) {
         ui.horizontal_wrapped(|ui| {
             ComboBox::from_id_salt("ordinate")
                 .width(110.0)
@@ -195,7 +195,7 @@ impl Diagram {
     }
 
     /// Legend of the colours with the number of values of each kind.
-    fn key(&self, ui: &mut Ui, swept: &Swept, dark: bool) {
+    fn key(&self, ui: &mut Ui, swept: &SweepResults, dark: bool) {
         let weak = ui.visuals().weak_text_color();
         let mut entries: Vec<_> = REGIMES
             .iter()
@@ -235,7 +235,7 @@ impl Diagram {
         });
     }
 
-    fn make(&mut self, swept: &Swept, coordinate: Coordinate, shown: &dyn Fn(f64) -> f64) {
+    fn make(&mut self, swept: &SweepResults, coordinate: Coordinate, shown: &dyn Fn(f64) -> f64) {
         self.marks.iter_mut().for_each(Vec::clear);
         self.all.clear();
         self.doubtful.clear();

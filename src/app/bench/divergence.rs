@@ -6,7 +6,7 @@ use egui_plot::{GridMark, PlotPoint};
 use super::plane::{AxisLabel, named, plane};
 use super::portrait::title;
 use crate::app::curve::Path;
-use crate::app::layout::reserved;
+use crate::app::layout::reserve_lines;
 use crate::app::player::Player;
 use crate::app::twin::Twin;
 use crate::app::{plots, theme, value};
@@ -55,7 +55,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
          neighbouring motions converge. It is known after 25 periods of the drives, or of 0.1 s without drives, \
          because the first impacts say nothing about it",
     );
-    reserved(ui, "twin says", 2, |ui| {
+    reserve_lines(ui, "twin says", 2, |ui| {
         if let Some(why) = twin.stopped() {
             theme::warning(ui, format!("The twin run {why}"));
         }

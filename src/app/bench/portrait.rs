@@ -7,7 +7,7 @@ use super::coordinate::Coordinate;
 use super::plane::{AxisLabel, named, plane};
 use crate::analysis::drive::observed;
 use crate::app::curve::Path;
-use crate::app::layout::reserved;
+use crate::app::layout::reserve_lines;
 use crate::app::player::Player;
 use crate::app::watch::Observed;
 use crate::app::{keys, spoken, theme, value};
@@ -28,7 +28,7 @@ impl Portrait {
         self.read(player, coordinate);
         let (across, up) = (coordinate.axis(), coordinate.rate_axis());
         let dark = ui.visuals().dark_mode;
-        reserved(ui, "portrait of", 2, |ui| {
+        reserve_lines(ui, "portrait of", 2, |ui| {
             let words = format!(
                 "Running: {}; sections at phase {}°",
                 value::scene_line(player.running(), &[]),

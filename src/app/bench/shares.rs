@@ -5,13 +5,13 @@ use eframe::egui::{ProgressBar, Ui};
 use super::throttle::Throttle;
 use crate::analysis::sweep_task::Share;
 use crate::analysis::task::{Job, Message};
-use crate::app::host::{Host, Running};
+use crate::app::host::{BackgroundTask, Host};
 
 /// Elapsed time below which no remaining time is estimated, s.
-const SOON: f64 = 1.0;
+const MIN_ELAPSED: f64 = 1.0;
 
 /// A running computation.
-pub struct Shares {
+pub struct SharedJob {
     workers: Vec<Worker>,
     throttle: Throttle,
     /// Time of the first frame since the start, and of the latest frame, s.
@@ -21,12 +21,12 @@ pub struct Shares {
 
 /// A worker, and its completed fraction of the whole.
 struct Worker {
-    running: Box<dyn Running>,
+    running: Box<dyn BackgroundTask>,
     done: f64,
     finished: bool,
 }
 
-impl Shares {
+impl SharedJob {
     /// Starts the shares of a job on all workers of `host`, at most `most` of them; `None` if that is impossible.
     pub fn start(host: &mut dyn Host, most: usize, job: impl Fn(Share) -> Job) -> Option<Self> {
         let of = host.workers().min(most).max(1);
@@ -71,7 +71,7 @@ impl Shares {
     pub fn ui(&self, ui: &mut Ui, name: &str, what: &str) {
         let done = self.done();
         let mut words = format!("{} %", (100.0 * done).floor());
-        if let Some(left) = self.time_left() {
+        if let Some(left) = self.remaining_time() {
             words += &format!(", {left}");
         }
         let help = format!(
@@ -88,14 +88,14 @@ impl Shares {
     }
 
     /// Estimated remaining time at the average speed so far; `None` while too little is known.
-    fn time_left(&self) -> Option<String> {
+    fn remaining_time(&self) -> Option<String> {
         let (spent, done) = (self.now - self.since?, self.done());
-        (spent >= SOON && done > 0.0).then(|| in_time(spent * (1.0 - done).max(0.0) / done))
+        (spent >= MIN_ELAPSED && done > 0.0).then(|| remaining_time_text(spent * (1.0 - done).max(0.0) / done))
     }
 }
 
 /// Formats a remaining time, s.
-fn in_time(left: f64) -> String {
+fn remaining_time_text(left: f64) -> String {
     match left {
         _ if left < 10.0 => "a few seconds left".to_owned(),
         _ if left < 90.0 => format!("about {} s left", 10.0 * (left / 10.0).round()),
@@ -116,7 +116,7 @@ mod tests {
             (130.0, "about 2 min left"),
             (7500.0, "about 2 h left"),
         ] {
-            assert_eq!(in_time(left), words);
+            assert_eq!(remaining_time_text(left), words);
         }
     }
 }

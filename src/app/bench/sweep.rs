@@ -2,30 +2,30 @@
 
 use eframe::egui::{Align, Button, ComboBox, DragValue, RichText, TextEdit, Ui, vec2};
 
-use super::asked::Asked;
 use super::coordinate::Coordinate;
 use super::diagram::Diagram;
 use super::in_words;
-use super::shares::Shares;
-use super::swept::{Swept, start_word};
+use super::request::BenchRequest;
+use super::shares::SharedJob;
+use super::swept::{SweepResults, start_label};
 use crate::analysis::design::Start;
-use crate::analysis::point::LOOSEST_FOR_EXPONENT;
+use crate::analysis::point::MAX_EXPONENT_TOLERANCE;
 use crate::analysis::ready::{READY, ReadySweep};
 use crate::analysis::source::SceneSource;
 use crate::analysis::sweep_task::SweepTask;
 use crate::analysis::task::{Job, Message};
 use crate::app::host::Host;
-use crate::app::layout::reserved;
+use crate::app::layout::reserve_lines;
 use crate::app::load::Load;
 use crate::app::player::Player;
 use crate::app::{theme, value};
 use crate::scene::{Kind, Parameter, Scene, Value};
 
 /// Parameter varied by default, and its range.
-const FIRST: (&str, &str, &str) = ("contact.clearance", "0.01 mm", "1 mm");
+const DEFAULT_RANGE: (&str, &str, &str) = ("contact.clearance", "0.01 mm", "1 mm");
 
 /// Width of the start/stop button, points; fixed, so that it does not move.
-const GO: f32 = 120.0;
+const BUTTON_WIDTH: f32 = 120.0;
 
 /// Settings of the next sweep.
 struct Settings {
@@ -42,9 +42,9 @@ struct Settings {
 }
 
 /// A running sweep.
-struct Sweeping {
+struct RunningSweep {
     task: SweepTask,
-    shares: Shares,
+    shares: SharedJob,
     /// Whether its ranges are known.
     begun: bool,
 }
@@ -54,8 +54,8 @@ struct Sweeping {
 pub struct SweepPanel {
     settings: Option<Settings>,
     asked: Option<SweepTask>,
-    running: Option<Sweeping>,
-    swept: Option<Swept>,
+    running: Option<RunningSweep>,
+    swept: Option<SweepResults>,
     problem: Option<String>,
     diagram: Diagram,
     /// Whether to scroll to the diagram.
@@ -67,19 +67,19 @@ impl SweepPanel {
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
         if let Some(task) = self.asked.take() {
             self.problem = None;
-            let shares = Shares::start(host, usize::MAX, |share| Job::Sweep(task.clone(), share));
-            self.running = shares.map(|shares| Sweeping { task, shares, begun: false });
+            let shares = SharedJob::start(host, usize::MAX, |share| Job::Sweep(task.clone(), share));
+            self.running = shares.map(|shares| RunningSweep { task, shares, begun: false });
             if self.running.is_none() {
                 self.problem = Some("Sweeps cannot be computed here".to_owned());
             }
         }
-        let Some(Sweeping { task, shares, begun }) = &mut self.running else {
+        let Some(RunningSweep { task, shares, begun }) = &mut self.running else {
             return false;
         };
         let polled = shares.poll(|message| match message {
             Message::Ranges(ranges) if !*begun => {
                 *begun = true;
-                self.swept = ranges.into_iter().next().map(|range| Swept {
+                self.swept = ranges.into_iter().next().map(|range| SweepResults {
                     task: task.clone(),
                     points: vec![None; range.count],
                     scene: task.scene.scene().ok(),
@@ -92,7 +92,7 @@ impl SweepPanel {
                     && let Some(slot) = swept.points.get_mut(point.index)
                 {
                     *slot = Some(*point);
-                    self.diagram.renew();
+                    self.diagram.invalidate();
                 }
             }
             _ => {}
@@ -119,7 +119,7 @@ impl SweepPanel {
     }
 
     /// The latest sweep.
-    pub fn swept(&self) -> Option<&Swept> {
+    pub fn swept(&self) -> Option<&SweepResults> {
         self.swept.as_ref()
     }
 
@@ -136,10 +136,10 @@ impl SweepPanel {
     }
 
     /// Ready sweeps, settings, progress and diagram; returns the user's request to the run.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Asked> {
-        let ready = ready_ui(ui).map(Asked::Ready);
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<BenchRequest> {
+        let ready = ready_ui(ui).map(BenchRequest::Ready);
         let load = self.sweep_ui(ui, player, coordinate);
-        ready.or(load.map(Asked::Section))
+        ready.or(load.map(BenchRequest::Section))
     }
 
     /// Whether the diagram belongs to the requested sweep, or no other is to come.
@@ -162,9 +162,9 @@ impl SweepPanel {
                 self.go_ui(ui, player);
             }
         }
-        reserved(ui, "sweep says", 2, |ui| self.state_ui(ui, player));
+        reserve_lines(ui, "sweep says", 2, |ui| self.state_ui(ui, player));
         let diagram = ui.cursor().top();
-        let load = self.swept_ui(ui, coordinate);
+        let load = self.diagram_ui(ui, coordinate);
         if self.reveal {
             self.reveal = !self.has_diagram();
             let room = ui.clip_rect().height();
@@ -182,9 +182,9 @@ impl SweepPanel {
     }
 
     /// The diagram; returns the clicked section.
-    fn swept_ui(&mut self, ui: &mut Ui, coordinate: Coordinate) -> Option<Load> {
+    fn diagram_ui(&mut self, ui: &mut Ui, coordinate: Coordinate) -> Option<Load> {
         let swept = self.swept.as_ref()?;
-        reserved(ui, "sweep of", 3, |ui| {
+        reserve_lines(ui, "sweep of", 3, |ui| {
             ui.label(RichText::new(swept.caption()).small()).on_hover_text("Scene and settings of the diagram below");
         });
         let (index, section) = self.diagram.ui(ui, swept, coordinate)?;
@@ -223,7 +223,7 @@ impl SweepPanel {
     fn settings_ui(&mut self, ui: &mut Ui, player: &Player) {
         let scene = player.pending();
         let mut parameters = scene.parameters();
-        parameters.retain(|parameter| varies(player, parameter));
+        parameters.retain(|parameter| is_variable(player, parameter));
         let known = |settings: &&mut Settings| settings.scene == scene.name;
         let settings = match self.settings.as_mut().filter(known) {
             Some(_) => self.settings.as_mut(),
@@ -282,10 +282,10 @@ impl SweepPanel {
             ui.label("Start");
             ComboBox::from_id_salt("start")
                 .width(120.0)
-                .selected_text(start_word(settings.start))
+                .selected_text(start_label(settings.start))
                 .show_ui(ui, |ui| {
                     for start in [Start::Cold, Start::FollowUp, Start::FollowDown] {
-                        ui.selectable_value(&mut settings.start, start, start_word(start));
+                        ui.selectable_value(&mut settings.start, start, start_label(start));
                     }
                 })
                 .response
@@ -299,11 +299,12 @@ impl SweepPanel {
             );
         });
         let solver = player.pending().machine.solver;
-        if settings.exponent && solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9) {
+        if settings.exponent && solver.method.is_adaptive() && solver.tolerance > MAX_EXPONENT_TOLERANCE * (1.0 + 1e-9)
+        {
             let words = format!(
                 "At a tolerance of {} integration error hides the exponents; use {} or less",
                 value::power_of_ten(solver.tolerance),
-                value::power_of_ten(LOOSEST_FOR_EXPONENT)
+                value::power_of_ten(MAX_EXPONENT_TOLERANCE)
             );
             theme::warning(ui, words);
         }
@@ -321,7 +322,7 @@ impl SweepPanel {
             )
         };
         let clicked = ui.horizontal(|ui| {
-            let button = Button::new(name).min_size(vec2(GO, 0.0));
+            let button = Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0));
             let clicked = ui.add(button).on_hover_text(help).clicked();
             if let Some(sweeping) = &self.running {
                 sweeping.shares.ui(ui, "Swept so far", "points");
@@ -367,7 +368,7 @@ impl Settings {
     }
 
     fn new(scene: &str, parameters: &[&'static Parameter]) -> Option<Self> {
-        let first = parameters.iter().find(|p| p.key == FIRST.0);
+        let first = parameters.iter().find(|p| p.key == DEFAULT_RANGE.0);
         let first = first.or_else(|| parameters.first())?;
         let mut settings = Self {
             scene: scene.to_owned(),
@@ -388,7 +389,7 @@ impl Settings {
     fn vary(&mut self, parameter: &'static Parameter) {
         self.key = parameter.key;
         (self.from, self.to) = match parameter.kind {
-            _ if parameter.key == FIRST.0 => (FIRST.1.to_owned(), FIRST.2.to_owned()),
+            _ if parameter.key == DEFAULT_RANGE.0 => (DEFAULT_RANGE.1.to_owned(), DEFAULT_RANGE.2.to_owned()),
             Kind::Number { slider, .. } => {
                 let end = |si| value::shown(&Value::Number(si), &parameter.kind);
                 (end(slider.0), end(slider.1))
@@ -416,7 +417,7 @@ fn ready_ui(ui: &mut Ui) -> Option<&'static ReadySweep> {
 }
 
 /// Whether the scene has `parameter` as a number that affects the motion.
-fn varies(player: &Player, parameter: &Parameter) -> bool {
+fn is_variable(player: &Player, parameter: &Parameter) -> bool {
     let value = player.pending().get(parameter.key);
     matches!(value, Ok(Value::Number(_) | Value::Count(_)))
         && !parameter.key.starts_with("view.")

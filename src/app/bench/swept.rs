@@ -7,7 +7,7 @@ use crate::app::value;
 use crate::scene::{Kind, Parameter, Scene, Value};
 
 /// A started sweep and its results so far.
-pub struct Swept {
+pub struct SweepResults {
     /// The requested task.
     pub task: SweepTask,
     /// The varied parameter.
@@ -18,7 +18,7 @@ pub struct Swept {
     pub(super) scene: Option<Scene>,
 }
 
-impl Swept {
+impl SweepResults {
     /// The varied parameter as defined in the swept scene.
     pub(super) fn parameter(&self) -> Option<&'static Parameter> {
         self.scene.as_ref()?.parameter(&self.range.key).ok()
@@ -44,7 +44,7 @@ impl Swept {
             task.periods,
             task.discard,
             value::number(360.0 * task.phase, 4),
-            start_word(task.start),
+            start_label(task.start),
         )
     }
 
@@ -56,7 +56,7 @@ impl Swept {
     }
 }
 
-pub(super) fn start_word(start: Start) -> &'static str {
+pub(super) fn start_label(start: Start) -> &'static str {
     match start {
         Start::Cold => "as in file",
         Start::FollowUp => "follow upwards",
@@ -74,7 +74,7 @@ mod tests {
         let ready = &READY[0];
         let scene = ready.scene().expect("a built-in scene");
         let range = Range { key: ready.key.to_owned(), from: 21.0, to: 45.0, count: ready.values };
-        let swept = Swept { task: ready.task(&scene), range, points: Vec::new(), scene: Some(scene) };
+        let swept = SweepResults { task: ready.task(&scene), range, points: Vec::new(), scene: Some(scene) };
         let parameter = swept.parameter().expect("a parameter of the file");
         assert_eq!((parameter.label, parameter.display_unit()), ("Crank speed", "rad/s"));
         assert!(swept.caption().contains("crank speed 21 rad/s to 45 rad/s, 25 values"), "{}", swept.caption());

@@ -2,17 +2,17 @@
 
 /// Minimum frame rate beside a sweep, 1/s, for a picture that reaches it without one; margin of the target, because a count over
 /// one second is an integer; rate above which the sweep may use more time again.
-const LEAST: f64 = 20.0;
+const MIN_RATE: f64 = 20.0;
 const MARGIN: f64 = 0.5;
-const AMPLE: f64 = 30.0;
+const RELAX_RATE: f64 = 30.0;
 /// Averaging time of the frame rate, s; a gap of this length between two frames means that nothing moved.
-const SPAN: f64 = 1.0;
+const AVERAGING_TIME: f64 = 1.0;
 /// Shortest and longest rest of a sweep, as multiples of its computing time; the rest is doubled or halved.
-const SHORTEST: f64 = 1.0;
-const LONGEST: f64 = 8.0;
+const MIN_REST: f64 = 1.0;
+const MAX_REST: f64 = 8.0;
 /// Frame rate below which a picture is slow by itself if it occurs at the longest rest, and the required number of counts in
 /// succession.
-const HOPELESS: (f64, u32) = (16.0, 3);
+const SLOW_PICTURE: (f64, u32) = (16.0, 3);
 
 /// Determines the rest of the sweep's threads.
 #[derive(Debug, Default)]
@@ -32,7 +32,7 @@ impl Throttle {
     pub fn frame(&mut self, now: f64, moves: bool) -> Option<f64> {
         let before = self.rest;
         let latest = self.latest.replace(now).filter(|_| moves);
-        match latest.filter(|latest| now - latest < SPAN) {
+        match latest.filter(|latest| now - latest < AVERAGING_TIME) {
             None => {
                 // At rest or just started: the frame rate is unknown.
                 (self.since, self.frames) = (now, 0);
@@ -43,8 +43,8 @@ impl Throttle {
             Some(_) => {
                 self.frames += 1;
                 let span = now - self.since;
-                if span >= SPAN {
-                    self.judge(f64::from(self.frames) / span);
+                if span >= AVERAGING_TIME {
+                    self.adjust_rest(f64::from(self.frames) / span);
                     (self.since, self.frames) = (now, 0);
                 }
             }
@@ -53,21 +53,21 @@ impl Throttle {
     }
 
     /// Adjusts the rest to a frame rate, 1/s.
-    fn judge(&mut self, rate: f64) {
-        let (hopeless, patience) = HOPELESS;
+    fn adjust_rest(&mut self, rate: f64) {
+        let (hopeless, patience) = SLOW_PICTURE;
         if self.hopeless >= patience {
             return;
         }
-        if self.rest < LONGEST || rate >= hopeless {
+        if self.rest < MAX_REST || rate >= hopeless {
             self.hopeless = 0;
         } else {
             self.hopeless += 1;
         }
-        if rate > AMPLE {
+        if rate > RELAX_RATE {
             let shorter = 0.5 * self.rest;
-            self.rest = if shorter < SHORTEST { 0.0 } else { shorter };
-        } else if rate < LEAST + MARGIN {
-            self.rest = if self.hopeless >= patience { 0.0 } else { (2.0 * self.rest).clamp(SHORTEST, LONGEST) };
+            self.rest = if shorter < MIN_REST { 0.0 } else { shorter };
+        } else if rate < MIN_RATE + MARGIN {
+            self.rest = if self.hopeless >= patience { 0.0 } else { (2.0 * self.rest).clamp(MIN_REST, MAX_REST) };
         }
     }
 }
@@ -111,7 +111,7 @@ mod tests {
             let mut page = Page::new(free, busy);
             page.draw(7.0);
             let rate = page.draw(60.0);
-            assert!(rate >= LEAST, "{free}, {busy}: {rate}");
+            assert!(rate >= MIN_RATE, "{free}, {busy}: {rate}");
             assert!(page.rest <= most, "{free}, {busy}: {}", page.rest);
         }
     }

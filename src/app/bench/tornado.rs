@@ -13,15 +13,15 @@ use crate::app::{theme, value};
 use crate::scene::Value;
 
 /// Height of a bar with its texts, for a mouse and for touch, points.
-const BAR: (f32, f32) = (18.0, 30.0);
+const BAR_HEIGHTS: (f32, f32) = (18.0, 30.0);
 /// Gap between two inputs, and between two columns, points.
 const GAP: f32 = 8.0;
 /// Margin of a bar above and below, points.
 const MARGIN: f32 = 2.0;
 /// Largest part of the width for the names.
-const NAMES: f32 = 0.3;
+const MAX_NAMES_FRACTION: f32 = 0.3;
 /// Opacity of the bars of an earlier setting.
-const PALE: f32 = 0.45;
+const PALE_OPACITY: f32 = 0.45;
 /// Digits of a value on show.
 const DIGITS: usize = 4;
 
@@ -63,7 +63,7 @@ impl Tornado {
         let (finished, all) = study.counts();
         let pointed = self.area.is_some_and(|area| ui.rect_contains_pointer(area));
         if finished == all && self.sorted != Some(output) && !pointed {
-            (self.order, self.sorted) = (study.by_effect(output), Some(output));
+            (self.order, self.sorted) = (study.ranked_by_effect(output), Some(output));
         }
     }
 
@@ -90,13 +90,13 @@ impl Tornado {
         let ends = |input: usize| [0, 1].map(|end| End::new(study, output, (input, end), player, &what, &shown));
         let ends: Vec<[End; 2]> = self.order.iter().map(|&input| ends(input)).collect();
 
-        let bar = if theme::has_fingers(ui) { BAR.1 } else { BAR.0 };
+        let bar = if theme::has_fingers(ui) { BAR_HEIGHTS.1 } else { BAR_HEIGHTS.0 };
         let height = self.order.len() as f32 * (2.0 * bar + GAP);
         let (area, _) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
         self.area = Some(area);
         let names: Vec<[&str; 2]> = self.order.iter().map(|&input| name(&study.task.over[input].0)).collect();
         let column = |at: usize| widest(ui, ends.iter().flatten().map(|end| &*end.texts[at]));
-        let first = widest(ui, names.iter().flatten().copied()).min(NAMES * area.width());
+        let first = widest(ui, names.iter().flatten().copied()).min(MAX_NAMES_FRACTION * area.width());
         let place = Place {
             area,
             bar,
@@ -188,7 +188,7 @@ impl Place {
             let (a, b) = (self.across(base), self.across(value));
             let bar = Rect::from_x_y_ranges(a.min(b)..=a.max(b), strip.y_range()).shrink2(vec2(0.0, MARGIN));
             let colour = theme::series(end, visuals.dark_mode);
-            painter.rect_filled(bar, 0.0, if self.earlier { colour.gamma_multiply(PALE) } else { colour });
+            painter.rect_filled(bar, 0.0, if self.earlier { colour.gamma_multiply(PALE_OPACITY) } else { colour });
         }
         let help = format!("{}. A click moves the slider there", own.words);
         response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(help).clicked()

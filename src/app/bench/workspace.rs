@@ -6,8 +6,8 @@ use super::in_words;
 use crate::analysis::map_task::{MapMessage, MapTask, TipErrors};
 use crate::analysis::source::SceneSource;
 use crate::analysis::task::{Job, Message};
-use crate::app::host::{Host, Running};
-use crate::app::layout::reserved;
+use crate::app::host::{BackgroundTask, Host};
+use crate::app::layout::reserve_lines;
 use crate::app::player::Player;
 use crate::app::{theme, value};
 use crate::machine::{Drive, Machine, Vec3};
@@ -18,22 +18,22 @@ use crate::view::{Cloud, to_f32};
 /// Directions at each point: enough for the largest error, which is improved from the largest of them.
 const DIRECTIONS: usize = 16;
 /// Width of the start button, points; fixed, so that it does not move.
-const GO: f32 = 120.0;
+const BUTTON_WIDTH: f32 = 120.0;
 /// Range of the scale, and that at first.
-const SCALE: std::ops::RangeInclusive<f32> = 1.0..=1000.0;
-const FIRST_SCALE: f32 = 100.0;
+const SCALE_RANGE: std::ops::RangeInclusive<f32> = 1.0..=1000.0;
+const INITIAL_SCALE: f32 = 100.0;
 /// Largest number of drives that vary at first.
-const MOST_DRIVES: usize = 3;
+const MAX_DRIVES: usize = 3;
 
-/// Which error is shown.
+/// The error that the map shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Which {
+enum ShownError {
     #[default]
     Largest,
     Settled,
 }
 
-impl Which {
+impl ShownError {
     const ALL: [Self; 2] = [Self::Largest, Self::Settled];
 
     fn name(self) -> &'static str {
@@ -70,10 +70,10 @@ impl Which {
 }
 
 /// Axes of the first drives, one per line: around their positions at t = 0, or a whole turn where a crank that goes round is alone.
-fn at_first(machine: &Machine) -> String {
+fn default_axes(machine: &Machine) -> String {
     let driven = || machine.joints.iter().flat_map(|joint| joint.drives().map(move |drive| (joint, drive)));
     let alone = driven().nth(1).is_none();
-    let axes = driven().zip(drive_positions(machine)).take(MOST_DRIVES).map(|((joint, (freedom, drive)), at)| {
+    let axes = driven().zip(drive_positions(machine)).take(MAX_DRIVES).map(|((joint, (freedom, drive)), at)| {
         let round = alone && matches!(drive, Drive::Constant { velocity, .. } if *velocity != 0.0);
         let (unit, ends, count) = match (freedom.turns(), round) {
             (true, true) => ("deg", [0.0, 345.0_f64.to_radians()], 24),
@@ -87,13 +87,13 @@ fn at_first(machine: &Machine) -> String {
 }
 
 /// A map so far.
-struct Mapped {
+struct PartialMap {
     task: MapTask,
     axes: Vec<(String, Vec<f64>)>,
     points: Vec<Option<TipErrors>>,
 }
 
-impl Mapped {
+impl PartialMap {
     fn count(&self) -> usize {
         self.axes.iter().map(|(_, values)| values.len()).product()
     }
@@ -111,10 +111,10 @@ pub struct MapPanel {
     scene: String,
     over: String,
     asked: Option<MapTask>,
-    running: Option<Box<dyn Running>>,
-    mapped: Option<Mapped>,
+    running: Option<Box<dyn BackgroundTask>>,
+    mapped: Option<PartialMap>,
     problem: Option<String>,
-    which: Which,
+    which: ShownError,
     scale: f32,
     /// The axis that is fixed, and at which of its values.
     slice: Option<(usize, usize)>,
@@ -131,8 +131,8 @@ impl Default for MapPanel {
             running: None,
             mapped: None,
             problem: None,
-            which: Which::default(),
-            scale: FIRST_SCALE,
+            which: ShownError::default(),
+            scale: INITIAL_SCALE,
             slice: None,
             shown: false,
         }
@@ -146,7 +146,7 @@ impl MapPanel {
             (self.problem, self.slice) = (None, None);
             self.running = host.start(Job::Map(task.clone()));
             match self.running {
-                Some(_) => self.mapped = Some(Mapped { task, axes: Vec::new(), points: Vec::new() }),
+                Some(_) => self.mapped = Some(PartialMap { task, axes: Vec::new(), points: Vec::new() }),
                 None => self.problem = Some("Maps cannot be computed here".to_owned()),
             }
         }
@@ -188,7 +188,7 @@ impl MapPanel {
         self.shown = true;
         let scene = player.pending();
         if self.scene != scene.name {
-            (self.scene, self.over) = (scene.name.clone(), at_first(&scene.machine));
+            (self.scene, self.over) = (scene.name.clone(), default_axes(&scene.machine));
         }
         ui.label("Over").on_hover_text(
             "One axis per line, all combined: a driven coordinate at which the drive is held, such as \
@@ -198,9 +198,9 @@ impl MapPanel {
             .on_hover_text("What varies, as in `jointplay map --over`")
             .accessible_name("Axes of the map");
         self.go_ui(ui, player);
-        reserved(ui, "map says", 2, |ui| self.state_ui(ui, player));
+        reserve_lines(ui, "map says", 2, |ui| self.state_ui(ui, player));
         ui.horizontal_wrapped(|ui| {
-            for which in Which::ALL {
+            for which in ShownError::ALL {
                 let mut name = which.name().to_owned();
                 name[..1].make_ascii_uppercase();
                 ui.selectable_value(&mut self.which, which, name).on_hover_text(which.help());
@@ -208,9 +208,11 @@ impl MapPanel {
         });
         ui.horizontal(|ui| {
             ui.label("Scale");
-            ui.add(Slider::new(&mut self.scale, SCALE).logarithmic(true).custom_formatter(|x, _| format!("×{x:.0}")))
-                .on_hover_text("Length of an arrow over that of the error")
-                .accessible_name("Scale of the arrows");
+            ui.add(
+                Slider::new(&mut self.scale, SCALE_RANGE).logarithmic(true).custom_formatter(|x, _| format!("×{x:.0}")),
+            )
+            .on_hover_text("Length of an arrow over that of the error")
+            .accessible_name("Scale of the arrows");
         });
         self.slice_ui(ui);
     }
@@ -226,7 +228,7 @@ impl MapPanel {
                     "Computes the error of the tip at every point in the background; the run is not affected",
                 )
             };
-            if ui.add(Button::new(name).min_size(vec2(GO, 0.0))).on_hover_text(help).clicked() {
+            if ui.add(Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0))).on_hover_text(help).clicked() {
                 if running {
                     (self.running, self.asked) = (None, None);
                 } else {
@@ -305,13 +307,13 @@ mod tests {
     use super::*;
     use crate::analysis::map::WorkspaceMap;
     use crate::analysis::task::perform;
-    use crate::app::{Dropped, OpenedFile};
+    use crate::app::{DroppedFile, OpenedFile};
     use crate::scene::Scene;
 
     /// Messages of a job that has already been computed.
     struct Done(std::vec::IntoIter<Message>);
 
-    impl Running for Done {
+    impl BackgroundTask for Done {
         fn poll(&mut self) -> Option<Message> {
             self.0.next()
         }
@@ -325,13 +327,13 @@ mod tests {
     struct AtOnce;
 
     impl Host for AtOnce {
-        fn read_dropped(&mut self, _files: Vec<Dropped>) {}
+        fn read_dropped(&mut self, _files: Vec<DroppedFile>) {}
 
         fn opened(&mut self) -> Option<Vec<OpenedFile>> {
             None
         }
 
-        fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+        fn start(&mut self, job: Job) -> Option<Box<dyn BackgroundTask>> {
             let mut messages = Vec::new();
             perform(&job, &mut || 0.0, &mut |message| {
                 messages.push(message);
@@ -355,15 +357,15 @@ mod tests {
             panel.shown = true;
             panel.take_cloud(&player).expect("the map is of this scene")
         };
-        for which in Which::ALL {
+        for which in ShownError::ALL {
             panel.which = which;
             let cloud = shown(&mut panel);
-            assert_eq!((cloud.arrows.len(), cloud.factor), (6, FIRST_SCALE));
+            assert_eq!((cloud.arrows.len(), cloud.factor), (6, INITIAL_SCALE));
             for (point, [tip, error]) in cloud.arrows.iter().enumerate() {
                 let own = map.point(point).expect("a pose");
                 let expected = match which {
-                    Which::Largest => own.largest.and_then(|largest| largest.error).expect("an error"),
-                    Which::Settled => own.settled.expect("a position of rest"),
+                    ShownError::Largest => own.largest.and_then(|largest| largest.error).expect("an error"),
+                    ShownError::Settled => own.settled.expect("a position of rest"),
                 };
                 assert_eq!((*tip, *error), (to_f32(&own.ideal_tip), to_f32(&expected)));
             }
@@ -384,11 +386,11 @@ mod tests {
     #[test]
     fn axes_at_first_are_positions_of_the_first_drives() {
         let scene = Scene::load("hexapod", &[]).expect("built in");
-        let over: Vec<String> = at_first(&scene.machine).lines().map(str::to_owned).collect();
-        assert_eq!(over.len(), MOST_DRIVES);
+        let over: Vec<String> = default_axes(&scene.machine).lines().map(str::to_owned).collect();
+        assert_eq!(over.len(), MAX_DRIVES);
         let map = WorkspaceMap::new(scene, &over, 2).expect("it reads them");
         assert!(map.point(0).is_ok() && map.point(62).is_ok());
         let crank = Scene::load("four-bar", &[]).expect("built in");
-        assert!(at_first(&crank.machine).ends_with("deg:24"), "{}", at_first(&crank.machine));
+        assert!(default_axes(&crank.machine).ends_with("deg:24"), "{}", default_axes(&crank.machine));
     }
 }

@@ -11,11 +11,11 @@ use crate::app::App;
 use crate::session::link::{NOT_A_PAGE_ADDRESS, is_page_address};
 
 /// Quiet zone around a code, modules.
-const QUIET: i32 = 4;
+const QUIET_ZONE: i32 = 4;
 /// Largest version, 117 modules a side; cameras cannot resolve larger codes on a screen.
-const LARGEST: u8 = 25;
+const MAX_VERSION: u8 = 25;
 /// Largest number of characters in a code of that version.
-const MOST: usize = 1273;
+const MAX_CHARACTERS: usize = 1273;
 
 /// A QR code.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub struct Code {
 }
 
 /// Whether other devices can reach the page at `address`, i.e. it is not a local address.
-fn is_found_by_others(address: &str) -> bool {
+fn is_publicly_reachable(address: &str) -> bool {
     let Some((scheme, rest)) = address.split_once("://") else {
         return false;
     };
@@ -46,11 +46,11 @@ fn is_found_by_others(address: &str) -> bool {
 /// The link is too long, as a message.
 fn encode(link: &str) -> Result<Code, String> {
     let segments = [QrSegment::make_bytes(link.as_bytes())];
-    let (low, any, largest) = (QrCodeEcc::Low, Version::MIN, Version::new(LARGEST));
+    let (low, any, largest) = (QrCodeEcc::Low, Version::MIN, Version::new(MAX_VERSION));
     let code = QrCode::encode_segments_advanced(&segments, low, any, largest, None, true);
     let code = code.map_err(|_| {
         format!(
-            "The link has {} characters, and {MOST} fit into a QR code that a camera reads from a screen. Copy the link \
+            "The link has {} characters, and {MAX_CHARACTERS} fit into a QR code that a camera reads from a screen. Copy the link \
              instead, or press R: without the changes made on the way it is shorter",
             link.len()
         )
@@ -76,7 +76,7 @@ pub struct SharedLink {
 
 impl SharedLink {
     fn new(fragment: String, page: String) -> Self {
-        let typed = !is_found_by_others(&page);
+        let typed = !is_publicly_reachable(&page);
         let mut shared = Self { fragment, page, typed, code: Err(String::new()) };
         shared.encode();
         shared
@@ -93,7 +93,7 @@ impl SharedLink {
     }
 
     /// Whether the user can edit the address.
-    pub fn is_typed(&self) -> bool {
+    pub fn is_editable(&self) -> bool {
         self.typed
     }
 
@@ -107,7 +107,7 @@ impl SharedLink {
         self.code = match page {
             "" => Err("No QR code without an address: a phone could not open it".to_owned()),
             _ if !self.can_be_copied() => Err(format!("{page}: {NOT_A_PAGE_ADDRESS}")),
-            _ if !is_found_by_others(page) => Err(format!("No QR code: other devices cannot reach {page}")),
+            _ if !is_publicly_reachable(page) => Err(format!("No QR code: other devices cannot reach {page}")),
             _ => encode(&self.link()),
         };
     }
@@ -174,7 +174,7 @@ pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, most: f32) -> bool {
 /// Draws dark on light in every theme, with whole pixels per module, at most `side` points large.
 fn draw(ui: &mut Ui, code: &Code, side: f32) {
     let pixels = ui.pixels_per_point();
-    let across = code.size + 2 * QUIET;
+    let across = code.size + 2 * QUIET_ZONE;
     let module = (side * pixels / across as f32).floor().max(1.0) / pixels;
     let (room, _) = ui.allocate_exact_size(Vec2::splat(side), Sense::hover());
     let whole = Vec2::splat(across as f32 * module);
@@ -185,7 +185,7 @@ fn draw(ui: &mut Ui, code: &Code, side: f32) {
     let mut mesh = Mesh::default();
     mesh.add_colored_rect(Rect::from_min_size(corner, whole), Color32::WHITE);
     for [x, y] in &code.dark {
-        let at = corner + vec2((x + QUIET) as f32, (y + QUIET) as f32) * module;
+        let at = corner + vec2((x + QUIET_ZONE) as f32, (y + QUIET_ZONE) as f32) * module;
         mesh.add_colored_rect(Rect::from_min_size(at, Vec2::splat(module)), Color32::BLACK);
     }
     ui.painter().add(Shape::mesh(mesh));
@@ -200,7 +200,7 @@ mod tests {
         for address in
             ["http://192.168.0.7:8420/", "https://example.org/lab/", "http://[2001:db8::1]:8420/", "http://room.local/"]
         {
-            assert!(is_found_by_others(address), "{address}");
+            assert!(is_publicly_reachable(address), "{address}");
         }
         for address in [
             "",
@@ -210,15 +210,15 @@ mod tests {
             "http://127.0.0.1:8420/page/",
             "http://[::1]:8420/",
         ] {
-            assert!(!is_found_by_others(address), "{address}");
+            assert!(!is_publicly_reachable(address), "{address}");
         }
     }
 
     #[test]
     fn a_link_fits_up_to_the_length_that_the_message_names() {
         let link = |length: usize| format!("https://example.org/#{}", "x".repeat(length - 21));
-        assert_eq!(encode(&link(MOST)).expect("fits").size, 117);
-        let error = encode(&link(MOST + 1)).expect_err("too long");
+        assert_eq!(encode(&link(MAX_CHARACTERS)).expect("fits").size, 117);
+        let error = encode(&link(MAX_CHARACTERS + 1)).expect_err("too long");
         assert!(error.contains("1274 characters, and 1273 fit"), "{error}");
         assert!(encode(&link(200)).expect("fits").size < 60);
     }

@@ -12,7 +12,7 @@ use crate::app::{App, CameraPose};
 use crate::view::{ScenePart, ViewOptions};
 
 /// All settings that a lesson changes.
-pub struct WindowBefore {
+pub struct PreviousWindow {
     /// Whether controls, plots and bench were shown.
     panels: [bool; 3],
     sheet: Option<Sheet>,
@@ -40,7 +40,7 @@ impl App {
             return;
         }
         self.bench.show_costs(false);
-        self.before_lesson = Some(Box::new(WindowBefore {
+        self.before_lesson = Some(Box::new(PreviousWindow {
             panels: [self.show_controls, self.show_plots, self.show_bench],
             sheet: self.sheet,
             plots: self.plots.choice(),
@@ -69,7 +69,7 @@ impl App {
     }
 
     /// Restores the window from before `lesson`. A machine opened meanwhile that does not belong to the lesson stays.
-    pub(super) fn give_back_window(&mut self, lesson: &Lesson) {
+    pub(super) fn restore_window(&mut self, lesson: &Lesson) {
         let Some(before) = self.before_lesson.take() else {
             return;
         };

@@ -16,13 +16,13 @@ use crate::units::Dimension;
 use crate::view::Preset;
 
 /// Limits on steps, measures, and choices of a question.
-const MOST_STEPS: usize = 40;
-const MOST_MEASURES: usize = 100;
-const MOST_CHOICES: usize = 6;
+const MAX_STEPS: usize = 40;
+const MAX_MEASURES: usize = 100;
+const MAX_CHOICES: usize = 6;
 
 /// Default end and start of the measures of a run.
-const END: &str = "120 s";
-const START: &str = "0 s";
+const DEFAULT_END: &str = "120 s";
+const DEFAULT_START: &str = "0 s";
 
 /// A parsed lesson.
 #[derive(Clone, Debug)]
@@ -77,7 +77,7 @@ pub enum Kind {
         /// Number of the impact, from 1.
         number: usize,
         /// The property.
-        its: Its,
+        its: ImpactProperty,
     },
     /// Number of finished impacts of a ball joint, or of all joints for `any`.
     Count {
@@ -101,10 +101,10 @@ impl Kind {
     pub fn dimension(&self) -> Dimension {
         match self {
             Self::Impact { its, .. } => match its {
-                Its::Start | Its::End | Its::Duration => Dimension::Time,
-                Its::Approach | Its::Rebound => Dimension::Speed,
-                Its::Force => Dimension::Force,
-                Its::Depth => Dimension::Length,
+                ImpactProperty::Start | ImpactProperty::End | ImpactProperty::Duration => Dimension::Time,
+                ImpactProperty::Approach | ImpactProperty::Rebound => Dimension::Speed,
+                ImpactProperty::Force => Dimension::Force,
+                ImpactProperty::Depth => Dimension::Length,
             },
             Self::Instant => Dimension::Time,
             _ => Dimension::None,
@@ -132,7 +132,7 @@ impl Kind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[allow(missing_docs)]
-pub enum Its {
+pub enum ImpactProperty {
     Start,
     End,
     Duration,
@@ -156,7 +156,7 @@ pub struct Step {
     /// Its other settings, as a link.
     pub link: Link,
     /// Camera target.
-    pub view: Option<Look>,
+    pub view: Option<CameraTarget>,
     /// Open panels; `None` leaves them unchanged.
     pub open: Option<Vec<PanelName>>,
     /// Whether a twin run starts with the step.
@@ -175,7 +175,7 @@ pub struct Step {
 
 /// Camera target of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Look {
+pub enum CameraTarget {
     /// The whole scene from a point of view.
     From(Preset),
     /// A close-up of a ball joint, by its index.
@@ -228,7 +228,7 @@ struct MeasureRow {
     parameter: Option<String>,
     instant: Option<String>,
     impact: Option<usize>,
-    its: Option<Its>,
+    its: Option<ImpactProperty>,
     of: Option<String>,
     impacts: Option<String>,
     peak: Option<String>,
@@ -326,12 +326,12 @@ impl Lesson {
             SceneError::in_text(file, text, at, key_at(text, at), None, error.message())
         })?;
         let whole = || rows.scene.span();
-        if !(1..=MOST_STEPS).contains(&rows.step.len()) {
-            let message = format!("{} steps; allowed 1 to {MOST_STEPS}", rows.step.len());
+        if !(1..=MAX_STEPS).contains(&rows.step.len()) {
+            let message = format!("{} steps; allowed 1 to {MAX_STEPS}", rows.step.len());
             return Err(source.error(whole(), "step", message));
         }
-        if rows.measure.len() > MOST_MEASURES {
-            let message = format!("{} measures; allowed {MOST_MEASURES}", rows.measure.len());
+        if rows.measure.len() > MAX_MEASURES {
+            let message = format!("{} measures; allowed {MAX_MEASURES}", rows.measure.len());
             return Err(source.error(whole(), "measure", message));
         }
         let mut lesson = Self {
@@ -359,7 +359,7 @@ impl Lesson {
     pub fn names(&self) -> Names<'_> {
         let one = |measure: &Measure| Quantity::new(1.0, measure.kind.dimension());
         let all = self.measures.iter();
-        Names::to_come(all.map(|measure| (measure.name.as_str(), one(measure))).collect())
+        Names::unmeasured(all.map(|measure| (measure.name.as_str(), one(measure))).collect())
     }
 
     /// The last step up to `step` that starts a run; the machine is set for it.
@@ -447,8 +447,8 @@ impl Lesson {
         if let Some(question) = &row.question {
             let wrong = |message: String| source.error(question.span(), &key("question"), message);
             let count = question.get_ref().choices.len();
-            if !(2..=MOST_CHOICES).contains(&count) {
-                return Err(wrong(format!("{count} choices; allowed 2 to {MOST_CHOICES}")));
+            if !(2..=MAX_CHOICES).contains(&count) {
+                return Err(wrong(format!("{count} choices; allowed 2 to {MAX_CHOICES}")));
             }
             if row.until.is_none() {
                 return Err(wrong("needs `until`, the instant at which the answer is shown".to_owned()));
@@ -496,7 +496,7 @@ impl Lesson {
             impact.map(|number| Kind::Impact {
                 of: of.clone().unwrap_or_else(|| "any".to_owned()),
                 number,
-                its: its.unwrap_or(Its::Start),
+                its: its.unwrap_or(ImpactProperty::Start),
             }),
             impacts.map(|of| Kind::Count { of }),
             peak.map(Kind::Peak),
@@ -550,7 +550,7 @@ impl Lesson {
             name: name.to_owned(),
             run,
             kind: kind.clone(),
-            times: [or(from, START), or(at.or(twin).or(instant).or(to), END)],
+            times: [or(from, DEFAULT_START), or(at.or(twin).or(instant).or(to), DEFAULT_END)],
         })
     }
 
@@ -616,14 +616,14 @@ fn beside(scene: &str, file: Option<&str>) -> String {
 }
 
 /// Parses a camera target.
-fn look(word: &str, scene: &Scene) -> Result<Look, String> {
+fn look(word: &str, scene: &Scene) -> Result<CameraTarget, String> {
     let joints = || scene.machine.ball_joints.iter().map(|joint| &*joint.name);
     if let Some(joint) = joints().position(|name| name == word) {
-        return Ok(Look::At(joint));
+        return Ok(CameraTarget::At(joint));
     }
     let name = |preset: &Preset| preset.label().to_lowercase();
     let found = Preset::ALL.into_iter().find(|preset| name(preset) == word);
-    found.map(Look::From).ok_or_else(|| {
+    found.map(CameraTarget::From).ok_or_else(|| {
         let presets = Preset::ALL.iter().map(name);
         let known: Vec<String> = presets.chain(joints().map(str::to_owned)).collect();
         format!("no such view; allowed: {}", known.join(", "))

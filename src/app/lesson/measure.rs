@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::format::{Its, Kind, Lesson, Measure, Run};
+use super::format::{ImpactProperty, Kind, Lesson, Measure, Run};
 use super::names::{Names, parameter};
 use crate::app::twin::Twin;
 use crate::scene::LiveScene;
@@ -11,21 +11,21 @@ use crate::simulate::{Frame, Impact, Peak, Reading, channels_of, chosen_columns}
 use crate::units::Dimension;
 
 /// Latest measurable instant, s.
-const FARTHEST: f64 = 120.0;
+const MAX_TIME: f64 = 120.0;
 /// An impact that begins before another may end at most this much later, s.
-const OVERLAP: f64 = 5e-3;
+const MAX_OVERLAP: f64 = 5e-3;
 /// Sampling intervals per step.
 const SAMPLES: u32 = 4;
 
 /// The measures of a lesson, computed incrementally.
-pub struct Measured {
+pub struct LessonMeasures {
     lesson: Arc<Lesson>,
     values: Vec<Option<Quantity>>,
-    pass: Option<Pass>,
+    pass: Option<MeasuringRun>,
     fault: Option<String>,
 }
 
-impl Measured {
+impl LessonMeasures {
     /// Starts with no values.
     pub fn new(lesson: Arc<Lesson>) -> Self {
         Self { values: vec![None; lesson.measures.len()], lesson, pass: None, fault: None }
@@ -71,10 +71,10 @@ impl Measured {
     }
 
     /// The next run: that of the first pending measure, with all measures of that run whose instants are known.
-    fn next_pass(&self) -> Result<Option<Pass>, String> {
+    fn next_pass(&self) -> Result<Option<MeasuringRun>, String> {
         let measures = self.lesson.measures.iter().enumerate();
         let open = measures.filter(|(index, _)| self.values[*index].is_none());
-        let mut pass: Option<Pass> = None;
+        let mut pass: Option<MeasuringRun> = None;
         let (mut run, mut waits) = (None, None);
         let names = self.names();
         for (index, measure) in open {
@@ -91,12 +91,13 @@ impl Measured {
             let wrong = |why: String| format!("measure {}: {why}", measure.name);
             let pass = match &mut pass {
                 Some(pass) => pass,
-                none => none.insert(Pass::new(&self.lesson.runs[own]).map_err(wrong)?),
+                none => none.insert(MeasuringRun::new(&self.lesson.runs[own]).map_err(wrong)?),
             };
             let gauge = pass.gauge(measure, from, to).map_err(wrong)?;
             // A run has one twin at a time; a twin with another start waits for a later pass.
-            let of_other_twin = |(_, other): &(usize, Gauge)| other.is_apart() && other.from != from;
-            if gauge.is_apart() && pass.gauges.iter().any(of_other_twin) {
+            let of_other_twin =
+                |(_, other): &(usize, RunningMeasure)| other.measures_twin_distance() && other.from != from;
+            if gauge.measures_twin_distance() && pass.gauges.iter().any(of_other_twin) {
                 continue;
             }
             pass.gauges.push((index, gauge));
@@ -109,11 +110,11 @@ impl Measured {
 }
 
 /// A run in progress.
-struct Pass {
+struct MeasuringRun {
     simulation: LiveScene,
     changes: Vec<(f64, String, String)>,
     scene: Scene,
-    gauges: Vec<(usize, Gauge)>,
+    gauges: Vec<(usize, RunningMeasure)>,
     frame: Frame,
     impacts: Vec<Impact>,
     peaks: Vec<Peak>,
@@ -121,7 +122,7 @@ struct Pass {
 }
 
 /// A measure in progress.
-struct Gauge {
+struct RunningMeasure {
     kind: Kind,
     joint: Option<usize>,
     readings: Vec<Reading>,
@@ -133,14 +134,14 @@ struct Gauge {
     value: Option<Quantity>,
 }
 
-impl Gauge {
+impl RunningMeasure {
     /// Whether it measures the distance of a twin run.
-    fn is_apart(&self) -> bool {
+    fn measures_twin_distance(&self) -> bool {
         matches!(self.kind, Kind::Apart)
     }
 }
 
-impl Pass {
+impl MeasuringRun {
     fn new(run: &Run) -> Result<Self, String> {
         let simulation = LiveScene::new(&run.scene).map_err(|error| run.scene.locate(&error).to_string())?;
         Ok(Self {
@@ -155,9 +156,9 @@ impl Pass {
         })
     }
 
-    fn gauge(&mut self, measure: &Measure, from: f64, to: f64) -> Result<Gauge, String> {
-        if to > FARTHEST {
-            return Err(format!("ends at {to} s; allowed up to {FARTHEST} s"));
+    fn gauge(&mut self, measure: &Measure, from: f64, to: f64) -> Result<RunningMeasure, String> {
+        if to > MAX_TIME {
+            return Err(format!("ends at {to} s; allowed up to {MAX_TIME} s"));
         }
         let over_stretch = matches!(measure.kind, Kind::Peak(_) | Kind::Least(_) | Kind::Mean(_));
         if over_stretch && from >= to {
@@ -168,7 +169,7 @@ impl Pass {
             None => None,
             Some(name) => Some(self.joint(name)?),
         };
-        let mut gauge = Gauge {
+        let mut gauge = RunningMeasure {
             dimension: kind.dimension(),
             joint,
             readings: Vec::new(),
@@ -236,14 +237,14 @@ impl Pass {
 
     fn step(&mut self) -> Result<(), String> {
         let now = self.simulation.time();
-        if now > FARTHEST {
-            return Err(format!("there is no such impact within {FARTHEST} s"));
+        if now > MAX_TIME {
+            return Err(format!("there is no such impact within {MAX_TIME} s"));
         }
         while let Some((_, key, value)) = self.changes.pop_if(|(time, ..)| *time <= now) {
             let done = self.simulation.set(&key, &value);
             done.map_err(|error| error.to_string())?;
         }
-        let apart = |(_, gauge): &(usize, Gauge)| gauge.is_apart() && gauge.from <= now;
+        let apart = |(_, gauge): &(usize, RunningMeasure)| gauge.measures_twin_distance() && gauge.from <= now;
         if self.twin.is_none() && self.gauges.iter().any(apart) {
             self.twin = Some(Twin::new(&self.simulation));
         }
@@ -262,7 +263,7 @@ impl Pass {
     }
 }
 
-impl Gauge {
+impl RunningMeasure {
     /// Evaluates the latest step.
     fn step(
         &mut self,
@@ -281,7 +282,7 @@ impl Gauge {
                 let mut known: Vec<&Impact> = impacts.iter().filter(own).collect();
                 known.sort_by(|a, b| a.start.total_cmp(&b.start));
                 if let Some(impact) = known.get(number - 1)
-                    && end > impact.end + OVERLAP
+                    && end > impact.end + MAX_OVERLAP
                 {
                     self.finish(its.of(impact));
                 }
@@ -345,7 +346,7 @@ impl Gauge {
     }
 }
 
-impl Its {
+impl ImpactProperty {
     fn of(self, impact: &Impact) -> f64 {
         match self {
             Self::Start => impact.start,

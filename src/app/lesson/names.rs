@@ -15,7 +15,7 @@ pub struct Names<'l> {
 
 impl<'l> Names<'l> {
     /// Starts with no measure known; `all` holds 1 of each dimension where that is known in advance.
-    pub fn to_come(all: Vec<(&'l str, Quantity)>) -> Self {
+    pub fn unmeasured(all: Vec<(&'l str, Quantity)>) -> Self {
         let known = Vec::new();
         Self { known, all }
     }

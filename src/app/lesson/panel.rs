@@ -6,22 +6,22 @@ use eframe::egui::{
 };
 
 use super::names::Names;
-use super::spots::Spots;
-use super::text::{self, Block, Face};
-use super::{Course, lesson_titles};
+use super::spots::ControlFinder;
+use super::text::{self, Block, SpanStyle};
+use super::{RunningLesson, lesson_titles};
 use crate::app::bench::Bench;
 use crate::app::{App, layout, spoken, theme};
 
 /// Height of a choice for mouse input, points.
-const LOW: f32 = 24.0;
+const CHOICE_HEIGHT: f32 = 24.0;
 /// Hidden height of a page above which a button to scroll appears, points.
-const MORE: f32 = 8.0;
+const MIN_HIDDEN: f32 = 8.0;
 /// Width beside the navigation buttons below which the step counter is abbreviated, points.
-const ROOM: f32 = 200.0;
+const MIN_COUNTER_WIDTH: f32 = 200.0;
 
 /// A request from the panel's buttons.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Asked {
+enum Request {
     Nothing,
     Turn(bool),
     More,
@@ -42,18 +42,18 @@ impl App {
 
     /// The whole panel.
     pub(in crate::app) fn lesson_ui(&mut self, ui: &mut Ui) {
-        let elsewhere = self.only_in_window(ui.ctx());
+        let elsewhere = self.item_outside_presentation(ui.ctx());
         let Some(course) = &mut self.course else {
             return;
         };
         spoken::landmark(ui, "Lesson");
-        let own = course.sets || course.is_own(&self.player);
+        let own = course.sets || course.is_run_of_step(&self.player);
         // A presentation screen is low in points but not operated by touch.
         let low = self.presentation.is_some() && !self.touched;
         let backwards = Layout::bottom_up(egui::Align::Min);
-        let asked = ui
+        let request = ui
             .with_layout(backwards, |ui| {
-                let asked = buttons(ui, course);
+                let request = buttons(ui, course);
                 ui.with_layout(Layout::top_down(egui::Align::Min), |ui| {
                     let id = (course.lesson.name.clone(), course.step);
                     let page = ScrollArea::vertical().id_salt(id).auto_shrink(false);
@@ -61,10 +61,10 @@ impl App {
                         // Space for the scroll bar.
                         ui.set_max_width(ui.available_width() - 10.0);
                         if low {
-                            ui.spacing_mut().interact_size.y = LOW;
-                            ui.spacing_mut().icon_width = LOW - 8.0;
+                            ui.spacing_mut().interact_size.y = CHOICE_HEIGHT;
+                            ui.spacing_mut().icon_width = CHOICE_HEIGHT - 8.0;
                         }
-                        if asked == Asked::More {
+                        if request == Request::More {
                             // The last line of a page is repeated at the top of the next.
                             ui.scroll_with_delta(egui::vec2(0.0, 40.0 - ui.clip_rect().height()));
                         }
@@ -75,20 +75,20 @@ impl App {
                         set
                     });
                     let below = set.content_size.y - set.state.unclamped_offset().y - set.inner_rect.height();
-                    if course.more != (below > MORE) {
-                        course.more = below > MORE;
+                    if course.more != (below > MIN_HIDDEN) {
+                        course.more = below > MIN_HIDDEN;
                         ui.ctx().request_repaint();
                     }
-                    if set.inner { Asked::Set } else { asked }
+                    if set.inner { Request::Set } else { request }
                 })
                 .inner
             })
             .inner;
-        match asked {
-            Asked::Nothing | Asked::More => {}
-            Asked::Turn(forward) => self.turn_page(forward),
-            Asked::Set => self.set_step(),
-            Asked::Leave => self.leave_lesson(),
+        match request {
+            Request::Nothing | Request::More => {}
+            Request::Turn(forward) => self.change_step(forward),
+            Request::Set => self.set_step(),
+            Request::Leave => self.leave_lesson(),
         }
     }
 }
@@ -108,10 +108,10 @@ impl App {
     }
 
     /// The item the step refers to that the presentation does not show.
-    fn only_in_window(&self, ctx: &egui::Context) -> Option<String> {
+    fn item_outside_presentation(&self, ctx: &egui::Context) -> Option<String> {
         self.presentation.as_ref()?;
         let labels = self.pointed_controls();
-        let places = Spots::places(ctx, &labels);
+        let places = ControlFinder::places(ctx, &labels);
         let missing: Vec<String> =
             labels.into_iter().filter(|name| places.iter().all(|(own, _)| own != name)).collect();
         (!missing.is_empty()).then(|| format!("In the window (F5): {}", missing.join(", ")))
@@ -119,8 +119,8 @@ impl App {
 }
 
 /// Back, Next, progress, and Leave, at positions independent of the page.
-fn buttons(ui: &mut Ui, course: &Course) -> Asked {
-    let mut asked = Asked::Nothing;
+fn buttons(ui: &mut Ui, course: &RunningLesson) -> Request {
+    let mut request = Request::Nothing;
     let last = course.lesson.steps.len() - 1;
     ui.horizontal(|ui| {
         for (forward, name, help, possible) in [
@@ -129,26 +129,26 @@ fn buttons(ui: &mut Ui, course: &Course) -> Asked {
         ] {
             let button = ui.add_enabled(possible, Button::new(name)).on_hover_text(help);
             if button.clicked() {
-                asked = Asked::Turn(forward);
+                request = Request::Turn(forward);
             }
         }
         let count = format!("{} of {}", course.step + 1, last + 1);
-        ui.label(if course.more && ui.available_width() < ROOM { count } else { format!("Step {count}") });
+        ui.label(if course.more && ui.available_width() < MIN_COUNTER_WIDTH { count } else { format!("Step {count}") });
         ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
             let help = "Ends the lesson and restores the window as it was before";
             let leave = ui.button("End").on_hover_text(help);
             if leave.accessible_name("Leave the lesson").clicked() {
-                asked = Asked::Leave;
+                request = Request::Leave;
             }
             if course.more && ui.button("More").on_hover_text("Scroll down to the rest of the step").clicked() {
-                asked = Asked::More;
+                request = Request::More;
             }
         });
     });
-    asked
+    request
 }
 
-impl Course {
+impl RunningLesson {
     /// Title, text, question and answer of the step; returns whether to reset the machine. `own`: it runs as set by the step.
     fn page(&mut self, ui: &mut Ui, own: bool) -> bool {
         let lesson = self.lesson.clone();
@@ -164,7 +164,7 @@ impl Course {
             prose(ui, &step.text, &names);
         }
         if let Some(question) = &step.question {
-            theme::tighten(ui);
+            theme::use_dense_rows(ui);
             let (right, names) = (self.right(), self.measured.names());
             let shows = self.reached && own;
             let mut predicted = self.predicted;
@@ -254,10 +254,10 @@ fn paragraph(ui: &mut Ui, block: &Block) {
     for piece in &block.pieces {
         let mut format = TextFormat::simple(body.clone(), plain);
         match piece.face {
-            Face::Plain => {}
-            Face::Emphasis => format.italics = true,
-            Face::Strong => format.color = strong,
-            Face::Code => {
+            SpanStyle::Plain => {}
+            SpanStyle::Emphasis => format.italics = true,
+            SpanStyle::Strong => format.color = strong,
+            SpanStyle::Code => {
                 format.font_id.family = FontFamily::Monospace;
                 format.background = ui.visuals().code_bg_color;
             }

@@ -7,12 +7,12 @@ use eframe::egui::{self, Rect, pos2};
 
 /// Records where the controls with these names were last drawn.
 #[derive(Default)]
-pub struct Spots {
+pub struct ControlFinder {
     wanted: Arc<[String]>,
     found: Vec<(String, Rect)>,
 }
 
-impl egui::Plugin for Spots {
+impl egui::Plugin for ControlFinder {
     fn debug_name(&self) -> &'static str {
         "places of the controls that a lesson points at"
     }
@@ -27,7 +27,7 @@ impl egui::Plugin for Spots {
     }
 }
 
-impl Spots {
+impl ControlFinder {
     /// Rectangles of the controls named in `wanted` in the previous frame; parts of one control, such as slider and field, are
     /// merged.
     pub fn places(ctx: &egui::Context, wanted: &[String]) -> Vec<(String, Rect)> {

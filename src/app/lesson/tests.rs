@@ -58,7 +58,7 @@ fn every_lesson_holds_what_it_says() {
         }
         assert!(lesson.steps.iter().filter(|step| step.question.is_some()).count() >= 2, "{name}");
         assert!(lesson.steps.iter().any(|step| !step.claims.is_empty()), "{name}");
-        Course::new(lesson, 0).examine().unwrap_or_else(|why| panic!("{why}"));
+        RunningLesson::new(lesson, 0).examine().unwrap_or_else(|why| panic!("{why}"));
         assert!(names.insert(name));
     }
     assert!(written_number("after 7.8 ms").is_some());
@@ -77,7 +77,7 @@ fn example() -> &'static str {
 fn the_example_of_the_page_holds_and_is_printed_with_its_values() {
     let lesson = Lesson::parse("own.toml", example(), Some("own.toml"));
     let lesson = lesson.unwrap_or_else(|error| panic!("{error}"));
-    let printed = Course::new(Arc::new(lesson), 0).print();
+    let printed = RunningLesson::new(Arc::new(lesson), 0).print();
     let printed = printed.unwrap_or_else(|why| panic!("{why}"));
     assert!(printed.contains("[x]  At twice the time"), "{printed}");
     assert!(printed.contains("larger by 0.3 mm"), "{printed}");
@@ -90,7 +90,7 @@ fn fault(old: &str, new: &str) -> String {
     let text = example().replacen(old, new, 1);
     match Lesson::parse("own.toml", &text, Some("own.toml")) {
         Err(error) => error.to_string(),
-        Ok(lesson) => Course::new(Arc::new(lesson), 0).examine().expect_err(new),
+        Ok(lesson) => RunningLesson::new(Arc::new(lesson), 0).examine().expect_err(new),
     }
 }
 
@@ -144,7 +144,7 @@ fn a_change_belongs_to_an_instant_and_is_measured_where_it_happens() {
         )
     };
     let lesson = Lesson::parse("own", &text("t=20ms"), None).expect("a lesson");
-    Course::new(Arc::new(lesson), 0).examine().unwrap_or_else(|why| panic!("{why}"));
+    RunningLesson::new(Arc::new(lesson), 0).examine().unwrap_or_else(|why| panic!("{why}"));
     let error = Lesson::parse("own", &text("t=20ms&log=AAAA"), None).expect_err("a log");
     assert!(error.to_string().contains("step 1.state"), "{error}");
 }

@@ -5,7 +5,7 @@ use crate::app::value;
 use crate::scene::{Quantity, evaluate};
 
 /// Placeholder for a pending value.
-const TO_COME: &str = "…";
+const PENDING: &str = "…";
 
 /// Significant digits of a value.
 const DIGITS: usize = 3;
@@ -32,17 +32,17 @@ const UNITS: [Units; 11] = [
 
 /// A run of text in one style.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Piece {
+pub struct TextSpan {
     /// The text.
     pub text: String,
     /// Its style.
-    pub face: Face,
+    pub face: SpanStyle,
 }
 
 /// Text style.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
-pub enum Face {
+pub enum SpanStyle {
     #[default]
     Plain,
     Emphasis,
@@ -56,7 +56,7 @@ pub struct Block {
     /// Whether it is a list item.
     pub entry: bool,
     /// Its text.
-    pub pieces: Vec<Piece>,
+    pub pieces: Vec<TextSpan>,
 }
 
 /// Parses paragraphs and list items (lines that begin with `- `), with `*emphasis*`, `**strong**` and `` `code` ``.
@@ -75,13 +75,14 @@ pub fn blocks(markdown: &str) -> Vec<Block> {
     blocks
 }
 
-fn pieces(line: &str) -> Vec<Piece> {
-    const MARKS: [(&str, Face); 3] = [("**", Face::Strong), ("*", Face::Emphasis), ("`", Face::Code)];
+fn pieces(line: &str) -> Vec<TextSpan> {
+    const MARKS: [(&str, SpanStyle); 3] =
+        [("**", SpanStyle::Strong), ("*", SpanStyle::Emphasis), ("`", SpanStyle::Code)];
     let (mut pieces, mut rest) = (Vec::new(), line);
     let mut push = |text: &str, face| {
         if !text.is_empty() {
             let text = text.to_owned();
-            pieces.push(Piece { text, face });
+            pieces.push(TextSpan { text, face });
         }
     };
     // An unpaired mark is literal.
@@ -96,12 +97,12 @@ fn pieces(line: &str) -> Vec<Piece> {
             from = at + 1;
             continue;
         };
-        push(&rest[..at], Face::Plain);
+        push(&rest[..at], SpanStyle::Plain);
         push(inside, face);
         rest = &rest[at + 2 * mark + inside.len()..];
         from = 0;
     }
-    push(rest, Face::Plain);
+    push(rest, SpanStyle::Plain);
     pieces
 }
 
@@ -132,7 +133,7 @@ pub fn fill(text: &str, names: &Names<'_>) -> Result<String, String> {
         match evaluate(expression, &names.known) {
             Ok(quantity) => words(quantity, unit).map_err(|why| format!("{{{inside}}}: {why}")),
             Err(_) => {
-                names.check(expression).map(|()| TO_COME.to_owned()).map_err(|why| format!("{{{inside}}}: {why}"))
+                names.check(expression).map(|()| PENDING.to_owned()).map_err(|why| format!("{{{inside}}}: {why}"))
             }
         }
     })
@@ -194,8 +195,8 @@ mod tests {
         let expected =
             [(false, "One two three four a*b."), (true, "first goes on"), (true, "second"), (false, "2 * 3 = 6")];
         assert_eq!(words, expected.map(|(entry, words)| (entry, words.to_owned())));
-        let faces: Vec<Face> = read[0].pieces.iter().map(|piece| piece.face).collect();
-        use Face::{Code, Emphasis, Plain, Strong};
+        let faces: Vec<SpanStyle> = read[0].pieces.iter().map(|piece| piece.face).collect();
+        use SpanStyle::{Code, Emphasis, Plain, Strong};
         assert_eq!(faces, [Plain, Emphasis, Plain, Strong, Plain, Code, Plain]);
     }
 

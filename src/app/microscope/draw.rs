@@ -3,7 +3,7 @@
 use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use glam::Vec3;
 
-use super::sight::{Patch, Sight};
+use super::sight::{ContactPatch, MagnifiedJoint};
 use crate::app::overlay::{colour, text};
 use crate::app::paths::Point;
 use crate::app::value;
@@ -11,18 +11,18 @@ use crate::scene::SignedAxis;
 use crate::view::{Palette, Theme, to_f32};
 
 /// Radius of the clearance circle, as a fraction of the picture's side.
-const CIRCLE: f32 = 0.39;
+const CIRCLE_RADIUS: f32 = 0.39;
 /// Radius of the ball-centre mark, points.
-const CENTRE: f32 = 4.5;
+const CENTRE_RADIUS: f32 = 4.5;
 /// Length of the arrow at the reference speed, points.
-const ARROW: f32 = 40.0;
+const ARROW_LENGTH: f32 = 40.0;
 /// Width and height of the words in the left corners of the sphere's picture, and room beside it for the scale, points.
-const WORDS: [f32; 2] = [86.0, 40.0];
-const SCALE: f32 = 34.0;
+const CORNER_TEXT: [f32; 2] = [86.0, 40.0];
+const SCALE_WIDTH: f32 = 34.0;
 /// Path points closer than this on the screen are merged, points.
-const APART: f32 = 0.8;
+const MIN_DISTANCE: f32 = 0.8;
 /// Least scale of the section, m; typical penetrations are some micrometres.
-const SHALLOWEST: f64 = 0.5e-6;
+const MIN_DEPTH_SCALE: f64 = 0.5e-6;
 
 /// Projection plane of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -103,11 +103,11 @@ pub struct Sheet<'a> {
     ink: Color32,
     faint: Color32,
     ground: Color32,
-    sight: &'a Sight,
+    sight: &'a MagnifiedJoint,
 }
 
 impl<'a> Sheet<'a> {
-    pub fn new(ui: &Ui, rect: Rect, sight: &'a Sight) -> Self {
+    pub fn new(ui: &Ui, rect: Rect, sight: &'a MagnifiedJoint) -> Self {
         let dark = ui.visuals().dark_mode;
         let theme = if dark { Theme::Dark } else { Theme::Light };
         let sheet = Self {
@@ -155,12 +155,12 @@ pub struct Circle {
 pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, speed: f64) -> Circle {
     let Sheet { painter, rect, palette, sight, .. } = sheet;
     let report = &sight.report;
-    let radius = CIRCLE * rect.size().min_elem();
+    let radius = CIRCLE_RADIUS * rect.size().min_elem();
     // To the right of the words in the left corners, as far as the scale in the right one permits.
-    let off = 0.5 * rect.height() - WORDS[1];
+    let off = 0.5 * rect.height() - CORNER_TEXT[1];
     let chord = (radius * radius - off * off).max(0.0).sqrt();
-    let most = (0.5 * rect.width() - radius - SCALE).max(0.0);
-    let shift = (WORDS[0] - (0.5 * rect.width() - chord)).clamp(0.0, most);
+    let most = (0.5 * rect.width() - radius - SCALE_WIDTH).max(0.0);
+    let shift = (CORNER_TEXT[0] - (0.5 * rect.width() - chord)).clamp(0.0, most);
     let circle = Circle { centre: rect.center() + vec2(shift, 0.0), radius };
     let clearance = report.clearance as f32;
     let scale = circle.radius / clearance;
@@ -189,7 +189,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     for point in path {
         let at = place(carrier * Vec3::from_array(point.position));
         if let Some(from) = before {
-            if from.distance(at) < APART {
+            if from.distance(at) < MIN_DISTANCE {
                 continue;
             }
             let share = ((point.time - start) / age) as f32;
@@ -215,21 +215,21 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     }
     let moving = colour(palette.friction);
     let velocity = to_f32(&sight.sliding.unwrap_or(sight.velocity));
-    let arrow = flat(velocity) * (ARROW / speed as f32);
+    let arrow = flat(velocity) * (ARROW_LENGTH / speed as f32);
     if arrow.length() > 2.0 {
         painter.arrow(here, arrow, Stroke::new(2.0, moving));
     }
     let fill = if touches { contact } else { sheet.ink };
-    painter.circle(here, CENTRE, fill, Stroke::new(1.5, sheet.ground));
+    painter.circle(here, CENTRE_RADIUS, fill, Stroke::new(1.5, sheet.ground));
 
     triad(sheet, axes);
     let bar = round_down(f64::from(clearance) * 0.9);
     let end = pos2(rect.right() - 10.0, rect.bottom() - 9.0);
     sheet.bar(end, bar as f32 * scale, &length(bar, 3));
     let ruler = pos2(rect.left() + 10.0, rect.top() + 12.0);
-    painter.arrow(ruler, vec2(ARROW, 0.0), Stroke::new(2.0, moving));
+    painter.arrow(ruler, vec2(ARROW_LENGTH, 0.0), Stroke::new(2.0, moving));
     let words = value::quantity(speed, "m/s", 3);
-    let beside = ruler + vec2(ARROW + 6.0, 0.0);
+    let beside = ruler + vec2(ARROW_LENGTH + 6.0, 0.0);
     sheet.words(beside, Align2::LEFT_CENTER, &words, moving);
     if path.len() > 1 {
         let words = format!("path of {}", value::quantity(now - start, "ms", 3));
@@ -257,9 +257,9 @@ fn triad(sheet: &Sheet<'_>, axes: [Vec3; 2]) {
 
 /// Section of the undeformed ball and wall around the contact point: the part below the wall line is the elastic penetration over
 /// the contact patch. Depths are exaggerated relative to widths by the displayed factor.
-pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
+pub fn section(sheet: &Sheet<'_>, patch: &ContactPatch) {
     let Sheet { painter, rect, palette, .. } = sheet;
-    let depth = round_up(1.1 * patch.penetration.max(patch.deepest).max(SHALLOWEST));
+    let depth = round_up(1.1 * patch.penetration.max(patch.deepest).max(MIN_DEPTH_SCALE));
     let radius = patch.effective_radius;
     let half = 1.3 * (2.0 * radius * depth).sqrt();
     let wide = f64::from(rect.width()) / (2.0 * half);

@@ -10,7 +10,7 @@ use crate::simulate::{ContactMode, Frame, Impact, JointReport};
 pub const IMPACTS: usize = 6;
 
 /// One ball joint at the displayed instant. SI units, world axes.
-pub struct Sight {
+pub struct MagnifiedJoint {
     /// Joint report of the step.
     pub report: JointReport,
     /// Axes of the socket's body as columns.
@@ -22,7 +22,7 @@ pub struct Sight {
     /// Sliding velocity of the ball as used by the friction law, m/s; `None` out of contact.
     pub sliding: Option<Vec3>,
     /// Geometry of the contact; `None` in an ideal joint.
-    pub patch: Option<Patch>,
+    pub patch: Option<ContactPatch>,
     /// The latest impact whose end is known.
     pub impact: Option<Impact>,
     /// Start of the path shown, s.
@@ -31,7 +31,7 @@ pub struct Sight {
 
 /// Ball and wall near the contact point: the gap grows as x²/(2 R) from there, where R is the effective radius.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Patch {
+pub struct ContactPatch {
     /// R = (r + c) r / c, m: 1/R is the difference of both curvatures.
     pub effective_radius: f64,
     /// Penetration delta, m; negative for a gap.
@@ -40,7 +40,7 @@ pub struct Patch {
     pub deepest: f64,
 }
 
-impl Patch {
+impl ContactPatch {
     /// Radius of the elastic contact patch by Hertz, a = sqrt(R delta), m; 0 out of contact.
     pub fn radius(&self) -> f64 {
         (self.effective_radius * self.penetration.max(0.0)).sqrt()
@@ -57,7 +57,7 @@ fn velocity_of(frame: &Frame, at: &Attachment) -> (Vec3, Vec3) {
     })
 }
 
-impl Sight {
+impl MagnifiedJoint {
     /// State of ball joint `joint`; `None` if the scene has no such joint.
     pub fn of(player: &Player, joint: usize) -> Option<Self> {
         let (frame, shown) = (player.frame(), player.pacer.shown());
@@ -81,7 +81,7 @@ impl Sight {
         let first = begun.nth(IMPACTS - 2);
         let since = first.map_or(f64::NEG_INFINITY, |impact| impact.start);
         let (radius, clearance) = (spec.contact.ball_radius, report.clearance);
-        let patch = (!ideal && clearance > 0.0).then(|| Patch {
+        let patch = (!ideal && clearance > 0.0).then(|| ContactPatch {
             effective_radius: (radius + clearance) * radius / clearance,
             penetration: report.penetration,
             deepest: impact.map_or(0.0, |impact| impact.deepest),
@@ -118,7 +118,7 @@ mod tests {
             let mut compared = 0;
             for _ in 0..4000 {
                 player.single_step();
-                let sight = Sight::of(&player, 0).expect("has a joint");
+                let sight = MagnifiedJoint::of(&player, 0).expect("has a joint");
                 let rate = sight.normal.map_or(0.0, |normal| normal.dot(&sight.velocity));
                 let reported = sight.report.penetration_rate;
                 assert!((rate - reported).abs() < 1e-12 + 1e-9 * sight.velocity.norm());
@@ -144,7 +144,7 @@ mod tests {
         let (mut before, mut ends) = (None, Vec::new());
         while ends.len() < 3 {
             player.single_step();
-            let sight = Sight::of(&player, 0).expect("has a joint");
+            let sight = MagnifiedJoint::of(&player, 0).expect("has a joint");
             if let Some(impact) = sight.impact.filter(|_| sight.impact != before) {
                 assert!(impact.end <= player.pacer.shown() && impact.joint == 0);
                 ends.push(impact);
@@ -158,11 +158,11 @@ mod tests {
         assert!((ends[0].achieved() - given).abs() < 1e-15 && ends[0].asked == 0.9);
         // Going back into an impact shows its recorded outcome.
         player.step_back();
-        assert_eq!(Sight::of(&player, 0).expect("has a joint").impact, Some(ends[2]));
+        assert_eq!(MagnifiedJoint::of(&player, 0).expect("has a joint").impact, Some(ends[2]));
         while player.pacer.shown() >= ends[2].start {
             player.step_back();
         }
-        let sight = Sight::of(&player, 0).expect("has a joint");
+        let sight = MagnifiedJoint::of(&player, 0).expect("has a joint");
         assert_eq!(sight.impact, Some(ends[1]));
         assert_eq!(sight.since, f64::NEG_INFINITY, "fewer than are shown");
     }
@@ -172,15 +172,15 @@ mod tests {
         // Hertz: F = 4/3 E* a³ / R, E* = E / (2 (1 - nu²)); the scene's law without damping is the same number.
         let player = player("spcmm", &[]);
         let contact = player.running().machine.ball_joints[0].contact;
-        let sight = Sight::of(&player, 0).expect("has a joint");
-        let patch = Patch { penetration: 3e-6, ..sight.patch.expect("has clearance") };
+        let sight = MagnifiedJoint::of(&player, 0).expect("has a joint");
+        let patch = ContactPatch { penetration: 3e-6, ..sight.patch.expect("has clearance") };
         let modulus = contact.youngs_modulus / (2.0 * (1.0 - contact.poisson_ratio.powi(2)));
         let force = 4.0 / 3.0 * modulus * patch.radius().powi(3) / patch.effective_radius;
         let law = Coefficients::new(&contact, contact.clearance);
         assert!((force / law.normal_force(3e-6, 0.0, 1.0) - 1.0).abs() < 1e-12);
         assert_eq!(patch.radius(), (patch.effective_radius * 3e-6).sqrt());
         let ideal = super::tests::player("spcmm", &[("contact.clearance", "0")]);
-        let sight = Sight::of(&ideal, 0).expect("has a joint");
+        let sight = MagnifiedJoint::of(&ideal, 0).expect("has a joint");
         assert!(sight.patch.is_none() && sight.normal.is_none() && sight.impact.is_none());
     }
 }

@@ -2,20 +2,20 @@
 
 use eframe::egui::{self, Align2, Button, Pos2, Rect, RichText, Shape, Stroke, TextStyle, Ui, vec2};
 
-use super::{GRAIN, Trace, value};
+use super::{ROUNDING, Trace, value};
 
 /// Shares of the recorded time in view, from its beginning: peaks that come within the first are cut, within the second they can be.
-const EARLY: [f64; 2] = [0.25, 0.5];
+const EARLY_FRACTIONS: [f64; 2] = [0.25, 0.5];
 /// Least ratio of such a peak to the largest later value.
-const TALL: f64 = 4.0;
+const MIN_PEAK_RATIO: f64 = 4.0;
 /// Padding of the note about the largest, points.
-const PAD: egui::Vec2 = vec2(5.0, 1.0);
+const NOTE_PADDING: egui::Vec2 = vec2(5.0, 1.0);
 /// Room for the note above the largest later value, as a factor of that value.
 const HEADROOM: f64 = 1.2;
 /// Least distance between two marks of a curve, points.
-const APART: f32 = 9.0;
+const MIN_MARK_DISTANCE: f32 = 9.0;
 /// Width and height of a mark, points.
-const MARK: egui::Vec2 = vec2(8.0, 7.0);
+const MARK_SIZE: egui::Vec2 = vec2(8.0, 7.0);
 
 /// First peaks far above all later values.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,9 +29,9 @@ pub struct Peaks {
 
 /// First peaks of `traces`, if they would flatten the rest.
 pub fn peaks<'a>(traces: impl Iterator<Item = &'a Trace> + Clone) -> Option<Peaks> {
-    EARLY.into_iter().find_map(|share| {
+    EARLY_FRACTIONS.into_iter().find_map(|share| {
         let (largest, later) = within(traces.clone(), share)?;
-        Some(Peaks { largest, later, brief: share == EARLY[0] })
+        Some(Peaks { largest, later, brief: share == EARLY_FRACTIONS[0] })
     })
 }
 
@@ -46,7 +46,7 @@ fn within<'a>(traces: impl Iterator<Item = &'a Trace> + Clone, share: f64) -> Op
         let part = if bin.to <= until { &mut early } else { &mut later };
         *part = part.max(bin.greatest);
     }
-    (early > TALL * later && later > GRAIN * early).then_some((early, later))
+    (early > MIN_PEAK_RATIO * later && later > ROUNDING * early).then_some((early, later))
 }
 
 impl Peaks {
@@ -61,11 +61,11 @@ pub fn mark(ui: &Ui, frame: Rect, trace: &Trace, most: f64, x: impl Fn(f64) -> f
     let mut last = f32::NEG_INFINITY;
     for bin in trace.bins.iter().filter(|bin| bin.greatest > most) {
         let tip = egui::pos2(x(0.5 * (bin.from + bin.to)), frame.top() + 1.0);
-        if tip.x - last < APART || !frame.x_range().contains(tip.x) {
+        if tip.x - last < MIN_MARK_DISTANCE || !frame.x_range().contains(tip.x) {
             continue;
         }
         last = tip.x;
-        let foot = |side: f32| -> Pos2 { tip + vec2(side * MARK.x, MARK.y) };
+        let foot = |side: f32| -> Pos2 { tip + vec2(side * MARK_SIZE.x, MARK_SIZE.y) };
         let edge = Stroke::new(1.0, ui.visuals().panel_fill);
         ui.painter().add(Shape::convex_polygon(vec![tip, foot(0.5), foot(-0.5)], trace.colour, edge));
     }
@@ -76,9 +76,9 @@ pub fn note(ui: &Ui, frame: Rect, peak: f64, unit: (&str, f64)) {
     let words = format!("Peak {} {} above", value::number(peak / unit.1, 3), unit.0);
     let ink = ui.visuals().strong_text_color();
     let words = ui.painter().layout_no_wrap(words, TextStyle::Small.resolve(ui.style()), ink);
-    let plate = Align2::RIGHT_TOP.align_size_within_rect(words.size() + 2.0 * PAD, frame.shrink(2.0));
+    let plate = Align2::RIGHT_TOP.align_size_within_rect(words.size() + 2.0 * NOTE_PADDING, frame.shrink(2.0));
     ui.painter().rect_filled(plate, 4.0, ui.visuals().widgets.inactive.weak_bg_fill);
-    ui.painter().galley(plate.min + PAD, words, ink);
+    ui.painter().galley(plate.min + NOTE_PADDING, words, ink);
 }
 
 /// The button that cuts first peaks in all plots, in the title of `plot`; `on`: whether they are cut. Returns whether it was clicked.

@@ -10,16 +10,16 @@ use crate::chart::{Axis, Chart, Colour, PALETTE, Series, Sheet};
 use crate::simulate::{Bin, PlotKind};
 
 /// Size of a chart, pixels, and its maximum number of instants; more would not be visible.
-const CHART: (u32, u32) = (520, 320);
-const INSTANTS: usize = 1000;
+const CHART_SIZE: (u32, u32) = (520, 320);
+const MAX_INSTANTS: usize = 1000;
 /// Charts side by side.
 const COLUMNS: usize = 2;
 /// Space for the legend and the line below the charts, pixels.
-const REST: u32 = 60;
+const FOOTER_HEIGHT: u32 = 60;
 /// Colour of clearance lines.
-const LEVEL: Colour = (150, 150, 150);
+const CLEARANCE_COLOUR: Colour = (150, 150, 150);
 /// PNG pixels per sheet pixel.
-const SHARP: f32 = 2.0;
+const PNG_SCALE: f32 = 2.0;
 
 /// File format of saved plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,7 +64,7 @@ impl App {
         let bytes = match format {
             PlotFormat::Pdf => sheet.pdf(),
             PlotFormat::Svg => sheet.svg().map(String::into_bytes),
-            PlotFormat::Png => sheet.png(SHARP),
+            PlotFormat::Png => sheet.png(PNG_SCALE),
         };
         let (_, _, ending, mime) = PlotFormat::ALL[format as usize];
         let name = format!("{}-plots.{ending}", self.file_stem());
@@ -78,13 +78,13 @@ impl App {
 impl Plots {
     /// The visible plots with their time range, and `note` below; `None` without plots.
     pub fn sheet(&self, player: &Player, note: String) -> Option<Sheet> {
-        let of_quantity = |quantity: &_| Panel::of_quantity(*quantity, player);
+        let of_quantity = |quantity: &_| Panel::for_quantity(*quantity, player);
         let mut panels: Vec<Panel<'_>> = self.chosen.iter().filter_map(of_quantity).collect();
-        panels.extend(self.picked.iter().flat_map(|name| Panel::of_pick(name, player)));
+        panels.extend(self.picked.iter().flat_map(|name| Panel::for_pick(name, player)));
         let charts: Vec<Chart> = panels.iter().map(|panel| self.chart(player, panel)).collect();
         let columns = COLUMNS.min(charts.len());
         let rows = charts.len().div_ceil(columns.max(1)) as u32;
-        let size = (CHART.0 * columns as u32, CHART.1 * rows + REST);
+        let size = (CHART_SIZE.0 * columns as u32, CHART_SIZE.1 * rows + FOOTER_HEIGHT);
         (!charts.is_empty()).then_some(Sheet { title: String::new(), charts, columns, size, note, apart: true })
     }
 
@@ -104,13 +104,14 @@ impl Plots {
         let mut bins: Vec<Bin> = Vec::new();
         let mut points = |channel: usize| {
             bins.clear();
-            player.bins(channel, from, to, INSTANTS, &mut bins);
+            player.bins(channel, from, to, MAX_INSTANTS, &mut bins);
             ends(&bins)
         };
         let mut series = Vec::new();
         if panel.kind == PlotKind::FromZeroWithClearances {
             for channel in player.clearances() {
-                let level = Series::line(if series.is_empty() { "clearance" } else { "" }, points(channel), LEVEL);
+                let level =
+                    Series::line(if series.is_empty() { "clearance" } else { "" }, points(channel), CLEARANCE_COLOUR);
                 let closed = level.points.iter().all(|(_, value)| *value <= 0.0);
                 if !closed && !series.iter().any(|other: &Series| other.points == level.points) {
                     series.push(level);
@@ -119,7 +120,7 @@ impl Plots {
         }
         if panel.kind != PlotKind::Bands {
             for kept in self.comparison.shown() {
-                let traces = before(kept, player, panel, &self.hidden, false, (from, to, INSTANTS));
+                let traces = before(kept, player, panel, &self.hidden, false, (from, to, MAX_INSTANTS));
                 for (index, trace) in traces.iter().enumerate() {
                     let [r, g, b, _] = trace.colour.to_array();
                     let label = if index == 0 { kept.name() } else { String::new() };

@@ -16,7 +16,7 @@ use crate::simulate::{Frame, Peak};
 use crate::view::{PeakMarks, ViewOptions};
 
 /// Frame names have five digits.
-const MOST_FRAMES: f64 = 100_000.0;
+const MAX_FRAMES: f64 = 100_000.0;
 
 /// When to draw, and how much viewing time passes between two pictures.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,9 +39,9 @@ impl Times {
         let rate = fps * arguments.slow;
         // Both ends count; the factor keeps a whole number of frames whole despite rounding.
         let last = (duration * rate * (1.0 + 1e-9)).floor();
-        if last >= MOST_FRAMES {
+        if last >= MAX_FRAMES {
             return Err(Failure::usage(format!(
-                "{} frames are more than the limit of {MOST_FRAMES}; choose a lower --fps, a lower --slow or a shorter \
+                "{} frames are more than the limit of {MAX_FRAMES}; choose a lower --fps, a lower --slow or a shorter \
                  --duration",
                 last + 1.0
             )));

@@ -212,14 +212,14 @@ fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
 }
 
 /// Smallest exponent plotted, 1/s: the smallest clearances would squeeze all others against 0.
-const LEAST_EXPONENT: f64 = -10.0;
+const MIN_EXPONENT: f64 = -10.0;
 
 fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
     let data = found.cold(series);
     let points = &data.points;
     let (kept, discard) = (data.sweep.layout().kept(), data.plan.discard);
     let running = data.values("exponent_running_per_s");
-    let legible: Vec<usize> = (0..points.len()).filter(|&k| points[k].exponent.0 > LEAST_EXPONENT).collect();
+    let legible: Vec<usize> = (0..points.len()).filter(|&k| points[k].exponent.0 > MIN_EXPONENT).collect();
     let chosen = 5.min(legible.len());
     let convergence = (0..chosen).map(|n| {
         let k = legible[n * (legible.len() - 1) / (chosen - 1).max(1)];
@@ -229,7 +229,7 @@ fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
     });
     let most = points.iter().map(|p| p.exponent.0).fold(0.0, f64::max);
     let exponents = |title: &str, x: Axis, lines: Vec<Curve>| {
-        let range = Some((LEAST_EXPONENT, 1.1 * most + 1.0));
+        let range = Some((MIN_EXPONENT, 1.1 * most + 1.0));
         let y = Axis { range, ..Axis::new("Largest Lyapunov exponent", "1/s") };
         let zero = Level { y: 0.0, text: "chaos lies above".to_owned() };
         Chart { levels: vec![zero], ..Chart::new(title, x, y, lines) }

@@ -9,14 +9,14 @@ const WIDTH: u32 = 560;
 const FRAME: u32 = 170;
 const ROW: u32 = 34;
 /// Largest number of parameters drawn: those with the largest effects.
-const MOST: usize = 20;
+const MAX_BARS: usize = 20;
 
 /// Space above and below the parameters, in rows.
 const MARGIN: f64 = 0.5;
 /// Width of a bar and of one of two side by side, pixels; how far the latter lie from the middle, in rows.
 const BAR: f64 = 20.0;
 const HALF: f64 = 10.0;
-const ASIDE: f64 = 0.5 * HALF / ROW as f64;
+const BAR_OFFSET: f64 = 0.5 * HALF / ROW as f64;
 /// Colour and meaning of the bars of the tornado.
 const ENDS: [(Colour, &str); 2] = [(PALETTE[1], "lower end of the range"), (PALETTE[5], "upper end")];
 
@@ -24,7 +24,7 @@ const ENDS: [(Colour, &str); 2] = [(PALETTE[1], "lower end of the range"), (PALE
 pub fn sheet(study: &Study, found: &Sensitivity) -> Sheet {
     let outputs = study.outputs().len();
     let mut charts = Vec::new();
-    let drawn = study.inputs().len().min(MOST) as u32;
+    let drawn = study.inputs().len().min(MAX_BARS) as u32;
     let with_indices = found.indices.iter().any(|indices| matches!(indices, Some(Ok(_))));
     for o in 0..outputs {
         let order = order(found, o);
@@ -54,7 +54,7 @@ fn order(found: &Sensitivity, o: usize) -> Vec<usize> {
     };
     let mut order: Vec<usize> = (0..found.alone.ends.len()).collect();
     order.sort_by(|&a, &b| spread(b).total_cmp(&spread(a)));
-    order.truncate(MOST);
+    order.truncate(MAX_BARS);
     order
 }
 
@@ -68,7 +68,7 @@ fn tornado(study: &Study, found: &Sensitivity, o: usize, order: &[usize]) -> Cha
         let ends = found.alone.ends[i].each_ref().map(|(_, outputs)| scaled(outputs[o]));
         let apart = (ends[0] - nominal) * (ends[1] - nominal) < 0.0;
         for ((end, side), (colour, label)) in ends.into_iter().zip([1.0, -1.0]).zip(ENDS) {
-            let (width, shift) = if apart { (BAR, 0.0) } else { (HALF, side * ASIDE) };
+            let (width, shift) = if apart { (BAR, 0.0) } else { (HALF, side * BAR_OFFSET) };
             let label = if rank == 0 { label } else { "" };
             series.push(Series::bar(label, (nominal, end), place(order, rank) + shift, width, colour));
         }
@@ -91,7 +91,7 @@ fn indices(study: &Study, found: &Sensitivity, o: usize, order: &[usize]) -> Cha
             for (estimate, colour, label, side) in
                 [(&indices.first[at], PALETTE[1], "first-order", 1.0), (&indices.total[at], PALETTE[5], "total", -1.0)]
             {
-                let y = place(order, rank) + side * ASIDE;
+                let y = place(order, rank) + side * BAR_OFFSET;
                 let label = if labelled { "" } else { label };
                 series.push(Series::bar(label, (0.0, estimate.value), y, HALF, colour));
                 let interval = vec![(estimate.low, y), (estimate.high, y)];

@@ -16,7 +16,7 @@ use crate::units::format_quantity_digits;
 const DIGITS: usize = 4;
 /// Of the largest of several differences, and of any number.
 const DISTINCT: usize = 3;
-const MOST_DIGITS: usize = 9;
+const MAX_DIGITS: usize = 9;
 /// PNG pixels per pixel of a chart.
 const PNG_SCALE: f32 = 2.0;
 
@@ -36,7 +36,7 @@ pub fn digits_apart(nominal: f64, values: impl Iterator<Item = f64>) -> usize {
     let distance = |value: f64| (value - nominal).abs();
     let largest = values.filter(|value| value.is_finite()).map(distance).fold(0.0, f64::max);
     let lost = libm::log10(nominal.abs() / largest);
-    if lost.is_finite() { (lost.ceil().max(0.0) as usize + DISTINCT).clamp(DIGITS, MOST_DIGITS) } else { DIGITS }
+    if lost.is_finite() { (lost.ceil().max(0.0) as usize + DISTINCT).clamp(DIGITS, MAX_DIGITS) } else { DIGITS }
 }
 
 /// One of the values of `input`, with unit.

@@ -8,7 +8,7 @@ use crate::cli::output::significant;
 use crate::cli::tables::quoted;
 
 /// Largest number of values in memory, 64 MiB.
-const MOST_HELD: usize = 1 << 23;
+const MAX_VALUES_IN_MEMORY: usize = 1 << 23;
 
 /// Writes header and rows.
 ///
@@ -26,7 +26,7 @@ pub(super) fn write(
     let heads = starts.iter().take(1).map(|_| "start".to_owned()).chain(keys);
     let heads: Vec<String> = heads.chain(single.iter().map(|name| quoted(name))).collect();
     writeln!(out, "{}", heads.join(","))?;
-    let at_once = (MOST_HELD / single.len().max(1)).max(1);
+    let at_once = (MAX_VALUES_IN_MEMORY / single.len().max(1)).max(1);
     for first in (0..archive.count()).step_by(at_once) {
         let rows = first..(first + at_once).min(archive.count());
         let mut held = Vec::new();

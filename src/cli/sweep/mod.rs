@@ -33,7 +33,7 @@ use crate::analysis::axis::Axis;
 use crate::analysis::design::{Arrangement, FOLLOW_BLOCK};
 use crate::analysis::ideal_fault::{IdealFault, ideal_fault};
 use crate::analysis::layout::Status;
-use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Span};
+use crate::analysis::point::{MAX_EXPONENT_TOLERANCE, Span};
 use crate::analysis::regime::{MIN_SECTIONS, Regime};
 use crate::analysis::sweep::Sweep;
 use crate::machine::WarningKind;
@@ -223,11 +223,11 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
         ));
     }
     let solver = &sweep.scene().machine.solver;
-    let loose = solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
+    let loose = solver.method.is_adaptive() && solver.tolerance > MAX_EXPONENT_TOLERANCE * (1.0 + 1e-9);
     if loose && protocol.plan().is_some_and(|plan| plan.exponent) {
         all.push(format!(
             "solver.tolerance {:e}: at this tolerance the integration error is too large, so exponents and the \
-             regimes classified from them are unreliable; use {LOOSEST_FOR_EXPONENT:e} or less, or --no-exponent.",
+             regimes classified from them are unreliable; use {MAX_EXPONENT_TOLERANCE:e} or less, or --no-exponent.",
             solver.tolerance
         ));
     }

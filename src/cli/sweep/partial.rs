@@ -21,7 +21,7 @@ use crate::files::{open_or_create, remove_file};
 /// Magic number; its last character is the format version.
 const MAGIC: &[u8; 8] = b"JPSWEEP1";
 /// Size limit of the settings, bytes; longer ones are rejected as damaged.
-const LONGEST_SETTINGS: u64 = 1 << 20;
+const MAX_SETTINGS_SIZE: u64 = 1 << 20;
 
 /// The finished blocks of a sweep.
 pub struct Partial {
@@ -181,7 +181,7 @@ impl Partial {
             }));
         }
         let size = read_u64(&mut reader).map_err(cut)?;
-        if size > LONGEST_SETTINGS.min(length) {
+        if size > MAX_SETTINGS_SIZE.min(length) {
             return Err(self.damaged("its settings are too long"));
         }
         let mut text = vec![0; size as usize];

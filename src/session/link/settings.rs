@@ -6,11 +6,11 @@ use crate::units::{Dimension, parse_quantity};
 use crate::view::{ScenePart, WearMap};
 
 /// Longest window of the plots that a link may request, s.
-const LONGEST_WINDOW: f64 = 1e4;
+const MAX_PLOT_WINDOW: f64 = 1e4;
 /// Shortest window, s.
-const SHORTEST_WINDOW: f64 = 1e-6;
+const MIN_PLOT_WINDOW: f64 = 1e-6;
 /// Length limit of a channel's name or of a pattern, bytes.
-const LONGEST_NAME: usize = 120;
+const MAX_NAME_LENGTH: usize = 120;
 
 const IDEAL: &str = "ideal";
 const MICROSCOPE: &str = "microscope.";
@@ -108,7 +108,7 @@ pub fn read_channels(text: &str) -> Result<Vec<String>, String> {
     let parts = text.split([',', ' ']).filter(|part| !part.is_empty());
     let mut names: Vec<String> = Vec::new();
     for part in parts.filter(|part| *part != "none") {
-        if part.len() > LONGEST_NAME || !part.chars().all(is_allowed) {
+        if part.len() > MAX_NAME_LENGTH || !part.chars().all(is_allowed) {
             return Err(
                 "no names of channels; allowed, separated by commas, are those that `jointplay check --channels` lists, with * for any \
                  characters and ? for one"
@@ -141,7 +141,7 @@ pub fn read_window(text: &str) -> Result<PlotWindow, String> {
         _ => {}
     }
     let length = parse_quantity(text, Dimension::Time).map_err(|error| error.to_string())?;
-    if (SHORTEST_WINDOW..=LONGEST_WINDOW).contains(&length) {
+    if (MIN_PLOT_WINDOW..=MAX_PLOT_WINDOW).contains(&length) {
         Ok(PlotWindow::Last(length))
     } else {
         Err("allowed automatic, everything, and 1 us to 10000 s".to_owned())

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{LONGEST_LINK, Link, LinkError, link_error, pack, unpack_within};
+use super::{Link, LinkError, MAX_LINK_LENGTH, link_error, pack, unpack_within};
 use crate::scene::Texts;
 
 /// Prefix of a stored link.
@@ -17,7 +17,7 @@ impl Link {
     /// otherwise a text that only [`Self::parse`] reads.
     pub fn to_storage_text(&self) -> String {
         let link = self.format();
-        if link.len() + RESERVED <= LONGEST_LINK && self.beside.is_empty() {
+        if link.len() + RESERVED <= MAX_LINK_LENGTH && self.beside.is_empty() {
             return link;
         }
         let files = self.beside.iter();

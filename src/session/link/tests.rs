@@ -225,14 +225,14 @@ fn errors_in_a_link_are_named() {
 
 #[test]
 fn a_decompression_bomb_is_refused() {
-    let zeros = "0".repeat(LARGEST_UNPACKED + 1);
+    let zeros = "0".repeat(MAX_UNPACKED_LINK + 1);
     let packed = pack(&zeros);
     assert!(packed.len() < 10_000);
     let error = Link::parse(&format!("text={packed}")).expect_err("too large");
     assert!(error.to_string().contains("does not unpack"));
     let long = |length: usize| format!("?scene={}", "x".repeat(length - "?scene=".len()));
-    assert!(Link::parse(&long(LONGEST_LINK)).is_ok());
-    let error = Link::parse(&long(LONGEST_LINK + 1)).expect_err("too long");
+    assert!(Link::parse(&long(MAX_LINK_LENGTH)).is_ok());
+    let error = Link::parse(&long(MAX_LINK_LENGTH + 1)).expect_err("too long");
     assert!(error.to_string().contains("allowed at most 32000"), "{error}");
 }
 
@@ -245,9 +245,9 @@ fn a_link_that_is_too_long_omits_the_run_or_is_refused() {
         let value = format!("{} mm", chance.unit());
         link.log.set(index, "contact.clearance", &value);
     }
-    assert!(link.format().len() > LONGEST_LINK);
+    assert!(link.format().len() > MAX_LINK_LENGTH);
     let (short, note) = link.format_short(&scene).expect("the start fits");
-    assert!(short.len() <= LONGEST_LINK && note.is_some());
+    assert!(short.len() <= MAX_LINK_LENGTH && note.is_some());
     let start = Link::parse(&short).expect("a link");
     assert_eq!(start.log.base, scene.changes);
     assert!(!start.has_instant() && start.hash.is_none());

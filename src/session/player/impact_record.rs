@@ -10,10 +10,10 @@ const MAX_IMPACTS: usize = 20_000;
 
 /// Time after its start for which the end of an impact is awaited, s. A longer contact, such as a ball coming to rest on its
 /// wall, has the peak of this time.
-pub const LONGEST_IMPACT: f64 = 10e-3;
+pub const MAX_IMPACT_DURATION: f64 = 10e-3;
 
 /// Number of latest impacts that are searched for the one that ended last.
-const SEARCHED: usize = 64;
+const MAX_SEARCHED: usize = 64;
 
 /// Relative rounding difference between the times of a record and of an impact.
 const ROUNDING: f64 = 1e-12;
@@ -140,7 +140,7 @@ impl ImpactRecord {
         *force_peak = ForcePeak { time: peak.time, force: peak.normal_force };
         let force_peak = *force_peak;
         let own = self.all.iter_mut().rev().find(|impact| impact.joint == joint);
-        if let Some(own) = own.filter(|own| force_peak.time <= own.start + LONGEST_IMPACT) {
+        if let Some(own) = own.filter(|own| force_peak.time <= own.start + MAX_IMPACT_DURATION) {
             own.force_peak = force_peak;
         }
     }
@@ -203,7 +203,7 @@ impl ImpactRecord {
     /// The impact that ended last, but not after `end`, s, among the latest that had begun by `time`, s.
     pub fn last_ended(&self, time: f64, end: f64) -> Option<&Impact> {
         let ended = self.latest(None, time).filter(|impact| impact.end <= end);
-        ended.take(SEARCHED).max_by(|a, b| a.end.total_cmp(&b.end))
+        ended.take(MAX_SEARCHED).max_by(|a, b| a.end.total_cmp(&b.end))
     }
 
     /// The impact in progress at `time`, s, of ball joint `joint`, or of any, once its peak is known; resting balls are
@@ -212,7 +212,7 @@ impl ImpactRecord {
         let touching = || {
             let own = self.numbered().rev().filter(move |(_, impact)| is_of(joint, impact));
             let touches = move |impact: &RecordedImpact| match impact.end {
-                end if end.is_infinite() => time <= impact.start + LONGEST_IMPACT,
+                end if end.is_infinite() => time <= impact.start + MAX_IMPACT_DURATION,
                 end => time <= end,
             };
             own.filter(move |(_, impact)| impact.has_begun(time) && touches(impact) && !self.may_still_peak(impact))
@@ -222,7 +222,7 @@ impl ImpactRecord {
 
     /// Whether `impact` may still reach its peak.
     fn may_still_peak(&self, impact: &RecordedImpact) -> bool {
-        impact.end.is_infinite() && self.latest_step[1] <= impact.start + LONGEST_IMPACT
+        impact.end.is_infinite() && self.latest_step[1] <= impact.start + MAX_IMPACT_DURATION
     }
 
     /// The first peak after `time`, s, of an impact of ball joint `joint`, or of any. `None` while an earlier one may still

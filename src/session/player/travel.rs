@@ -11,7 +11,7 @@ use crate::session::log::Event;
 use crate::simulate::{Bin, History};
 
 /// Most steps retraced before a past instant, so that the plots show its history in detail.
-const LEAD: u64 = 512;
+const MAX_RETRACED_STEPS: u64 = 512;
 
 /// Search horizon for the next impact, s.
 const SEARCH_HORIZON: f64 = 5.0;
@@ -247,7 +247,7 @@ impl Player {
             return self.restore(start, false);
         }
         let lead = seen - self.automatic_window();
-        let is_early_enough = |k: &Keyframe| k.state.time() <= lead || k.state.steps() + LEAD <= steps;
+        let is_early_enough = |k: &Keyframe| k.state.time() <= lead || k.state.steps() + MAX_RETRACED_STEPS <= steps;
         let first = self.keyframes.latest_regular(is_early_enough);
         let start = first.map_or(0.0, |k| k.state.time());
         self.restore(start, true);

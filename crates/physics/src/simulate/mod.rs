@@ -38,7 +38,7 @@ pub use crate::mechanism::Pull;
 use crate::mechanism::{Counts, MechanismError};
 
 /// The longest run, s: at its end a double still resolves 0.1 ns.
-pub const LONGEST_RUN: f64 = 1e6;
+pub const MAX_RUN_DURATION: f64 = 1e6;
 
 /// Error in starting a simulation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

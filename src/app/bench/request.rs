@@ -4,7 +4,7 @@ use crate::analysis::ready::ReadySweep;
 use crate::app::load::Load;
 
 /// A request of the user to the run.
-pub enum Asked {
+pub enum BenchRequest {
     /// Run to a section of a sweep.
     Section(Load),
     /// Start a ready sweep with its scene.
