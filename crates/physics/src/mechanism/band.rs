@@ -14,6 +14,10 @@ pub struct Band {
     columns: Vec<usize>,
     starts: Vec<usize>,
     diagonal: Vec<usize>,
+    /// Blocks that the elimination changes, in its order: for each pivot and each row i below it, the block of row i under the
+    /// pivot and those under the rest of the pivot's row. Index of the first of each pivot.
+    targets: Vec<usize>,
+    first_targets: Vec<usize>,
 }
 
 impl Band {
@@ -24,6 +28,8 @@ impl Band {
             columns: Vec::with_capacity(Self::max_blocks(size, bandwidth)),
             starts: Vec::with_capacity(size + 1),
             diagonal: Vec::with_capacity(size),
+            targets: Vec::with_capacity(size * bandwidth * (bandwidth + 1)),
+            first_targets: Vec::with_capacity(size),
             ..Self::default()
         }
     }
@@ -64,6 +70,18 @@ impl Band {
             self.columns.extend(after);
         }
         self.starts.push(self.columns.len());
+        self.targets.clear();
+        self.first_targets.clear();
+        for k in 0..size {
+            self.first_targets.push(self.targets.len());
+            for below in self.after(k) {
+                let i = self.columns[below];
+                // Row i has a block wherever row k has one.
+                for column in self.diagonal[k]..self.starts[k + 1] {
+                    self.targets.push(self.position(i, self.columns[column]));
+                }
+            }
+        }
     }
 
     /// Indices of the stored blocks of row `i`.
@@ -102,22 +120,18 @@ impl Band {
             let pivot = &mut blocks[self.diagonal[k]];
             let inverse = pivot.try_inverse().unwrap_or_else(|| Mat3::from_element(f64::NAN));
             *pivot = inverse;
-            for below in self.after(k) {
-                let i = self.columns[below];
+            let after = self.after(k);
+            let targets = self.targets[self.first_targets[k]..].chunks_exact(after.len() + 1);
+            for (&i, targets) in self.columns[after.clone()].iter().zip(targets) {
                 if is_unit(i) {
                     continue;
                 }
-                let (above, row) = blocks.split_at_mut(self.starts[i]);
-                let columns = &self.columns[self.row(i)];
-                // Row i has a block wherever row k has one.
-                let mut at = columns.iter().take_while(|&&j| j < k).count();
-                let factor = row[at] * inverse;
-                row[at] = factor;
-                for (&j, by) in self.columns[self.after(k)].iter().zip(&above[self.after(k)]) {
-                    while columns[at] != j {
-                        at += 1;
-                    }
-                    subtract_product(&mut row[at], &factor, by);
+                let start = self.starts[i];
+                let (above, row) = blocks.split_at_mut(start);
+                let factor = row[targets[0] - start] * inverse;
+                row[targets[0] - start] = factor;
+                for (&target, by) in targets[1..].iter().zip(&above[after.clone()]) {
+                    subtract_product(&mut row[target - start], &factor, by);
                 }
             }
         }

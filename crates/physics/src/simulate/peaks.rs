@@ -144,6 +144,17 @@ impl PenetrationCubic {
         if f1 >= f0 { (f1, 1.0) } else { (f0, 0.0) }
     }
 
+    /// Upper bound on the normal force over the step of a contact in the state `contact_state`, N. Penetration and rate stay below
+    /// the largest of their Bernstein coefficients, and the force grows with both.
+    pub(super) fn force_bound(&self, c: &Coefficients, contact_state: &ContactState) -> f64 {
+        let (p0, p1) = (self.start.penetration, self.end.penetration);
+        let (v0, v1) = (self.start.rate, self.end.rate);
+        let third = self.h / 3.0;
+        let penetration = p0.max(p1).max(p0 + v0 * third).max(p1 - v1 * third);
+        let rate = v0.max(v1).max((p1 - p0) / third - v0 - v1);
+        c.normal_force(penetration, rate, contact_state.approach(c, rate))
+    }
+
     /// Largest normal force over the step of a contact in the state `contact_state`, and where: (N, theta).
     pub(super) fn strongest(&self, c: &Coefficients, contact_state: &ContactState) -> (f64, f64) {
         let force = |theta: f64| {
@@ -182,7 +193,7 @@ impl PenetrationCubic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::Parameters;
+    use crate::contact::{ApproachSpeed, Parameters};
 
     #[test]
     fn the_peak_of_a_parabola_between_samples_is_found() {
@@ -190,6 +201,27 @@ mod tests {
         let mut recent = Recent::default();
         let peak = [0.1, 0.35, 0.7].map(|t| recent.push_and_find_peak(t, f(t)))[2];
         assert!((peak - 7.0).abs() < 1e-14, "{peak}");
+    }
+
+    #[test]
+    fn no_force_within_a_step_exceeds_its_bound() {
+        let end = |penetration, rate| Approach { penetration, rate, speed: 0.0 };
+        let ends = [end(-1e-6, 0.1), end(2e-6, 0.05), end(3e-6, 0.0), end(2e-6, -0.08), end(-1e-6, -0.1)];
+        for approach_speed in ApproachSpeed::ALL {
+            let c = Coefficients::new(&Parameters { approach_speed, ..Parameters::default() }, 3e-4);
+            let state = ContactState::at_onset(&c, 0.06);
+            for (start, end) in ends.iter().flat_map(|start| ends.iter().map(move |end| (*start, *end))) {
+                for h in [1e-6, 2e-5, 2e-4] {
+                    let cubic = PenetrationCubic::new(start, end, h);
+                    let bound = cubic.force_bound(&c, &state);
+                    for theta in (0..=100).map(|i| 0.01 * f64::from(i)) {
+                        let (p, v, _) = cubic.at(theta);
+                        let force = c.normal_force(p, v, state.approach(&c, v));
+                        assert!(force <= bound * (1.0 + 1e-12), "{approach_speed} {h} {theta}: {force} {bound}");
+                    }
+                }
+            }
+        }
     }
 
     #[test]

@@ -28,8 +28,8 @@ impl Run<'_> {
     }
 
     /// Finds the largest normal force of every joint in contact over the step just accepted, and its step fraction, from the
-    /// penetration cubic. A peak inside a located step is re-evaluated there: the cubic's rate, which sets the damping, differs
-    /// from that of the motion.
+    /// penetration cubic; no force where none can come near a peak so far. A peak inside a located step is re-evaluated there: the
+    /// cubic's rate, which sets the damping, differs from that of the motion.
     pub(super) fn find_peak_forces(&mut self, h: f64) {
         let located = self.locates();
         for j in 0..self.state.now.gaps.len() {
@@ -39,11 +39,15 @@ impl Run<'_> {
             }
             let cubic = PenetrationCubic::new(self.before.gaps[j], self.state.now.gaps[j], h);
             let c = *self.mechanism.contacts.coefficients(j);
+            let run_peak = self.state.record.statistics.peak_normal[j];
+            let least =
+                run_peak.min(self.state.record.peaks[j].normal).min(self.state.record.impacts.peak_under_way(j));
+            if cubic.force_bound(&c, &contact_state) <= least.min(NEAR_PEAK * run_peak) {
+                self.attempt.peak_forces[j] = (0.0, 1.0);
+                continue;
+            }
             let (force, theta) = cubic.strongest(&c, &contact_state);
             self.attempt.peak_forces[j] = (force, theta);
-            let least = self.state.record.statistics.peak_normal[j]
-                .min(self.state.record.peaks[j].normal)
-                .min(self.state.record.impacts.peak_under_way(j));
             if !located || theta <= 0.0 || theta >= 1.0 || force <= least {
                 continue;
             }
