@@ -5,15 +5,15 @@ use std::collections::BinaryHeap;
 
 use crate::yields::Estimate;
 
-/// Largest number of choices that a proof looks at; without an evaluation a choice costs nearly nothing.
+/// Largest number of choices that a proof visits. Visiting a choice without evaluating it is nearly free.
 const MAX_CHOICES: usize = 1 << 20;
 
-/// The yield that a choice of fits has to hold.
+/// The yield that a choice of fits must hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RequiredYield {
     /// Fraction of accepted units, above 0 and up to 1.
     pub fraction: f64,
-    /// Whether the lower end of the confidence interval must reach it, not only the estimate.
+    /// Whether the lower end of the confidence interval must reach the fraction, not only the estimate.
     pub with_confidence: bool,
 }
 
@@ -23,7 +23,7 @@ impl RequiredYield {
     }
 }
 
-/// Why there is no search.
+/// Reasons for rejecting a search.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitSearchError {
     /// No joints.
@@ -35,7 +35,7 @@ pub enum FitSearchError {
         /// Index of the joint.
         joint: usize,
     },
-    /// A cost that cannot be added up.
+    /// A cost that is negative or not finite.
     #[error("cost {cost} of candidate {candidate} of joint {joint}: a finite number of at least 0 is possible")]
     Cost {
         /// Index of the joint.
@@ -45,10 +45,10 @@ pub enum FitSearchError {
         /// The cost.
         cost: f64,
     },
-    /// A yield out of range.
+    /// A required yield out of range.
     #[error("required yield {fraction}: above 0 and up to 1 is possible")]
     Yield {
-        /// As given.
+        /// The given fraction.
         fraction: f64,
     },
     /// No evaluations allowed.
@@ -56,43 +56,43 @@ pub enum FitSearchError {
     NoEvaluations,
 }
 
-/// A candidate for each joint, with its cost and yield.
+/// One candidate for each joint, with their total cost and their yield.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitChoice {
     /// Index of the chosen candidate of each joint.
     pub candidates: Vec<usize>,
-    /// Sum of their costs.
+    /// Sum of the candidates' costs.
     pub cost: f64,
-    /// Their yield.
+    /// Estimated yield.
     pub estimate: Estimate,
 }
 
 /// Result of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitSearch {
-    /// The cheapest choice found that holds the yield; `None` if even the tightest fits do not.
+    /// The cheapest choice result that holds the yield; `None` if even the tightest fits do not.
     pub best: Option<FitChoice>,
-    /// Whether every cheaper choice is known to fail. Not if the evaluations ran out.
+    /// Whether every cheaper choice is known to fail; false if the evaluations ran out first.
     pub is_proven: bool,
     /// Number of evaluated choices.
     pub evaluations: usize,
 }
 
-/// What a search is given, checked.
+/// Validated input of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitProblem {
     /// (candidate, cost) of each joint, loosest first.
     levels: Vec<Vec<(usize, f64)>>,
     required: RequiredYield,
-    most_evaluations: usize,
+    max_evaluations: usize,
 }
 
 impl FitProblem {
-    /// `costs` holds the costs of each joint's candidates, **loosest first**. At most `most_evaluations` choices are tried.
+    /// `costs` holds the costs of each joint's candidates, **loosest first**. At most `max_evaluations` choices are tried.
     ///
     /// # Errors
-    /// No joints or candidates, a cost or yield out of range, or no evaluations.
-    pub fn new(costs: &[Vec<f64>], required: RequiredYield, most_evaluations: usize) -> Result<Self, FitSearchError> {
+    /// No joints, no candidates for a joint, a cost or yield out of range, or no evaluations.
+    pub fn new(costs: &[Vec<f64>], required: RequiredYield, max_evaluations: usize) -> Result<Self, FitSearchError> {
         if costs.is_empty() {
             return Err(FitSearchError::NoJoints);
         }
@@ -108,24 +108,28 @@ impl FitProblem {
         if !(required.fraction > 0.0 && required.fraction <= 1.0) {
             return Err(FitSearchError::Yield { fraction: required.fraction });
         }
-        if most_evaluations == 0 {
+        if max_evaluations == 0 {
             return Err(FitSearchError::NoEvaluations);
         }
         let levels = costs.iter().map(|costs| levels(costs)).collect();
-        Ok(Self { levels, required, most_evaluations })
+        Ok(Self { levels, required, max_evaluations })
     }
 
     /// Finds the cheapest choice that holds the required yield. `evaluate` estimates the yield of a choice, given as the index
-    /// of each joint's candidate, and is never called twice for a choice.
+    /// of each joint's candidate, and is called at most once for each choice.
     ///
-    /// The search assumes that a tighter fit in any joint never lowers the yield. It holds for a tip error that grows with every
-    /// clearance; with estimates from samples, all choices must share the same random points, or noise breaks it. Where a tighter
-    /// fit moves the centre of a clearance away from its best value, the result is not the optimum.
+    /// The search assumes that a tighter fit in any joint never lowers the yield. This holds for a tip error that grows with
+    /// every
+    /// clearance. If yields are estimated from samples, all choices must share the same random points, or noise violates the
+    /// assumption. Where a tighter fit moves the centre of a clearance away from its best value, the result is not the
+    /// optimum.
     ///
-    /// Candidates that cost as much as a tighter one are left out. First one joint after the other is loosened as far as the
-    /// yield allows. Then choices cheaper than the best are visited in the order of their costs (branch and bound). One that is
-    /// not tighter in any joint than a choice known to fail fails, too. Of the others, the tightest affordable choice above is
-    /// evaluated: either it is a cheaper solution, or it decides all choices below it.
+    /// Candidates that cost at least as much as a tighter one are discarded. First, the joints are loosened one at a time as
+    /// far
+    /// as the yield allows. Then choices cheaper than the best are visited in order of cost (branch and bound). A choice
+    /// fails
+    /// if no joint is tighter than in a choice known to fail. Otherwise the tightest affordable choice above it is evaluated:
+    /// either that is a cheaper solution, or it rules out all choices below it.
     ///
     /// # Errors
     /// An error of `evaluate`.
@@ -157,20 +161,22 @@ struct Search<'a, F> {
     problem: &'a FitProblem,
     evaluations: usize,
     evaluate: F,
-    /// Choices known to fail, none of them below another.
+    /// Choices known to fail; each is tighter in some joint than every other.
     failed: Vec<Vec<usize>>,
     best: Option<(Vec<usize>, Estimate)>,
 }
 
-/// A choice to visit, by the level of each joint; those from `open` on may still be tightened, so that each is visited once.
+/// A choice to visit, as the level of each joint. Only joints from `first_open` on may still be tightened, so that each
+/// choice
+/// is visited once.
 struct Node {
     cost: f64,
     choice: Vec<usize>,
-    open: usize,
+    first_open: usize,
 }
 
 impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
-    /// Whether the result is proven.
+    /// Runs the search and returns whether the best choice is proven to be the cheapest.
     fn run(&mut self) -> Result<bool, E> {
         let tightest: Vec<usize> = self.problem.levels.iter().map(|levels| levels.len() - 1).collect();
         match self.holds(&tightest)? {
@@ -178,7 +184,7 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
             _ => return Ok(true),
         }
         let loosest = vec![0; self.problem.levels.len()];
-        let mut nodes = BinaryHeap::from([Node { cost: self.cost(&loosest), choice: loosest, open: 0 }]);
+        let mut nodes = BinaryHeap::from([Node { cost: self.cost(&loosest), choice: loosest, first_open: 0 }]);
         let mut visited = 0;
         while let Some(node) = nodes.pop() {
             visited += 1;
@@ -193,13 +199,13 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
                     Some(false) => {}
                 }
             }
-            for joint in node.open..node.choice.len() {
+            for joint in node.first_open..node.choice.len() {
                 if node.choice[joint] + 1 < self.problem.levels[joint].len() {
                     let mut choice = node.choice.clone();
                     choice[joint] += 1;
                     let cost = self.cost(&choice);
                     if cost < self.best_cost() {
-                        nodes.push(Node { cost, choice, open: joint });
+                        nodes.push(Node { cost, choice, first_open: joint });
                     }
                 }
             }
@@ -223,12 +229,14 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
         self.failed.iter().any(|failed| choice.iter().zip(failed).all(|(own, failed)| own <= failed))
     }
 
-    /// Whether a choice holds the yield; `None` if no evaluation is left. A cheaper choice that does becomes the best.
+    /// Whether a choice holds the yield; `None` if no evaluation is left. If it does and is cheaper than the best, it becomes
+    /// the
+    /// best.
     fn holds(&mut self, choice: &[usize]) -> Result<Option<bool>, E> {
         if self.is_known_to_fail(choice) {
             return Ok(Some(false));
         }
-        if self.evaluations == self.problem.most_evaluations {
+        if self.evaluations == self.problem.max_evaluations {
             return Ok(None);
         }
         self.evaluations += 1;
@@ -244,7 +252,7 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
         Ok(Some(is_held))
     }
 
-    /// Loosens one joint after the other of a choice that holds the yield, by bisection, the one with the largest saving first.
+    /// Loosens the joints of a choice that holds the yield one at a time by bisection, starting with the largest saving.
     fn loosen(&mut self, mut choice: Vec<usize>) -> Result<(), E> {
         let saving = |joint: usize| self.problem.levels[joint][choice[joint]].1 - self.problem.levels[joint][0].1;
         let mut joints: Vec<(usize, f64)> = (0..choice.len()).map(|joint| (joint, saving(joint))).collect();
@@ -264,8 +272,9 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
         Ok(())
     }
 
-    /// The choice at or above `choice` that is tightened, one level after the other, where it costs least, while it is cheaper
-    /// than the best.
+    /// Tightens `choice` one level at a time, each time in the joint where this costs least, while it remains cheaper than
+    /// the
+    /// best choice.
     fn tightest_affordable(&self, choice: &[usize]) -> Vec<usize> {
         let mut above = choice.to_vec();
         loop {
@@ -284,7 +293,7 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
 }
 
 impl Ord for Node {
-    /// The cheapest is the greatest, and of equal costs the first in lexical order: the heap yields it first.
+    /// The heap pops the greatest node first: the cheapest, and among equal costs the first in lexical order.
     fn cmp(&self, other: &Self) -> Ordering {
         other.cost.total_cmp(&self.cost).then_with(|| other.choice.cmp(&self.choice))
     }
@@ -312,8 +321,9 @@ mod tests {
 
     const UNITS: usize = 400;
 
-    /// A stack of gaps, each uniform from 0 to a width that halves from one candidate to the next, and the largest acceptable
-    /// sum.
+    /// A stack of gaps and the largest acceptable sum. Each gap is uniform from 0 to a width that halves from one candidate
+    /// to
+    /// the next.
     struct Stack {
         widths: Vec<f64>,
         costs: Vec<Vec<f64>>,
@@ -326,7 +336,7 @@ mod tests {
             let stream = RandomStream::new(seed, Purpose::Position, 0);
             let widths: Vec<f64> = (0..joints).map(|joint| 1.0 + stream.unit(joint as u64)).collect();
             let cost = |joint: usize, candidate: usize| {
-                // Grows with tightness, but for some noise: a few candidates cost more than a tighter one.
+                // Grows with tightness apart from some noise: a few candidates cost more than a tighter one.
                 (1.6_f64).powi(candidate as i32) * (1.0 + stream.unit((100 + 10 * joint + candidate) as u64))
             };
             let costs =
@@ -354,32 +364,32 @@ mod tests {
         }
     }
 
-    fn search(stack: &Stack, required: RequiredYield, most: usize) -> FitSearch {
+    fn search(stack: &Stack, required: RequiredYield, max_evaluations: usize) -> FitSearch {
         let mut seen = Vec::new();
-        let found = FitProblem::new(&stack.costs, required, most).unwrap().solve(|choice| {
+        let result = FitProblem::new(&stack.costs, required, max_evaluations).unwrap().solve(|choice| {
             assert!(!seen.contains(&choice.to_vec()), "{choice:?} is evaluated twice");
             seen.push(choice.to_vec());
             Ok::<_, String>(stack.yield_of(choice))
         });
-        let found = found.unwrap();
-        assert_eq!(found.evaluations, seen.len());
-        found
+        let result = result.unwrap();
+        assert_eq!(result.evaluations, seen.len());
+        result
     }
 
     #[test]
-    fn the_cheapest_choice_of_a_stack_is_that_of_the_enumeration() {
+    fn the_search_finds_the_lowest_cost_of_an_enumeration() {
         let (mut evaluations, mut choices) = (0, 0);
         for seed in 0..20 {
             for with_confidence in [false, true] {
                 let stack = Stack::new(4, 5, seed);
                 let required = RequiredYield { fraction: 0.95, with_confidence };
-                let found = search(&stack, required, usize::MAX);
+                let result = search(&stack, required, usize::MAX);
                 let (cost, count) = stack.enumerate(required);
-                let best = found.best.unwrap();
+                let best = result.best.unwrap();
                 assert!((best.cost - cost.unwrap()).abs() < 1e-12, "seed {seed}: {best:?}");
-                assert!(found.is_proven && required.is_held(best.estimate));
+                assert!(result.is_proven && required.is_held(best.estimate));
                 assert_eq!(best.estimate, stack.yield_of(&best.candidates));
-                evaluations += found.evaluations;
+                evaluations += result.evaluations;
                 choices += count;
             }
         }
@@ -390,8 +400,8 @@ mod tests {
     fn a_yield_that_the_tightest_fits_miss_takes_one_evaluation() {
         let mut stack = Stack::new(3, 4, 1);
         stack.limit = 1e-3;
-        let found = search(&stack, RequiredYield { fraction: 0.99, with_confidence: false }, 100);
-        assert_eq!(found, FitSearch { best: None, is_proven: true, evaluations: 1 });
+        let result = search(&stack, RequiredYield { fraction: 0.99, with_confidence: false }, 100);
+        assert_eq!(result, FitSearch { best: None, is_proven: true, evaluations: 1 });
     }
 
     #[test]
@@ -400,10 +410,10 @@ mod tests {
         let required = RequiredYield { fraction: 0.9, with_confidence: true };
         let all = search(&stack, required, usize::MAX);
         let mut last = f64::INFINITY;
-        for most in [1, 3, 8, all.evaluations - 1] {
-            let found = search(&stack, required, most);
-            let best = found.best.unwrap();
-            assert!(!found.is_proven && found.evaluations == most && required.is_held(best.estimate));
+        for max_evaluations in [1, 3, 8, all.evaluations - 1] {
+            let result = search(&stack, required, max_evaluations);
+            let best = result.best.unwrap();
+            assert!(!result.is_proven && result.evaluations == max_evaluations && required.is_held(best.estimate));
             assert!(best.cost <= last && best.cost >= all.best.as_ref().unwrap().cost);
             last = best.cost;
         }
@@ -419,24 +429,24 @@ mod tests {
             Ok::<_, String>(Estimate { value, low: value, high: value })
         };
         let required = RequiredYield { fraction: 0.5, with_confidence: false };
-        let found = FitProblem::new(&costs, required, 1000).unwrap().solve(estimate).unwrap();
-        assert_eq!(found.best.unwrap().cost, 15.0);
-        assert!(found.is_proven && found.evaluations < 66 + 50, "{}", found.evaluations);
+        let result = FitProblem::new(&costs, required, 1000).unwrap().solve(estimate).unwrap();
+        assert_eq!(result.best.unwrap().cost, 15.0);
+        assert!(result.is_proven && result.evaluations < 66 + 50, "{}", result.evaluations);
     }
 
     #[test]
     fn bad_input_is_refused_and_errors_are_passed_on() {
         let required = RequiredYield { fraction: 0.9, with_confidence: false };
-        let failing =
-            |costs: &[Vec<f64>], required, most| FitProblem::new(costs, required, most).unwrap_err().to_string();
+        let message =
+            |costs: &[Vec<f64>], required, max| FitProblem::new(costs, required, max).unwrap_err().to_string();
         let problem = FitProblem::new(&[vec![1.0]], required, 9).unwrap();
         assert_eq!(problem.solve(|_| Err("diverged")), Err("diverged"));
-        assert_eq!(failing(&[], required, 9), "no joints to choose fits for");
-        assert_eq!(failing(&[vec![1.0], vec![]], required, 9), "joint 1 has no candidate fits");
-        let cost = failing(&[vec![1.0, f64::NAN]], required, 9);
+        assert_eq!(message(&[], required, 9), "no joints to choose fits for");
+        assert_eq!(message(&[vec![1.0], vec![]], required, 9), "joint 1 has no candidate fits");
+        let cost = message(&[vec![1.0, f64::NAN]], required, 9);
         assert_eq!(cost, "cost NaN of candidate 1 of joint 0: a finite number of at least 0 is possible");
-        assert_eq!(failing(&[vec![1.0]], required, 0), "0 evaluations: at least one is needed");
+        assert_eq!(message(&[vec![1.0]], required, 0), "0 evaluations: at least one is needed");
         let percent = RequiredYield { fraction: 99.0, with_confidence: false };
-        assert_eq!(failing(&[vec![1.0]], percent, 9), "required yield 99: above 0 and up to 1 is possible");
+        assert_eq!(message(&[vec![1.0]], percent, 9), "required yield 99: above 0 and up to 1 is possible");
     }
 }

@@ -1,4 +1,5 @@
-//! Variance-based sensitivity indices (Sobol' 1993), by the design of Saltelli et al. 2010, "Variance based sensitivity analysis
+//! Variance-based sensitivity indices (Sobol' 1993) with the design of Saltelli et al. 2010, "Variance based sensitivity
+//! analysis
 //! of model output", Computer Physics Communications 181, 259-270.
 
 use crate::random::{Purpose, RandomStream};
@@ -7,10 +8,10 @@ use crate::yields::{Estimate, interpolated_quantile};
 
 /// Least number of complete rows from which indices are estimated.
 pub const MIN_ROWS: usize = 8;
-/// Least number of resamples of an interval.
+/// Least number of bootstrap resamples for an interval.
 const MIN_RESAMPLES: usize = 100;
 
-/// Why there is no such design, or no indices.
+/// Reasons for rejecting a design, its results or the settings of the intervals.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IndicesError {
     /// No inputs or too many.
@@ -46,7 +47,7 @@ pub enum IndicesError {
         /// All rows.
         rows: usize,
     },
-    /// The result is the same at all points, but for rounding.
+    /// The result is the same at all points, apart from rounding.
     #[error("the variance of the result is 0: it is {value}, whatever the inputs")]
     NoVariance {
         /// The result.
@@ -65,9 +66,10 @@ pub enum IndicesError {
 }
 
 /// A design of N (k + 2) points for k inputs. Row j holds, in this order, point j of the sample A, point j of the sample B, and
-/// for each input i the point of A with coordinate i of B. A and B are the two halves of the coordinates of one sample in 2 k
-/// dimensions. Points are numbered row by row; each is computed from its index alone. Of a Sobol sequence or a random sample, the
-/// first rows are a smaller design.
+/// for each input i the point of A with coordinate i taken from B. A and B are the two halves of the coordinates of one
+/// sample in
+/// 2 k dimensions. Points are numbered row by row; each is computed from its index alone. With a Sobol sequence or a random
+/// sample, the first rows form a smaller design.
 #[derive(Clone, Debug)]
 pub struct SaltelliDesign {
     inputs: usize,
@@ -79,14 +81,14 @@ pub struct SaltelliDesign {
 pub struct Bootstrap {
     /// Number of resamples.
     pub resamples: usize,
-    /// Probability that an interval holds the index.
+    /// Probability that an interval covers the index.
     pub confidence: f64,
     /// Seed of the resampling.
     pub seed: u64,
 }
 
 impl Default for Bootstrap {
-    /// 1000 resamples, 95 %.
+    /// 1000 resamples, 95 % confidence.
     fn default() -> Self {
         Self { resamples: 1000, confidence: 0.95, seed: 0 }
     }
@@ -103,14 +105,14 @@ pub struct SensitivityIndices {
     pub first: Vec<Estimate>,
     /// Total index of each input: the share that remains on average when all other inputs are fixed.
     pub total: Vec<Estimate>,
-    /// Rows that were evaluated.
+    /// Number of evaluated rows.
     pub rows: usize,
-    /// Rows left out because a result is missing.
+    /// Number of rows left out because a result is missing.
     pub incomplete_rows: usize,
 }
 
 impl SaltelliDesign {
-    /// A design of `rows` rows, N (k + 2) points. Powers of two are best for a Sobol sequence.
+    /// A design of `rows` rows, N (k + 2) points. With a Sobol sequence, `rows` should be a power of two.
     ///
     /// # Errors
     /// No inputs, more than 64, no rows, or too many points.
@@ -142,15 +144,18 @@ impl SaltelliDesign {
         Some(point)
     }
 
-    /// Indices of one result from its values at all points in order: first-order indices by Saltelli et al. 2010, table 2 (b),
-    /// with the mean subtracted from all results; total indices by Jansen 1999 ("Analysis of variance designs for model output",
-    /// Computer Physics Communications 117, 35-43), table 2 (f) there. A value that is not finite is missing, and its row is left
-    /// out. Small indices can be estimated as slightly negative. Intervals are percentiles of resampled rows (Efron 1979,
-    /// "Bootstrap methods: another look at the jackknife", Annals of Statistics 7, 1-26), which overestimate the error of a Sobol
-    /// sequence.
+    /// Indices of one result from its values at all points in order. First-order indices follow Saltelli et al. 2010, table 2
+    /// (b),
+    /// with the mean subtracted from all results. Total indices follow Jansen 1999 ("Analysis of variance designs for model
+    /// output", Computer Physics Communications 117, 35-43), table 2 (f) of Saltelli et al. A value that is not finite counts
+    /// as
+    /// missing, and its row is left out. Estimates of small indices can be slightly negative. Intervals are percentiles over
+    /// resampled rows (Efron 1979, "Bootstrap methods: another look at the jackknife", Annals of Statistics 7, 1-26); they
+    /// overestimate the error of a Sobol sequence.
     ///
     /// # Errors
-    /// A number of results that is not that of the points, too few complete rows, no variance, or settings of the intervals out
+    /// A number of results that differs from the number of points, too few complete rows, no variance, or interval settings
+    /// out
     /// of range.
     pub fn indices(&self, results: &[f64], bootstrap: Bootstrap) -> Result<SensitivityIndices, IndicesError> {
         if results.len() != self.points() {
@@ -170,10 +175,10 @@ impl SaltelliDesign {
         if rows.iter().all(|row| row.iter().all(|&result| result == value)) {
             return Err(IndicesError::NoVariance { value });
         }
-        let everything = Moments::of(&rows, 0..rows.len(), self.inputs);
-        let Some((first, total)) = everything.indices() else {
-            // The result differs at the mixed points alone, or by less than its rounding error.
-            return Err(IndicesError::NoVariance { value: everything.mean });
+        let full_sample = Moments::of(&rows, 0..rows.len(), self.inputs);
+        let Some((first, total)) = full_sample.indices() else {
+            // The result differs only at the mixed points, or by less than its rounding error.
+            return Err(IndicesError::NoVariance { value: full_sample.mean });
         };
         let resampled: Vec<(Vec<f64>, Vec<f64>)> = (0..resamples)
             .filter_map(|index| {
@@ -184,16 +189,16 @@ impl SaltelliDesign {
             .collect();
         let estimate = |value: f64, mut values: Vec<f64>| {
             values.sort_by(f64::total_cmp);
-            // No resample had a variance: nothing bounds the index.
-            let end = |p, without| if values.is_empty() { without } else { interpolated_quantile(&values, p) };
+            // If no resample has a variance, nothing bounds the index.
+            let end = |p, unbounded| if values.is_empty() { unbounded } else { interpolated_quantile(&values, p) };
             let low = end(0.5 * (1.0 - confidence), f64::NEG_INFINITY);
             Estimate { value, low, high: end(0.5 * (1.0 + confidence), f64::INFINITY) }
         };
         let first = first.iter().enumerate();
         let total = total.iter().enumerate();
         Ok(SensitivityIndices {
-            mean: everything.mean,
-            variance: everything.variance,
+            mean: full_sample.mean,
+            variance: full_sample.variance,
             first: first
                 .map(|(i, &own)| estimate(own, resampled.iter().map(|(first, _)| first[i]).collect()))
                 .collect(),
@@ -206,13 +211,13 @@ impl SaltelliDesign {
     }
 }
 
-/// Means over a set of rows.
+/// Moments of the results over a set of rows.
 struct Moments {
     mean: f64,
     variance: f64,
-    /// Of f(B) (f(AB_i) - f(A)) for each input i.
+    /// Mean of f(B) (f(AB_i) - f(A)) for each input i.
     first: Vec<f64>,
-    /// Of (f(A) - f(AB_i))^2 / 2.
+    /// Mean of (f(A) - f(AB_i))^2 / 2 for each input i.
     total: Vec<f64>,
 }
 
@@ -258,16 +263,16 @@ mod tests {
         sine(0) + 7.0 * sine(1).powi(2) + 0.1 * x[2].powi(4) * sine(0)
     }
 
-    /// Exact first-order and total indices of it, from the partial variances.
+    /// Exact first-order and total indices of the Ishigami function, from its partial variances.
     fn ishigami_indices() -> [(f64, f64); 3] {
         let (v1, v2, v13) = (0.5 * (1.0 + 0.1 * PI.powi(4) / 5.0).powi(2), 49.0 / 8.0, 0.01 * PI.powi(8) * 8.0 / 225.0);
         let v = v1 + v2 + v13;
         [(v1 / v, (v1 + v13) / v), (v2 / v, v2 / v), (0.0, v13 / v)]
     }
 
-    fn check(own: &SensitivityIndices, exact: &[(f64, f64)], tolerance: f64) {
+    fn check(indices: &SensitivityIndices, exact: &[(f64, f64)], tolerance: f64) {
         for (i, &(first, total)) in exact.iter().enumerate() {
-            for (name, estimate, exact) in [("S", own.first[i], first), ("ST", own.total[i], total)] {
+            for (name, estimate, exact) in [("S", indices.first[i], first), ("ST", indices.total[i], total)] {
                 assert!((estimate.value - exact).abs() < tolerance, "{name}{}: {estimate:?}, exact {exact}", i + 1);
                 assert!(
                     estimate.low <= exact && exact <= estimate.high,
@@ -279,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn the_indices_of_the_ishigami_function_are_the_exact_ones() {
+    fn the_indices_of_the_ishigami_function_match_the_exact_values() {
         let exact = ishigami_indices();
         for ((first, total), published) in exact.iter().zip([(0.3139, 0.5576), (0.4424, 0.4424), (0.0, 0.2437)]) {
             assert!((first - published.0).abs() < 1e-4 && (total - published.1).abs() < 1e-4);
@@ -301,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn the_indices_of_the_g_function_are_the_exact_ones() {
+    fn the_indices_of_the_g_function_match_the_exact_values() {
         // Sobol' 1993; partial variances 1 / (3 (1 + a)^2).
         let a = [0.0, 1.0, 4.5, 9.0, 99.0, 99.0];
         let g = |u: &[f64]| u.iter().zip(a).map(|(u, a)| ((4.0 * u - 2.0).abs() + a) / (1.0 + a)).product::<f64>();
@@ -313,17 +318,18 @@ mod tests {
     }
 
     #[test]
-    fn intervals_of_independent_rows_hold_the_exact_index_as_often_as_they_promise() {
+    fn intervals_of_independent_rows_cover_the_exact_index_at_the_stated_confidence() {
         let exact = ishigami_indices();
-        let mut held = 0;
+        let mut covered = 0;
         for seed in 0..100 {
             let design = SaltelliDesign::new(Sampling::Random, 3, 256, seed).unwrap();
             let bootstrap = Bootstrap { resamples: 200, confidence: 0.9, seed };
             let own = design.indices(&run(&design, ishigami), bootstrap).unwrap();
-            held += (0..3).filter(|&i| own.total[i].low <= exact[i].1 && exact[i].1 <= own.total[i].high).count();
+            covered += (0..3).filter(|&i| own.total[i].low <= exact[i].1 && exact[i].1 <= own.total[i].high).count();
         }
-        // 270 of 300 expected; standard deviation 5.2 if independent, and percentile intervals of a ratio are a little short.
-        assert!((245..295).contains(&held), "{held}");
+        // 270 of 300 expected, with standard deviation 5.2 if independent; percentile intervals of a ratio are slightly too
+        // short.
+        assert!((245..295).contains(&covered), "{covered}");
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! Limits of size and fits of ISO 286-1:2010 for nominal sizes up to 500 mm: holes A to H, JS, K, M, N, P, R, S and shafts a to
-//! h, js, k, m, n, p, r, s in the grades IT01 to IT18.
+//! Limits of size and fits according to ISO 286-1:2010 for nominal sizes up to 500 mm: holes A to H, JS, K, M, N, P, R, S and
+//! shafts a to h, js, k, m, n, p, r, s in the grades IT01 to IT18.
 
 mod tables;
 
@@ -13,23 +13,23 @@ use tables::{CLEARANCE_SIDE, Deviation, INTERFERENCE_SIDE, INTERMEDIATE, RANGES,
 
 const MICROMETRE: f64 = 1e-6;
 
-/// Why there are no such limits.
+/// Reasons why a fit is invalid or has no limits.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// No hole and shaft.
+    /// A text that does not name a hole and a shaft.
     #[error("`{}` is no fit: expected a hole and a shaft such as H7/g6", brief(text))]
     Form {
-        /// As written.
+        /// The given text.
         text: String,
     },
-    /// No tolerance class.
+    /// A text that is not a tolerance class.
     #[error(
         "`{}` is no tolerance class: expected a letter (A to H, JS, K, M, N, P, R, S for a hole, small for a shaft) and a grade \
          from 01 to 18, such as H7",
         brief(text)
     )]
     Class {
-        /// As written.
+        /// The given text.
         text: String,
     },
     /// A nominal size out of range.
@@ -49,10 +49,10 @@ pub enum FitError {
     /// A process capability that is not positive.
     #[error("process capability {capability}: expected a number above 0, e.g. 1 or 1.33")]
     Capability {
-        /// As given.
+        /// The given capability.
         capability: f64,
     },
-    /// Limits that define no distribution.
+    /// Limits that do not define a distribution.
     #[error(transparent)]
     Distribution(#[from] DistributionError),
 }
@@ -92,29 +92,29 @@ impl FromStr for ToleranceClass {
     type Err = FitError;
 
     fn from_str(text: &str) -> Result<Self, FitError> {
-        let wrong = || FitError::Class { text: text.to_owned() };
+        let invalid_class = || FitError::Class { text: text.to_owned() };
         let trimmed = text.trim();
-        let digits = trimmed.find(|c: char| c.is_ascii_digit()).ok_or_else(wrong)?;
+        let digits = trimmed.find(|c: char| c.is_ascii_digit()).ok_or_else(invalid_class)?;
         let (letters, number) = trimmed.split_at(digits);
         let is_hole = letters.starts_with(|c: char| c.is_ascii_uppercase());
-        let small = letters.to_ascii_lowercase();
-        if letters != if is_hole { small.to_ascii_uppercase() } else { small.clone() } {
-            return Err(wrong());
+        let lowercase = letters.to_ascii_lowercase();
+        if letters != if is_hole { lowercase.to_ascii_uppercase() } else { lowercase.clone() } {
+            return Err(invalid_class());
         }
-        let row = |table: &[(&str, Deviation)]| table.iter().position(|(letter, _)| *letter == small);
-        let position = match small.as_str() {
+        let row = |table: &[(&str, Deviation)]| table.iter().position(|(letter, _)| *letter == lowercase);
+        let position = match lowercase.as_str() {
             "h" => Position::Nominal,
             "js" => Position::Symmetric,
             _ => {
                 let clearance = row(&CLEARANCE_SIDE).map(Position::Clearance);
-                clearance.or_else(|| row(&INTERFERENCE_SIDE).map(Position::Interference)).ok_or_else(wrong)?
+                clearance.or_else(|| row(&INTERFERENCE_SIDE).map(Position::Interference)).ok_or_else(invalid_class)?
             }
         };
         let grade = match number {
             "01" => 0,
             "0" => 1,
-            _ if number.starts_with('0') => return Err(wrong()),
-            _ => number.parse::<usize>().ok().filter(|n| (1..=18).contains(n)).ok_or_else(wrong)? + 1,
+            _ if number.starts_with('0') => return Err(invalid_class()),
+            _ => number.parse::<usize>().ok().filter(|n| (1..=18).contains(n)).ok_or_else(invalid_class)? + 1,
         };
         Ok(Self { is_hole, position, grade })
     }
@@ -137,7 +137,7 @@ impl fmt::Display for ToleranceClass {
 }
 
 impl ToleranceClass {
-    /// Whether it is a hole (capital letter).
+    /// Whether this is the class of a hole (capital letter).
     pub fn is_hole(self) -> bool {
         self.is_hole
     }
@@ -163,7 +163,7 @@ impl ToleranceClass {
         };
         let tolerance = TOLERANCES[self.grade][main];
         let undefined = || FitError::Undefined { class: self, nominal };
-        // Notes to tables 1 to 5: no IT14 and coarser, a, b, A, B, nor N coarser than IT8 up to 1 mm.
+        // Notes to tables 1 to 5: up to 1 mm, IT14 and coarser grades, a, b, A, B, and N coarser than IT8 are not defined.
         if nominal <= 1e-3 * (1.0 + ROUNDING) {
             let letter = match self.position {
                 Position::Clearance(row) => CLEARANCE_SIDE[row].0,
@@ -193,7 +193,7 @@ impl ToleranceClass {
             }
             (Position::Interference(row), false) => {
                 let (letter, deviation) = &INTERFERENCE_SIDE[row];
-                // Table 5: k is 0 but for IT4 to IT7.
+                // Table 5: k is 0 except in IT4 to IT7.
                 let is_zero = *letter == "k" && !(grade(4)..=grade(7)).contains(&self.grade);
                 let lower = if is_zero { 0.0 } else { size(deviation) };
                 (lower, lower + tolerance)
@@ -202,17 +202,19 @@ impl ToleranceClass {
         Ok(LimitDeviations { lower: lower * MICROMETRE, upper: upper * MICROMETRE })
     }
 
-    /// Upper limit deviation ES, micrometres, of a hole K to S whose shaft has the lower deviation `shaft` (tables 2 and 3). Up
-    /// to IT8 (P to S: IT7) it is -`shaft` + Δ with Δ = ITn - IT(n-1), so that such a hole fits a shaft h of the next finer grade
-    /// as the shaft of the same letter in that grade fits a hole H; above 3 mm, and from IT3 on.
+    /// Upper limit deviation ES, micrometres, of a hole K to S; `shaft` is the lower deviation of the shaft with the same
+    /// letter
+    /// (tables 2 and 3). Above 3 mm, from IT3 to IT8 (P to S: IT7), it is -`shaft` + Δ with Δ = ITn - IT(n-1). The hole with
+    /// a
+    /// shaft h of the next finer grade then has the same clearance as a hole H with the shaft of that letter and finer grade.
     fn hole_deviation(self, row: usize, shaft: f64, main: usize) -> Option<f64> {
         let letter = INTERFERENCE_SIDE[row].0;
-        let last = if ["k", "m", "n"].contains(&letter) { grade(8) } else { grade(7) };
+        let last_grade = if ["k", "m", "n"].contains(&letter) { grade(8) } else { grade(7) };
         if main == 0 {
             // K is 0 and N -4 µm in every grade.
             return Some(-shaft);
         }
-        if self.grade > last {
+        if self.grade > last_grade {
             return match letter {
                 "k" => None,
                 "n" => Some(0.0),
@@ -235,7 +237,7 @@ const fn grade(number: usize) -> usize {
     number + 1
 }
 
-/// Sizes that differ less, relatively, are the same: 3 mm in metres is the end of its range.
+/// Relative difference below which two sizes are equal, so that 3 mm converted to metres still ends its range.
 const ROUNDING: f64 = 1e-12;
 
 /// Indices of the main and the intermediate range of a nominal size.
@@ -265,16 +267,16 @@ pub enum FitKind {
     Clearance,
     /// Play or interference, depending on the actual sizes.
     Transition,
-    /// Never play.
+    /// Interference for all sizes within the limits.
     Interference,
 }
 
-/// Clearance of a fit on the diameter, hole less shaft, m. Negative values are interference.
+/// Clearance of a fit on the diameter, hole minus shaft, m. Negative values are interference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClearanceLimits {
-    /// Smallest hole, largest shaft.
+    /// Smallest hole minus largest shaft.
     pub min: f64,
-    /// Largest hole, smallest shaft.
+    /// Largest hole minus smallest shaft.
     pub max: f64,
 }
 
@@ -297,11 +299,11 @@ impl FromStr for Fit {
     type Err = FitError;
 
     fn from_str(text: &str) -> Result<Self, FitError> {
-        let form = || FitError::Form { text: text.to_owned() };
-        let (hole, shaft) = text.split_once('/').ok_or_else(form)?;
+        let invalid_form = || FitError::Form { text: text.to_owned() };
+        let (hole, shaft) = text.split_once('/').ok_or_else(invalid_form)?;
         let fit = Self { hole: hole.parse()?, shaft: shaft.parse()? };
         if !fit.hole.is_hole || fit.shaft.is_hole {
-            return Err(form());
+            return Err(invalid_form());
         }
         Ok(fit)
     }
@@ -323,9 +325,11 @@ impl Fit {
         Ok(ClearanceLimits { min: hole.lower - shaft.upper, max: hole.upper - shaft.lower })
     }
 
-    /// Distribution of the radial clearance, half of that on the diameter, at a nominal diameter, both in m. Hole and shaft are
-    /// independent and normally distributed about the centres of their tolerance intervals, whose widths are 6 `capability`
-    /// standard deviations (the process capability index Cp). Clearances outside the limits of the fit do not occur.
+    /// Distribution of the radial clearance, half the clearance on the diameter, at a nominal diameter, both in m. Hole and
+    /// shaft
+    /// are independent and normally distributed about the centres of their tolerance intervals, whose widths are 6
+    /// `capability`
+    /// standard deviations (the process capability index Cp). The distribution is truncated at the limits of the fit.
     ///
     /// # Errors
     /// As [`Self::clearance`]; a capability that is not above 0.

@@ -1,17 +1,22 @@
-//! Results computed from whole runs. The crate starts no threads, and the caller supplies its clock ([`RunContext`]).
+//! Results computed from whole runs. The crate starts no threads; the caller supplies the clock ([`RunContext`]).
 //!
 //! - Sweeps: [`axis`] and [`design`] define the points, [`sweep`] runs them, [`point`], [`crossing`] and [`statistic`] record the
-//!   results; [`sweep_task`] and [`task`] are the same as plain data for a thread or a worker, as is [`alone_task`] of a study.
-//! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the [`regime`] that follows.
+//!   results; [`sweep_task`] and [`task`] describe the same work as plain data for a thread or a worker, as [`alone_task`]
+//! does
+//!   for a study.
+//! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the resulting
+//! [`regime`].
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`], [`model_costs`].
-//! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and cases with
-//!   known answers ([`validation`]).
+//! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and
+//! validation
+//!   cases with known answers ([`validation`]).
 //! - The tip's error over the workspace, with the drives held ([`map`]).
-//! - Uncertain parameters of a scene ([`study`]). Without any scene: [`sampling`], [`distribution`] and ISO fits ([`iso286`]);
-//!   which input matters ([`morris`], [`indices`]); percentiles, yield and rejects ([`yields`]); the cheapest fits that hold a
-//!   yield ([`fits`]).
+//! - Uncertain parameters of a scene ([`study`]). Independent of any scene: [`sampling`], [`distribution`] and ISO fits
+//!   ([`iso286`]); ranking of inputs ([`morris`], [`indices`]); percentiles, yield and rejects ([`yields`]); the cheapest
+//! fits
+//!   that hold a yield ([`fits`]).
 //!
-//! A sweep of the clearance over two values, with the motion of each and the largest force in its second ball joint:
+//! A sweep over two clearances that prints the kind of motion and the largest force in the second ball joint:
 //!
 //! ```
 //! use jointplay_analysis::axis::Axis;

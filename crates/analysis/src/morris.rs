@@ -8,7 +8,7 @@ use crate::yields::mean_and_deviation;
 /// Largest number of levels of an input.
 const MAX_LEVELS: usize = 1000;
 
-/// Why there is no such plan.
+/// Reasons for rejecting a plan or its results.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MorrisError {
     /// Too few points or too many.
@@ -21,16 +21,16 @@ pub enum MorrisError {
         /// Number of trajectories.
         trajectories: usize,
     },
-    /// A number of levels without the step that reaches all levels equally often.
+    /// A number of levels for which no step reaches all levels equally often.
     #[error("{levels} levels: an even number from 2 to {MAX_LEVELS} is possible")]
     Levels {
-        /// As asked for.
+        /// Requested number of levels.
         levels: usize,
     },
-    /// A margin that leaves nothing.
+    /// A margin out of range.
     #[error("margin {margin}: at least 0 and below 0.5 is possible")]
     Margin {
-        /// As asked for.
+        /// Requested margin.
         margin: f64,
     },
     /// A number of results that does not match the plan.
@@ -65,17 +65,19 @@ struct Trajectory {
     rises: Vec<bool>,
 }
 
-/// Elementary effects of one input: changes of the result per unit of the level, which is 1 from the lowest to the highest.
+/// Statistics of one input's elementary effects: changes of the result, scaled to a change from the lowest level to the
+/// highest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ElementaryEffects {
     /// Number of effects; fewer than the number of trajectories where results are missing.
     pub count: usize,
     /// Mean μ.
     pub mean: f64,
-    /// Mean of the magnitudes μ* (Campolongo, Cariboni & Saltelli 2007, Environmental Modelling & Software 22, 1509-1518): the
-    /// influence.
+    /// Mean of the magnitudes μ* (Campolongo, Cariboni & Saltelli 2007, Environmental Modelling & Software 22, 1509-1518),
+    /// which
+    /// measures the influence.
     pub mean_magnitude: f64,
-    /// Standard deviation σ: interactions and curvature.
+    /// Standard deviation σ, which measures interactions and curvature.
     pub deviation: f64,
     /// Standard error of the mean.
     pub mean_error: f64,
@@ -85,7 +87,7 @@ pub struct ElementaryEffects {
 
 impl MorrisPlan {
     /// A plan of `trajectories` trajectories through `levels` levels of each of `inputs` inputs. Levels are equally spaced from
-    /// `margin` to 1 - `margin`: 0 gives Morris's plan, and an input of unlimited distribution needs a margin.
+    /// `margin` to 1 - `margin`: 0 gives Morris's plan; an input with an unbounded distribution needs a margin.
     ///
     /// # Errors
     /// No inputs, no trajectories or too many points; an odd number of levels; a margin out of range.
@@ -122,7 +124,7 @@ impl MorrisPlan {
         }
     }
 
-    /// Point `index`, each coordinate from the margin to 1 less the margin; `None` beyond the last.
+    /// Point `index`, each coordinate from the margin to 1 minus the margin; `None` beyond the last.
     pub fn point(&self, index: usize) -> Option<Vec<f64>> {
         if index >= self.points() {
             return None;
@@ -137,8 +139,9 @@ impl MorrisPlan {
         Some(level.iter().map(|&level| self.margin + (1.0 - 2.0 * self.margin) * level as f64 / last).collect())
     }
 
-    /// Elementary effects of each input, from the results at all points in order. A result that is not finite is missing; the
-    /// effects on either side of it are left out. `None` for an input with fewer than two effects.
+    /// Elementary effects of each input, from the results at all points in order. A result that is not finite counts as
+    /// missing;
+    /// the effects on either side of it are left out. `None` for an input with fewer than two effects.
     ///
     /// # Errors
     /// A number of results that is not the number of points.
@@ -148,9 +151,9 @@ impl MorrisPlan {
         }
         let step = self.levels as f64 / (2 * (self.levels - 1)) as f64;
         let mut effects = vec![Vec::new(); self.inputs];
-        for (index, own) in results.chunks_exact(self.inputs + 1).enumerate() {
+        for (index, along) in results.chunks_exact(self.inputs + 1).enumerate() {
             let trajectory = self.trajectory(index);
-            for (pair, &input) in own.windows(2).zip(&trajectory.order) {
+            for (pair, &input) in along.windows(2).zip(&trajectory.order) {
                 let input = input as usize;
                 let change = if trajectory.rises[input] { pair[1] - pair[0] } else { pair[0] - pair[1] };
                 if change.is_finite() {
@@ -168,8 +171,8 @@ fn summary(effects: &[f64]) -> Option<ElementaryEffects> {
         return None;
     }
     let magnitudes: Vec<f64> = effects.iter().map(|effect| effect.abs()).collect();
-    let ((mean, deviation), (mean_magnitude, of_magnitudes)) =
-        (mean_and_deviation(effects), mean_and_deviation(&magnitudes));
+    let (mean, deviation) = mean_and_deviation(effects);
+    let (mean_magnitude, magnitude_deviation) = mean_and_deviation(&magnitudes);
     let root = (count as f64).sqrt();
     Some(ElementaryEffects {
         count,
@@ -177,7 +180,7 @@ fn summary(effects: &[f64]) -> Option<ElementaryEffects> {
         mean_magnitude,
         deviation,
         mean_error: deviation / root,
-        mean_magnitude_error: of_magnitudes / root,
+        mean_magnitude_error: magnitude_deviation / root,
     })
 }
 
@@ -214,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_linear_function_has_its_coefficients_as_effects_and_no_spread() {
+    fn the_effects_of_a_linear_function_are_its_coefficients_without_spread() {
         let plan = MorrisPlan::new(4, 10, 6, 0.0, 1).unwrap();
         let coefficients = [3.0, -2.0, 0.0, 0.5];
         let results = run(&plan, |u| 7.0 + u.iter().zip(coefficients).map(|(u, c)| c * u).sum::<f64>());
@@ -224,7 +227,7 @@ mod tests {
             assert!((effect.mean - c).abs() < 1e-13 && (effect.mean_magnitude - c.abs()).abs() < 1e-13);
             assert!(effect.deviation < 1e-13 && effect.mean_error < 1e-13);
         }
-        // With a margin, an effect is that of the whole remaining range.
+        // With a margin, an effect is scaled to the remaining range.
         let inner = MorrisPlan::new(4, 10, 6, 0.1, 1).unwrap();
         let effects = inner.effects(&run(&inner, |u| 3.0 * u[0])).unwrap();
         assert!((effects[0].unwrap().mean - 0.8 * 3.0).abs() < 1e-13);

@@ -2,7 +2,7 @@
 
 use crate::normal;
 
-/// Why there are no such statistics.
+/// Reasons for rejecting a sample or the settings of a statistic.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum YieldsError {
     /// Too few values.
@@ -24,9 +24,9 @@ pub enum YieldsError {
     /// A probability out of range.
     #[error("{name} {value}: a number above 0 and below 1 is possible")]
     Probability {
-        /// What it is: `percentile` or `confidence`.
+        /// Name of the setting: `percentile` or `confidence`.
         name: &'static str,
-        /// As given.
+        /// The given value.
         value: f64,
     },
     /// All values are the same.
@@ -43,7 +43,7 @@ pub enum YieldsError {
         /// All units.
         made: usize,
     },
-    /// No limit, or limits that leave nothing.
+    /// No limit, or limits in the wrong order.
     #[error("capability needs a lower or an upper limit, and the lower one below the upper one")]
     Limits,
     /// An input without a value for each unit.
@@ -69,7 +69,7 @@ pub struct Estimate {
     pub high: f64,
 }
 
-/// Linear interpolation between the values of a sorted, non-empty sample, value k of n at the probability (k - 1) / (n - 1)
+/// Quantile of a sorted, non-empty sample by linear interpolation, with value k of n at the probability (k - 1) / (n - 1)
 /// (Hyndman & Fan 1996, definition 7).
 pub(crate) fn interpolated_quantile(sorted: &[f64], p: f64) -> f64 {
     let last = sorted.len() - 1;
@@ -79,7 +79,7 @@ pub(crate) fn interpolated_quantile(sorted: &[f64], p: f64) -> f64 {
     sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
 }
 
-/// Mean and sample standard deviation of at least two values; the deviation of a single one is NaN.
+/// Mean and sample standard deviation of the values; the deviation of a single value is NaN.
 pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -87,11 +87,11 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (n - 1.0)).sqrt())
 }
 
-fn probability(name: &'static str, value: f64) -> Result<(), YieldsError> {
+fn check_probability(name: &'static str, value: f64) -> Result<(), YieldsError> {
     if value > 0.0 && value < 1.0 { Ok(()) } else { Err(YieldsError::Probability { name, value }) }
 }
 
-fn finite(values: &[f64], least: usize) -> Result<(), YieldsError> {
+fn check_values(values: &[f64], least: usize) -> Result<(), YieldsError> {
     if values.len() < least {
         return Err(YieldsError::TooFew { count: values.len(), least });
     }
@@ -101,22 +101,24 @@ fn finite(values: &[f64], least: usize) -> Result<(), YieldsError> {
     }
 }
 
-/// The value below which the fraction `p` of the lot lies, with a confidence interval between two order statistics, which holds
-/// for any distribution (David & Nagaraja 2003, "Order statistics", section 7.1). An end is infinite where the sample is too
-/// small to bound it: a 99 % percentile with an upper end at 95 % confidence takes 368 values.
+/// The value that the fraction `p` of the lot does not exceed. Its confidence interval lies between two order statistics and
+/// is
+/// valid for any distribution (David & Nagaraja 2003, "Order statistics", section 7.1). An end is infinite where the sample
+/// is
+/// too small to bound it: an upper end for the 99 % percentile at 95 % confidence takes 368 values.
 ///
 /// # Errors
-/// No values or one that is not finite; a probability that is not between 0 and 1.
+/// No values, or a value that is not finite; a probability that is not between 0 and 1.
 pub fn percentile(values: &[f64], p: f64, confidence: f64) -> Result<Estimate, YieldsError> {
-    probability("percentile", p)?;
-    probability("confidence", confidence)?;
-    finite(values, 1)?;
+    check_probability("percentile", p)?;
+    check_probability("confidence", confidence)?;
+    check_values(values, 1)?;
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let n = sorted.len();
     let tail = 0.5 * (1.0 - confidence);
-    // The number of values below the percentile is binomial. The r-th smallest value is above the percentile if fewer than r are
-    // below.
+    // The number of values below the percentile is binomial. The r-th smallest value is above the percentile if fewer than r
+    // values are below it.
     let mass = binomial(n, p);
     let mut below = 0.0;
     let mut lower = 0;
@@ -137,8 +139,8 @@ pub fn percentile(values: &[f64], p: f64, confidence: f64) -> Result<Estimate, Y
     })
 }
 
-/// Probabilities of 0 to `n` successes, each with probability `p`. From the most likely number outwards, so that no start
-/// underflows.
+/// Binomial distribution: probabilities of 0 to `n` successes in `n` trials that succeed with probability `p`. The recurrence
+/// runs outwards from the most likely number, so that its start does not underflow.
 fn binomial(n: usize, p: f64) -> Vec<f64> {
     let mode = (((n + 1) as f64 * p) as usize).min(n);
     let log_factorial = |k: usize| libm::lgamma(k as f64 + 1.0);
@@ -156,12 +158,12 @@ fn binomial(n: usize, p: f64) -> Vec<f64> {
 }
 
 /// Fraction of accepted units, with the interval of Wilson 1927 ("Probable inference, the law of succession, and statistical
-/// inference", J. Am. Stat. Assoc. 22, 209-212), which also holds near 0 and 1.
+/// inference", J. Am. Stat. Assoc. 22, 209-212), which is valid near 0 and 1, too.
 ///
 /// # Errors
 /// No units, more accepted than made, or a confidence that is not between 0 and 1.
 pub fn yield_fraction(accepted: usize, made: usize, confidence: f64) -> Result<Estimate, YieldsError> {
-    probability("confidence", confidence)?;
+    check_probability("confidence", confidence)?;
     if made == 0 {
         return Err(YieldsError::TooFew { count: 0, least: 1 });
     }
@@ -174,7 +176,7 @@ pub fn yield_fraction(accepted: usize, made: usize, confidence: f64) -> Result<E
     let ratio = z * z / n;
     let centre = (value + 0.5 * ratio) / (1.0 + ratio);
     let half = z * (value * (1.0 - value) / n + 0.25 * ratio / n).sqrt() / (1.0 + ratio);
-    // At 0 and 1 the end is exact but for rounding.
+    // At 0 and 1 the formula gives the exact end apart from rounding.
     let low = if accepted == 0 { 0.0 } else { centre - half };
     let high = if accepted == made { 1.0 } else { centre + half };
     Ok(Estimate { value, low, high })
@@ -187,27 +189,28 @@ pub struct Capability {
     pub mean: f64,
     /// Sample standard deviation.
     pub deviation: f64,
-    /// Cp: distance of the limits over six standard deviations; `None` with one limit.
+    /// Cp: distance between the limits over six standard deviations; `None` with only one limit.
     pub cp: Option<f64>,
     /// Cpk: distance of the mean from the nearer limit over three standard deviations, with the interval of Bissell 1990 ("How
     /// reliable is your capability index?", Applied Statistics 39, 331-340).
     pub cpk: Estimate,
 }
 
-/// Process capability for a lower limit, an upper limit or both (ISO 22514-2). The indices say nothing about the yield where the
-/// values are not normal.
+/// Process capability for a lower limit, an upper limit or both (ISO 22514-2). The indices say nothing about the yield if the
+/// values are not normally distributed.
 ///
 /// # Errors
-/// Fewer than two values, one that is not finite, or no spread; no limits, or limits in the wrong order; a confidence that is not
-/// between 0 and 1.
+/// Fewer than two values, a value that is not finite, or no spread; no limits, or limits in the wrong order; a confidence
+/// that is
+/// not between 0 and 1.
 pub fn capability(
     values: &[f64],
     lower: Option<f64>,
     upper: Option<f64>,
     confidence: f64,
 ) -> Result<Capability, YieldsError> {
-    probability("confidence", confidence)?;
-    finite(values, 2)?;
+    check_probability("confidence", confidence)?;
+    check_values(values, 2)?;
     let ordered = lower.zip(upper).is_none_or(|(lower, upper)| lower < upper);
     if (lower.is_none() && upper.is_none())
         || !ordered
@@ -238,25 +241,30 @@ pub fn capability(
 /// "Eutrophication in Peel Inlet II", Water Research 14, 43-49).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RejectDriver {
-    /// Mean over the rejects less mean over the accepted, in standard deviations over all units; 0 for an input without spread.
+    /// Mean over the rejected units minus mean over the accepted, in standard deviations of all units; 0 for an input without
+    /// spread.
     pub mean_shift: f64,
-    /// Kolmogorov-Smirnov distance of the two distributions, 0 to 1: also sees an input whose rejects lie at both ends.
+    /// Kolmogorov-Smirnov distance between the two distributions, 0 to 1. It also detects an input whose rejects lie at both
+    /// ends.
     pub distance: f64,
-    /// Probability of a distance at least as large if the input has no influence. For k inputs, compare with the level over k.
+    /// Probability of a distance at least as large if the input has no influence. With k inputs, compare it with the
+    /// significance
+    /// level divided by k.
     pub p_value: f64,
 }
 
-/// What distinguishes the rejects, for each input. `inputs` holds one list of values per input, `accepted` whether a unit was
-/// accepted. `None` if all units or none are accepted.
+/// How the rejected units differ from the accepted ones in each input. `inputs` holds one list of values per input,
+/// `accepted`
+/// one flag per unit. `None` if all units or none are accepted.
 ///
 /// # Errors
-/// An input without a value for each unit, or with one that is not finite.
+/// An input without a value for each unit, or with a value that is not finite.
 pub fn reject_drivers(inputs: &[Vec<f64>], accepted: &[bool]) -> Result<Option<Vec<RejectDriver>>, YieldsError> {
     for (input, values) in inputs.iter().enumerate() {
         if values.len() != accepted.len() {
             return Err(YieldsError::Lengths { input, values: values.len(), units: accepted.len() });
         }
-        finite(values, 0)?;
+        check_values(values, 0)?;
     }
     if accepted.windows(2).all(|pair| pair[0] == pair[1]) {
         return Ok(None);
@@ -298,11 +306,11 @@ fn reject_driver(values: &[f64], accepted: &[bool]) -> RejectDriver {
 fn kolmogorov_p_value(distance: f64, n: f64) -> f64 {
     let lambda = (n.sqrt() + 0.12 + 0.11 / n.sqrt()) * distance;
     if lambda < 0.2 {
-        // Below 1e-12 of 1.
+        // Differs from 1 by less than 1e-12.
         return 1.0;
     }
     if lambda < 1.18 {
-        // The theta function's other series, which converges where the first does not.
+        // The theta function's other series, which converges fast where the first does not.
         let terms = (1..=4).map(|j| {
             let odd = f64::from(2 * j - 1) * std::f64::consts::PI;
             libm::exp(-odd * odd / (8.0 * lambda * lambda))

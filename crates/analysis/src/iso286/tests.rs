@@ -7,7 +7,7 @@ fn limits(nominal: f64, class: &str) -> (f64, f64) {
 }
 
 #[test]
-fn limits_are_those_of_iso_286_2() {
+fn limits_match_the_tables_of_iso_286_2() {
     // Lower and upper limit deviation, micrometres, from the tables of ISO 286-2:2010.
     let published = [
         (25.0, "H7", 0.0, 21.0),
@@ -60,8 +60,11 @@ fn limits_are_those_of_iso_286_2() {
         (110.0, "S7", -101.0, -66.0),
     ];
     for (nominal, class, lower, upper) in published {
-        let own = limits(nominal, class);
-        assert!((own.0 - lower).abs() < 1e-6 && (own.1 - upper).abs() < 1e-6, "{nominal} {class}: {own:?}");
+        let computed = limits(nominal, class);
+        assert!(
+            (computed.0 - lower).abs() < 1e-6 && (computed.1 - upper).abs() < 1e-6,
+            "{nominal} {class}: {computed:?}"
+        );
     }
 }
 
@@ -85,7 +88,7 @@ fn tolerances_follow_the_formulas_of_the_standard() {
             let error = (table / formula - 1.0).abs();
             assert!(error < tolerance, "IT{} up to {upper} mm: {table}, formula {formula}", index + 5);
         }
-        // IT01, IT0, IT1; IT2 to IT4 are roughly in geometric progression from IT1 to IT5.
+        // IT01, IT0 and IT1 follow formulas of their own; IT2 to IT4 are roughly in geometric progression from IT1 to IT5.
         for (row, formula) in [(0, 0.3 + 0.008 * mean), (1, 0.5 + 0.012 * mean), (grade(1), 0.8 + 0.02 * mean)] {
             let table = TOLERANCES[row][range];
             assert!(
@@ -98,7 +101,7 @@ fn tolerances_follow_the_formulas_of_the_standard() {
             let formula = first * libm::pow(fifth / first, (n - 1) as f64 / 4.0);
             assert!((TOLERANCES[grade(n)][range] / formula - 1.0).abs() < 0.2, "IT{n} up to {upper} mm");
         }
-        // From IT6 on, five grades are a factor of 10, with the one exception that the standard names.
+        // From IT6 on, five grades correspond to a factor of 10, with the one exception that the standard names.
         for n in 6..14 {
             let expected = if *upper == 6.0 && n == 6 { 75.0 } else { 10.0 * TOLERANCES[grade(n)][range] };
             assert_eq!(TOLERANCES[grade(n + 5)][range], expected, "IT{} up to {upper} mm", n + 5);
@@ -112,7 +115,7 @@ fn tolerances_follow_the_formulas_of_the_standard() {
 /// Ranges of a letter as (main range, geometric mean, value).
 fn deviations(letter: &str) -> Vec<(usize, f64, f64)> {
     let rows = CLEARANCE_SIDE.iter().chain(&INTERFERENCE_SIDE);
-    let (_, deviation) = rows.into_iter().find(|(own, _)| *own == letter).unwrap();
+    let (_, deviation) = rows.into_iter().find(|(name, _)| *name == letter).unwrap();
     let (ends, values): (&[f64], &[f64]) = match deviation {
         Deviation::Main(values) => (&RANGES, values),
         Deviation::Intermediate(values) => (&INTERMEDIATE, values),
@@ -142,12 +145,12 @@ fn deviations_follow_the_formulas_of_the_standard() {
     ];
     for (letter, formula) in formulas {
         for (range, mean, value) in deviations(letter) {
-            // Rounding to 1 µm, 5 µm or 10 µm; c is larger up to 40 mm, and n smaller up to 3 mm, by older practice.
+            // Values are rounded to 1 µm, 5 µm or 10 µm. By older practice, c is larger up to 40 mm and n smaller up to 3 mm.
             let tolerance = if letter == "c" && mean < 40.0 { 0.16 } else { 0.05 };
             let exact = formula(mean);
-            let is_old = letter == "n" && range == 0;
+            let follows_older_practice = letter == "n" && range == 0;
             assert!(
-                (value - exact).abs() <= 1.0 + tolerance * exact || is_old,
+                (value - exact).abs() <= 1.0 + tolerance * exact || follows_older_practice,
                 "{letter} at {mean} mm: {value}, {exact}"
             );
         }
@@ -171,7 +174,7 @@ fn deviations_follow_the_formulas_of_the_standard() {
 }
 
 #[test]
-fn a_hole_with_an_increment_fits_as_its_shaft_does() {
+fn a_hole_with_an_increment_has_the_clearance_of_the_matching_shaft() {
     // The purpose of Δ (ISO 286-1:1988, annex A): N7/h6 has the clearance of H7/n6, P7/h6 of H7/p6, ….
     for nominal in [5.0, 9.0, 15.0, 25.0, 45.0, 75.0, 110.0, 150.0, 220.0, 400.0, 480.0] {
         for letter in ["k", "m", "n", "p", "r", "s"] {
@@ -184,7 +187,7 @@ fn a_hole_with_an_increment_fits_as_its_shaft_does() {
 }
 
 #[test]
-fn clearances_of_fits_are_the_published_ones() {
+fn clearances_of_fits_match_published_values() {
     let of = |nominal: f64, text: &str| text.parse::<Fit>().unwrap().clearance(nominal * 1e-3).unwrap();
     let published = [
         (50.0, "H7/g6", 9.0, 50.0, FitKind::Clearance),
@@ -218,7 +221,7 @@ fn the_radial_clearance_is_half_the_clearance_on_the_diameter() {
 }
 
 #[test]
-fn names_are_read_back_and_bad_ones_are_refused() {
+fn names_survive_a_round_trip_and_invalid_ones_are_refused() {
     for text in ["H7/g6", "JS01/js0", "A18/s1", "K7/h6"] {
         assert_eq!(text.parse::<Fit>().unwrap().to_string(), text);
     }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::random::{Purpose, RandomStream};
 
-/// Uniform numbers of a test.
+/// Reproducible random numbers for a test.
 fn stream(index: usize) -> RandomStream {
     RandomStream::new(99, Purpose::Position, index)
 }
@@ -9,8 +9,8 @@ fn stream(index: usize) -> RandomStream {
 #[test]
 fn binomial_probabilities_sum_to_one_and_match_small_cases() {
     let small = binomial(3, 0.25);
-    for (own, exact) in small.iter().zip([27.0, 27.0, 9.0, 1.0]) {
-        assert!((own - exact / 64.0).abs() < 1e-15);
+    for (computed, exact) in small.iter().zip([27.0, 27.0, 9.0, 1.0]) {
+        assert!((computed - exact / 64.0).abs() < 1e-15);
     }
     for (n, p) in [(10, 0.5), (5000, 0.99), (200_000, 1e-3), (1, 1e-9)] {
         assert!((binomial(n, p).iter().sum::<f64>() - 1.0).abs() < 1e-9, "{n} {p}");
@@ -32,18 +32,18 @@ fn percentile_intervals_take_the_tabulated_order_statistics() {
 }
 
 #[test]
-fn percentile_intervals_hold_the_percentile_as_often_as_they_promise() {
-    let held = (0..1000).filter(|&lot| {
+fn percentile_intervals_cover_the_percentile_at_the_stated_confidence() {
+    let covered = (0..1000).filter(|&lot| {
         let stream = stream(lot);
         // Exponential: strongly skewed. Its 90 % percentile is ln 10.
         let values: Vec<f64> = (0..200).map(|i| -libm::log(stream.unit(i))).collect();
-        let own = percentile(&values, 0.9, 0.95).unwrap();
+        let computed = percentile(&values, 0.9, 0.95).unwrap();
         let exact = libm::log(10.0);
-        own.low <= exact && exact <= own.high
+        computed.low <= exact && exact <= computed.high
     });
-    // At least 950 expected, less three standard deviations of 7.
-    let held = held.count();
-    assert!((930..=990).contains(&held), "{held}");
+    // 950 expected at least; the lower bound is three standard deviations of 7 below.
+    let covered = covered.count();
+    assert!((930..=990).contains(&covered), "{covered}");
 }
 
 #[test]
@@ -52,8 +52,8 @@ fn yields_have_wilsons_interval() {
     for (accepted, made, low, high) in
         [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)]
     {
-        let own = yield_fraction(accepted, made, 0.95).unwrap();
-        assert!((own.low - low).abs() < 5e-5 && (own.high - high).abs() < 5e-5, "{own:?}");
+        let computed = yield_fraction(accepted, made, 0.95).unwrap();
+        assert!((computed.low - low).abs() < 5e-5 && (computed.high - high).abs() < 5e-5, "{computed:?}");
     }
     let all = yield_fraction(20, 20, 0.95).unwrap();
     assert_eq!((all.value, all.high), (1.0, 1.0));
@@ -65,9 +65,9 @@ fn capability_indices_follow_their_definition() {
     let values = [9.0, 10.0, 11.0, 10.0];
     // Mean 10, variance 2/3.
     let deviation = (2.0_f64 / 3.0).sqrt();
-    let own = capability(&values, Some(6.0), Some(13.0), 0.95).unwrap();
-    assert!((own.cp.unwrap() - 7.0 / (6.0 * deviation)).abs() < 1e-14);
-    assert!((own.cpk.value - 1.0 / deviation).abs() < 1e-14);
+    let computed = capability(&values, Some(6.0), Some(13.0), 0.95).unwrap();
+    assert!((computed.cp.unwrap() - 7.0 / (6.0 * deviation)).abs() < 1e-14);
+    assert!((computed.cpk.value - 1.0 / deviation).abs() < 1e-14);
     let one_sided = capability(&values, Some(6.0), None, 0.95).unwrap();
     assert!(one_sided.cp.is_none() && (one_sided.cpk.value - 4.0 / (3.0 * deviation)).abs() < 1e-14);
     // A mean outside the limits has a negative index.
@@ -75,44 +75,48 @@ fn capability_indices_follow_their_definition() {
 }
 
 #[test]
-fn capability_intervals_hold_the_index_as_often_as_they_promise() {
+fn capability_intervals_cover_the_index_at_the_stated_confidence() {
     // Standard normal values with an upper limit at 0 and at 4 standard deviations.
     for limit in [0.0, 4.0] {
-        let held = (0..1000).filter(|&lot| {
+        let covered = (0..1000).filter(|&lot| {
             let stream = stream(lot);
             let values: Vec<f64> = (0..100).map(|i| normal::quantile(stream.unit(i))).collect();
-            let own = capability(&values, None, Some(limit), 0.95).unwrap().cpk;
-            own.low <= limit / 3.0 && limit / 3.0 <= own.high
+            let computed = capability(&values, None, Some(limit), 0.95).unwrap().cpk;
+            computed.low <= limit / 3.0 && limit / 3.0 <= computed.high
         });
-        let held = held.count();
-        assert!((920..=980).contains(&held), "limit {limit}: {held}");
+        let covered = covered.count();
+        assert!((920..=980).contains(&covered), "limit {limit}: {covered}");
     }
 }
 
 #[test]
-fn the_driver_of_the_rejects_is_found() {
+fn the_inputs_that_cause_rejects_stand_out() {
     let n = 2000;
     let input = |i| (0..n).map(|k| normal::quantile(stream(i).unit(k))).collect::<Vec<f64>>();
     let constant = vec![3.0; n as usize];
     let inputs = vec![input(0), input(1), input(2), constant];
     // Rejected where the first is large or the second far from its mean; the third has no influence.
     let accepted: Vec<bool> = (0..n as usize).map(|k| inputs[0][k] < 1.5 && inputs[1][k].abs() < 2.0).collect();
-    let own = reject_drivers(&inputs, &accepted).unwrap().unwrap();
-    assert!(own[0].mean_shift > 0.8 && own[0].p_value < 1e-10, "{:?}", own[0]);
-    assert!(own[1].mean_shift.abs() < 0.5 && own[1].distance > 0.15 && own[1].p_value < 1e-3, "{:?}", own[1]);
-    assert!(own[2].mean_shift.abs() < 0.3 && own[2].p_value > 0.01, "{:?}", own[2]);
-    assert_eq!(own[3], RejectDriver { mean_shift: 0.0, distance: 0.0, p_value: 1.0 });
+    let computed = reject_drivers(&inputs, &accepted).unwrap().unwrap();
+    assert!(computed[0].mean_shift > 0.8 && computed[0].p_value < 1e-10, "{:?}", computed[0]);
+    assert!(
+        computed[1].mean_shift.abs() < 0.5 && computed[1].distance > 0.15 && computed[1].p_value < 1e-3,
+        "{:?}",
+        computed[1]
+    );
+    assert!(computed[2].mean_shift.abs() < 0.3 && computed[2].p_value > 0.01, "{:?}", computed[2]);
+    assert_eq!(computed[3], RejectDriver { mean_shift: 0.0, distance: 0.0, p_value: 1.0 });
     assert_eq!(reject_drivers(&inputs, &vec![true; n as usize]).unwrap(), None);
     assert_eq!(reject_drivers(&[], &[]).unwrap(), None);
 }
 
 #[test]
-fn p_values_are_those_of_kolmogorovs_distribution() {
+fn p_values_follow_kolmogorovs_distribution() {
     // Critical values of the limit distribution (Smirnov 1948): 1.358 at 5 %, 1.628 at 1 %, 0.8276 at 50 %.
     let n: f64 = 1e8;
     for (lambda, p) in [(1.3581, 0.05), (1.6276, 0.01), (0.8276, 0.5), (0.2, 1.0)] {
-        let own = kolmogorov_p_value(lambda / n.sqrt(), n);
-        assert!((own - p).abs() < 1e-4, "{lambda}: {own}");
+        let computed = kolmogorov_p_value(lambda / n.sqrt(), n);
+        assert!((computed - p).abs() < 1e-4, "{lambda}: {computed}");
     }
     // The two series agree where they meet.
     let jump = kolmogorov_p_value(1.179_999 / n.sqrt(), n) - kolmogorov_p_value(1.180_001 / n.sqrt(), n);
