@@ -9,15 +9,16 @@ use super::argument::Argument;
 use super::axis::{Axis, Coordinate, RangeError};
 use jointplay_scene::{Scene, SceneError, Value};
 
-/// Points per block in a `follow` sweep: each block starts cold at its first point, so that neither threads nor shards
-/// affect which point continues from which.
+/// Points per block in a `follow` sweep. Each block starts cold at its first point, so that the predecessor of a point
+/// depends
+/// neither on threads nor on shards.
 pub const FOLLOW_BLOCK: usize = 25;
 /// Largest number of points in a sweep.
 const MAX_POINTS: usize = 1 << 24;
-/// Largest number of points tried inside a map, or in a table.
+/// Largest number of points of a map's interior, or of a table, whose scenes are checked in advance.
 const MAX_CHECKED: usize = 4096;
 
-/// State from which a point starts: [`Self::meaning`].
+/// State from which a point starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Start {
     /// The scene's own initial state.
@@ -54,13 +55,13 @@ impl Start {
 /// How the values of several parameters combine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrangement {
-    /// Every value with every value of the others; the last parameter varies fastest.
+    /// All combinations of the values; the last parameter varies fastest.
     Crossed,
-    /// Value i with value i of the others.
+    /// Value i of each parameter with value i of the others.
     Zipped,
 }
 
-/// All points of a sweep: the parameter sets, once for each start.
+/// All points of a sweep: every parameter set, once for each start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Design {
     axes: Vec<Axis>,
@@ -79,7 +80,7 @@ impl Design {
         Self::new(scene, axes, Arrangement::Crossed, starts)
     }
 
-    /// The values of `axes` in parallel.
+    /// The values of `axes` in parallel, value i of each with value i of the others.
     ///
     /// # Errors
     /// As [`Self::crossed`]; axes of different lengths.
@@ -114,24 +115,24 @@ impl Design {
     }
 
     fn new(scene: &Scene, axes: Vec<Axis>, arrangement: Arrangement, starts: &[Start]) -> Result<Self, RangeError> {
-        let wrong = |argument, what: String| Err(RangeError::Together(argument, what));
+        let invalid = |argument, what: String| Err(RangeError::Together(argument, what));
         if axes.is_empty() {
-            return wrong(Some(Argument::Vary), "a sweep varies at least one parameter, as in KEY=A..B:N".to_owned());
+            return invalid(Some(Argument::Vary), "a sweep varies at least one parameter, as in KEY=A..B:N".to_owned());
         }
         let mut keys = BTreeSet::new();
-        if let Some(twice) = axes.iter().find(|axis| !keys.insert(axis.key())) {
-            return Err(twice.duplicate_error());
+        if let Some(repeated) = axes.iter().find(|axis| !keys.insert(axis.key())) {
+            return Err(repeated.duplicate_error());
         }
         let mut known = BTreeSet::new();
         match starts.iter().find(|start| !known.insert(start.word())) {
-            Some(twice) => return wrong(Some(Argument::Start), format!("{} is given twice", twice.word())),
-            None if starts.is_empty() => return wrong(Some(Argument::Start), "give at least one start".to_owned()),
+            Some(repeated) => return invalid(Some(Argument::Start), format!("{} is given twice", repeated.word())),
+            None if starts.is_empty() => return invalid(Some(Argument::Start), "give at least one start".to_owned()),
             None => {}
         }
         let design = Self { axes, arrangement, starts: starts.to_vec() };
         let points = design.shape().into_iter().try_fold(1_usize, usize::checked_mul);
         if points.is_none_or(|points| points > MAX_POINTS) {
-            return wrong(None, format!("the ranges have more than {MAX_POINTS} points together"));
+            return invalid(None, format!("the ranges have more than {MAX_POINTS} points together"));
         }
         if let Some(start) = design.starts.iter().find(|start| **start != Start::Cold) {
             design.check_following(scene, *start)?;
@@ -139,9 +140,9 @@ impl Design {
         Ok(design)
     }
 
-    /// Requires numbers in ascending order along a row, and no change along it that waits for a reset.
+    /// Requires numbers in ascending order along a row, and no parameter along it that takes effect only at a reset.
     fn check_following(&self, scene: &Scene, start: Start) -> Result<(), RangeError> {
-        let wrong = |why: String, or| Err(RangeError::Start { start: start.word(), why, or });
+        let invalid = |why: String, or| Err(RangeError::Start { start: start.word(), why, or });
         let (last, others) = match self.axes.split_last() {
             Some((last, others)) => (last, others),
             None => return Ok(()),
@@ -151,7 +152,7 @@ impl Design {
                 "a state is followed from one value to the next, and the values of {} are not numbers in ascending order",
                 last.key()
             );
-            return wrong(why, ", or name a range last");
+            return invalid(why, ", or name a range last");
         }
         let along = match self.arrangement {
             Arrangement::Crossed => std::slice::from_ref(last),
@@ -162,8 +163,8 @@ impl Design {
                 "{} takes effect at the next reset only, so no state can be followed through its values",
                 waiting.key()
             );
-            let is_alone = others.is_empty() || self.arrangement == Arrangement::Zipped;
-            return wrong(why, if is_alone { "" } else { ", or name another range last" });
+            let has_no_alternative = others.is_empty() || self.arrangement == Arrangement::Zipped;
+            return invalid(why, if has_no_alternative { "" } else { ", or name another range last" });
         }
         Ok(())
     }
@@ -178,13 +179,14 @@ impl Design {
         self.arrangement
     }
 
-    /// Where points start from. With several, every parameter set is a point of each.
+    /// Starts. With several, every parameter set is a point for each of them.
     pub fn starts(&self) -> &[Start] {
         &self.starts
     }
 
-    /// Shape of an array with one value per point: the starts, if there are several; then the number of values of each
-    /// crossed axis, or of all zipped ones.
+    /// Shape of an array with one value per point: the number of starts, if there are several, then the number of values of
+    /// each
+    /// crossed axis, or the common number of zipped axes.
     pub fn shape(&self) -> Vec<usize> {
         let starts = (self.starts.len() > 1).then_some(self.starts.len());
         starts.into_iter().chain(self.counts()).collect()
@@ -256,7 +258,7 @@ impl Design {
             }
             Ok(scene)
         };
-        // On the way there may be values that the scene accepts only together, such as a large clearance and a larger ball.
+        // One change at a time can fail on values that are valid only together, such as a large clearance and a larger ball.
         let together = |error| {
             let write = |key: &str, value| base.parameter(key).map(|parameter| parameter.write(value));
             let written = settings.iter().map(|(key, value)| Ok(((*key).to_owned(), write(key, value)?)));
@@ -268,30 +270,33 @@ impl Design {
         one_by_one().or_else(together)
     }
 
-    /// Points to be tried before anything runs. Of crossed axes: every value of each with the others at their ends, and a
-    /// lattice inside, which covers every point of a small map; of more than two axes at most [`MAX_CHECKED`] of these. Of zipped
-    /// ones: all, or as many spread over the rows.
+    /// Points whose scenes are checked before anything runs. With crossed axes, these are every value of each axis with the
+    /// others
+    /// at their ends, and a lattice inside, which covers every point of a small map; with more than two axes, at most
+    /// [`MAX_CHECKED`] of these. With zipped axes, these are all points, or [`MAX_CHECKED`] spread over the rows.
     pub(super) fn checked_points(&self) -> Vec<usize> {
         let sets = self.sets();
         if self.arrangement == Arrangement::Zipped {
             return (0..sets - 1).step_by(sets.div_ceil(MAX_CHECKED)).chain([sets - 1]).collect();
         }
-        let within = |most: usize| most.checked_pow(self.axes.len() as u32).is_some_and(|all| all <= MAX_CHECKED);
-        let most_within = (1..=MAX_CHECKED).take_while(|most| within(*most)).last().unwrap_or(1);
+        let fits = |per_axis: usize| {
+            per_axis.checked_pow(self.axes.len() as u32).is_some_and(|lattice| lattice <= MAX_CHECKED)
+        };
+        let max_per_axis = (1..=MAX_CHECKED).take_while(|per_axis| fits(*per_axis)).last().unwrap_or(1);
         let is_checked = |point: &usize| {
             let indices = self.indices(*point);
             let along = || self.axes.iter().zip(&indices);
             let is_end = |(axis, i): (&Axis, &usize)| *i == 0 || *i + 1 == axis.count();
             let ends = along().filter(|&of| is_end(of)).count();
-            ends + 1 >= indices.len() || along().all(|(axis, i)| i % axis.count().div_ceil(most_within) == 0)
+            ends + 1 >= indices.len() || along().all(|(axis, i)| i % axis.count().div_ceil(max_per_axis) == 0)
         };
         let all: Vec<usize> = (0..sets).filter(is_checked).collect();
-        // The border of more than two ranges grows with a power of two.
+        // With more than two axes, the border itself grows like 2 to the power of their number.
         let stride = if self.axes.len() > 2 { all.len().div_ceil(MAX_CHECKED) } else { 1 };
         all.into_iter().step_by(stride).collect()
     }
 
-    /// Number of blocks. A block is computed in one piece, independently of threads and shards.
+    /// Number of blocks. A block is computed as a whole, independently of threads and shards.
     pub fn blocks(&self) -> usize {
         self.starts.iter().map(|start| self.blocks_of(*start)).sum()
     }
@@ -317,8 +322,8 @@ impl Design {
     /// Points of block `b` in the order in which they are computed.
     pub fn order(&self, b: usize) -> Vec<usize> {
         let points = self.block(b);
-        let down = !points.is_empty() && self.start(points.start) == Start::FollowDown;
-        if down { points.rev().collect() } else { points.collect() }
+        let is_down = !points.is_empty() && self.start(points.start) == Start::FollowDown;
+        if is_down { points.rev().collect() } else { points.collect() }
     }
 
     fn row_length(&self) -> usize {
@@ -378,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn zipped_values_go_together_and_tables_are_zipped() {
+    fn zipped_values_vary_in_parallel_and_tables_are_zipped() {
         let scene = spcmm();
         let axes = vec![axis("contact.friction=0.1..0.3:3"), axis("contact.normal_law=hertz,flores,hertz")];
         let design = Design::zipped(&scene, axes, &[Start::Cold]).expect("three points");
@@ -403,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_that_do_not_go_together_are_refused() {
+    fn ranges_that_cannot_be_combined_are_refused() {
         let scene = spcmm();
         let friction = || axis("contact.friction=0.1..0.4:3");
         let frequency = || axis("spcmm.frequency=0.5Hz..1Hz:3");
@@ -429,7 +434,7 @@ mod tests {
     }
 
     #[test]
-    fn points_within_a_small_map_are_checked() {
+    fn interior_points_of_a_small_map_are_checked() {
         let checked_points = |rows: usize, columns: usize| {
             let axes =
                 [format!("contact.clearance=0.2mm..0.5mm:{rows}"), format!("contact.friction=0.1..0.2:{columns}")];
@@ -439,8 +444,10 @@ mod tests {
         assert_eq!(checked_points(3, 5), (0..15).collect::<Vec<_>>());
         // The border, and every second value of the first range and every third of the second.
         let large = checked_points(128, 130);
-        for (i, j, is) in [(0, 1, true), (127, 7, true), (5, 129, true), (2, 3, true), (2, 4, false), (3, 3, false)] {
-            assert_eq!(large.contains(&(i * 130 + j)), is, "{i} {j}");
+        for (i, j, expected) in
+            [(0, 1, true), (127, 7, true), (5, 129, true), (2, 3, true), (2, 4, false), (3, 3, false)]
+        {
+            assert_eq!(large.contains(&(i * 130 + j)), expected, "{i} {j}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Distributions of an uncertain parameter, as quantile functions.
+//! Distributions of uncertain parameters, as quantile functions.
 
 use std::fmt::Display;
 
@@ -7,7 +7,7 @@ use jointplay_physics::suggest::brief;
 use crate::normal::{cumulative, quantile};
 use crate::yields::interpolated_quantile;
 
-/// Smallest probability between the limits of a truncated normal distribution.
+/// Smallest probability that the limits of a truncated normal distribution may enclose.
 const MIN_MASS: f64 = 1e-200;
 const FORMS: &str = "a value, `uniform(LOW, HIGH)`, `normal(MEAN, SD)`, `normal(MEAN, SD, LOW..HIGH)`, \
                      `triangular(LOW, MODE, HIGH)`, `measured(VALUE, VALUE, …)` or a fit such as `H7/g6`";
@@ -38,83 +38,84 @@ enum Law {
         mode: f64,
         high: f64,
     },
-    /// In ascending order.
+    /// The values in ascending order.
     Measured(Vec<f64>),
 }
 
-/// Why there is no such distribution.
+/// Reasons why a distribution is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DistributionError {
-    /// No known form.
+    /// A text of unknown form.
     #[error("`{}` is no distribution: expected {FORMS}", brief(text))]
     Form {
-        /// As written.
+        /// The given text.
         text: String,
     },
     /// A number that the parameter does not accept.
     #[error("`{}`: {}: {reason}", brief(text), brief(part))]
     Number {
-        /// As written.
+        /// The given text.
         text: String,
-        /// The number at fault.
+        /// The invalid number.
         part: String,
-        /// What is wrong, from the reader of numbers.
+        /// Message of the number parser.
         reason: String,
     },
-    /// A fit that does not exist, or that the parameter does not accept.
+    /// A fit that does not exist or that the parameter does not accept.
     #[error("`{}`: {reason}", brief(text))]
     Fit {
-        /// As written.
+        /// The given text.
         text: String,
-        /// What is wrong, from the reader of fits.
+        /// Message of the fit parser.
         reason: String,
     },
-    /// Values that define no distribution.
+    /// Values that do not define a distribution.
     #[error("{0}")]
     Values(&'static str),
 }
 
 impl Distribution {
-    /// Always `value`.
+    /// The constant `value`.
     ///
     /// # Errors
     /// A value that is not finite.
     pub fn constant(value: f64) -> Result<Self, DistributionError> {
-        finite(&[value])?;
+        check_finite(&[value])?;
         Ok(Self(Law::Constant(value)))
     }
 
-    /// Uniform between two limits.
+    /// Uniform distribution between two limits.
     ///
     /// # Errors
     /// Limits that are not finite or not in ascending order.
     pub fn uniform(low: f64, high: f64) -> Result<Self, DistributionError> {
-        finite(&[low, high])?;
+        check_finite(&[low, high])?;
         check(low < high, "the lower limit of a uniform distribution must be below the upper one")?;
         Ok(Self(Law::Uniform { low, high }))
     }
 
-    /// Normal.
+    /// Normal distribution.
     ///
     /// # Errors
     /// Values that are not finite, or a standard deviation that is not above 0.
     pub fn normal(mean: f64, deviation: f64) -> Result<Self, DistributionError> {
-        finite(&[mean, deviation])?;
+        check_finite(&[mean, deviation])?;
         check(deviation > 0.0, "the standard deviation of a normal distribution must be above 0")?;
         Ok(Self(Law::Normal { mean, deviation }))
     }
 
-    /// Normal, under the condition that the value is between two limits. `mean` and `deviation` are those without the condition.
+    /// Normal distribution truncated at two limits. `mean` and `deviation` are those before truncation.
     ///
     /// # Errors
-    /// As [`Self::normal`] and [`Self::uniform`]; limits so far from the mean that hardly anything is between them.
+    /// As [`Self::normal`] and [`Self::uniform`]; limits so far from the mean that they enclose almost no probability.
     pub fn truncated_normal(mean: f64, deviation: f64, low: f64, high: f64) -> Result<Self, DistributionError> {
         Self::normal(mean, deviation)?;
-        finite(&[low, high])?;
+        check_finite(&[low, high])?;
         check(low < high, "the lower limit of a truncated normal distribution must be below the upper one")?;
-        // Computed in the lower tail, where small probabilities are exact.
-        let (from, to) = ((low - mean) / deviation, (high - mean) / deviation);
-        let mass = if from > 0.0 { cumulative(-from) - cumulative(-to) } else { cumulative(to) - cumulative(from) };
+        // Evaluated in the lower tail, where small probabilities keep their relative precision.
+        let (z_low, z_high) = ((low - mean) / deviation, (high - mean) / deviation);
+        let mass =
+            if z_low > 0.0 { cumulative(-z_low) - cumulative(-z_high) } else { cumulative(z_high) - cumulative(z_low) };
         check(
             mass > MIN_MASS,
             "the limits of a truncated normal distribution are too many standard deviations from its mean",
@@ -122,73 +123,77 @@ impl Distribution {
         Ok(Self(Law::Truncated { mean, deviation, low, high }))
     }
 
-    /// Triangular, with its most frequent value at `mode`.
+    /// Triangular distribution with its most frequent value at `mode`.
     ///
     /// # Errors
     /// Values that are not finite, equal limits, or a mode outside them.
     pub fn triangular(low: f64, mode: f64, high: f64) -> Result<Self, DistributionError> {
-        finite(&[low, mode, high])?;
+        check_finite(&[low, mode, high])?;
         let ordered = low <= mode && mode <= high && low < high;
         check(ordered, "a triangular distribution takes LOW, MODE and HIGH in ascending order, with LOW below HIGH")?;
         Ok(Self(Law::Triangular { low, mode, high }))
     }
 
-    /// Measured values, as a quantile function that is linear between the values in ascending order: value k of n has the
-    /// probability (k - 1) / (n - 1) (Hyndman & Fan 1996, "Sample quantiles in statistical packages", definition 7). Nothing
-    /// outside the measured range is drawn.
+    /// Distribution of measured values. Its quantile function is linear between the values in ascending order: value k of n
+    /// has
+    /// the probability (k - 1) / (n - 1) (Hyndman & Fan 1996, "Sample quantiles in statistical packages", definition 7). Its
+    /// support is the measured range.
     ///
     /// # Errors
-    /// No values, or one that is not finite.
+    /// No values, or a value that is not finite.
     pub fn measured(values: &[f64]) -> Result<Self, DistributionError> {
         check(!values.is_empty(), "a measured distribution needs at least one value")?;
-        finite(values)?;
+        check_finite(values)?;
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
         Ok(Self(Law::Measured(sorted)))
     }
 
-    /// Reads a value, `uniform(LOW, HIGH)`, `normal(MEAN, SD)`, `normal(MEAN, SD, LOW..HIGH)`, `triangular(LOW, MODE, HIGH)`,
-    /// `measured(VALUE, …)` or a fit such as `H7/g6`. `number` reads a value with its unit, in SI; `of_fit` reads a fit and gives
-    /// the distribution of the parameter under it ([`crate::iso286::Fit::radial_clearance`]), for which it knows the nominal
-    /// size.
+    /// Parses a value, `uniform(LOW, HIGH)`, `normal(MEAN, SD)`, `normal(MEAN, SD, LOW..HIGH)`, `triangular(LOW, MODE,
+    /// HIGH)`,
+    /// `measured(VALUE, …)` or a fit such as `H7/g6`. `number` parses a value with its unit and returns it in SI. `of_fit`
+    /// parses a
+    /// fit and returns the resulting distribution of the parameter ([`crate::iso286::Fit::radial_clearance`]), because only
+    /// the
+    /// caller knows the nominal size.
     ///
     /// # Errors
-    /// A text of another form, a number or fit that the caller refuses, or numbers without a distribution.
+    /// A text of another form, a number or fit that the caller rejects, or numbers that do not define a distribution.
     pub fn parse<E: Display>(
         text: &str,
         number: impl Fn(&str) -> Result<f64, E>,
         of_fit: impl FnOnce(&str) -> Result<Self, E>,
     ) -> Result<Self, DistributionError> {
-        let own = || text.to_owned();
+        let given = || text.to_owned();
         let read = |part: &str| {
             let part = part.trim();
             number(part).map_err(|reason| DistributionError::Number {
-                text: own(),
+                text: given(),
                 part: part.to_owned(),
                 reason: reason.to_string(),
             })
         };
-        let form = || DistributionError::Form { text: own() };
+        let invalid_form = || DistributionError::Form { text: given() };
         let trimmed = text.trim();
         let Some((name, rest)) = trimmed.split_once('(') else {
             if trimmed.contains('/') && !trimmed.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) {
                 return of_fit(trimmed)
-                    .map_err(|reason| DistributionError::Fit { text: own(), reason: reason.to_string() });
+                    .map_err(|reason| DistributionError::Fit { text: given(), reason: reason.to_string() });
             }
-            // A word with no brackets is a form with its numbers missing, not a number.
+            // A word without parentheses is a form whose numbers are missing, not a number.
             return if trimmed.starts_with(char::is_alphabetic) || trimmed.is_empty() {
-                Err(form())
+                Err(invalid_form())
             } else {
                 Self::constant(read(trimmed)?)
             };
         };
-        let inside = rest.strip_suffix(')').ok_or_else(form)?;
+        let inside = rest.strip_suffix(')').ok_or_else(invalid_form)?;
         let parts: Vec<&str> = inside.split(',').map(str::trim).collect();
         match (name.trim(), parts.as_slice()) {
             ("uniform", [low, high]) => Self::uniform(read(low)?, read(high)?),
             ("normal", [mean, deviation]) => Self::normal(read(mean)?, read(deviation)?),
             ("normal", [mean, deviation, limits]) => {
-                let (low, high) = limits.split_once("..").ok_or_else(form)?;
+                let (low, high) = limits.split_once("..").ok_or_else(invalid_form)?;
                 Self::truncated_normal(read(mean)?, read(deviation)?, read(low)?, read(high)?)
             }
             ("triangular", [low, mode, high]) => Self::triangular(read(low)?, read(mode)?, read(high)?),
@@ -196,25 +201,26 @@ impl Distribution {
                 let values: Result<Vec<f64>, _> = values.iter().map(|value| read(value)).collect();
                 Self::measured(&values?)
             }
-            _ => Err(form()),
+            _ => Err(invalid_form()),
         }
     }
 
-    /// The value below which the fraction `u` of all values lies, for `u` in (0, 1). At 0 and 1 an unlimited distribution is
-    /// infinite.
+    /// The value below which the fraction `u` of all values lies, for `u` in (0, 1). At 0 and 1 the quantile of an unbounded
+    /// distribution is infinite.
     pub fn quantile(&self, u: f64) -> f64 {
         match self.0 {
             Law::Constant(value) => value,
             Law::Uniform { low, high } => (low * (1.0 - u) + high * u).clamp(low, high),
             Law::Normal { mean, deviation } => mean + deviation * quantile(u),
             Law::Truncated { mean, deviation, low, high } => {
-                let (from, to) = ((low - mean) / deviation, (high - mean) / deviation);
-                // Of limits above the mean, in the lower tail, where small probabilities are exact.
-                let z = if from > 0.0 {
-                    let (upper, lower) = (cumulative(-from), cumulative(-to));
+                let (z_low, z_high) = ((low - mean) / deviation, (high - mean) / deviation);
+                // Limits above the mean are mirrored to the lower tail, where small probabilities keep their relative
+                // precision.
+                let z = if z_low > 0.0 {
+                    let (upper, lower) = (cumulative(-z_low), cumulative(-z_high));
                     -quantile(upper - (upper - lower) * u)
                 } else {
-                    let (lower, upper) = (cumulative(from), cumulative(to));
+                    let (lower, upper) = (cumulative(z_low), cumulative(z_high));
                     quantile(lower + (upper - lower) * u)
                 };
                 (mean + deviation * z).clamp(low, high)
@@ -231,7 +237,7 @@ impl Distribution {
         }
     }
 
-    /// Least and greatest possible value; infinite for a normal distribution.
+    /// Smallest and largest possible value; infinite for a normal distribution.
     pub fn support(&self) -> (f64, f64) {
         match self.0 {
             Law::Constant(value) => (value, value),
@@ -244,11 +250,11 @@ impl Distribution {
     }
 }
 
-fn check(holds: bool, otherwise: &'static str) -> Result<(), DistributionError> {
-    if holds { Ok(()) } else { Err(DistributionError::Values(otherwise)) }
+fn check(is_valid: bool, message: &'static str) -> Result<(), DistributionError> {
+    if is_valid { Ok(()) } else { Err(DistributionError::Values(message)) }
 }
 
-fn finite(values: &[f64]) -> Result<(), DistributionError> {
+fn check_finite(values: &[f64]) -> Result<(), DistributionError> {
     check(values.iter().all(|value| value.is_finite()), "a distribution takes finite numbers")
 }
 
@@ -256,7 +262,7 @@ fn finite(values: &[f64]) -> Result<(), DistributionError> {
 mod tests {
     use super::*;
 
-    /// Micrometres.
+    /// Parses a number of micrometres.
     fn number(text: &str) -> Result<f64, String> {
         let bare = text.strip_suffix("um").ok_or("needs the unit um")?;
         bare.trim().parse().map_err(|_| "not a number".to_owned())
@@ -270,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_give_the_distributions_they_name() {
+    fn texts_are_parsed_as_the_distributions_they_name() {
         assert_eq!(parse(" 20 um").unwrap(), Distribution::constant(20.0).unwrap());
         assert_eq!(parse("uniform(10 um, 30 um)").unwrap(), Distribution::uniform(10.0, 30.0).unwrap());
         assert_eq!(parse("normal(20um,3um)").unwrap(), Distribution::normal(20.0, 3.0).unwrap());
@@ -282,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_text_and_its_part() {
+    fn errors_quote_the_text_and_the_invalid_part() {
         let error = |text| parse(text).unwrap_err().to_string();
         assert_eq!(error("uniform(10 um, 30)"), "`uniform(10 um, 30)`: 30: needs the unit um");
         assert!(error("uniform(10 um)").starts_with("`uniform(10 um)` is no distribution: expected a value"));
@@ -306,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_have_the_moments_of_their_distribution() {
+    fn quantiles_reproduce_the_moments_of_their_distribution() {
         let density = |z: f64| libm::exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt();
         // Truncated to two standard deviations below and one above (Johnson, Kotz & Balakrishnan 1994, section 13.10.1).
         let mass = cumulative(1.0) - cumulative(-2.0);
@@ -323,14 +329,17 @@ mod tests {
         ];
         for (distribution, mean, deviation) in cases {
             let distribution = distribution.unwrap();
-            let (own_mean, own_deviation) = moments(&distribution);
-            // The midpoint rule misses the last tail of the normal distribution.
-            assert!((own_mean - mean).abs() < 1e-5 && (own_deviation - deviation).abs() < 2e-3, "{distribution:?}");
+            let (computed_mean, computed_deviation) = moments(&distribution);
+            // The midpoint rule misses the outermost tails of the normal distribution.
+            assert!(
+                (computed_mean - mean).abs() < 1e-5 && (computed_deviation - deviation).abs() < 2e-3,
+                "{distribution:?}"
+            );
         }
     }
 
     #[test]
-    fn quantiles_rise_within_the_support_even_in_a_far_tail() {
+    fn quantiles_increase_within_the_support_even_in_a_far_tail() {
         for (low, high) in [(30.0, 31.0), (-31.0, -30.0), (-1.0, 8.0)] {
             let distribution = Distribution::truncated_normal(0.0, 1.0, low, high).unwrap();
             let values: Vec<f64> = (1..1000).map(|i| distribution.quantile(f64::from(i) / 1000.0)).collect();

@@ -1,5 +1,6 @@
-//! The tip's error over the workspace: at every point of a grid over drive positions and parameters, the error at rest and the
-//! set of errors that are reachable with all balls anywhere in their play.
+//! The tip's error over the workspace. For every point of a grid of drive positions and parameters, it gives the error at
+//! rest
+//! and the set of errors that are reachable with every ball anywhere in its play.
 
 use super::axis::{Axis, RangeError};
 use super::design::{Design, Start};
@@ -9,13 +10,14 @@ use jointplay_scene::{Scene, SceneError};
 
 /// Allowed numbers of directions.
 pub const DIRECTIONS: std::ops::RangeInclusive<usize> = 2..=4096;
-/// Largest number of directions of all points together: their arrays take 512 MiB.
+/// Largest number of errors in a map, points times directions: their arrays take 512 MiB.
 const MAX_ERRORS: usize = 1 << 24;
-/// The farthest error has been found when another direction enlarges it by less than this part, and maximum number of directions.
-const STANDSTILL: f64 = 1e-9;
-const MAX_TURNS: usize = 50;
+/// Relative growth below which the search for the largest error has converged.
+const CONVERGED_GROWTH: f64 = 1e-9;
+/// Largest number of iterations of that search.
+const MAX_ITERATIONS: usize = 50;
 
-/// A grid of points at which the drives stand still.
+/// A grid of points at which the drives are held.
 #[derive(Clone, Debug)]
 pub struct WorkspaceMap {
     scene: Scene,
@@ -23,38 +25,39 @@ pub struct WorkspaceMap {
     directions: usize,
 }
 
-/// What a point has.
+/// Tip errors at a point.
 #[derive(Clone, Debug)]
 pub struct MapPoint {
     /// Tip without play, world axes, m.
     pub ideal_tip: Vec3,
-    /// Tip at rest with play minus that, m; why there is none.
+    /// Tip at rest with play minus `ideal_tip`, m; the error if there is no rest position.
     pub settled: Result<Vec3, HeldError>,
     /// Directions in which the tip can err.
     pub freedoms: TipFreedoms,
-    /// Farthest errors in directions spread evenly over the bounded ones, without their parts in the unbounded ones.
+    /// Farthest errors in directions spread evenly over the bounded directions, without components in unbounded directions.
     pub farthest: Vec<Farthest>,
-    /// The largest error in any bounded direction; `None` if play moves the tip nowhere, or no pose closes.
+    /// The largest error in any bounded direction; `None` if play does not move the tip, or if no pose closes the loops.
     pub largest: Option<Farthest>,
 }
 
-/// Why a point has nothing.
+/// Reasons why a point has no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PointFault {
-    /// Parameters that the scene does not accept together.
+    /// Parameter values that the scene does not accept together.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The machine without play has no pose there.
+    /// The machine without play has no pose at this point.
     #[error(transparent)]
     Held(#[from] HeldError),
 }
 
 impl WorkspaceMap {
-    /// The points `over` which `scene` is mapped, each axis as [`Axis::parse_over`] reads it, all combined, the last one varying
-    /// fastest; with so many `directions` at each.
+    /// A map of `scene` over all combinations of the axes in `over`, in the syntax of [`Axis::parse_over`]; the last axis
+    /// varies
+    /// fastest. `directions` is the number of directions at each point.
     ///
     /// # Errors
-    /// As [`Axis::parse_over`] and [`Design::crossed`]; more errors than a result holds.
+    /// As [`Axis::parse_over`] and [`Design::crossed`]; more points times directions than a map holds.
     pub fn new(scene: Scene, over: &[String], directions: usize) -> Result<Self, RangeError> {
         let axes = over.iter().map(|text| Axis::parse_over(&scene, text)).collect::<Result<Vec<_>, _>>()?;
         let design = Design::crossed(&scene, axes, &[Start::Cold])?;
@@ -69,7 +72,7 @@ impl WorkspaceMap {
         Ok(Self { scene, design, directions })
     }
 
-    /// The scene, without what varies.
+    /// The scene, without the varied values.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -79,7 +82,7 @@ impl WorkspaceMap {
         &self.design
     }
 
-    /// Directions at each point.
+    /// Number of directions at each point.
     pub fn directions(&self) -> usize {
         self.directions
     }
@@ -87,7 +90,7 @@ impl WorkspaceMap {
     /// Computes a point.
     ///
     /// # Errors
-    /// The machine without play has no pose there.
+    /// The scene rejects the parameter values, or the machine without play has no pose at the point.
     pub fn point(&self, point: usize) -> Result<MapPoint, PointFault> {
         let scene = self.design.scene(&self.scene, point)?;
         let mut positions = vec![None; scene.machine.driven().count()];
@@ -115,8 +118,8 @@ impl WorkspaceMap {
     }
 }
 
-/// At most `count` unit vectors, spread evenly over all that `basis` spans: both ways along a line, around a circle, or over a
-/// sphere along a Fibonacci spiral (González, Math. Geosci. 42, 2010, pp. 49-64).
+/// At most `count` unit vectors, spread evenly over the space that `basis` spans: both ways along a line, around a circle, or
+/// over a sphere along a Fibonacci spiral (González, Math. Geosci. 42, 2010, pp. 49-64).
 fn spread(basis: &[Vec3], count: usize) -> Vec<Vec3> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let around = |turn: f64| (libm::cos(turn), libm::sin(turn));
@@ -140,22 +143,23 @@ fn spread(basis: &[Vec3], count: usize) -> Vec<Vec3> {
     }
 }
 
-/// The largest error: from the largest of `sampled`, each error is the direction of the next. The set's `farthest` point along an
-/// error is at least as far as that error (Journée et al., J. Mach. Learn. Res. 11, 2010, pp. 517-553, algorithm 1).
+/// The largest error, by an iteration that starts at the largest of `sampled` and searches along each error for the next. The
+/// set's `farthest` point along an error is at least as far as that error (Journée et al., J. Mach. Learn. Res. 11, 2010,
+/// pp. 517-553, algorithm 1).
 fn largest(sampled: &[Farthest], mut farthest: impl FnMut(&Vec3) -> Farthest) -> Option<Farthest> {
     let size = |farthest: &Farthest| farthest.error.map_or(0.0, |error| error.norm());
-    let first = sampled.iter().reduce(|most, next| if size(next) > size(most) { next } else { most })?;
-    let mut most = first.clone();
-    for _ in 0..MAX_TURNS {
-        let direction = most.error?.try_normalize(0.0)?;
+    let first = sampled.iter().reduce(|largest, next| if size(next) > size(largest) { next } else { largest })?;
+    let mut largest = first.clone();
+    for _ in 0..MAX_ITERATIONS {
+        let direction = largest.error?.try_normalize(0.0)?;
         let next = farthest(&direction);
-        let grown = size(&next) > size(&most) * (1.0 + STANDSTILL);
-        if size(&next) >= size(&most) {
-            most = next;
+        let has_grown = size(&next) > size(&largest) * (1.0 + CONVERGED_GROWTH);
+        if size(&next) >= size(&largest) {
+            largest = next;
         }
-        if !grown {
+        if !has_grown {
             break;
         }
     }
-    Some(most)
+    Some(largest)
 }

@@ -11,23 +11,23 @@ use jointplay_physics::machine::Vec3;
 /// Largest number of points that the window shows.
 pub const MAX_POINTS: usize = 5000;
 
-/// A map to be computed.
+/// A request for a map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapTask {
     /// The scene.
     pub scene: SceneSource,
-    /// What varies, as in `map --over`.
+    /// Axes of the map, as in `map --over`.
     pub over: Vec<String>,
-    /// Directions at each point.
+    /// Number of directions at each point.
     pub directions: usize,
 }
 
 /// A message about a map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum MapMessage {
-    /// The accepted axes: name and values in their order, SI. The points follow, the last axis varying fastest.
+    /// The accepted axes: name and values in order, SI. The points follow, with the last axis varying fastest.
     Axes(Vec<(String, Vec<f64>)>),
-    /// The next point; `None` if the machine without play has no pose there.
+    /// The next point; `None` if it has no result.
     Point(Option<TipErrors>),
 }
 
@@ -36,7 +36,7 @@ pub enum MapMessage {
 pub struct TipErrors {
     /// Tip without play.
     pub tip: [f64; 3],
-    /// Error at rest, if there is a position of rest.
+    /// Error at rest, if there is a rest position.
     pub settled: Option<[f64; 3]>,
     /// Largest error that is reachable with every ball anywhere in its play.
     pub largest: Option<[f64; 3]>,
@@ -54,7 +54,7 @@ impl TipErrors {
     }
 }
 
-/// Computes `task`, point after point, and awaits `rest` after each.
+/// Computes `task` point by point and awaits `rest` after each.
 pub(super) async fn run(
     task: &MapTask,
     report: &mut dyn FnMut(MapMessage) -> ControlFlow<()>,
@@ -85,24 +85,25 @@ mod tests {
     use crate::task::{Job, Message, perform};
     use jointplay_scene::Scene;
 
-    fn said(over: &[&str], most: usize) -> Vec<Message> {
+    /// The first messages of a map, up to `limit`, after which it is cancelled.
+    fn messages(over: &[&str], limit: usize) -> Vec<Message> {
         let scene = Scene::load("four-bar", &[]).expect("built in");
         let over = over.iter().map(|&text| text.to_owned()).collect();
         let job = Job::Map(MapTask { scene: SceneSource::of(&scene), over, directions: 4 });
-        // Jobs are sent as text.
+        // A job must survive its serialisation as text.
         let job: Job = serde_json::from_str(&serde_json::to_string(&job).expect("plain data")).expect("its own text");
-        let mut said = Vec::new();
+        let mut messages = Vec::new();
         perform(&job, &mut || 0.0, &mut |message| {
-            said.push(message);
-            if said.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            messages.push(message);
+            if messages.len() < limit { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
-        said
+        messages
     }
 
     #[test]
     fn a_map_reports_its_axes_then_its_points_and_ends_when_cancelled() {
         let over = ["crank.angle=0deg,90deg,180deg", "contact.clearance=0.1mm,0.2mm"];
-        let all = said(&over, usize::MAX);
+        let all = messages(&over, usize::MAX);
         assert_eq!((all.len(), all.last()), (8, Some(&Message::Done)));
         let Message::Map(MapMessage::Axes(axes)) = &all[0] else { panic!("{all:?}") };
         assert_eq!((&axes[0].0[..], axes[1].1.len()), ("crank.angle", 2));
@@ -110,13 +111,13 @@ mod tests {
             Message::Map(MapMessage::Point(Some(errors))) => errors.clone(),
             other => panic!("{other:?}"),
         };
-        // Twice the play, twice the error, and the same tip.
+        // Twice the play doubles the error and leaves the ideal tip unchanged.
         let (one, two) = (errors(&all[1]), errors(&all[2]));
         assert_eq!(one.tip, two.tip);
         let size = |errors: &TipErrors| Vec3::from(errors.largest.expect("an error")).norm();
         assert!((size(&two) / size(&one) - 2.0).abs() < 0.01);
-        assert_eq!(said(&over, 3), all[..3]);
-        let refused = said(&["crank.angle=0deg..1deg:9999"], usize::MAX);
+        assert_eq!(messages(&over, 3), all[..3]);
+        let refused = messages(&["crank.angle=0deg..1deg:9999"], usize::MAX);
         assert!(matches!(&refused[..], [Message::Failed(why)] if why.contains("9999 points")), "{refused:?}");
     }
 }

@@ -7,9 +7,10 @@ pub(crate) fn cumulative(z: f64) -> f64 {
     0.5 * libm::erfc(-z / SQRT_2)
 }
 
-/// Quantile of the standard normal distribution for `p` in (0, 1): relative error about 1e-16 (Wichura 1988, "Algorithm AS 241:
-/// the percentage points of the normal distribution", Applied Statistics 37, 477-484, routine PPND16). -∞ at 0, ∞ at 1, NaN
-/// outside.
+/// Quantile of the standard normal distribution for `p` in (0, 1), with a relative error of about 1e-16 (Wichura 1988,
+/// "Algorithm AS 241: the percentage points of the normal distribution", Applied Statistics 37, 477-484, routine PPND16). It
+/// is
+/// -∞ at 0, ∞ at 1 and NaN outside.
 pub(crate) fn quantile(p: f64) -> f64 {
     let q = p - 0.5;
     if q.abs() <= 0.425 {
@@ -31,7 +32,7 @@ fn ratio([numerator, denominator]: &[[f64; 8]; 2], r: f64) -> f64 {
     value(numerator) / value(denominator)
 }
 
-/// |p - 1/2| up to 0.425.
+/// Coefficients for |p - 1/2| up to 0.425.
 const CENTRE: [[f64; 8]; 2] = [
     [
         3.387_132_872_796_366_5,
@@ -54,7 +55,7 @@ const CENTRE: [[f64; 8]; 2] = [
         5.226_495_278_852_854e3,
     ],
 ];
-/// Tails down to exp(-25).
+/// Coefficients for tail probabilities down to exp(-25).
 const MIDDLE: [[f64; 8]; 2] = [
     [
         1.423_437_110_749_683_5,
@@ -77,7 +78,7 @@ const MIDDLE: [[f64; 8]; 2] = [
         1.050_750_071_644_416_9e-9,
     ],
 ];
-/// Tails beyond.
+/// Coefficients for smaller tail probabilities.
 const TAIL: [[f64; 8]; 2] = [
     [
         6.657_904_643_501_103,
@@ -119,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_of_common_probabilities_are_the_tabulated_ones() {
+    fn quantiles_of_common_probabilities_match_tables() {
         assert!((quantile(0.975) - 1.959_963_984_540_054).abs() < 1e-14);
         assert!((quantile(0.995) - 2.575_829_303_548_900_4).abs() < 1e-14);
         assert!((quantile(1e-10) + 6.361_340_902_404_056).abs() < 1e-13);

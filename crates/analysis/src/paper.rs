@@ -1,5 +1,5 @@
-//! Figures, numbers and statements of Sheng & Chen, sections 4.2, 4.3 and 5, as a table (`assets/paper.toml`), and the runs that
-//! it names. Nothing is tuned to match; the paper omits one dimension and contradicts itself in places.
+//! Figures, numbers and statements of Sheng & Chen, sections 4.2, 4.3 and 5, and the runs they refer to, from a table
+//! (`assets/paper.toml`). Nothing is tuned to match; the paper omits one dimension and contradicts itself in places.
 
 #![allow(missing_docs, reason = "the table explains its keys")]
 
@@ -44,9 +44,9 @@ impl Case {
 /// Runs that differ in a single parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Series {
-    /// Figures 5 to 10 and 18 to 20.
+    /// Different clearances: Figures 5 to 10 and 18 to 20.
     Clearance,
-    /// Figures 11 to 16 and 21 to 23.
+    /// Different friction coefficients: Figures 11 to 16 and 21 to 23.
     Friction,
 }
 
@@ -56,12 +56,12 @@ words!(Series {
 });
 
 impl Series {
-    /// Its row of the table.
+    /// The row of the series in the table.
     pub fn row(self) -> &'static SeriesRow {
         &PAPER.series[self as usize]
     }
 
-    /// Its runs, in ascending order of the parameter.
+    /// The runs of the series, in ascending order of the parameter.
     pub fn cases(self) -> [Case; 3] {
         self.row().runs
     }
@@ -71,12 +71,12 @@ impl Series {
         self.row().value.replace("{}", &value.to_string())
     }
 
-    /// Label of a run among the others of the series.
+    /// Label of a run within the series.
     pub fn run_name(self, case: Case) -> String {
         self.name(self.of(case))
     }
 
-    /// Value of its parameter in a run.
+    /// Value of the varied parameter in a run.
     pub fn of(self, case: Case) -> f64 {
         match self {
             Self::Clearance => case.clearance,
@@ -112,7 +112,7 @@ pub struct Variant {
     pub changes: Vec<(String, String)>,
 }
 
-/// Variants of the model in which the paper's runs are computed.
+/// Variants of the model with which the paper's runs are computed.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Variants {
@@ -122,7 +122,7 @@ pub struct Variants {
 }
 
 impl Variants {
-    /// All of them, in the order of the table.
+    /// All variants, in the order of the table.
     pub fn all(&self) -> impl Iterator<Item = &Variant> {
         [&self.corrected, &self.printed].into_iter().chain(&self.combinations)
     }
@@ -143,7 +143,7 @@ words!(Coordinate {
 });
 
 impl Coordinate {
-    /// Its index among the coordinates of the output body.
+    /// Index among the coordinates of the output body.
     pub const fn index(self) -> usize {
         [0, 4][self as usize]
     }
@@ -161,9 +161,9 @@ impl Coordinate {
 pub enum Curves {
     /// The runs with different clearances.
     Clearance,
-    /// The runs with different friction.
+    /// The runs with different friction coefficients.
     Friction,
-    /// The same run in two formulations that share no equations of motion.
+    /// The same run in two independent formulations of the equations of motion.
     Formulations,
 }
 
@@ -188,7 +188,7 @@ pub struct Published {
     pub value: f64,
 }
 
-/// A peak of Figure 17, whose run the paper does not name, SI units.
+/// A peak of Figure 17, SI units. The paper does not say which run the figure shows.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Verification {
@@ -202,7 +202,7 @@ pub struct Verification {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Shows {
-    /// Columns of three runs over the whole period, and while the balls bounce.
+    /// Columns of three runs, over the whole period and during the initial impacts.
     Response { to: Series, whole: Vec<String>, early: Vec<String> },
     /// The contact forces of a run.
     Forces(Case),
@@ -210,7 +210,7 @@ pub enum Shows {
     Verification(Vec<String>),
     /// Divergence of the formulations, and constraint violation.
     Drift,
-    /// Phase portraits, settled and during impacts.
+    /// Phase portraits, after settling and during impacts.
     Portraits(Series),
     /// Sections of three runs.
     Sections(Series),
@@ -237,7 +237,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Whether `figure`, such as `6a`, is a part of this figure.
+    /// Whether `figure`, such as `6a`, is part of this figure.
     pub fn contains(&self, figure: &str) -> bool {
         let number = figure.trim_end_matches(char::is_alphabetic);
         self.name == format!("figure-{number:0>2}")
@@ -254,7 +254,7 @@ pub struct Section {
     pub figures: Vec<Figure>,
 }
 
-/// Test that confirms a statement; [`super::reproduction::Findings::statements`] has the criterion of each.
+/// Test of a statement; [`super::reproduction::Findings::statements`] applies the criteria.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Test {
@@ -283,7 +283,7 @@ pub enum Test {
     ChaosAllOrNone(Series),
 }
 
-/// A statement of the paper in words.
+/// A statement of the paper and the test that decides it.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Claim {
@@ -292,7 +292,7 @@ pub struct Claim {
     pub test: Test,
 }
 
-/// Everything compared with the paper, in its order.
+/// Everything compared with the paper, in the paper's order.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Paper {
@@ -347,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn rates_are_held_against_the_amplitude_of_the_rate() {
+    fn amplitudes_of_rates_follow_from_the_amplitude_of_the_coordinate() {
         let beta = [0, 1, 2].map(|nth| Coordinate::Beta.amplitude(nth));
         assert_eq!(beta, [0.025, 0.025 * PI, 0.025 * (PI * PI)]);
     }

@@ -1,11 +1,12 @@
-//! Random numbers by counter: number `i` of a stream is computed without the earlier ones, with the same bits on every platform.
+//! Counter-based random numbers: number `i` of a stream is computed without its predecessors, with the same bits on every
+//! platform.
 
 /// Weyl increment of SplitMix64: 2^64 divided by the golden ratio, odd.
 const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
-/// Random bits of a number in (0, 1), half a unit of the last place away from both ends.
+/// Random bits of a number in (0, 1).
 pub(crate) const BITS: u32 = 52;
 
-/// What a stream is drawn for: streams of one seed and different purposes are independent.
+/// Purpose of a stream. Streams of the same seed with different purposes are independent.
 #[derive(Clone, Copy)]
 pub(crate) enum Purpose {
     Scrambling,
@@ -15,8 +16,9 @@ pub(crate) enum Purpose {
     Bootstrap,
 }
 
-/// SplitMix64 (Steele, Lea & Flood 2014, "Fast splittable pseudorandom number generators", OOPSLA), whose state after
-/// `i` numbers is a sum, so that it serves as a function of the counter.
+/// SplitMix64 (Steele, Lea & Flood 2014, "Fast splittable pseudorandom number generators", OOPSLA). Its state after `i`
+/// numbers
+/// is the key plus a multiple of `i`, so that each number is a function of the counter.
 #[derive(Clone, Debug)]
 pub(crate) struct RandomStream {
     key: u64,
@@ -37,7 +39,7 @@ impl RandomStream {
         z ^ (z >> 31)
     }
 
-    /// Uniform in (0, 1), without both ends.
+    /// Uniform number in the open interval (0, 1).
     pub fn unit(&self, counter: u64) -> f64 {
         unit(self.bits(counter) >> (64 - BITS))
     }
@@ -57,7 +59,7 @@ impl RandomStream {
     }
 }
 
-/// The centre of cell `cell` of 2^[`BITS`] equal cells of (0, 1), exactly.
+/// The exact centre of cell `cell` of the 2^[`BITS`] equal cells of (0, 1).
 pub(crate) fn unit(cell: u64) -> f64 {
     (cell as f64 + 0.5) / (1_u64 << BITS) as f64
 }
@@ -67,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_numbers_are_those_of_splitmix64() {
+    fn the_numbers_match_splitmix64() {
         // The first outputs of the published generator from the seed 0.
         let stream = RandomStream { key: 0 };
         assert_eq!(stream.bits(0), 0xe220_a839_7b1d_cdaf);
@@ -83,13 +85,13 @@ mod tests {
         for i in 0..64_000 {
             counts[(stream.unit(i) * 64.0) as usize] += 1;
         }
-        // Chi-square with 63 degrees of freedom: mean 63, standard deviation 11.2; five of them.
+        // Chi-square with 63 degrees of freedom has mean 63 and standard deviation 11.2; the tolerance is five deviations.
         let chi_square: f64 = counts.iter().map(|&n| (f64::from(n) - 1000.0).powi(2) / 1000.0).sum();
         assert!((chi_square - 63.0).abs() < 56.0, "{chi_square}");
     }
 
     #[test]
-    fn a_permutation_holds_every_number_once_and_each_is_as_likely() {
+    fn a_permutation_holds_every_number_once_and_all_are_equally_likely() {
         let mut seen = [0_u32; 6];
         for index in 0..6000 {
             let order = RandomStream::new(1, Purpose::Permutation, index).permutation(0, 3);

@@ -11,7 +11,7 @@ const OBSERVATIONS_PER_STEP: u32 = 4;
 /// Largest magnitudes over a run. SI units; coordinates in the order x, y, z, alpha, beta, gamma.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Extremes {
-    /// Largest |coordinate less that of the ideal motion|, m or rad; NaN where there is no ideal motion.
+    /// Largest |coordinate minus ideal coordinate|, m or rad; NaN if there is no ideal motion.
     pub deviation: [f64; COORDINATES],
     /// Largest |rate|, m/s or rad/s.
     pub rate: [f64; COORDINATES],
@@ -22,15 +22,15 @@ pub struct Extremes {
 }
 
 impl Extremes {
-    fn new(joints: usize, ideal: bool) -> Self {
+    fn new(joints: usize, has_ideal: bool) -> Self {
         Self {
-            deviation: [if ideal { 0.0 } else { f64::NAN }; COORDINATES],
+            deviation: [if has_ideal { 0.0 } else { f64::NAN }; COORDINATES],
             normal: vec![0.0; joints],
             ..Self::default()
         }
     }
 
-    fn take(&mut self, frame: &Frame, ideal: Option<&Pose>) {
+    fn include(&mut self, frame: &Frame, ideal: Option<&Pose>) {
         let [_, rates, accelerations] = derivatives(&frame.pose);
         for i in 0..COORDINATES {
             self.rate[i] = self.rate[i].max(rates[i].abs());
@@ -42,8 +42,8 @@ impl Extremes {
                 self.deviation[i] = self.deviation[i].max(deviations[i].abs());
             }
         }
-        for (most, joint) in self.normal.iter_mut().zip(&frame.joints) {
-            *most = most.max(joint.normal_force.norm());
+        for (peak, joint) in self.normal.iter_mut().zip(&frame.joints) {
+            *peak = peak.max(joint.normal_force.norm());
         }
     }
 }
@@ -59,12 +59,12 @@ pub(super) fn derivatives(pose: &Pose) -> [[f64; COORDINATES]; 3] {
     ]
 }
 
-/// Coordinates less those of the ideal motion; differences of angles are wrapped.
+/// Coordinates minus those of the ideal motion; differences of angles are wrapped.
 fn deviation(pose: &Pose, ideal: &Pose) -> [f64; COORDINATES] {
-    let ([is, ..], [should, ..]) = (derivatives(pose), derivatives(ideal));
+    let ([actual, ..], [ideal, ..]) = (derivatives(pose), derivatives(ideal));
     let turn = std::f64::consts::TAU;
     std::array::from_fn(|i| {
-        let d = is[i] - should[i];
+        let d = actual[i] - ideal[i];
         if i < 3 { d } else { d - turn * (d / turn).round() }
     })
 }
@@ -74,9 +74,9 @@ fn deviation(pose: &Pose, ideal: &Pose) -> [f64; COORDINATES] {
 pub struct Response {
     /// Names of the ball joints.
     pub joints: Vec<String>,
-    /// In continuous time: forces from the cubic interpolant of each step, the rest at four instants of each step.
+    /// Extremes in continuous time: forces from the cubic interpolant of each step, all others at four instants of each step.
     pub full: Extremes,
-    /// Only at whole multiples of the sampling interval, as a solver with that output step would report.
+    /// Extremes at whole multiples of the sampling interval only, as a solver with that output step would report.
     pub sampled: Extremes,
     /// Time of the last separation of each joint, if any, s.
     pub last_separation: Vec<Option<f64>>,
@@ -84,24 +84,24 @@ pub struct Response {
     pub constraint_drift: f64,
 }
 
-/// Why there is no response.
+/// Reasons why there is no response.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ResponseError {
     /// The scene does not start.
     #[error(transparent)]
     Start(#[from] StartError),
-    /// A parameter was refused.
+    /// The scene rejected a parameter.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The divergence guard stopped the run.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// The caller cancelled it.
+    /// The caller cancelled the run.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// The same scene with every ball joint ideal; `None` if it then cannot move.
+/// Simulation of the same scene with every ball joint ideal; `None` if it does not start.
 fn ideal_of(scene: &Scene) -> Option<Simulation> {
     let mut ideal = scene.clone();
     ideal.set("contact.clearance", "0").ok()?;
@@ -137,9 +137,9 @@ pub struct Observation<'a> {
     pub time: f64,
     /// State of the run.
     pub frame: &'a Frame,
-    /// The ideal motion, where there is one.
+    /// Pose of the ideal motion, if there is one.
     pub ideal: Option<&'a Pose>,
-    /// Whether it is a whole multiple of the sampling interval; otherwise it is one of four instants of a step.
+    /// Whether the time is a whole multiple of the sampling interval; otherwise it is one of four instants of a step.
     pub sample: bool,
     /// Largest constraint violation of the `lagrange` form so far, m or rad.
     pub constraint_drift: f64,
@@ -151,24 +151,25 @@ impl Observation<'_> {
         derivatives(&self.frame.pose)
     }
 
-    /// Coordinates less those of the ideal motion, m and rad; NaN without one.
+    /// Coordinates minus those of the ideal motion, m and rad; NaN without an ideal motion.
     pub fn deviation(&self) -> [f64; COORDINATES] {
         self.ideal.map_or([f64::NAN; COORDINATES], |ideal| deviation(&self.frame.pose, ideal))
     }
 }
 
 /// Runs `scene` for `duration` (s) and compares it with its ideal motion; `every` (s) is the sampling interval of
-/// [`Response::sampled`]. `observe` receives every examined instant in order of time; `keep_going` receives the simulated time
+/// [`Response::sampled`]. `observe` receives every examined instant in order of time; `may_continue` receives the simulated
+/// time
 /// after every step and returns false to cancel.
 ///
 /// # Errors
-/// A scene that does not start, the divergence guard, cancellation by `keep_going`.
+/// A scene that does not start, the divergence guard, or cancellation by `may_continue`.
 pub fn respond(
     scene: &Scene,
     duration: f64,
     every: f64,
     mut observe: impl FnMut(&Observation),
-    mut keep_going: impl FnMut(f64) -> bool,
+    mut may_continue: impl FnMut(f64) -> bool,
 ) -> Result<Response, ResponseError> {
     let mut simulation = Simulation::new(&scene.machine)?;
     let mut ideal = Ideal { simulation: ideal_of(scene), frame: Frame::default() };
@@ -179,16 +180,17 @@ pub fn respond(
     let mut next_sample = 0_u64;
     loop {
         let (start, end) = (simulation.step_start(), simulation.time());
-        // Examined instants and samples of the step, in order of time: the ideal motion cannot go back.
-        let mut look = 0;
+        // Observed instants and samples of the step are visited in order of time, because the ideal motion cannot run
+        // backwards.
+        let mut observation = 0;
         loop {
-            let look_at = start + (end - start) * f64::from(look) / f64::from(OBSERVATIONS_PER_STEP);
-            let sample_at = next_sample as f64 * every;
-            let is_sample = sample_at <= end.min(duration) && sample_at <= look_at;
-            if !is_sample && look > OBSERVATIONS_PER_STEP {
+            let observation_time = start + (end - start) * f64::from(observation) / f64::from(OBSERVATIONS_PER_STEP);
+            let sample_time = next_sample as f64 * every;
+            let is_sample = sample_time <= end.min(duration) && sample_time <= observation_time;
+            if !is_sample && observation > OBSERVATIONS_PER_STEP {
                 break;
             }
-            let time = if is_sample { sample_at } else { look_at.min(end) };
+            let time = if is_sample { sample_time } else { observation_time.min(end) };
             simulation.sample(time, &mut frame);
             let pose = ideal.at(time);
             if time <= duration {
@@ -201,24 +203,24 @@ pub fn respond(
                 });
             }
             if is_sample {
-                sampled.take(&frame, pose);
+                sampled.include(&frame, pose);
                 next_sample += 1;
             } else {
-                full.take(&frame, pose);
-                look += 1;
+                full.include(&frame, pose);
+                observation += 1;
             }
         }
         if end >= duration {
             break;
         }
-        if !keep_going(end) {
+        if !may_continue(end) {
             return Err(ResponseError::Cancelled);
         }
         simulation.step_until(duration)?;
     }
     let statistics = simulation.statistics();
-    for (most, peak) in full.normal.iter_mut().zip(&statistics.peak_normal) {
-        *most = most.max(*peak);
+    for (sampled_peak, peak) in full.normal.iter_mut().zip(&statistics.peak_normal) {
+        *sampled_peak = sampled_peak.max(*peak);
     }
     Ok(Response {
         joints: scene.machine.ball_joints.iter().map(|j| j.name.clone()).collect(),
@@ -234,13 +236,13 @@ mod tests {
     use super::*;
 
     fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
-        let own = |&(k, v): &(&str, &str)| (k.to_owned(), v.to_owned());
-        let changes: Vec<_> = changes.iter().map(own).collect();
+        let owned = |&(k, v): &(&str, &str)| (k.to_owned(), v.to_owned());
+        let changes: Vec<_> = changes.iter().map(owned).collect();
         Scene::load(name, &changes).expect("built in")
     }
 
     #[test]
-    fn the_ideal_mechanism_does_not_deviate_and_moves_as_its_drive_says() {
+    fn the_ideal_mechanism_follows_its_drive_without_deviation() {
         let scene = scene("spcmm", &[("contact.clearance", "0")]);
         let response = respond(&scene, 2.0, 1e-3, |_| (), |_| true).expect("runs");
         // x = 0.203 + sin(pi t)/40: |dx/dt| <= pi/40, |d2x/dt2| <= pi^2/40 (59).
@@ -253,27 +255,28 @@ mod tests {
     }
 
     #[test]
-    fn play_shows_as_deviation_and_coarse_samples_miss_peaks() {
+    fn play_causes_deviation_and_coarse_samples_miss_peaks() {
         let scene = scene("spcmm", &[]);
-        let mut looks = 0;
-        let response = respond(&scene, 0.02, 1e-3, |_| looks += 1, |_| true).expect("runs");
-        assert!(looks > 100);
-        // The peaks of `tests/physics/reference.rs`; friction moves no peak of the first 20 ms by more.
+        let mut observations = 0;
+        let response = respond(&scene, 0.02, 1e-3, |_| observations += 1, |_| true).expect("runs");
+        assert!(observations > 100);
+        // The peaks of `tests/physics/reference.rs`; friction changes the peaks of the first 20 ms by less than the
+        // tolerance.
         for (peak, expected) in response.full.normal.iter().zip([771.15, 870.59, 533.36]) {
             assert!((peak / expected - 1.0).abs() < 5e-3, "{peak} {expected}");
         }
         for (coarse, fine) in response.sampled.normal.iter().zip(&response.full.normal) {
             assert!(coarse < fine);
         }
-        // Free fall through the clearance, and no further.
+        // The ball falls freely through the clearance, but no further.
         assert!(response.full.deviation[0] > 0.25e-3 && response.full.deviation[0] < 0.5e-3);
         assert!(response.full.rate[0] >= response.sampled.rate[0]);
     }
 
     #[test]
-    fn a_cancelled_run_ends() {
+    fn a_cancelled_run_returns_the_cancellation() {
         let scene = scene("pendulum", &[]);
-        let ended = respond(&scene, 1.0, 1e-3, |_| (), |t| t < 0.01);
-        assert!(matches!(ended, Err(ResponseError::Cancelled)));
+        let result = respond(&scene, 1.0, 1e-3, |_| (), |t| t < 0.01);
+        assert!(matches!(result, Err(ResponseError::Cancelled)));
     }
 }

@@ -11,20 +11,23 @@ use direction_numbers::ROWS;
 pub const MAX_DIMENSIONS: usize = ROWS.len() + 1;
 /// Largest number of points.
 pub const MAX_POINTS: usize = 1 << 24;
-/// Largest number of coordinates in a Latin hypercube, whose permutations are in memory: 256 MB.
+/// Largest number of coordinates in a Latin hypercube: its permutations then take 256 MiB of memory.
 const MAX_STRATA: usize = 1 << 26;
 
 /// How points are distributed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sampling {
-    /// Sobol sequence with the direction numbers of Joe & Kuo (2008), each coordinate under a nested uniform scrambling (Owen
-    /// 1995; 1998, "Scrambling Sobol' and Niederreiter-Xing points", J. Complexity 14, 466-489): every point is uniform, and the
-    /// points together are as evenly spaced as those of the plain sequence. Best at powers of two.
+    /// Sobol sequence with the direction numbers of Joe & Kuo (2008) and nested uniform scrambling of each coordinate (Owen
+    /// 1995;
+    /// 1998, "Scrambling Sobol' and Niederreiter-Xing points", J. Complexity 14, 466-489). Every point is uniformly
+    /// distributed,
+    /// and the points together are as evenly spaced as those of the plain sequence. Best with a power of two points.
     Sobol,
-    /// Latin hypercube (McKay, Beckman & Conover 1979, Technometrics 21, 239-245): of N points, each of the N equal strata of
+    /// Latin hypercube (McKay, Beckman & Conover 1979, Technometrics 21, 239-245): with N points, each of the N equal strata
+    /// of
     /// every coordinate holds one.
     LatinHypercube,
-    /// Independent, uniform.
+    /// Independent, uniformly distributed points.
     Random,
 }
 
@@ -34,21 +37,21 @@ words! { Sampling {
     Random => "random",
 } }
 
-/// Why there is no such sample.
+/// Reasons for rejecting a sample.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SamplingError {
     /// No coordinates or too many.
     #[error("{dimensions} dimensions: 1 to {MAX_DIMENSIONS} are possible")]
     Dimensions {
-        /// As asked for.
+        /// Requested number of coordinates.
         dimensions: usize,
     },
     /// No points or too many.
     #[error("{points} points: 1 to {most} are possible for a sample `{sampling}` of {dimensions} dimensions")]
     Points {
-        /// As asked for.
+        /// Requested number of points.
         points: usize,
-        /// Largest number.
+        /// Largest allowed number.
         most: usize,
         /// Kind of sample.
         sampling: Sampling,
@@ -57,8 +60,9 @@ pub enum SamplingError {
     },
 }
 
-/// A finite sample in the open unit cube. Each point is computed from its index, the seed and, for a Latin hypercube, the number
-/// of points alone, so that parts of a sample can be computed anywhere. No coordinate is 0 or 1.
+/// A finite sample in the open unit cube. Each point depends only on its index, the seed and, for a Latin hypercube, the
+/// number
+/// of points, so that parts of a sample can be computed anywhere. No coordinate is 0 or 1.
 #[derive(Clone, Debug)]
 pub struct Sampler {
     points: usize,
@@ -123,7 +127,7 @@ impl Sampler {
             Coordinate::Sobol { directions, scrambling } => unit(scramble(sobol(directions, index as u64), scrambling)),
             Coordinate::LatinHypercube { strata, position } => {
                 let stratum = f64::from(strata[index]) + position.unit(index as u64);
-                // The sum may round up to the number of points.
+                // The sum can round up to the number of points.
                 (stratum / self.points as f64).min(1.0 - f64::EPSILON)
             }
             Coordinate::Random { position } => position.unit(index as u64),
@@ -136,7 +140,7 @@ impl Sampler {
 fn directions(dimension: usize) -> [u64; BITS as usize] {
     let mut v = [0; BITS as usize];
     let Some(row) = dimension.checked_sub(1).and_then(|row| ROWS.get(row)) else {
-        // Van der Corput: all m are 1.
+        // Van der Corput sequence: all m are 1.
         for (k, v) in v.iter_mut().enumerate() {
             *v = 1 << (BITS as usize - 1 - k);
         }
@@ -147,28 +151,29 @@ fn directions(dimension: usize) -> [u64; BITS as usize] {
         v[k] = match row.initial.get(k) {
             Some(&m) => u64::from(m) << (BITS as usize - 1 - k),
             None => {
-                let own = v[k - degree] ^ (v[k - degree] >> degree);
-                (1..degree).filter(|j| row.polynomial >> (degree - j) & 1 == 1).fold(own, |sum, j| sum ^ v[k - j])
+                let initial = v[k - degree] ^ (v[k - degree] >> degree);
+                (1..degree).filter(|j| row.polynomial >> (degree - j) & 1 == 1).fold(initial, |sum, j| sum ^ v[k - j])
             }
         };
     }
     v
 }
 
-/// Point `index` of the plain sequence, as a binary fraction of [`BITS`] digits. The order is that of the indices, not of their
-/// Gray codes; the first 2^m points are the same set.
+/// Point `index` of the plain sequence, as a binary fraction of [`BITS`] digits. Points follow the indices, not their Gray
+/// codes;
+/// the first 2^m points are the same set in both orders.
 fn sobol(directions: &[u64; BITS as usize], index: u64) -> u64 {
     let digits = directions.iter().enumerate().filter(|(k, _)| index >> k & 1 == 1);
     digits.fold(0, |sum, (_, v)| sum ^ v)
 }
 
-/// Nested uniform scrambling (Owen 1995): each digit is flipped or not at random, with a decision of its own for every
-/// combination of the digits before it. The first point is scrambled as the others and must not be dropped (Owen 2020, "On
-/// dropping the first Sobol' point").
+/// Nested uniform scrambling (Owen 1995): each digit is flipped at random, independently for every combination of the digits
+/// before it. The first point is scrambled like the others and must not be dropped (Owen 2020, "On dropping the first Sobol'
+/// point").
 fn scramble(x: u64, scrambling: &RandomStream) -> u64 {
     let mut scrambled = x;
     for digit in 0..BITS {
-        // A number for each node of the binary tree of digits.
+        // Each node of the binary tree of digits has its own random number.
         let node = 1 << digit | x >> (BITS - digit);
         scrambled ^= scrambling.bits(node) >> 63 << (BITS - 1 - digit);
     }

@@ -1,5 +1,6 @@
-//! Cases with independently known answers: a table (`assets/validation/cases.toml`), reference values, and this program's
-//! results.
+//! Validation cases with independently known answers: a table of cases (`assets/validation/cases.toml`), reference values,
+//! and
+//! this program's results.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -19,12 +20,12 @@ pub struct Case {
     pub title: String,
     /// The scene, by name.
     pub scene: String,
-    /// Changed keys and values.
+    /// Changed keys of the scene and their values.
     #[serde(default)]
     pub changes: Vec<(String, String)>,
     /// Length of the run, s.
     pub duration: f64,
-    /// Source of the data and of the answer.
+    /// Source of the case's data and of its answer.
     pub source: String,
     /// Compared quantities.
     #[serde(rename = "check")]
@@ -67,7 +68,7 @@ pub enum Measure {
         /// Start of the search, s.
         from: f64,
     },
-    /// Mean interval between the upward crossings of a level.
+    /// Mean interval between upward crossings of a level.
     Period {
         /// Name of the channel.
         channel: String,
@@ -130,7 +131,7 @@ impl Right {
     /// The value, SI unit.
     ///
     /// # Panics
-    /// If the embedded tables lack it: a test reads every value.
+    /// If the embedded tables lack the value; a test reads every value.
     pub fn value(&self) -> f64 {
         match self {
             Self::Published(value) => *value,
@@ -146,7 +147,7 @@ impl Right {
     }
 }
 
-/// All cases, in the order of the page.
+/// All cases, in the order of the validation page.
 pub static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
     #[derive(Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -157,7 +158,7 @@ pub static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
     table.expect("a test reads it").case
 });
 
-/// Why a case has no result.
+/// Reasons why a case has no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValidationError {
     /// The scene, or a change to it, is invalid.
@@ -186,7 +187,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Result less reference value.
+    /// Result minus reference value.
     pub fn difference(&self) -> f64 {
         self.ours - self.right
     }
@@ -214,7 +215,7 @@ impl Case {
             run.simulation.step_until(self.duration)?;
             run.simulation.take_impacts(&mut impacts);
             for watch in &mut watches {
-                watch.follow(&mut run);
+                watch.update(&mut run);
             }
         }
         let pairs = self.checks.iter().zip(&watches);
@@ -277,8 +278,8 @@ impl Watch {
         })
     }
 
-    /// Processes the latest step.
-    fn follow(&mut self, run: &mut Run) {
+    /// Evaluates the latest step.
+    fn update(&mut self, run: &mut Run) {
         let (start, end) = (run.simulation.step_start(), run.simulation.time());
         match self {
             Self::At { reading, time, value } if start < *time && *time <= end => *value = run.read(*reading, *time),
@@ -325,7 +326,7 @@ mod tests {
     use jointplay_scene::BENCHMARKS;
 
     #[test]
-    fn every_benchmark_has_a_case_and_every_case_a_right_value() {
+    fn every_benchmark_has_a_case_and_every_check_a_reference_value() {
         for name in BENCHMARKS {
             assert!(CASES.iter().any(|case| case.scene == name), "{name}");
         }
@@ -335,10 +336,10 @@ mod tests {
     }
 
     #[test]
-    fn every_number_of_the_models_is_compared() {
+    fn every_value_of_the_independent_models_is_compared() {
         let used = |name: &str| {
             let checks = CASES.iter().flat_map(|case| &case.checks);
-            checks.into_iter().any(|check| matches!(&check.right, Right::Model(own) if own == name))
+            checks.into_iter().any(|check| matches!(&check.right, Right::Model(model) if model == name))
         };
         for (case, numbers) in &*MODELS {
             for key in numbers.keys() {
@@ -348,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_machine_misses_its_bound() {
+    fn a_slightly_wrong_gravity_violates_the_bound() {
         let pendulum = CASES.iter().find(|case| case.scene == "simple-pendulum").expect("a case");
         let mut wrong = pendulum.clone();
         wrong.changes.push(("gravity.z".to_owned(), "-9.81001 m/s^2".to_owned()));
@@ -358,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn a_check_without_a_measured_value_does_not_hold() {
+    fn a_check_fails_if_the_run_does_not_show_its_quantity() {
         let pendulum = CASES.iter().find(|case| case.scene == "simple-pendulum").expect("a case");
         for measure in [
             Measure::Impact { number: 1, property: ImpactProperty::Peak },

@@ -40,7 +40,7 @@ impl FigureValue {
     /// Contact forces, joint by joint.
     pub const NORMAL: [Self; 3] = [Self::Normal1, Self::Normal2, Self::Normal3];
 
-    /// Unit, and accessor of its value in the extremes of a run; `None` where sampling does not matter.
+    /// Unit, and accessor of the value in the extremes of a run; the accessor returns `None` where sampling does not matter.
     fn row(self) -> (&'static str, fn(&Extremes) -> Option<f64>) {
         match self {
             Self::DeviationX => ("m", |e| Some(e.deviation[X.index()])),
@@ -57,7 +57,7 @@ impl FigureValue {
         }
     }
 
-    /// Unit.
+    /// SI unit.
     pub fn unit(self) -> &'static str {
         self.row().0
     }
@@ -80,11 +80,11 @@ impl FigureValue {
 /// How close two numbers are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Agreement {
-    /// Within 10 % of the paper's.
+    /// Within 10 % of the paper's number.
     Agrees,
-    /// Between half and twice the paper's.
+    /// Between half and twice the paper's number.
     Near,
-    /// Further off.
+    /// Further away.
     Differs,
 }
 
@@ -95,7 +95,7 @@ words!(Agreement {
 });
 
 impl Agreement {
-    /// Agreement for the ratio of a number to the paper's.
+    /// Agreement of a number with the paper's, from their ratio.
     pub fn of(ratio: f64) -> Self {
         if (0.9..=1.1).contains(&ratio) {
             Self::Agrees
@@ -112,24 +112,24 @@ impl Agreement {
 pub struct Comparison {
     /// The paper's number.
     pub published: &'static Published,
-    /// This program's, in continuous time.
+    /// This program's number, in continuous time.
     pub full: f64,
     /// Value that a solver with the paper's output step would report; `None` where sampling does not matter.
     pub sampled: Option<f64>,
 }
 
 impl Comparison {
-    /// Continuous-time value over the paper's.
+    /// Continuous-time value over the paper's number.
     pub fn ratio(&self) -> f64 {
         self.full / self.published.value
     }
 
-    /// Sampled value over the paper's.
+    /// Sampled value over the paper's number.
     pub fn sampled_ratio(&self) -> Option<f64> {
         self.sampled.map(|value| value / self.published.value)
     }
 
-    /// Judged in continuous time: impacts are so short that samples catch their peaks only by chance.
+    /// Agreement in continuous time: impacts are so short that samples catch their peaks only by chance.
     pub fn agreement(&self) -> Agreement {
         Agreement::of(self.ratio())
     }
@@ -140,8 +140,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ratios_have_their_words() {
-        for (ratio, word) in [
+    fn ratios_are_classified_by_their_agreement() {
+        for (ratio, expected) in [
             (1.0, Agreement::Agrees),
             (0.89, Agreement::Near),
             (2.0, Agreement::Near),
@@ -149,7 +149,7 @@ mod tests {
             (0.3, Agreement::Differs),
             (f64::NAN, Agreement::Differs),
         ] {
-            assert_eq!(Agreement::of(ratio), word, "{ratio}");
+            assert_eq!(Agreement::of(ratio), expected, "{ratio}");
         }
     }
 }

@@ -6,7 +6,7 @@ fn sample(sampling: Sampling, dimensions: usize, points: usize, seed: u64) -> Ve
     (0..points).map(|index| sampler.point(index).unwrap()).collect()
 }
 
-/// The plain sequence.
+/// A coordinate of the unscrambled sequence.
 fn plain(dimension: usize, points: u64) -> Vec<u64> {
     let directions = directions(dimension);
     (0..points).map(|index| sobol(&directions, index)).collect()
@@ -34,7 +34,7 @@ fn shapes(coordinates: usize, digits: u32) -> Vec<Vec<u32>> {
     (0..=digits).flat_map(with).collect()
 }
 
-/// Whether all intervals of 2^-shape hold the same number of points.
+/// Whether all elementary intervals with sides 2^-`shape` hold the same number of points.
 fn is_balanced(columns: &[Vec<u64>], shape: &[u32]) -> bool {
     let digits: u32 = shape.iter().sum();
     let mut counts = vec![0; 1 << digits];
@@ -46,7 +46,7 @@ fn is_balanced(columns: &[Vec<u64>], shape: &[u32]) -> bool {
 }
 
 #[test]
-fn direction_numbers_are_admissible_and_the_polynomials_are_the_primitive_ones_in_order() {
+fn direction_numbers_are_admissible_and_belong_to_the_primitive_polynomials_in_order() {
     let is_primitive = |p: u16| {
         let degree = p.ilog2();
         let mut power = 1_u16;
@@ -74,8 +74,11 @@ fn direction_numbers_are_admissible_and_the_polynomials_are_the_primitive_ones_i
 
 #[test]
 fn the_sequence_has_property_a_in_all_dimensions() {
-    // Sobol' 1976: the 2^d corners of the halved cube hold one point each, for every run of 2^d points that starts at a multiple.
-    // The first digits of the direction numbers then are a regular matrix over GF(2), and so is each of its leading blocks.
+    // Sobol' 1976: halving each side divides the cube into 2^d cells, which hold one point each of every run of 2^d points
+    // that
+    // starts at a multiple of 2^d. The first digits of the direction numbers then form a matrix that is regular over GF(2),
+    // and so
+    // is each of its leading blocks.
     let first_digits = |dimension: usize| -> u128 {
         let mut bits = Vec::new();
         for k in 0..MAX_DIMENSIONS {
@@ -96,10 +99,10 @@ fn the_sequence_has_property_a_in_all_dimensions() {
     };
     let mut rows: Vec<u128> = (0..MAX_DIMENSIONS).map(first_digits).collect();
     for (dimension, row) in rows.iter().enumerate() {
-        let own = directions(dimension);
-        assert!((0..BITS as usize).all(|k| u128::from(own[k] >> (BITS - 1)) == row >> k & 1), "{dimension}");
+        let directions = directions(dimension);
+        assert!((0..BITS as usize).all(|k| u128::from(directions[k] >> (BITS - 1)) == row >> k & 1), "{dimension}");
     }
-    // Elimination without pivoting: every pivot is 1.
+    // Elimination without pivoting succeeds: every pivot is 1.
     for pivot in 0..MAX_DIMENSIONS {
         assert_eq!(rows[pivot] >> pivot & 1, 1, "dimension {}", pivot + 1);
         for below in pivot + 1..MAX_DIMENSIONS {
@@ -111,7 +114,7 @@ fn the_sequence_has_property_a_in_all_dimensions() {
 }
 
 #[test]
-fn the_first_points_are_the_published_ones() {
+fn the_first_points_match_the_published_example() {
     // Joe & Kuo's example of ten points in three dimensions, in the order of Gray codes.
     let published = [
         [0.0, 0.0, 0.0],
@@ -128,14 +131,14 @@ fn the_first_points_are_the_published_ones() {
     for (index, point) in published.iter().enumerate() {
         let gray = (index ^ index >> 1) as u64;
         for (dimension, &value) in point.iter().enumerate() {
-            let own = sobol(&directions(dimension), gray) as f64 / (1_u64 << BITS) as f64;
-            assert_eq!(own, value, "point {index}, dimension {dimension}");
+            let computed = sobol(&directions(dimension), gray) as f64 / (1_u64 << BITS) as f64;
+            assert_eq!(computed, value, "point {index}, dimension {dimension}");
         }
     }
 }
 
 #[test]
-fn elementary_intervals_hold_their_share_scrambled_or_not() {
+fn elementary_intervals_hold_their_share_with_and_without_scrambling() {
     // Sobol' 1967: t is at most the sum of (degree - 1).
     let bound = |dimensions: &[usize]| -> u32 {
         let degree = |&d: &usize| d.checked_sub(1).map_or(1, |row| ROWS[row].initial.len() as u32);
@@ -189,7 +192,7 @@ fn points_are_uniform_and_depend_on_the_seed() {
     }
 }
 
-/// Root mean square error over 20 seeds of the mean of a smooth function, whose mean is 1.
+/// Root mean square error, over 20 seeds, of the estimated mean of a smooth function; the exact mean is 1.
 fn error(sampling: Sampling, dimensions: usize, points: usize) -> f64 {
     let smooth = |u: &[f64]| u.iter().map(|&u| libm::exp(u) / (std::f64::consts::E - 1.0)).product::<f64>();
     let squares = (0..20).map(|seed| {
@@ -200,7 +203,7 @@ fn error(sampling: Sampling, dimensions: usize, points: usize) -> f64 {
 }
 
 #[test]
-fn the_mean_of_a_smooth_function_converges_at_the_rate_of_its_sample() {
+fn the_mean_of_a_smooth_function_converges_at_the_theoretical_rate() {
     let rate = |sampling, dimensions| {
         libm::log2(error(sampling, dimensions, 1 << 12) / error(sampling, dimensions, 1 << 6)) / 6.0
     };
