@@ -9,8 +9,7 @@ use super::argument::Argument;
 use super::axis::{Axis, Coordinate, RangeError};
 use jointplay_scene::{Scene, SceneError, Value};
 
-/// Points per block in a `follow` sweep. Each block starts cold at its first point, so that the predecessor of a point
-/// depends
+/// Points per block in a `follow` sweep. Each block starts cold at its first point, so that the predecessor of a point depends
 /// neither on threads nor on shards.
 pub const FOLLOW_BLOCK: usize = 25;
 /// Largest number of points in a sweep.
@@ -185,8 +184,7 @@ impl Design {
     }
 
     /// Shape of an array with one value per point: the number of starts, if there are several, then the number of values of
-    /// each
-    /// crossed axis, or the common number of zipped axes.
+    /// each crossed axis, or the common number of zipped axes.
     pub fn shape(&self) -> Vec<usize> {
         let starts = (self.starts.len() > 1).then_some(self.starts.len());
         starts.into_iter().chain(self.counts()).collect()
@@ -271,8 +269,7 @@ impl Design {
     }
 
     /// Points whose scenes are checked before anything runs. With crossed axes, these are every value of each axis with the
-    /// others
-    /// at their ends, and a lattice inside, which covers every point of a small map; with more than two axes, at most
+    /// others at their ends, and a lattice inside, which covers every point of a small map; with more than two axes, at most
     /// [`MAX_CHECKED`] of these. With zipped axes, these are all points, or [`MAX_CHECKED`] spread over the rows.
     pub(super) fn checked_points(&self) -> Vec<usize> {
         let sets = self.sets();

@@ -134,8 +134,7 @@ impl Distribution {
         Ok(Self(Law::Triangular { low, mode, high }))
     }
 
-    /// Distribution of measured values. Its quantile function is linear between the values in ascending order: value k of n
-    /// has
+    /// Distribution of measured values. Its quantile function is linear between the values in ascending order: value k of n has
     /// the probability (k - 1) / (n - 1) (Hyndman & Fan 1996, "Sample quantiles in statistical packages", definition 7). Its
     /// support is the measured range.
     ///
@@ -149,13 +148,10 @@ impl Distribution {
         Ok(Self(Law::Measured(sorted)))
     }
 
-    /// Parses a value, `uniform(LOW, HIGH)`, `normal(MEAN, SD)`, `normal(MEAN, SD, LOW..HIGH)`, `triangular(LOW, MODE,
-    /// HIGH)`,
+    /// Parses a value, `uniform(LOW, HIGH)`, `normal(MEAN, SD)`, `normal(MEAN, SD, LOW..HIGH)`, `triangular(LOW, MODE, HIGH)`,
     /// `measured(VALUE, …)` or a fit such as `H7/g6`. `number` parses a value with its unit and returns it in SI. `of_fit`
-    /// parses a
-    /// fit and returns the resulting distribution of the parameter ([`crate::iso286::Fit::radial_clearance`]), because only
-    /// the
-    /// caller knows the nominal size.
+    /// parses a fit and returns the resulting distribution of the parameter ([`crate::iso286::Fit::radial_clearance`]), because
+    /// only the caller knows the nominal size.
     ///
     /// # Errors
     /// A text of another form, a number or fit that the caller rejects, or numbers that do not define a distribution.

@@ -70,7 +70,7 @@ pub struct FitChoice {
 /// Result of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitSearch {
-    /// The cheapest choice result that holds the yield; `None` if even the tightest fits do not.
+    /// The cheapest choice found that holds the yield; `None` if even the tightest fits do not.
     pub best: Option<FitChoice>,
     /// Whether every cheaper choice is known to fail; false if the evaluations ran out first.
     pub is_proven: bool,
@@ -119,17 +119,14 @@ impl FitProblem {
     /// of each joint's candidate, and is called at most once for each choice.
     ///
     /// The search assumes that a tighter fit in any joint never lowers the yield. This holds for a tip error that grows with
-    /// every
-    /// clearance. If yields are estimated from samples, all choices must share the same random points, or noise violates the
-    /// assumption. Where a tighter fit moves the centre of a clearance away from its best value, the result is not the
+    /// every clearance. If yields are estimated from samples, all choices must share the same random points, or noise violates
+    /// the assumption. Where a tighter fit moves the centre of a clearance away from its best value, the result is not the
     /// optimum.
     ///
     /// Candidates that cost at least as much as a tighter one are discarded. First, the joints are loosened one at a time as
-    /// far
-    /// as the yield allows. Then choices cheaper than the best are visited in order of cost (branch and bound). A choice
-    /// fails
-    /// if no joint is tighter than in a choice known to fail. Otherwise the tightest affordable choice above it is evaluated:
-    /// either that is a cheaper solution, or it rules out all choices below it.
+    /// far as the yield allows. Then choices cheaper than the best are visited in order of cost (branch and bound). A choice
+    /// fails if no joint is tighter than in a choice known to fail. Otherwise the tightest affordable choice above it is
+    /// evaluated: either that is a cheaper solution, or it rules out all choices below it.
     ///
     /// # Errors
     /// An error of `evaluate`.
@@ -166,8 +163,7 @@ struct Search<'a, F> {
     best: Option<(Vec<usize>, Estimate)>,
 }
 
-/// A choice to visit, as the level of each joint. Only joints from `first_open` on may still be tightened, so that each
-/// choice
+/// A choice to visit, as the level of each joint. Only joints from `first_open` on may still be tightened, so that each choice
 /// is visited once.
 struct Node {
     cost: f64,
@@ -230,8 +226,7 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
     }
 
     /// Whether a choice holds the yield; `None` if no evaluation is left. If it does and is cheaper than the best, it becomes
-    /// the
-    /// best.
+    /// the best.
     fn holds(&mut self, choice: &[usize]) -> Result<Option<bool>, E> {
         if self.is_known_to_fail(choice) {
             return Ok(Some(false));
@@ -272,8 +267,7 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
         Ok(())
     }
 
-    /// Tightens `choice` one level at a time, each time in the joint where this costs least, while it remains cheaper than
-    /// the
+    /// Tightens `choice` one level at a time, each time in the joint where this costs least, while it remains cheaper than the
     /// best choice.
     fn tightest_affordable(&self, choice: &[usize]) -> Vec<usize> {
         let mut above = choice.to_vec();
@@ -321,8 +315,7 @@ mod tests {
 
     const UNITS: usize = 400;
 
-    /// A stack of gaps and the largest acceptable sum. Each gap is uniform from 0 to a width that halves from one candidate
-    /// to
+    /// A stack of gaps and the largest acceptable sum. Each gap is uniform from 0 to a width that halves from one candidate to
     /// the next.
     struct Stack {
         widths: Vec<f64>,

@@ -1,6 +1,5 @@
 //! Variance-based sensitivity indices (Sobol' 1993) with the design of Saltelli et al. 2010, "Variance based sensitivity
-//! analysis
-//! of model output", Computer Physics Communications 181, 259-270.
+//! analysis of model output", Computer Physics Communications 181, 259-270.
 
 use crate::random::{Purpose, RandomStream};
 use crate::sampling::{MAX_DIMENSIONS, MAX_POINTS, Sampler, Sampling, SamplingError};
@@ -66,9 +65,8 @@ pub enum IndicesError {
 }
 
 /// A design of N (k + 2) points for k inputs. Row j holds, in this order, point j of the sample A, point j of the sample B, and
-/// for each input i the point of A with coordinate i taken from B. A and B are the two halves of the coordinates of one
-/// sample in
-/// 2 k dimensions. Points are numbered row by row; each is computed from its index alone. With a Sobol sequence or a random
+/// for each input i the point of A with coordinate i taken from B. A and B are the two halves of the coordinates of one sample
+/// in 2 k dimensions. Points are numbered row by row; each is computed from its index alone. With a Sobol sequence or a random
 /// sample, the first rows form a smaller design.
 #[derive(Clone, Debug)]
 pub struct SaltelliDesign {
@@ -145,17 +143,14 @@ impl SaltelliDesign {
     }
 
     /// Indices of one result from its values at all points in order. First-order indices follow Saltelli et al. 2010, table 2
-    /// (b),
-    /// with the mean subtracted from all results. Total indices follow Jansen 1999 ("Analysis of variance designs for model
-    /// output", Computer Physics Communications 117, 35-43), table 2 (f) of Saltelli et al. A value that is not finite counts
-    /// as
-    /// missing, and its row is left out. Estimates of small indices can be slightly negative. Intervals are percentiles over
-    /// resampled rows (Efron 1979, "Bootstrap methods: another look at the jackknife", Annals of Statistics 7, 1-26); they
-    /// overestimate the error of a Sobol sequence.
+    /// (b), with the mean subtracted from all results. Total indices follow Jansen 1999 ("Analysis of variance designs for
+    /// model output", Computer Physics Communications 117, 35-43), table 2 (f) of Saltelli et al. A value that is not finite
+    /// counts as missing, and its row is left out. Estimates of small indices can be slightly negative. Intervals are
+    /// percentiles over resampled rows (Efron 1979, "Bootstrap methods: another look at the jackknife", Annals of Statistics 7,
+    /// 1-26); they overestimate the error of a Sobol sequence.
     ///
     /// # Errors
-    /// A number of results that differs from the number of points, too few complete rows, no variance, or interval settings
-    /// out
+    /// A number of results that differs from the number of points, too few complete rows, no variance, or interval settings out
     /// of range.
     pub fn indices(&self, results: &[f64], bootstrap: Bootstrap) -> Result<SensitivityIndices, IndicesError> {
         if results.len() != self.points() {

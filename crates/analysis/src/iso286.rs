@@ -203,10 +203,9 @@ impl ToleranceClass {
     }
 
     /// Upper limit deviation ES, micrometres, of a hole K to S; `shaft` is the lower deviation of the shaft with the same
-    /// letter
-    /// (tables 2 and 3). Above 3 mm, from IT3 to IT8 (P to S: IT7), it is -`shaft` + Δ with Δ = ITn - IT(n-1). The hole with
-    /// a
-    /// shaft h of the next finer grade then has the same clearance as a hole H with the shaft of that letter and finer grade.
+    /// letter (tables 2 and 3). Above 3 mm, from IT3 to IT8 (P to S: IT7), it is -`shaft` + Δ with Δ = ITn - IT(n-1). The hole
+    /// with a shaft h of the next finer grade then has the same clearance as a hole H with the shaft of that letter and finer
+    /// grade.
     fn hole_deviation(self, row: usize, shaft: f64, main: usize) -> Option<f64> {
         let letter = INTERFERENCE_SIDE[row].0;
         let last_grade = if ["k", "m", "n"].contains(&letter) { grade(8) } else { grade(7) };
@@ -326,10 +325,9 @@ impl Fit {
     }
 
     /// Distribution of the radial clearance, half the clearance on the diameter, at a nominal diameter, both in m. Hole and
-    /// shaft
-    /// are independent and normally distributed about the centres of their tolerance intervals, whose widths are 6
-    /// `capability`
-    /// standard deviations (the process capability index Cp). The distribution is truncated at the limits of the fit.
+    /// shaft are independent and normally distributed about the centres of their tolerance intervals, whose widths are 6
+    /// `capability` standard deviations (the process capability index Cp). The distribution is truncated at the limits of the
+    /// fit.
     ///
     /// # Errors
     /// As [`Self::clearance`]; a capability that is not above 0.

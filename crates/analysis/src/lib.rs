@@ -1,19 +1,16 @@
 //! Results computed from whole runs. The crate starts no threads; the caller supplies the clock ([`RunContext`]).
 //!
-//! - Sweeps: [`axis`] and [`design`] define the points, [`sweep`] runs them, [`point`], [`crossing`] and [`statistic`] record the
-//!   results; [`sweep_task`] and [`task`] describe the same work as plain data for a thread or a worker, as [`alone_task`]
-//! does
-//!   for a study.
+//! - Sweeps: [`axis`] and [`design`] define the points, [`sweep`] runs them, [`point`], [`crossing`] and [`statistic`] record
+//!   the results; [`sweep_task`] and [`task`] describe the same work as plain data for a thread or a worker, as [`alone_task`]
+//!   does for a study.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the resulting
-//! [`regime`].
+//!   [`regime`].
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`], [`model_costs`].
 //! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and
-//! validation
-//!   cases with known answers ([`validation`]).
+//!   validation cases with known answers ([`validation`]).
 //! - The tip's error over the workspace, with the drives held ([`map`]).
 //! - Uncertain parameters of a scene ([`study`]). Independent of any scene: [`sampling`], [`distribution`] and ISO fits
-//!   ([`iso286`]); ranking of inputs ([`morris`], [`indices`]); percentiles, yield and rejects ([`yields`]); the cheapest
-//! fits
+//!   ([`iso286`]); ranking of inputs ([`morris`], [`indices`]); percentiles, yield and rejects ([`yields`]); the cheapest fits
 //!   that hold a yield ([`fits`]).
 //!
 //! A sweep over two clearances that prints the kind of motion and the largest force in the second ball joint:

@@ -1,5 +1,4 @@
-//! The tip's error over the workspace. For every point of a grid of drive positions and parameters, it gives the error at
-//! rest
+//! The tip's error over the workspace. For every point of a grid of drive positions and parameters, it gives the error at rest
 //! and the set of errors that are reachable with every ball anywhere in its play.
 
 use super::axis::{Axis, RangeError};
@@ -53,8 +52,7 @@ pub enum PointFault {
 
 impl WorkspaceMap {
     /// A map of `scene` over all combinations of the axes in `over`, in the syntax of [`Axis::parse_over`]; the last axis
-    /// varies
-    /// fastest. `directions` is the number of directions at each point.
+    /// varies fastest. `directions` is the number of directions at each point.
     ///
     /// # Errors
     /// As [`Axis::parse_over`] and [`Design::crossed`]; more points times directions than a map holds.
@@ -144,8 +142,8 @@ fn spread(basis: &[Vec3], count: usize) -> Vec<Vec3> {
 }
 
 /// The largest error, by an iteration that starts at the largest of `sampled` and searches along each error for the next. The
-/// set's `farthest` point along an error is at least as far as that error (Journée et al., J. Mach. Learn. Res. 11, 2010,
-/// pp. 517-553, algorithm 1).
+/// set's `farthest` point along an error is at least as far as that error (Journée et al., J. Mach. Learn. Res. 11, 2010, pp.
+/// 517-553, algorithm 1).
 fn largest(sampled: &[Farthest], mut farthest: impl FnMut(&Vec3) -> Farthest) -> Option<Farthest> {
     let size = |farthest: &Farthest| farthest.error.map_or(0.0, |error| error.norm());
     let first = sampled.iter().reduce(|largest, next| if size(next) > size(largest) { next } else { largest })?;

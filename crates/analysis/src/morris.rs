@@ -74,8 +74,7 @@ pub struct ElementaryEffects {
     /// Mean μ.
     pub mean: f64,
     /// Mean of the magnitudes μ* (Campolongo, Cariboni & Saltelli 2007, Environmental Modelling & Software 22, 1509-1518),
-    /// which
-    /// measures the influence.
+    /// which measures the influence.
     pub mean_magnitude: f64,
     /// Standard deviation σ, which measures interactions and curvature.
     pub deviation: f64,
@@ -140,8 +139,7 @@ impl MorrisPlan {
     }
 
     /// Elementary effects of each input, from the results at all points in order. A result that is not finite counts as
-    /// missing;
-    /// the effects on either side of it are left out. `None` for an input with fewer than two effects.
+    /// missing; the effects on either side of it are left out. `None` for an input with fewer than two effects.
     ///
     /// # Errors
     /// A number of results that is not the number of points.

@@ -8,8 +8,7 @@ pub(crate) fn cumulative(z: f64) -> f64 {
 }
 
 /// Quantile of the standard normal distribution for `p` in (0, 1), with a relative error of about 1e-16 (Wichura 1988,
-/// "Algorithm AS 241: the percentage points of the normal distribution", Applied Statistics 37, 477-484, routine PPND16). It
-/// is
+/// "Algorithm AS 241: the percentage points of the normal distribution", Applied Statistics 37, 477-484, routine PPND16). It is
 /// -∞ at 0, ∞ at 1 and NaN outside.
 pub(crate) fn quantile(p: f64) -> f64 {
     let q = p - 0.5;

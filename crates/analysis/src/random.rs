@@ -16,8 +16,7 @@ pub(crate) enum Purpose {
     Bootstrap,
 }
 
-/// SplitMix64 (Steele, Lea & Flood 2014, "Fast splittable pseudorandom number generators", OOPSLA). Its state after `i`
-/// numbers
+/// SplitMix64 (Steele, Lea & Flood 2014, "Fast splittable pseudorandom number generators", OOPSLA). Its state after `i` numbers
 /// is the key plus a multiple of `i`, so that each number is a function of the counter.
 #[derive(Clone, Debug)]
 pub(crate) struct RandomStream {

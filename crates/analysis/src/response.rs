@@ -159,8 +159,7 @@ impl Observation<'_> {
 
 /// Runs `scene` for `duration` (s) and compares it with its ideal motion; `every` (s) is the sampling interval of
 /// [`Response::sampled`]. `observe` receives every examined instant in order of time; `may_continue` receives the simulated
-/// time
-/// after every step and returns false to cancel.
+/// time after every step and returns false to cancel.
 ///
 /// # Errors
 /// A scene that does not start, the divergence guard, or cancellation by `may_continue`.
@@ -260,8 +259,7 @@ mod tests {
         let mut observations = 0;
         let response = respond(&scene, 0.02, 1e-3, |_| observations += 1, |_| true).expect("runs");
         assert!(observations > 100);
-        // The peaks of `tests/physics/reference.rs`; friction changes the peaks of the first 20 ms by less than the
-        // tolerance.
+        // The peaks of `tests/physics/reference.rs`; friction changes the peaks of the first 20 ms by less than the tolerance.
         for (peak, expected) in response.full.normal.iter().zip([771.15, 870.59, 533.36]) {
             assert!((peak / expected - 1.0).abs() < 5e-3, "{peak} {expected}");
         }

@@ -18,13 +18,11 @@ const MAX_STRATA: usize = 1 << 26;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sampling {
     /// Sobol sequence with the direction numbers of Joe & Kuo (2008) and nested uniform scrambling of each coordinate (Owen
-    /// 1995;
-    /// 1998, "Scrambling Sobol' and Niederreiter-Xing points", J. Complexity 14, 466-489). Every point is uniformly
-    /// distributed,
-    /// and the points together are as evenly spaced as those of the plain sequence. Best with a power of two points.
+    /// 1995; 1998, "Scrambling Sobol' and Niederreiter-Xing points", J. Complexity 14, 466-489). Every point is uniformly
+    /// distributed, and the points together are as evenly spaced as those of the plain sequence. Best with a power of two
+    /// points.
     Sobol,
-    /// Latin hypercube (McKay, Beckman & Conover 1979, Technometrics 21, 239-245): with N points, each of the N equal strata
-    /// of
+    /// Latin hypercube (McKay, Beckman & Conover 1979, Technometrics 21, 239-245): with N points, each of the N equal strata of
     /// every coordinate holds one.
     LatinHypercube,
     /// Independent, uniformly distributed points.
@@ -60,8 +58,7 @@ pub enum SamplingError {
     },
 }
 
-/// A finite sample in the open unit cube. Each point depends only on its index, the seed and, for a Latin hypercube, the
-/// number
+/// A finite sample in the open unit cube. Each point depends only on its index, the seed and, for a Latin hypercube, the number
 /// of points, so that parts of a sample can be computed anywhere. No coordinate is 0 or 1.
 #[derive(Clone, Debug)]
 pub struct Sampler {
@@ -160,8 +157,7 @@ fn directions(dimension: usize) -> [u64; BITS as usize] {
 }
 
 /// Point `index` of the plain sequence, as a binary fraction of [`BITS`] digits. Points follow the indices, not their Gray
-/// codes;
-/// the first 2^m points are the same set in both orders.
+/// codes; the first 2^m points are the same set in both orders.
 fn sobol(directions: &[u64; BITS as usize], index: u64) -> u64 {
     let digits = directions.iter().enumerate().filter(|(k, _)| index >> k & 1 == 1);
     digits.fold(0, |sum, (_, v)| sum ^ v)

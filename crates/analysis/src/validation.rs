@@ -1,5 +1,4 @@
-//! Validation cases with independently known answers: a table of cases (`assets/validation/cases.toml`), reference values,
-//! and
+//! Validation cases with independently known answers: a table of cases (`assets/validation/cases.toml`), reference values, and
 //! this program's results.
 
 use std::collections::BTreeMap;

@@ -101,10 +101,8 @@ fn check_values(values: &[f64], least: usize) -> Result<(), YieldsError> {
     }
 }
 
-/// The value that the fraction `p` of the lot does not exceed. Its confidence interval lies between two order statistics and
-/// is
-/// valid for any distribution (David & Nagaraja 2003, "Order statistics", section 7.1). An end is infinite where the sample
-/// is
+/// The value that the fraction `p` of the lot does not exceed. Its confidence interval lies between two order statistics and is
+/// valid for any distribution (David & Nagaraja 2003, "Order statistics", section 7.1). An end is infinite where the sample is
 /// too small to bound it: an upper end for the 99 % percentile at 95 % confidence takes 368 values.
 ///
 /// # Errors
@@ -200,9 +198,8 @@ pub struct Capability {
 /// values are not normally distributed.
 ///
 /// # Errors
-/// Fewer than two values, a value that is not finite, or no spread; no limits, or limits in the wrong order; a confidence
-/// that is
-/// not between 0 and 1.
+/// Fewer than two values, a value that is not finite, or no spread; no limits, or limits in the wrong order; a confidence that
+/// is not between 0 and 1.
 pub fn capability(
     values: &[f64],
     lower: Option<f64>,
@@ -248,13 +245,11 @@ pub struct RejectDriver {
     /// ends.
     pub distance: f64,
     /// Probability of a distance at least as large if the input has no influence. With k inputs, compare it with the
-    /// significance
-    /// level divided by k.
+    /// significance level divided by k.
     pub p_value: f64,
 }
 
-/// How the rejected units differ from the accepted ones in each input. `inputs` holds one list of values per input,
-/// `accepted`
+/// How the rejected units differ from the accepted ones in each input. `inputs` holds one list of values per input, `accepted`
 /// one flag per unit. `None` if all units or none are accepted.
 ///
 /// # Errors

@@ -74,11 +74,9 @@ fn direction_numbers_are_admissible_and_belong_to_the_primitive_polynomials_in_o
 
 #[test]
 fn the_sequence_has_property_a_in_all_dimensions() {
-    // Sobol' 1976: halving each side divides the cube into 2^d cells, which hold one point each of every run of 2^d points
-    // that
-    // starts at a multiple of 2^d. The first digits of the direction numbers then form a matrix that is regular over GF(2),
-    // and so
-    // is each of its leading blocks.
+    // Sobol' 1976: halving each side divides the cube into 2^d cells, which hold one point each of every run of 2^d points that
+    // starts at a multiple of 2^d. The first digits of the direction numbers then form a matrix that is regular over GF(2), and
+    // so is each of its leading blocks.
     let first_digits = |dimension: usize| -> u128 {
         let mut bits = Vec::new();
         for k in 0..MAX_DIMENSIONS {
