@@ -1,4 +1,4 @@
-//! The effect of each uncertain parameter alone as a job in plain data, which reports every run as soon as it is finished.
+//! One-at-a-time runs of a study as a job in plain data, which reports every run as soon as it is finished.
 
 use std::ops::ControlFlow;
 
@@ -10,12 +10,12 @@ use super::study::{Alone, Output, RunSpan, StudyRuns, outputs};
 use super::sweep_task::{STEPS, Share};
 use jointplay_physics::simulate::{MAX_RUN_DURATION, Simulation};
 
-/// Runs to be computed.
+/// A request for one-at-a-time runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AloneTask {
     /// The scene.
     pub scene: SceneSource,
-    /// Keys of the parameters that vary, each with its lower and its upper end, SI.
+    /// Keys of the varied parameters, each with its lower and its upper end, SI.
     pub over: Vec<(String, [f64; 2])>,
     /// Names of outputs, as on the command line.
     pub outputs: Vec<String>,
@@ -28,16 +28,16 @@ pub struct AloneTask {
 pub struct AlonePlan {
     /// Value of each parameter in the scene, SI.
     pub nominal: Vec<f64>,
-    /// SI unit of each requested output, "" for a number; `None` for an output that the scene does not have.
+    /// SI unit of each requested output, "" for a dimensionless number; `None` for an output that the scene does not have.
     pub units: Vec<Option<String>>,
 }
 
 /// A finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AloneRun {
-    /// 0: the values of the scene; 1 + 2 i and 2 + 2 i: parameter i at its lower and at its upper end.
+    /// 0 for the run with the values of the scene; 1 + 2 i and 2 + 2 i for parameter i at its lower and at its upper end.
     pub index: usize,
-    /// The requested outputs, SI; `None` for one that the scene does not have, and if the run did not start or diverged.
+    /// The requested outputs, SI; `None` for an output that the scene does not have, and if the run did not start or diverged.
     pub outputs: Vec<Option<f64>>,
 }
 
@@ -47,7 +47,7 @@ pub(super) enum AloneMessage {
     Progress(f64),
     /// The accepted runs; their results follow.
     Plan(AlonePlan),
-    /// A run.
+    /// A finished run.
     Run(AloneRun),
 }
 
@@ -70,11 +70,11 @@ pub(super) async fn run(
     Simulation::new(&scene.machine).map_err(|error| scene.locate(&error))?;
     let alone = Alone::between(&scene, &task.over)?;
     let keys: Vec<String> = task.over.iter().map(|(key, _)| key.clone()).collect();
-    // Another scene may have a probe, or an energy ledger.
+    // An output can be unknown in this scene: not every scene has a probe or an energy ledger.
     let known = task.outputs.iter().map(|name| outputs(&scene, name).ok().and_then(|mut found| found.pop()));
     let known: Vec<Option<Output>> = known.collect();
-    let own: Vec<Output> = known.iter().flatten().cloned().collect();
-    let runs = StudyRuns::new(&scene, &keys, &own, task.span, &alone.rows())?;
+    let available: Vec<Output> = known.iter().flatten().cloned().collect();
+    let runs = StudyRuns::new(&scene, &keys, &available, task.span, &alone.rows())?;
     send(AloneMessage::Plan(AlonePlan {
         nominal: alone.nominal().to_vec(),
         units: known.iter().map(|output| output.as_ref().map(|output| output.unit.to_owned())).collect(),
@@ -106,7 +106,7 @@ mod tests {
 
     const OUTPUTS: [&str; 3] = ["tip-error", "peak-force", "impacts"];
 
-    /// The parameters that match a pattern, by half of their values.
+    /// A task that varies the parameters that match a pattern by half of their values.
     fn task(scene: &str, pattern: &str) -> AloneTask {
         let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
         let scene = Scene::load(scene, if scene == "spcmm" { &changes } else { &[] }).expect("built in");
@@ -119,8 +119,8 @@ mod tests {
         }
     }
 
-    /// What is told of a share, which is sent as text, by its index.
-    fn reported(task: &AloneTask, index: usize, of: usize) -> Vec<Message> {
+    /// The messages of a share, given by its index; the job and the messages pass through text.
+    fn messages_of(task: &AloneTask, index: usize, of: usize) -> Vec<Message> {
         let text = serde_json::to_string(&Job::Alone(task.clone(), Share { index, of })).expect("plain data");
         let mut messages = Vec::new();
         perform(&serde_json::from_str(&text).expect("its own text"), &mut || 0.0, &mut |message| {
@@ -145,17 +145,18 @@ mod tests {
     }
 
     #[test]
-    fn shares_have_the_bits_of_the_study_and_the_nominal_run_comes_first() {
+    fn shares_reproduce_the_study_bit_for_bit_and_the_nominal_run_comes_first() {
         let task = task("spcmm", "joint.*.clearance");
-        let whole = reported(&task, 0, 1);
+        let whole = messages_of(&task, 0, 1);
         assert_eq!(whole.last(), Some(&Message::Done));
         let first = whole.iter().find(|message| matches!(message, Message::Run(_)));
         assert!(matches!(first, Some(Message::Run(AloneRun { index: 0, .. }))));
         let scene = task.scene.scene().expect("built in");
-        let kept: Vec<Output> = OUTPUTS.iter().flat_map(|name| outputs(&scene, name).expect("an output")).collect();
+        let available: Vec<Output> =
+            OUTPUTS.iter().flat_map(|name| outputs(&scene, name).expect("an output")).collect();
         let alone = Alone::between(&scene, &task.over).expect("ends");
         let keys: Vec<String> = task.over.iter().map(|(key, _)| key.clone()).collect();
-        let study = StudyRuns::new(&scene, &keys, &kept, task.span, &alone.rows()).expect("runs");
+        let study = StudyRuns::new(&scene, &keys, &available, task.span, &alone.rows()).expect("runs");
         let expected: Vec<AloneRun> = (0..study.sweep().design().blocks())
             .map(|index| {
                 let mut block = study.sweep().begin(index);
@@ -167,10 +168,10 @@ mod tests {
             })
             .collect();
         assert_eq!(expected.len(), 7);
-        // Each end changes something.
+        // Each end changes the outputs.
         assert!(expected[1..].iter().all(|run| run.outputs[..2] != expected[0].outputs[..2]));
         assert_eq!(runs(&whole), expected);
-        let shared: Vec<Message> = [2, 0, 1].into_iter().flat_map(|index| reported(&task, index, 3)).collect();
+        let shared: Vec<Message> = [2, 0, 1].into_iter().flat_map(|index| messages_of(&task, index, 3)).collect();
         assert_eq!(runs(&shared), expected);
         let done = |messages: &[Message]| {
             let last = messages.iter().rev().find_map(|message| match message {
@@ -180,7 +181,7 @@ mod tests {
             last.expect("progress")
         };
         assert!((done(&whole) - 1.0).abs() < 1e-12);
-        let shares: f64 = (0..3).map(|index| done(&reported(&task, index, 3))).sum();
+        let shares: f64 = (0..3).map(|index| done(&messages_of(&task, index, 3))).sum();
         assert!((shares - 1.0).abs() < 1e-12, "{shares}");
         let plan = whole.iter().find_map(|message| match message {
             Message::Plan(plan) => Some(plan),
@@ -194,7 +195,7 @@ mod tests {
 
     #[test]
     fn an_output_that_the_scene_lacks_is_left_out() {
-        let messages = reported(&task("pendulum", "joint.*.friction"), 0, 1);
+        let messages = messages_of(&task("pendulum", "joint.*.friction"), 0, 1);
         let Some(Message::Plan(plan)) = messages.first() else {
             panic!("{messages:?}");
         };
@@ -217,7 +218,7 @@ mod tests {
             (spans(0.1, 0.1), "runs of 0.1 s, observed from 0.1 s on"),
             (spans(f64::NAN, 0.0), "must begin before the end"),
         ] {
-            let messages = reported_without_text(&task);
+            let messages = messages_without_text(&task);
             let [Message::Failed(why)] = &messages[..] else {
                 panic!("{words}: {messages:?}");
             };
@@ -225,8 +226,8 @@ mod tests {
         }
     }
 
-    /// As [`reported`], of a task whose numbers text may not hold.
-    fn reported_without_text(task: &AloneTask) -> Vec<Message> {
+    /// As [`messages_of`], for a task with numbers that text cannot represent.
+    fn messages_without_text(task: &AloneTask) -> Vec<Message> {
         let mut messages = Vec::new();
         perform(&Job::Alone(task.clone(), Share::WHOLE), &mut || 0.0, &mut |message| {
             messages.push(message);
@@ -236,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cancelled_task_ends() {
+    fn a_cancelled_task_sends_no_further_messages() {
         let mut messages = 0;
         perform(&Job::Alone(task("spcmm", "joint.*.clearance"), Share::WHOLE), &mut || 0.0, &mut |_| {
             messages += 1;

@@ -1,9 +1,9 @@
-//! How errors name the arguments of sweeps and studies.
+//! Names of the arguments of sweeps and studies in error messages.
 
 use std::fmt::{Display, Formatter, Result};
 
-/// An argument. `{}` writes the option of the command line, `--discard`; `{:#}` the argument of a function, `discard`. Errors that
-/// carry one pass the choice on, so that a caller of a library prints `{error:#}`.
+/// An argument of a sweep or study. `{}` writes the command-line option, `--discard`; `{:#}` writes the function argument,
+/// `discard`. Errors that contain an argument forward this choice, so that users of the library print `{error:#}`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Argument {
     /// A parameter and its values.
@@ -12,26 +12,26 @@ pub enum Argument {
     Over,
     /// Whether values vary in parallel.
     Zip,
-    /// Where points start from.
+    /// States from which points start.
     Start,
     /// Drive periods of a run.
     Periods,
-    /// Crossings of a section.
+    /// Section crossings of a run.
     Crossings,
-    /// Periods or crossings of the transient.
+    /// Transient periods or crossings to discard.
     Discard,
     /// Rows of the design for sensitivity indices.
     Rows,
     /// Trajectories of a screening.
     Screen,
-    /// Units of a lot.
+    /// Number of units of a lot.
     Units,
     /// Candidate fits and their costs.
     Cost,
 }
 
 impl Argument {
-    /// Its option on the command line, and its name in a function.
+    /// Command-line option and function argument.
     fn names(self) -> [&'static str; 2] {
         match self {
             Self::Vary => ["--vary", "vary"],

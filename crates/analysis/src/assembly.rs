@@ -1,5 +1,5 @@
-//! How assembly changed a scene's values at the start, which forces are not unique, and what is probably not intended: in words
-//! and as JSON.
+//! Report on the start of a scene, in words and as JSON: how assembly moved the bodies, which forces are indeterminate, and
+//! what is probably not intended.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -10,10 +10,10 @@ use jointplay_physics::simulate::{Doubt, Simulation};
 use jointplay_physics::units::format_quantity_digits;
 use jointplay_scene::Scene;
 
-/// A body moved or turned by more than this during assembly gets a warning: m, rad.
+/// Placement in m and rad; a body that assembly moves or turns further than this gets a warning.
 const WARNING_DISTANCE: Placement = Placement { moved: 5e-3, turned: 5.0 * DEGREE };
 
-/// A body moved and turned by less than this counts as not moved: m, rad.
+/// Placement in m and rad; a body that assembly moves and turns by less than this counts as unmoved.
 const NEAR: Placement = Placement { moved: 1e-6, turned: 1e-3 * DEGREE };
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
@@ -57,11 +57,11 @@ fn lines(simulation: &Simulation) -> Vec<(String, String)> {
     for (body, placement) in bodies().filter(|(_, p)| exceeds(p, &NEAR)) {
         lines.push((format!("  {}", body.name), words(placement)));
     }
-    let still = bodies().filter(|(_, p)| !exceeds(p, &NEAR)).count();
-    if still > 0 {
-        let who = if still == machine.bodies.len() { "  every body" } else { "  every other body" };
+    let unmoved = bodies().filter(|(_, p)| !exceeds(p, &NEAR)).count();
+    if unmoved > 0 {
+        let label = if unmoved == machine.bodies.len() { "  every body" } else { "  every other body" };
         let text = "moved less than 0.001 mm, turned less than 0.001°";
-        lines.push((who.to_owned(), text.to_owned()));
+        lines.push((label.to_owned(), text.to_owned()));
     }
     lines
 }
@@ -101,37 +101,37 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
     warnings
 }
 
-/// Findings about a scene at the start of its run.
+/// Report on a scene at the start of its run.
 pub struct StartReport {
     /// Label and text of each line about the assembly.
     pub lines: Vec<(String, String)>,
     /// Assembly results that are probably not intended.
     warnings: Vec<String>,
-    /// Ideal ball joints and joints that close loops whose reactions are not unique.
+    /// Ideal ball joints, and joints that close loops, whose reactions are indeterminate.
     pub reactions: Vec<String>,
-    /// Driven joints whose actuator forces are not unique.
+    /// Driven joints whose actuator forces are indeterminate.
     pub actuators: Vec<String>,
     /// The assembly as JSON, in m and rad.
     pub assembly: Json,
 }
 
 impl StartReport {
-    /// From a simulation at its start.
+    /// Report on a simulation at its start.
     pub fn of(simulation: &mut Simulation) -> Self {
-        let loose = simulation.indeterminate_forces();
+        let indeterminate = simulation.indeterminate_forces();
         let machine = simulation.machine();
         let driven: Vec<&String> = machine.driven().map(|(joint, _)| &joint.name).collect();
-        let reactions = loose.reactions.iter();
+        let reactions = indeterminate.reactions.iter();
         Self {
             lines: lines(simulation),
             warnings: warnings(simulation),
             reactions: reactions.map(|&j| cut_joint(machine, j).to_owned()).collect(),
-            actuators: loose.actuators.iter().map(|&i| driven[i].clone()).collect(),
+            actuators: indeterminate.actuators.iter().map(|&i| driven[i].clone()).collect(),
             assembly: json(simulation),
         }
     }
 
-    /// Message about forces that are not unique, if there are any.
+    /// Message about indeterminate forces, if there are any.
     pub fn indeterminate_forces(&self) -> Option<String> {
         if self.reactions.is_empty() {
             return None;
@@ -148,7 +148,7 @@ impl StartReport {
         ))
     }
 
-    /// What is probably not intended in `scene`, which started as reported here.
+    /// Warnings about `scene`, the scene of this report: what is probably not intended.
     pub fn warnings_of(&self, scene: &Scene) -> Vec<String> {
         let of_machine = scene.machine.warnings().into_iter().map(|warning| warning.to_string());
         let slow = too_slow(scene).map(|slow| slow.to_string());

@@ -1,4 +1,4 @@
-//! The values of one varied parameter: equally or geometrically spaced, or listed.
+//! The values of one varied parameter: linearly or geometrically spaced, or listed.
 
 use std::fmt::{Display as _, Formatter};
 
@@ -6,46 +6,46 @@ use super::argument::Argument;
 use jointplay_physics::units::{Dimension, parse_quantity};
 use jointplay_scene::{Kind, Parameter, Scene, SceneError, Value, ValueError};
 
-/// Largest relative distance of a geometrically spaced value from a whole number that counts as rounding.
+/// Relative distance from a whole number below which a geometrically spaced value counts as whole.
 const ROUNDING: f64 = 1e-9;
 
-/// Why a range defines no values.
+/// Reasons why a range does not define values.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RangeFault {
-    /// Malformed.
+    /// A malformed range.
     #[error("expected KEY=A..B:N, KEY=A..B:N:log or KEY=V1,V2,…, e.g. contact.clearance=0.01mm..1mm:200")]
     Form,
     /// An unknown key, or a value that the scene does not accept.
     #[error(transparent)]
     Scene(Box<SceneError>),
-    /// Neither a parameter nor a driven coordinate.
-    #[error("{error}; {}", driven(.coordinates))]
+    /// A key that is neither a parameter nor a driven coordinate.
+    #[error("{error}; {}", coordinate_list(.coordinates))]
     NoSubject {
-        /// What is wrong.
+        /// The error of the parameter.
         error: Box<SceneError>,
         /// Names of the driven coordinates.
         coordinates: Vec<String>,
     },
-    /// Not a value of the parameter.
+    /// A text that is not a value of the parameter.
     #[error("{value}: {error}")]
     Value {
-        /// The value at fault.
+        /// The invalid value.
         value: String,
-        /// What is wrong and what is allowed.
+        /// The reason, and the allowed values.
         error: ValueError,
     },
     /// A range of a parameter whose values are words.
     #[error("{key} is not a number; list its values, as in {key}={example}")]
     Words {
-        /// Key.
+        /// Key of the parameter.
         key: String,
-        /// Its allowed words.
+        /// Allowed words of the parameter.
         example: String,
     },
     /// A whole-number parameter whose spaced values are not whole.
     #[error("{key} takes whole numbers, which {count} spaced values from {from} to {to} are not")]
     NotWhole {
-        /// Key.
+        /// Key of the parameter.
         key: String,
         /// First value.
         from: u64,
@@ -54,13 +54,13 @@ pub enum RangeFault {
         /// Number of values.
         count: usize,
     },
-    /// Geometric spacing from or to a number that is not positive.
+    /// A geometric range with an end that is not positive.
     #[error("both ends of a logarithmic range must be above 0")]
     NotPositive,
-    /// No points.
+    /// A range without values, or with a contradictory number of values.
     #[error("the range is empty: {what}")]
     Empty {
-        /// Why.
+        /// The reason.
         what: String,
     },
     /// The last value is below the first.
@@ -69,69 +69,69 @@ pub enum RangeFault {
          downwards)"
     )]
     Reversed {
-        /// First end as written.
+        /// First end as given.
         from: String,
-        /// Second end as written.
+        /// Second end as given.
         to: String,
     },
 }
 
-/// Why there are no such points.
+/// Reasons why axes and starts do not define points.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RangeError {
-    /// One axis.
-    #[error(fmt = of_axis)]
+    /// An invalid axis.
+    #[error(fmt = write_axis_error)]
     Axis {
-        /// Its argument.
+        /// Argument that gave the axis.
         argument: Argument,
-        /// As written.
+        /// Text of the axis as given.
         text: String,
-        /// What is wrong.
+        /// The reason.
         fault: RangeFault,
     },
     /// A key that is given twice.
-    #[error(fmt = duplicate_error)]
-    Twice {
-        /// Its argument.
+    #[error(fmt = write_duplicate_key)]
+    DuplicateKey {
+        /// Argument that gave the key.
         argument: Argument,
         /// The key.
         key: String,
     },
     /// A start from which the points cannot follow.
-    #[error(fmt = of_start)]
+    #[error(fmt = write_start_error)]
     Start {
-        /// Its word.
+        /// Word of the start.
         start: &'static str,
-        /// Why they cannot.
+        /// The reason.
         why: String,
-        /// What could be done in place of a cold start; empty for nothing.
+        /// Alternative to a cold start, in words; empty if there is none.
         or: &'static str,
     },
-    /// Axes that do not fit together: the argument at fault, if it is one, and what is wrong.
-    #[error(fmt = together)]
+    /// Axes that cannot be combined: the responsible argument, if there is one, and the reason.
+    #[error(fmt = write_combination_error)]
     Together(Option<Argument>, String),
 }
 
-fn of_axis(argument: &Argument, text: &str, fault: &RangeFault, f: &mut Formatter<'_>) -> std::fmt::Result {
+fn write_axis_error(argument: &Argument, text: &str, fault: &RangeFault, f: &mut Formatter<'_>) -> std::fmt::Result {
     argument.fmt(f)?;
     f.write_str(if f.alternate() { ": " } else { " " })?;
     write!(f, "{text}: {fault}")
 }
 
-fn duplicate_error(argument: &Argument, key: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
+fn write_duplicate_key(argument: &Argument, key: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
     argument.fmt(f)?;
     f.write_str(if f.alternate() { ": " } else { " " })?;
     write!(f, "{key} is given twice")
 }
 
-fn of_start(start: &str, why: &str, or: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
+fn write_start_error(start: &str, why: &str, or: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
     Argument::Start.write(start, f)?;
     write!(f, ": {why}; use ")?;
     Argument::Start.write("cold", f)?;
     f.write_str(or)
 }
 
-fn together(argument: &Option<Argument>, what: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
+fn write_combination_error(argument: &Option<Argument>, what: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
     if let Some(argument) = argument {
         argument.fmt(f)?;
         f.write_str(": ")?;
@@ -139,7 +139,7 @@ fn together(argument: &Option<Argument>, what: &str, f: &mut Formatter<'_>) -> s
     f.write_str(what)
 }
 
-fn driven(coordinates: &[String]) -> String {
+fn coordinate_list(coordinates: &[String]) -> String {
     if coordinates.is_empty() {
         return "the scene has no driven coordinate".to_owned();
     }
@@ -155,14 +155,14 @@ pub struct Coordinate {
     pub dimension: Dimension,
 }
 
-/// What an axis varies.
+/// The quantity that an axis varies.
 enum Subject {
     Parameter(&'static Parameter),
     Coordinate(Coordinate),
 }
 
 impl Subject {
-    /// The subject called `key` of an axis that `argument` gives.
+    /// The quantity called `key`, for an axis given by `argument`.
     fn find(scene: &Scene, argument: Argument, key: &str) -> Result<Self, RangeFault> {
         let error = match scene.parameter(key) {
             Ok(parameter) => return Ok(Self::Parameter(parameter)),
@@ -220,7 +220,7 @@ enum Spacing {
 
 #[derive(Clone, Debug, PartialEq)]
 enum Values {
-    /// SI; `whole` for counts.
+    /// Spaced values, SI; `whole` marks whole numbers.
     Spaced {
         spacing: Spacing,
         from: f64,
@@ -258,7 +258,7 @@ impl Values {
 pub struct Axis {
     argument: Argument,
     key: String,
-    /// As written, for error messages.
+    /// Text as given, for error messages.
     text: String,
     coordinate: Option<Coordinate>,
     values: Values,
@@ -273,10 +273,11 @@ impl Axis {
         Self::of_argument(Argument::Vary, scene, text)
     }
 
-    /// The same; KEY may also be a driven coordinate by the name of its channel, such as `crank.angle` or `slider.position`.
+    /// Parses as [`Self::parse`], but KEY may also name a driven coordinate by its channel, such as `crank.angle` or
+    /// `slider.position`.
     ///
     /// # Errors
-    /// The same.
+    /// As [`Self::parse`].
     pub fn parse_over(scene: &Scene, text: &str) -> Result<Self, RangeError> {
         Self::of_argument(Argument::Over, scene, text)
     }
@@ -306,7 +307,7 @@ impl Axis {
         read().map_err(|fault| RangeError::Axis { argument, text: text.to_owned(), fault })
     }
 
-    /// A parameter with listed values.
+    /// An axis over listed values of a parameter.
     ///
     /// # Errors
     /// An unknown key, no values, or a value that the parameter does not accept.
@@ -326,7 +327,7 @@ impl Axis {
         }
     }
 
-    /// Tries the first and the last value, or every listed one, in `scene`.
+    /// Checks the first and the last value, or every listed value, in `scene`.
     ///
     /// # Errors
     /// A value that the scene does not accept.
@@ -350,14 +351,14 @@ impl Axis {
         &self.key
     }
 
-    /// The driven coordinate, if it varies one.
+    /// The driven coordinate, if the axis varies one.
     pub fn coordinate(&self) -> Option<Coordinate> {
         self.coordinate
     }
 
-    /// The error that it is given twice.
+    /// Error for an axis whose key is given twice.
     pub(super) fn duplicate_error(&self) -> RangeError {
-        RangeError::Twice { argument: self.argument, key: self.key.clone() }
+        RangeError::DuplicateKey { argument: self.argument, key: self.key.clone() }
     }
 
     fn error(&self, fault: RangeFault) -> RangeError {
@@ -372,7 +373,7 @@ impl Axis {
         }
     }
 
-    /// Value `i` in the form that the scene accepts.
+    /// Value `i` as a scene value.
     pub fn value(&self, i: usize) -> Value {
         match &self.values {
             Values::Spaced { whole: true, .. } => Value::Count(self.number(i) as u64),
@@ -391,7 +392,7 @@ impl Axis {
         (0..self.count()).map(|i| self.number(i))
     }
 
-    /// The words of a parameter without numbers; `None` for one with numbers.
+    /// The words of a parameter whose values are words; `None` if they are numbers.
     pub fn words(&self) -> Option<Vec<&'static str>> {
         let Values::Listed(values) = &self.values else {
             return None;
@@ -400,7 +401,7 @@ impl Axis {
         values.iter().map(word).collect()
     }
 
-    /// How the values are given: `linear`, `log` or `list`.
+    /// Spacing of the values: `linear`, `log` or `list`.
     pub fn spacing(&self) -> &'static str {
         match &self.values {
             Values::Spaced { spacing: Spacing::Linear, .. } => "linear",
@@ -409,18 +410,18 @@ impl Axis {
         }
     }
 
-    /// Whether its values are listed and not spaced.
+    /// Whether the values are listed, not spaced.
     pub fn is_listed(&self) -> bool {
         matches!(self.values, Values::Listed(_))
     }
 
-    /// Whether its values are numbers in ascending order.
+    /// Whether the values are numbers in ascending order.
     pub(super) fn is_ascending(&self) -> bool {
         let ordered = (1..self.count()).all(|i| self.number(i - 1) < self.number(i));
         ordered && !self.number(0).is_nan()
     }
 
-    /// Whether its values take effect only at a reset of `scene`.
+    /// Whether a change along the axis takes effect only at a reset of `scene`.
     pub(super) fn waits_for_restart(&self, scene: &Scene) -> bool {
         let at = |i| {
             let mut scene = scene.clone();
@@ -433,7 +434,7 @@ impl Axis {
         })
     }
 
-    /// Error of an axis with words where numbers are needed.
+    /// Error for an axis with words where numbers are needed.
     pub(super) fn not_numbers(&self, scene: &Scene) -> RangeError {
         self.error(not_a_number_fault(scene, &self.key))
     }
@@ -448,7 +449,7 @@ fn not_a_number_fault(scene: &Scene, key: &str) -> RangeFault {
     RangeFault::Words { key: key.to_owned(), example }
 }
 
-/// Last value, number of values and spacing of a range that continues with `rest`: `B:N` or `B:N:log`.
+/// Last value, number of values and spacing from `rest`, the part of a range after `..`: `B:N` or `B:N:log`.
 fn parse_range(rest: &str) -> Result<(&str, &str, Spacing), RangeFault> {
     let parts: Vec<&str> = rest.split(':').map(str::trim).collect();
     match parts[..] {
@@ -458,7 +459,7 @@ fn parse_range(rest: &str) -> Result<(&str, &str, Spacing), RangeFault> {
     }
 }
 
-/// Reads the range of `key` that begins with `first` and continues with `rest`, from [`parts`].
+/// Values of the range of `key` that begins with `first` and continues as parsed by [`parse_range`].
 fn spaced_values(
     scene: &Scene,
     subject: &Subject,
@@ -545,7 +546,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_ranges_state_their_fault() {
+    fn errors_of_invalid_ranges_state_the_reason() {
         for (text, fragment) in [
             ("contact.clearance", "expected KEY=A..B:N"),
             ("contact.clearance=0.1mm..1mm", "expected KEY=A..B:N"),

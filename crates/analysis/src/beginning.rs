@@ -1,13 +1,13 @@
-//! Largest contact forces at the beginning of a run.
+//! Largest contact forces in the first instants of a run.
 
 use jointplay_physics::simulate::{Peak, Simulation};
 
 /// Simulated time examined, s.
 pub const LENGTH: f64 = 0.05;
-/// Limit on evaluations times ball joints.
+/// Work limit: evaluations times ball joints.
 const MAX_EVALUATIONS: u64 = 2_000_000;
 
-/// Largest contact forces of the beginning of a run.
+/// Largest contact forces in the first instants of a run.
 pub struct Beginning {
     /// End of the examined time, s: [`LENGTH`], or less if the limit on work is reached or the run stops.
     pub until: f64,
@@ -16,11 +16,11 @@ pub struct Beginning {
 }
 
 impl Beginning {
-    /// Examines `simulation`, which must be at its start, and advances it.
+    /// Advances `simulation`, which must be at its start, and collects its peaks.
     pub fn of(simulation: &mut Simulation) -> Self {
         let joints = simulation.machine().ball_joints.len().max(1) as u64;
         while simulation.time() < LENGTH && simulation.statistics().evaluations < MAX_EVALUATIONS / joints {
-            // A run that stops here reports the reason itself.
+            // The run itself will report why it stops.
             if simulation.step_until(LENGTH).is_err() {
                 break;
             }

@@ -1,4 +1,4 @@
-//! Cost of each part of the model: one scene with parts added and removed.
+//! Computing cost of each part of the model, from scenes with parts added and removed.
 
 use super::timing::clock_time_to;
 use super::{AnalysisError, RunContext, Setting, WorkBudget};
@@ -7,10 +7,11 @@ use jointplay_physics::machine::Preset;
 use jointplay_physics::mechanism::{ActiveSet, Mechanism};
 use jointplay_scene::Scene;
 
-/// Preset used for the runs.
+/// Solver preset of the runs.
 const PRESET: Preset = Preset::Accurate;
 /// Evaluations per timed batch.
 const BATCH: u32 = 200;
+/// Number of timed batches.
 const BATCHES: u32 = 40;
 
 /// A variation of a built-in scene.
@@ -22,7 +23,7 @@ pub struct CostCase {
     pub label: &'static str,
     /// The parameter changes.
     pub changes: &'static [(&'static str, &'static str)],
-    /// Instant of the timed evaluation, s: the contacts carry load by then.
+    /// Instant of the timed evaluation, s; by then the contacts carry load.
     loaded: f64,
     /// Simulated time of the run, s.
     pub span: f64,
@@ -56,11 +57,11 @@ const PARTS: [CostCase; 11] = [
 pub struct CaseCost {
     /// The variation.
     pub part: CostCase,
-    /// Clock seconds per evaluation of its equations.
+    /// Clock seconds per evaluation of the equations of motion.
     pub evaluation_s: f64,
     /// Clock seconds per simulated second over `part.span`.
     pub cost: f64,
-    /// Evaluations in that span.
+    /// Evaluations over that span.
     pub evaluations: u64,
 }
 
@@ -70,16 +71,16 @@ pub struct CaseCost {
 /// As [`super::work_precision`].
 pub fn model_costs(budget: &WorkBudget, context: &mut RunContext) -> Result<Vec<CaseCost>, AnalysisError> {
     let parts = PARTS.iter().enumerate();
-    parts.map(|(n, part)| one(part, budget, &mut context.part(n, PARTS.len()))).collect()
+    parts.map(|(n, part)| measure(part, budget, &mut context.part(n, PARTS.len()))).collect()
 }
 
-fn one(part: &CostCase, budget: &WorkBudget, context: &mut RunContext) -> Result<CaseCost, AnalysisError> {
+fn measure(part: &CostCase, budget: &WorkBudget, context: &mut RunContext) -> Result<CaseCost, AnalysisError> {
     let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
     let changes: Vec<(String, String)> = part.changes.iter().map(owned).collect();
     let scene = Scene::load(part.scene, &changes)?;
     let setting = Setting::of_preset(PRESET, &scene.machine);
     let mut simulation = setting.start(&scene)?;
-    // Counts the evaluations up to the end of the span, without a cap; the timed runs below cover the same span.
+    // Counts the evaluations of the whole span, without a cap; the timed runs below cover the same span.
     while simulation.time() < part.span {
         simulation.step_until(part.span)?;
         context.report_progress(0.0)?;
@@ -99,13 +100,13 @@ fn one(part: &CostCase, budget: &WorkBudget, context: &mut RunContext) -> Result
     })
 }
 
-/// Seconds per evaluation at a new instant: the shortest average over several batches.
+/// Clock seconds per evaluation at a new instant: the shortest average of several batches.
 fn evaluation(setting: &Setting, scene: &Scene, loaded: f64, context: &mut RunContext) -> Result<f64, AnalysisError> {
     let mut simulation = setting.start(scene)?;
     simulation.advance_to(loaded)?;
     let (t, y) = (simulation.time(), simulation.state_vector());
     let mut mechanism = Mechanism::new(simulation.machine()).map_err(jointplay_physics::simulate::StartError)?;
-    // Starting it determines its rank.
+    // The start determines the rank of the constraints.
     mechanism.start().map_err(jointplay_physics::simulate::StartError)?;
     let joints = 0..mechanism.contacts.len();
     let contact_states: Vec<_> = joints.map(|j| simulation.contact_state(j)).collect();

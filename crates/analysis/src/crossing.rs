@@ -1,4 +1,4 @@
-//! Sections of a motion where a channel crosses a value: `crank.angle=90deg:up`.
+//! Sections of a motion where a channel crosses a value, such as `crank.angle=90deg:up`.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -8,44 +8,44 @@ use jointplay_physics::simulate::{Frame, Reading, Simulation, StartError, Unknow
 use jointplay_physics::units::{Dimension, QuantityError, all_units, parse_quantity};
 use jointplay_scene::Scene;
 
-/// Instants per step at which the channel is read: a value that it crosses twice between two of them counts as not crossed.
+/// Instants per step at which the channel is read. Two crossings between neighbouring instants remain undetected.
 const SAMPLES_PER_STEP: u32 = 4;
-/// Largest number of bisections: enough to reach neighbouring times.
+/// Largest number of bisections, enough to reach adjacent floating-point times.
 const BISECTIONS: u32 = 60;
 
-/// Why a condition for sections is invalid.
+/// Reasons why a condition for sections is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CrossingError {
-    /// Malformed.
+    /// A malformed condition.
     #[error("{text}: expected phase or CHANNEL=VALUE[:up|:down], e.g. crank.angle=90deg:up")]
     Form {
-        /// As written.
+        /// The given text.
         text: String,
     },
     /// An unknown channel.
     #[error("{text}: {error}")]
     Channel {
-        /// As written.
+        /// The given text.
         text: String,
-        /// What is wrong.
+        /// The reason.
         error: UnknownChannel,
     },
-    /// A pattern of several channels.
+    /// A pattern that matches several channels.
     #[error("{text}: the section needs one channel, and these match: {}", .names.join(", "))]
     Several {
-        /// As written.
+        /// The given text.
         text: String,
         /// The channels.
         names: Vec<String>,
     },
-    /// Not a value of the channel.
+    /// A text that is not a value of the channel.
     #[error("{text}: {value} {error}")]
     Value {
-        /// As written.
+        /// The given text.
         text: String,
-        /// The value as written.
+        /// The given value.
         value: String,
-        /// What is wrong.
+        /// The reason.
         error: QuantityError,
     },
     /// The scene whose channels are needed does not start.
@@ -53,7 +53,7 @@ pub enum CrossingError {
     Start(#[from] StartError),
 }
 
-/// Sense of a crossing.
+/// Direction of a crossing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Direction {
     Up,
@@ -61,7 +61,7 @@ enum Direction {
     Either,
 }
 
-/// A value of a channel whose crossing is a section. An angle crosses its value once per turn.
+/// A value of a channel; each crossing of it is a section. An angle crosses its value once per turn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crossing {
     text: String,
@@ -77,48 +77,48 @@ impl Crossing {
     /// # Errors
     /// A malformed text, no such channel or several, a value without its unit; a scene that does not start.
     pub fn parse(scene: &Scene, text: &str) -> Result<Self, CrossingError> {
-        let own = || text.to_owned();
-        let (pattern, rest) = text.split_once('=').ok_or_else(|| CrossingError::Form { text: own() })?;
+        let given = || text.to_owned();
+        let (pattern, rest) = text.split_once('=').ok_or_else(|| CrossingError::Form { text: given() })?;
         let (value, direction) = match rest.split_once(':').map(|(value, direction)| (value, direction.trim())) {
             None => (rest, Direction::Either),
             Some((value, "up")) => (value, Direction::Up),
             Some((value, "down")) => (value, Direction::Down),
-            Some(_) => return Err(CrossingError::Form { text: own() }),
+            Some(_) => return Err(CrossingError::Form { text: given() }),
         };
         let list = channels(&scene.machine, &mut Simulation::new(&scene.machine)?);
         let pattern = pattern.trim();
-        let chosen = matching(&list, pattern).map_err(|error| CrossingError::Channel { text: own(), error })?;
-        // The exact name, or else the only match.
+        let chosen = matching(&list, pattern).map_err(|error| CrossingError::Channel { text: given(), error })?;
+        // An exact name takes precedence over a pattern with a single match.
         let exact = chosen.iter().find(|channel| channel.name == pattern);
         let channel = match (exact, &chosen[..]) {
             (Some(channel), _) | (None, [channel]) => *channel,
             _ => {
                 let names = chosen.iter().map(|channel| channel.name.clone()).collect();
-                return Err(CrossingError::Several { text: own(), names });
+                return Err(CrossingError::Several { text: given(), names });
             }
         };
         let number = parse_quantity(value, dimension_of(channel.unit)).map_err(|error| {
             let value = value.trim().to_owned();
-            CrossingError::Value { text: own(), value, error }
+            CrossingError::Value { text: given(), value, error }
         })?;
         let is_angle = channel.unit == "rad";
-        Ok(Self { text: own(), channel: channel.name.clone(), value: number, is_angle, direction })
+        Ok(Self { text: given(), channel: channel.name.clone(), value: number, is_angle, direction })
     }
 
-    /// As written.
+    /// The given text.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Deviation of `value` from the crossed one; for an angle that of the nearest turn.
+    /// Deviation of `value` from the value to cross; for an angle, from the nearest turn.
     fn deviation(&self, value: f64) -> f64 {
-        let off = value - self.value;
-        if self.is_angle { off - TAU * (off / TAU).round() } else { off }
+        let deviation = value - self.value;
+        if self.is_angle { deviation - TAU * (deviation / TAU).round() } else { deviation }
     }
 
     /// Whether the channel crosses its value between two deviations.
     fn is_between(&self, before: f64, after: f64) -> bool {
-        // Between half a turn above and below, an angle jumps without a crossing.
+        // Half a turn away from the value, the wrapped deviation jumps without a crossing.
         let is_near = !self.is_angle || before.abs().max(after.abs()) < FRAC_PI_2;
         let is_upward = before < 0.0 && after >= 0.0 && self.direction != Direction::Down;
         let is_downward = before > 0.0 && after <= 0.0 && self.direction != Direction::Up;
@@ -126,7 +126,7 @@ impl Crossing {
     }
 }
 
-/// Dimension of a channel's unit; a pure number where scenes have no such unit.
+/// Dimension of a channel's unit; a pure number if scenes have no such unit.
 fn dimension_of(unit: &str) -> Dimension {
     let plain = |text: &str| text.replace([' ', '^'], "");
     let same = |(name, _, size): &(&str, Dimension, f64)| *size == 1.0 && plain(name) == plain(unit);
@@ -141,10 +141,11 @@ pub(super) struct CrossingRun {
     frame: Frame,
     /// Deviation at the end of the latest step.
     latest: f64,
-    /// Crossings to take, discarded ones included, and how many of them to discard.
+    /// Number of crossings to record, including discarded ones.
     count: usize,
+    /// Number of initial crossings to discard.
     discard: usize,
-    /// End of the run, s, whether or not all crossings are taken.
+    /// End of the run, s, even if fewer crossings have occurred.
     end: f64,
     taken: usize,
     kept: Vec<f64>,
@@ -152,7 +153,7 @@ pub(super) struct CrossingRun {
 }
 
 impl CrossingRun {
-    /// Observes `orbit` from now to `count` crossings, but not beyond time `end`, s.
+    /// Observes `orbit` from now until `count` crossings have occurred, or until time `end`, s.
     pub(super) fn new(mut orbit: ObservedRun, crossing: &Crossing, (count, discard): (usize, usize), end: f64) -> Self {
         let machine = orbit.simulation().machine().clone();
         let list = channels(&machine, orbit.simulation_mut());
@@ -263,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_conditions_state_their_fault() {
+    fn errors_of_invalid_conditions_state_the_reason() {
         for (text, fragment) in [
             ("zero", "expected phase or CHANNEL=VALUE"),
             ("crank.angle=90deg:round", "expected phase or CHANNEL=VALUE"),
@@ -294,7 +295,7 @@ mod tests {
             }
             let turns =
                 |times: &[f64]| times.windows(2).all(|w| ((w[1] - w[0]) * per_turn / period - 1.0).abs() < 1e-9);
-            // The crank turns one way: the other sense never occurs.
+            // The crank turns in one direction, so that crossings in the other direction never occur.
             assert!(run.taken() == 0 || (run.taken() >= 3 && turns(run.times())), "{text}: {:?}", run.times());
             assert_eq!(run.sections().len(), 12 * run.times().len());
             if text == "crank.angle=90deg" {

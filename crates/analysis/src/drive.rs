@@ -1,4 +1,4 @@
-//! The period of a scene's drives, and a running scene as an [`Orbit`].
+//! The common period of a scene's drives, and a running scene as an [`Orbit`].
 
 use super::orbit::Orbit;
 use jointplay_physics::machine::Machine;
@@ -6,10 +6,10 @@ use jointplay_physics::mechanism::periods_of;
 use jointplay_physics::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 use jointplay_scene::Scene;
 
-/// Why a scene has no sections at a fixed drive phase.
+/// Reasons why a scene has no sections at a fixed drive phase.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoPeriod {
-    /// Nothing periodic drives it.
+    /// Nothing periodic drives the scene.
     #[error(
         "the scene `{scene}` has no drive that repeats, and no periodic tyre ground, motor target or load, so there is no phase \
          at which to take sections"
@@ -50,10 +50,10 @@ pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
 /// Two different periods, s.
 pub fn common_period(machine: &Machine) -> Result<Option<f64>, [f64; 2]> {
     let mut period: Option<f64> = None;
-    for own in periods_of(machine).filter(|own| own.is_finite()) {
+    for next in periods_of(machine).filter(|period| period.is_finite()) {
         match period {
-            Some(first) if (first / own - 1.0).abs() > 1e-12 => return Err([first, own]),
-            _ => period = Some(own),
+            Some(first) if (first / next - 1.0).abs() > 1e-12 => return Err([first, next]),
+            _ => period = Some(next),
         }
     }
     Ok(period)
@@ -75,13 +75,13 @@ pub const OBSERVABLES: [&str; 12] = [
     "gamma_rate_rad_s",
 ];
 
-/// Values of a section in the order of [`OBSERVABLES`].
+/// Observables of a pose, in the order of [`OBSERVABLES`].
 pub fn observed(pose: &Pose) -> [f64; 12] {
     let parts = [pose.position, pose.angles, pose.velocity, pose.angle_rates];
     std::array::from_fn(|i| parts[i / 3][i % 3])
 }
 
-/// A running scene whose sections are the pose of its output body.
+/// A running scene whose sections record the pose and rates of its output body.
 pub struct ObservedRun {
     simulation: Simulation,
     frame: Frame,
@@ -119,13 +119,13 @@ impl ObservedRun {
     }
 }
 
-/// Why a run cannot start or continue.
+/// Reasons why a run cannot start or continue.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ObservedError {
     /// The scene does not start.
     #[error(transparent)]
     Start(#[from] StartError),
-    /// The divergence guard stopped it.
+    /// The divergence guard stopped the run.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
@@ -169,7 +169,8 @@ impl Orbit for Simulation {
         self.adopt_step_control(other);
     }
 
-    /// True only while the same balls touch: otherwise one run is in an impact that the other has not reached or has left.
+    /// True only while the same balls are in contact. Otherwise one run is in an impact that the other has not reached or has
+    /// left.
     fn is_comparable(&self, twin: &Self) -> bool {
         (0..self.machine().ball_joints.len()).all(|j| self.contact_state(j).active == twin.contact_state(j).active)
     }

@@ -1,5 +1,6 @@
-//! The motion without play of a machine with a closed form: whether it comes near a singular pose, where the reactions of ideal
-//! joints explode even if all rods reach, and whether it is the path that tip errors are measured from.
+//! Checks of the motion without play of a machine with a closed form: whether it comes near a singular pose, where the
+//! reactions of ideal joints grow without bound even if all rods are long enough, and whether it follows the path from which
+//! tip errors are measured.
 
 use jointplay_physics::machine::{Formulation, Machine, Output};
 use jointplay_physics::mechanism::OFF_PATH;
@@ -13,22 +14,22 @@ const INSTANTS: u32 = 400;
 /// Number of instants at which a simulated motion is compared with its path.
 const COMPARED: u32 = 40;
 
-/// Most time for which it is simulated, s.
-const LONGEST: f64 = 10.0;
+/// Longest duration of that simulation, s.
+const MAX_DURATION: f64 = 10.0;
 
-/// Drive frequency of this check, Hz, as in the paper.
+/// Drive frequency at which reactions are checked, Hz, as in the paper.
 const SLOW: f64 = 0.5;
 
 /// Reactions above this many times the weight of all bodies indicate a mechanism about to lose its stiffness.
 const MAX_WEIGHTS: f64 = 5.0;
 
-/// What is wrong with the motion without play.
+/// A fault of the motion without play.
 pub enum IdealFault {
-    /// It gets stuck at this time, s.
+    /// The motion gets stuck at this time, s.
     Stuck(f64),
-    /// Largest reaction, N, and its time, s.
-    Loaded(f64, f64),
-    /// At this time, s, it is this far from the path in closed form, m.
+    /// A reaction beyond the limit: the largest, N, and its time, s.
+    HighReaction(f64, f64),
+    /// A time, s, and the distance from the path in closed form at that time, m.
     OffPath(f64, f64),
 }
 
@@ -36,7 +37,7 @@ impl std::fmt::Display for IdealFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Stuck(time) => write!(f, "the ideal mechanism has a singular pose near t = {time:.3} s"),
-            Self::Loaded(largest, when) => write!(
+            Self::HighReaction(largest, when) => write!(
                 f,
                 "the mechanism comes near a singular pose: with ideal joints and a slow drive a reaction reaches {} at \
                  t = {when:.3} s, more than {MAX_WEIGHTS} times the weight of all bodies",
@@ -52,8 +53,8 @@ impl std::fmt::Display for IdealFault {
     }
 }
 
-/// Examines the motion without play of a scene whose drives prescribe it: whether it is its path in closed form, and whether it
-/// comes near a singular pose.
+/// Checks the motion without play of a scene whose drives prescribe it: whether it follows its path in closed form, and whether
+/// it comes near a singular pose.
 pub fn ideal_fault(scene: &Scene) -> Option<IdealFault> {
     let mut rigid = scene.clone();
     rigid.machine.formulation = Formulation::Tree;
@@ -61,7 +62,7 @@ pub fn ideal_fault(scene: &Scene) -> Option<IdealFault> {
     let form = rigid.machine.closed_form.as_mut()?;
     // Drives at rest have a single pose.
     let instants = if form.frequency > 0.0 { INSTANTS } else { 0 };
-    // At a low frequency only weight loads the joints; the poses do not depend on it.
+    // At a low frequency only weight loads the joints; the poses do not depend on the frequency.
     form.pace = if form.frequency > 0.0 { SLOW / form.frequency } else { 1.0 };
     let (pace, period) = (form.pace, 1.0 / SLOW);
     for joint in &mut rigid.machine.ball_joints {
@@ -69,7 +70,7 @@ pub fn ideal_fault(scene: &Scene) -> Option<IdealFault> {
     }
     let limit = MAX_WEIGHTS * 9.81 * rigid.machine.bodies.iter().map(|body| body.mass).sum::<f64>();
     let mut simulation = Simulation::new(&rigid.machine).ok()?;
-    // The loads of any other motion would need a simulation of arbitrary length.
+    // Reactions in any other motion would need a simulation of arbitrary length.
     if !simulation.mechanism().is_kinematic() {
         return off_path(&scene.machine);
     }
@@ -90,13 +91,14 @@ pub fn ideal_fault(scene: &Scene) -> Option<IdealFault> {
             }
         }
     }
-    (largest > limit).then_some(IdealFault::Loaded(largest, when))
+    (largest > limit).then_some(IdealFault::HighReaction(largest, when))
 }
 
-/// Simulates the motion without play, and compares the probe's tip with its path for one period, or for [`LONGEST`].
+/// Simulates the motion without play and compares the probe's tip with its path for one period, or for [`MAX_DURATION`] if that
+/// is shorter.
 fn off_path(machine: &Machine) -> Option<IdealFault> {
     let form = machine.closed_form.as_ref().filter(|form| form.path.is_some() && form.frequency > 0.0)?;
-    let end = f64::min(1.0 / (form.frequency * form.pace), LONGEST);
+    let end = f64::min(1.0 / (form.frequency * form.pace), MAX_DURATION);
     let ideal = closed(machine);
     let output = Output { probe: machine.output.probe, ..ideal.output };
     let mut simulation = Simulation::new(&Machine { output, ..ideal }).ok()?;

@@ -1,4 +1,4 @@
-//! An impact as a row of a table: the columns of `run --impacts`, and of the file saved from the window.
+//! An impact as a table row, with the columns of `run --impacts` and of the file that the window saves.
 
 use jointplay_physics::simulate::Impact;
 
@@ -20,9 +20,9 @@ pub const COLUMNS: [&str; 14] = [
     "damping_over_elastic",
 ];
 
-/// Values of `impact` in the order of [`COLUMNS`], SI units; the joint by its index, from 0.
+/// Values of `impact` in the order of [`COLUMNS`], SI units; the joint is given by its index from 0.
 pub fn row(impact: &Impact) -> [f64; COLUMNS.len()] {
-    let flag = |is: bool| f64::from(u8::from(is));
+    let flag = |set: bool| f64::from(u8::from(set));
     [
         impact.joint as f64,
         impact.start,

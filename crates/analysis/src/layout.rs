@@ -1,4 +1,4 @@
-//! The columns of a sweep's result and the order of its values: one fixed-length record per point.
+//! Columns of a sweep's result, and the order of values in its records, which have a fixed length per point.
 
 use super::drive::OBSERVABLES;
 use super::exponent::Exponent;
@@ -8,9 +8,9 @@ use jointplay_scene::Scene;
 /// How a point ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// All periods were run.
+    /// All periods were completed.
     Done,
-    /// The divergence guard stopped it.
+    /// The divergence guard stopped the run.
     Diverged,
     /// The scene did not start.
     NoStart,
@@ -32,7 +32,7 @@ impl Status {
 pub struct Column {
     /// Name, with the unit.
     pub name: String,
-    /// Whether its values are whole numbers.
+    /// Whether the values are whole numbers.
     pub whole: bool,
     /// Whether a point has one value per kept section instead of a single one.
     pub per_section: bool,
@@ -47,41 +47,42 @@ pub struct Layout {
     probe: bool,
     /// Number of statistics of channels.
     statistics: usize,
-    /// Whether there are sections at all, and whether they are at crossings of a channel.
+    /// Whether there are sections.
     has_sections: bool,
-    of_crossings: bool,
+    /// Whether the sections are crossings of a channel.
+    at_crossings: bool,
     kept: usize,
 }
 
-/// An array with one value per point: its name, whether it is an integer, and how to read it from a result.
-type OfPoint = (&'static str, bool, fn(&PointResult, Status) -> f64);
+/// An array with one value per point: name, whether it holds integers, and accessor of the value.
+type PointColumn = (&'static str, bool, fn(&PointResult, Status) -> f64);
 
-/// Those of [`POINT`] that exist only with sections.
-const OF_SECTIONS: std::ops::Range<usize> = 2..10;
+/// Rows of [`POINT`] that exist only with sections.
+const SECTION_ROWS: std::ops::Range<usize> = 2..10;
 
-static POINT: [OfPoint; 12] = [
+static POINT: [PointColumn; 12] = [
     ("status", true, |_, status| status.code() as f64),
     ("stopped_at_s", false, |r, _| r.stopped.unwrap_or(f64::NAN)),
-    // A point that did not reach its end has no regime: code -1.
+    // A point that did not reach its end has no regime, which is code -1.
     ("regime", true, |r, status| match status {
         Status::Done => r.regime.code() as f64,
         Status::Diverged | Status::NoStart => -1.0,
     }),
     ("period", true, |r, _| r.regime.period() as f64),
-    ("return_distance", false, |r, status| known(status, r.evidence.return_distance)),
+    ("return_distance", false, |r, status| if_done(status, r.evidence.return_distance)),
     ("distinct_sections", true, |r, _| r.evidence.distinct as f64),
     ("zero_one", false, |r, _| r.evidence.zero_one),
     ("exponent_per_s", false, |r, _| exponent(r, |e| e.value)),
     ("exponent_standard_error_per_s", false, |r, _| exponent(r, |e| e.standard_error)),
-    ("exponent_bound_per_s", false, |r, status| known(status, r.evidence.exponent_bound)),
+    ("exponent_bound_per_s", false, |r, status| if_done(status, r.evidence.exponent_bound)),
     ("doubts", true, |r, _| f64::from(r.doubts)),
     ("energy_residual", false, |r, _| r.residual),
 ];
 
-/// The same per ball joint, prefixed with the joint's name.
-type OfJoint = (&'static str, bool, fn(&JointResult) -> f64);
+/// As [`PointColumn`], per ball joint; the joint's name is prefixed.
+type JointColumn = (&'static str, bool, fn(&JointResult) -> f64);
 
-const JOINT: [OfJoint; 6] = [
+const JOINT: [JointColumn; 6] = [
     ("peak_N", false, |joint| joint.peak),
     ("peak_kept_N", false, |joint| joint.peak_kept),
     ("mean_N", false, |joint| joint.mean),
@@ -90,13 +91,13 @@ const JOINT: [OfJoint; 6] = [
     ("last_separation_s", false, |joint| joint.last_separation.unwrap_or(f64::NAN)),
 ];
 
-/// A value defined only for points that reached their end.
-fn known(status: Status, value: f64) -> f64 {
+/// A value that is defined only for points that reached their end.
+fn if_done(status: Status, value: f64) -> f64 {
     if status == Status::Done { value } else { f64::NAN }
 }
 
-fn exponent(result: &PointResult, of: fn(&Exponent) -> f64) -> f64 {
-    result.evidence.exponent.as_ref().map_or(f64::NAN, of)
+fn exponent(result: &PointResult, value: fn(&Exponent) -> f64) -> f64 {
+    result.evidence.exponent.as_ref().map_or(f64::NAN, value)
 }
 
 impl Layout {
@@ -107,8 +108,8 @@ impl Layout {
             columns.push(Column { name: name.to_owned(), whole, per_section });
         };
         let has_sections = protocol.sections().is_some();
-        let of_crossings = has_sections && protocol.plan().is_none();
-        for (name, whole, _) in of_point(has_sections) {
+        let at_crossings = has_sections && protocol.plan().is_none();
+        for (name, whole, _) in point_columns(has_sections) {
             add(name, *whole, false);
         }
         let by_default = protocol.keep.is_empty() || protocol.joints;
@@ -124,8 +125,8 @@ impl Layout {
             add("probe_error_max_um", false, false);
             add("probe_error_rms_um", false, false);
         }
-        protocol.keep.iter().for_each(|of| add(of.column(), false, false));
-        if of_crossings {
+        protocol.keep.iter().for_each(|statistic| add(statistic.column(), false, false));
+        if at_crossings {
             add("crossings", true, false);
             add("section_time_s", false, true);
         } else if has_sections {
@@ -142,7 +143,7 @@ impl Layout {
             probe,
             statistics: protocol.keep.len(),
             has_sections,
-            of_crossings,
+            at_crossings,
             kept: protocol.kept(),
         }
     }
@@ -172,7 +173,7 @@ impl Layout {
         self.columns[..column].iter().map(|c| self.values_in(c)).sum()
     }
 
-    /// Appends the record of a point; `None` is a point that could not start.
+    /// Appends the record of a point; `None` stands for a point that could not start.
     pub fn append(&self, result: Option<&PointResult>, record: &mut Vec<f64>) {
         let unknown;
         let (status, result) = match result {
@@ -184,25 +185,25 @@ impl Layout {
             }
         };
         let start = record.len();
-        record.extend(of_point(self.has_sections).map(|(.., of)| of(result, status)));
+        record.extend(point_columns(self.has_sections).map(|(.., value)| value(result, status)));
         for name in &self.joints {
-            // A point may lack a joint of the scene, such as the last one of a chain with fewer links.
+            // A point can lack a joint of the scene, such as the last joint of a chain with fewer links.
             let joint = result.joints.iter().find(|joint| joint.name == *name);
             let unknown = JointResult { peak: f64::NAN, peak_kept: f64::NAN, mean: f64::NAN, ..JointResult::default() };
-            record.extend(JOINT.iter().map(|(.., of)| of(joint.unwrap_or(&unknown))));
+            record.extend(JOINT.iter().map(|(.., value)| value(joint.unwrap_or(&unknown))));
         }
         if self.probe {
             let (largest, rms) = result.probe.unwrap_or((f64::NAN, f64::NAN));
             record.extend([largest * 1e6, rms * 1e6]);
         }
         record.extend((0..self.statistics).map(|i| result.statistics.get(i).copied().unwrap_or(f64::NAN)));
-        if self.of_crossings {
+        if self.at_crossings {
             record.push(result.crossings as f64);
         }
         let mut per_section = |values: &[f64]| {
             record.extend((0..self.kept).map(|k| values.get(k).copied().unwrap_or(f64::NAN)));
         };
-        if self.of_crossings {
+        if self.at_crossings {
             per_section(&result.times);
         } else if self.has_sections {
             per_section(result.evidence.exponent.as_ref().map_or(&[][..], |e| &e.running));
@@ -218,8 +219,8 @@ impl Layout {
     }
 }
 
-/// The rows of [`POINT`], with or without those of sections.
-fn of_point(has_sections: bool) -> impl Iterator<Item = &'static OfPoint> {
+/// The rows of [`POINT`], with or without those for sections.
+fn point_columns(has_sections: bool) -> impl Iterator<Item = &'static PointColumn> {
     let rows = POINT.iter().enumerate();
-    rows.filter(move |(i, _)| has_sections || !OF_SECTIONS.contains(i)).map(|(_, row)| row)
+    rows.filter(move |(i, _)| has_sections || !SECTION_ROWS.contains(i)).map(|(_, row)| row)
 }

@@ -1,13 +1,13 @@
-//! A lot of units made alike, each with a run: which of them hold their limits, and how their outputs are distributed.
+//! A lot of units, each represented by a run: which of them are within their limits, and how their outputs are distributed.
 
 use super::yields::{Capability, Estimate, YieldsError, capability, mean_and_deviation, percentile, yield_fraction};
 
-/// Probability of all confidence intervals.
+/// Confidence level of all intervals.
 const CONFIDENCE: f64 = 0.95;
 /// Percentiles of each output.
 pub const PERCENTILES: [f64; 3] = [0.5, 0.95, 0.99];
 
-/// Limits of an output, SI; one of them at least.
+/// Limits of an output, SI; at least one is set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limit {
     /// Lower limit.
@@ -17,7 +17,7 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// Whether `value` is within; NaN is not.
+    /// Whether `value` is within the limits; NaN is not.
     pub fn holds(&self, value: f64) -> bool {
         !value.is_nan()
             && self.lower.is_none_or(|lower| value >= lower)
@@ -25,54 +25,54 @@ impl Limit {
     }
 }
 
-/// Units made alike: a run of each.
+/// A lot of units with their outputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lot {
-    /// Values of the limited outputs of each unit, SI; NaN without a result.
+    /// Outputs of each unit, in the order of the limits, SI; NaN if the run has no result.
     pub outputs: Vec<Vec<f64>>,
-    /// Whether each unit holds all limits.
+    /// Whether each unit is within all limits.
     pub accepted: Vec<bool>,
-    /// Part of the units that holds all limits.
+    /// Yield: fraction of the units within all limits.
     pub yielded: Estimate,
 }
 
 /// Statistics of a limited output.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quality {
-    /// Part of all units that holds this limit.
+    /// Fraction of all units within this output's limits.
     pub yielded: Estimate,
     /// Mean of the units with a result, SI.
     pub mean: f64,
-    /// Their standard deviation, SI.
+    /// Standard deviation of these units, SI.
     pub deviation: f64,
-    /// For each of [`PERCENTILES`], SI; `None` without results.
+    /// Estimates of the [`PERCENTILES`], SI; `None` without results.
     pub percentiles: Vec<Option<Estimate>>,
-    /// `None` without a spread.
+    /// Process capability; `None` without spread.
     pub capability: Option<Capability>,
 }
 
 impl Lot {
-    /// The lot with these outputs of each unit, in the order of `limits`.
+    /// A lot from the outputs of its units, each in the order of `limits`.
     ///
     /// # Errors
     /// No units.
     pub fn new(outputs: Vec<Vec<f64>>, limits: &[Limit]) -> Result<Self, YieldsError> {
         let holds_all = |outputs: &Vec<f64>| limits.iter().zip(outputs).all(|(limit, &value)| limit.holds(value));
         let accepted: Vec<bool> = outputs.iter().map(holds_all).collect();
-        Ok(Self { yielded: part(&accepted)?, outputs, accepted })
+        Ok(Self { yielded: fraction_of(&accepted)?, outputs, accepted })
     }
 
-    /// Statistics of output `o`, whose limit is `limit`.
+    /// Statistics of output `o` with its limits `limit`.
     ///
     /// # Errors
     /// No units.
     pub fn quality(&self, o: usize, limit: &Limit) -> Result<Quality, YieldsError> {
-        let held: Vec<bool> = self.outputs.iter().map(|outputs| limit.holds(outputs[o])).collect();
+        let accepted: Vec<bool> = self.outputs.iter().map(|outputs| limit.holds(outputs[o])).collect();
         let values = self.outputs.iter().map(|outputs| outputs[o]);
         let values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
         let (mean, deviation) = mean_and_deviation(&values);
         Ok(Quality {
-            yielded: part(&held)?,
+            yielded: fraction_of(&accepted)?,
             mean,
             deviation,
             percentiles: PERCENTILES.iter().map(|&p| percentile(&values, p, CONFIDENCE).ok()).collect(),
@@ -81,6 +81,6 @@ impl Lot {
     }
 }
 
-fn part(accepted: &[bool]) -> Result<Estimate, YieldsError> {
+fn fraction_of(accepted: &[bool]) -> Result<Estimate, YieldsError> {
     yield_fraction(accepted.iter().filter(|accepted| **accepted).count(), accepted.len(), CONFIDENCE)
 }

@@ -1,17 +1,18 @@
-//! The fastest settings with which machines with loose joints reproduce the peaks of their first impacts.
+//! Speed of machines with loose joints: the fastest settings that reproduce the peaks of the first impacts.
 
 use super::timing::clock_time_to;
 use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
 use jointplay_physics::integrate::Method;
 use jointplay_scene::Scene;
 
-/// Tolerance of the reference.
+/// Tolerance of the reference solution.
 const REFERENCE: f64 = 1e-9;
-/// Steps per impact and tolerances tried, from the fastest.
+/// Steps per impact to try, fastest first.
 const STEPS_PER_IMPACT: [f64; 12] = [3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0];
+/// Tolerances to try, fastest first.
 const TOLERANCES: [f64; 8] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7];
 const BUDGET: WorkBudget = WorkBudget { measured: 0.3, ..WorkBudget::REFERENCE };
-/// Errors of the first peaks allowed.
+/// Allowed errors of the first peaks.
 pub const LIMITS: [f64; 2] = [0.02, 0.08];
 
 /// A machine whose speed is measured.
@@ -34,26 +35,26 @@ const fn machine(
     LooseMachine { label, scene, changes, span }
 }
 
-/// All of them.
+/// All measured machines.
 pub const LOOSE_MACHINES: [LooseMachine; 7] = [
     machine("chain of 8", "chain", &[("chain.links", "8")], 0.1),
     machine("chain of 32", "chain", &[("chain.links", "32")], 0.1),
     machine("hexapod, 12 loose", "hexapod", &[], 1.0),
     machine("hexapod, 1 loose", "hexapod", &[("contact.clearance", "0"), ("joint.A6.clearance", "0.1 mm")], 1.0),
-    // The rods are held by their balls alone.
+    // Only their balls hold the rods.
     machine("delta, 12 loose", "delta", &[("parameter.grip", "0.001 N")], 0.5),
     machine("four-bar, 2 loose", "four-bar", &[], 1.0),
     machine("suspension, 4 loose", "suspension", &[], 1.0),
 ];
 
-/// Numbers of links of two chains whose costs per link and simulated second are compared, the span in s, and the allowed ratio.
+/// Comparison of two chains by cost per link and simulated second: numbers of links, span in s, and allowed ratio.
 pub const GROWTH: ([u32; 2], f64, f64) = ([32, 256], 10e-3, 1.5);
 
 impl LooseMachine {
     /// Loads the machine.
     ///
     /// # Errors
-    /// Only a mistake in the machine's text or the changes.
+    /// A mistake in the text of the scene or in the changes.
     pub fn load(&self) -> Result<Scene, AnalysisError> {
         let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
         let changes: Vec<_> = self.changes.iter().map(owned).collect();
@@ -64,22 +65,22 @@ impl LooseMachine {
 /// A setting with its error and its speed on a machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timed {
-    /// Method and accuracy.
+    /// Method and its accuracy setting.
     pub setting: Setting,
-    /// Largest relative error of the first peaks; `None` if the run did not get that far.
+    /// Largest relative error of the first peaks; `None` if the run did not reach them.
     pub error: Option<f64>,
     /// Simulated seconds per clock second.
     pub speed: f64,
 }
 
-/// What a machine costs.
+/// Measured speed of a machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LooseSpeed {
     /// The machine.
     pub machine: LooseMachine,
-    /// The fastest setting within each of [`LIMITS`], for each method that has one, the faster method first.
+    /// For each of [`LIMITS`], the fastest setting of each method that stays within it, the faster method first.
     pub fastest: [Vec<Timed>; LIMITS.len()],
-    /// Runge-Kutta 4 at 10 microseconds, in the same run.
+    /// Runge-Kutta 4 at 10 microseconds, measured in the same run.
     pub baseline: Timed,
 }
 
@@ -91,18 +92,18 @@ pub fn loose_speed(machine: LooseMachine, context: &mut RunContext) -> Result<Lo
     let scene = machine.load()?;
     let reference = ReferenceSolution::of_impacts(&scene, REFERENCE, &mut context.part(0, 2))?;
     let mut context = context.part(1, 2);
-    let ways = [(Method::DiscreteGradient, &STEPS_PER_IMPACT[..]), (Method::Automatic, &TOLERANCES[..])];
+    let candidates = [(Method::DiscreteGradient, &STEPS_PER_IMPACT[..]), (Method::Automatic, &TOLERANCES[..])];
     let mut timed: Vec<Timed> = Vec::new();
     let mut time = |setting: Setting, error: Option<f64>, context: &mut RunContext| {
-        if let Some(known) = timed.iter().find(|known| known.setting == setting) {
-            return Ok::<_, AnalysisError>(*known);
+        if let Some(measured) = timed.iter().find(|measured| measured.setting == setting) {
+            return Ok::<_, AnalysisError>(*measured);
         }
         let seconds = clock_time_to(machine.span, &BUDGET, context, |_| setting.start(&scene))?;
         timed.push(Timed { setting, error, speed: machine.span / seconds });
         Ok(timed[timed.len() - 1])
     };
     let mut fastest = LIMITS.map(|_| Vec::new());
-    for (method, values) in ways {
+    for (method, values) in candidates {
         let mut errors = Vec::with_capacity(values.len());
         for value in values {
             let setting = Setting::new(method, *value);
@@ -124,8 +125,8 @@ pub fn loose_speed(machine: LooseMachine, context: &mut RunContext) -> Result<Lo
     Ok(LooseSpeed { machine, fastest, baseline })
 }
 
-/// Clock seconds per link and simulated second of the longer chain of [`GROWTH`] over those of the shorter, with 16 steps per
-/// impact.
+/// Cost of the longer chain of [`GROWTH`] over cost of the shorter, each in clock seconds per link and simulated second, with
+/// 16 steps per impact.
 ///
 /// # Errors
 /// As [`loose_speed`].
@@ -147,12 +148,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_machine_has_the_loose_joints_that_it_is_named_for() {
-        for goal in LOOSE_MACHINES {
-            let scene = goal.load().unwrap_or_else(|e| panic!("{}: {e}", goal.label));
+    fn each_machine_has_the_number_of_loose_joints_in_its_label() {
+        for machine in LOOSE_MACHINES {
+            let scene = machine.load().unwrap_or_else(|e| panic!("{}: {e}", machine.label));
             let loose = scene.machine.joints_with_clearance();
             let count = loose.to_string();
-            assert!(goal.label.split([' ', ',']).any(|word| word == count), "{}: {count}", goal.label);
+            assert!(machine.label.split([' ', ',']).any(|word| word == count), "{}: {count}", machine.label);
         }
     }
 }

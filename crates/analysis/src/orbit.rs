@@ -1,11 +1,11 @@
-//! The interface of a motion for sections and exponents.
+//! Interface of a motion for the computation of sections and exponents.
 
-/// A motion that can be stepped, observed and copied as a twin: a map, a driven oscillator, a mechanism.
+/// A motion that can be stepped, observed and copied as a twin, such as an iterated map, a driven oscillator or a mechanism.
 ///
-/// [`SectionRun`](super::section::SectionRun) accesses a system only through this trait, so that known systems
+/// [`SectionRun`](super::section::SectionRun) accesses a system only through this trait, so that systems with known exponents
 /// (`tests/physics/known_systems.rs`) and mechanisms run through the same code.
 pub trait Orbit: Sized {
-    /// Why a step failed.
+    /// Reason why a step failed.
     type Stop;
 
     /// Time, s; for a map the number of iterations.
@@ -17,7 +17,7 @@ pub trait Orbit: Sized {
     /// The system cannot continue; its state is unchanged.
     fn step_until(&mut self, end: f64) -> Result<(), Self::Stop>;
 
-    /// Steps to the time of its twin `other`, with steps like the latest of `other`.
+    /// Steps to the time of the twin `other`, with the same steps as the latest step of `other`.
     ///
     /// # Errors
     /// As [`Self::step_until`].
@@ -31,7 +31,7 @@ pub trait Orbit: Sized {
     /// The continuous part of the state: coordinates and velocities.
     fn state(&self) -> &[f64];
 
-    /// Scale of each component of [`Self::state`]: the unit of differences.
+    /// Scale of each component of [`Self::state`], the unit in which differences are measured.
     fn scales(&self) -> &[f64];
 
     /// A copy in the same state and with the same future.
@@ -40,18 +40,18 @@ pub trait Orbit: Sized {
     /// Adds `offset` to the state.
     fn displace(&mut self, offset: &[f64]);
 
-    /// Moves history variables, which are not part of the state, towards those of `other` by the fraction `part` of their
+    /// Moves history variables, which are not part of the state, towards those of `other` by the fraction `part` of the
     /// difference.
     fn blend_approach_speeds(&mut self, _other: &Self, _part: f64) {}
 
-    /// Whether the two states differ in continuous variables alone: while only one of them is in contact, a small difference is
+    /// Whether the two states differ only in continuous variables. While only one of them is in contact, a small difference is
     /// about to jump.
     fn is_comparable(&self, _twin: &Self) -> bool {
         true
     }
 
-    /// Adopts the step control of `other`, a comparable run at the same time, so that the two runs differ by their motion and not
-    /// by their errors.
+    /// Adopts the step control of `other`, a comparable run at the same time, so that the two runs differ by their motion and
+    /// not by their integration errors.
     fn adopt_step_control(&mut self, _other: &Self) {}
 
     /// Number of values that [`Self::observe`] writes.

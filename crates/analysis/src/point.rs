@@ -1,4 +1,4 @@
-//! One point of a sweep: the run of a scene through its periods, and the recorded results.
+//! One point of a sweep: the run of a scene through its periods, and its recorded results.
 
 use super::crossing::{Crossing, CrossingRun};
 use super::drive::{NoPeriod, OBSERVABLES, ObservedError, ObservedRun, drive_period};
@@ -10,47 +10,48 @@ use jointplay_physics::machine::{Machine, Solver};
 use jointplay_physics::simulate::{Effect, Peak};
 use jointplay_scene::Scene;
 
-/// Samples per period for the means and the tip error: at most, and at least for statistics of channels.
+/// Samples per drive period: an upper limit for the means and the tip error, and a lower limit for statistics of channels.
 const SAMPLES: f64 = 400.0;
-/// The same for a run of given duration.
+/// Samples per run of given duration, with the same meaning.
 const SAMPLES_OF_DURATION: f64 = 1000.0;
-/// Separation of the twin over the tolerance, and its range, in units of the scales of the tolerance: 10 nm at a tolerance of
-/// 1e-6 in a machine with balls of 10 mm. It is so small that the twins part only at a grazing contact, and well above the
-/// difference between runs with the same steps, which comes from the last iteration of an implicit step.
-const OVER_TOLERANCE: f64 = 1.0;
+/// Separation of the twin over the tolerance, in units of the scales of the tolerance: 10 nm at a tolerance of 1e-6 in a
+/// machine with balls of 10 mm. It is so small that only a grazing contact separates the twins, and well above the difference
+/// between runs with the same steps, which comes from the last iteration of an implicit step.
+const SEPARATION_OVER_TOLERANCE: f64 = 1.0;
+/// Range of the separation, in units of the scales of the tolerance.
 const SEPARATIONS: (f64, f64) = (1e-6, 1e-5);
-/// Loosest tolerance at which a run stays close enough to the motion of its scene to have the same exponent.
+/// Loosest tolerance at which a run follows the motion of its scene closely enough to have the same exponent.
 pub const MAX_EXPONENT_TOLERANCE: f64 = 1e-5;
-/// Resolution of the coordinates of a section, and of its rates, over the tolerance: the errors of many steps add up, and a stiff
-/// contact turns coordinate errors into larger rate errors.
+/// Resolution of the coordinates and of the rates of a section, over the tolerance. The errors of many steps add up, and a
+/// stiff contact turns coordinate errors into larger rate errors.
 const RESOLUTION: [f64; 2] = [10.0, 100.0];
-/// Substitute for the tolerance of a fixed-step method.
-const FIXED_STEP: f64 = 1e-5;
+/// Tolerance that stands for the errors of a fixed-step method.
+const FIXED_STEP_TOLERANCE: f64 = 1e-5;
 
 /// Run length and section phase of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// Drive periods, including those discarded.
+    /// Drive periods, including discarded ones.
     pub periods: usize,
-    /// Initial periods that are a transient.
+    /// Initial periods to discard as a transient.
     pub discard: usize,
     /// Drive phase of the sections as a fraction of the period, 0 <= phase < 1.
     pub phase: f64,
-    /// Whether a twin run measures the largest Lyapunov exponent.
+    /// Whether to measure the largest Lyapunov exponent with a twin run.
     pub exponent: bool,
 }
 
 /// Length of the run of each point, and its observed part.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Span {
-    /// Periods with a section in each.
+    /// A number of periods with a section in each.
     Sections {
         /// Number of periods and phase of the sections.
         plan: Plan,
-        /// Time between two sections, s; `None` is the common period of the scene's drives.
+        /// Time between two sections, s; `None` for the common period of the scene's drives.
         interval: Option<f64>,
     },
-    /// A time without sections.
+    /// A duration without sections.
     Duration {
         /// Length, s, from the point's start.
         duration: f64,
@@ -61,11 +62,11 @@ pub enum Span {
     Crossings {
         /// The channel and its value.
         crossing: Crossing,
-        /// Number of crossings, including those discarded.
+        /// Number of crossings, including discarded ones.
         count: usize,
-        /// Initial crossings that are a transient.
+        /// Initial crossings to discard as a transient.
         discard: usize,
-        /// Longest time for them, s, from the point's start.
+        /// Time limit for the crossings, s, from the point's start.
         duration: f64,
     },
 }
@@ -73,11 +74,11 @@ pub enum Span {
 /// The run of each point of a sweep and the recorded quantities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Protocol {
-    /// Length.
+    /// Length and observed part.
     pub span: Span,
-    /// Statistics of channels, in place of the quantities of the ball joints and the probe; if empty, those.
+    /// Statistics of channels to record. If empty, the quantities of the ball joints and the probe are recorded.
     pub keep: Vec<ChannelStatistic>,
-    /// Whether the quantities of the ball joints and the probe are recorded beside statistics of channels.
+    /// Whether to record the quantities of the ball joints and the probe in addition to statistics of channels.
     pub joints: bool,
 }
 
@@ -107,7 +108,7 @@ impl Protocol {
     /// Time between two sections of `scene`, or the observed time, s.
     ///
     /// # Errors
-    /// A scene without a common period of its drives, where that is needed.
+    /// A scene without a common drive period, if the period is needed.
     pub fn interval(&self, scene: &Scene) -> Result<f64, NoPeriod> {
         match self.span {
             Span::Sections { interval, .. } => interval.map_or_else(|| drive_period(scene), Ok),
@@ -116,14 +117,15 @@ impl Protocol {
         }
     }
 
-    /// The run of a simulation that starts cold at t = 0 or, if it `follows` another point, continues that.
-    /// A duration is a transient that ends at a first, discarded section, and one interval to a second.
+    /// The run of a simulation that starts cold at t = 0 or, if it `follows`, continues another point. A duration is
+    /// represented by a transient that ends at a first, discarded section, and one interval to a second section.
     fn start_run(&self, machine: ObservedRun, interval: f64, separation: Option<f64>, follows: bool) -> SpanRun {
         let now = machine.time();
         let follows = follows.then_some(now);
         let schedule = match &self.span {
             Span::Sections { plan, .. } => {
-                // Sections lie at (k + phase) T, k = 1, 2, … for phase 0 and k = 0, 1, … otherwise: always as many as periods.
+                // Sections lie at (k + phase) T, with k = 1, 2, … for phase 0 and k = 0, 1, … otherwise, so that there are
+                // always as many as periods.
                 let part = if plan.phase > 0.0 { plan.phase } else { 1.0 };
                 let first = follows.map_or(part * interval, |now| now + interval);
                 Schedule { first, interval, sections: plan.periods, discard: plan.discard }
@@ -152,7 +154,7 @@ impl From<Plan> for Protocol {
 /// Result for one ball joint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointResult {
-    /// Its name.
+    /// Name of the joint.
     pub name: String,
     /// Largest normal force of all periods, in continuous time, N.
     pub peak: f64,
@@ -160,9 +162,9 @@ pub struct JointResult {
     pub peak_kept: f64,
     /// Mean normal force over the kept periods, N.
     pub mean: f64,
-    /// Contacts begun in all periods.
+    /// Number of contacts that began in all periods.
     pub impacts: u64,
-    /// Contacts begun in the kept periods.
+    /// Number of contacts that began in the kept periods.
     pub impacts_kept: u64,
     /// Time from the point's start to the last separation, if any, s.
     pub last_separation: Option<f64>,
@@ -171,7 +173,7 @@ pub struct JointResult {
 /// Result of a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointResult {
-    /// Time at which the divergence guard stopped it, s from its start; `None` if it did not.
+    /// Time at which the divergence guard stopped the run, s from the point's start; `None` if it did not.
     pub stopped: Option<f64>,
     /// Ball joints in scene order.
     pub joints: Vec<JointResult>,
@@ -182,9 +184,9 @@ pub struct PointResult {
     pub regime: Regime,
     /// Evidence for the regime.
     pub evidence: Evidence,
-    /// Reasons for distrust: bit k is set for kind k of [`jointplay_physics::simulate::Doubt::KINDS`].
+    /// Doubts about the result: bit k is set for kind k of [`jointplay_physics::simulate::Doubt::KINDS`].
     pub doubts: u32,
-    /// Unaccounted energy since the start of the run, relative to the energy that the machine held and lost; NaN without a
+    /// Unaccounted energy since the start of the run, relative to the energy that the machine contained and lost; NaN without a
     /// ledger.
     pub residual: f64,
     /// Kept sections, concatenated, in the order of [`OBSERVABLES`].
@@ -245,7 +247,7 @@ pub struct PointRun {
     span_run: SpanRun,
     interval: f64,
     /// Whether the transient is over.
-    is_keeping: bool,
+    is_recording: bool,
     resolution: Vec<f64>,
     started: f64,
     impacts_at_start: Vec<u64>,
@@ -265,7 +267,8 @@ impl PointRun {
         Ok(Self::begin(ObservedRun::new(scene)?, protocol, interval, false))
     }
 
-    /// Continues from the latest section of another point as `machine`; `None` if a running simulation cannot change to that.
+    /// Continues from the latest section of another point with the parameters of `machine`; `None` if a running simulation
+    /// cannot adopt them.
     pub fn follow(mut run: ObservedRun, machine: &Machine, protocol: &Protocol, interval: f64) -> Option<Self> {
         if run.simulation_mut().adopt(machine) != Ok(Effect::Now) {
             return None;
@@ -278,7 +281,7 @@ impl PointRun {
         let tolerance = tolerance_of(&solver);
         let samples = if protocol.plan().is_some() { SAMPLES } else { SAMPLES_OF_DURATION };
         let sample_interval = interval / samples;
-        // The motion of a purely kinematic scene has no neighbours.
+        // A purely kinematic scene has a single motion, from which no twin can deviate.
         let exponent = protocol.plan().is_some_and(|plan| plan.exponent);
         let twin = exponent && !machine.simulation().mechanism().is_kinematic();
         let separation = twin.then(|| separation(tolerance));
@@ -296,7 +299,7 @@ impl PointRun {
             statistics: Accumulator::new(&protocol.keep, simulation, sample_interval),
             span_run: protocol.start_run(machine, interval, separation, follows),
             interval,
-            is_keeping: false,
+            is_recording: false,
             started,
             impacts_at_discard: impacts.clone(),
             impacts_at_start: impacts,
@@ -304,7 +307,7 @@ impl PointRun {
             transient_peaks: vec![0.0; joints],
         };
         if run.span_run.discard() == 0 {
-            run.begin_keeping();
+            run.begin_recording();
         }
         run
     }
@@ -317,12 +320,12 @@ impl PointRun {
         }
     }
 
-    /// Whether it started from the scene's own initial state.
+    /// Whether the point started from the scene's own initial state.
     pub fn is_cold(&self) -> bool {
         self.started == 0.0
     }
 
-    /// Whether all periods have been run.
+    /// Whether all periods are complete.
     pub fn is_done(&self) -> bool {
         match &self.span_run {
             SpanRun::Sections(run) => run.is_done(),
@@ -345,7 +348,7 @@ impl PointRun {
         self.span_run.orbit()
     }
 
-    /// One step of the scene.
+    /// Takes one step of the scene.
     ///
     /// # Errors
     /// The divergence guard: the point has diverged.
@@ -357,8 +360,8 @@ impl PointRun {
         if self.span_run.taken() < self.span_run.discard() {
             return Ok(());
         }
-        if !self.is_keeping {
-            self.begin_keeping();
+        if !self.is_recording {
+            self.begin_recording();
         } else {
             self.means.sample(self.span_run.orbit_mut(), at_section);
             self.statistics.sample(self.span_run.orbit_mut().simulation_mut());
@@ -367,8 +370,8 @@ impl PointRun {
     }
 
     /// Ends the transient and starts recording.
-    fn begin_keeping(&mut self) {
-        self.is_keeping = true;
+    fn begin_recording(&mut self) {
+        self.is_recording = true;
         let machine = self.span_run.orbit_mut();
         let simulation = machine.simulation_mut();
         simulation.take_peaks(&mut self.peaks);
@@ -389,8 +392,8 @@ impl PointRun {
         let statistics = simulation.statistics();
         let span = self.means.span;
         let machine = simulation.machine();
-        // A point with fewer crossings than are discarded has no kept part.
-        let peak_kept = |j: usize| if self.is_keeping { self.peaks[j].normal } else { f64::NAN };
+        // A point with no more crossings than are discarded has no kept part.
+        let peak_kept = |j: usize| if self.is_recording { self.peaks[j].normal } else { f64::NAN };
         let statistics_of_channels = self.statistics.values(machine, peak_kept);
         let joints = (0..self.peaks.len())
             .map(|j| JointResult {
@@ -399,14 +402,14 @@ impl PointRun {
                 peak_kept: peak_kept(j),
                 mean: self.means.normal[j] / span,
                 impacts: statistics.impacts[j] - self.impacts_at_start[j],
-                impacts_kept: if self.is_keeping { statistics.impacts[j] - self.impacts_at_discard[j] } else { 0 },
+                impacts_kept: if self.is_recording { statistics.impacts[j] - self.impacts_at_discard[j] } else { 0 },
                 last_separation: statistics.last_separation[j]
                     .filter(|&time| time > self.started)
                     .map(|time| time - self.started),
             })
             .collect();
-        let known = self.means.probe_now.filter(|_| !self.means.probe_lost);
-        let probe = known.map(|_| (self.means.probe_largest, (self.means.probe_square / span).sqrt()));
+        let probe_error = self.means.probe_now.filter(|_| !self.means.probe_lost);
+        let probe = probe_error.map(|_| (self.means.probe_largest, (self.means.probe_square / span).sqrt()));
         let sections = self.span_run.sections().to_vec();
         let crossings = self.span_run.taken();
         let (exponent, times) = match &self.span_run {
@@ -435,7 +438,7 @@ impl PointRun {
         (result, machine)
     }
 
-    /// Result of a point that the divergence guard stopped: only the time.
+    /// Result of a point that the divergence guard stopped, with only the time known.
     pub fn stopped(self) -> PointResult {
         PointResult { stopped: Some(self.machine().time() - self.started), ..PointResult::unknown() }
     }
@@ -461,23 +464,23 @@ impl PointResult {
     }
 }
 
-/// Relative tolerance that represents the errors of a run.
+/// Relative tolerance as a measure of a run's errors.
 fn tolerance_of(solver: &Solver) -> f64 {
-    if solver.method.is_adaptive() { solver.tolerance } else { FIXED_STEP }
+    if solver.method.is_adaptive() { solver.tolerance } else { FIXED_STEP_TOLERANCE }
 }
 
-/// Separation of a twin from a run with this tolerance, in units of the scales.
+/// Separation of the twin of a run with this tolerance, in units of the scales.
 fn separation(tolerance: f64) -> f64 {
-    (OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1)
+    (SEPARATION_OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1)
 }
 
-/// The same for the twin of a run of `machine`.
+/// Separation of the twin of a run of `machine`, in units of the scales.
 pub fn separation_of(machine: &Machine) -> f64 {
     separation(tolerance_of(&machine.solver))
 }
 
-/// Smallest differences that distinguish two sections of `machine`, in the order of [`OBSERVABLES`]: the tolerance times
-/// its scales and a factor.
+/// Smallest differences that distinguish two sections of `machine`, in the order of [`OBSERVABLES`]: products of the tolerance,
+/// the scales and a factor.
 pub fn resolution(machine: &Machine, tolerance: f64) -> Vec<f64> {
     let length = machine.length_scale();
     let of_group = [length, 0.1, length / 0.1, 1.0];
@@ -486,23 +489,28 @@ pub fn resolution(machine: &Machine, tolerance: f64) -> Vec<f64> {
 
 /// Time averages by the trapezoidal rule.
 struct Means {
-    least: f64,
+    /// Least time between two samples, s.
+    min_interval: f64,
+    /// Time of the latest sample, s.
     latest: f64,
+    /// Time covered so far, s.
     span: f64,
-    /// Integral of the normal force per ball joint, N s, and its value at the latest sample.
+    /// Integral of the normal force per ball joint, N s.
     normal: Vec<f64>,
+    /// Normal forces at the latest sample, N.
     normal_now: Vec<f64>,
-    /// Integral of the squared tip error, m^2 s, and its magnitude at the latest sample.
+    /// Integral of the squared tip error, m^2 s.
     probe_square: f64,
+    /// Tip error at the latest sample, m.
     probe_now: Option<f64>,
     probe_largest: f64,
     probe_lost: bool,
 }
 
 impl Means {
-    fn new(joints: usize, least: f64) -> Self {
+    fn new(joints: usize, min_interval: f64) -> Self {
         Self {
-            least,
+            min_interval,
             latest: f64::NAN,
             span: 0.0,
             normal: vec![0.0; joints],
@@ -516,19 +524,19 @@ impl Means {
 
     fn begin(&mut self, machine: &mut ObservedRun) {
         self.latest = machine.time();
-        self.take(machine, 0.0);
+        self.integrate(machine, 0.0);
     }
 
-    /// Takes a sample if the latest one is old enough, or at a section.
+    /// Takes a sample at a section, or if the latest sample is old enough.
     fn sample(&mut self, machine: &mut ObservedRun, at_section: bool) {
-        let ago = machine.time() - self.latest;
-        if ago >= self.least || (at_section && ago > 0.0) {
+        let elapsed = machine.time() - self.latest;
+        if elapsed >= self.min_interval || (at_section && elapsed > 0.0) {
             self.latest = machine.time();
-            self.take(machine, ago);
+            self.integrate(machine, elapsed);
         }
     }
 
-    fn take(&mut self, machine: &mut ObservedRun, h: f64) {
+    fn integrate(&mut self, machine: &mut ObservedRun, h: f64) {
         let frame = machine.frame();
         self.span += h;
         let values = self.normal.iter_mut().zip(&mut self.normal_now);
@@ -537,7 +545,7 @@ impl Means {
             *sum += 0.5 * h * (*now + force);
             *now = force;
         }
-        // If the ideal motion ends early, there is no mean over the whole span.
+        // An ideal motion that ends early leaves no mean over the whole span.
         self.probe_lost |= frame.probe_error.is_none();
         if let Some(error) = frame.probe_error.filter(|_| !self.probe_lost) {
             let size = error.norm();

@@ -1,11 +1,11 @@
-//! Parameter sets from a CSV text: a header of keys, then one set per row, with values as users write them.
+//! Parameter sets from CSV text: a header of keys, then one set per row, with values in the syntax of the user.
 
 use super::axis::{Axis, RangeError};
 use super::design::{Design, Start};
 use jointplay_physics::suggest::brief;
 use jointplay_scene::{Scene, SceneError, Value, ValueError};
 
-/// Why a text is no table of points.
+/// Reasons why a text is not a table of points.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PointsError {
     /// No rows.
@@ -21,10 +21,10 @@ pub enum PointsError {
         file: String,
         /// Line, from 1.
         line: usize,
-        /// What is wrong.
+        /// The reason.
         error: Box<SceneError>,
     },
-    /// A row of another length than the header.
+    /// A row whose length differs from the header's.
     #[error("{file}, line {line}: {values} values for the {keys} keys of the header")]
     Length {
         /// Name of the file.
@@ -36,78 +36,78 @@ pub enum PointsError {
         /// Keys in the header.
         keys: usize,
     },
-    /// Not a value of the parameter.
+    /// A text that is not a value of the parameter.
     #[error("{file}, line {line}: {key} = {value}: {error}")]
     Value {
         /// Name of the file.
         file: String,
         /// Line, from 1.
         line: usize,
-        /// Key.
+        /// Key of the parameter.
         key: String,
-        /// As written.
+        /// The given value.
         value: String,
-        /// What is wrong and what is allowed.
+        /// The reason, and the allowed values.
         error: Box<ValueError>,
     },
-    /// Points that do not go together.
+    /// Columns that cannot be combined.
     #[error("{file}: {error}")]
     Together {
         /// Name of the file.
         file: String,
-        /// What is wrong.
+        /// The reason.
         error: Box<RangeError>,
     },
 }
 
-/// Reads the points of `text`, the content of `file`, for `scene`. Cells may be quoted; empty lines are skipped.
+/// Parses the points in `text`, the content of `file`, for `scene`. Cells may be quoted; empty lines are skipped.
 ///
 /// # Errors
-/// No rows, a row of another length than the header, an unknown key, or an invalid value, with its line.
+/// No rows; with the line, a row whose length differs from the header's, an unknown key or an invalid value.
 pub fn read_points(scene: &Scene, file: &str, text: &str, starts: &[Start]) -> Result<Design, PointsError> {
-    let own = || file.to_owned();
-    // Spreadsheets begin a text with a byte-order mark.
+    let file_name = || file.to_owned();
+    // Spreadsheets begin a file with a byte-order mark.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line));
     let mut lines = lines.filter(|(_, line)| !line.trim().is_empty());
-    let (line, header) = lines.next().ok_or_else(|| PointsError::Empty { file: own() })?;
+    let (line, header) = lines.next().ok_or_else(|| PointsError::Empty { file: file_name() })?;
     let keys = cells(header);
     let parameter = |key: &String| {
-        scene.parameter(key).map_err(|error| PointsError::Key { file: own(), line, error: Box::new(error) })
+        scene.parameter(key).map_err(|error| PointsError::Key { file: file_name(), line, error: Box::new(error) })
     };
     let parameters = keys.iter().map(parameter).collect::<Result<Vec<_>, _>>()?;
     let mut columns: Vec<Vec<Value>> = vec![Vec::new(); keys.len()];
     for (line, row) in lines {
         let row = cells(row);
         if row.len() != keys.len() {
-            return Err(PointsError::Length { file: own(), line, values: row.len(), keys: keys.len() });
+            return Err(PointsError::Length { file: file_name(), line, values: row.len(), keys: keys.len() });
         }
         for (j, cell) in row.iter().enumerate() {
             let value = parameters[j].read(cell).map_err(|error| {
                 let (key, value) = (keys[j].clone(), brief(cell));
-                PointsError::Value { file: own(), line, key, value, error: Box::new(error) }
+                PointsError::Value { file: file_name(), line, key, value, error: Box::new(error) }
             })?;
             columns[j].push(value);
         }
     }
     if columns[0].is_empty() {
-        return Err(PointsError::Empty { file: own() });
+        return Err(PointsError::Empty { file: file_name() });
     }
     let axes = keys.iter().zip(columns).map(|(key, values)| Axis::listed(scene, key, values));
     let axes: Result<Vec<_>, _> = axes.collect();
     let design = axes.and_then(|axes| Design::zipped(scene, axes, starts));
-    design.map_err(|error| PointsError::Together { file: own(), error: Box::new(error) })
+    design.map_err(|error| PointsError::Together { file: file_name(), error: Box::new(error) })
 }
 
-/// The cells of a line of CSV, without quotes and surrounding blanks.
+/// The cells of a line of CSV, without quotes and surrounding white space.
 pub fn cells(line: &str) -> Vec<String> {
     let (mut all, mut cell, mut quoted) = (Vec::new(), String::new(), false);
-    let mut letters = line.chars().peekable();
-    while let Some(letter) = letters.next() {
-        match letter {
-            // A doubled quote inside quotes stands for one.
+    let mut characters = line.chars().peekable();
+    while let Some(character) = characters.next() {
+        match character {
+            // A doubled quote inside quotes stands for a single one.
             '"' if quoted && letters.peek() == Some(&'"') => {
-                letters.next();
+                characters.next();
                 cell.push('"');
             }
             '"' => quoted = !quoted,
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_their_line() {
+    fn errors_state_their_line() {
         for (text, fragment) in [
             ("", "points.csv: expected a header"),
             ("contact.friction\n", "points.csv: expected a header"),

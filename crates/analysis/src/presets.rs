@@ -1,4 +1,4 @@
-//! Measured cost and error of the presets: stored in the program for the built-in scenes, computed on request for any scene.
+//! Measured speed and error of the presets: stored in the program for the built-in scenes, computed on request for any scene.
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -25,12 +25,12 @@ pub struct Measured {
     pub settled_error: Option<f64>,
     /// Speed over the first impacts, relative to Runge-Kutta 4 at 10 microseconds.
     pub impacts_ratio: Option<f64>,
-    /// The same in settled motion.
+    /// Speed in settled motion, relative to Runge-Kutta 4 at 10 microseconds.
     pub settled_ratio: Option<f64>,
 }
 
 impl Measured {
-    /// The stored values of a point.
+    /// The values to store for a point.
     pub fn of(point: &Point) -> Self {
         Self {
             peak_error: point.errors.peak,
@@ -45,11 +45,11 @@ impl Measured {
 /// Measured presets as stored in the program.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// Machine it was measured on.
+    /// Computer on which the presets were measured.
     pub machine: String,
-    /// By scene: method and value of each preset when measured.
+    /// By scene, then by preset: method and accuracy value at the time of measurement.
     pub points: BTreeMap<String, BTreeMap<String, (String, f64)>>,
-    /// By scene, then by preset.
+    /// By scene, then by preset: the measurement.
     pub scenes: BTreeMap<String, BTreeMap<String, Measured>>,
     /// By scene: simulated seconds per clock second of the preset `real-time`, as measured by [`pace`].
     pub pace: BTreeMap<String, f64>,
@@ -70,16 +70,16 @@ pub struct TooSlow {
     pub scene: String,
     /// Simulated seconds per clock second.
     pub pace: f64,
-    /// Where it was measured.
+    /// Computer on which it was measured.
     pub machine: &'static str,
 }
 
 /// Returns the measurement of a built-in `scene` that requests the preset `real-time` but ran slower than real time.
 pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
     let record = record();
-    let own = Preset::RealTime.solver(scene.machine.joints_with_clearance());
+    let real_time = Preset::RealTime.solver(scene.machine.joints_with_clearance());
     let settings = |solver: &Solver| (solver.preset, solver.method, solver.tolerance, solver.steps_per_impact);
-    let is_requested = settings(&scene.machine.solver) == settings(&own) && scene.source.file.is_none();
+    let is_requested = settings(&scene.machine.solver) == settings(&real_time) && scene.source.file.is_none();
     let pace = record.pace.get(&scene.name).copied();
     pace.filter(|pace| is_requested && *pace < 1.0).map(|pace| TooSlow {
         scene: scene.name.clone(),
@@ -120,13 +120,13 @@ pub fn limit(preset: Preset) -> f64 {
     }
 }
 
-/// The best setting within a limit: among those whose peak-force error is at most `limit` on every scene of `found`, the one with
-/// the largest product of speed ratios over the impacts and the settled motion of every scene.
-pub fn choose(found: &[&WorkPrecision], limit: f64) -> Option<Setting> {
-    let candidates = found.first()?.points.iter().map(|point| point.setting);
+/// The fastest setting within a limit. Among the settings whose peak-force error is at most `limit` on every scene of
+/// `results`, it has the largest product of speed ratios over the impacts and the settled motion of every scene.
+pub fn choose(results: &[&WorkPrecision], limit: f64) -> Option<Setting> {
+    let candidates = results.first()?.points.iter().map(|point| point.setting);
     let score = |setting: &Setting| {
         let mut product = 1.0;
-        for scene in found {
+        for scene in results {
             let point = scene.points.iter().find(|p| p.setting == *setting)?;
             if !point.errors.peak.is_some_and(|error| error <= limit) {
                 return None;
@@ -144,7 +144,7 @@ pub fn choose(found: &[&WorkPrecision], limit: f64) -> Option<Setting> {
         .map(|(setting, _)| setting)
 }
 
-/// Measures `presets` on `scene` in its current form, within seconds; results in the same order.
+/// Measures `presets` on `scene` in its current form, within seconds. Results are in the same order.
 ///
 /// # Errors
 /// As [`super::work_precision`].

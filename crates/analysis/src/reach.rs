@@ -1,4 +1,4 @@
-//! Speed goals of the program: three spans of the default scene, each with its required speed.
+//! Speed goals of the program: three time spans of the default scene, each with its required speed.
 
 use super::reference_solution::{MeanForces, require_reached};
 use super::timing::{advance_capped, clock_time_to};
@@ -6,16 +6,16 @@ use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
 use jointplay_physics::simulate::Simulation;
 use jointplay_scene::Scene;
 
-/// Tolerance of the automatic selection that must reach them.
+/// Tolerance of the automatic method, which must reach the goals.
 const TOLERANCE: f64 = 1e-5;
 /// Tolerance of the reference run for the settled forces.
 const REFERENCE_TOLERANCE: f64 = 1e-10;
-/// Allowed relative error of goals that have one.
+/// Allowed relative error of goals whose error is measured.
 const ALLOWED_ERROR: f64 = 0.01;
 /// Number of instants over which settled forces are averaged.
 const SAMPLES: u32 = 3000;
 
-/// One of the three spans.
+/// One of the three goals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {
     /// 0 to 1 s, impacts included.
@@ -27,7 +27,7 @@ pub enum Goal {
 }
 
 impl Goal {
-    /// All three.
+    /// All goals.
     pub const ALL: [Self; 3] = [Self::FirstSecond, Self::Settled, Self::Ideal];
 
     /// Display name.
@@ -66,12 +66,12 @@ impl Goal {
     }
 }
 
-/// A measured result.
+/// Measured result of a goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GoalResult {
     /// The goal.
     pub goal: Goal,
-    /// The method.
+    /// Method and its setting.
     pub setting: Setting,
     /// Simulated seconds per clock second.
     pub speed: f64,
@@ -89,7 +89,7 @@ impl GoalResult {
     }
 }
 
-/// Measures the three spans of `scene`, the default scene.
+/// Measures all goals on `scene`, the default scene.
 ///
 /// # Errors
 /// As [`super::work_precision`].
@@ -117,7 +117,7 @@ fn measure_goal(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<G
         let seconds = clock_time_to(to, &budget, context, |_| Ok(start.clone()))?;
         Ok::<_, AnalysisError>((to - from) / seconds)
     };
-    // Timed before and after the baseline, so that load setting in meanwhile slows both.
+    // The setting is timed before and after the baseline, because load from other processes could slow a single measurement.
     let first = speed(&setting, &mut context.part(0, 4))?;
     let baseline = if integrates { Some(speed(&baseline, &mut context.part(1, 4))?) } else { None };
     let second = speed(&setting, &mut context.part(2, 4))?;
@@ -149,12 +149,12 @@ fn run_to(
     mut after_step: impl FnMut(&mut Simulation),
 ) -> Result<Simulation, AnalysisError> {
     let mut simulation = setting.start(scene)?;
-    let look = |simulation: &mut Simulation| {
+    let observe = |simulation: &mut Simulation| {
         after_step(simulation);
         false
     };
-    let ended = advance_capped(&mut simulation, end, &WorkBudget::REFERENCE, context, look)?;
-    require_reached(ended)?;
+    let outcome = advance_capped(&mut simulation, end, &WorkBudget::REFERENCE, context, observe)?;
+    require_reached(outcome)?;
     Ok(simulation)
 }
 

@@ -1,4 +1,4 @@
-//! Ready-made sweeps for the chaos bench; each states beforehand what it will show.
+//! Ready-made sweeps for the chaos bench; each states its expected result in advance.
 
 use super::design::Start;
 use super::source::SceneSource;
@@ -10,7 +10,7 @@ use jointplay_scene::{Scene, SceneError};
 pub struct ReadySweep {
     /// Label of the button.
     pub name: &'static str,
-    /// Expected result in one sentence (`tests/physics/ready_sweeps.rs`).
+    /// Expected result in one sentence, checked by `tests/physics/ready_sweeps.rs`.
     pub shows: &'static str,
     /// The built-in scene.
     pub scene: &'static str,
@@ -24,9 +24,9 @@ pub struct ReadySweep {
     pub to: &'static str,
     /// Number of values.
     pub values: usize,
-    /// Drive periods per value, including those discarded; forty kept periods reveal chaos without an exponent.
+    /// Drive periods per value, including the transient; forty periods after it reveal chaos without an exponent.
     pub periods: usize,
-    /// Discarded transient periods.
+    /// Transient periods to discard.
     pub discard: usize,
 }
 
@@ -37,8 +37,8 @@ pub const READY: [ReadySweep; 3] = [
         shows: "The four-bar, its crank at 21 to 45 rad/s: every turn is alike until the balls knock, at 24. From there on chaos, but \
                 for two regular windows: at 27 every turn is alike again, at 29 every second one.",
         scene: "four-bar",
-        // The schemes of `automatic` have different errors, which leaves the exponent of a regular motion uncertain to a third of
-        // 1/s.
+        // The schemes of `automatic` have different errors, which makes the exponent of a regular motion uncertain by a third
+        // of 1/s.
         changes: &[("solver.method", "radau5")],
         key: "parameter.speed",
         from: "21 rad/s",
@@ -74,13 +74,13 @@ pub const READY: [ReadySweep; 3] = [
 ];
 
 impl ReadySweep {
-    /// Loads its scene.
+    /// Loads the scene with its changes.
     ///
     /// # Errors
     /// As [`Scene::load`].
     pub fn scene(&self) -> Result<Scene, SceneError> {
-        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
-        let changes: Vec<(String, String)> = self.changes.iter().map(own).collect();
+        let owned = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = self.changes.iter().map(owned).collect();
         Scene::load(self.scene, &changes)
     }
 

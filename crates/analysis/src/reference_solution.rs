@@ -1,8 +1,9 @@
-//! The reference for every run of a scene: the peaks of its first impacts, the position of its output body at the third, and the
-//! mean contact forces once it has settled, with the change of these values in a tighter run.
+//! Reference solution of a scene: the peaks of its first impacts, the position of its output body at the third impact, and the
+//! mean contact forces after settling, each with its change in a run at a tighter tolerance.
 //!
-//! The motion is sensitive: after some tens of impacts two good runs have diverged. So the first impacts are compared one
-//! by one, each within a time slot set by the reference, and settled motion starts from the same state for every method.
+//! The motion is sensitive to errors: after some tens of impacts, two accurate runs have diverged. So the first impacts are
+//! compared one by one, each within a time slot of the reference, and settled motion starts from the same state for every
+//! method.
 
 use serde::Serialize;
 
@@ -12,47 +13,51 @@ use jointplay_physics::machine::Vec3;
 use jointplay_physics::simulate::{Frame, Peak, Simulation};
 use jointplay_scene::Scene;
 
-/// Number of impacts compared; and the scene in which it is smaller, as the next impact overlaps that of a neighbour by 25 us: its peak
-/// depends on which of the two comes first, so that no method comes close to it before it resolves the instants to a microsecond.
+/// Number of impacts to compare.
 const IMPACT_COUNT: usize = 6;
+/// A scene with fewer impacts to compare. Its next impact overlaps an impact of a neighbouring joint by 25 us, and the peak
+/// depends on which of the two begins first. So no method is close to that peak before it resolves the instants to a
+/// microsecond.
 const OVERLAPPING_SCENE: (&str, usize) = ("chain", 5);
 /// The impact at which the position is compared.
 const POSITION_IMPACT: usize = 3;
-/// Simulated time within which the impacts must occur, s; and the span compared in a scene without any, s.
+/// Simulated time within which the impacts must occur, s.
 const IMPACT_TIME_LIMIT: f64 = 0.5;
+/// Compared time span of a scene without impacts, s.
 const SPAN_WITHOUT_IMPACTS: f64 = 0.1;
-/// A longer contact counts as ended after this time, s: an impact takes 0.1 ms.
+/// Time after which a longer contact counts as ended, s; an impact takes 0.1 ms.
 const LONG_CONTACT: f64 = 5e-3;
-/// Extra time run after the last impact, s.
+/// Simulated time after the last impact, s.
 const EXTRA_TIME: f64 = 0.1e-3;
-/// Contacts that have all been closed for this long have settled, s; and the time limit for settling, s.
+/// Time without a new or lost contact after which a scene has settled, s.
 const QUIET_TIME: f64 = 0.15;
+/// Time limit for settling, s.
 const SETTLING_TIME_LIMIT: f64 = 1.2;
-/// Tolerance of the run that settles a scene: all methods start from its final state.
+/// Tolerance of the run that settles a scene; all methods start from its final state.
 const SETTLING_TOLERANCE: f64 = 1e-6;
-/// Untimed beginning of a settled run, in which a method finds its step size, and the timed span, s.
+/// Untimed start of a settled run, in which a method adapts its step size, s.
 const WARM_UP: f64 = 0.05;
+/// Timed span of a settled run, s.
 const SETTLED_SPAN: f64 = 0.2;
 /// Number of instants over which forces are averaged.
 const SAMPLES: u32 = 200;
-/// A mean force below this fraction of the largest one has no meaningful relative error.
+/// Fraction of the largest mean force below which the relative error of a mean force is meaningless.
 const SMALL_FORCE: f64 = 1e-3;
-/// Tolerance of the reference.
+/// Tolerance of the reference solution.
 const REFERENCE_TOLERANCE: f64 = 1e-12;
 
 /// The comparison slot of one impact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Slot {
-    /// Ball joint, index in the scene.
+    /// Index of the ball joint in the scene.
     pub joint: usize,
     /// Start of the contact in the reference, s.
     pub begin_s: f64,
-    /// Start of the slot, s: half-way from the joint's previous contact. The peak is the largest normal force (reaction
-    /// of an ideal joint) in the slot.
+    /// Start of the slot, s: half-way from the joint's previous contact.
     pub from_s: f64,
     /// End of the slot, s: half-way to the joint's next contact.
     pub to_s: f64,
-    /// Peak in the reference, N.
+    /// Peak in the reference, N: the largest normal force in the slot, or the largest reaction of an ideal joint.
     pub peak_n: f64,
 }
 
@@ -65,11 +70,11 @@ pub struct SettledSpan {
     pub to: f64,
     /// Mean magnitude of each joint's contact force (reaction of an ideal joint), N.
     pub means: Vec<f64>,
-    /// State from which every run starts.
+    /// Initial state of every run.
     start: Simulation,
 }
 
-/// Errors against the reference. `None`: the run did not get that far, or the scene has no such quantity.
+/// Errors against the reference; `None` if the run did not reach the quantity, or the scene does not have it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Errors {
     /// Largest relative error of the peak forces of the first impacts.
@@ -96,20 +101,21 @@ pub struct ReferenceSolution {
     scene: Scene,
     /// The first impacts in the order in which they begin; one entry per joint if there is no impact.
     pub slots: Vec<Slot>,
-    /// Number of impacts compared.
+    /// Number of compared impacts.
     pub impacts: usize,
     /// End of the span with the first impacts, s.
     pub span: f64,
-    /// Instant at which the position is compared, s: the third impact, the last if there are fewer, the end if there is none.
+    /// Instant at which the position is compared, s: the third impact, the last impact if there are fewer, or the end if there
+    /// is none.
     pub instant: f64,
-    /// Number of that impact, from 1; 0 if there is none.
+    /// Number of the impact at `instant`, from 1; 0 if there is none.
     pub instant_impact: usize,
     position: Vec3,
     /// Settled motion, if the scene reaches it in time.
     pub settled: Option<SettledSpan>,
     /// The method and tolerance of the reference.
     pub setting: Setting,
-    /// Change of the reference itself at half its tolerance: smaller errors cannot be resolved.
+    /// Change of the reference itself at half its tolerance; smaller errors cannot be resolved.
     pub floor: Errors,
 }
 
@@ -121,14 +127,14 @@ struct Contact {
 }
 
 impl Contact {
-    /// End of the contact, or the time after which it counts as ended; `None` while neither is known at `now`.
+    /// End of the contact, or the time at which it counts as ended; `None` if neither is reached at `now`.
     fn end_at(&self, now: f64) -> Option<f64> {
         let long = self.begin + LONG_CONTACT;
         self.end.filter(|end| *end <= long).or((now >= long).then_some(long))
     }
 }
 
-/// Number of impacts of `scene` that are compared.
+/// Number of impacts to compare for `scene`.
 fn impacts_compared(scene: &Scene) -> usize {
     let (name, fewer) = OVERLAPPING_SCENE;
     if scene.name == name { fewer } else { IMPACT_COUNT }
@@ -151,7 +157,7 @@ impl ReferenceSolution {
         Ok(reference)
     }
 
-    /// The first impacts alone, with the explicit pair at `tolerance`: no settled motion and no floor.
+    /// The reference of the first impacts only, by the explicit pair at `tolerance`, without settled motion and floor.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -179,7 +185,7 @@ impl ReferenceSolution {
         Ok(reference)
     }
 
-    /// Sets the slots of the first impacts: half-way to the same joint's contacts before and after.
+    /// Sets the slots of the first impacts, which extend half-way to the same joint's previous and next contacts.
     fn set_slots(&mut self, contacts: &[Contact], joints: usize) {
         let first = &contacts[..self.impacts];
         if first.is_empty() {
@@ -217,23 +223,24 @@ impl ReferenceSolution {
         Ok((peaks, position.unwrap_or_default()))
     }
 
-    /// Runs over the first impacts; returns how that ended, the largest force in every slot, and the position at the instant.
+    /// Runs over the first impacts. Returns how the run ended, the largest force in every slot, and the position at the
+    /// instant.
     fn observe_impacts(
         &self,
         simulation: &mut Simulation,
         budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<(End, Vec<f64>, Option<Vec3>), AnalysisError> {
-        let mut found = vec![0.0_f64; self.slots.len()];
+        let mut largest = vec![0.0_f64; self.slots.len()];
         let mut position = None;
         let mut peaks: Vec<Peak> = Vec::new();
         let mut frame = Frame::default();
         let end = advance_capped(simulation, self.span, budget, context, |simulation| {
             simulation.take_peaks(&mut peaks);
-            for (slot, found) in self.slots.iter().zip(&mut found) {
+            for (slot, largest) in self.slots.iter().zip(&mut largest) {
                 let peak = &peaks[slot.joint];
                 if (slot.from_s..=slot.to_s).contains(&peak.time) {
-                    *found = found.max(peak.normal);
+                    *largest = largest.max(peak.normal);
                 }
             }
             if position.is_none() && simulation.time() >= self.instant {
@@ -242,10 +249,10 @@ impl ReferenceSolution {
             }
             false
         })?;
-        Ok((end, found, position))
+        Ok((end, largest, position))
     }
 
-    /// Largest relative difference between the slots' peaks; `None` if there is nothing to compare.
+    /// Largest relative error of `peaks`; `None` if there is nothing to compare.
     fn peak_error(&self, peaks: &[f64]) -> Option<f64> {
         let pairs = self.slots.iter().zip(peaks);
         pairs
@@ -272,7 +279,7 @@ impl ReferenceSolution {
         Ok((end, errors, work(&simulation, &PhaseCost::default())))
     }
 
-    /// Finds settled motion and averages its forces.
+    /// Computes the settled motion, if there is any, and averages its forces.
     fn settle(&mut self, setting: &Setting, tighter: &Setting, context: &mut RunContext) -> Result<(), AnalysisError> {
         let Some(start) = settled_state(&self.scene, &mut context.part(0, 3))? else {
             return Ok(());
@@ -287,13 +294,13 @@ impl ReferenceSolution {
         let budget = WorkBudget::REFERENCE;
         let mut means = [Vec::new(), Vec::new()];
         for (n, (setting, means)) in [setting, tighter].into_iter().zip(&mut means).enumerate() {
-            let (end, found, _) = self.mean_forces(setting, &budget, &mut context.part(n + 1, 3))?;
+            let (end, forces, _) = self.mean_forces(setting, &budget, &mut context.part(n + 1, 3))?;
             if end != End::Reached {
-                // Settled motion that the reference cannot follow is no basis for comparison.
+                // A settled motion that the reference run cannot complete is no basis for comparison.
                 self.settled = None;
                 return Ok(());
             }
-            *means = found;
+            *means = forces;
         }
         let [means, check] = means;
         if let Some(span) = &mut self.settled {
@@ -322,7 +329,7 @@ impl ReferenceSolution {
         budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<(End, Vec<f64>, PhaseCost), AnalysisError> {
-        let span = self.settled.as_ref().expect("asked only of a scene that settles");
+        let span = self.settled.as_ref().expect("only called for a scene that settles");
         let (end, mut simulation) = self.resume(span, setting, budget, context)?;
         let before = work(&simulation, &PhaseCost::default());
         let mut forces = MeanForces::new(&self.scene, (span.from, span.to), SAMPLES);
@@ -361,7 +368,7 @@ impl ReferenceSolution {
         Ok(Some((end, error.flatten(), work)))
     }
 
-    /// The scene it belongs to.
+    /// The scene of the reference.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -388,7 +395,7 @@ pub(super) struct MeanForces {
     samples: u32,
     next: u32,
     frame: Frame,
-    /// N; complete once a run has been sampled to the end of the span.
+    /// Mean forces, N; complete once a run has been sampled to the end of the span.
     pub means: Vec<f64>,
 }
 
@@ -416,7 +423,7 @@ impl MeanForces {
     }
 }
 
-/// Requires that the reference reached its end; the error states why it did not.
+/// Requires that the reference run reached its end; the error states why it did not.
 pub(super) fn require_reached(end: End) -> Result<(), AnalysisError> {
     match end {
         End::Reached => Ok(()),
@@ -426,7 +433,7 @@ pub(super) fn require_reached(end: End) -> Result<(), AnalysisError> {
     }
 }
 
-/// Contacts of the reference until shortly after the first impacts, and how many of them to compare.
+/// Contacts of the reference until shortly after the first impacts, and the number of them to compare.
 fn first_contacts(
     setting: &Setting,
     scene: &Scene,
@@ -437,12 +444,12 @@ fn first_contacts(
     if scene.machine.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
         return Ok((Vec::new(), 0));
     }
-    let begun_before = |j: &usize| simulation.contact_state(*j).active;
+    let starts_in_contact = |j: &usize| simulation.contact_state(*j).active;
     let mut contacts: Vec<Contact> =
-        (0..joints).filter(begun_before).map(|joint| Contact { joint, begin: 0.0, end: None }).collect();
+        (0..joints).filter(starts_in_contact).map(|joint| Contact { joint, begin: 0.0, end: None }).collect();
     let mut peaks: Vec<Peak> = Vec::new();
     simulation.take_peaks(&mut peaks);
-    let (budget, most) = (WorkBudget::REFERENCE, impacts_compared(scene));
+    let (budget, count) = (WorkBudget::REFERENCE, impacts_compared(scene));
     let end = advance_capped(&mut simulation, IMPACT_TIME_LIMIT, &budget, context, |simulation| {
         let now = simulation.time();
         simulation.take_peaks(&mut peaks);
@@ -459,21 +466,22 @@ fn first_contacts(
             }
         }
         let is_over = |contact: &Contact| contact.end_at(now).is_some_and(|t| now > t + EXTRA_TIME);
-        contacts.len() >= most && contacts[..most].iter().all(is_over)
+        contacts.len() >= count && contacts[..count].iter().all(is_over)
     })?;
     match end {
-        // A large scene may be capped before its sixth impact: the impacts until then are compared.
+        // A large scene may reach the cap before its sixth impact; then the impacts so far are compared.
         End::Capped if !contacts.is_empty() => {}
         end => require_reached(end)?,
     }
     let last = simulation.time();
-    // Only contacts that have ended by then can be compared to their end.
+    // Only contacts that are over can be compared.
     let is_over = |contact: &&Contact| contact.end_at(last).is_some_and(|end| end + EXTRA_TIME <= last);
-    let compared = contacts.iter().take(most).take_while(is_over).count();
+    let compared = contacts.iter().take(count).take_while(is_over).count();
     Ok((contacts, compared))
 }
 
-/// The state in which every joint with clearance has been in contact for a while without a new impact.
+/// The simulation once every joint with clearance has been in contact for [`QUIET_TIME`] without a new impact; `None` if the
+/// scene does not settle in time.
 fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<Simulation>, AnalysisError> {
     let setting = Setting::automatic(SETTLING_TOLERANCE);
     let mut simulation = setting.start(scene)?;
@@ -506,15 +514,14 @@ mod tests {
         let changes: Vec<_> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         let scene = Scene::load(name, &changes).expect("built in");
         let mut clock = || 0.0;
-        let mut keep_going = |_: f64| ControlFlow::Continue(());
-        ReferenceSolution::new(&scene, &mut RunContext::new(&mut clock, &mut keep_going)).expect("measures")
+        let mut progress = |_: f64| ControlFlow::Continue(());
+        ReferenceSolution::new(&scene, &mut RunContext::new(&mut clock, &mut progress)).expect("measures")
     }
 
     #[test]
-    fn the_reference_of_the_default_scene_has_the_published_impacts() {
+    fn the_reference_of_the_default_scene_matches_the_published_impacts() {
         let reference = reference("spcmm", &[]);
-        // (joint, start in ms, peak in N) of an independent solution, whose last digit is rounded; two nearly
-        // simultaneous contacts may come in either order.
+        // (joint, start in ms, peak in N) of an independent solution, with rounded last digits.
         let published = [
             (0, 7.801422908, 621.35),
             (1, 7.807677416, 560.67),

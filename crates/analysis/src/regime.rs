@@ -1,25 +1,25 @@
 //! Classification of a motion from its sections, with the evidence.
 //!
-//! The rules, in order: sections that return to themselves within the resolution are periodic, or unclear if an exponent clearly
-//! above 0 contradicts them. Otherwise an exponent clearly above 0 means chaos, or an unclear motion if the 0-1 test clearly
-//! indicates a regular one. An exponent clearly below 0 means a cycle if the sections stay near one, else an unfinished
-//! transient. An exponent indistinguishable from 0 with a regular 0-1 test is quasi-periodic, unless the sections still converge
-//! to a cycle. Anything else is unclear.
+//! The rules, in order: sections that return to themselves within the resolution are periodic, or unclear if an exponent
+//! clearly above 0 contradicts them. Otherwise an exponent clearly above 0 means chaos, or an unclear motion if the 0-1 test
+//! clearly indicates a regular one. An exponent clearly below 0 means a cycle if the sections stay near one, and an unfinished
+//! transient otherwise. An exponent indistinguishable from 0 with a regular result of the 0-1 test means quasi-periodic motion,
+//! unless the sections still converge to a cycle. Anything else is unclear.
 
 use super::exponent::Exponent;
 
 /// A kind of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Regime {
-    /// The evidence is too short or contradicts itself.
+    /// The evidence is insufficient or contradictory.
     Unclear,
-    /// It repeats after this many intervals; a motion at rest repeats after one.
+    /// The motion repeats after this many intervals; a machine at rest repeats after one.
     Periodic(usize),
-    /// Regular, but it never repeats.
+    /// The motion is regular but never repeats.
     QuasiPeriodic,
     /// Neighbouring motions diverge exponentially.
     Chaotic,
-    /// Neighbouring motions converge, but the sections have not settled yet: discard more.
+    /// Neighbouring motions converge, but the sections have not settled yet; more of them need to be discarded.
     NotSettled,
 }
 
@@ -38,7 +38,7 @@ impl Regime {
         }
     }
 
-    /// Its code in files.
+    /// Code in files.
     pub fn code(self) -> i64 {
         match self {
             Self::Unclear => 0,
@@ -58,7 +58,7 @@ impl Regime {
         })
     }
 
-    /// Intervals after which it repeats; 0 if it does not.
+    /// Number of intervals after which the motion repeats; 0 if it does not.
     pub fn period(self) -> usize {
         match self {
             Self::Periodic(n) => n,
@@ -68,7 +68,7 @@ impl Regime {
 }
 
 impl std::fmt::Display for Regime {
-    /// Writes its name, with the period if it has one.
+    /// Writes the name, with the period if there is one.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.word())?;
         match self {
@@ -81,37 +81,39 @@ impl std::fmt::Display for Regime {
 /// The evidence for a regime.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evidence {
-    /// Number of sections examined: the latter half of the kept ones, but at least 32 if there are that many.
+    /// Number of examined sections: the second half of the kept sections, but at least 32 if there are that many.
     pub sections: usize,
-    /// Largest distance between two of these sections that should coincide, in units of the resolution: for the period
-    /// found, or for period 1 without one.
+    /// Largest distance between two of these sections that should coincide, in units of the resolution, for the detected
+    /// period, or for period 1 if there is none.
     pub return_distance: f64,
-    /// Number of sections distinguishable at the resolution.
+    /// Number of sections that the resolution distinguishes.
     pub distinct: usize,
     /// Median correlation of the 0-1 test, near 0 for regular motion and near 1 for chaos; NaN for fewer than 40 sections.
     pub zero_one: f64,
-    /// Magnitude below which an exponent may still be zero, 1/s: a separation that grows linearly in time would show ln(n) over n
+    /// Magnitude below which an exponent may still be zero, 1/s: a separation that grows linearly with time shows ln(n) over n
     /// intervals.
     pub exponent_bound: f64,
-    /// Largest Lyapunov exponent, if a twin was run.
+    /// Largest Lyapunov exponent, if there was a twin run.
     pub exponent: Option<Exponent>,
 }
 
-/// Fewest sections that allow a verdict.
+/// Fewest sections that allow a classification.
 pub const MIN_SECTIONS: usize = 8;
-/// At least this many sections are examined, if there are that many.
+/// Least number of examined sections, if there are that many.
 const MIN_EXAMINED: usize = 32;
-/// Largest spread, in resolutions, of the sections of an attracting cycle despite the errors of its steps.
+/// Largest spread that step errors cause in the sections of an attracting cycle, in units of the resolution.
 const MAX_CYCLE_SPREAD: f64 = 100.0;
-/// How often such a cycle must occur, and how far its points may drift as a fraction of their extent: errors come and go.
+/// Number of times that such a cycle must occur.
 const CYCLE_RETURNS: usize = 8;
+/// Largest drift of the cycle's points as a fraction of their spread: step errors fluctuate but do not drift.
 const MAX_DRIFT: f64 = 0.3;
 /// Number of times that a period must occur.
 const MIN_RETURNS: usize = 3;
-/// Sections whose spread falls below this fraction of their earlier spread are converging to a cycle.
+/// Fraction of the earlier spread; sections whose spread falls below it are converging to a cycle.
 const CONVERGENCE_RATIO: f64 = 0.7;
-/// Without an exponent, the 0-1 test indicates chaos above the first of these and regular motion below the second.
+/// Result of the 0-1 test above which it indicates chaos, without an exponent.
 const CHAOTIC_ABOVE: f64 = 0.8;
+/// Result of the 0-1 test below which it clearly indicates regular motion.
 const REGULAR_BELOW: f64 = 0.2;
 
 /// Classifies `sections` (concatenated, each as long as `resolution`), taken every `interval` seconds; `resolution` is
@@ -122,19 +124,20 @@ pub fn classify(sections: &[f64], resolution: &[f64], interval: f64, exponent: O
     let from = all.len() - (all.len() / 2).max(MIN_EXAMINED).min(all.len());
     let used = &all[from..];
     let period = (1..=used.len() / MIN_RETURNS).find(|&n| spread(used, n, resolution) <= 1.0);
-    let many = all.len().max(2) as f64;
+    let count = all.len().max(2) as f64;
     let evidence = Evidence {
         sections: used.len(),
         return_distance: spread(used, period.unwrap_or(1), resolution),
         distinct: distinct(used, resolution),
         zero_one: zero_one(&all, most_varying(used, resolution)),
-        exponent_bound: libm::log(many) / (many * interval),
+        exponent_bound: libm::log(count) / (count * interval),
         exponent,
     };
     let regime = match decide(period, &evidence) {
         // Close to a bifurcation a cycle attracts so weakly that its exponent is indistinguishable from 0.
         Regime::QuasiPeriodic if is_converging(used, resolution) => Regime::NotSettled,
-        // Step errors keep the sections of an attracting cycle from returning within the resolution, but not from staying near.
+        // Step errors prevent the sections of an attracting cycle from returning within the resolution, but the sections stay
+        // near.
         Regime::NotSettled if !is_converging(used, resolution) => {
             let is_cycle = |n: &usize| {
                 let spread = spread(used, *n, resolution);
@@ -148,7 +151,7 @@ pub fn classify(sections: &[f64], resolution: &[f64], interval: f64, exponent: O
     (regime, evidence)
 }
 
-/// Whether the sections of the best-fitting period continue to approach each other.
+/// Whether the sections of the best-fitting period are still approaching each other.
 fn is_converging(sections: &[&[f64]], resolution: &[f64]) -> bool {
     let (first, second) = sections.split_at(sections.len() / 2);
     let by_spread = |&a: &usize, &b: &usize| {
@@ -166,7 +169,7 @@ fn decide(period: Option<usize>, evidence: &Evidence) -> Regime {
     let is_regular = evidence.zero_one < 0.5;
     let diverges = |e: &Exponent| e.value - 2.0 * e.standard_error > evidence.exponent_bound;
     if let Some(n) = period {
-        // The sections indicate a repetition that the twin excludes: one of them is wrong.
+        // The sections indicate a repetition that the twin excludes: one of the two is wrong.
         let is_contradicted = evidence.exponent.as_ref().is_some_and(diverges);
         return if is_contradicted { Regime::Unclear } else { Regime::Periodic(n) };
     }
@@ -179,7 +182,7 @@ fn decide(period: Option<usize>, evidence: &Evidence) -> Regime {
     };
     let (bound, doubt) = (evidence.exponent_bound, 2.0 * exponent.standard_error);
     if diverges(exponent) {
-        // Neighbours diverge, yet the sections wander like those of a regular motion: one of them is wrong.
+        // Neighbours diverge, yet the sections wander like those of a regular motion: one of the two is wrong.
         if evidence.zero_one < REGULAR_BELOW { Regime::Unclear } else { Regime::Chaotic }
     } else if exponent.value + doubt < -bound {
         Regime::NotSettled
@@ -190,7 +193,7 @@ fn decide(period: Option<usize>, evidence: &Evidence) -> Regime {
     }
 }
 
-/// Largest extent, in resolutions, of the sections that would coincide if the motion repeated after `n`.
+/// Largest extent, in units of the resolution, of the sections that would coincide if the motion repeated after `n` intervals.
 fn spread(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
     let mut largest: f64 = 0.0;
     for first in 0..n.min(sections.len()) {
@@ -206,8 +209,8 @@ fn spread(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
     largest
 }
 
-/// Movement, from the first half to the second, of the sections that would coincide if the motion repeated after `n`, in
-/// resolutions.
+/// Drift, from the first half to the second and in units of the resolution, of the sections that would coincide if the motion
+/// repeated after `n` intervals.
 fn drift(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
     let mut largest: f64 = 0.0;
     for first in 0..n.min(sections.len()) {
@@ -237,7 +240,7 @@ fn distinct(sections: &[&[f64]], resolution: &[f64]) -> usize {
     kept.len()
 }
 
-/// The observable with the largest extent in units of its resolution.
+/// Index of the observable with the largest extent in units of its resolution.
 fn most_varying(sections: &[&[f64]], resolution: &[f64]) -> usize {
     let extent = |i: usize| {
         let values = sections.iter().map(|section| section[i]);
@@ -260,14 +263,14 @@ fn zero_one(sections: &[&[f64]], observable: usize) -> f64 {
     let mean = sections.iter().map(|s| s[observable]).sum::<f64>() / n as f64;
     let mut correlations: Vec<f64> = (0..FREQUENCIES)
         .map(|m| {
-            // In (pi/5, 4 pi/5): away from resonances with the sampling.
+            // Frequencies in (pi/5, 4 pi/5) avoid resonances with the sampling.
             let part = (m as f64 + 0.5) / FREQUENCIES as f64;
             let c = std::f64::consts::PI * (0.2 + 0.6 * part);
             let (mut p, mut q) = (0.0, 0.0);
             let walk: Vec<(f64, f64)> = (0..n)
                 .map(|j| {
                     let (sine, cosine) = libm::sincos((j + 1) as f64 * c);
-                    // With the mean removed, there is no oscillating term to subtract.
+                    // Removing the mean makes it unnecessary to subtract an oscillating term.
                     let value = sections[j][observable] - mean;
                     p += value * cosine;
                     q += value * sine;
@@ -288,7 +291,7 @@ fn zero_one(sections: &[&[f64]], observable: usize) -> f64 {
     correlations[FREQUENCIES / 2]
 }
 
-/// Correlation of values with 1, 2, 3, …; 0 where they do not vary.
+/// Correlation of `values` with 1, 2, 3, …; 0 if they do not vary.
 fn correlation_with_time(values: &[f64]) -> f64 {
     let n = values.len() as f64;
     let (mean_t, mean) = (0.5 * (n + 1.0), values.iter().sum::<f64>() / n);
@@ -311,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_at_rest_has_period_one_and_a_cycle_its_length() {
+    fn a_state_at_rest_has_period_one_and_a_cycle_its_length() {
         let rest = [0.25; 40];
         assert_eq!(classify(&rest, &[1e-9], 1.0, None).0, Regime::Periodic(1));
         let cycle: Vec<f64> = (0..60).map(|k| [0.1, 0.7, 0.4][k % 3]).collect();
@@ -328,10 +331,10 @@ mod tests {
     }
 
     #[test]
-    fn a_drift_is_not_settled_and_never_called_periodic() {
+    fn a_drift_is_classified_as_not_settled_and_never_as_periodic() {
         let drift: Vec<f64> = (0..60).map(|k| 1e-3 * f64::from(k)).collect();
         let (regime, evidence) = classify(&drift, &[1.5e-3], 1.0, exponent(-0.5));
-        // Neighbours are within the resolution, the whole set is not.
+        // Neighbouring sections are within the resolution; the whole set is not.
         assert_eq!(regime, Regime::NotSettled);
         assert!(evidence.return_distance > 10.0);
     }

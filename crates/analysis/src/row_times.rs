@@ -1,4 +1,4 @@
-//! Instants of the rows of a run.
+//! Times of the output rows of a run.
 
 /// Row times k x `every`, k = 0..=`last`, of a run of length `duration`, in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,13 +9,13 @@ pub struct RowTimes {
 }
 
 impl RowTimes {
-    /// Rows of a run of length `duration`, s, at intervals `every`, s; `None` if that is not positive.
+    /// Rows of a run of length `duration`, s, at intervals `every`, s; `None` if the interval is not positive.
     pub fn new(duration: f64, every: f64) -> Option<Self> {
-        // NaN is not positive.
+        // This form also rejects NaN.
         if !(every > 0.0) {
             return None;
         }
-        // 20 ms / 0.1 ms must give 200 intervals despite rounding.
+        // A quotient such as 20 ms / 0.1 ms must give 200 intervals despite rounding.
         let intervals = duration / every;
         let whole = intervals.round();
         let last = if (intervals - whole).abs() <= 1e-9 * whole { whole } else { intervals.floor() };
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_lie_at_whole_multiples_and_both_ends_count() {
+    fn rows_are_at_whole_multiples_of_the_interval_including_both_ends() {
         for (duration, every, count) in [
             (0.02, 0.1e-3, 201),
             (0.0, 1e-3, 1),

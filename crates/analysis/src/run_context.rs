@@ -5,12 +5,13 @@ use std::ops::ControlFlow;
 use jointplay_physics::simulate::{ChangeError, StartError, Stopped};
 use jointplay_scene::SceneError;
 
-/// Clock and progress callback from the caller of an analysis: the command line, a background thread, a worker in a browser.
+/// Clock and progress callback from the caller of an analysis: the command line, a background thread or a worker in a browser.
 pub struct RunContext<'a> {
     clock: &'a mut dyn FnMut() -> f64,
     progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
-    /// Range of the current part within the whole, as fractions.
+    /// Start of the current part, as a fraction of the whole.
     from: f64,
+    /// End of the current part, as a fraction of the whole.
     to: f64,
 }
 
@@ -26,7 +27,7 @@ impl<'a> RunContext<'a> {
         (self.clock)()
     }
 
-    /// Reports `fraction` of the current part as done; the caller receives that of the whole.
+    /// Reports `fraction` of the current part as done; the caller receives the fraction of the whole.
     ///
     /// # Errors
     /// [`AnalysisError::Cancelled`] if the caller cancelled.
@@ -46,10 +47,10 @@ impl<'a> RunContext<'a> {
     }
 }
 
-/// Why an analysis has no result.
+/// Reasons why an analysis has no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AnalysisError {
-    /// The caller cancelled it.
+    /// The caller cancelled the analysis.
     #[error("cancelled")]
     Cancelled,
     /// The scene does not start.
@@ -64,12 +65,12 @@ pub enum AnalysisError {
     /// The divergence guard stopped the reference run.
     #[error("cannot compute the reference run: {0}")]
     Stopped(#[from] Stopped),
-    /// The reference run reached the cap on work.
+    /// The reference run reached the work limit.
     #[error(
         "the reference run takes more than {evaluations} evaluations of the equations: the scene is too large to be measured"
     )]
     TooLong {
-        /// The cap.
+        /// The limit.
         evaluations: u64,
     },
 }

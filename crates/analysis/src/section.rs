@@ -1,17 +1,17 @@
-//! A motion sampled at equal intervals of time (the Poincaré section of a driven system), with a twin run that measures how fast
-//! neighbouring motions diverge.
+//! Sampling of a motion at equal time intervals (the Poincaré section of a driven system), with a twin run that measures how
+//! fast neighbouring motions diverge.
 
 use super::exponent::{ALIGNMENT, Benettin};
 use super::orbit::Orbit;
 
-/// Times of the sections, and the number of discarded ones.
+/// Times of the sections, and how many are discarded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
     /// Time of the first section, s.
     pub first: f64,
     /// Time from one section to the next, s.
     pub interval: f64,
-    /// Number of sections, discarded ones included.
+    /// Number of sections, including discarded ones.
     pub sections: usize,
     /// Initial sections, discarded as a transient.
     pub discard: usize,
@@ -23,7 +23,7 @@ impl Schedule {
         self.first + k as f64 * self.interval
     }
 
-    /// Number of sections kept.
+    /// Number of kept sections.
     pub fn kept(&self) -> usize {
         self.sections - self.discard
     }
@@ -31,7 +31,7 @@ impl Schedule {
     /// Number of sections up to `now`, s.
     pub fn passed(&self, now: f64) -> usize {
         let guess = ((now - self.first) / self.interval).floor();
-        // Off by at most one through rounding; a negative guess is 0.
+        // Rounding can make the guess wrong by one; the cast turns a negative guess into 0.
         let mut k = (guess as usize).saturating_sub(1).min(self.sections);
         while k < self.sections && self.time(k) <= now {
             k += 1;
@@ -46,7 +46,7 @@ impl Schedule {
     }
 }
 
-/// A motion being run through its sections.
+/// A motion on its way through its sections.
 pub struct SectionRun<O: Orbit> {
     orbit: O,
     schedule: Schedule,
@@ -64,10 +64,10 @@ enum Twin<O> {
 }
 
 impl<O: Orbit> SectionRun<O> {
-    /// Observes `orbit` from now on. `separation` is that of the twin in units of the scales of the state: well above the error
-    /// of a step, well below the amplitude of the motion; `None` runs no twin.
+    /// Observes `orbit` from now on. `separation` is the separation of the twin in units of the scales of the state. It should
+    /// be well above the error of a step and well below the amplitude of the motion; `None` runs no twin.
     pub fn new(orbit: O, schedule: Schedule, separation: Option<f64>) -> Self {
-        let mut watch = Self {
+        let mut run = Self {
             kept: Vec::with_capacity(schedule.kept() * orbit.observables()),
             orbit,
             schedule,
@@ -75,11 +75,11 @@ impl<O: Orbit> SectionRun<O> {
             twin: Twin::None,
             separation,
         };
-        watch.maybe_start_twin();
-        watch
+        run.maybe_start_twin();
+        run
     }
 
-    /// Times of its sections.
+    /// Times of the sections.
     pub fn schedule(&self) -> &Schedule {
         &self.schedule
     }
@@ -89,7 +89,7 @@ impl<O: Orbit> SectionRun<O> {
         &self.orbit
     }
 
-    /// The motion, to observe more of it.
+    /// The motion, mutable for further observation.
     pub fn orbit_mut(&mut self) -> &mut O {
         &mut self.orbit
     }
@@ -114,7 +114,7 @@ impl<O: Orbit> SectionRun<O> {
         &self.kept
     }
 
-    /// Growth of the twin's separation so far; `None` without a twin, or after it failed.
+    /// Growth of the twin's separation so far; `None` without a twin, or after the twin failed.
     pub fn exponent(&self) -> Option<&Benettin> {
         match &self.twin {
             Twin::Running(_, benettin) => Some(benettin),
@@ -164,12 +164,12 @@ impl<O: Orbit> SectionRun<O> {
         }
     }
 
-    /// Advances the twin to the time of the motion. The motion itself never waits for its twin.
+    /// Advances the twin to the time of the motion, which never depends on its twin.
     fn follow(&mut self, at_section: bool) {
         if let Twin::Running(twin, benettin) = &mut self.twin
             && benettin.follow(&self.orbit, twin, at_section).is_err()
         {
-            // A failing twin costs the motion its exponent, not its sections.
+            // If the twin fails, only the exponent is lost, not the sections.
             self.twin = Twin::None;
             self.separation = None;
         }

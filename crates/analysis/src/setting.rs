@@ -1,4 +1,4 @@
-//! A method with the setting that decides its steps.
+//! An integration method with the setting that controls its steps.
 
 use serde::Serialize;
 
@@ -11,9 +11,9 @@ use jointplay_scene::Scene;
 /// A method with its step size, tolerance or steps per impact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Setting {
-    /// Method.
+    /// Integration method.
     pub method: Method,
-    /// Fixed step size, or initial step size of another method, s.
+    /// Fixed step size, or initial step size of a method that adapts it, s.
     pub step_s: f64,
     /// Relative tolerance of an adaptive method.
     pub tolerance: f64,
@@ -22,7 +22,8 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// `method` at `value`: a step size in s, a tolerance, or a number of steps per impact, as it needs.
+    /// `method` with `value` as its step size in s, its tolerance or its number of steps per impact, whichever controls its
+    /// steps.
     pub fn new(method: Method, value: f64) -> Self {
         let mut setting = Self::of(&Solver { method, ..Solver::default() });
         match method.control() {
@@ -33,7 +34,7 @@ impl Setting {
         setting
     }
 
-    /// That of a machine.
+    /// The setting of a machine's solver.
     fn of(solver: &Solver) -> Self {
         let Solver { method, step: step_s, tolerance, steps_per_impact, .. } = *solver;
         Self { method, step_s, tolerance, steps_per_impact }
@@ -49,7 +50,7 @@ impl Setting {
         Self::new(Method::RungeKutta4, 10e-6)
     }
 
-    /// The reference: the explicit pair of order 5 at `tolerance`.
+    /// The method of reference runs: the explicit pair of order 5 at `tolerance`.
     pub(super) fn reference(tolerance: f64) -> Self {
         Self::new(Method::DormandPrince5, tolerance)
     }
@@ -59,7 +60,7 @@ impl Setting {
         Self::new(Method::Automatic, tolerance)
     }
 
-    /// What decides the steps of the method: a step size in s, a tolerance, or a number of steps per impact.
+    /// The value that controls the steps of the method: a step size in s, a tolerance, or a number of steps per impact.
     pub fn value(&self) -> f64 {
         match self.method.control() {
             StepControl::Fixed => self.step_s,
@@ -73,7 +74,7 @@ impl Setting {
         Ok(Simulation::new(&self.in_machine(&scene.machine))?)
     }
 
-    /// Continues from the state of `start` with this setting in place of its own.
+    /// Continues from the state of `start` with this setting in place of its solver's.
     pub(super) fn resume(&self, start: &Simulation) -> Result<Simulation, AnalysisError> {
         let mut simulation = start.clone();
         let machine = self.in_machine(&simulation.changed_machine());

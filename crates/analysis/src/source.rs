@@ -1,4 +1,4 @@
-//! A scene in transferable form for a thread or worker, and why a task has no result.
+//! A scene in transferable form for a thread or worker, and the errors of tasks.
 
 use std::collections::BTreeMap;
 
@@ -11,16 +11,16 @@ use super::sweep::SweepError;
 use jointplay_physics::simulate::MAX_RUN_DURATION;
 use jointplay_scene::{Scene, SceneError};
 
-/// A scene in transferable form: its text and changes, to be parsed again.
+/// A scene in transferable form: its text and changes, which the receiver parses again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneSource {
     /// The TOML text.
     pub text: String,
     /// File name, for messages.
     pub file: Option<String>,
-    /// Changed parameters, as a user writes them.
+    /// Changed parameters, in the syntax of the user.
     pub changes: Vec<(String, String)>,
-    /// Contents of the files that it refers to, by name.
+    /// Contents of the files that the scene refers to, by name.
     pub beside: BTreeMap<String, String>,
 }
 
@@ -47,7 +47,7 @@ impl SceneSource {
     }
 }
 
-/// Why there is no result.
+/// Reasons why a task has no result.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum TaskFault {
     #[error("cancelled")]

@@ -1,4 +1,4 @@
-//! Statistics of channels over the kept part of a run: `S1.normal:max`, `*.force:mean`.
+//! Statistics of channels over the kept part of a run, such as `S1.normal:max` or `*.force:mean`.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -23,7 +23,7 @@ pub enum Statistic {
     Rms,
     /// Standard deviation in time.
     Std,
-    /// Largest less smallest value.
+    /// Difference between the largest and the smallest value.
     Range,
     /// Last value.
     End,
@@ -39,31 +39,31 @@ words!(Statistic {
     End => "end",
 });
 
-/// Why a list of channels with statistics is invalid.
+/// Reasons why a list of channels with statistics is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StatisticError {
-    /// Malformed.
+    /// A malformed entry.
     #[error("{text}: expected CHANNEL:STATISTIC, e.g. S1.normal:max; statistics: {}", Statistic::WORDS.join(", "))]
     Form {
-        /// As written.
+        /// The given entry.
         text: String,
     },
     /// An unknown statistic.
     #[error("{text}: `{word}` is no statistic{near}; allowed: {}", Statistic::WORDS.join(", "))]
     Unknown {
-        /// As written.
+        /// The given entry.
         text: String,
         /// The unknown word.
         word: String,
-        /// The nearest word, in brackets; or empty.
+        /// Suggestion of the nearest word, in parentheses; empty if there is none.
         near: String,
     },
     /// An unknown channel.
     #[error("{text}: {error}")]
     Channel {
-        /// As written.
+        /// The given entry.
         text: String,
-        /// What is wrong.
+        /// The reason.
         error: UnknownChannel,
     },
     /// The scene whose channels are needed does not start.
@@ -72,7 +72,7 @@ pub enum StatisticError {
 }
 
 impl StatisticError {
-    /// The entry at fault, as written; `None` if it is not at fault.
+    /// The invalid entry as given; `None` if the error is not about an entry.
     pub(crate) fn text(&self) -> Option<&str> {
         match self {
             Self::Form { text } | Self::Unknown { text, .. } | Self::Channel { text, .. } => Some(text),
@@ -97,8 +97,8 @@ impl Display for ChannelStatistic {
 }
 
 impl ChannelStatistic {
-    /// Parses `CHANNEL:STATISTIC,…` for `scene`. A channel may be a pattern, as in `run --channels`, and stands for all
-    /// channels that match it. Repetitions count once.
+    /// Parses `CHANNEL:STATISTIC,…` for `scene`. A channel may be a pattern for all channels that match it, as in `run
+    /// --channels`. Repetitions count once.
     ///
     /// # Errors
     /// A malformed entry, an unknown channel or statistic; a scene that does not start.
@@ -106,15 +106,15 @@ impl ChannelStatistic {
         let list = channels(&scene.machine, &mut Simulation::new(&scene.machine)?);
         let mut found: Vec<Self> = Vec::new();
         for entry in text.split(',').map(str::trim) {
-            let own = || entry.to_owned();
-            let (pattern, word) = entry.rsplit_once(':').ok_or_else(|| StatisticError::Form { text: own() })?;
+            let given = || entry.to_owned();
+            let (pattern, word) = entry.rsplit_once(':').ok_or_else(|| StatisticError::Form { text: given() })?;
             let (pattern, word) = (pattern.trim(), word.trim());
             let statistic = Statistic::of_word(word).ok_or_else(|| {
                 let near = nearest(word, Statistic::WORDS.iter().copied());
-                StatisticError::Unknown { text: own(), word: word.to_owned(), near }
+                StatisticError::Unknown { text: given(), word: word.to_owned(), near }
             })?;
             let chosen = matching(&list, pattern);
-            for channel in chosen.map_err(|error| StatisticError::Channel { text: own(), error })? {
+            for channel in chosen.map_err(|error| StatisticError::Channel { text: given(), error })? {
                 let next = Self {
                     channel: channel.name.clone(),
                     statistic,
@@ -129,17 +129,17 @@ impl ChannelStatistic {
         Ok(found)
     }
 
-    /// Name of its column in a file, with the SI unit: `S1_normal_max_N`.
+    /// Column name in files, with the SI unit, such as `S1_normal_max_N`.
     pub fn column(&self) -> &str {
         &self.column
     }
 
-    /// SI unit; "" for a number.
+    /// SI unit; "" for a dimensionless number.
     pub fn unit(&self) -> &'static str {
         self.unit
     }
 
-    /// Index of the ball joint whose largest normal force in continuous time it is, if it is one.
+    /// Index of the ball joint, if this is the largest normal force of a ball joint, which is known in continuous time.
     fn peak_of(&self, machine: &Machine) -> Option<usize> {
         let name = self.channel.strip_suffix(".normal").filter(|_| self.statistic == Statistic::Max)?;
         machine.ball_joints.iter().position(|joint| joint.name == name)
@@ -153,22 +153,23 @@ pub(super) fn channels(machine: &Machine, simulation: &mut Simulation) -> Vec<Ch
     channels_of(machine, &first)
 }
 
-/// Values of one channel seen so far.
+/// Running statistics of one channel.
 #[derive(Clone, Debug)]
 struct Tally {
     reading: Option<Reading>,
-    /// The first value: deviations from it keep their digits in a small spread about a large mean.
+    /// First value. Deviations from it do not lose digits if the spread is small and the mean large.
     first: f64,
     latest: f64,
     least: f64,
     largest: f64,
-    /// Time integrals of the deviation from the first value and of its square, by the trapezoidal rule.
+    /// Time integral of the deviation from the first value, by the trapezoidal rule.
     deviation: f64,
+    /// Time integral of the squared deviation, by the trapezoidal rule.
     square: f64,
 }
 
 impl Tally {
-    /// Nothing seen.
+    /// A tally without values.
     fn new(reading: Option<Reading>) -> Self {
         let unknown = f64::NAN;
         Self {
@@ -193,7 +194,7 @@ impl Tally {
         self.deviation += 0.5 * h * (before + now);
         self.square += 0.5 * h * (before * before + now * now);
         self.latest = value;
-        // A value that is unknown once makes the statistics unknown.
+        // A single unknown value makes the statistics unknown.
         self.least = if value < self.least || value.is_nan() { value } else { self.least };
         self.largest = if value > self.largest || value.is_nan() { value } else { self.largest };
     }
@@ -201,7 +202,7 @@ impl Tally {
     fn value(&self, statistic: Statistic, span: f64) -> f64 {
         let (mean, square) = if span > 0.0 { (self.deviation / span, self.square / span) } else { (0.0, 0.0) };
         let variance = square - mean * mean;
-        // Rounding can make it negative; NaN stays.
+        // Rounding can make the variance negative; NaN must remain NaN.
         let variance = if variance < 0.0 { 0.0 } else { variance };
         match statistic {
             Statistic::Max => self.largest,
@@ -215,7 +216,7 @@ impl Tally {
     }
 }
 
-/// Statistics being accumulated: one tally for each requested [`ChannelStatistic`].
+/// Accumulator with one tally for each requested [`ChannelStatistic`].
 #[derive(Debug)]
 pub(super) struct Accumulator {
     requested: Vec<ChannelStatistic>,
@@ -228,13 +229,13 @@ pub(super) struct Accumulator {
 }
 
 impl Accumulator {
-    /// An accumulator of `requested`, with samples at every end of a step and at most `interval`, s, apart. Channels that the
-    /// simulation does not have stay unknown.
+    /// An accumulator of `requested`. Samples are taken at the end of every step and at most `interval`, s, apart. Channels
+    /// that the simulation does not have remain unknown.
     pub(super) fn new(requested: &[ChannelStatistic], simulation: &mut Simulation, interval: f64) -> Self {
         let machine = simulation.machine().clone();
         let list = if requested.is_empty() { Vec::new() } else { channels(&machine, simulation) };
-        let tally = |of: &ChannelStatistic| {
-            Tally::new(list.iter().find(|channel| channel.name == of.channel).map(ChannelInfo::reading))
+        let tally = |statistic: &ChannelStatistic| {
+            Tally::new(list.iter().find(|channel| channel.name == statistic.channel).map(ChannelInfo::reading))
         };
         let tallies: Vec<Tally> = requested.iter().map(tally).collect();
         let mut frame = Frame::default();
@@ -242,7 +243,7 @@ impl Accumulator {
         Self { requested: requested.to_vec(), tallies, frame, interval, latest: simulation.time(), span: 0.0 }
     }
 
-    /// Starts over at the latest state.
+    /// Restarts at the latest state.
     pub(super) fn begin(&mut self, simulation: &mut Simulation) {
         if self.tallies.is_empty() {
             return;
@@ -278,9 +279,9 @@ impl Accumulator {
     /// The statistics, in the requested order. `peaks` are the largest normal forces of the ball joints of `machine` in
     /// continuous time over the same span, N.
     pub(super) fn values(&self, machine: &Machine, peaks: impl Fn(usize) -> f64) -> Vec<f64> {
-        let value = |(of, tally): (&ChannelStatistic, &Tally)| match of.peak_of(machine) {
+        let value = |(requested, tally): (&ChannelStatistic, &Tally)| match requested.peak_of(machine) {
             Some(joint) => peaks(joint),
-            None => tally.value(of.statistic, self.span),
+            None => tally.value(requested.statistic, self.span),
         };
         self.requested.iter().zip(&self.tallies).map(value).collect()
     }
@@ -295,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn patterns_choose_channels_and_columns_have_the_unit_last() {
+    fn patterns_select_channels_and_column_names_end_with_the_unit() {
         let columns = |text: &str| {
             let found = ChannelStatistic::parse_list(&scene(), text).expect(text);
             found.iter().map(|of| of.column().to_owned()).collect::<Vec<_>>().join(" ")
@@ -326,10 +327,10 @@ mod tests {
 
     /// A sine about a large mean, sampled at unequal intervals.
     #[test]
-    fn statistics_of_a_sine_are_the_known_ones() {
+    fn statistics_of_a_sine_match_the_exact_values() {
         let mut tally = Tally::new(None);
         let (mean, amplitude, samples) = (1e6, 2.0, 4000);
-        // Two periods; the intervals alternate between one and three parts of four.
+        // Two periods, with intervals that alternate between short and long.
         let time = |k: usize| (k as f64 + if k % 2 == 1 { 0.5 } else { 0.0 }) / samples as f64;
         let value = |t: f64| mean + amplitude * libm::sin(2.0 * std::f64::consts::TAU * t);
         tally.begin(value(0.0));
@@ -343,13 +344,13 @@ mod tests {
             (Statistic::Range, 2.0 * amplitude),
             (Statistic::End, mean),
         ] {
-            // The trapezoidal rule errs by (2 pi h)^2 / 12 of the amplitude, h the longest interval in periods: 1e-6.
+            // The relative error of the trapezoidal rule is (2 pi h)^2 / 12 with the longest interval h in periods: 1e-6.
             let error = tally.value(statistic, 1.0) - expected;
             assert!(error.abs() < 1e-5, "{statistic}: {error}");
         }
         tally.add(f64::NAN, 1e-3);
         tally.add(mean, 1e-3);
-        // All but the last value.
+        // Only the last value is known.
         assert!(Statistic::ALL[..6].iter().all(|statistic| tally.value(*statistic, 1.0).is_nan()));
     }
 }

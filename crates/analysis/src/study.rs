@@ -1,19 +1,19 @@
-//! Studies of uncertain parameters: the parameters that vary ([`Input`]), the numbers that a run is reduced to ([`Output`]), the
-//! runs at given values ([`StudyRuns`]), and what follows from them ([`sensitivity()`], [`tolerance()`]). The caller schedules the
-//! runs, as it does those of any [`Sweep`].
+//! Studies of uncertain parameters: the varied parameters ([`Input`]), the scalar results of a run ([`Output`]), the runs at
+//! given values ([`StudyRuns`]), and their evaluation ([`sensitivity()`], [`tolerance()`]). The caller schedules the runs, as
+//! in any [`Sweep`].
 
-mod alone;
 mod candidates;
 mod inputs;
+mod one_at_a_time;
 mod outputs;
 mod runner;
 mod sensitivity;
 mod target;
 mod tolerance;
 
-pub use alone::{Alone, AloneOutputs, ENDS};
 pub use candidates::{Candidate, CandidateRequest, Candidates, candidates};
 pub use inputs::{Input, Uncertainty, inputs, matching};
+pub use one_at_a_time::{Alone, AloneOutputs, ENDS};
 pub use outputs::{NAMED, NamedOutput, Output, outputs};
 pub use runner::StudyRunner;
 pub use sensitivity::{Screening, Sensitivity, SensitivityOptions, sensitivity};
@@ -39,19 +39,20 @@ use crate::sweep::{Sweep, SweepError};
 use crate::yields::YieldsError;
 use jointplay_scene::{Scene, SceneError, Value, ValueError};
 
-/// Observed periods of a driven scene, and time of another, s, if no duration is given.
+/// Default number of observed periods of a driven scene.
 const PERIODS: f64 = 2.0;
-const UNDRIVEN: f64 = 1.0;
+/// Default duration of a run without a common drive period, s.
+const UNDRIVEN_DURATION: f64 = 1.0;
 
-/// Why there is no such study.
+/// Reasons why a study cannot be set up or evaluated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StudyError {
-    /// One of the requested parameters.
-    #[error(fmt = at)]
+    /// An error with its place in the request.
+    #[error(fmt = write_at_place)]
     At {
         /// Option, or file with line.
         place: String,
-        /// What is wrong there.
+        /// The error at that place.
         error: Box<Self>,
     },
     /// An unknown key.
@@ -62,105 +63,105 @@ pub enum StudyError {
     NoMatch {
         /// The pattern.
         pattern: String,
-        /// The nearest key, in words; empty for none.
+        /// Suggestion of the nearest key, in words; empty if there is none.
         nearest: String,
     },
-    /// A parameter whose values are words or counts.
+    /// A parameter whose values are words or whole numbers.
     #[error("its values are no real numbers")]
     NotReal,
-    /// A parameter without a distribution, and whose value gives none.
+    /// A parameter without a given distribution whose value yields no default range.
     #[error("is {value} in the scene, and half to one and a half of that is no range: give one, KEY=A..B")]
     NoRange {
-        /// Its value in the scene, with its unit.
+        /// Value in the scene, with unit.
         value: String,
     },
-    /// Not a value of the parameter.
+    /// A text that is not a value of the parameter.
     #[error(transparent)]
     Read(#[from] ValueError),
-    /// A distribution that does not exist.
+    /// An invalid distribution.
     #[error(transparent)]
     Distribution(#[from] DistributionError),
     /// An end of a distribution that the parameter does not accept.
     #[error("{value}: {error}")]
     End {
-        /// The end, with its unit.
+        /// The end, with unit.
         value: String,
         /// What is allowed.
         error: ValueError,
     },
     /// An end of a distribution that the scene does not accept.
     #[error("{value}: {why}")]
-    NoEnd {
-        /// The end, with its unit.
+    RejectedEnd {
+        /// The end, with unit.
         value: String,
-        /// What is wrong and what is allowed.
+        /// The reason, and the allowed values.
         why: String,
     },
     /// More parameters than a study varies.
     #[error("{found} uncertain parameters; at most {most} are possible")]
     TooMany {
-        /// Requested parameters.
+        /// Number of requested parameters.
         found: usize,
-        /// Most of them.
+        /// Largest allowed number.
         most: usize,
     },
     /// An unknown output, channel or statistic.
-    #[error(fmt = of_output)]
+    #[error(fmt = write_output_error)]
     Output {
-        /// As written.
+        /// The given entry.
         entry: String,
-        /// What is wrong.
+        /// The error.
         error: StatisticError,
     },
     /// An output that is requested twice.
     #[error("{name}: given twice ({position} and before)")]
-    Twice {
-        /// Its name.
+    DuplicateOutput {
+        /// Name of the output.
         name: String,
         /// Position of the repetition, from 1.
         position: usize,
     },
-    /// A drawn value that the parameter does not accept, which a distribution without limits does not exclude.
+    /// A drawn value that the parameter does not accept; only a distribution without limits can draw one.
     #[error(
         "{key}: {value}: {error}; a distribution with limits, such as normal(MEAN, SD, LOW..HIGH), draws no such value"
     )]
-    Drawn {
-        /// Parameter.
+    DrawnValue {
+        /// Key of the parameter.
         key: String,
-        /// The value, with its unit.
+        /// The value, with unit.
         value: String,
         /// What is allowed.
         error: ValueError,
     },
-    /// Values that define no runs.
+    /// Values that do not define runs.
     #[error(transparent)]
     Range(#[from] RangeError),
-    /// Runs that define no sweep.
+    /// Runs that do not define a sweep.
     #[error(transparent)]
     Sweep(#[from] SweepError),
     /// A number that an argument does not accept.
-    #[error(fmt = of_argument)]
+    #[error(fmt = write_argument_error)]
     Argument {
         /// The argument.
         argument: Argument,
         /// The number.
         value: usize,
-        /// What is wrong.
+        /// The error.
         error: Box<Self>,
     },
-    /// Fewer rows than indices need.
+    /// Fewer rows than the indices need.
     #[error("allowed at least {MIN_ROWS}, or 0 for no indices")]
     TooFewRows,
-    /// No design for indices.
+    /// An error of the design for indices.
     #[error(transparent)]
     Indices(#[from] IndicesError),
-    /// No screening.
+    /// An error of the screening.
     #[error(transparent)]
     Screening(#[from] MorrisError),
-    /// No sample.
+    /// An error of the sampling.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
-    /// No statistics of a lot.
+    /// An error of the statistics of a lot.
     #[error(transparent)]
     Yields(#[from] YieldsError),
     /// A candidate without a cost.
@@ -174,45 +175,50 @@ pub enum StudyError {
         "{text} is wider than the candidate before it; list the candidates of a parameter from the loosest to the tightest"
     )]
     Wider {
-        /// The later one, as written.
+        /// The wider candidate, as given.
         text: String,
     },
-    /// No search of the cheapest fits.
-    #[error(fmt = of_fits)]
+    /// An error of the search for the cheapest fits.
+    #[error(fmt = write_fit_search_error)]
     Fits(FitSearchError),
 }
 
-fn at(place: &str, error: &StudyError, f: &mut Formatter<'_>) -> std::fmt::Result {
+fn write_at_place(place: &str, error: &StudyError, f: &mut Formatter<'_>) -> std::fmt::Result {
     write!(f, "{place}: ")?;
     error.fmt(f)
 }
 
-fn of_output(entry: &str, error: &StatisticError, f: &mut Formatter<'_>) -> std::fmt::Result {
-    // An error about the entry itself begins with it; one about what its name stands for does not.
+fn write_output_error(entry: &str, error: &StatisticError, f: &mut Formatter<'_>) -> std::fmt::Result {
+    // An error about the entry itself begins with the entry; an error about the statistics behind a name does not.
     if error.text() != Some(entry) {
         write!(f, "{entry}: ")?;
     }
     write!(f, "{error}; outputs by name: {}", NAMED.map(|named| named.name).join(", "))
 }
 
-fn of_argument(argument: &Argument, value: &usize, error: &StudyError, f: &mut Formatter<'_>) -> std::fmt::Result {
+fn write_argument_error(
+    argument: &Argument,
+    value: &usize,
+    error: &StudyError,
+    f: &mut Formatter<'_>,
+) -> std::fmt::Result {
     argument.write(value, f)?;
     f.write_str(": ")?;
     error.fmt(f)
 }
 
-fn of_fits(error: &FitSearchError, f: &mut Formatter<'_>) -> std::fmt::Result {
+fn write_fit_search_error(error: &FitSearchError, f: &mut Formatter<'_>) -> std::fmt::Result {
     Argument::Cost.fmt(f)?;
     write!(f, ": {error}")
 }
 
 impl StudyError {
-    /// The same, with the place at fault.
+    /// Adds the place of the error.
     pub(crate) fn at(self, place: &str) -> Self {
         Self::At { place: place.to_owned(), error: Box::new(self) }
     }
 
-    /// Of the number `value` that `argument` gives.
+    /// An error about the number `value` given for `argument`.
     fn argument(argument: Argument, value: usize, error: impl Into<Self>) -> Self {
         Self::Argument { argument, value, error: Box::new(error.into()) }
     }
@@ -234,11 +240,12 @@ pub struct RunSpan {
 }
 
 impl RunSpan {
-    /// Three periods of the drives of `scene`, the first a transient; or a second from the start, without a common period.
+    /// Three drive periods of `scene`, of which the first is the transient; one second from the start if there is no common
+    /// period.
     pub fn of(scene: &Scene) -> Self {
         match common_period(&scene.machine) {
             Ok(Some(period)) => Self { duration: (1.0 + PERIODS) * period, from: period },
-            _ => Self { duration: UNDRIVEN, from: 0.0 },
+            _ => Self { duration: UNDRIVEN_DURATION, from: 0.0 },
         }
     }
 }
@@ -248,12 +255,13 @@ impl RunSpan {
 pub struct StudyRuns {
     sweep: Sweep,
     outputs: Vec<Output>,
-    /// Columns of a record from which each output follows.
+    /// Columns of a record that determine each output.
     columns: Vec<Vec<usize>>,
 }
 
 impl StudyRuns {
-    /// A run for each of `rows`, which give each of `keys` a value, SI. All start cold from the scene's own start.
+    /// One run for each of `rows`, which hold a value for each of `keys`, SI. All runs start cold from the scene's initial
+    /// state.
     ///
     /// # Errors
     /// A value that its parameter does not accept.
@@ -268,7 +276,7 @@ impl StudyRuns {
             let parameter = scene.parameter(key)?;
             for row in rows {
                 let value = Value::Number(row[i]);
-                parameter.check(&value).map_err(|error| StudyError::Drawn {
+                parameter.check(&value).map_err(|error| StudyError::DrawnValue {
                     key: key.clone(),
                     value: parameter.show(&value),
                     error,
@@ -289,19 +297,19 @@ impl StudyRuns {
         &self.sweep
     }
 
-    /// The outputs of a run from its record, SI; NaN if it did not start or diverged.
+    /// The outputs of a run from its record, SI; NaN if the run did not start or diverged.
     pub fn outputs_of(&self, record: &[f64]) -> Vec<f64> {
         let outputs = self.outputs.iter().zip(&self.columns);
-        outputs.map(|(output, columns)| output.value(columns.iter().map(|&at| record[at]))).collect()
+        outputs.map(|(output, columns)| output.value(columns.iter().map(|&column| record[column]))).collect()
     }
 }
 
-/// The recorded quantities that `outputs` follow from.
+/// The protocol that records the quantities behind `outputs`.
 fn protocol(outputs: &[Output], span: Span) -> Protocol {
     let mut keep = Vec::new();
-    for one in outputs.iter().flat_map(Output::statistics) {
-        if !keep.contains(one) {
-            keep.push(one.clone());
+    for statistic in outputs.iter().flat_map(Output::statistics) {
+        if !keep.contains(statistic) {
+            keep.push(statistic.clone());
         }
     }
     let joints = outputs.iter().any(|output| output.statistics().is_empty());

@@ -8,30 +8,31 @@ use jointplay_physics::suggest::nearest;
 use jointplay_physics::units::{QuantityError, parse_quantity, si_unit};
 use jointplay_scene::{Kind, Parameter, Scene, SceneError, Value, ValueError, ValueFault, contact_parts};
 
-/// Range of an input without one of its own, over its value in the scene.
+/// Default range of an input, as multiples of its value in the scene.
 const DEFAULT_RANGE: [f64; 2] = [0.5, 1.5];
 /// Largest number of inputs.
 const MAX_INPUTS: usize = 64;
-/// Process capability of hole and shaft of a fit.
+/// Assumed process capability of the hole and the shaft of a fit.
 const CAPABILITY: f64 = 1.0;
 
-/// Parameters with a distribution, as requested.
+/// A request to vary one or several parameters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Uncertainty {
     /// Option, or file with line, for messages.
     pub place: String,
-    /// A key, or a pattern that stands for all numeric parameters that it matches.
+    /// A key, or a pattern for all numeric parameters that it matches.
     pub pattern: String,
-    /// The distribution, as written; `None`: uniform, from half to one and a half of the value, within what is allowed.
+    /// The distribution as given; `None` for a uniform one from half to one and a half times the value, within the allowed
+    /// range.
     pub distribution: Option<String>,
 }
 
 /// A parameter with its distribution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Input {
-    /// Key.
+    /// Key of the parameter.
     pub key: String,
-    /// Unit in which it is shown.
+    /// Display unit.
     pub unit: &'static str,
     /// SI unit.
     pub si_unit: &'static str,
@@ -39,12 +40,13 @@ pub struct Input {
     pub nominal: f64,
     /// Distribution, SI.
     pub distribution: Distribution,
-    /// Whether it was given; else it is uniform, from half to one and a half of the value, within what is allowed.
+    /// Whether the distribution was given; otherwise it is uniform from half to one and a half times the value, within the
+    /// allowed range.
     pub is_given: bool,
 }
 
 impl Uncertainty {
-    /// Reads `PATTERN[=DISTRIBUTION]`; `option` is what the user wrote it for.
+    /// Parses `PATTERN[=DISTRIBUTION]`; `option` is the command-line option it was given for.
     pub fn parse(option: &str, text: &str) -> Self {
         let (pattern, distribution) = match text.split_once('=') {
             Some((pattern, distribution)) => (pattern, Some(distribution.trim().to_owned())),
@@ -54,10 +56,10 @@ impl Uncertainty {
     }
 }
 
-/// The parameters of all `requested`, in order. Of a parameter that is requested twice, the later distribution counts.
+/// The parameters of all `requested`, in order. If a parameter is requested twice, the later distribution applies.
 ///
 /// # Errors
-/// With its place: no such parameter, or a distribution that one does not accept. More than 64 parameters.
+/// With the place: no such parameter, or a distribution that a parameter does not accept. More than 64 parameters.
 pub fn inputs(scene: &Scene, requested: &[Uncertainty]) -> Result<Vec<Input>, StudyError> {
     let mut inputs: Vec<Input> = Vec::new();
     for Uncertainty { place, pattern, distribution } in requested {
@@ -65,7 +67,7 @@ pub fn inputs(scene: &Scene, requested: &[Uncertainty]) -> Result<Vec<Input>, St
             let input = Input::new(scene, &key, distribution.as_deref());
             let input = input.map_err(|error| error.at(&key).at(place))?;
             match inputs.iter_mut().find(|known| known.key == key) {
-                // A later one refines an earlier pattern.
+                // A later request refines an earlier pattern.
                 Some(known) => *known = input,
                 None => inputs.push(input),
             }
@@ -75,12 +77,12 @@ pub fn inputs(scene: &Scene, requested: &[Uncertainty]) -> Result<Vec<Input>, St
     Ok(inputs)
 }
 
-/// Requires no more inputs than a study varies.
+/// Requires at most [`MAX_INPUTS`] inputs.
 pub(super) fn check_count(found: usize) -> Result<(), StudyError> {
     if found > MAX_INPUTS { Err(StudyError::TooMany { found, most: MAX_INPUTS }) } else { Ok(()) }
 }
 
-/// Row and value, SI, of the real parameter `key`.
+/// Table row and SI value of the real-valued parameter `key`.
 pub(super) fn real_parameter(scene: &Scene, key: &str) -> Result<(&'static Parameter, f64), StudyError> {
     let parameter = scene.parameter(key)?;
     match scene.get(key)? {
@@ -89,25 +91,26 @@ pub(super) fn real_parameter(scene: &Scene, key: &str) -> Result<(&'static Param
     }
 }
 
-/// Requires an end, SI, that the parameter accepts.
+/// Requires that the parameter accepts `end`, SI.
 pub(super) fn check_end(parameter: &Parameter, end: f64) -> Result<(), StudyError> {
     let value = Value::Number(end);
     parameter.check(&value).map_err(|error| StudyError::End { value: parameter.show(&value), error })
 }
 
-/// Requires an end, SI, that `scene` accepts with its other values: such as a moment of inertia that a body can have.
+/// Requires that `scene` accepts `end`, SI, with its other values; for example, not every moment of inertia belongs to a body.
 fn try_end(scene: &Scene, key: &str, parameter: &Parameter, end: f64) -> Result<(), StudyError> {
     let value = Value::Number(end);
-    let refused = |error: SceneError| StudyError::NoEnd { value: parameter.show(&value), why: error.message };
-    scene.clone().set_value(key, &value).map(|_| ()).map_err(refused)
+    let rejected = |error: SceneError| StudyError::RejectedEnd { value: parameter.show(&value), why: error.message };
+    scene.clone().set_value(key, &value).map(|_| ()).map_err(rejected)
 }
 
-/// Keys of the numeric parameters that match `pattern`, or, where there are none, of the numbers of the file; at least one.
+/// Keys of the numeric parameters that match `pattern`, or of the matching numbers in the scene file if no parameter matches;
+/// at least one.
 ///
 /// # Errors
-/// There are none.
+/// No match.
 pub fn matching(scene: &Scene, pattern: &str) -> Result<Vec<String>, StudyError> {
-    let parameters = keys(scene);
+    let parameters = real_keys(scene);
     let numbers = || scene.source.numbers.keys().cloned();
     let matches = |key: &String| matches_pattern(pattern, key);
     let mut found: Vec<String> = parameters.iter().filter(|key| matches(key)).cloned().collect();
@@ -154,13 +157,13 @@ impl Input {
                 Some((low, high)) => Distribution::uniform(number(low.trim())?, number(high.trim())?),
                 None => Distribution::parse(
                     text,
-                    |text| unlimited(parameter, text).map_err(|error| error.to_string()),
-                    |fit| of_fit(scene, key, fit),
+                    |text| parse_unchecked(parameter, text).map_err(|error| error.to_string()),
+                    |fit| fit_distribution(scene, key, fit),
                 ),
             },
         }?;
         let (low, high) = distribution.support();
-        // Of a distribution without limits, its middle.
+        // A distribution without limits is checked at its median.
         for end in [low, high, distribution.quantile(0.5)].into_iter().filter(|end| end.is_finite()) {
             check_end(parameter, end)?;
             if text.is_some() {
@@ -181,19 +184,20 @@ impl Input {
         })
     }
 
-    /// The range, SI, that was assumed because none was given.
+    /// The default range, SI, if no distribution was given.
     pub fn assumed_range(&self) -> Option<(f64, f64)> {
         (!self.is_given).then(|| self.distribution.support())
     }
 
-    /// Its value at the fraction `u` of all values, 0 < u < 1.
+    /// Quantile of the input at probability `u`, 0 < u < 1.
     pub fn at(&self, u: f64) -> f64 {
         self.distribution.quantile(u)
     }
 }
 
-/// A number in the unit of `parameter`, SI, within its range or not: a standard deviation has another range than its mean.
-fn unlimited(parameter: &Parameter, text: &str) -> Result<f64, StudyError> {
+/// Parses a number in a unit of `parameter`, SI, without its range check: a standard deviation may lie outside the range of the
+/// parameter.
+fn parse_unchecked(parameter: &Parameter, text: &str) -> Result<f64, StudyError> {
     match (parameter.read(text), parameter.kind) {
         (Ok(Value::Number(value)), _) => Ok(value),
         (Err(ValueError { fault: ValueFault::OutOfRange, .. }), Kind::Number { dimension, .. }) => {
@@ -205,19 +209,19 @@ fn unlimited(parameter: &Parameter, text: &str) -> Result<f64, StudyError> {
     }
 }
 
-/// The clearance of a ball joint under a fit at the diameter of its ball.
-fn of_fit(scene: &Scene, key: &str, fit: &str) -> Result<Distribution, String> {
+/// Distribution of the radial clearance of a ball joint with a fit, at the diameter of its ball.
+fn fit_distribution(scene: &Scene, key: &str, fit: &str) -> Result<Distribution, String> {
     let joint = key.strip_prefix("joint.").and_then(|rest| rest.strip_suffix(".clearance"));
     let joints = scene.machine.ball_joints.iter();
-    let own = joints.clone().find(|ball| Some(ball.name.as_str()) == joint).map(|ball| ball.contact.ball_radius);
-    let radius = own.or((key == "contact.clearance").then_some(scene.machine.contact.ball_radius));
+    let own_radius = joints.clone().find(|ball| Some(ball.name.as_str()) == joint).map(|ball| ball.contact.ball_radius);
+    let radius = own_radius.or((key == "contact.clearance").then_some(scene.machine.contact.ball_radius));
     let radius = radius.ok_or_else(|| format!("{fit}: a fit gives a clearance, and {key} is none"))?;
     let fit: Fit = fit.parse().map_err(|error: FitError| error.to_string())?;
     fit.radial_clearance(2.0 * radius, CAPABILITY).map_err(|error| error.to_string())
 }
 
-/// Keys of the real numbers of a scene: its own, then those of each ball joint.
-fn keys(scene: &Scene) -> Vec<String> {
+/// Keys of the real-valued parameters of a scene: first its own, then those of each ball joint.
+fn real_keys(scene: &Scene) -> Vec<String> {
     let own = scene.parameters().into_iter();
     let own = own.filter(|parameter| matches!(parameter.kind, Kind::Number { .. })).map(|p| p.key.to_owned());
     let joints = scene.machine.ball_joints.iter();
@@ -231,7 +235,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_range_that_nobody_gave_is_one_that_the_parameter_allows() {
+    fn a_default_range_is_clamped_to_the_allowed_range() {
         let scene = Scene::load("four-bar", &[]).expect("built in");
         let ends = |key: &str| Input::new(&scene, key, None).expect("a range").assumed_range();
         assert_eq!(ends("contact.restitution"), Some((0.45, 1.0)));
@@ -242,16 +246,16 @@ mod tests {
     }
 
     #[test]
-    fn a_value_of_nothing_has_no_range_by_default() {
+    fn a_value_of_zero_has_no_default_range() {
         let changes = [("contact.clearance".to_owned(), "0mm".to_owned())];
         let scene = Scene::load("four-bar", &changes).expect("built in");
-        let said = Input::new(&scene, "contact.clearance", None).expect_err("no range").to_string();
-        assert_eq!(said, "is 0 mm in the scene, and half to one and a half of that is no range: give one, KEY=A..B");
+        let message = Input::new(&scene, "contact.clearance", None).expect_err("no range").to_string();
+        assert_eq!(message, "is 0 mm in the scene, and half to one and a half of that is no range: give one, KEY=A..B");
         assert!(Input::new(&scene, "contact.clearance", Some("0mm..0.1mm")).is_ok());
     }
 
     #[test]
-    fn a_deviation_may_be_smaller_than_every_value_of_its_parameter() {
+    fn a_standard_deviation_may_lie_below_the_allowed_range_of_its_parameter() {
         let scene = Scene::load("four-bar", &[]).expect("built in");
         // A ball has a radius of at least 0.1 mm.
         let of = |text: &str| Input::new(&scene, "contact.ball_radius", Some(text));
@@ -264,13 +268,13 @@ mod tests {
             ("triangular(10 um, 1 mm, 2 mm)", "0.01 mm: out of range; allowed 0.1 mm to 1000 mm"),
             ("normal(10 mm, 20 s)", "unit"),
         ] {
-            let said = of(text).expect_err(text).to_string();
-            assert!(said.contains(expected), "{text}: {said}");
+            let message = of(text).expect_err(text).to_string();
+            assert!(message.contains(expected), "{text}: {message}");
         }
     }
 
     #[test]
-    fn an_end_that_a_number_of_the_file_does_not_allow_is_refused() {
+    fn ends_that_the_scene_rejects_are_refused() {
         let scene = Scene::load("four-bar", &[]).expect("built in");
         let mass = "out of range; allowed above 0 up to 1e9 kg; units kg, g, mg, t";
         for (key, text, expected) in [
@@ -282,14 +286,14 @@ mod tests {
             ("body.coupler.inertia.x", "-1 kg m^2..1 kg m^2", "-1 kg m^2: no body has this inertia".to_owned()),
             ("contact.clearance", "0 mm..10 mm", "10 mm: clearance 10 mm must be below the ball radius".to_owned()),
         ] {
-            let said = Input::new(&scene, key, Some(text)).expect_err(text).to_string();
-            assert!(said.starts_with(&expected), "{key}={text}: {said}");
+            let message = Input::new(&scene, key, Some(text)).expect_err(text).to_string();
+            assert!(message.starts_with(&expected), "{key}={text}: {message}");
         }
         assert!(Input::new(&scene, "body.coupler.mass", Some("1 g..2 kg")).is_ok());
     }
 
     #[test]
-    fn a_pattern_finds_parameters_then_numbers_of_the_file() {
+    fn a_pattern_matches_parameters_first_then_numbers_of_the_file() {
         let scene = Scene::load("four-bar", &[]).expect("built in");
         let found = |pattern: &str| matching(&scene, pattern).map_err(|error| error.to_string());
         assert_eq!(found("joint.A.clearance"), Ok(vec!["joint.A.clearance".to_owned()]));

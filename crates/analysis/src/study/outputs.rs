@@ -1,89 +1,89 @@
-//! The numbers that a run is reduced to.
+//! The scalar results of a run.
 
 use super::StudyError;
 use crate::statistic::ChannelStatistic;
 use jointplay_physics::units::{Dimension, parse_quantity};
 use jointplay_scene::Scene;
 
-/// How an output follows from several columns.
+/// How several columns are reduced to an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Of {
+enum Reduction {
     Largest,
     Sum,
 }
 
-/// An output with a name of its own.
+/// A predefined output with a name.
 #[derive(Clone, Copy, Debug)]
 pub struct NamedOutput {
     /// Name on the command line and in files.
     pub name: &'static str,
     /// Name in the interface, in sentence case.
     pub label: &'static str,
-    /// What it is, in a sentence.
+    /// Description in a sentence.
     pub help: &'static str,
-    /// Statistics of channels; "" for impacts, which are columns of the joints.
-    list: &'static str,
-    of: Of,
+    /// Statistics of channels, as a list; "" for impacts, which are counted in the columns of the joints.
+    statistics: &'static str,
+    reduction: Reduction,
     unit: &'static str,
 }
 
-/// A number that a run is reduced to.
+/// A scalar result of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
-    /// As asked for: `tip-error`, `S1.normal:max`.
+    /// Requested name, such as `tip-error` or `S1.normal:max`.
     pub name: String,
-    /// SI unit; "" for a number.
+    /// SI unit; "" for a dimensionless number.
     pub unit: &'static str,
-    of: Of,
+    reduction: Reduction,
     /// Statistics of channels; none for impacts, which are counted per joint.
-    keep: Vec<ChannelStatistic>,
+    statistics: Vec<ChannelStatistic>,
 }
 
-/// Outputs with a name of their own.
+/// Predefined outputs.
 pub const NAMED: [NamedOutput; 5] = [
     NamedOutput {
         name: "tip-error",
         label: "Largest tip error",
         help: "Largest distance of the probe tip from the tip of the machine without play",
-        list: "tip_error:max",
-        of: Of::Largest,
+        statistics: "tip_error:max",
+        reduction: Reduction::Largest,
         unit: "m",
     },
     NamedOutput {
         name: "tip-error-rms",
         label: "Tip error, RMS",
         help: "Root-mean-square distance of the probe tip from the tip of the machine without play",
-        list: "tip_error:rms",
-        of: Of::Largest,
+        statistics: "tip_error:rms",
+        reduction: Reduction::Largest,
         unit: "m",
     },
     NamedOutput {
         name: "peak-force",
         label: "Peak normal force",
         help: "Largest normal force of any ball joint, in continuous time",
-        list: "*.normal:max",
-        of: Of::Largest,
+        statistics: "*.normal:max",
+        reduction: Reduction::Largest,
         unit: "N",
     },
     NamedOutput {
         name: "energy-lost",
         label: "Energy lost",
         help: "Energy lost to restitution, friction and damping since the start",
-        list: "energy.*_loss:end",
-        of: Of::Sum,
+        statistics: "energy.*_loss:end",
+        reduction: Reduction::Sum,
         unit: "J",
     },
     NamedOutput {
         name: "impacts",
         label: "Impacts",
         help: "Contacts begun in all ball joints",
-        list: "",
-        of: Of::Sum,
+        statistics: "",
+        reduction: Reduction::Sum,
         unit: "",
     },
 ];
-/// End of the names of the columns that are impacts of the kept time.
-const IMPACTS_COLUMN: &str = "_impacts_kept";
+/// Suffix of the names of columns that count impacts after the transient.
+const IMPACTS_SUFFIX: &str = "_impacts_kept";
 
 /// Parses names of [`NAMED`] and CHANNEL:STATISTIC, separated by commas.
 ///
@@ -93,34 +93,36 @@ pub fn outputs(scene: &Scene, text: &str) -> Result<Vec<Output>, StudyError> {
     let mut found: Vec<Output> = Vec::new();
     for entry in text.split(',').map(str::trim) {
         let named = NAMED.iter().find(|named| named.name == entry);
-        let keep = |list: &str| {
+        let parse = |list: &str| {
             ChannelStatistic::parse_list(scene, list)
                 .map_err(|error| StudyError::Output { entry: entry.to_owned(), error })
         };
         match named {
-            Some(NamedOutput { name, list, of, unit, .. }) => {
-                let keep = if list.is_empty() { Vec::new() } else { keep(list)? };
-                found.push(Output { name: (*name).to_owned(), unit, of: *of, keep });
+            Some(NamedOutput { name, statistics, reduction, unit, .. }) => {
+                let statistics = if statistics.is_empty() { Vec::new() } else { parse(statistics)? };
+                found.push(Output { name: (*name).to_owned(), unit, reduction: *reduction, statistics });
             }
             None => {
-                for one in keep(entry)? {
-                    let (name, unit) = (one.to_string(), one.unit());
-                    found.push(Output { name, unit, of: Of::Largest, keep: vec![one] });
+                for statistic in parse(entry)? {
+                    let (name, unit) = (statistic.to_string(), statistic.unit());
+                    found.push(Output { name, unit, reduction: Reduction::Largest, statistics: vec![statistic] });
                 }
             }
         }
     }
-    if let Some((i, twice)) = found.iter().enumerate().find(|(i, one)| found[..*i].iter().any(|o| o.name == one.name)) {
-        return Err(StudyError::Twice { name: twice.name.clone(), position: i + 1 });
+    if let Some((i, repeated)) =
+        found.iter().enumerate().find(|(i, one)| found[..*i].iter().any(|o| o.name == one.name))
+    {
+        return Err(StudyError::DuplicateOutput { name: repeated.name.clone(), position: i + 1 });
     }
     Ok(found)
 }
 
 impl Output {
-    /// Reads a value of this output, SI.
+    /// Parses a value of this output, SI.
     ///
     /// # Errors
-    /// A sentence: no finite number, or not in a unit of the output.
+    /// A message: not a finite number, or not in a unit of the output.
     pub fn read(&self, text: &str) -> Result<f64, String> {
         let dimension = match self.unit {
             "m" => Some(Dimension::Length),
@@ -139,29 +141,29 @@ impl Output {
         })
     }
 
-    /// Statistics of channels that it follows from; none for impacts.
+    /// Statistics of channels that determine the output; none for impacts.
     pub(super) fn statistics(&self) -> &[ChannelStatistic] {
-        &self.keep
+        &self.statistics
     }
 
-    /// Which of the columns `names` of a record it follows from.
+    /// Indices of those columns of a record, among `names`, that determine the output.
     pub(super) fn columns(&self, names: &[&str]) -> Vec<usize> {
-        let is_own = |name: &str| {
-            if self.keep.is_empty() {
-                name.ends_with(IMPACTS_COLUMN)
+        let is_used = |name: &str| {
+            if self.statistics.is_empty() {
+                name.ends_with(IMPACTS_SUFFIX)
             } else {
-                self.keep.iter().any(|one| one.column() == name)
+                self.statistics.iter().any(|statistic| statistic.column() == name)
             }
         };
-        (0..names.len()).filter(|&at| is_own(names[at])).collect()
+        (0..names.len()).filter(|&column| is_used(names[column])).collect()
     }
 
-    /// Its value from those of its columns; unknown if one of them is.
+    /// Value of the output from the values of its columns; NaN if one of them is.
     pub(super) fn value(&self, values: impl Iterator<Item = f64>) -> f64 {
         let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-        match self.of {
-            Of::Largest => values.reduce(larger).unwrap_or(f64::NAN),
-            Of::Sum => values.sum(),
+        match self.reduction {
+            Reduction::Largest => values.reduce(larger).unwrap_or(f64::NAN),
+            Reduction::Sum => values.sum(),
         }
     }
 }

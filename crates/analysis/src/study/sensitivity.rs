@@ -1,4 +1,4 @@
-//! Which parameters move an output most: each alone, screened, and all together.
+//! Which parameters influence an output most: one at a time, by screening, and by variance-based indices.
 
 use super::target::{self, TargetAnswer};
 use super::{AloneOutputs, ENDS, StudyError, StudyRunner};
@@ -7,12 +7,13 @@ use crate::indices::{Bootstrap, IndicesError, MIN_ROWS, SaltelliDesign, Sensitiv
 use crate::morris::{ElementaryEffects, MorrisPlan};
 use crate::sampling::Sampling;
 
-/// Largest number of parameters without a screening, and of those that it leaves over.
+/// Largest number of parameters for indices; more are screened first.
 const UNSCREENED: usize = 8;
-/// Trajectories of a screening that was not asked for, and levels of each parameter.
+/// Default number of trajectories of a screening.
 const TRAJECTORIES: usize = 10;
+/// Levels of each parameter in a screening.
 const LEVELS: usize = 4;
-/// Least mean magnitude of an effect, over the largest, that leaves a parameter to the indices.
+/// Mean magnitude of an effect, relative to the largest, below which a parameter is screened out.
 const NEGLIGIBLE: f64 = 0.05;
 
 /// What a sensitivity study computes.
@@ -20,7 +21,7 @@ const NEGLIGIBLE: f64 = 0.05;
 pub struct SensitivityOptions {
     /// Rows of the design for the indices; 0 for no indices.
     pub rows: usize,
-    /// Trajectories of the screening; `None`: 10 if more than 8 parameters vary, else no screening.
+    /// Trajectories of the screening; `None` for 10 if more than 8 parameters vary, and no screening otherwise.
     pub screen: Option<usize>,
     /// Largest allowed value of the first output, SI.
     pub target: Option<f64>,
@@ -41,27 +42,27 @@ impl SensitivityOptions {
     }
 }
 
-/// Elementary effects of each parameter on the first output, and the parameters left to the indices.
+/// Elementary effects of each parameter on the first output, and the parameters that remain for the indices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Screening {
-    /// For each parameter; `None` without results.
+    /// Effects of each parameter; `None` without results.
     pub effects: Vec<Option<ElementaryEffects>>,
-    /// Parameters of the indices, ascending.
+    /// Indices of the parameters that remain, ascending.
     pub kept: Vec<usize>,
 }
 
-/// Everything found. All values are SI, and NaN where a run did not start or diverged.
+/// Results of a sensitivity study. All values are SI, and NaN where a run did not start or diverged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensitivity {
-    /// Each parameter alone.
+    /// Effects of each parameter alone.
     pub alone: AloneOutputs,
-    /// `None` if none was made.
+    /// Screening, if there was one.
     pub screening: Option<Screening>,
-    /// Parameters of the indices, ascending.
+    /// Indices of the parameters that remain, ascending.
     pub kept: Vec<usize>,
-    /// For each output; `None` if none were asked for.
+    /// Sensitivity indices of each output; `None` if none were requested.
     pub indices: Vec<Option<Result<SensitivityIndices, IndicesError>>>,
-    /// `None` without a target.
+    /// Changes that reach the target; `None` without a target.
     pub target: Option<TargetAnswer>,
 }
 
@@ -71,20 +72,20 @@ impl Sensitivity {
         self.indices[o].as_ref().and_then(|indices| indices.as_ref().ok())
     }
 
-    /// Place of parameter `i` among those of the indices.
+    /// Position of parameter `i` in [`Self::kept`].
     pub fn place_of(&self, i: usize) -> Option<usize> {
         self.kept.iter().position(|&kept| kept == i)
     }
 }
 
-/// Makes the runs of a sensitivity study in the stages `alone`, `screening`, `indices`, `target` and `target-together`, of which
-/// those not needed are left out.
+/// Runs a sensitivity study in the stages `alone`, `screening`, `indices`, `target` and `target-together`, skipping those that
+/// are not needed.
 ///
 /// # Errors
 /// Too few rows, before anything runs; a design that is too large; an error of `runner`.
 pub fn sensitivity<R: StudyRunner>(runner: &mut R, options: &SensitivityOptions) -> Result<Sensitivity, R::Error> {
     options.check()?;
-    let alone = AloneOutputs::find(runner)?;
+    let alone = AloneOutputs::compute(runner)?;
     let screening = screening(runner, options)?;
     let kept = screening.as_ref().map_or_else(|| (0..runner.inputs().len()).collect(), |s| s.kept.clone());
     let indices = indices(runner, &kept, options)?;
@@ -96,32 +97,33 @@ pub fn sensitivity<R: StudyRunner>(runner: &mut R, options: &SensitivityOptions)
     Ok(found)
 }
 
-/// Elementary effects, if asked for or if there are many parameters.
+/// Elementary effects, if requested or if there are many parameters.
 fn screening<R: StudyRunner>(runner: &mut R, options: &SensitivityOptions) -> Result<Option<Screening>, R::Error> {
     let inputs = runner.inputs().len();
     let trajectories = options.screen.unwrap_or(if inputs > UNSCREENED { TRAJECTORIES } else { 0 });
     if trajectories == 0 {
         return Ok(None);
     }
-    let limited = |(low, high): (f64, f64)| low.is_finite() && high.is_finite();
-    let margin = if runner.inputs().iter().all(|input| limited(input.distribution.support())) { 0.0 } else { ENDS[0] };
+    let is_bounded = |(low, high): (f64, f64)| low.is_finite() && high.is_finite();
+    let margin =
+        if runner.inputs().iter().all(|input| is_bounded(input.distribution.support())) { 0.0 } else { ENDS[0] };
     let plan = MorrisPlan::new(inputs, trajectories, LEVELS, margin, options.seed)
         .map_err(|error| StudyError::argument(Argument::Screen, trajectories, error))?;
     let rows = (0..plan.points()).map(|index| row(runner, plan.point(index), &[])).collect();
     let results = runner.run("screening", rows)?;
     let first: Vec<f64> = results.iter().map(|outputs| outputs[0]).collect();
     let effects = plan.effects(&first).map_err(StudyError::from)?;
-    let size = |i: usize| effects[i].map_or(0.0, |effects| effects.mean_magnitude);
+    let influence = |i: usize| effects[i].map_or(0.0, |effects| effects.mean_magnitude);
     let mut kept: Vec<usize> = (0..inputs).collect();
-    kept.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
-    let largest = size(kept[0]);
-    kept.retain(|&i| size(i) >= NEGLIGIBLE * largest);
+    kept.sort_by(|&a, &b| influence(b).total_cmp(&influence(a)));
+    let largest = influence(kept[0]);
+    kept.retain(|&i| influence(i) >= NEGLIGIBLE * largest);
     kept.truncate(UNSCREENED);
     kept.sort_unstable();
     Ok(Some(Screening { effects, kept }))
 }
 
-/// First-order and total indices of the parameters `kept` on each output; the others stay at their values in the scene.
+/// First-order and total indices of the parameters `kept` for each output; all others stay at their values in the scene.
 fn indices<R: StudyRunner>(
     runner: &mut R,
     kept: &[usize],
@@ -142,7 +144,8 @@ fn indices<R: StudyRunner>(
     Ok((0..runner.outputs().len()).map(of_output).collect())
 }
 
-/// Values of all parameters at a point of the unit cube, whose coordinates belong to the parameters `kept`, or to all if it is empty.
+/// Values of all parameters at a point of the unit cube, whose coordinates belong to the parameters `kept`, or to all
+/// parameters if `kept` is empty.
 fn row(runner: &impl StudyRunner, point: Option<Vec<f64>>, kept: &[usize]) -> Vec<f64> {
     let mut row: Vec<f64> = runner.inputs().iter().map(|input| input.nominal).collect();
     for (j, u) in point.unwrap_or_default().into_iter().enumerate() {

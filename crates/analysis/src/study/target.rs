@@ -1,9 +1,9 @@
-//! How far parameters must go from their values in the scene for an output to stay below a target.
+//! Changes of parameters that bring an output down to a target.
 
 use super::{AloneOutputs, StudyRunner};
 use crate::indices::SensitivityIndices;
 
-/// Values tried between that of the scene and the better end.
+/// Number of steps from the value in the scene to the better end.
 const STEPS: usize = 8;
 
 /// A changed parameter.
@@ -15,20 +15,20 @@ pub struct Change {
     pub value: f64,
 }
 
-/// Changes after which the first output is no larger than a target. Each was run. Outputs are SI.
+/// Changes after which the first output is at most the target, each confirmed by a run. Outputs are SI.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetAnswer {
     /// The target.
     pub target: f64,
-    /// Single changes that suffice, each the smallest tried, with the output there.
+    /// Single changes that suffice, each the smallest that was tried, with the resulting output.
     pub single: Vec<(Change, f64)>,
-    /// Where none does: all of these changes together, in order of effect, and the output with them.
+    /// If no single change suffices: changes that suffice together, in order of effect, with the resulting output.
     pub together: Option<(Vec<Change>, f64)>,
 }
 
-/// Tries each parameter alone in equal steps towards its better end; if none suffices, all of them, one after the other to its
-/// better end, in order of their total indices in `indices`, whose parameters are `kept`, or without them in order of their effects
-/// alone, and the last one only as far as needed.
+/// Moves each parameter alone in equal steps towards its better end. If no single change suffices, it moves the parameters to
+/// their better ends one after another, and the last one only as far as needed. Their order is that of their total indices in
+/// `indices`, whose parameters are `kept`, or without indices that of their effects alone.
 ///
 /// # Errors
 /// As [`StudyRunner::run`].
@@ -70,7 +70,7 @@ pub(super) fn answer<R: StudyRunner>(
     }
     let effect = |i: usize| alone.nominal[0] - better(i).1;
     let total = |i: usize| match indices {
-        Some(indices) => kept.iter().position(|&k| k == i).map_or(0.0, |at| indices.total[at].value),
+        Some(indices) => kept.iter().position(|&k| k == i).map_or(0.0, |position| indices.total[position].value),
         None => effect(i),
     };
     let mut order: Vec<usize> = (0..inputs).filter(|&i| effect(i) > 0.0).collect();

@@ -1,4 +1,5 @@
-//! What part of a lot holds its limits, what drives the rejects, and the cheapest fits that hold a yield.
+//! Tolerance studies: the fraction of a lot within its limits, the inputs that cause rejects, and the cheapest fits that hold a
+//! yield.
 
 use super::{Candidates, StudyError, StudyRunner};
 use crate::argument::Argument;
@@ -13,49 +14,49 @@ use crate::yields::{Estimate, RejectDriver, reject_drivers};
 pub struct ToleranceOptions {
     /// Units of the lot, one run each.
     pub units: usize,
-    /// How their values are drawn.
+    /// How the values of the units are drawn.
     pub sampling: Sampling,
     /// Seed of the samples.
     pub seed: u64,
-    /// Search of the cheapest fits.
+    /// Search for the cheapest fits, if requested.
     pub fits: Option<FitOptions>,
 }
 
-/// A search of the cheapest fits.
+/// Options of a search for the cheapest fits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitOptions {
-    /// Of each parameter that has any.
+    /// Candidates of each parameter that has any.
     pub candidates: Vec<Candidates>,
-    /// Part of the lot that must be accepted, above 0 and up to 1.
+    /// Fraction of the lot that must be accepted, above 0 and up to 1.
     pub required_yield: f64,
-    /// Most choices that are tried, one lot each.
+    /// Largest number of choices to evaluate, one lot each.
     pub evaluations: usize,
 }
 
-/// The cheapest fits.
+/// Result of a search for the cheapest fits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheapestFits {
-    /// What was asked for.
+    /// The requested options.
     pub options: FitOptions,
-    /// What was found; the joints are those of the candidates.
+    /// Result of the search; its joints are the parameters of the candidates.
     pub search: FitSearch,
-    /// Yield of the best choice in a lot of other units, and what it says about the required one.
+    /// Yield of the best choice in an independent lot, and the verdict on the required yield.
     pub check: Option<(Estimate, FitVerdict)>,
 }
 
-/// What another lot says about a required yield.
+/// Verdict of an independent lot on a required yield.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FitVerdict {
-    /// It holds with 95 % confidence.
+    /// The yield holds with 95 % confidence.
     Held,
-    /// It does not hold.
+    /// The yield does not hold, with 95 % confidence.
     Missed,
     /// Too few runs to tell.
     Open,
 }
 
 impl FitVerdict {
-    /// What the yield `check` says about the required one.
+    /// Compares the measured yield `check` with the required one.
     fn of(check: &Estimate, required: f64) -> Self {
         if check.low >= required {
             Self::Held
@@ -76,24 +77,24 @@ impl FitVerdict {
     }
 }
 
-/// Everything found.
+/// Results of a tolerance study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tolerance {
     /// The units.
     pub lot: Lot,
-    /// For each limited output.
+    /// Statistics of each limited output.
     pub qualities: Vec<Quality>,
-    /// For each parameter; `None` if all units or none are accepted.
+    /// How rejects differ in each parameter; `None` if all units or none are accepted.
     pub drivers: Option<Vec<RejectDriver>>,
-    /// `None` if they were not asked for.
+    /// The cheapest fits, if requested.
     pub cheapest: Option<CheapestFits>,
 }
 
-/// Makes the runs of a tolerance study in the stages `lot`, `fits-1`, `fits-2`, …, and `fits-check`. `limits` has one for each
+/// Runs a tolerance study in the stages `lot`, `fits-1`, `fits-2`, …, and `fits-check`. `limits` holds one entry for each
 /// output.
 ///
 /// # Errors
-/// A lot or search that is not possible, before anything runs; an error of `runner`.
+/// An invalid lot or search, before anything runs; an error of `runner`.
 pub fn tolerance<R: StudyRunner>(
     runner: &mut R,
     limits: &[Limit],
@@ -102,22 +103,22 @@ pub fn tolerance<R: StudyRunner>(
     let ToleranceOptions { units, sampling, seed, fits } = options;
     let sample = sample(runner, units, sampling, seed)?;
     let problem = fits.as_ref().map(problem).transpose()?;
-    let own: Vec<Distribution> = runner.inputs().iter().map(|input| input.distribution.clone()).collect();
-    let lot = lot(runner, limits, "lot", &sample, &own)?;
+    let given: Vec<Distribution> = runner.inputs().iter().map(|input| input.distribution.clone()).collect();
+    let lot = lot(runner, limits, "lot", &sample, &given)?;
     let qualities = limits.iter().enumerate().map(|(o, limit)| lot.quality(o, limit)).collect::<Result<_, _>>();
     let qualities = qualities.map_err(StudyError::from)?;
     let of_input =
         |(i, distribution): (usize, &Distribution)| sample.iter().map(|u| distribution.quantile(u[i])).collect();
-    let values: Vec<Vec<f64>> = own.iter().enumerate().map(of_input).collect();
+    let values: Vec<Vec<f64>> = given.iter().enumerate().map(of_input).collect();
     let drivers = reject_drivers(&values, &lot.accepted).map_err(StudyError::from)?;
-    let mut found = Tolerance { lot, qualities, drivers, cheapest: None };
+    let mut result = Tolerance { lot, qualities, drivers, cheapest: None };
     let Some((fits, problem)) = fits.zip(problem) else {
-        return Ok(found);
+        return Ok(result);
     };
     let with = |chosen: &[usize]| {
-        let mut distributions = own.clone();
-        for (of, &chosen) in fits.candidates.iter().zip(chosen) {
-            distributions[of.input] = of.list[chosen].distribution.clone();
+        let mut distributions = given.clone();
+        for (candidates, &chosen) in fits.candidates.iter().zip(chosen) {
+            distributions[candidates.input] = candidates.list[chosen].distribution.clone();
         }
         distributions
     };
@@ -128,32 +129,36 @@ pub fn tolerance<R: StudyRunner>(
     })?;
     let check = match &search.best {
         Some(best) => {
-            // Independent of the units of the search, which were in favour of the choice that they led to.
-            let others = self::sample(runner, units, Sampling::Random, seed.wrapping_add(1))?;
-            let yielded = self::lot(runner, limits, "fits-check", &others, &with(&best.candidates))?.yielded;
+            // The units of the search are biased in favour of the choice that they selected; the check uses independent units.
+            let independent = self::sample(runner, units, Sampling::Random, seed.wrapping_add(1))?;
+            let yielded = self::lot(runner, limits, "fits-check", &independent, &with(&best.candidates))?.yielded;
             Some((yielded, FitVerdict::of(&yielded, fits.required_yield)))
         }
         None => None,
     };
-    found.cheapest = Some(CheapestFits { options: fits, search, check });
-    Ok(found)
+    result.cheapest = Some(CheapestFits { options: fits, search, check });
+    Ok(result)
 }
 
-/// The search of the cheapest fits, in which all choices are judged by the same units.
+/// The search problem for the cheapest fits. All choices are evaluated with the same units.
 fn problem(fits: &FitOptions) -> Result<FitProblem, StudyError> {
-    let costs: Vec<Vec<f64>> = fits.candidates.iter().map(|of| of.list.iter().map(|one| one.cost).collect()).collect();
+    let costs: Vec<Vec<f64>> = fits
+        .candidates
+        .iter()
+        .map(|candidates| candidates.list.iter().map(|candidate| candidate.cost).collect())
+        .collect();
     let required = RequiredYield { fraction: fits.required_yield, with_confidence: false };
     FitProblem::new(&costs, required, fits.evaluations).map_err(StudyError::Fits)
 }
 
-/// Points of the unit cube, a coordinate for each parameter.
+/// Points of the unit cube, with a coordinate for each parameter.
 fn sample(runner: &impl StudyRunner, units: usize, sampling: Sampling, seed: u64) -> Result<Vec<Vec<f64>>, StudyError> {
     let sampler = Sampler::new(sampling, runner.inputs().len(), units, seed)
         .map_err(|error| StudyError::argument(Argument::Units, units, error))?;
     Ok((0..sampler.points()).filter_map(|index| sampler.point(index)).collect())
 }
 
-/// Runs the units whose parameters have the fractions `sample` of their `distributions`.
+/// Runs the units whose parameters are the quantiles of their `distributions` at the points of `sample`.
 fn lot<R: StudyRunner>(
     runner: &mut R,
     limits: &[Limit],

@@ -1,4 +1,4 @@
-//! Runs that show the effect of each parameter alone.
+//! One-at-a-time runs: the effect of each parameter alone.
 
 use super::StudyError;
 use super::inputs::{Input, check_count, check_end, real_parameter};
@@ -6,10 +6,11 @@ use super::runner::StudyRunner;
 use crate::distribution::Distribution;
 use jointplay_scene::Scene;
 
-/// Fractions of all values taken for the ends of a distribution without limits.
+/// Probabilities whose quantiles serve as the ends of a distribution without limits.
 pub const ENDS: [f64; 2] = [0.025, 0.975];
 
-/// Every input at the lower and at the upper end of its distribution, the others at their values in the scene.
+/// Plan of the one-at-a-time runs: each input at the lower and at the upper end of its distribution, with all others at their
+/// values in the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alone {
     nominal: Vec<f64>,
@@ -17,7 +18,7 @@ pub struct Alone {
 }
 
 impl Alone {
-    /// The ends of `inputs`: the limits of each distribution, or its [`ENDS`] quantiles where it has none.
+    /// A plan for `inputs`. Its ends are the limits of each distribution, or the [`ENDS`] quantiles where there is no limit.
     pub fn new(inputs: &[Input]) -> Self {
         let ends = inputs.iter().map(|input| {
             let (low, high) = input.distribution.support();
@@ -27,12 +28,12 @@ impl Alone {
         Self { nominal: inputs.iter().map(|input| input.nominal).collect(), ends: ends.collect() }
     }
 
-    /// The parameters of `scene` with these keys, between these ends, SI. It reads no distributions, so that the page does not
-    /// contain their code.
+    /// A plan for parameters of `scene`, given by key with lower and upper end, SI. It does not parse distributions, so that
+    /// the web page need not contain the parser.
     ///
     /// # Errors
-    /// With its key: no such real parameter, an end that it does not accept, or a lower end that is not below the upper one.
-    /// More than 64 parameters.
+    /// With the key: no such real parameter, an end that the parameter does not accept, or a lower end that is not below the
+    /// upper one. More than 64 parameters.
     pub fn between(scene: &Scene, ranges: &[(String, [f64; 2])]) -> Result<Self, StudyError> {
         check_count(ranges.len())?;
         let nominal = ranges.iter().map(|(key, [low, high])| {
@@ -58,11 +59,12 @@ impl Alone {
         &self.ends
     }
 
-    /// Values of all inputs in each run, SI: the values in the scene, then for each input its lower and its upper end.
+    /// Values of all inputs in each run, SI. The first run has the values of the scene; two runs for each input follow, at its
+    /// lower and at its upper end.
     pub fn rows(&self) -> Vec<Vec<f64>> {
         let mut rows = vec![self.nominal.clone()];
-        for (i, own) in self.ends.iter().enumerate() {
-            for end in own {
+        for (i, ends) in self.ends.iter().enumerate() {
+            for end in ends {
                 let mut row = self.nominal.clone();
                 row[i] = *end;
                 rows.push(row);
@@ -72,14 +74,14 @@ impl Alone {
     }
 }
 
-/// Outputs of a study with one parameter at an end of its distribution and the others at their values in the scene, SI.
+/// Outputs of the one-at-a-time runs, SI.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AloneOutputs {
-    /// With the values of the scene.
+    /// Outputs with the values of the scene.
     pub nominal: Vec<f64>,
-    /// For each parameter the values at its ends, and the outputs there.
+    /// Lower and upper end of each parameter, with the outputs of these runs.
     pub ends: Vec<[(f64, Vec<f64>); 2]>,
-    /// With all parameters at their lower, or upper, ends.
+    /// Outputs with all parameters at their lower ends, and at their upper ends.
     pub together: [Vec<f64>; 2],
 }
 
@@ -88,14 +90,14 @@ impl AloneOutputs {
     ///
     /// # Errors
     /// As [`StudyRunner::run`].
-    pub(super) fn find<R: StudyRunner>(runner: &mut R) -> Result<Self, R::Error> {
+    pub(super) fn compute<R: StudyRunner>(runner: &mut R) -> Result<Self, R::Error> {
         let plan = Alone::new(runner.inputs());
         let mut rows = plan.rows();
-        rows.extend([0, 1].map(|end| plan.ends().iter().map(|own| own[end]).collect()));
+        rows.extend([0, 1].map(|end| plan.ends().iter().map(|ends| ends[end]).collect()));
         let mut results = runner.run("alone", rows)?.into_iter();
         let mut next = || results.next().unwrap_or_default();
         let nominal = next();
-        let ends = plan.ends().iter().map(|own| own.map(|end| (end, next()))).collect();
+        let ends = plan.ends().iter().map(|ends| ends.map(|end| (end, next()))).collect();
         Ok(Self { nominal, ends, together: [next(), next()] })
     }
 }
