@@ -1,4 +1,4 @@
-//! All computations for section 4 of the paper, as jobs that any number of threads can run in any order, and their results.
+//! Computations for section 4 of the paper, as jobs that any number of threads can run in any order, and their results.
 
 mod findings;
 mod record;
@@ -26,9 +26,9 @@ const CURVE_POINTS: usize = 800;
 /// Extent of the computation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Extent {
-    /// Periods run before a settled curve is taken.
+    /// Periods before a settled curve is recorded.
     pub settle: usize,
-    /// Periods of the paper's runs, and how many of them are discarded.
+    /// Periods of the paper's runs for sections, and how many of them are discarded.
     pub runs: (usize, usize),
     /// Number of clearance and of friction values in the bifurcation diagrams.
     pub values: [usize; 2],
@@ -53,16 +53,16 @@ impl Extent {
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("{name}: {error}")]
 pub struct RunError {
-    /// Its name in files.
+    /// Name of the run in files.
     pub name: String,
-    /// Reason.
+    /// The reason.
     pub error: Box<ResponseError>,
 }
 
-/// The work of a report.
+/// The jobs of a report.
 pub struct Agenda {
     extent: Extent,
-    /// Runs of section 4.2 by variant; the last one has ideal joints.
+    /// Runs of section 4.2 by variant; the last run has ideal joints.
     runs: Vec<PlannedRun>,
     sweeps: Vec<SweepData>,
     jobs: Vec<ReportJob>,
@@ -73,8 +73,8 @@ struct PlannedRun {
     name: String,
     case: Case,
     scene: Scene,
-    /// Whether its settled motion is recorded as well.
-    settles: bool,
+    /// Whether to record the settled motion, too.
+    records_settled: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,24 +94,24 @@ pub enum Outcome {
 const SCENE: &str = "spcmm";
 const LOADS: &str = "a test plans all runs and sweeps";
 
-fn planned(variant: &'static Variant, name: &str, case: Case, more: &[(&str, &str)]) -> PlannedRun {
+fn plan_run(variant: &'static Variant, name: &str, case: Case, more: &[(&str, &str)]) -> PlannedRun {
     let more = more.iter().map(|&(k, v)| (k.to_owned(), v.to_owned()));
     let changes = case.changes().into_iter().chain(variant.changes.iter().cloned()).chain(more);
     let scene = Scene::load(SCENE, &changes.collect::<Vec<_>>()).expect(LOADS);
-    PlannedRun { variant, name: format!("{}{name}", variant.prefix), case, scene, settles: false }
+    PlannedRun { variant, name: format!("{}{name}", variant.prefix), case, scene, records_settled: false }
 }
 
-fn of_case(variant: &'static Variant, case: Case, settles: bool) -> PlannedRun {
+fn plan_case(variant: &'static Variant, case: Case, records_settled: bool) -> PlannedRun {
     let name = format!("response_c{}mm_cf{}", case.clearance, case.friction);
-    PlannedRun { settles, ..planned(variant, &name, case, &[]) }
+    PlannedRun { records_settled, ..plan_run(variant, &name, case, &[]) }
 }
 
-/// Name, axes, start, periods and discarded periods of a sweep, and whether it has exponents.
+/// Name, axes, start, periods and discarded periods of a sweep, and whether it measures exponents.
 type SweepRow<'a> = (&'static str, &'a [String], Start, (usize, usize), bool);
 
 fn sweep_data(variant: &'static Variant, row: &SweepRow) -> SweepData {
     let &(name, vary, start, (periods, discard), exponent) = row;
-    let scene = planned(variant, name, PAPER.runs[0], &[]).scene;
+    let scene = plan_run(variant, name, PAPER.runs[0], &[]).scene;
     let axes = vary.iter().map(|text| Axis::parse(&scene, text).expect(LOADS));
     let design = Design::crossed(&scene, axes.collect(), &[start]).expect(LOADS);
     let plan = Plan { periods, discard, phase: 0.0, exponent };
@@ -148,16 +148,16 @@ impl Agenda {
         let nominal = PAPER.runs[0];
         let (mut runs, mut sweeps) = (Vec::new(), Vec::new());
         for variant in [&variants.corrected, &variants.printed] {
-            runs.extend(PAPER.runs.iter().map(|&case| of_case(variant, case, true)));
-            runs.push(planned(variant, "lagrange", nominal, &[("formulation", "lagrange")]));
+            runs.extend(PAPER.runs.iter().map(|&case| plan_case(variant, case, true)));
+            runs.push(plan_run(variant, "lagrange", nominal, &[("formulation", "lagrange")]));
             sweeps.extend(rows.iter().map(|row| sweep_data(variant, row)));
         }
         for variant in &variants.combinations {
-            runs.extend(Series::Clearance.cases().map(|case| of_case(variant, case, false)));
+            runs.extend(Series::Clearance.cases().map(|case| plan_case(variant, case, false)));
             sweeps.push(sweep_data(variant, &rows[0]));
         }
-        runs.push(planned(&variants.corrected, "ideal", nominal, &[("contact.clearance", "0")]));
-        // Blocks take longest and come first, so that no thread is left running one at the end.
+        runs.push(plan_run(&variants.corrected, "ideal", nominal, &[("contact.clearance", "0")]));
+        // Blocks take longest and come first, so that no single thread is left with one at the end.
         let blocks =
             |(s, data): (usize, &SweepData)| (0..data.sweep.design().blocks()).map(move |b| ReportJob::Block(s, b));
         let jobs = sweeps.iter().enumerate().flat_map(blocks).chain((0..runs.len()).map(ReportJob::Run)).collect();
@@ -169,12 +169,12 @@ impl Agenda {
         self.jobs.len()
     }
 
-    /// Its sweeps, without records.
+    /// The sweeps, without records.
     pub fn sweeps(&self) -> &[SweepData] {
         &self.sweeps
     }
 
-    /// Sweep number and block number that job `job` computes, if any.
+    /// Sweep number and block number of job `job`, if it computes a block.
     pub fn block(&self, job: usize) -> Option<(usize, usize)> {
         match self.jobs[job] {
             ReportJob::Block(s, b) => Some((s, b)),
@@ -185,7 +185,7 @@ impl Agenda {
     /// Simulated time of a job, s; a twin counts as a second run.
     pub fn length(&self, job: usize) -> f64 {
         let periods = match self.jobs[job] {
-            ReportJob::Run(n) if self.runs[n].settles => 1 + self.extent.settle + 2,
+            ReportJob::Run(n) if self.runs[n].records_settled => 1 + self.extent.settle + 2,
             ReportJob::Run(_) => 1,
             ReportJob::Block(s, b) => {
                 let SweepData { plan, sweep, .. } = &self.sweeps[s];
@@ -196,16 +196,17 @@ impl Agenda {
         PAPER.period * periods as f64
     }
 
-    /// Runs job `job`; `keep_going` receives the completed part of [`Self::length`] and returns false to cancel.
+    /// Runs job `job`; `may_continue` receives the completed part of [`Self::length`] and returns false to cancel.
     ///
     /// # Errors
-    /// A run stopped by the divergence guard; cancellation by `keep_going`. Points of a sweep that diverge are no error.
-    pub fn run(&self, job: usize, mut keep_going: impl FnMut(f64) -> bool) -> Result<Outcome, RunError> {
+    /// A run stopped by the divergence guard; cancellation by `may_continue`. Diverging points of a sweep are not errors.
+    pub fn run(&self, job: usize, mut may_continue: impl FnMut(f64) -> bool) -> Result<Outcome, RunError> {
         let failed = |name: &str, error| RunError { name: name.to_owned(), error: Box::new(error) };
         match self.jobs[job] {
             ReportJob::Run(n) => {
                 let run = &self.runs[n];
-                let recorded = record(run, self.extent.settle, keep_going).map_err(|error| failed(&run.name, error))?;
+                let recorded =
+                    record(run, self.extent.settle, may_continue).map_err(|error| failed(&run.name, error))?;
                 Ok(Outcome::Run(Box::new(recorded)))
             }
             ReportJob::Block(s, b) => {
@@ -216,7 +217,7 @@ impl Agenda {
                 while !block.is_done() {
                     block.advance(2048);
                     let now = block.current().map_or(0.0, |run| run.taken() as f64 / all);
-                    if !keep_going(share * (block.finished().len() as f64 + now)) {
+                    if !may_continue(share * (block.finished().len() as f64 + now)) {
                         return Err(failed(&self.sweeps[s].file_name(), ResponseError::Cancelled));
                     }
                 }
@@ -225,17 +226,17 @@ impl Agenda {
         }
     }
 
-    /// Assembles the outcomes of all jobs, in job order.
+    /// Assembles the outcomes of all jobs, given in job order.
     ///
     /// # Panics
-    /// If there is not one outcome for each job.
+    /// If there is not exactly one outcome for each job.
     pub fn gather(self, outcomes: Vec<Outcome>) -> Report {
-        assert_eq!(outcomes.len(), self.jobs.len(), "an outcome a job");
+        assert_eq!(outcomes.len(), self.jobs.len(), "one outcome for each job");
         let (mut runs, mut sweeps) = (Vec::new(), self.sweeps);
         for (job, outcome) in self.jobs.iter().zip(outcomes) {
             match (*job, outcome) {
                 (ReportJob::Run(n), Outcome::Run(run)) => runs.push((self.runs[n].variant, *run)),
-                // Blocks of a sweep come in the order of their points.
+                // Blocks of a sweep are in the order of their points.
                 (ReportJob::Block(s, _), Outcome::Block(records)) => sweeps[s].records.extend(records),
                 _ => unreachable!("a job has an outcome of its kind"),
             }
@@ -259,28 +260,29 @@ impl Agenda {
 fn record(
     run: &PlannedRun,
     settle: usize,
-    mut keep_going: impl FnMut(f64) -> bool,
+    mut may_continue: impl FnMut(f64) -> bool,
 ) -> Result<RecordedRun, ResponseError> {
     let mut rows = Vec::new();
-    let observe = |look: &Observation| rows.push(COLUMNS.map(|column| (column.of)(look)));
-    let response = respond(&run.scene, PAPER.period, PAPER.sampling, observe, &mut keep_going)?;
-    let settled = run.settles.then(|| settled(&run.scene, settle, |time| keep_going(PAPER.period + time)));
+    let observe = |observation: &Observation| rows.push(COLUMNS.map(|column| (column.value)(observation)));
+    let response = respond(&run.scene, PAPER.period, PAPER.sampling, observe, &mut may_continue)?;
+    let settled = run.records_settled.then(|| settled(&run.scene, settle, |time| may_continue(PAPER.period + time)));
     Ok(RecordedRun { name: run.name.clone(), case: run.case, response, rows, settled: settled.transpose()? })
 }
 
-/// Settled motion over the period after `settle` periods and the next one, at equal phases.
+/// Settled motion over the second of the two periods after `settle` periods; its width is the difference from the first of the
+/// two at equal phases.
 fn settled(
     scene: &Scene,
     settle: usize,
-    mut keep_going: impl FnMut(f64) -> bool,
+    mut may_continue: impl FnMut(f64) -> bool,
 ) -> Result<SettledCurve, ResponseError> {
     let mut simulation = Simulation::new(&scene.machine)?;
     let mut frame = Frame::default();
-    let mut found = SettledCurve::default();
+    let mut curve = SettledCurve::default();
     for n in 0..=2 * CURVE_POINTS {
         let time = PAPER.period * (settle as f64 + n as f64 / CURVE_POINTS as f64);
         while simulation.time() < time {
-            if !keep_going(simulation.time()) {
+            if !may_continue(simulation.time()) {
                 return Err(ResponseError::Cancelled);
             }
             simulation.step()?;
@@ -288,17 +290,17 @@ fn settled(
         simulation.sample(time, &mut frame);
         let [coordinates, rates, _] = derivatives(&frame.pose);
         for c in Coordinate::ALL {
-            found.coordinates[c as usize].push(coordinates[c.index()]);
-            found.rates[c as usize].push(rates[c.index()]);
+            curve.coordinates[c as usize].push(coordinates[c.index()]);
+            curve.rates[c as usize].push(rates[c.index()]);
         }
     }
     for c in 0..2 {
-        let (before, settled) = found.coordinates[c].split_at(CURVE_POINTS);
-        found.width[c] = before.iter().zip(settled).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
-        found.coordinates[c].drain(..CURVE_POINTS);
-        found.rates[c].drain(..CURVE_POINTS);
+        let (before, settled) = curve.coordinates[c].split_at(CURVE_POINTS);
+        curve.width[c] = before.iter().zip(settled).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+        curve.coordinates[c].drain(..CURVE_POINTS);
+        curve.rates[c].drain(..CURVE_POINTS);
     }
-    Ok(found)
+    Ok(curve)
 }
 
 #[cfg(test)]
@@ -306,7 +308,7 @@ mod tests {
     use super::{Agenda, Extent};
 
     #[test]
-    fn all_runs_and_sweeps_of_the_full_report_can_be() {
+    fn the_full_report_can_be_planned() {
         assert!(Agenda::new(Extent::FULL).jobs() > Agenda::new(Extent::QUICK).jobs());
     }
 }

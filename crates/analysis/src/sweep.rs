@@ -1,5 +1,5 @@
-//! A whole sweep: its scene, its points, and the computation of one block of them. The caller schedules the blocks: the records
-//! of a block depend only on the sweep and the block number.
+//! A sweep: its scene, its points, and the computation of the points block by block. The caller schedules the blocks; the
+//! records of a block depend only on the sweep and the block number.
 
 use std::fmt::{Display as _, Formatter};
 
@@ -11,20 +11,20 @@ use super::point::{PointResult, PointRun, Protocol};
 use jointplay_physics::simulate::{MAX_RUN_DURATION, Simulation};
 use jointplay_scene::{Scene, SceneError, Value};
 
-/// Largest total number of kept sections: an array of them takes 512 MiB.
+/// Largest total number of kept sections; an array of them takes 512 MiB.
 const MAX_SECTIONS: usize = 1 << 26;
 
-/// Why a sweep is invalid.
+/// Reasons why a sweep is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SweepError {
     /// No kept periods.
     #[error(fmt = nothing_kept)]
     NothingKept {
-        /// Which of the two is counted.
+        /// The counted quantity, periods or crossings.
         counted: Argument,
-        /// Periods or crossings.
+        /// Number of periods or crossings.
         all: usize,
-        /// Discarded ones.
+        /// Number of discarded ones.
         discard: usize,
     },
     /// More numbers than a result can hold.
@@ -37,22 +37,22 @@ pub enum SweepError {
         points: usize,
         /// Kept sections of a point.
         kept: usize,
-        /// Most sections.
+        /// Largest allowed number of sections.
         most: usize,
     },
-    /// Longer than the longest allowed run.
+    /// A run that is longer than allowed.
     #[error(fmt = too_long)]
     TooLong {
         /// Periods.
         periods: usize,
         /// Parameters of the point.
         point: String,
-        /// Its drive period, s.
+        /// Drive period at the point, s.
         period: f64,
-        /// Most periods.
+        /// Largest allowed number of periods.
         most: usize,
     },
-    /// No drive phase.
+    /// A scene without a drive phase.
     #[error("{0}; take a driven scene such as spcmm or slider-crank-driven")]
     NoPeriod(#[from] NoPeriod),
     /// A point that the scene does not accept, or that cannot start.
@@ -60,7 +60,7 @@ pub enum SweepError {
     Infeasible {
         /// Parameters of the point.
         point: String,
-        /// What is wrong there.
+        /// The reason.
         error: Box<SceneError>,
     },
 }
@@ -90,8 +90,8 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// A sweep of `scene`. Before anything runs, every value of each range is tried with the other ranges at their ends, and
-    /// up to 4096 points within a map or of a table.
+    /// A sweep of `scene`. Before anything runs, it checks that the scene starts for every value of each range with the other
+    /// ranges at their ends, and at up to 4096 points inside a map or of a table.
     ///
     /// # Errors
     /// No kept periods, no drive phase where sections need one, or a value at which the scene cannot start.
@@ -101,7 +101,7 @@ impl Sweep {
         Ok(sweep)
     }
 
-    /// The same without a trial: a point that cannot start is recorded as such.
+    /// A sweep whose points are not checked in advance; a point that cannot start is recorded as such.
     ///
     /// # Errors
     /// No kept periods, or too many sections.
@@ -121,7 +121,7 @@ impl Sweep {
         Ok(Self { scene, design, protocol, layout })
     }
 
-    /// Requires that a point can start, and that its run is no longer than the longest.
+    /// Requires that a point can start, and that its run is not longer than allowed.
     fn check(&self, point: usize) -> Result<(), SweepError> {
         let scene = self.design.scene(&self.scene, point);
         let started = scene.and_then(|scene| {
@@ -173,7 +173,7 @@ impl Sweep {
 
     /// Block `b`, not yet started.
     pub fn begin(&self, b: usize) -> BlockRun<'_> {
-        BlockRun { sweep: self, order: self.design.order(b), at: 0, run: None, machine: None, done: Vec::new() }
+        BlockRun { sweep: self, order: self.design.order(b), position: 0, run: None, machine: None, done: Vec::new() }
     }
 }
 
@@ -181,15 +181,16 @@ impl Sweep {
 pub struct BlockRun<'a> {
     sweep: &'a Sweep,
     order: Vec<usize>,
-    at: usize,
+    /// Position of the current point in `order`.
+    position: usize,
     run: Option<PointRun>,
-    /// Run at the end of the previous point, if the next point follows it.
+    /// State at the end of the previous point, if the next point follows it.
     machine: Option<ObservedRun>,
     done: Vec<(usize, Option<PointResult>)>,
 }
 
 impl BlockRun<'_> {
-    /// Points finished so far, in the order of computation: index and result, `None` for one that could not start.
+    /// Points finished so far, in the order of computation: index and result, which is `None` if the point could not start.
     pub fn finished(&self) -> &[(usize, Option<PointResult>)] {
         &self.done
     }
@@ -201,7 +202,7 @@ impl BlockRun<'_> {
 
     /// Whether every point is finished.
     pub fn is_done(&self) -> bool {
-        self.at >= self.order.len()
+        self.position >= self.order.len()
     }
 
     /// Advances by at most `steps` simulation steps, not past the end of a point.
@@ -227,10 +228,10 @@ impl BlockRun<'_> {
         self.run = Some(run);
     }
 
-    /// Starts the next point, from the previous one if it follows that.
+    /// Starts the next point, which continues from the previous one if it follows it.
     fn start(&mut self) -> Option<PointRun> {
         let sweep = self.sweep;
-        let point = self.order[self.at];
+        let point = self.order[self.position];
         let scene = sweep.design.scene(&sweep.scene, point).ok()?;
         let interval = sweep.protocol.interval(&scene).ok()?;
         let run = self.machine.take();
@@ -240,9 +241,9 @@ impl BlockRun<'_> {
 
     /// Finishes the current point; the next one follows `machine`, or starts cold without one.
     fn close(&mut self, result: Option<PointResult>, machine: Option<ObservedRun>) {
-        let point = self.order[self.at];
+        let point = self.order[self.position];
         self.done.push((point, result));
-        self.at += 1;
+        self.position += 1;
         self.machine = machine.filter(|_| self.sweep.design.start(point) != Start::Cold);
     }
 
@@ -283,9 +284,9 @@ mod tests {
         (sweep, results)
     }
 
-    /// Statistics of a run that is stepped and sampled here.
+    /// Compares with statistics of a run that the test itself steps and samples.
     #[test]
-    fn a_duration_needs_no_drive_and_its_statistics_are_those_of_a_run() {
+    fn a_duration_needs_no_drive_and_its_statistics_match_a_direct_run() {
         let span = Span::Duration { duration: 0.06, from: 0.02 };
         let keep = "rod.pose.x:min,rod.pose.x:max,rod.velocity.x:mean,rod.pose.x:end,*.normal:max,*.normal:mean";
         let (sweep, results) = sweep_of("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, keep);
@@ -297,7 +298,7 @@ mod tests {
             let mut frame = Frame::default();
             let (mut x, mut forces, mut peaks): (Vec<f64>, Vec<f64>, Vec<_>) = Default::default();
             for end in [0.02, 0.06] {
-                // Only what follows the transient counts.
+                // Only the part after the transient counts.
                 simulation.take_peaks(&mut peaks);
                 (x, forces) = (Vec::new(), Vec::new());
                 loop {
@@ -322,7 +323,7 @@ mod tests {
             let least = x.iter().copied().fold(f64::INFINITY, f64::min);
             let largest = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             assert!((value("x_min_m") - least).abs() < 1e-9 && (value("x_max_m") - largest).abs() < 1e-9);
-            // The mean velocity is the path over the time.
+            // The mean velocity is the displacement over the time.
             let first = value("x_end_m") - 0.04 * value("vx_mean_m_s");
             assert!((first - x[0]).abs() < 1e-5, "{first} {}", x[0]);
             assert!(result.statistics.iter().all(|value| value.is_finite()));
@@ -338,9 +339,9 @@ mod tests {
     #[test]
     fn a_point_without_enough_crossings_has_no_kept_part() {
         let scene = Scene::load("pendulum", &[]).expect("built in");
-        // It starts at 30 degrees and swings through the vertical at least once in a second.
+        // The pendulum starts at 30 degrees and swings through the vertical at least once in a second.
         let crossing = Crossing::parse(&scene, "rod.pose.gamma=0deg").expect("an angle");
-        for (discard, keeps) in [(1, true), (40, false)] {
+        for (discard, has_kept_part) in [(1, true), (40, false)] {
             let (count, crossing) = (50, crossing.clone());
             let span = Span::Crossings { crossing, count, discard, duration: 1.0 };
             let (sweep, results) =
@@ -348,8 +349,8 @@ mod tests {
             for result in results {
                 assert!(result.crossings >= 1 && result.crossings < 40, "{}", result.crossings);
                 let (peak, end) = (result.statistics[0], result.statistics[1]);
-                assert_eq!((peak.is_finite(), end == 1.0), (keeps, keeps));
-                assert!(keeps || result.joints[0].impacts_kept == 0);
+                assert_eq!((peak.is_finite(), end == 1.0), (has_kept_part, has_kept_part));
+                assert!(has_kept_part || result.joints[0].impacts_kept == 0);
                 assert_eq!(result.times.len(), result.crossings.saturating_sub(discard));
                 let mut record = Vec::new();
                 sweep.layout().append(Some(&result), &mut record);
@@ -359,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn a_given_period_replaces_that_of_the_drives() {
+    fn a_given_period_replaces_the_period_of_the_drives() {
         let plan = Plan { periods: 3, discard: 1, phase: 0.0, exponent: false };
         let span = Span::Sections { plan, interval: Some(0.01) };
         let (sweep, results) = sweep_of("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, "time:end");

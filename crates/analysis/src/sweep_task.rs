@@ -18,26 +18,26 @@ pub const COORDINATES: usize = 6;
 /// Largest total number of kept sections that a window holds and draws.
 const MAX_SECTIONS: usize = 50_000;
 
-/// A sweep to be computed.
+/// A request for a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SweepTask {
     /// The scene, without the varied parameters.
     pub scene: SceneSource,
     /// Ranges as on the command line: `contact.clearance=0.01mm..1mm:200`.
     pub vary: Vec<String>,
-    /// Drive periods per point, including those discarded.
+    /// Drive periods per point, including discarded ones.
     pub periods: usize,
-    /// Discarded transient periods.
+    /// Transient periods to discard.
     pub discard: usize,
     /// Drive phase of the sections as a fraction of the period, 0 <= phase < 1.
     pub phase: f64,
     /// State from which points start.
     pub start: Start,
-    /// Whether the largest Lyapunov exponent is measured.
+    /// Whether to measure the largest Lyapunov exponent.
     pub exponent: bool,
 }
 
-/// Share of a sweep for one of several workers; the points are the same whichever worker computes them.
+/// Share of a sweep for one of several workers. The results do not depend on the division into shares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Share {
     /// Index, from 0.
@@ -54,7 +54,7 @@ impl Share {
 /// One varied parameter of a running sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Range {
-    /// Key.
+    /// Key of the parameter.
     pub key: String,
     /// First value, SI.
     pub from: f64,
@@ -64,24 +64,24 @@ pub struct Range {
     pub count: usize,
 }
 
-/// One point of a sweep. Unknown values are `None`, so that they survive in JSON.
+/// One point of a sweep. Unknown values are `None`, because JSON has no NaN.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SweptPoint {
-    /// Number in the sweep; the last range varies fastest.
+    /// Index in the sweep; the last range varies fastest.
     pub index: usize,
     /// Value of each varied parameter, SI.
     pub values: Vec<f64>,
-    /// Keys and values as a user writes them; they parse back to the same bits.
+    /// Keys and values in the syntax of the user; they parse back to the same bits.
     pub settings: Vec<(String, String)>,
     /// The preceding point, from which it continued; `None` for a cold start.
     pub after: Option<usize>,
-    /// Time of its first section, including discarded ones, s.
+    /// Time of the first section, including discarded ones, s.
     pub first: f64,
     /// Time from one section to the next, s.
     pub interval: f64,
-    /// Time at which the divergence guard stopped it, s from its start; it then has no sections.
+    /// Time at which the divergence guard stopped the run, s from the point's start; there are no sections then.
     pub diverged: Option<f64>,
-    /// Kind of motion in a word, with its period if it has one; "" if the point did not reach its end.
+    /// Kind of motion in a word, with the period if there is one; "" if the point did not reach its end.
     pub regime: String,
     /// Regime code in files; -1 if the point did not reach its end.
     pub regime_code: i64,
@@ -93,7 +93,7 @@ pub struct SweptPoint {
     pub peak: Option<f64>,
     /// Largest and root-mean-square tip error over the kept periods, m.
     pub probe: Option<(f64, f64)>,
-    /// Reasons for distrust: bit k is set for kind k of [`jointplay_physics::simulate::Doubt::KINDS`].
+    /// Doubts about the result: bit k is set for kind k of [`jointplay_physics::simulate::Doubt::KINDS`].
     pub doubts: u32,
 }
 
@@ -122,8 +122,8 @@ pub(super) async fn run(
     let scene = task.scene.scene()?;
     let axes = task.vary.iter().map(|text| Axis::parse(&scene, text));
     let axes = axes.collect::<Result<Vec<_>, _>>()?;
-    if let Some(words) = axes.iter().find(|axis| axis.words().is_some()) {
-        return Err(words.not_numbers(&scene).into());
+    if let Some(axis) = axes.iter().find(|axis| axis.words().is_some()) {
+        return Err(axis.not_numbers(&scene).into());
     }
     let ranges = axes.iter().map(|axis| Range {
         key: axis.key().to_owned(),
@@ -145,8 +145,8 @@ pub(super) async fn run(
     send(SweepMessage::Ranges(ranges))?;
     let blocks = sweep.design().blocks();
     let mut completed = 0;
-    let own = coarse_first(blocks).into_iter();
-    for b in own.skip(share.index).step_by(share.of.max(1)) {
+    let order = coarse_first(blocks).into_iter();
+    for b in order.skip(share.index).step_by(share.of.max(1)) {
         let mut block = Block::new(&sweep, b);
         while !block.run.is_done() {
             rest().await;
@@ -162,7 +162,7 @@ pub(super) async fn run(
     Ok(())
 }
 
-/// 0 to n - 1, each number once: the ends, then the midpoints of the gaps, and so on.
+/// The numbers 0 to n - 1, each once: first the ends, then the midpoints of the gaps, and so on.
 fn coarse_first(n: usize) -> Vec<usize> {
     let mut order = Vec::with_capacity(n);
     let Some(last) = n.checked_sub(1) else {
@@ -188,7 +188,7 @@ struct Block<'a> {
     reported: usize,
     /// Time of the first section of the current point, s, and whether it starts cold.
     first: Option<(f64, bool)>,
-    /// The previous point: its number and the time of its last section, s.
+    /// Index of the previous point and time of its last section, s.
     before: Option<(usize, f64)>,
 }
 
@@ -199,7 +199,7 @@ impl<'a> Block<'a> {
 
     fn advance(&mut self) {
         if self.run.current().is_none() {
-            // The first step starts the point, which fixes the times of its sections.
+            // The first step starts the point, which determines the times of its sections.
             self.run.advance(1);
             self.first = self.run.current().map(|run| (run.first(), run.is_cold()));
         } else {
@@ -290,19 +290,20 @@ mod tests {
         }
     }
 
-    fn reported(task: SweepTask, most: usize) -> Vec<Message> {
-        reported_of_share(task, Share::WHOLE, most)
+    /// The first messages of a sweep, up to `limit`, after which it is cancelled.
+    fn messages_of(task: SweepTask, limit: usize) -> Vec<Message> {
+        messages_of_share(task, Share::WHOLE, limit)
     }
 
-    fn reported_of_share(task: SweepTask, share: Share, most: usize) -> Vec<Message> {
+    fn messages_of_share(task: SweepTask, share: Share, limit: usize) -> Vec<Message> {
         let mut messages = Vec::new();
-        // Jobs and messages are sent as text.
+        // Jobs and messages must survive their serialisation as text.
         let text = serde_json::to_string(&Job::Sweep(task, share)).expect("plain data");
         let job = serde_json::from_str(&text).expect("its own text");
         perform(&job, &mut || 0.0, &mut |message| {
             let text = serde_json::to_string(&message).expect("plain data");
             messages.push(serde_json::from_str(&text).expect("its own text"));
-            if messages.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            if messages.len() < limit { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         messages
     }
@@ -318,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn coarse_order_starts_at_the_ends_and_holds_every_number_once() {
+    fn coarse_order_starts_at_the_ends_and_contains_every_number_once() {
         assert_eq!(coarse_first(9), [0, 8, 4, 2, 6, 1, 3, 5, 7]);
         for n in 0..40 {
             let mut order = coarse_first(n);
@@ -328,9 +329,9 @@ mod tests {
     }
 
     #[test]
-    fn points_match_the_records_of_the_sweep_and_hold_their_settings() {
+    fn the_settings_of_a_point_reproduce_its_sections() {
         let task = task(&["contact.clearance=0.2mm..0.4mm:3"]);
-        let messages = reported(task.clone(), usize::MAX);
+        let messages = messages_of(task.clone(), usize::MAX);
         assert_eq!(messages.last(), Some(&Message::Done));
         let points = points(&messages);
         let order: Vec<usize> = points.iter().map(|point| point.index).collect();
@@ -339,7 +340,7 @@ mod tests {
             assert_eq!(point.sections.len(), 2);
             assert_eq!((point.first, point.interval), (0.05, 0.2));
             assert!(point.peak.is_some_and(|peak| peak > 1.0) && !point.regime.is_empty());
-            // The same section again, with the same steps.
+            // A run with the point's settings and the same steps reproduces the section.
             let mut source = task.scene.clone();
             source.changes.extend(point.settings.iter().cloned());
             let scene = source.scene().expect("its own settings");
@@ -357,18 +358,19 @@ mod tests {
     }
 
     #[test]
-    fn shares_together_hold_every_point_with_the_same_bits() {
-        // One share for each of four workers, two of which have nothing to do; then two blocks of points that follow each other.
+    fn shares_together_yield_every_point_bit_for_bit() {
+        // Four shares, first of two cold points, so that two shares are empty, then of two blocks of points that follow each
+        // other.
         let is_cold = task(&["contact.clearance=0.2mm..0.4mm:2"]);
         let mut followed = task(&["contact.friction=0.1..0.3:26"]);
         (followed.start, followed.periods, followed.discard) = (Start::FollowUp, 2, 1);
         followed.scene.changes.push(("solver.preset".to_owned(), "preview".to_owned()));
         for task in [is_cold, followed] {
-            let mut whole: Vec<_> = reported(task.clone(), usize::MAX);
+            let mut whole: Vec<_> = messages_of(task.clone(), usize::MAX);
             let mut shared = Vec::new();
             let mut done = 0.0;
             for index in 0..4 {
-                let messages = reported_of_share(task.clone(), Share { index, of: 4 }, usize::MAX);
+                let messages = messages_of_share(task.clone(), Share { index, of: 4 }, usize::MAX);
                 assert!(matches!(messages[0], Message::Ranges(_)));
                 assert_eq!(messages.last(), Some(&Message::Done));
                 done += messages.iter().rev().find_map(progress).unwrap_or(0.0);
@@ -392,10 +394,10 @@ mod tests {
     }
 
     #[test]
-    fn a_followed_point_names_the_one_before() {
+    fn a_point_that_follows_another_names_it() {
         let mut task = task(&["contact.friction=0.1..0.3:3"]);
         task.start = Start::FollowDown;
-        let messages = reported(task, usize::MAX);
+        let messages = messages_of(task, usize::MAX);
         let points = points(&messages);
         let after: Vec<_> = points.iter().map(|p| (p.index, p.after)).collect();
         assert_eq!(after, [(2, None), (1, Some(2)), (0, Some(1))]);
@@ -404,7 +406,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_of_the_scenes_own_is_followed_where_only_contacts_depend_on_it() {
+    fn states_follow_a_user_parameter_if_only_contacts_depend_on_it() {
         let built_in = Scene::load("slider-crank-driven", &[]).expect("built in");
         let own = "[[parameter]]\nname = \"gap\"\nvalue = \"0.2 mm\"\n";
         let text = format!("{}\n{own}", built_in.source.text);
@@ -416,7 +418,7 @@ mod tests {
             let scene = Scene::parse(&text, None, &[]).expect("a scene");
             let mut task = task(&["parameter.gap=0.2mm..0.3mm:2"]);
             (task.scene, task.start) = (SceneSource::of(&scene), Start::FollowUp);
-            let messages = reported(task, usize::MAX);
+            let messages = messages_of(task, usize::MAX);
             if followed {
                 let after: Vec<_> = points(&messages).iter().map(|point| point.after).collect();
                 assert_eq!(after, [None, Some(0)]);
@@ -430,16 +432,16 @@ mod tests {
     }
 
     #[test]
-    fn a_cancelled_sweep_ends_and_faulty_ranges_are_reported() {
+    fn a_cancelled_sweep_sends_no_further_messages_and_invalid_ranges_are_reported() {
         let good = task(&["contact.friction=0.1..0.3:3"]);
-        assert_eq!(reported(good, 3).len(), 3);
+        assert_eq!(messages_of(good, 3).len(), 3);
         for (vary, words) in [
             ("contact.friction=0.3..0.1:3", "reversed"),
             ("contact.friction=0.3", "expected KEY=A..B:N"),
             ("contact.friction=0.1..0.3:900000", "more than the window draws"),
             ("contact.clearance=0.1mm..20mm:3", "below the ball radius"),
         ] {
-            let messages = reported(task(&[vary]), usize::MAX);
+            let messages = messages_of(task(&[vary]), usize::MAX);
             let [Message::Failed(why)] = &messages[..] else {
                 panic!("{vary}: {messages:?}");
             };

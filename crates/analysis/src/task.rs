@@ -1,4 +1,4 @@
-//! Long computations as plain data, so that a thread on the desktop and a worker in the browser run the same code.
+//! Long computations as plain data, so that a desktop thread and a browser worker run the same code.
 
 use std::ops::ControlFlow;
 use std::pin::pin;
@@ -17,16 +17,16 @@ use jointplay_physics::machine::Preset;
 /// A computation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Job {
-    /// Cost and error of presets on a scene as it is.
+    /// Speed and error of presets on a scene in its current form.
     Presets {
         /// The scene.
         scene: SceneSource,
         /// Words of `solver.preset`.
         presets: Vec<String>,
     },
-    /// Points over a range of a parameter, or a share of them.
+    /// Points of a sweep, or a share of them.
     Sweep(SweepTask, Share),
-    /// The effect of each uncertain parameter alone, or a share of its runs.
+    /// One-at-a-time runs of uncertain parameters, or a share of them.
     Alone(AloneTask, Share),
     /// The tip's error over the workspace.
     Map(MapTask),
@@ -37,21 +37,21 @@ pub enum Job {
 pub enum Message {
     /// Fraction done, 0 to 1; for a share, as a fraction of the whole.
     Progress(f64),
-    /// The requested presets, by their words.
+    /// Measurements of the requested presets, by their words.
     Presets(Vec<(String, Measured)>),
     /// The accepted ranges of a sweep; its points follow.
     Ranges(Vec<Range>),
     /// A point of a sweep.
     Point(Box<SweptPoint>),
-    /// The accepted runs of parameters alone; their results follow.
+    /// The accepted one-at-a-time runs; their results follow.
     Plan(AlonePlan),
-    /// One of these runs.
+    /// A finished one-at-a-time run.
     Run(AloneRun),
-    /// About a map.
+    /// A message about a map.
     Map(MapMessage),
     /// End of the results.
     Done,
-    /// Reason for the lack of a result.
+    /// The computation failed, for this reason.
     Failed(String),
 }
 
@@ -81,10 +81,10 @@ pub fn perform(job: &Job, clock: &mut dyn FnMut() -> f64, report: &mut dyn FnMut
     let mut rest = async || {};
     let performed = pin!(perform_with_rests(job, clock, report, &mut rest));
     let end = performed.poll(&mut Context::from_waker(Waker::noop()));
-    assert!(end.is_ready(), "nothing in it waits");
+    assert!(end.is_ready(), "without rests, nothing waits");
 }
 
-/// As [`perform`]; a computation that can be shared awaits `rest` every few milliseconds.
+/// As [`perform`], but a computation that can be shared awaits `rest` every few milliseconds, so that other work can proceed.
 pub async fn perform_with_rests(
     job: &Job,
     clock: &mut dyn FnMut() -> f64,
@@ -102,7 +102,7 @@ pub async fn perform_with_rests(
         Err(TaskFault::Cancelled) => return,
         Err(fault) => Message::Failed(fault.to_string()),
     };
-    // Nothing is left to cancel.
+    // After the last message there is nothing to cancel.
     let _ = report(last);
 }
 
@@ -140,44 +140,45 @@ mod tests {
     use jointplay_scene::Scene;
 
     fn job(changes: &[(&str, &str)], presets: &[&str]) -> Job {
-        let own = |&(k, v): &(&str, &str)| (k.to_owned(), v.to_owned());
-        let changes: Vec<_> = changes.iter().map(own).collect();
+        let owned = |&(k, v): &(&str, &str)| (k.to_owned(), v.to_owned());
+        let changes: Vec<_> = changes.iter().map(owned).collect();
         let scene = Scene::load("pendulum", &changes).expect("built in");
         Job::Presets { scene: SceneSource::of(&scene), presets: presets.iter().map(|&word| word.to_owned()).collect() }
     }
 
-    fn messages(job: &Job, most: usize) -> Vec<Message> {
+    /// The first messages of `job`, up to `limit`, after which it is cancelled.
+    fn messages(job: &Job, limit: usize) -> Vec<Message> {
         let mut ticks = 0.0;
         let mut clock = || {
             ticks += 1e-3;
             ticks
         };
-        let mut said = Vec::new();
+        let mut received = Vec::new();
         perform(job, &mut clock, &mut |message| {
-            said.push(message);
-            if said.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            received.push(message);
+            if received.len() < limit { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
-        said
+        received
     }
 
     #[test]
-    fn a_preset_is_measured_on_the_scene_as_it_is() {
+    fn a_preset_is_measured_on_the_changed_scene() {
         let job = job(&[("contact.clearance", "0.2 mm")], &["preview"]);
-        // Jobs are sent as text.
+        // A job must survive its serialisation as text.
         let text = serde_json::to_string(&job).expect("plain data");
         let job: Job = serde_json::from_str(&text).expect("its own text");
-        let said = messages(&job, usize::MAX);
-        assert_eq!(said.last(), Some(&Message::Done));
-        let Some(Message::Presets(found)) = said.iter().rev().nth(1) else {
-            panic!("{said:?}");
+        let received = messages(&job, usize::MAX);
+        assert_eq!(received.last(), Some(&Message::Done));
+        let Some(Message::Presets(found)) = received.iter().rev().nth(1) else {
+            panic!("{received:?}");
         };
         let error = found[0].1.peak_error.expect("the pendulum has impacts");
         assert!(error > 0.0 && error < 0.2, "{error}");
-        assert!(said.iter().any(|m| matches!(m, Message::Progress(p) if *p > 0.5)));
+        assert!(received.iter().any(|m| matches!(m, Message::Progress(p) if *p > 0.5)));
     }
 
     #[test]
-    fn a_sweep_with_rests_reports_the_same() {
+    fn a_sweep_with_rests_sends_the_same_messages() {
         let scene = Scene::load("slider-crank-driven", &[]).expect("built in");
         let task = SweepTask {
             scene: SceneSource::of(&scene),
@@ -189,9 +190,9 @@ mod tests {
             exponent: false,
         };
         let job = Job::Sweep(task, Share::WHOLE);
-        let (mut said, mut rests, mut waits) = (Vec::new(), 0, 0);
+        let (mut received, mut rests, mut waits) = (Vec::new(), 0, 0);
         let mut report = |message| {
-            said.push(message);
+            received.push(message);
             ControlFlow::Continue(())
         };
         let mut rest = async || {
@@ -212,13 +213,13 @@ mod tests {
             }
         }
         assert!(rests > 2 && waits == rests, "{rests} rests, {waits} waits");
-        assert_eq!(said, messages(&job, usize::MAX));
+        assert_eq!(received, messages(&job, usize::MAX));
     }
 
     #[test]
-    fn a_cancelled_job_ends_and_faults_are_reported() {
+    fn a_cancelled_job_sends_no_further_messages_and_faults_are_reported() {
         assert_eq!(messages(&job(&[], &["preview"]), 3).len(), 3);
-        let said = messages(&job(&[], &["quick"]), usize::MAX);
-        assert!(matches!(&said[..], [Message::Failed(why)] if why.contains("quick")));
+        let received = messages(&job(&[], &["quick"]), usize::MAX);
+        assert!(matches!(&received[..], [Message::Failed(why)] if why.contains("quick")));
     }
 }

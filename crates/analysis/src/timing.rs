@@ -1,4 +1,4 @@
-//! Stepping over a span under a cap on work, timed in pieces.
+//! Stepping over a time span under a work cap, timed in pieces.
 
 use std::fmt::Display;
 
@@ -10,9 +10,11 @@ use jointplay_scene::Scene;
 
 /// Steps between two checks of the clock, the cap and cancellation.
 const STEPS_PER_PIECE: u32 = 32;
-/// Fewest and most runs of one setting; and the multiple of the time to be measured after which two runs suffice.
+/// Least number of timed runs of one setting.
 const MIN_RUNS: usize = 3;
+/// Largest number of timed runs of one setting.
 const MAX_RUNS: usize = 40;
+/// Multiple of [`WorkBudget::measured`] after which two runs suffice.
 const LONG_MEASUREMENT: f64 = 4.0;
 
 /// Limits on the work of an analysis.
@@ -20,9 +22,9 @@ const LONG_MEASUREMENT: f64 = 4.0;
 pub struct WorkBudget {
     /// Cap on the evaluations of the equations in a run.
     pub evaluations: u64,
-    /// Cap on the clock seconds of a run, since evaluations do not cover the linear algebra of implicit methods.
+    /// Cap on the clock seconds of a run, because evaluations do not include the linear algebra of implicit methods.
     pub seconds: f64,
-    /// Clock seconds to accumulate for each run, by repeating it.
+    /// Total clock seconds to measure for each run, by repeating it.
     pub measured: f64,
     /// Step sizes of the fixed-step methods, s.
     pub steps: &'static [f64],
@@ -51,10 +53,10 @@ impl WorkBudget {
         tolerances: &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11],
         steps_per_impact: &[2.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 64.0],
     };
-    /// Runs with more loose joints than this are long.
+    /// Largest number of loose joints for which the full budget applies.
     const MANY_JOINTS: usize = 8;
 
-    /// Budget for `scene`: runs of many loose joints are capped earlier, at the same settings.
+    /// Budget for `scene`. Runs with many loose joints are capped earlier, at the same settings.
     #[must_use]
     pub fn of(self, scene: &Scene) -> Self {
         if scene.machine.joints_with_clearance() <= Self::MANY_JOINTS {
@@ -68,7 +70,7 @@ impl WorkBudget {
         }
     }
 
-    /// Cap for the reference, on which everything else depends.
+    /// Budget of reference runs, on which all other results depend.
     pub(super) const REFERENCE: Self = Self { evaluations: 40_000_000, seconds: f64::INFINITY, ..Self::FULL };
 }
 
@@ -76,20 +78,20 @@ impl WorkBudget {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum End {
-    /// It reached its end.
+    /// The run reached its end.
     Reached,
-    /// It reached the cap on work.
+    /// The run reached the work cap.
     Capped,
-    /// The divergence guard stopped it.
+    /// The divergence guard stopped the run.
     #[serde(serialize_with = "as_words")]
     Stopped(Stopped),
-    /// The method refused the scene, for instance as too large for its matrices; files list it as stopped, too.
+    /// The method rejected the scene, for example as too large for its matrices; files list this as stopped, too.
     #[serde(rename = "stopped", serialize_with = "as_words")]
     Refused(StartError),
 }
 
 impl End {
-    /// Why it was stopped or refused, if it was.
+    /// Reason why the run was stopped or rejected, if it was.
     pub fn fault(&self) -> Option<&dyn Display> {
         match self {
             Self::Reached | Self::Capped => None,
@@ -114,7 +116,7 @@ pub(super) fn advance_capped(
     run_until_timed(simulation, end, budget, context, &mut Vec::new(), &mut after_step)
 }
 
-/// The same with timing; `pieces` holds the shortest time so far of each piece, s.
+/// As [`advance_capped`], with timing; `pieces` holds the shortest time of each piece so far, s.
 fn run_until_timed(
     simulation: &mut Simulation,
     end: f64,
@@ -143,10 +145,10 @@ fn run_until_timed(
             return Ok(End::Capped);
         }
     }
-    unreachable!("pieces are counted for ever")
+    unreachable!("the loop over pieces has no end")
 }
 
-/// Steps one piece; returns whether `end` is reached or `after_step` has returned true.
+/// Takes the steps of one piece; returns whether `end` is reached or `after_step` has returned true.
 fn take_steps(
     simulation: &mut Simulation,
     end: f64,
@@ -164,8 +166,8 @@ fn take_steps(
     Ok(simulation.time() >= end)
 }
 
-/// Clock seconds to step to `end`: the sum of the shortest times of all pieces, so that other load on the machine counts as
-/// little as possible. Every run starts from the result of `start`, whose time does not count.
+/// Clock seconds to step to `end`: the sum of the shortest times of all pieces, which minimises the effect of other load on the
+/// machine. Every run starts from the result of `start`, whose time does not count.
 pub(super) fn clock_time_to(
     end: f64,
     budget: &WorkBudget,
@@ -179,8 +181,8 @@ pub(super) fn clock_time_to(
         let before = context.now();
         run_until_timed(&mut simulation, end, budget, context, &mut pieces, &mut |_| false)?;
         measured += context.now() - before;
-        let long = measured >= LONG_MEASUREMENT * budget.measured && run > 0;
-        if long || (measured >= budget.measured && run + 1 >= MIN_RUNS) {
+        let is_long = measured >= LONG_MEASUREMENT * budget.measured && run > 0;
+        if is_long || (measured >= budget.measured && run + 1 >= MIN_RUNS) {
             break;
         }
     }
@@ -200,8 +202,8 @@ mod tests {
         let small = WorkBudget { evaluations: 500, ..WorkBudget::QUICK };
         let mut clock = || 0.0;
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
-        let mut keep_going = |_: f64| ControlFlow::Continue(());
-        let mut context = RunContext::new(&mut clock, &mut keep_going);
+        let mut progress = |_: f64| ControlFlow::Continue(());
+        let mut context = RunContext::new(&mut clock, &mut progress);
         let end = advance_capped(&mut simulation, 1.0, &small, &mut context, |_| false);
         assert_eq!(end, Ok(End::Capped));
         let evaluations = simulation.statistics().evaluations;
@@ -218,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_takes_the_time_of_its_shortest_pieces() {
+    fn the_time_of_a_run_is_the_sum_of_its_shortest_pieces() {
         let scene = Scene::load("pendulum", &[]).expect("built in");
         // A clock that advances by 1 s per reading, but by 100 s if the reading falls on a busy moment.
         let (mut time, mut reading) = (0.0, 0);
@@ -227,8 +229,8 @@ mod tests {
             time += if reading % 17 == 0 { 100.0 } else { 1.0 };
             time
         };
-        let mut keep_going = |_: f64| ControlFlow::Continue(());
-        let mut context = RunContext::new(&mut clock, &mut keep_going);
+        let mut progress = |_: f64| ControlFlow::Continue(());
+        let mut context = RunContext::new(&mut clock, &mut progress);
         let budget = WorkBudget { measured: 1e6, seconds: 1e9, ..WorkBudget::QUICK };
         let mut steps = 0;
         let seconds = clock_time_to(5e-3, &budget, &mut context, |_| {

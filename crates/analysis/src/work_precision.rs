@@ -1,4 +1,4 @@
-//! Cost and error of every method on one scene.
+//! Work-precision data: cost and error of every method on one scene.
 
 use serde::Serialize;
 
@@ -12,13 +12,13 @@ use jointplay_scene::Scene;
 /// A run over the first impacts, or in settled motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Phase {
-    /// How it ended. If it did not reach its end, there is no time and no error.
+    /// How the run ended. Unless it reached its end, there is no time and no error.
     pub end: End,
     /// Simulated time, s.
     pub simulated_s: f64,
-    /// Clock seconds to step over it.
+    /// Clock seconds to step over the phase.
     pub wall_s: Option<f64>,
-    /// Speed relative to Runge-Kutta 4 at 10 microseconds on the same span, measured in the same run.
+    /// Speed relative to Runge-Kutta 4 at 10 microseconds over the same span, measured alongside it.
     pub ratio: Option<f64>,
     /// Accepted steps.
     pub steps: u64,
@@ -26,7 +26,7 @@ pub struct Phase {
     pub evaluations: u64,
     /// Rejected steps.
     pub rejected: u64,
-    /// Whether it is on the front: no other point is both faster and more accurate in this phase.
+    /// Whether the point is on the Pareto front: no other point is both faster and more accurate in this phase.
     pub front: bool,
 }
 
@@ -42,12 +42,12 @@ impl Phase {
     }
 }
 
-/// One method at one step or tolerance.
+/// One method at one setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Point {
-    /// Method, step, tolerance.
+    /// Method and its setting.
     pub setting: Setting,
-    /// The preset with this setting.
+    /// The preset with this setting, if any.
     pub preset: Option<Preset>,
     /// The first impacts.
     pub impacts: Phase,
@@ -57,7 +57,7 @@ pub struct Point {
     pub errors: Errors,
 }
 
-/// A phase of a point and the relative error in it.
+/// Selects a phase of a point and the relative error in it.
 pub type View = fn(&Point) -> Option<(&Phase, f64)>;
 
 impl Point {
@@ -75,9 +75,9 @@ impl Point {
 /// All points of a scene.
 #[derive(Clone, Debug)]
 pub struct WorkPrecision {
-    /// The reference.
+    /// The reference solution.
     pub reference: ReferenceSolution,
-    /// In the order of the methods, each from coarse to fine.
+    /// Points in the order of the methods, each method from coarse to fine.
     pub points: Vec<Point>,
 }
 
@@ -108,7 +108,7 @@ impl WorkPrecision {
     }
 }
 
-/// Runs every method over its step sizes or tolerances, and the presets.
+/// Runs every method at each of its settings, including those of the presets.
 ///
 /// # Errors
 /// A scene without a reference ([`ReferenceSolution::new`]); cancellation by [`RunContext`].
@@ -128,7 +128,8 @@ pub fn work_precision(
         point.preset = preset;
         points.push(point);
     }
-    // Timed again after the points, so that other load on the machine slows the baseline and the points alike.
+    // The baseline is timed again after the points, so that other load on the machine affects the baseline and the points
+    // alike.
     baseline.measure_again(&reference, budget, &mut context.part(parts - 1, parts))?;
     for point in &mut points {
         baseline.set_ratios(point);
@@ -137,7 +138,7 @@ pub fn work_precision(
     Ok(WorkPrecision { reference, points })
 }
 
-/// Every method at its values, including those of the presets.
+/// Settings of every method, including those of the presets.
 fn grid(machine: &Machine, budget: &WorkBudget) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError> {
     let mut presets = Vec::new();
     for preset in Preset::ALL {
@@ -150,20 +151,20 @@ fn grid(machine: &Machine, budget: &WorkBudget) -> Result<Vec<(Setting, Option<P
             StepControl::Error => budget.tolerances.to_vec(),
             StepControl::PerImpact => budget.steps_per_impact.to_vec(),
         };
-        let own = presets.iter().filter(|(setting, _)| setting.method == method);
-        values.extend(own.map(|(setting, _)| setting.value()));
+        let of_presets = presets.iter().filter(|(setting, _)| setting.method == method);
+        values.extend(of_presets.map(|(setting, _)| setting.value()));
         values.sort_by(|a, b| b.total_cmp(a));
         values.dedup();
         for value in values {
             let setting = Setting::new(method, value);
-            let same = presets.iter().find(|(own, _)| own.method == method && own.value() == value);
-            settings.push((setting, same.map(|(_, preset)| *preset)));
+            let preset = presets.iter().find(|(other, _)| other.method == method && other.value() == value);
+            settings.push((setting, preset.map(|(_, preset)| *preset)));
         }
     }
     Ok(settings)
 }
 
-/// Runs one setting against `reference`: errors, work and time, without ratios and fronts.
+/// Runs one setting and compares it with `reference`: errors, work and time, without ratios and fronts.
 pub(super) fn measure(
     reference: &ReferenceSolution,
     setting: Setting,
@@ -253,7 +254,7 @@ impl Baseline {
     }
 
     pub(super) fn set_ratios(&self, point: &mut Point) {
-        let ratio = |own: Option<f64>, of: Option<f64>| Some(of? / own.filter(|w| *w > 0.0)?);
+        let ratio = |wall: Option<f64>, baseline: Option<f64>| Some(baseline? / wall.filter(|w| *w > 0.0)?);
         point.impacts.ratio = ratio(point.impacts.wall_s, self.impacts);
         if let Some(settled) = &mut point.settled {
             settled.ratio = ratio(settled.wall_s, self.settled);
@@ -264,8 +265,8 @@ impl Baseline {
 fn mark_fronts(points: &mut [Point], floor: &Errors) {
     let on_front = |view: View, floor: Option<f64>| {
         let pair = |point| {
-            let seen = view(point);
-            seen.map_or((f64::INFINITY, f64::NAN), |(phase, error)| (phase.wall_s.unwrap_or(f64::INFINITY), error))
+            let selected = view(point);
+            selected.map_or((f64::INFINITY, f64::NAN), |(phase, error)| (phase.wall_s.unwrap_or(f64::INFINITY), error))
         };
         let pairs: Vec<_> = points.iter().map(pair).collect();
         front(&pairs, floor.unwrap_or(0.0))

@@ -13,7 +13,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// The variants with all figures and statements: this program's model, and the one whose friction uses (13) as printed.
+    /// The variants with all figures and statements: this program's model, and the model whose friction uses (13) as printed.
     pub fn complete(&self) -> [&Findings; 2] {
         [&self.models[0], &self.models[1]]
     }
@@ -25,7 +25,7 @@ impl Report {
         let of_model = |found: &Findings| {
             found.runs.iter().map(of_run).sum::<usize>() + found.sweeps.iter().map(of_sweep).sum::<usize>()
         };
-        // Plus the run with ideal joints.
+        // One more period for the run with ideal joints.
         PAPER.period * (1 + self.models.iter().map(of_model).sum::<usize>()) as f64
     }
 }
@@ -34,11 +34,11 @@ impl Report {
 pub struct Findings {
     /// The variant.
     pub variant: &'static Variant,
-    /// The paper's runs, in the order of [`PAPER`]; then the first of them with all bodies and multipliers.
+    /// The paper's runs, in the order of [`PAPER`]; then the first of them in the `lagrange` formulation.
     pub runs: Vec<RecordedRun>,
     /// The run with ideal joints.
     pub ideal: RecordedRun,
-    /// Sweeps: [`Findings::sweep`] finds one by name.
+    /// Sweeps, which [`Findings::sweep`] finds by name.
     pub sweeps: Vec<SweepData>,
     /// Smallest distinguishable differences in x (m) and beta (rad) between two sections.
     pub resolution: [f64; 2],
@@ -48,13 +48,13 @@ impl Findings {
     /// The sweep called `name`.
     ///
     /// # Panics
-    /// If there is none.
+    /// If there is no such sweep.
     pub fn sweep(&self, name: &str) -> &SweepData {
         let found = self.sweeps.iter().find(|s| s.name == name);
         found.expect("named as in Agenda::new")
     }
 
-    /// Many sections of each run of a series.
+    /// Sections of each run of a series over many periods.
     pub fn sections(&self, series: Series) -> &[SettledPoint] {
         &self.sweep(&format!("runs_by_{series}")).points
     }
@@ -64,12 +64,12 @@ impl Findings {
         self.sweep(&format!("{series}_cold"))
     }
 
-    /// Points of that sweep.
+    /// Points of the sweep over a series' parameter from cold starts.
     pub fn swept(&self, series: Series) -> &[SettledPoint] {
         &self.cold(series).points
     }
 
-    /// Points of that sweep, and of the sweeps that follow the motion upward and downward.
+    /// Points of the sweep from cold starts, and of the sweeps that follow the motion upwards and downwards.
     pub fn branches(&self, series: Series) -> [&[SettledPoint]; 3] {
         ["cold", "up", "down"].map(|start| &self.sweep(&format!("{series}_{start}")).points[..])
     }
@@ -77,12 +77,12 @@ impl Findings {
     /// The run of `case`.
     ///
     /// # Panics
-    /// If it is not one of those in [`PAPER`].
+    /// If [`PAPER`] has no such run.
     pub fn run(&self, case: Case) -> &RecordedRun {
         self.runs.iter().find(|run| run.case == case).expect("the table names no other run")
     }
 
-    /// The nominal run with all bodies and multipliers.
+    /// The nominal run in the `lagrange` formulation.
     pub fn lagrange(&self) -> &RecordedRun {
         &self.runs[PAPER.runs.len()]
     }
@@ -92,10 +92,10 @@ impl Findings {
     /// # Panics
     /// For a combination, which has none.
     pub fn loops(&self, series: Series) -> [&SettledCurve; 3] {
-        series.cases().map(|case| self.run(case).settled.as_ref().expect("taken of all runs of the paper"))
+        series.cases().map(|case| self.run(case).settled.as_ref().expect("recorded for all runs of the paper"))
     }
 
-    /// Every published number of a named run, with this program's result.
+    /// Every published number, with this program's result for the same run.
     pub fn comparisons(&self) -> Vec<Comparison> {
         let of = |published: &'static Published| {
             let response = &self.run(published.case).response;

@@ -11,14 +11,14 @@ use crate::sweep::Sweep;
 pub struct Column {
     /// Name in files.
     pub name: &'static str,
-    /// Label.
+    /// Label in plots.
     pub label: &'static str,
     /// Unit in plots.
     pub unit: &'static str,
-    /// Size of that unit in SI units.
+    /// Size of the plot unit in SI units.
     pub one: f64,
-    /// Value at an instant.
-    pub(super) of: fn(&Observation) -> f64,
+    /// Accessor of the value at an instant.
+    pub(super) value: fn(&Observation) -> f64,
 }
 
 const fn column(
@@ -26,9 +26,9 @@ const fn column(
     label: &'static str,
     unit: &'static str,
     one: f64,
-    of: fn(&Observation) -> f64,
+    value: fn(&Observation) -> f64,
 ) -> Column {
-    Column { name, label, unit, one, of }
+    Column { name, label, unit, one, value }
 }
 
 const X: usize = Coordinate::X.index();
@@ -36,31 +36,31 @@ const BETA: usize = Coordinate::Beta.index();
 
 /// Columns of a [`RecordedRow`]; each coordinate is followed by its derivatives.
 pub const COLUMNS: [Column; 15] = [
-    column("t_s", "time", "s", 1.0, |look| look.time),
-    column("x_m", "x", "mm", 1e-3, |look| look.derivatives()[0][X]),
-    column("vx_m_s", "velocity in x", "m/s", 1.0, |look| look.derivatives()[1][X]),
-    column("ax_m_s2", "acceleration in x", "m/s²", 1.0, |look| look.derivatives()[2][X]),
-    column("beta_rad", "beta", "mrad", 1e-3, |look| look.derivatives()[0][BETA]),
-    column("beta_rate_rad_s", "rate of beta", "rad/s", 1.0, |look| look.derivatives()[1][BETA]),
-    column("beta_accel_rad_s2", "acceleration of beta", "rad/s²", 1.0, |look| look.derivatives()[2][BETA]),
-    column("S1_normal_N", "contact force", "N", 1.0, |look| normal_force(look, 0)),
-    column("S2_normal_N", "contact force", "N", 1.0, |look| normal_force(look, 1)),
-    column("S3_normal_N", "contact force", "N", 1.0, |look| normal_force(look, 2)),
-    column("x_deviation_m", "x less ideal", "mm", 1e-3, |look| look.deviation()[X]),
-    column("beta_deviation_rad", "beta less ideal", "mrad", 1e-3, |look| look.deviation()[BETA]),
-    column("probe_error_m", "tip error", "µm", 1e-6, |look| look.frame.probe_error.map_or(f64::NAN, |e| e.norm())),
-    column("constraint_drift", "largest violation so far", "", 1.0, |look| look.constraint_drift),
-    column("sample", "at the paper's output step", "", 1.0, |look| f64::from(u8::from(look.sample))),
+    column("t_s", "time", "s", 1.0, |o| o.time),
+    column("x_m", "x", "mm", 1e-3, |o| o.derivatives()[0][X]),
+    column("vx_m_s", "velocity in x", "m/s", 1.0, |o| o.derivatives()[1][X]),
+    column("ax_m_s2", "acceleration in x", "m/s²", 1.0, |o| o.derivatives()[2][X]),
+    column("beta_rad", "beta", "mrad", 1e-3, |o| o.derivatives()[0][BETA]),
+    column("beta_rate_rad_s", "rate of beta", "rad/s", 1.0, |o| o.derivatives()[1][BETA]),
+    column("beta_accel_rad_s2", "acceleration of beta", "rad/s²", 1.0, |o| o.derivatives()[2][BETA]),
+    column("S1_normal_N", "contact force", "N", 1.0, |o| normal_force(o, 0)),
+    column("S2_normal_N", "contact force", "N", 1.0, |o| normal_force(o, 1)),
+    column("S3_normal_N", "contact force", "N", 1.0, |o| normal_force(o, 2)),
+    column("x_deviation_m", "x less ideal", "mm", 1e-3, |o| o.deviation()[X]),
+    column("beta_deviation_rad", "beta less ideal", "mrad", 1e-3, |o| o.deviation()[BETA]),
+    column("probe_error_m", "tip error", "µm", 1e-6, |o| o.frame.probe_error.map_or(f64::NAN, |e| e.norm())),
+    column("constraint_drift", "largest violation so far", "", 1.0, |o| o.constraint_drift),
+    column("sample", "at the paper's output step", "", 1.0, |o| f64::from(u8::from(o.sample))),
 ];
 
-fn normal_force(look: &Observation, joint: usize) -> f64 {
-    look.frame.joints.get(joint).map_or(f64::NAN, |joint| joint.normal_force.norm())
+fn normal_force(o: &Observation, joint: usize) -> f64 {
+    o.frame.joints.get(joint).map_or(f64::NAN, |joint| joint.normal_force.norm())
 }
 
 /// Index of the column called `name`.
 ///
 /// # Panics
-/// If there is none.
+/// If there is no such column.
 pub fn column_of(name: &str) -> usize {
     let found = COLUMNS.iter().position(|c| c.name == name);
     found.unwrap_or_else(|| panic!("no column {name}"))
@@ -71,17 +71,17 @@ pub fn derivative(coordinate: Coordinate, nth: usize) -> usize {
     1 + 3 * coordinate as usize + nth
 }
 
-/// One instant of a run, in the order of [`COLUMNS`]; the last is 1 at whole multiples of the paper's output step.
+/// One instant of a run, in the order of [`COLUMNS`]; the last value is 1 at whole multiples of the paper's output step.
 pub type RecordedRow = [f64; COLUMNS.len()];
 
-/// A run of section 4.2 with everything that its figures show.
+/// A run of section 4.2 with all data of its figures.
 #[derive(Clone, Debug)]
 pub struct RecordedRun {
     /// Name in files.
     pub name: String,
     /// Clearance and friction.
     pub case: Case,
-    /// Peaks and separations.
+    /// Peaks and last separations.
     pub response: Response,
     /// All instants, in order of time.
     pub rows: Vec<RecordedRow>,
@@ -108,21 +108,20 @@ impl RecordedRun {
 pub struct SettledCurve {
     /// x (m) and beta (rad) at equal drive phases, the same for every run.
     pub coordinates: [Vec<f64>; 2],
-    /// Their rates, m/s and rad/s.
+    /// Rates of x and beta, m/s and rad/s.
     pub rates: [Vec<f64>; 2],
-    /// Largest difference of x and of beta between this period and the previous one at equal phases: the width of the
-    /// closed curve.
+    /// Width of the closed curve: largest difference of x and of beta between this period and the previous one at equal phases.
     pub width: [f64; 2],
 }
 
 /// Settled motion at one value of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SettledPoint {
-    /// Value: clearance in mm, or friction.
+    /// Value of the parameter: clearance in mm, or friction coefficient.
     pub value: f64,
     /// Regime; `None` if the point did not reach its end.
     pub regime: Option<Regime>,
-    /// Largest Lyapunov exponent and its standard error, 1/s; NaN where none was measured.
+    /// Largest Lyapunov exponent and its standard error, 1/s; NaN if not measured.
     pub exponent: (f64, f64),
     /// Kept sections in x (m) and beta (rad), in order of time.
     pub sections: [Vec<f64>; 2],
@@ -135,7 +134,7 @@ impl SettledPoint {
         last.copied().unwrap_or(f64::NAN)
     }
 
-    /// Range of a coordinate over the latter half of the sections.
+    /// Range of a coordinate over the second half of the sections.
     pub fn spread(&self, coordinate: Coordinate) -> f64 {
         let all = &self.sections[coordinate as usize];
         extent(all[all.len() / 2..].iter().copied())
@@ -146,7 +145,7 @@ impl SettledPoint {
         self.regime.map_or_else(|| NO_REGIME.to_owned(), |regime| regime.to_string())
     }
 
-    /// Drive periods after which it repeats; 0 if it does not.
+    /// Number of drive periods after which the motion repeats; 0 if it does not.
     pub fn period(&self) -> usize {
         self.regime.map_or(0, Regime::period)
     }
@@ -157,7 +156,7 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
 }
 
-/// Maximum less minimum.
+/// Maximum minus minimum.
 pub(super) fn extent(values: impl IntoIterator<Item = f64>) -> f64 {
     let (least, most) = range(values.into_iter());
     most - least
@@ -172,12 +171,12 @@ pub fn exponents(points: &[SettledPoint]) -> (f64, f64) {
 /// Name of the regime of a motion that did not reach its end.
 pub const NO_REGIME: &str = "none";
 
-/// Number of points per regime with its period, in order of first occurrence.
+/// Number of points of each regime and period, in order of first occurrence.
 pub fn regime_counts(points: &[SettledPoint]) -> Vec<(String, usize)> {
     let mut counts: Vec<(String, usize)> = Vec::new();
     for point in points {
         let word = point.regime_word();
-        match counts.iter_mut().find(|(of, _)| *of == word) {
+        match counts.iter_mut().find(|(counted, _)| *counted == word) {
             Some((_, count)) => *count += 1,
             None => counts.push((word, 1)),
         }
@@ -188,7 +187,7 @@ pub fn regime_counts(points: &[SettledPoint]) -> Vec<(String, usize)> {
 /// A sweep with the records of all its points.
 #[derive(Clone, Debug)]
 pub struct SweepData {
-    /// The model.
+    /// Variant of the model.
     pub variant: &'static Variant,
     /// Name used in file names.
     pub name: &'static str,
@@ -198,7 +197,7 @@ pub struct SweepData {
     pub sweep: Sweep,
     /// One record per point, concatenated; empty until its blocks are added.
     pub records: Vec<f64>,
-    /// Points along its axis; empty for a map, and before there are records.
+    /// Points along the axis; empty for a map, and before there are records.
     pub points: Vec<SettledPoint>,
 }
 
@@ -211,20 +210,20 @@ impl SweepData {
     /// Values of the array called `name`, grouped by point; empty if there is none.
     pub fn values(&self, name: &str) -> Vec<f64> {
         let layout = self.sweep.layout();
-        let Some(at) = layout.columns().iter().position(|c| c.name == name) else {
+        let Some(column) = layout.columns().iter().position(|c| c.name == name) else {
             return Vec::new();
         };
-        let (offset, length) = (layout.offset(at), layout.values_in(&layout.columns()[at]));
+        let (offset, length) = (layout.offset(column), layout.values_in(&layout.columns()[column]));
         let records = self.records.chunks_exact(layout.record_length());
         records.flat_map(|r| r[offset..offset + length].to_vec()).collect()
     }
 
-    /// Reads [`Self::points`] from the records.
+    /// Fills [`Self::points`] from the records.
     pub(super) fn read_points(&mut self) {
         let [axis] = self.sweep.design().axes() else {
             return;
         };
-        // Clearances in mm.
+        // Clearances are in mm.
         let factor = if axis.key() == "contact.clearance" { 1e3 } else { 1.0 };
         let kept = self.sweep.layout().kept();
         let column = |name: &str| self.values(name);

@@ -1,4 +1,4 @@
-//! Verdicts on the paper's statements: the test of each one in [`PAPER`], with its criterion and its numbers.
+//! Verdicts on the paper's statements: the tests of [`PAPER`], with their criteria and numbers.
 
 use super::Findings;
 use super::record::{
@@ -7,15 +7,15 @@ use super::record::{
 use crate::paper::{Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Series, Test};
 use crate::regime::Regime;
 
-/// A change below this fraction of the amplitude is negligible; the criteria call it 5 %.
+/// Fraction of the amplitude below which a change is negligible; the criteria state it as 5 %.
 const NEGLIGIBLE_SHARE: f64 = 0.05;
 
 /// A statement of the paper and this program's verdict.
 #[derive(Clone, Debug)]
 pub struct Statement {
-    /// Place in the paper, wording and test.
+    /// The statement's place in the paper, wording and test.
     pub claim: &'static Claim,
-    /// Whether the criterion is met here.
+    /// Whether this program's results meet the criterion.
     pub confirmed: bool,
     /// Criterion for confirmation.
     pub criterion: &'static str,
@@ -27,7 +27,7 @@ pub struct Statement {
 pub type Reading = (String, f64, &'static str);
 
 impl Findings {
-    /// Every statement of the paper, in its order.
+    /// Every statement, in the order of the paper.
     pub fn statements(&self) -> Vec<Statement> {
         let of = |claim: &'static Claim| {
             let (confirmed, criterion, evidence) = self.evaluate(&claim.test);
@@ -36,7 +36,7 @@ impl Findings {
         PAPER.statements.iter().map(of).collect()
     }
 
-    /// Evaluates a test: whether its criterion is met, the criterion, and the numbers compared with it.
+    /// Evaluates a test. Returns whether the criterion is met, the criterion, and the compared numbers.
     fn evaluate(&self, test: &Test) -> (bool, &'static str, Vec<Reading>) {
         match *test {
             Test::StaysNearIdeal { coordinate, run } => {
@@ -55,11 +55,11 @@ impl Findings {
             }
             Test::AllGrow(series) => {
                 let tests = PAPER.statements.iter().map(|claim| &claim.test);
-                let own = |test: &&Test| matches!(test, Test::Grows { with, .. } if *with == series);
-                let grown: Vec<bool> = tests.filter(own).map(|test| self.evaluate(test).0).collect();
-                let held = grown.iter().filter(|held| **held).count();
-                let evidence = vec![count_reading("that grow", held), count_reading("measured", grown.len())];
-                (held == grown.len(), "every measured quantity of section 4.2 grows at both steps", evidence)
+                let of_series = |test: &&Test| matches!(test, Test::Grows { with, .. } if *with == series);
+                let grows: Vec<bool> = tests.filter(of_series).map(|test| self.evaluate(test).0).collect();
+                let growing = grows.iter().filter(|grows| **grows).count();
+                let evidence = vec![count_reading("that grow", growing), count_reading("measured", grows.len())];
+                (growing == grows.len(), "every measured quantity of section 4.2 grows at both steps", evidence)
             }
             Test::Exceeds { of, that, over } => {
                 let [large, small] = [of, that].map(|quantity| self.values(quantity, over));
@@ -222,7 +222,7 @@ impl Findings {
         }
     }
 
-    /// Distances in a coordinate, run by run, and the smallest one that counts.
+    /// Distances in a coordinate, run by run, and the resolution.
     fn distance_readings(&self, of: Coordinate, over: Series, sizes: &[f64]) -> Vec<Reading> {
         let runs = over.cases().map(|case| over.run_name(case)).into_iter().zip(sizes);
         let runs = runs.map(|(name, size)| distance_reading(&name, *size, of));
@@ -252,7 +252,7 @@ impl Findings {
     }
 }
 
-/// Largest distance between any two of `curves` at any instant from `from` (s) on, over the amplitude.
+/// Largest distance between any two of `curves` at any instant from `from` (s) on, relative to the amplitude.
 fn largest_distance(curves: &[Vec<&RecordedRow>], column: usize, from: f64) -> f64 {
     let coordinate = Coordinate::ALL[(column - 1) / 3];
     let late = curves.iter().map(|c| {
@@ -269,7 +269,8 @@ fn largest_difference<C: AsRef<[f64]>>(curves: &[C]) -> f64 {
     (0..places).map(|k| extent(curves.iter().map(|c| c.as_ref()[k]))).fold(0.0, f64::max)
 }
 
-/// Fraction of the sections within half of the largest distance from their mean; `None` if they cannot be told apart.
+/// Fraction of the sections within half of the largest distance from their mean; `None` if the sections cannot be
+/// distinguished.
 fn share_near_mean(run: &SettledPoint, resolution: [f64; 2]) -> Option<f64> {
     let middle = [0, 1].map(|c| {
         let all = &run.sections[c];
@@ -292,13 +293,13 @@ fn readings_per_run(series: Series, values: &[f64], unit: &'static str) -> Vec<R
     runs.map(|(case, value)| (series.run_name(case), *value, unit)).collect()
 }
 
-/// Converts shares, fractions of 1, to percent.
+/// Readings in percent of `shares`, which are fractions.
 fn percent_readings<'a>(of: impl IntoIterator<Item = &'a str>, shares: &[f64]) -> Vec<Reading> {
     let shares = of.into_iter().zip(shares);
     shares.map(|(of, share)| (of.to_owned(), share * 100.0, "%")).collect()
 }
 
-/// Converts a distance in a coordinate, m or rad, to µm or µrad.
+/// Reading in µm or µrad of a distance in a coordinate, m or rad.
 fn distance_reading(of: &str, size: f64, coordinate: Coordinate) -> Reading {
     (of.to_owned(), size * 1e6, ["µm", "µrad"][coordinate as usize])
 }
@@ -328,7 +329,7 @@ fn is_ascending(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] < pair[1])
 }
 
-/// Number of points per regime, and the range of exponents.
+/// Readings of the number of points per regime and of the range of exponents.
 fn regime_readings(points: &[SettledPoint]) -> Vec<Reading> {
     let mut counts: Vec<Reading> = regime_counts(points).into_iter().map(|(word, n)| count_reading(&word, n)).collect();
     let (least, most) = exponents(points);
@@ -345,16 +346,17 @@ mod tests {
     use crate::response::respond;
     use jointplay_scene::Scene;
 
-    /// The same short run for every case, settled curves at rest, and sweeps of zeros: each test fills in what it needs.
-    fn nothing_moves() -> Findings {
+    /// Findings with the same short run for every case, settled curves at rest and sweeps of zeros. Each test fills in the
+    /// results it needs.
+    fn findings_at_rest() -> Findings {
         let (runs, sweep, map_periods) = ((9, 1), (3, 1), (2, 1));
         let work = Agenda::new(Extent { settle: 1, runs, values: [2, 2], sweep, map: [2, 2], map_periods });
         let scene = Scene::load("spcmm", &[]).expect("built in");
         let response = respond(&scene, 1e-3, 1e-3, |_| (), |_| true).expect("runs");
         let outcome = |job: &ReportJob| match *job {
             ReportJob::Run(n) => {
-                let still = || [vec![0.0; 4], vec![0.0; 4]];
-                let settled = Some(SettledCurve { coordinates: still(), rates: still(), width: [0.0; 2] });
+                let at_rest = || [vec![0.0; 4], vec![0.0; 4]];
+                let settled = Some(SettledCurve { coordinates: at_rest(), rates: at_rest(), width: [0.0; 2] });
                 let (response, case) = (response.clone(), work.runs[n].case);
                 Outcome::Run(Box::new(RecordedRun { name: String::new(), case, response, rows: Vec::new(), settled }))
             }
@@ -371,14 +373,14 @@ mod tests {
     }
 
     impl Findings {
-        /// Expects verdicts by place and words of the statement.
+        /// Asserts verdicts, given by the place and words of the statement.
         #[track_caller]
         fn expect(&self, verdicts: &[(&str, &str, bool)]) {
             let statements = self.statements();
             for (place, says, confirmed) in verdicts {
-                let own = |s: &&Statement| s.claim.place.ends_with(place) && s.claim.says.contains(says);
-                let own: Vec<bool> = statements.iter().filter(own).map(|s| s.confirmed).collect();
-                assert_eq!(own, [*confirmed], "{place}, {says}");
+                let matches = |s: &&Statement| s.claim.place.ends_with(place) && s.claim.says.contains(says);
+                let matching: Vec<bool> = statements.iter().filter(matches).map(|s| s.confirmed).collect();
+                assert_eq!(matching, [*confirmed], "{place}, {says}");
             }
         }
     }
@@ -396,14 +398,14 @@ mod tests {
         std::array::from_fn(|k| if k % 2 == 0 { 0.0 } else { width })
     }
 
-    fn put(found: &mut Findings, name: &str, points: Vec<SettledPoint>) {
+    fn set_points(found: &mut Findings, name: &str, points: Vec<SettledPoint>) {
         let sweep = found.sweeps.iter_mut().find(|s| s.name == name);
         sweep.expect("a sweep").points = points;
     }
 
     #[test]
     fn verdicts_on_runs_follow_the_numbers() {
-        let mut found = nothing_moves();
+        let mut found = findings_at_rest();
         let runs = [
             ([3.0, 2.0, 1.0], 0.1, [1.0, 2.0], 1e-3),
             ([3.0, 2.0, 1.0], 0.2, [1.0, 3.0], 2e-3),
@@ -451,8 +453,8 @@ mod tests {
     }
 
     #[test]
-    fn a_conclusion_needs_every_quantity() {
-        let mut found = nothing_moves();
+    fn a_conclusion_requires_every_quantity() {
+        let mut found = findings_at_rest();
         let grow = |found: &mut Findings, case: usize, size: f64| {
             let response = &mut found.runs[case].response;
             for values in [&mut response.full.deviation, &mut response.full.rate, &mut response.full.acceleration] {
@@ -471,8 +473,8 @@ mod tests {
     }
 
     #[test]
-    fn curves_coincide_from_the_instant_that_is_asked_for() {
-        // A curve that is off by `early` until 0.35 s and by `late` afterwards, in every coordinate and derivative.
+    fn curves_are_compared_from_the_given_instant() {
+        // A curve that deviates by `early` until 0.35 s and by `late` afterwards, in every coordinate and derivative.
         let curve = |early: f64, late: f64| -> Vec<RecordedRow> {
             let instants = (0..=20).map(|k| f64::from(k) * 0.1);
             let row = |t: f64| {
@@ -488,9 +490,9 @@ mod tests {
             };
             instants.map(row).collect()
         };
-        let mut found = nothing_moves();
-        // Over clearance the curves differ only at the beginning, until after 0.3 s; over friction they differ by 4 % from there
-        // on.
+        let mut found = findings_at_rest();
+        // Over clearance the curves differ only at first, until shortly after 0.3 s; over friction they differ by 4 % after
+        // that.
         let off = [(0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.0, 0.02), (0.0, 0.04)];
         for (run, (early, late)) in found.runs.iter_mut().zip(off) {
             run.rows = curve(early, late);
@@ -521,7 +523,7 @@ mod tests {
     #[test]
     fn verdicts_on_sections_follow_the_sweeps() {
         // Results that agree with the paper.
-        let mut found = nothing_moves();
+        let mut found = findings_at_rest();
         let as_printed = vec![
             point(0.01, Regime::Periodic(1), 0.2, &wide(0.0)),
             point(0.5, Regime::Periodic(1), 0.2, &wide(0.0)),
@@ -529,8 +531,8 @@ mod tests {
         ];
         let runs =
             |regime, width: f64| [1.0, 2.0, 3.0].map(|n| point(n, regime, 0.2 + 0.01 * n, &wide(width * n))).to_vec();
-        put(&mut found, "clearance_cold", as_printed.clone());
-        put(&mut found, "runs_by_clearance", runs(Regime::QuasiPeriodic, 1e-4));
+        set_points(&mut found, "clearance_cold", as_printed.clone());
+        set_points(&mut found, "runs_by_clearance", runs(Regime::QuasiPeriodic, 1e-4));
         found.expect(&[
             ("Figure 20a", "periodic", true),
             ("Figure 20b", "chaotic", true),
@@ -539,14 +541,14 @@ mod tests {
             ("Figure 19a", "quasi-periodic", true),
             ("Figure 19b", "areas", true),
         ]);
-        // All motions are periodic: over clearance all at one place, over friction at places 10 mm of 25 mm apart.
-        let still = [0.01, 0.5, 1.0].map(|c| point(c, Regime::Periodic(1), 0.2, &wide(0.0)));
-        put(&mut found, "clearance_cold", still.to_vec());
-        put(&mut found, "runs_by_clearance", still.to_vec());
-        put(&mut found, "runs_by_friction", still.to_vec());
-        let mut apart = still[..2].to_vec();
+        // All motions are periodic: at the same place over clearance, and 10 mm of 25 mm apart over friction.
+        let at_rest = [0.01, 0.5, 1.0].map(|c| point(c, Regime::Periodic(1), 0.2, &wide(0.0)));
+        set_points(&mut found, "clearance_cold", at_rest.to_vec());
+        set_points(&mut found, "runs_by_clearance", at_rest.to_vec());
+        set_points(&mut found, "runs_by_friction", at_rest.to_vec());
+        let mut apart = at_rest[..2].to_vec();
         apart[1].sections[0] = vec![0.21; 8];
-        put(&mut found, "friction_cold", apart);
+        set_points(&mut found, "friction_cold", apart);
         found.expect(&[
             ("Figure 20a", "periodic", true),
             ("Figure 20b", "chaotic", false),
@@ -562,10 +564,10 @@ mod tests {
             ("third conclusion", "friction has little", true),
         ]);
         // Chaos at a single friction value, and an x that moves from section to section.
-        put(&mut found, "friction_cold", as_printed.clone());
+        set_points(&mut found, "friction_cold", as_printed.clone());
         let mut moving = as_printed;
         moving[2].sections[0] = wide(1e-3).to_vec();
-        put(&mut found, "clearance_cold", moving);
+        set_points(&mut found, "clearance_cold", moving);
         found.expect(&[
             ("third conclusion", "friction has little", false),
             ("Figure 23", "motion is periodic", false),
@@ -574,7 +576,7 @@ mod tests {
     }
 
     #[test]
-    fn sections_crowd_around_a_centre_only_where_they_can_be_told_apart() {
+    fn sections_crowd_around_a_centre_only_if_they_can_be_distinguished() {
         let near = [0.0, 1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 9.0, -9.0];
         let with =
             |size: f64| share_near_mean(&point(0.2, Regime::Chaotic, 0.2, &near.map(|v| v * size)), [1e-7, 1e-6]);
@@ -586,7 +588,7 @@ mod tests {
 
     #[test]
     fn portraits_are_compared_at_equal_phases() {
-        let mut found = nothing_moves();
+        let mut found = findings_at_rest();
         // Over clearance the curves are 0.2 mm apart and increasingly wide; over friction they are 4 mm of 25 mm apart.
         let curves = [(0.0, 1e-3), (1e-4, 2e-3), (2e-4, 3e-3), (4e-3, 0.0), (0.0, 1e-3)];
         let settled = |found: &mut Findings, run: usize, (x, width): (f64, f64)| {
