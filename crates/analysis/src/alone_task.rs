@@ -71,7 +71,7 @@ pub(super) async fn run(
     let alone = Alone::between(&scene, &task.over)?;
     let keys: Vec<String> = task.over.iter().map(|(key, _)| key.clone()).collect();
     // An output can be unknown in this scene: not every scene has a probe or an energy ledger.
-    let known = task.outputs.iter().map(|name| outputs(&scene, name).ok().and_then(|mut found| found.pop()));
+    let known = task.outputs.iter().map(|name| outputs(&scene, name).ok().and_then(|mut outputs| outputs.pop()));
     let known: Vec<Option<Output>> = known.collect();
     let available: Vec<Output> = known.iter().flatten().cloned().collect();
     let runs = StudyRuns::new(&scene, &keys, &available, task.span, &alone.rows())?;
@@ -208,15 +208,15 @@ mod tests {
     #[test]
     fn faults_are_reported() {
         let good = || task("spcmm", "joint.*.clearance");
-        let of = |key: &str, ends| AloneTask { over: vec![(key.to_owned(), ends)], ..good() };
-        let spans = |duration, from| AloneTask { span: RunSpan { duration, from }, ..good() };
+        let over = |key: &str, ends| AloneTask { over: vec![(key.to_owned(), ends)], ..good() };
+        let with_span = |duration, from| AloneTask { span: RunSpan { duration, from }, ..good() };
         for (task, words) in [
-            (of("joint.S9.clearance", [1e-4, 2e-4]), "joint.S9.clearance: "),
-            (of("joint.S1.clearance", [4e-4, 2e-4]), "joint.S1.clearance: the lower limit"),
-            (of("joint.S1.friction", [0.0, 99.0]), "joint.S1.friction: 99: out of range"),
-            (of("solver.preset", [0.0, 1.0]), "solver.preset: its values are no real numbers"),
-            (spans(0.1, 0.1), "runs of 0.1 s, observed from 0.1 s on"),
-            (spans(f64::NAN, 0.0), "must begin before the end"),
+            (over("joint.S9.clearance", [1e-4, 2e-4]), "joint.S9.clearance: "),
+            (over("joint.S1.clearance", [4e-4, 2e-4]), "joint.S1.clearance: the lower limit"),
+            (over("joint.S1.friction", [0.0, 99.0]), "joint.S1.friction: 99: out of range"),
+            (over("solver.preset", [0.0, 1.0]), "solver.preset: its values are no real numbers"),
+            (with_span(0.1, 0.1), "runs of 0.1 s, observed from 0.1 s on"),
+            (with_span(f64::NAN, 0.0), "must begin before the end"),
         ] {
             let messages = messages_without_text(&task);
             let [Message::Failed(why)] = &messages[..] else {

@@ -157,10 +157,10 @@ impl Design {
             Arrangement::Crossed => std::slice::from_ref(last),
             Arrangement::Zipped => &self.axes[..],
         };
-        if let Some(waiting) = along.iter().find(|axis| axis.waits_for_restart(scene)) {
+        if let Some(deferred) = along.iter().find(|axis| axis.waits_for_restart(scene)) {
             let why = format!(
                 "{} takes effect at the next reset only, so no state can be followed through its values",
-                waiting.key()
+                deferred.key()
             );
             let has_no_alternative = others.is_empty() || self.arrangement == Arrangement::Zipped;
             return invalid(why, if has_no_alternative { "" } else { ", or name another range last" });
@@ -356,9 +356,9 @@ mod tests {
     fn blocks_cover_every_point_once_and_stay_in_their_row() {
         let scene = spcmm();
         let axes = || vec![axis("contact.friction=0.1..0.4:3"), axis("contact.clearance=0.1mm..1mm:60")];
-        let of = |starts: &[Start]| Design::crossed(&scene, axes(), starts).expect("a map");
+        let with_starts = |starts: &[Start]| Design::crossed(&scene, axes(), starts).expect("a map");
         for starts in [&[Start::Cold][..], &[Start::FollowUp], &[Start::FollowDown], &Start::ALL] {
-            let design = of(starts);
+            let design = with_starts(starts);
             assert_eq!(design.points(), 180 * starts.len());
             let mut seen = vec![0; design.points()];
             for b in 0..design.blocks() {
@@ -373,7 +373,7 @@ mod tests {
             }
             assert!(seen.iter().all(|&n| n == 1), "{starts:?}");
         }
-        let design = of(&Start::ALL);
+        let design = with_starts(&Start::ALL);
         assert_eq!(design.shape(), [3, 3, 60]);
         assert_eq!(design.indices(180 + 61), [1, 1]);
         assert_eq!(design.settings(61)[0], ("contact.friction", Value::Number(0.25)));

@@ -149,7 +149,7 @@ impl Distribution {
     }
 
     /// Parses a value, `uniform(LOW, HIGH)`, `normal(MEAN, SD)`, `normal(MEAN, SD, LOW..HIGH)`, `triangular(LOW, MODE, HIGH)`,
-    /// `measured(VALUE, …)` or a fit such as `H7/g6`. `number` parses a value with its unit and returns it in SI. `of_fit`
+    /// `measured(VALUE, …)` or a fit such as `H7/g6`. `number` parses a value with its unit and returns it in SI. `parse_fit`
     /// parses a fit and returns the resulting distribution of the parameter ([`crate::iso286::Fit::radial_clearance`]), because
     /// only the caller knows the nominal size.
     ///
@@ -158,7 +158,7 @@ impl Distribution {
     pub fn parse<E: Display>(
         text: &str,
         number: impl Fn(&str) -> Result<f64, E>,
-        of_fit: impl FnOnce(&str) -> Result<Self, E>,
+        parse_fit: impl FnOnce(&str) -> Result<Self, E>,
     ) -> Result<Self, DistributionError> {
         let given = || text.to_owned();
         let read = |part: &str| {
@@ -173,7 +173,7 @@ impl Distribution {
         let trimmed = text.trim();
         let Some((name, rest)) = trimmed.split_once('(') else {
             if trimmed.contains('/') && !trimmed.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) {
-                return of_fit(trimmed)
+                return parse_fit(trimmed)
                     .map_err(|reason| DistributionError::Fit { text: given(), reason: reason.to_string() });
             }
             // A word without parentheses is a form whose numbers are missing, not a number.

@@ -222,7 +222,7 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
     }
 
     fn is_known_to_fail(&self, choice: &[usize]) -> bool {
-        self.failed.iter().any(|failed| choice.iter().zip(failed).all(|(own, failed)| own <= failed))
+        self.failed.iter().any(|failed| choice.iter().zip(failed).all(|(level, failed)| level <= failed))
     }
 
     /// Whether a choice holds the yield; `None` if no evaluation is left. If it does and is cheaper than the best, it becomes
@@ -239,7 +239,7 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
         let estimate = (self.evaluate)(&candidates)?;
         let is_held = self.problem.required.is_held(estimate);
         if !is_held {
-            self.failed.retain(|failed| failed.iter().zip(choice).any(|(failed, own)| failed > own));
+            self.failed.retain(|failed| failed.iter().zip(choice).any(|(failed, level)| failed > level));
             self.failed.push(choice.to_vec());
         } else if self.cost(choice) < self.best_cost() {
             self.best = Some((choice.to_vec(), estimate));

@@ -195,10 +195,10 @@ impl SaltelliDesign {
             mean: full_sample.mean,
             variance: full_sample.variance,
             first: first
-                .map(|(i, &own)| estimate(own, resampled.iter().map(|(first, _)| first[i]).collect()))
+                .map(|(i, &value)| estimate(value, resampled.iter().map(|(first, _)| first[i]).collect()))
                 .collect(),
             total: total
-                .map(|(i, &own)| estimate(own, resampled.iter().map(|(_, total)| total[i]).collect()))
+                .map(|(i, &value)| estimate(value, resampled.iter().map(|(_, total)| total[i]).collect()))
                 .collect(),
             rows: rows.len(),
             incomplete_rows,
@@ -286,18 +286,18 @@ mod tests {
         }
         for seed in 0..4 {
             let design = SaltelliDesign::new(Sampling::Sobol, 3, 1 << 12, seed).unwrap();
-            let own = design.indices(&run(&design, ishigami), Bootstrap::default()).unwrap();
-            assert!((own.mean - 3.5).abs() < 0.01 && (own.rows, own.incomplete_rows) == (1 << 12, 0));
-            check(&own, &exact, 0.01);
+            let computed = design.indices(&run(&design, ishigami), Bootstrap::default()).unwrap();
+            assert!((computed.mean - 3.5).abs() < 0.01 && (computed.rows, computed.incomplete_rows) == (1 << 12, 0));
+            check(&computed, &exact, 0.01);
         }
     }
 
     #[test]
     fn equal_additive_inputs_share_the_variance() {
         let design = SaltelliDesign::new(Sampling::Sobol, 8, 1 << 11, 5).unwrap();
-        let own = design.indices(&run(&design, |u| 1000.0 + u.iter().sum::<f64>()), Bootstrap::default()).unwrap();
-        check(&own, &[(0.125, 0.125); 8], 0.005);
-        assert!((own.variance - 8.0 / 12.0).abs() < 1e-3);
+        let computed = design.indices(&run(&design, |u| 1000.0 + u.iter().sum::<f64>()), Bootstrap::default()).unwrap();
+        check(&computed, &[(0.125, 0.125); 8], 0.005);
+        assert!((computed.variance - 8.0 / 12.0).abs() < 1e-3);
     }
 
     #[test]
@@ -319,8 +319,9 @@ mod tests {
         for seed in 0..100 {
             let design = SaltelliDesign::new(Sampling::Random, 3, 256, seed).unwrap();
             let bootstrap = Bootstrap { resamples: 200, confidence: 0.9, seed };
-            let own = design.indices(&run(&design, ishigami), bootstrap).unwrap();
-            covered += (0..3).filter(|&i| own.total[i].low <= exact[i].1 && exact[i].1 <= own.total[i].high).count();
+            let computed = design.indices(&run(&design, ishigami), bootstrap).unwrap();
+            covered +=
+                (0..3).filter(|&i| computed.total[i].low <= exact[i].1 && exact[i].1 <= computed.total[i].high).count();
         }
         // 270 of 300 expected, with standard deviation 5.2 if independent; percentile intervals of a ratio are slightly too
         // short.
@@ -350,9 +351,9 @@ mod tests {
         for missing in [3, 4, 1000, 20_000] {
             results[missing] = f64::NAN;
         }
-        let own = design.indices(&results, Bootstrap::default()).unwrap();
-        assert_eq!((own.rows, own.incomplete_rows), ((1 << 12) - 3, 3));
-        check(&own, &ishigami_indices(), 0.015);
+        let computed = design.indices(&results, Bootstrap::default()).unwrap();
+        assert_eq!((computed.rows, computed.incomplete_rows), ((1 << 12) - 3, 3));
+        check(&computed, &ishigami_indices(), 0.015);
         results[8..].fill(f64::INFINITY);
         let error = design.indices(&results, Bootstrap::default()).unwrap_err();
         assert_eq!(error, IndicesError::TooFewRows { complete: 0, rows: 1 << 12 });
@@ -363,10 +364,10 @@ mod tests {
         let design = SaltelliDesign::new(Sampling::Sobol, 2, 16, 0).unwrap();
         let error = design.indices(&[4.5; 64], Bootstrap::default()).unwrap_err();
         assert_eq!(error.to_string(), "the variance of the result is 0: it is 4.5, whatever the inputs");
-        let of = |bootstrap| design.indices(&run(&design, |u| u[0]), bootstrap);
-        assert!(of(Bootstrap { resamples: 10, ..Bootstrap::default() }).is_err());
-        assert!(of(Bootstrap { confidence: 1.0, ..Bootstrap::default() }).is_err());
-        assert_eq!(of(Bootstrap::default()), of(Bootstrap::default()));
+        let with_bootstrap = |bootstrap| design.indices(&run(&design, |u| u[0]), bootstrap);
+        assert!(with_bootstrap(Bootstrap { resamples: 10, ..Bootstrap::default() }).is_err());
+        assert!(with_bootstrap(Bootstrap { confidence: 1.0, ..Bootstrap::default() }).is_err());
+        assert_eq!(with_bootstrap(Bootstrap::default()), with_bootstrap(Bootstrap::default()));
         assert!(design.indices(&[1.0], Bootstrap::default()).is_err());
         assert!(matches!(SaltelliDesign::new(Sampling::Sobol, 65, 16, 0), Err(IndicesError::Inputs { .. })));
         assert!(matches!(SaltelliDesign::new(Sampling::Sobol, 64, MAX_POINTS, 0), Err(IndicesError::Size { .. })));

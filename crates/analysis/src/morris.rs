@@ -237,16 +237,19 @@ mod tests {
         // sqrt(5)/6; (u2 - 1/2)^2: effects of both signs that cancel in the mean.
         let plan = MorrisPlan::new(3, 2000, 4, 0.0, 9).unwrap();
         let effects = plan.effects(&run(&plan, |u| u[0] * u[1] + (u[2] - 0.5).powi(2))).unwrap();
-        let of = |input: usize| effects[input].unwrap();
+        let effect_of = |input: usize| effects[input].unwrap();
         let root = 2000_f64.sqrt();
         for input in [0, 1] {
-            let effect = of(input);
+            let effect = effect_of(input);
             assert!((effect.mean - 0.5).abs() < 5.0 * effect.mean_error);
             assert!((effect.deviation - 5_f64.sqrt() / 6.0).abs() < 0.02, "{}", effect.deviation);
             assert!((effect.mean_error - effect.deviation / root).abs() < 1e-15);
         }
         // From 0 to 2/3 and from 1/3 to 1: (1/36 - 1/4) / (2/3) and (1/4 - 1/36) / (2/3).
-        assert!((of(2).mean_magnitude - 1.0 / 3.0).abs() < 1e-12 && of(2).mean.abs() < 5.0 * of(2).mean_error);
+        assert!(
+            (effect_of(2).mean_magnitude - 1.0 / 3.0).abs() < 1e-12
+                && effect_of(2).mean.abs() < 5.0 * effect_of(2).mean_error
+        );
     }
 
     #[test]

@@ -327,8 +327,8 @@ mod tests {
         for published in &PAPER.numbers {
             assert!(PAPER.runs.contains(&published.case), "{published:?}");
             assert!(published.value > 0.0);
-            let of = figures().filter(|f| f.contains(&published.figure));
-            assert_eq!(of.count(), 1, "{published:?}");
+            let matching = figures().filter(|f| f.contains(&published.figure));
+            assert_eq!(matching.count(), 1, "{published:?}");
         }
         assert_eq!((PAPER.numbers.len(), PAPER.statements.len()), (51, 52));
     }

@@ -51,8 +51,8 @@ impl Regime {
 
     /// The regime for a code in files and, if periodic, a period; `None` for a point that did not reach its end.
     pub fn of_code(code: i64, period: usize) -> Option<Self> {
-        let found = Self::ALL.into_iter().find(|regime| regime.code() == code);
-        found.map(|regime| match regime {
+        let regime = Self::ALL.into_iter().find(|regime| regime.code() == code);
+        regime.map(|regime| match regime {
             Self::Periodic(_) => Self::Periodic(period),
             other => other,
         })

@@ -104,7 +104,7 @@ impl ChannelStatistic {
     /// A malformed entry, an unknown channel or statistic; a scene that does not start.
     pub fn parse_list(scene: &Scene, text: &str) -> Result<Vec<Self>, StatisticError> {
         let list = channels(&scene.machine, &mut Simulation::new(&scene.machine)?);
-        let mut found: Vec<Self> = Vec::new();
+        let mut statistics: Vec<Self> = Vec::new();
         for entry in text.split(',').map(str::trim) {
             let given = || entry.to_owned();
             let (pattern, word) = entry.rsplit_once(':').ok_or_else(|| StatisticError::Form { text: given() })?;
@@ -121,12 +121,12 @@ impl ChannelStatistic {
                     column: channel.column_of(statistic.word()),
                     unit: channel.unit,
                 };
-                if !found.contains(&next) {
-                    found.push(next);
+                if !statistics.contains(&next) {
+                    statistics.push(next);
                 }
             }
         }
-        Ok(found)
+        Ok(statistics)
     }
 
     /// Column name in files, with the SI unit, such as `S1_normal_max_N`.
@@ -298,22 +298,25 @@ mod tests {
     #[test]
     fn patterns_select_channels_and_column_names_end_with_the_unit() {
         let columns = |text: &str| {
-            let found = ChannelStatistic::parse_list(&scene(), text).expect(text);
-            found.iter().map(|of| of.column().to_owned()).collect::<Vec<_>>().join(" ")
+            let statistics = ChannelStatistic::parse_list(&scene(), text).expect(text);
+            statistics.iter().map(|statistic| statistic.column().to_owned()).collect::<Vec<_>>().join(" ")
         };
-        for (text, found) in [
+        for (text, expected) in [
             ("B.normal:max, B.normal:rms", "B_normal_max_N B_normal_rms_N"),
             ("*.force:mean", "B_force_x_mean_N B_force_y_mean_N B_force_z_mean_N"),
             ("crank.angle:end,crank.rate:std", "crank_angle_end_rad crank_rate_std_rad_s"),
             ("B.state:mean", "B_state_mean"),
             ("crank.*ng*:max,crank.angle:max", "crank_angle_max_rad"),
         ] {
-            let found: Vec<&str> = found.split(' ').collect();
-            let own = columns(text);
-            assert!(found.iter().all(|column| own.split(' ').any(|own| own == *column)), "{text}: {own}");
+            let expected: Vec<&str> = expected.split(' ').collect();
+            let computed = columns(text);
+            assert!(
+                expected.iter().all(|name| computed.split(' ').any(|column| column == *name)),
+                "{text}: {computed}"
+            );
         }
-        let twice = columns("B.normal:max,B.normal:max");
-        assert_eq!(twice, "B_normal_max_N");
+        let repeated = columns("B.normal:max,B.normal:max");
+        assert_eq!(repeated, "B_normal_max_N");
         for (text, fragment) in [
             ("B.normal", "expected CHANNEL:STATISTIC"),
             ("", "expected CHANNEL:STATISTIC"),

@@ -352,8 +352,8 @@ mod tests {
                 }
             }
             let pose = machine.frame().pose;
-            let found = crate::drive::observed(&pose);
-            assert_eq!(found[..6], *point.sections.last().expect("kept"));
+            let computed = crate::drive::observed(&pose);
+            assert_eq!(computed[..6], *point.sections.last().expect("kept"));
         }
     }
 
@@ -408,8 +408,8 @@ mod tests {
     #[test]
     fn states_follow_a_user_parameter_if_only_contacts_depend_on_it() {
         let built_in = Scene::load("slider-crank-driven", &[]).expect("built in");
-        let own = "[[parameter]]\nname = \"gap\"\nvalue = \"0.2 mm\"\n";
-        let text = format!("{}\n{own}", built_in.source.text);
+        let parameter = "[[parameter]]\nname = \"gap\"\nvalue = \"0.2 mm\"\n";
+        let text = format!("{}\n{parameter}", built_in.source.text);
         for (place, instead, followed) in [
             ("clearance = \"0.3 mm\"", "clearance = \"gap\"", true),
             ("mass = \"0.12 kg\"", "mass = \"gap * 600 kg / 1 m\"", false),

@@ -172,7 +172,7 @@ pub(super) fn measure(
     context: &mut RunContext,
 ) -> Result<Point, AnalysisError> {
     let (end, mut errors, work) = match reference.impact_errors(&setting, budget, context) {
-        Ok(found) => found,
+        Ok(measured) => measured,
         Err(AnalysisError::Start(refused)) => {
             let (end, none) = (End::Refused(refused), PhaseCost::default());
             return Ok(Point {

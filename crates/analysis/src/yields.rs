@@ -272,9 +272,9 @@ fn reject_driver(values: &[f64], accepted: &[bool]) -> RejectDriver {
     units.sort_by(|a, b| a.0.total_cmp(&b.0));
     let good = accepted.iter().filter(|&&accepted| accepted).count() as f64;
     let bad = accepted.len() as f64 - good;
-    let mean_of = |of: bool, count: f64| {
-        let own = values.iter().zip(accepted).filter(|(_, accepted)| **accepted == of);
-        own.map(|(value, _)| value).sum::<f64>() / count
+    let mean_of = |group: bool, count: f64| {
+        let members = values.iter().zip(accepted).filter(|(_, accepted)| **accepted == group);
+        members.map(|(value, _)| value).sum::<f64>() / count
     };
     let (_, deviation) = mean_and_deviation(values);
     let shift = mean_of(false, bad) - mean_of(true, good);

@@ -178,8 +178,9 @@ fn a_hole_with_an_increment_has_the_clearance_of_the_matching_shaft() {
     // The purpose of Δ (ISO 286-1:1988, annex A): N7/h6 has the clearance of H7/n6, P7/h6 of H7/p6, ….
     for nominal in [5.0, 9.0, 15.0, 25.0, 45.0, 75.0, 110.0, 150.0, 220.0, 400.0, 480.0] {
         for letter in ["k", "m", "n", "p", "r", "s"] {
-            let of = |text: String| text.parse::<Fit>().unwrap().clearance(nominal * 1e-3).unwrap();
-            let (hole, shaft) = (of(format!("{}7/h6", letter.to_uppercase())), of(format!("H7/{letter}6")));
+            let clearance = |text: String| text.parse::<Fit>().unwrap().clearance(nominal * 1e-3).unwrap();
+            let (hole, shaft) =
+                (clearance(format!("{}7/h6", letter.to_uppercase())), clearance(format!("H7/{letter}6")));
             let same = |a: f64, b: f64| (a - b).abs() < 1e-12;
             assert!(same(hole.min, shaft.min) && same(hole.max, shaft.max), "{nominal} {letter}");
         }
@@ -188,7 +189,7 @@ fn a_hole_with_an_increment_has_the_clearance_of_the_matching_shaft() {
 
 #[test]
 fn clearances_of_fits_match_published_values() {
-    let of = |nominal: f64, text: &str| text.parse::<Fit>().unwrap().clearance(nominal * 1e-3).unwrap();
+    let clearance_of = |nominal: f64, text: &str| text.parse::<Fit>().unwrap().clearance(nominal * 1e-3).unwrap();
     let published = [
         (50.0, "H7/g6", 9.0, 50.0, FitKind::Clearance),
         (25.0, "H8/f7", 20.0, 74.0, FitKind::Clearance),
@@ -198,7 +199,7 @@ fn clearances_of_fits_match_published_values() {
         (25.0, "H7/p6", -35.0, -1.0, FitKind::Interference),
     ];
     for (nominal, text, min, max, kind) in published {
-        let clearance = of(nominal, text);
+        let clearance = clearance_of(nominal, text);
         assert!((clearance.min * 1e6 - min).abs() < 1e-6 && (clearance.max * 1e6 - max).abs() < 1e-6, "{text}");
         assert_eq!(clearance.kind(), kind, "{text}");
     }

@@ -22,8 +22,8 @@ impl Report {
     pub fn simulated(&self) -> f64 {
         let of_sweep = |data: &SweepData| data.plan.periods * data.sweep.design().points();
         let of_run = |run: &RecordedRun| if run.settled.is_some() { 1 + self.extent.settle + 2 } else { 1 };
-        let of_model = |found: &Findings| {
-            found.runs.iter().map(of_run).sum::<usize>() + found.sweeps.iter().map(of_sweep).sum::<usize>()
+        let of_model = |findings: &Findings| {
+            findings.runs.iter().map(of_run).sum::<usize>() + findings.sweeps.iter().map(of_sweep).sum::<usize>()
         };
         // One more period for the run with ideal joints.
         PAPER.period * (1 + self.models.iter().map(of_model).sum::<usize>()) as f64
@@ -50,8 +50,8 @@ impl Findings {
     /// # Panics
     /// If there is no such sweep.
     pub fn sweep(&self, name: &str) -> &SweepData {
-        let found = self.sweeps.iter().find(|s| s.name == name);
-        found.expect("named as in Agenda::new")
+        let sweep = self.sweeps.iter().find(|s| s.name == name);
+        sweep.expect("named as in Agenda::new")
     }
 
     /// Sections of each run of a series over many periods.
@@ -97,7 +97,7 @@ impl Findings {
 
     /// Every published number, with this program's result for the same run.
     pub fn comparisons(&self) -> Vec<Comparison> {
-        let of = |published: &'static Published| {
+        let comparison = |published: &'static Published| {
             let response = &self.run(published.case).response;
             Comparison {
                 published,
@@ -105,6 +105,6 @@ impl Findings {
                 sampled: published.quantity.sampled(response),
             }
         };
-        PAPER.numbers.iter().map(of).collect()
+        PAPER.numbers.iter().map(comparison).collect()
     }
 }

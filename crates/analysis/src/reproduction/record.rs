@@ -62,8 +62,8 @@ fn normal_force(o: &Observation, joint: usize) -> f64 {
 /// # Panics
 /// If there is no such column.
 pub fn column_of(name: &str) -> usize {
-    let found = COLUMNS.iter().position(|c| c.name == name);
-    found.unwrap_or_else(|| panic!("no column {name}"))
+    let index = COLUMNS.iter().position(|c| c.name == name);
+    index.unwrap_or_else(|| panic!("no column {name}"))
 }
 
 /// Index of the column of a coordinate or of its `nth` derivative.

@@ -29,11 +29,11 @@ pub type Reading = (String, f64, &'static str);
 impl Findings {
     /// Every statement, in the order of the paper.
     pub fn statements(&self) -> Vec<Statement> {
-        let of = |claim: &'static Claim| {
+        let statement = |claim: &'static Claim| {
             let (confirmed, criterion, evidence) = self.evaluate(&claim.test);
             Statement { claim, confirmed, criterion, evidence }
         };
-        PAPER.statements.iter().map(of).collect()
+        PAPER.statements.iter().map(statement).collect()
     }
 
     /// Evaluates a test. Returns whether the criterion is met, the criterion, and the compared numbers.
@@ -367,9 +367,9 @@ mod tests {
             }
         };
         let outcomes = work.jobs.iter().map(outcome).collect();
-        let mut found = work.gather(outcomes).models.swap_remove(0);
-        found.resolution = [1e-7, 1e-6];
-        found
+        let mut findings = work.gather(outcomes).models.swap_remove(0);
+        findings.resolution = [1e-7, 1e-6];
+        findings
     }
 
     impl Findings {
@@ -398,14 +398,14 @@ mod tests {
         std::array::from_fn(|k| if k % 2 == 0 { 0.0 } else { width })
     }
 
-    fn set_points(found: &mut Findings, name: &str, points: Vec<SettledPoint>) {
-        let sweep = found.sweeps.iter_mut().find(|s| s.name == name);
+    fn set_points(findings: &mut Findings, name: &str, points: Vec<SettledPoint>) {
+        let sweep = findings.sweeps.iter_mut().find(|s| s.name == name);
         sweep.expect("a sweep").points = points;
     }
 
     #[test]
     fn verdicts_on_runs_follow_the_numbers() {
-        let mut found = findings_at_rest();
+        let mut findings = findings_at_rest();
         let runs = [
             ([3.0, 2.0, 1.0], 0.1, [1.0, 2.0], 1e-3),
             ([3.0, 2.0, 1.0], 0.2, [1.0, 3.0], 2e-3),
@@ -414,7 +414,7 @@ mod tests {
             ([2.0, 1.0, 1.0], 0.1, [1.0, 1.0], 3e-3),
             ([5.0, 1.0, 1.0], 0.1, [1.0, 3.0], 2e-3),
         ];
-        for (run, (forces, last, [x, beta], deviation)) in found.runs.iter_mut().zip(runs) {
+        for (run, (forces, last, [x, beta], deviation)) in findings.runs.iter_mut().zip(runs) {
             let response = &mut run.response;
             response.full.normal = forces.to_vec();
             response.last_separation = vec![Some(0.01), Some(last)];
@@ -423,7 +423,7 @@ mod tests {
             response.full.deviation[0] = deviation;
             response.full.deviation[4] = deviation;
         }
-        found.expect(&[
+        findings.expect(&[
             // 3 mm of 25 mm.
             ("Figure 5a", "no obvious deviation", false),
             ("Figure 5b", "deviation of beta grows", true),
@@ -442,10 +442,10 @@ mod tests {
             ("4.2.2", "main influence", true),
             ("second conclusion", "with clearance", false),
         ]);
-        found.runs[0].response.full.acceleration[4] = 9.0;
-        found.runs[1].response.full.normal[0] = 9.0;
-        found.runs[4].response.full.acceleration[0] = 99.0;
-        found.expect(&[
+        findings.runs[0].response.full.acceleration[4] = 9.0;
+        findings.runs[1].response.full.normal[0] = 9.0;
+        findings.runs[4].response.full.acceleration[0] = 99.0;
+        findings.expect(&[
             ("Figure 13b", "no rule", true),
             ("Figure 13", "changes the acceleration", false),
             ("4.2.2", "main influence", false),
@@ -454,9 +454,9 @@ mod tests {
 
     #[test]
     fn a_conclusion_requires_every_quantity() {
-        let mut found = findings_at_rest();
-        let grow = |found: &mut Findings, case: usize, size: f64| {
-            let response = &mut found.runs[case].response;
+        let mut findings = findings_at_rest();
+        let grow = |findings: &mut Findings, case: usize, size: f64| {
+            let response = &mut findings.runs[case].response;
             for values in [&mut response.full.deviation, &mut response.full.rate, &mut response.full.acceleration] {
                 *values = [size; 6];
             }
@@ -464,12 +464,12 @@ mod tests {
             response.last_separation = vec![Some(size)];
         };
         for (case, size) in [2.0, 3.0, 4.0, 1.0, 3.0].into_iter().enumerate() {
-            grow(&mut found, case, size);
+            grow(&mut findings, case, size);
         }
-        let of = "second conclusion";
-        found.expect(&[(of, "with clearance", true), (of, "with friction", true)]);
-        found.runs[2].response.full.rate[0] = 1.0;
-        found.expect(&[(of, "with clearance", false), (of, "with friction", true)]);
+        let place = "second conclusion";
+        findings.expect(&[(place, "with clearance", true), (place, "with friction", true)]);
+        findings.runs[2].response.full.rate[0] = 1.0;
+        findings.expect(&[(place, "with clearance", false), (place, "with friction", true)]);
     }
 
     #[test]
@@ -490,16 +490,16 @@ mod tests {
             };
             instants.map(row).collect()
         };
-        let mut found = findings_at_rest();
+        let mut findings = findings_at_rest();
         // Over clearance the curves differ only at first, until shortly after 0.3 s; over friction they differ by 4 % after
         // that.
         let off = [(0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.0, 0.02), (0.0, 0.04)];
-        for (run, (early, late)) in found.runs.iter_mut().zip(off) {
+        for (run, (early, late)) in findings.runs.iter_mut().zip(off) {
             run.rows = curve(early, late);
         }
-        found.runs[5].rows = curve(0.0, 0.0);
-        found.ideal.rows = curve(0.0, 0.06);
-        found.expect(&[
+        findings.runs[5].rows = curve(0.0, 0.0);
+        findings.ideal.rows = curve(0.0, 0.06);
+        findings.expect(&[
             ("Figure 5b", "coincide", false),
             ("Figure 6", "coincide", true),
             // 6 % from the ideal motion, though not from each other.
@@ -512,18 +512,18 @@ mod tests {
             ("Figure 17c to f", "agree", true),
         ]);
         // The formulations differ by at most 12.5 mm of 100 mm.
-        for run in &mut found.runs {
+        for run in &mut findings.runs {
             run.response.full.deviation = [0.1; 6];
         }
-        found.expect(&[("first conclusion", "alike", true)]);
-        found.runs[5].rows = curve(0.5, 0.0);
-        found.expect(&[("first conclusion", "alike", false)]);
+        findings.expect(&[("first conclusion", "alike", true)]);
+        findings.runs[5].rows = curve(0.5, 0.0);
+        findings.expect(&[("first conclusion", "alike", false)]);
     }
 
     #[test]
     fn verdicts_on_sections_follow_the_sweeps() {
         // Results that agree with the paper.
-        let mut found = findings_at_rest();
+        let mut findings = findings_at_rest();
         let as_printed = vec![
             point(0.01, Regime::Periodic(1), 0.2, &wide(0.0)),
             point(0.5, Regime::Periodic(1), 0.2, &wide(0.0)),
@@ -531,9 +531,9 @@ mod tests {
         ];
         let runs =
             |regime, width: f64| [1.0, 2.0, 3.0].map(|n| point(n, regime, 0.2 + 0.01 * n, &wide(width * n))).to_vec();
-        set_points(&mut found, "clearance_cold", as_printed.clone());
-        set_points(&mut found, "runs_by_clearance", runs(Regime::QuasiPeriodic, 1e-4));
-        found.expect(&[
+        set_points(&mut findings, "clearance_cold", as_printed.clone());
+        set_points(&mut findings, "runs_by_clearance", runs(Regime::QuasiPeriodic, 1e-4));
+        findings.expect(&[
             ("Figure 20a", "periodic", true),
             ("Figure 20b", "chaotic", true),
             ("third conclusion", "larger clearance", true),
@@ -543,13 +543,13 @@ mod tests {
         ]);
         // All motions are periodic: at the same place over clearance, and 10 mm of 25 mm apart over friction.
         let at_rest = [0.01, 0.5, 1.0].map(|c| point(c, Regime::Periodic(1), 0.2, &wide(0.0)));
-        set_points(&mut found, "clearance_cold", at_rest.to_vec());
-        set_points(&mut found, "runs_by_clearance", at_rest.to_vec());
-        set_points(&mut found, "runs_by_friction", at_rest.to_vec());
+        set_points(&mut findings, "clearance_cold", at_rest.to_vec());
+        set_points(&mut findings, "runs_by_clearance", at_rest.to_vec());
+        set_points(&mut findings, "runs_by_friction", at_rest.to_vec());
         let mut apart = at_rest[..2].to_vec();
         apart[1].sections[0] = vec![0.21; 8];
-        set_points(&mut found, "friction_cold", apart);
-        found.expect(&[
+        set_points(&mut findings, "friction_cold", apart);
+        findings.expect(&[
             ("Figure 20a", "periodic", true),
             ("Figure 20b", "chaotic", false),
             ("third conclusion", "larger clearance", false),
@@ -564,11 +564,11 @@ mod tests {
             ("third conclusion", "friction has little", true),
         ]);
         // Chaos at a single friction value, and an x that moves from section to section.
-        set_points(&mut found, "friction_cold", as_printed.clone());
+        set_points(&mut findings, "friction_cold", as_printed.clone());
         let mut moving = as_printed;
         moving[2].sections[0] = wide(1e-3).to_vec();
-        set_points(&mut found, "clearance_cold", moving);
-        found.expect(&[
+        set_points(&mut findings, "clearance_cold", moving);
+        findings.expect(&[
             ("third conclusion", "friction has little", false),
             ("Figure 23", "motion is periodic", false),
             ("Figure 20a", "periodic", false),
@@ -588,26 +588,26 @@ mod tests {
 
     #[test]
     fn portraits_are_compared_at_equal_phases() {
-        let mut found = findings_at_rest();
+        let mut findings = findings_at_rest();
         // Over clearance the curves are 0.2 mm apart and increasingly wide; over friction they are 4 mm of 25 mm apart.
         let curves = [(0.0, 1e-3), (1e-4, 2e-3), (2e-4, 3e-3), (4e-3, 0.0), (0.0, 1e-3)];
-        let settled = |found: &mut Findings, run: usize, (x, width): (f64, f64)| {
-            let curve = found.runs[run].settled.as_mut().expect("given above");
+        let settled = |findings: &mut Findings, run: usize, (x, width): (f64, f64)| {
+            let curve = findings.runs[run].settled.as_mut().expect("given above");
             curve.coordinates[0] = vec![x; 4];
             curve.width[1] = width;
         };
-        (0..).zip(curves).for_each(|(run, curve)| settled(&mut found, run, curve));
-        found.expect(&[
+        (0..).zip(curves).for_each(|(run, curve)| settled(&mut findings, run, curve));
+        findings.expect(&[
             ("Figure 18a", "coincide", true),
             ("Figure 18b", "width", true),
             ("Figure 21a", "coincide", false),
             ("Figure 21b", "coincide", true),
             ("Figure 21b", "wide", false),
         ]);
-        settled(&mut found, 1, (1e-4, 4e-3));
-        settled(&mut found, 3, (4e-3, 1e-5));
-        found.expect(&[("Figure 18b", "width", false), ("Figure 21b", "wide", true)]);
-        assert_eq!(found.runs[3].case, PAPER.runs[3]);
-        assert_eq!(Some(found.loops(Series::Friction)[0]), found.runs[3].settled.as_ref());
+        settled(&mut findings, 1, (1e-4, 4e-3));
+        settled(&mut findings, 3, (4e-3, 1e-5));
+        findings.expect(&[("Figure 18b", "width", false), ("Figure 21b", "wide", true)]);
+        assert_eq!(findings.runs[3].case, PAPER.runs[3]);
+        assert_eq!(Some(findings.loops(Series::Friction)[0]), findings.runs[3].settled.as_ref());
     }
 }

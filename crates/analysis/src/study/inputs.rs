@@ -258,8 +258,8 @@ mod tests {
     fn a_standard_deviation_may_lie_below_the_allowed_range_of_its_parameter() {
         let scene = Scene::load("four-bar", &[]).expect("built in");
         // A ball has a radius of at least 0.1 mm.
-        let of = |text: &str| Input::new(&scene, "contact.ball_radius", Some(text));
-        let ball = of("normal(10 mm, 20 um)").expect("a distribution");
+        let radius = |text: &str| Input::new(&scene, "contact.ball_radius", Some(text));
+        let ball = radius("normal(10 mm, 20 um)").expect("a distribution");
         assert!((ball.at(0.841_344_746_068_543) - 10.02e-3).abs() < 1e-12, "{}", ball.at(0.841_344_746_068_543));
         for (text, expected) in [
             ("normal(10 mm, -20 um)", "standard deviation of a normal distribution must be above 0"),
@@ -268,7 +268,7 @@ mod tests {
             ("triangular(10 um, 1 mm, 2 mm)", "0.01 mm: out of range; allowed 0.1 mm to 1000 mm"),
             ("normal(10 mm, 20 s)", "unit"),
         ] {
-            let message = of(text).expect_err(text).to_string();
+            let message = radius(text).expect_err(text).to_string();
             assert!(message.contains(expected), "{text}: {message}");
         }
     }

@@ -90,7 +90,7 @@ const IMPACTS_SUFFIX: &str = "_impacts_kept";
 /// # Errors
 /// An unknown output, channel or statistic; an output that is given twice.
 pub fn outputs(scene: &Scene, text: &str) -> Result<Vec<Output>, StudyError> {
-    let mut found: Vec<Output> = Vec::new();
+    let mut outputs: Vec<Output> = Vec::new();
     for entry in text.split(',').map(str::trim) {
         let named = NAMED.iter().find(|named| named.name == entry);
         let parse = |list: &str| {
@@ -100,22 +100,22 @@ pub fn outputs(scene: &Scene, text: &str) -> Result<Vec<Output>, StudyError> {
         match named {
             Some(NamedOutput { name, statistics, reduction, unit, .. }) => {
                 let statistics = if statistics.is_empty() { Vec::new() } else { parse(statistics)? };
-                found.push(Output { name: (*name).to_owned(), unit, reduction: *reduction, statistics });
+                outputs.push(Output { name: (*name).to_owned(), unit, reduction: *reduction, statistics });
             }
             None => {
                 for statistic in parse(entry)? {
                     let (name, unit) = (statistic.to_string(), statistic.unit());
-                    found.push(Output { name, unit, reduction: Reduction::Largest, statistics: vec![statistic] });
+                    outputs.push(Output { name, unit, reduction: Reduction::Largest, statistics: vec![statistic] });
                 }
             }
         }
     }
     if let Some((i, repeated)) =
-        found.iter().enumerate().find(|(i, one)| found[..*i].iter().any(|o| o.name == one.name))
+        outputs.iter().enumerate().find(|(i, output)| outputs[..*i].iter().any(|other| other.name == output.name))
     {
         return Err(StudyError::DuplicateOutput { name: repeated.name.clone(), position: i + 1 });
     }
-    Ok(found)
+    Ok(outputs)
 }
 
 impl Output {
