@@ -214,7 +214,7 @@ mod tests {
             (over("joint.S9.clearance", [1e-4, 2e-4]), "joint.S9.clearance: "),
             (over("joint.S1.clearance", [4e-4, 2e-4]), "joint.S1.clearance: the lower limit"),
             (over("joint.S1.friction", [0.0, 99.0]), "joint.S1.friction: 99: out of range"),
-            (over("solver.preset", [0.0, 1.0]), "solver.preset: its values are no real numbers"),
+            (over("solver.preset", [0.0, 1.0]), "solver.preset: its values are not real numbers"),
             (with_span(0.1, 0.1), "runs of 0.1 s, observed from 0.1 s on"),
             (with_span(f64::NAN, 0.0), "must begin before the end"),
         ] {

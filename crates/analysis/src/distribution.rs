@@ -46,7 +46,7 @@ enum Law {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DistributionError {
     /// A text of unknown form.
-    #[error("`{}` is no distribution: expected {FORMS}", brief(text))]
+    #[error("`{}` is not a distribution: expected {FORMS}", brief(text))]
     Form {
         /// The given text.
         text: String,
@@ -287,8 +287,8 @@ mod tests {
     fn errors_quote_the_text_and_the_invalid_part() {
         let error = |text| parse(text).unwrap_err().to_string();
         assert_eq!(error("uniform(10 um, 30)"), "`uniform(10 um, 30)`: 30: needs the unit um");
-        assert!(error("uniform(10 um)").starts_with("`uniform(10 um)` is no distribution: expected a value"));
-        assert!(error("normal(1 um, 2 um, 3 um)").contains("is no distribution"));
+        assert!(error("uniform(10 um)").starts_with("`uniform(10 um)` is not a distribution: expected a value"));
+        assert!(error("normal(1 um, 2 um, 3 um)").contains("is not a distribution"));
         for text in ["uniform", "uniform(1 um, 2 um", "gauss(1 um)", "", "measured()", "(1 um)"] {
             assert!(parse(text).is_err(), "{text}");
         }

@@ -36,7 +36,7 @@ pub enum FitSearchError {
         joint: usize,
     },
     /// A cost that is negative or not finite.
-    #[error("cost {cost} of candidate {candidate} of joint {joint}: a finite number of at least 0 is possible")]
+    #[error("cost {cost} of candidate {candidate} of joint {joint}: expected a finite number of at least 0")]
     Cost {
         /// Index of the joint.
         joint: usize,
@@ -46,7 +46,7 @@ pub enum FitSearchError {
         cost: f64,
     },
     /// A required yield out of range.
-    #[error("required yield {fraction}: above 0 and up to 1 is possible")]
+    #[error("required yield {fraction}: expected a number above 0 and up to 1")]
     Yield {
         /// The given fraction.
         fraction: f64,
@@ -437,9 +437,9 @@ mod tests {
         assert_eq!(message(&[], required, 9), "no joints to choose fits for");
         assert_eq!(message(&[vec![1.0], vec![]], required, 9), "joint 1 has no candidate fits");
         let cost = message(&[vec![1.0, f64::NAN]], required, 9);
-        assert_eq!(cost, "cost NaN of candidate 1 of joint 0: a finite number of at least 0 is possible");
+        assert_eq!(cost, "cost NaN of candidate 1 of joint 0: expected a finite number of at least 0");
         assert_eq!(message(&[vec![1.0]], required, 0), "0 evaluations: at least one is needed");
         let percent = RequiredYield { fraction: 99.0, with_confidence: false };
-        assert_eq!(message(&[vec![1.0]], percent, 9), "required yield 99: above 0 and up to 1 is possible");
+        assert_eq!(message(&[vec![1.0]], percent, 9), "required yield 99: expected a number above 0 and up to 1");
     }
 }

@@ -14,13 +14,13 @@ const MIN_RESAMPLES: usize = 100;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IndicesError {
     /// No inputs or too many.
-    #[error("{inputs} inputs: 1 to {} are possible", MAX_DIMENSIONS / 2)]
+    #[error("{inputs} inputs: expected 1 to {}", MAX_DIMENSIONS / 2)]
     Inputs {
         /// Number of inputs.
         inputs: usize,
     },
     /// Too many points.
-    #[error("{rows} rows of {inputs} inputs: at least one row and at most {MAX_POINTS} points in all are possible")]
+    #[error("{rows} rows of {inputs} inputs: expected at least one row and at most {MAX_POINTS} points in all")]
     Size {
         /// Number of inputs.
         inputs: usize,

@@ -17,15 +17,15 @@ const MICROMETRE: f64 = 1e-6;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// A text that does not name a hole and a shaft.
-    #[error("`{}` is no fit: expected a hole and a shaft such as H7/g6", brief(text))]
+    #[error("`{}` is not a fit: expected a hole and a shaft such as H7/g6", brief(text))]
     Form {
         /// The given text.
         text: String,
     },
     /// A text that is not a tolerance class.
     #[error(
-        "`{}` is no tolerance class: expected a letter (A to H, JS, K, M, N, P, R, S for a hole, small for a shaft) and a grade \
-         from 01 to 18, such as H7",
+        "`{}` is not a tolerance class: expected a letter (A to H, JS, K, M, N, P, R, S for a hole, lower case for \
+         a shaft) and a grade from 01 to 18, such as H7",
         brief(text)
     )]
     Class {

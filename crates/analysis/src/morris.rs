@@ -13,7 +13,7 @@ const MAX_LEVELS: usize = 1000;
 pub enum MorrisError {
     /// Too few points or too many.
     #[error(
-        "{trajectories} trajectories of {inputs} inputs: at least one of each and at most {MAX_POINTS} points are possible"
+        "{trajectories} trajectories of {inputs} inputs: expected at least one of each and at most {MAX_POINTS} points"
     )]
     Size {
         /// Number of inputs.
@@ -22,13 +22,13 @@ pub enum MorrisError {
         trajectories: usize,
     },
     /// A number of levels for which no step reaches all levels equally often.
-    #[error("{levels} levels: an even number from 2 to {MAX_LEVELS} is possible")]
+    #[error("{levels} levels: expected an even number from 2 to {MAX_LEVELS}")]
     Levels {
         /// Requested number of levels.
         levels: usize,
     },
     /// A margin out of range.
-    #[error("margin {margin}: at least 0 and below 0.5 is possible")]
+    #[error("margin {margin}: expected at least 0 and below 0.5")]
     Margin {
         /// Requested margin.
         margin: f64,
@@ -270,8 +270,8 @@ mod tests {
         let error = |inputs, trajectories, levels, margin| {
             MorrisPlan::new(inputs, trajectories, levels, margin, 0).unwrap_err()
         };
-        assert_eq!(error(2, 4, 5, 0.0).to_string(), "5 levels: an even number from 2 to 1000 is possible");
-        assert_eq!(error(2, 4, 4, 0.5).to_string(), "margin 0.5: at least 0 and below 0.5 is possible");
+        assert_eq!(error(2, 4, 5, 0.0).to_string(), "5 levels: expected an even number from 2 to 1000");
+        assert_eq!(error(2, 4, 4, 0.5).to_string(), "margin 0.5: expected at least 0 and below 0.5");
         assert!(matches!(error(0, 4, 4, 0.0), MorrisError::Size { .. }));
         assert!(matches!(error(usize::MAX, 4, 4, 0.0), MorrisError::Size { .. }));
         let plan = MorrisPlan::new(2, 4, 4, 0.0, 0).unwrap();

@@ -39,13 +39,13 @@ words! { Sampling {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SamplingError {
     /// No coordinates or too many.
-    #[error("{dimensions} dimensions: 1 to {MAX_DIMENSIONS} are possible")]
+    #[error("{dimensions} dimensions: expected 1 to {MAX_DIMENSIONS}")]
     Dimensions {
         /// Requested number of coordinates.
         dimensions: usize,
     },
     /// No points or too many.
-    #[error("{points} points: 1 to {most} are possible for a sample `{sampling}` of {dimensions} dimensions")]
+    #[error("{points} points: expected 1 to {most} for a `{sampling}` sample of {dimensions} dimensions")]
     Points {
         /// Requested number of points.
         points: usize,

@@ -67,10 +67,12 @@ pub enum StudyError {
         nearest: String,
     },
     /// A parameter whose values are words or whole numbers.
-    #[error("its values are no real numbers")]
+    #[error("its values are not real numbers")]
     NotReal,
     /// A parameter without a given distribution whose value yields no default range.
-    #[error("is {value} in the scene, and half to one and a half of that is no range: give one, KEY=A..B")]
+    #[error(
+        "is {value} in the scene, so the default range, 0.5 to 1.5 times this value, is empty: give a range, KEY=A..B"
+    )]
     NoRange {
         /// Value in the scene, with unit.
         value: String,
@@ -98,7 +100,7 @@ pub enum StudyError {
         why: String,
     },
     /// More parameters than a study varies.
-    #[error("{found} uncertain parameters; at most {most} are possible")]
+    #[error("{found} uncertain parameters; expected at most {most}")]
     TooMany {
         /// Number of requested parameters.
         found: usize,

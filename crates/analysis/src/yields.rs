@@ -22,7 +22,7 @@ pub enum YieldsError {
         value: f64,
     },
     /// A probability out of range.
-    #[error("{name} {value}: a number above 0 and below 1 is possible")]
+    #[error("{name} {value}: expected a number above 0 and below 1")]
     Probability {
         /// Name of the setting: `percentile` or `confidence`.
         name: &'static str,

@@ -219,10 +219,10 @@ fn the_mean_of_a_smooth_function_converges_at_the_theoretical_rate() {
 #[test]
 fn impossible_samples_are_refused() {
     let refused = |dimensions, points| Sampler::new(Sampling::Sobol, dimensions, points, 0).unwrap_err().to_string();
-    assert_eq!(refused(129, 8), "129 dimensions: 1 to 128 are possible");
-    assert_eq!(refused(0, 8), "0 dimensions: 1 to 128 are possible");
+    assert_eq!(refused(129, 8), "129 dimensions: expected 1 to 128");
+    assert_eq!(refused(0, 8), "0 dimensions: expected 1 to 128");
     let text = refused(3, 0);
-    assert_eq!(text, "0 points: 1 to 16777216 are possible for a sample `sobol` of 3 dimensions");
+    assert_eq!(text, "0 points: expected 1 to 16777216 for a `sobol` sample of 3 dimensions");
     assert!(Sampler::new(Sampling::LatinHypercube, 128, MAX_POINTS, 0).is_err());
     assert!(Sampler::new(Sampling::Random, 2, 5, 0).unwrap().point(5).is_none());
 }

@@ -250,7 +250,10 @@ mod tests {
         let changes = [("contact.clearance".to_owned(), "0mm".to_owned())];
         let scene = Scene::load("four-bar", &changes).expect("built in");
         let message = Input::new(&scene, "contact.clearance", None).expect_err("no range").to_string();
-        assert_eq!(message, "is 0 mm in the scene, and half to one and a half of that is no range: give one, KEY=A..B");
+        assert_eq!(
+            message,
+            "is 0 mm in the scene, so the default range, 0.5 to 1.5 times this value, is empty: give a range, KEY=A..B"
+        );
         assert!(Input::new(&scene, "contact.clearance", Some("0mm..0.1mm")).is_ok());
     }
 
