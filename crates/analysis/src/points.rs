@@ -106,7 +106,7 @@ pub fn cells(line: &str) -> Vec<String> {
     while let Some(character) = characters.next() {
         match character {
             // A doubled quote inside quotes stands for a single one.
-            '"' if quoted && letters.peek() == Some(&'"') => {
+            '"' if quoted && characters.peek() == Some(&'"') => {
                 characters.next();
                 cell.push('"');
             }
