@@ -97,7 +97,7 @@ pub enum RangeError {
         /// The key.
         key: String,
     },
-    /// A start from which the points cannot follow.
+    /// A start that the axes do not allow.
     #[error(fmt = write_start_error)]
     Start {
         /// Word of the start.

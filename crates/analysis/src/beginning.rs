@@ -2,14 +2,14 @@
 
 use jointplay_physics::simulate::{Peak, Simulation};
 
-/// Simulated time examined, s.
+/// Simulated time to examine, s.
 pub const LENGTH: f64 = 0.05;
 /// Work limit: evaluations times ball joints.
 const MAX_EVALUATIONS: u64 = 2_000_000;
 
 /// Largest contact forces in the first instants of a run.
 pub struct Beginning {
-    /// End of the examined time, s: [`LENGTH`], or less if the limit on work is reached or the run stops.
+    /// End of the examined time, s: [`LENGTH`], or less if the work limit is reached or the run stops.
     pub until: f64,
     /// Peaks of the ball joints.
     pub peaks: Vec<Peak>,

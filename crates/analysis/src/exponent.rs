@@ -13,7 +13,7 @@ const RENORMALISE_AT: f64 = 100.0;
 const MAX_GROWTH: f64 = 1e5;
 /// A separation lost in rounding counts as this fraction of the nominal separation.
 const MIN_SEPARATION: f64 = 1e-9;
-/// Sections before the growth of a new twin counts, during which its offset aligns with the fastest-growing direction.
+/// Sections that pass before the growth of a new twin is counted, so that its offset aligns with the fastest-growing direction.
 pub const ALIGNMENT: usize = 5;
 /// Number of blocks for the standard error.
 const BLOCKS: usize = 10;

@@ -27,7 +27,7 @@ pub enum IndicesError {
         /// Number of rows.
         rows: usize,
     },
-    /// The underlying sample does not exist.
+    /// An error of the underlying sample.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
     /// A number of results that does not match the design.

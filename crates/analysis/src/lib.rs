@@ -5,7 +5,8 @@
 //!   does for a study.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the resulting
 //!   [`regime`].
-//! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`], [`model_costs`].
+//! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`],
+//!   [`model_costs`].
 //! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and
 //!   validation cases with known answers ([`validation`]).
 //! - The tip's error over the workspace, with the drives held ([`map`]).

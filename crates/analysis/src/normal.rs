@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn the_quantile_inverts_the_probability_in_all_three_ranges() {
         for step in -750..=120 {
-            // In the lower tail the probability has full relative precision; near 1 its last place limits z.
+            // In the lower tail the probability has full relative precision; near 1 its last digit limits the precision of z.
             let z = f64::from(step) / 20.0;
             let p = cumulative(z);
             let back = quantile(p);

@@ -111,9 +111,9 @@ const MAX_DRIFT: f64 = 0.3;
 const MIN_RETURNS: usize = 3;
 /// Fraction of the earlier spread; sections whose spread falls below it are converging to a cycle.
 const CONVERGENCE_RATIO: f64 = 0.7;
-/// Result of the 0-1 test above which it indicates chaos, without an exponent.
+/// Result of the 0-1 test above which a motion without a measured exponent counts as chaotic.
 const CHAOTIC_ABOVE: f64 = 0.8;
-/// Result of the 0-1 test below which it clearly indicates regular motion.
+/// Result of the 0-1 test below which it clearly indicates a regular motion.
 const REGULAR_BELOW: f64 = 0.2;
 
 /// Classifies `sections` (concatenated, each as long as `resolution`), taken every `interval` seconds; `resolution` is

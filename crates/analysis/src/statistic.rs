@@ -97,8 +97,8 @@ impl Display for ChannelStatistic {
 }
 
 impl ChannelStatistic {
-    /// Parses `CHANNEL:STATISTIC,…` for `scene`. A channel may be a pattern for all channels that match it, as in `run
-    /// --channels`. Repetitions count once.
+    /// Parses `CHANNEL:STATISTIC,…` for `scene`. As in `run --channels`, a channel may be a pattern for all channels that match
+    /// it. Repetitions count once.
     ///
     /// # Errors
     /// A malformed entry, an unknown channel or statistic; a scene that does not start.

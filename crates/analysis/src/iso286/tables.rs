@@ -9,7 +9,7 @@ pub(super) const INTERMEDIATE: [f64; 25] = [
     250.0, 280.0, 315.0, 355.0, 400.0, 450.0, 500.0,
 ];
 
-/// Standard tolerances IT01, IT0, IT1 … IT18, a row each, over the main ranges (table 1).
+/// Standard tolerances IT01, IT0, IT1 … IT18, one row each, over the main ranges (table 1).
 #[rustfmt::skip]
 pub(super) const TOLERANCES: [[f64; 13]; 20] = [
     [0.3, 0.4, 0.4, 0.5, 0.6, 0.6, 0.8, 1.0, 1.2, 2.0, 2.5, 3.0, 4.0],
@@ -65,7 +65,7 @@ pub(super) const CLEARANCE_SIDE: [(&str, Deviation); 7] = [
     ("g", Main([2.0, 4.0, 5.0, 6.0, 7.0, 9.0, 10.0, 12.0, 14.0, 15.0, 17.0, 18.0, 20.0])),
 ];
 
-/// ei of the shafts k to s, which is -ES of the holes K to S but for the increment Δ (tables 2, 3 and 5).
+/// ei of the shafts k to s, which is -ES of the holes K to S apart from the increment Δ (tables 2, 3 and 5).
 #[rustfmt::skip]
 pub(super) const INTERFERENCE_SIDE: [(&str, Deviation); 6] = [
     ("k", Main([0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 4.0, 4.0, 4.0, 5.0])),

@@ -86,7 +86,7 @@ pub struct AloneOutputs {
 }
 
 impl AloneOutputs {
-    /// Makes the runs.
+    /// Executes the runs.
     ///
     /// # Errors
     /// As [`StudyRunner::run`].

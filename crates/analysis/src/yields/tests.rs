@@ -41,7 +41,7 @@ fn percentile_intervals_cover_the_percentile_at_the_stated_confidence() {
         let exact = libm::log(10.0);
         computed.low <= exact && exact <= computed.high
     });
-    // 950 expected at least; the lower bound is three standard deviations of 7 below.
+    // At least 950 are expected; the lower bound is three standard deviations of 7 below that.
     let covered = covered.count();
     assert!((930..=990).contains(&covered), "{covered}");
 }
