@@ -51,13 +51,14 @@ pub enum Command {
     Merge(MergeArguments),
     /// Map the error of the tip over drive positions and parameters: at rest, and with every ball anywhere in its play.
     Map(MapArguments),
-    /// Find which parameters move an output most, such as which joint's clearance the tip error: each alone, and all together.
+    /// Find which parameters influence an output most, such as the clearance with the largest effect on the tip error: each alone,
+    /// and all together.
     Sensitivity(SensitivityArguments),
     /// Find what part of a manufactured lot holds its limits, such as a tip error of at most 50 um: percentiles, yield, capability, what
     /// drives the rejects, and the cheapest fits that hold a yield.
     Tolerance(ToleranceArguments),
-    /// Print a robot description, URDF or MJCF, as a scene file: bodies, inertias, hinges, slides, ball joints, shapes and meshes. What is
-    /// not taken is named on standard error and at the head of the scene.
+    /// Print a robot description, URDF or MJCF, as a scene file: bodies, inertias, hinges, slides, ball joints, shapes and meshes. Omitted
+    /// parts are listed on standard error and at the head of the scene.
     Import(ImportArguments),
     /// Compute everything in the paper's section 4 and compare it with the paper: data, plots and one page.
     Reproduce(ReproduceArguments),
@@ -211,7 +212,7 @@ pub struct SweepArguments {
     /// Initial periods or crossings to discard as the transient.
     #[arg(long, value_name = "D", value_parser = parse_count)]
     pub discard: Option<usize>,
-    /// Time between two sections, where the drives have no common period or none at all [default: the common period].
+    /// Time between two sections, for drives without a common period or without any period [default: the common period].
     #[arg(long, value_name = "TIME", requires = "periods")]
     pub period: Option<String>,
     /// Length of each point's run, e.g. `2s`, in place of periods: any scene, without sections, regimes and exponents.
@@ -307,11 +308,11 @@ pub struct SensitivityArguments {
     /// Rows N of the design for the indices, N (k + 2) runs for k parameters; a power of two is best; 0 leaves them out.
     #[arg(long, value_name = "N", default_value = "64", value_parser = clap::value_parser!(u32).range(0..=65536))]
     pub rows: u32,
-    /// Trajectories of the screening by elementary effects, which leaves the parameters that matter most for the first output to the
+    /// Trajectories of the screening by elementary effects, which selects the parameters that matter most for the first output for the
     /// indices [default: 10 if more than 8 parameters vary, else 0].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=10000))]
     pub screen: Option<u32>,
-    /// Largest allowed value of the first output, e.g. `100um`: finds how far which parameters must be lowered or raised for it.
+    /// Largest allowed value of the first output, e.g. `100um`: finds which parameters must be lowered or raised, and how far.
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     pub target: Option<String>,
     /// Runs.
@@ -400,7 +401,7 @@ pub struct RenderArguments {
     /// Force whose arrow has the reference length, e.g. `500N`; follows the forces if not given.
     #[arg(long, value_name = "FORCE", help_heading = "Picture")]
     pub arrow_reference: Option<String>,
-    /// Magnification of eccentricity and clearance together, 1 to 100 [default: 1; with --ui as the window starts].
+    /// Magnification of eccentricity and clearance together, 1 to 100 [default: 1; with --ui that of the window].
     #[arg(long, value_name = "FACTOR", help_heading = "Picture")]
     pub magnification: Option<f32>,
     /// Colours.
@@ -458,7 +459,7 @@ pub struct TradeoffArguments {
 /// `reproduce`.
 #[derive(Debug, Args)]
 pub struct ReproduceArguments {
-    /// Folder to write: `index.html`, `data/` and `plots/`; until then finished blocks are kept in `FOLDER.partial`.
+    /// Folder to write: `index.html`, `data/` and `plots/`; finished blocks are stored in `FOLDER.partial` until then.
     #[arg(long, value_name = "FOLDER")]
     pub out: PathBuf,
     /// Few points and few periods: about a minute instead of half an hour on two cores.

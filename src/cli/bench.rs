@@ -50,7 +50,7 @@ fn text(rows: &[GoalResult], machines: &[LooseSpeed], growth: f64) -> String {
         "Speeds            simulated seconds in a second of stepping, one core\n\
          All joints ideal  no differential equation is solved, so the stepper plays no part\n\n",
     );
-    let headings = "span | method | speed | asked | rk4 at 10 us | ratio | error | of | reached";
+    let headings = "span | method | speed | goal | rk4 at 10 us | ratio | error | of | reached";
     out.push_str(&Table::new(headings, goal_rows).text());
     out.push_str(
         "\nLoose joints: the fastest setting of each method whose peaks of the first impacts err by no more than the limit\n\n",
@@ -74,7 +74,7 @@ fn text(rows: &[GoalResult], machines: &[LooseSpeed], growth: f64) -> String {
     let ([short, long], span, most) = GROWTH;
     let _ = writeln!(
         out,
-        "\nA link of a chain of {long} costs {} times one of {short} over {}; asked: at most {most}; reached: {}",
+        "\nA link of a chain of {long} costs {} times one of {short} over {}; goal: at most {most}; reached: {}",
         times(Some(growth)),
         format_quantity(span, "ms"),
         yes(growth <= most)

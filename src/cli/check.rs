@@ -134,7 +134,7 @@ fn report(
         ),
     );
     line("Method", &method(scene, contents));
-    let (computed, skipped) = work(scene, contents);
+    let (computed, skipped) = computed_and_skipped(scene, contents);
     computed.iter().for_each(|item| line("Computed", item));
     skipped.iter().for_each(|item| line("Not computed", item));
     let near_singularity = ideal_fault(scene).map(|near| near.to_string());
@@ -285,8 +285,8 @@ fn method(scene: &Scene, contents: &Summary) -> String {
     }
 }
 
-/// Lists of what the run computes and of what it skips.
-fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
+/// Descriptions of the parts that the run computes, and of those that it skips.
+fn computed_and_skipped(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     let with = |ideal| names(scene.machine.ball_joints.iter().filter(move |j| is_ideal(j) == ideal).map(|j| &j.name));
     let (mut computed, mut skipped) = (Vec::new(), Vec::new());
     let mut list = |needed: bool, yes: String, no: &str| {

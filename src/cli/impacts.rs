@@ -105,10 +105,10 @@ mod tests {
 
     #[test]
     fn the_median_leaves_disturbed_and_slow_impacts_out() {
-        let impact = |joint, given: f64, floored, disturbed| Impact {
+        let impact = |joint, restitution: f64, floored, disturbed| Impact {
             joint,
             approach_speed: 0.1,
-            separation_speed: 0.1 * given,
+            separation_speed: 0.1 * restitution,
             asked: 0.5,
             floored,
             disturbed,

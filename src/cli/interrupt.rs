@@ -76,7 +76,7 @@ fn outlives_its_terminal() -> bool {
             let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
             mask.is_some_and(|mask| mask & 1 != 0)
         }
-        // Other than on Linux: `nohup` leaves no output on a terminal.
+        // Outside Linux: `nohup` redirects output away from the terminal.
         Err(_) => !std::io::stderr().is_terminal(),
     }
 }
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_echoed_signal_is_no_second_request_and_a_third_exits() {
+    fn an_echoed_signal_is_not_a_second_request_and_a_third_exits() {
         let start = Instant::now();
         let exits = |after: &[u64]| {
             let mut signals = Signals::default();

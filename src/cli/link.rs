@@ -96,12 +96,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_run_that_is_not_stopped_where_the_links_run_was_ends_with_an_error() {
+    fn a_replay_that_misses_a_recorded_stop_ends_with_an_error() {
         let mut link = Link::parse("?scene=pendulum&steps=9").expect("a link");
         link.log.push(3, Event::Stop);
         let mut simulation = crate::cli::start(&link.load().expect("built in")).expect("starts");
-        let mut way = LinkReplay::new(link).expect("its scene");
-        let outcomes: Vec<_> = (0..9).map(|_| way.step(&mut simulation, None)).collect();
+        let mut replay = LinkReplay::new(link).expect("its scene");
+        let outcomes: Vec<_> = (0..9).map(|_| replay.step(&mut simulation, None)).collect();
         assert_eq!(outcomes.iter().position(Result::is_err), Some(3), "{outcomes:?}");
     }
 }

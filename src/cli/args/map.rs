@@ -15,10 +15,10 @@ pub struct MapArguments {
     pub scene: SceneArguments,
     /// What varies, as in `sweep --vary`: a driven coordinate, which is held at each value, such as
     /// `crank.angle=0deg..90deg:10` or `slider.position=-20mm..20mm:11`, or a parameter; may be repeated. All combinations are
-    /// computed, the last one varying fastest. Other drives stand where they are at t = 0.
+    /// computed, the last one varying fastest. Other drives keep their positions at t = 0.
     #[arg(long, value_name = "KEY=VALUES", required = true)]
     pub over: Vec<String>,
-    /// Directions in which the farthest error is found at each point.
+    /// Number of directions in which the largest error is computed at each point.
     #[arg(long, value_name = "N", default_value = "64", value_parser = parse_directions)]
     pub directions: usize,
     /// Threads to use [default: one for each core]; the result does not depend on it.

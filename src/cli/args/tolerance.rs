@@ -16,8 +16,8 @@ pub struct ToleranceArguments {
     #[command(flatten)]
     pub scene: SceneArguments,
     /// Limit of an output: an upper one (`tip-error=50um`), both (`S1.normal:max=20N..500N`) or a lower one
-    /// (`tip-error-rms=1um..`); outputs as in `sensitivity --output`; may be repeated for others. A unit is accepted if it
-    /// holds all of them.
+    /// (`tip-error-rms=1um..`); outputs as in `sensitivity --output`; may be repeated for other outputs. A unit is accepted
+    /// if it meets all limits.
     #[arg(long, value_name = "OUTPUT=LIMIT", required = true)]
     pub limit: Vec<String>,
     /// Uncertain parameters: a CSV file with the heading `parameter,distribution`, in each row a key or pattern and its range,
@@ -36,14 +36,14 @@ pub struct ToleranceArguments {
     #[arg(long, value_name = "METHOD", default_value = "sobol", value_parser = sampling_parser())]
     pub sampling: Sampling,
     /// Find the cheapest fits that hold --yield: a CSV file with the heading `parameter,fit,cost`, in each row a key or
-    /// pattern, one of its candidates as in --over, and the cost of it; the candidates of a parameter from the loosest to the
+    /// pattern, one of its candidates as in --over, and its cost; list the candidates of a parameter from the loosest to the
     /// tightest.
     #[arg(long, value_name = "FILE")]
     pub cost: Option<PathBuf>,
     /// Yield that the fits must hold, e.g. `99%` or `0.99`.
     #[arg(long = "yield", value_name = "FRACTION", default_value = "99%", value_parser = parse_fraction)]
     pub required_yield: f64,
-    /// Most choices of fits that are tried, each with --runs runs.
+    /// Largest number of choices of fits to try, each with --runs runs.
     #[arg(long, value_name = "N", default_value = "64", value_parser = clap::value_parser!(u32).range(1..=10000))]
     pub evaluations: u32,
     /// Runs.

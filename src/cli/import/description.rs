@@ -27,17 +27,17 @@ impl Pose {
         Self { position: -(rotation * self.position), rotation }
     }
 
-    /// A point in the outer frame.
+    /// Transforms a point to the outer frame.
     pub fn point(&self, inner: Vec3) -> Vec3 {
         self.position + self.rotation * inner
     }
 
-    /// Pose in the outer frame of `inner`, which is given in the inner frame.
+    /// Transforms a pose to the outer frame.
     pub fn compose(&self, inner: &Self) -> Self {
         Self { position: self.point(inner.position), rotation: self.rotation * inner.rotation }
     }
 
-    /// `inner`, given in the inner frame, in the outer frame.
+    /// Transforms mass and inertia to the outer frame.
     pub fn inertial(&self, inner: Inertial) -> Inertial {
         let turn: Mat3 = *self.rotation.to_rotation_matrix().matrix();
         Inertial {
@@ -63,7 +63,7 @@ pub enum Form {
     Mesh(String, f64),
 }
 
-/// Length of a mesh file's unit, m, or why a scene has no mesh of this scale.
+/// Length of a mesh file's unit, m, or the reason why a scene cannot show a mesh of this scale.
 pub fn mesh_unit(scale: [f64; 3]) -> Result<f64, &'static str> {
     match scale {
         _ if scale.iter().any(|part| *part <= 0.0) => Err("whose scale is not above 0 along every axis"),
@@ -150,7 +150,7 @@ pub struct Spring {
     /// Coordinate of a joint that has two.
     pub coordinate: Option<&'static str>,
     /// Whether the coordinate is an angle.
-    pub turns: bool,
+    pub is_angle: bool,
     /// N/m or N m/rad.
     pub stiffness: f64,
     /// N s/m or N m s/rad.
@@ -217,8 +217,8 @@ impl Description {
     pub fn omissions(&self) -> Vec<String> {
         let mut all: Vec<_> = self.omitted.iter().map(|(what, (line, count))| (*line, what, *count)).collect();
         all.sort();
-        let many = |count: usize| if count > 1 { format!(", and {} more", count - 1) } else { String::new() };
-        all.into_iter().map(|(line, what, count)| format!("not taken: {what} (line {line}{})", many(count))).collect()
+        let others = |count: usize| if count > 1 { format!(", and {} more", count - 1) } else { String::new() };
+        all.into_iter().map(|(line, what, count)| format!("not taken: {what} (line {line}{})", others(count))).collect()
     }
 
     /// Pose in the world of each body where all coordinates are 0.
@@ -234,13 +234,13 @@ impl Description {
     /// Omits meshes that a scene in `folder` could not read.
     pub fn omit_unreadable_meshes(&mut self, folder: &Path) {
         let mut missing = Vec::new();
-        let mut keep = |shape: &Shape| {
+        let mut is_readable = |shape: &Shape| {
             let Form::Mesh(file, _) = &shape.form else {
                 return true;
             };
-            let below = Path::new(file).components().all(|part| matches!(part, Component::Normal(_)));
-            let ending = [".stl", ".obj", ".gltf", ".glb"].iter().any(|end| file.to_lowercase().ends_with(end));
-            let why = match (ending, below, below && folder.join(file).is_file()) {
+            let is_inside = Path::new(file).components().all(|part| matches!(part, Component::Normal(_)));
+            let is_supported = [".stl", ".obj", ".gltf", ".glb"].iter().any(|end| file.to_lowercase().ends_with(end));
+            let why = match (is_supported, is_inside, is_inside && folder.join(file).is_file()) {
                 (false, ..) => "is not STL, OBJ or glTF",
                 (_, false, _) => "is not in the folder of the description or below it",
                 (.., false) => "does not exist",
@@ -249,8 +249,8 @@ impl Description {
             missing.push((shape.line, format!("mesh {file}, which {why}")));
             false
         };
-        self.fixed.retain(&mut keep);
-        self.bodies.iter_mut().for_each(|body| body.shapes.retain(&mut keep));
+        self.fixed.retain(&mut is_readable);
+        self.bodies.iter_mut().for_each(|body| body.shapes.retain(&mut is_readable));
         for (line, what) in missing {
             self.omit(line, what);
         }

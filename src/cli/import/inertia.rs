@@ -68,7 +68,7 @@ impl Inertial {
         Self { mass, centre, inertia: rotation * own * rotation.transpose() }
     }
 
-    /// A solid of `density`, kg/m^3, or a shell of so many kg/m^2.
+    /// A solid of `density`, kg/m^3, or a shell of `density`, kg/m^2.
     pub fn of_density(solid: &machine::Solid, density: f64) -> Self {
         Self { mass: density * solid.volume, centre: solid.centre, inertia: solid.inertia() * density }
     }
@@ -112,13 +112,13 @@ impl Inertial {
 mod tests {
     use super::*;
 
-    /// Volume and second moments of a solid by points of a grid inside it.
-    fn counted(solid: Solid, inside: impl Fn(Vec3) -> bool, reach: [f64; 3]) {
+    /// Compares volume and second moments of a solid with those of the grid points inside it.
+    fn assert_moments_match_grid(solid: Solid, inside: impl Fn(Vec3) -> bool, reach: [f64; 3]) {
         const N: i32 = 80;
         let mut sums = [0.0; 4];
-        let place = |i: i32, reach: f64| reach * (2.0 * (f64::from(i) + 0.5) / f64::from(N) - 1.0);
+        let coordinate = |i: i32, reach: f64| reach * (2.0 * (f64::from(i) + 0.5) / f64::from(N) - 1.0);
         for (i, j, k) in (0..N).flat_map(|i| (0..N).flat_map(move |j| (0..N).map(move |k| (i, j, k)))) {
-            let p = Vec3::new(place(i, reach[0]), place(j, reach[1]), place(k, reach[2]));
+            let p = Vec3::new(coordinate(i, reach[0]), coordinate(j, reach[1]), coordinate(k, reach[2]));
             if inside(p) {
                 let squares = p.component_mul(&p);
                 let total = squares.sum();
@@ -138,11 +138,15 @@ mod tests {
     #[test]
     fn solids_have_the_moments_of_their_volume() {
         let [a, b, c] = [0.3, 0.2, 0.5];
-        counted(Solid::Box([a, b, c]), |_| true, [a, b, c]);
-        counted(Solid::Ellipsoid([a, b, c]), |p| p.component_div(&Vec3::new(a, b, c)).norm() < 1.0, [a, b, c]);
-        counted(Solid::Cylinder(a, c), |p| p.x.hypot(p.y) < a, [a, a, c]);
+        assert_moments_match_grid(Solid::Box([a, b, c]), |_| true, [a, b, c]);
+        assert_moments_match_grid(
+            Solid::Ellipsoid([a, b, c]),
+            |p| p.component_div(&Vec3::new(a, b, c)).norm() < 1.0,
+            [a, b, c],
+        );
+        assert_moments_match_grid(Solid::Cylinder(a, c), |p| p.x.hypot(p.y) < a, [a, a, c]);
         let capsule = |p: Vec3| Vec3::new(p.x, p.y, p.z - p.z.clamp(-c, c)).norm() < a;
-        counted(Solid::Capsule(a, c), capsule, [a, a, a + c]);
+        assert_moments_match_grid(Solid::Capsule(a, c), capsule, [a, a, a + c]);
     }
 
     #[test]

@@ -9,9 +9,9 @@ use crate::scene::MAX_MESH_SIZE;
 use crate::scene::mesh::Format;
 use crate::words::words;
 
-/// Largest number of pairs of a point and a face that are compared for a hull.
+/// Limit on the comparisons of a point with a face for a hull.
 const MAX_COMPARISONS: usize = 400_000_000;
-/// Distance from the plane of a hull's face within which a point counts as in it, in extents of the mesh: the rounding of files.
+/// Points within this distance of a face's plane, in extents of the mesh, count as in it: files are rounded.
 const PLANE_TOLERANCE: f64 = 1e-9;
 
 /// The part of a mesh that has mass: the values of its attribute `inertia`.
@@ -21,7 +21,7 @@ pub enum MeshInertia {
     Convex,
     /// The enclosed volume.
     Exact,
-    /// The pyramids between its triangles and a point among them, those that the surface faces away from as well.
+    /// The pyramids from an inner point to its triangles, all counted as positive, even those of triangles that face inwards.
     Legacy,
     /// Its surface.
     Shell,
@@ -84,7 +84,7 @@ pub fn solid(
         ));
     }
     let surface = Solid::of_surface(triangles.iter().copied());
-    let about = |point: Vec3, unsigned: bool| {
+    let pyramids_about = |point: Vec3, unsigned: bool| {
         let pyramids = triangles.iter().map(|corners| {
             let [a, b, c] = corners.map(|corner| corner - point);
             if unsigned && a.dot(&b.cross(&c)) < 0.0 { [a, c, b] } else { [a, b, c] }
@@ -93,12 +93,12 @@ pub fn solid(
     };
     let solid = match mesh_inertia {
         MeshInertia::Shell => surface,
-        MeshInertia::Convex | MeshInertia::Exact => about(surface.centre, false),
-        // The centroid of the first pyramids is the tip of those that have mass, and the centre of mass, though it is not their
-        // centroid: `ComputeVolume` and `ComputeInertia` of MuJoCo's user_mesh.cc.
+        MeshInertia::Convex | MeshInertia::Exact => pyramids_about(surface.centre, false),
+        // As in `ComputeVolume` and `ComputeInertia` of MuJoCo's user_mesh.cc: the centroid of the first pyramids is the tip of the
+        // pyramids with mass, and counts as the centre of mass, although it is not their centroid.
         MeshInertia::Legacy => {
-            let tip = about(surface.centre, true).centre;
-            about(tip, true).about(tip)
+            let tip = pyramids_about(surface.centre, true).centre;
+            pyramids_about(tip, true).about(tip)
         }
     };
     let has_volume = solid.volume > 0.0 && solid.inertia().symmetric_eigenvalues().min() > 0.0;
@@ -171,11 +171,11 @@ mod tests {
         Mesh::new(layer(0.0).chain(layer(height)).collect(), faces)
     }
 
-    fn found(mesh: &Mesh, mesh_inertia: MeshInertia) -> Solid {
+    fn solid_of(mesh: &Mesh, mesh_inertia: MeshInertia) -> Solid {
         solid(mesh, |point| point * 1e-3, false, mesh_inertia).unwrap()
     }
 
-    fn is(solid: &Solid, volume: f64, centre: [f64; 3], inertia: [f64; 3]) {
+    fn assert_solid(solid: &Solid, volume: f64, centre: [f64; 3], inertia: [f64; 3]) {
         assert!((solid.volume / volume - 1.0).abs() < 1e-6, "{} {volume}", solid.volume);
         assert!((solid.centre - Vec3::from(centre)).amax() < 1e-6, "{}", solid.centre);
         let off = solid.inertia().diagonal() - Vec3::from(inertia);
@@ -189,9 +189,9 @@ mod tests {
         let (v, squares) = (0.2 * 0.3 * 0.5, [0.04, 0.09, 0.25]);
         let own = [squares[1] + squares[2], squares[0] + squares[2], squares[0] + squares[1]].map(|sum| v * sum / 12.0);
         for mesh_inertia in [MeshInertia::Convex, MeshInertia::Exact, MeshInertia::Legacy] {
-            is(&found(&mesh, mesh_inertia), v, [0.1, 0.15, 0.25], own);
+            assert_solid(&solid_of(&mesh, mesh_inertia), v, [0.1, 0.15, 0.25], own);
         }
-        let shell = found(&mesh, MeshInertia::Shell);
+        let shell = solid_of(&mesh, MeshInertia::Shell);
         // Pairs of plates across each axis, half an edge from the centroid; along their own edges, the mean square is a twelfth.
         let [a, b, c] = [0.2, 0.3, 0.5];
         let (x, y, z) = (2.0 * b * c, 2.0 * a * c, 2.0 * a * b);
@@ -199,7 +199,7 @@ mod tests {
         let xx = mean(0.25, 1.0 / 12.0, 1.0 / 12.0, a);
         let yy = mean(1.0 / 12.0, 0.25, 1.0 / 12.0, b);
         let zz = mean(1.0 / 12.0, 1.0 / 12.0, 0.25, c);
-        is(&shell, x + y + z, [0.1, 0.15, 0.25], [yy + zz, xx + zz, xx + yy]);
+        assert_solid(&shell, x + y + z, [0.1, 0.15, 0.25], [yy + zz, xx + zz, xx + yy]);
     }
 
     /// An L of three squares: its hull has half a square more.
@@ -207,7 +207,7 @@ mod tests {
     fn only_the_hull_fills_an_l_shaped_mesh() {
         let corners = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.1], [0.1, 0.1], [0.1, 0.2], [0.0, 0.2]];
         let mesh = prism(&corners, &[[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]], 0.1);
-        let exact = found(&mesh, MeshInertia::Exact);
+        let exact = solid_of(&mesh, MeshInertia::Exact);
         let square = |x: f64, y: f64| {
             let size = Vec3::repeat(0.1);
             let geometry = crate::machine::Geometry::Box { centre: Vec3::new(x, y, 0.05), size };
@@ -219,15 +219,15 @@ mod tests {
             let d = part.centre - centre;
             sum + part.inertia() + 1e-3 * (crate::machine::Mat3::identity() * d.norm_squared() - d * d.transpose())
         });
-        is(&exact, 3e-3, centre.into(), inertia.diagonal().into());
+        assert_solid(&exact, 3e-3, centre.into(), inertia.diagonal().into());
         assert!((exact.inertia() - inertia).amax() < 1e-5 * inertia.amax());
-        let hull = found(&mesh, MeshInertia::Convex);
+        let hull = solid_of(&mesh, MeshInertia::Convex);
         assert!((hull.volume / 3.5e-3 - 1.0).abs() < 1e-6, "{}", hull.volume);
         // Three squares and a triangle with its centroid a third of its edges from the inner corner.
         let x = (3e-3 * centre.x + 0.5e-3 * (0.1 + 0.1 / 3.0)) / 3.5e-3;
         assert!((hull.centre - Vec3::new(x, x, 0.05)).amax() < 1e-6, "{}", hull.centre);
         // The centroid sees the whole surface from inside.
-        assert!((found(&mesh, MeshInertia::Legacy).volume / exact.volume - 1.0).abs() < 1e-9);
+        assert!((solid_of(&mesh, MeshInertia::Legacy).volume / exact.volume - 1.0).abs() < 1e-9);
         let mirrored =
             solid(&mesh, |point| Vec3::new(-point.x, point.y, point.z) * 1e-3, true, MeshInertia::Exact).unwrap();
         assert!((mirrored.volume / exact.volume - 1.0).abs() < 1e-12 && (mirrored.centre.x + centre.x).abs() < 1e-6);
@@ -239,10 +239,10 @@ mod tests {
         let channel =
             [[0.0, 0.0], [0.3, 0.0], [0.3, 0.3], [0.25, 0.3], [0.25, 0.05], [0.05, 0.05], [0.05, 0.3], [0.0, 0.3]];
         let channel = prism(&channel, &[[0, 1, 4], [0, 4, 5], [1, 2, 4], [2, 3, 4], [0, 5, 6], [0, 6, 7]], 0.1);
-        assert!((found(&channel, MeshInertia::Exact).volume / 4e-3 - 1.0).abs() < 1e-6);
-        let pyramids = found(&channel, MeshInertia::Legacy);
-        // The surface has its centroid at y = 0.125 m. The bases of the pyramids from there have theirs at 0.132 m, each counted by its
-        // pyramid, and the pyramids a quarter of the way back.
+        assert!((solid_of(&channel, MeshInertia::Exact).volume / 4e-3 - 1.0).abs() < 1e-6);
+        let pyramids = solid_of(&channel, MeshInertia::Legacy);
+        // The surface has its centroid at y = 0.125 m. The bases, weighted by their pyramids from there, have theirs at 0.132 m; the
+        // centroid of a pyramid is a quarter of the way from its base to its tip.
         let y = 0.75 * 0.132 + 0.25 * 0.125;
         let strip = |edge: f64| edge * edge / 12.0;
         let floor = [strip(0.3), strip(0.05) + (0.025 - y) * (0.025 - y)];
@@ -263,7 +263,7 @@ mod tests {
         let second =
             [0, 1, 2].map(|i| faces.iter().map(|(area, distance, mean)| area * distance / 5.0 * mean[i]).sum::<f64>());
         let moments = [second[1] + second[2], second[0] + second[2], second[0] + second[1]];
-        is(&pyramids, volume, [0.15, y, 0.05], moments);
+        assert_solid(&pyramids, volume, [0.15, y, 0.05], moments);
         assert!(volume > 2.0 * 4e-3, "{volume}");
     }
 
@@ -294,10 +294,11 @@ mod tests {
     fn an_open_mesh_has_only_a_hull_and_a_surface() {
         let vertices = vec![[0.0, 0.0, 0.0], [1e3, 0.0, 0.0], [0.0, 1e3, 0.0], [0.0, 0.0, 1e3]];
         let mesh = Mesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2]]);
-        let hull = found(&mesh, MeshInertia::Convex);
-        // A tetrahedron with three edges of 1 m: 1/6, and 3/80 of its volume for the square of a coordinate about the centroid.
-        is(&hull, 1.0 / 6.0, [0.25; 3], [2.0 / 6.0 * 3.0 / 80.0; 3]);
-        assert!((found(&mesh, MeshInertia::Shell).volume - 1.5).abs() < 1e-6);
+        let hull = solid_of(&mesh, MeshInertia::Convex);
+        // A tetrahedron with three perpendicular edges of 1 m: volume 1/6 m^3, mean square of a coordinate about the centroid
+        // 3/80 m^2.
+        assert_solid(&hull, 1.0 / 6.0, [0.25; 3], [2.0 / 6.0 * 3.0 / 80.0; 3]);
+        assert!((solid_of(&mesh, MeshInertia::Shell).volume - 1.5).abs() < 1e-6);
         let fault = solid(&mesh, |point| point, false, MeshInertia::Exact).unwrap_err();
         assert!(fault.contains("it is not closed: its edge from"), "{fault}");
     }

@@ -20,15 +20,15 @@ use xml::Source;
 
 /// Size limit for a description, bytes: that of a scene file.
 const MAX_BYTES: u64 = 4 << 20;
-/// Largest number of bodies that carry each other in a row.
+/// Largest nesting depth of bodies.
 const MAX_DEPTH: usize = 1000;
-/// Limit for its elements, attributes and texts.
+/// Limit on the number of elements, attributes and texts of a description.
 const MAX_NODES: u32 = 500_000;
 
 /// Runs `import`.
 ///
 /// # Errors
-/// An unreadable file, one that is neither URDF nor MJCF, or a part of it without which the machine is another one.
+/// An unreadable file, one that is neither URDF nor MJCF, or an unsupported part that changes the motion of the machine.
 pub fn import(arguments: &ImportArguments) -> Result<(), Failure> {
     let path = &arguments.file;
     let name = path.display().to_string();
@@ -41,7 +41,7 @@ pub fn import(arguments: &ImportArguments) -> Result<(), Failure> {
     let mut description = read(&name, folder, &text)?;
     description.omit_unreadable_meshes(folder);
     let scene = write::scene(&description, &name)?;
-    // The scene is read before anybody else reads it.
+    // A scene that cannot be read is not printed.
     Scene::parse_given(&scene.text, None, &Default::default(), Some(folder), &[])
         .map_err(|error| Failure::usage(in_description(&name, &scene, error)))?;
     for omission in description.omissions() {
@@ -50,17 +50,17 @@ pub fn import(arguments: &ImportArguments) -> Result<(), Failure> {
     print(&scene.text)
 }
 
-/// An error of the scene that was written, with the line of the description `name` from which it comes if there is one.
+/// Message about an error in the generated scene, with the line of the description `name` from which it comes, if any.
 fn in_description(name: &str, scene: &write::SceneFile, error: SceneError) -> String {
     let origin = error.position.filter(|_| error.file.is_none()).and_then(|(line, _)| scene.origin(line));
     let Some(line) = origin else {
-        return format!("{name}: what was read makes no scene: {error}");
+        return format!("{name}: the description gives no valid scene: {error}");
     };
     SceneError { file: Some(format!("{name}:{line}")), position: None, line_text: None, ..error }.to_string()
 }
 
 fn too_deep(source: &Source, node: Node) -> Failure {
-    source.error(node, &format!("more than {MAX_DEPTH} parts in a row"))
+    source.error(node, &format!("nested more than {MAX_DEPTH} levels deep"))
 }
 
 fn read(name: &str, folder: &Path, text: &str) -> Result<Description, Failure> {

@@ -1,4 +1,4 @@
-//! URDF, <http://wiki.ros.org/urdf/XML>: a tree of links, the first of which stands on the world. Links on fixed joints become one body.
+//! URDF, <http://wiki.ros.org/urdf/XML>: a tree of links whose root is fixed to the world. Links on fixed joints become one body.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ struct Tree<'s, 'n, 'i> {
 /// Reads `<robot>`.
 ///
 /// # Errors
-/// A missing or invalid part, a link with several parents or none that leads to the first, a joint of another kind.
+/// A missing or invalid part, a link with several parents or without a path to the root, an unsupported kind of joint.
 pub fn read(source: &Source, robot: Node) -> Result<Description, Failure> {
     let mut tree = Tree {
         source,
@@ -76,9 +76,11 @@ pub fn read(source: &Source, robot: Node) -> Result<Description, Failure> {
     }
     let roots: Vec<&str> = tree.links.keys().copied().filter(|link| !carried.contains_key(link)).collect();
     let [root] = roots[..] else {
-        let what = if roots.is_empty() { "the joints form a ring".to_owned() } else { roots.join(", ") };
-        return Err(source
-            .error(robot, &format!("one link must have no parent, and stands on the world; without parent: {what}")));
+        let what = if roots.is_empty() { "none, the joints form a loop".to_owned() } else { roots.join(", ") };
+        return Err(source.error(
+            robot,
+            &format!("exactly one link, which is fixed to the world, must have no parent; without parent: {what}"),
+        ));
     };
     tree.walk(root, None, &Pose::identity(), 0)?;
     if tree.description.bodies.is_empty() {
@@ -86,7 +88,7 @@ pub fn read(source: &Source, robot: Node) -> Result<Description, Failure> {
     }
     let moving = tree.joints.values().flatten().filter(|joint| joint.attribute("type") != Some("fixed")).count();
     if tree.description.bodies.len() < moving {
-        return Err(source.error(robot, "some links are carried by each other in a ring, and not by the world"));
+        return Err(source.error(robot, "some links form a loop that is not connected to the world"));
     }
     Ok(tree.description)
 }
@@ -224,7 +226,7 @@ impl<'n> Tree<'_, 'n, '_> {
                         return Ok(None);
                     }
                 };
-                // The package is the folder in which the scene lies.
+                // The folder of the scene is taken as the package.
                 let inside =
                     file.strip_prefix("package://").and_then(|rest| rest.split_once('/')).map(|(_, inside)| inside);
                 let file = inside.or(file.strip_prefix("file://")).unwrap_or(file).trim_start_matches("./");
@@ -242,7 +244,7 @@ impl<'n> Tree<'_, 'n, '_> {
         Ok(Some(Shape { form, pose: pose.compose(&self.origin(visual)?), colour, line }))
     }
 
-    /// How a joint moves; `None` for a fixed one.
+    /// Motion that a joint allows; `None` for a fixed one.
     fn kind(&mut self, joint: Node) -> Result<Option<Kind>, Failure> {
         let axis = || -> Result<Vec3, Failure> {
             let Some(node) = child(joint, "axis") else {
@@ -269,7 +271,7 @@ impl<'n> Tree<'_, 'n, '_> {
                 "origin" | "parent" | "child" | "axis" | "dynamics" => {}
                 "limit" if joint.attribute("type") == Some("continuous") => {}
                 "limit" => self.description.omit(line, "limits of a joint: a [[stop]] needs their stiffness, too"),
-                "mimic" => self.description.omit(line, "<mimic>: the joint moves by itself"),
+                "mimic" => self.description.omit(line, "<mimic>: the joint moves independently"),
                 other => self.description.omit(line, format!("<{other}> of a joint")),
             }
         }
@@ -285,7 +287,7 @@ impl<'n> Tree<'_, 'n, '_> {
             self.description.omit(line, "friction in a joint");
         }
         let damping = self.source.number(node, "damping")?.unwrap_or_default();
-        let turns = match kind {
+        let is_angle = match kind {
             Kind::Hinge(_) => true,
             Kind::Slide(_) => false,
             _ if damping != 0.0 => {
@@ -294,7 +296,7 @@ impl<'n> Tree<'_, 'n, '_> {
             }
             _ => return Ok(Vec::new()),
         };
-        let spring = Spring { coordinate: None, turns, stiffness: 0.0, damping, rest: 0.0 };
+        let spring = Spring { coordinate: None, is_angle, stiffness: 0.0, damping, rest: 0.0 };
         Ok((damping != 0.0).then_some(spring).into_iter().collect())
     }
 }

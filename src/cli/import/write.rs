@@ -7,12 +7,12 @@ use super::description::{Description, Form, Joint, Kind, Pose, Shape, Spring};
 use crate::cli::Failure;
 use crate::machine::{Quat, Vec3};
 
-/// Rounding error of a component that is 0: of positions, m, of directions, and of products relative to the inertia.
+/// Smaller components count as 0: of positions, m, of directions, and of products relative to the inertia.
 const ROUNDING: f64 = 1e-14;
 /// Longest name in a scene file.
 const MAX_NAME_LENGTH: usize = 40;
 
-/// Names of a scene file by those of the description, each once.
+/// Unique names in the scene file, and those that differ from the description.
 #[derive(Default)]
 struct Names {
     taken: BTreeSet<String>,
@@ -29,10 +29,10 @@ impl Names {
             name.push_str("part");
         }
         let mut number = 2;
-        let begin = name.clone();
+        let base = name.clone();
         while name == "world" || self.taken.contains(&name) {
             let suffix = format!("_{number}");
-            name = begin.chars().take(MAX_NAME_LENGTH - suffix.len()).collect::<String>() + &suffix;
+            name = base.chars().take(MAX_NAME_LENGTH - suffix.len()).collect::<String>() + &suffix;
             number += 1;
         }
         if name != requested {
@@ -154,15 +154,15 @@ fn write_joint(text: &mut String, joint: &Joint, parent: Option<&str>, child: &s
         Kind::Ball | Kind::Free => ("free", vec![]),
     };
     let is_ball = joint.kind == Kind::Ball;
-    let own = names.assign(&joint.name);
-    let name = if is_ball { names.assign(&format!("{own}_free")) } else { own.clone() };
+    let joint_name = names.assign(&joint.name);
+    let name = if is_ball { names.assign(&format!("{joint_name}_free")) } else { joint_name.clone() };
     let _ = writeln!(text, "\n[[joint]]\nname = \"{name}\"\nkind = \"{kind}\"");
     if kind == "free" {
         let _ = writeln!(text, "child = \"{child}\"");
         let position = vector(pose.position, "m");
         let _ = writeln!(text, "start = {{ position = {position}{} }}", rotation_key(", rotation", &pose.rotation));
         if is_ball {
-            write_ball_joint(text, &own, [(parent.unwrap_or("world"), at), (child, joint.anchor)]);
+            write_ball_joint(text, &joint_name, [(parent.unwrap_or("world"), at), (child, joint.anchor)]);
         }
         return;
     }
@@ -185,7 +185,7 @@ fn write_joint(text: &mut String, joint: &Joint, parent: Option<&str>, child: &s
         let _ = writeln!(text, "{rotation}");
     }
     for spring in &joint.springs {
-        write_spring(text, spring, &own, &names.assign(&format!("{own}_spring")));
+        write_spring(text, spring, &joint_name, &names.assign(&format!("{joint_name}_spring")));
     }
 }
 
@@ -212,7 +212,8 @@ fn write_spring(text: &mut String, spring: &Spring, joint: &str, name: &str) {
     if let Some(coordinate) = spring.coordinate {
         let _ = writeln!(text, "coordinate = \"{coordinate}\"");
     }
-    let [rest, stiffness, damping] = if spring.turns { ["rad", "N m/rad", "N m s/rad"] } else { ["m", "N/m", "N s/m"] };
+    let [rest, stiffness, damping] =
+        if spring.is_angle { ["rad", "N m/rad", "N m s/rad"] } else { ["m", "N/m", "N s/m"] };
     for (key, value, unit) in [
         ("position", spring.rest, rest),
         ("stiffness", spring.stiffness, stiffness),
@@ -242,7 +243,7 @@ fn shape(shape: &Shape) -> Vec<String> {
         Form::Box([a, b, c]) if rotation == Quat::identity() => {
             vec![form("box"), centre(), format!("size = {}", vector(2.0 * Vec3::new(*a, *b, *c), "m"))]
         }
-        // A box that is turned is a thick plate.
+        // A rotated box is written as a thick plate.
         Form::Box([a, b, c]) => {
             let corner = |(x, y): (f64, f64)| vector(shape.pose.point(Vec3::new(x * a, y * b, 0.0)), "m");
             let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(corner).join(", ");
@@ -263,7 +264,7 @@ fn shape(shape: &Shape) -> Vec<String> {
     keys
 }
 
-/// `key` with a rotation; empty for none.
+/// `key` with a rotation; empty for the identity.
 fn rotation_key(key: &str, rotation: &Quat) -> String {
     if *rotation == Quat::identity() {
         return String::new();
@@ -281,7 +282,7 @@ fn vector(v: Vec3, unit: &str) -> String {
     components(Vec3::from(rounded(v)), unit)
 }
 
-/// The components as they are, however small.
+/// The components, even the smallest, without rounding to 0.
 fn components(v: Vec3, unit: &str) -> String {
     format!("\"{} {} {} {unit}\"", v.x, v.y, v.z)
 }
@@ -291,7 +292,7 @@ fn direction(v: Vec3) -> String {
     format!("[{x}, {y}, {z}]")
 }
 
-/// The components; those within the rounding error become 0, never -0.
+/// The components, with 0 (never -0) in place of rounding errors.
 fn rounded(v: Vec3) -> [f64; 3] {
     [v.x, v.y, v.z].map(|part| if part.abs() < ROUNDING { 0.0 } else { part })
 }

@@ -31,7 +31,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             }
             let number = self.description.closures.len() + 1;
             let name = node.attribute("name").map_or_else(|| format!("{tag}{number}"), str::to_owned);
-            // Without a scale of its torque, a weld holds points alone.
+            // With a torque scale of 0, a weld holds only points together.
             let is_fixed = tag == "weld" && self.source.number(node, "torquescale")? != Some(0.0);
             self.description.closures.push(Closure { name, bodies, frames, is_fixed, line });
         }
@@ -71,8 +71,9 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         }
         // A frame with the world's axes.
         let pose = |body: Option<usize>| body.map_or_else(Pose::identity, |body| poses[body]);
-        let there = if is_weld { pose(second).compose(&other) } else { pose(first).compose(&one) }.point(anchor);
-        let common = Pose { position: there, ..Pose::identity() };
+        let anchor_in_world =
+            if is_weld { pose(second).compose(&other) } else { pose(first).compose(&one) }.point(anchor);
+        let common = Pose { position: anchor_in_world, ..Pose::identity() };
         Ok([first, second].map(|body| (body, pose(body).inverse().compose(&common))))
     }
 }

@@ -14,7 +14,7 @@ use crate::words::Words;
 
 /// Density of a geom without one of its own, kg/m^3.
 const DEFAULT_DENSITY: f64 = 1000.0;
-/// Attributes of a geom that are read, or noted elsewhere, or act on contacts alone.
+/// Attributes of a geom that are read, reported elsewhere, or affect only contacts.
 const KNOWN_ATTRIBUTES: [&str; 19] = [
     "type",
     "size",
@@ -138,7 +138,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         Some(if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") })
     }
 
-    /// What a mesh looks like, if a scene can show it.
+    /// Form of a mesh; `None` if a scene cannot show it.
     fn mesh_form(&mut self, node: Node<'n, 'i>, class: &str) -> Result<Option<Form>, Failure> {
         let (asset, scale) = self.mesh_asset(node, class)?;
         let moved = ["refpos", "refquat"].into_iter().find(|key| asset.attribute(*key).is_some());
@@ -154,7 +154,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         })
     }
 
-    /// What a mesh encloses, in the axes of its geom.
+    /// The solid that has the mass of a mesh, in the axes of its geom.
     fn mesh_solid(&mut self, node: Node<'n, 'i>, class: &str) -> Result<machine::Solid, Failure> {
         let (asset, scale) = self.mesh_asset(node, class)?;
         let mesh_inertia = match self.attribute(asset, MAIN, "inertia") {
@@ -171,16 +171,16 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         let origin = Pose { position, rotation }.inverse();
         let scale = Vec3::from(scale);
         let remedy = "give its body an <inertial>, or the geom mass = \"0\"";
-        let failed =
+        let mass_error =
             |what: String| self.source.error(node, &format!("mesh without a computable mass: {what}; {remedy}"));
-        let file = self.mesh_file(asset).ok_or_else(|| failed("it has no file".to_owned()))?;
+        let file = self.mesh_file(asset).ok_or_else(|| mass_error("it has no file".to_owned()))?;
         let mesh = match self.loaded_meshes.get(&file) {
             Some(mesh) => mesh.clone(),
-            None => Arc::new(mesh::read(self.source.folder, &file).map_err(failed)?),
+            None => Arc::new(mesh::read(self.source.folder, &file).map_err(mass_error)?),
         };
         let solid =
             mesh::solid(&mesh, |point| scale.component_mul(&origin.point(point)), scale.product() < 0.0, mesh_inertia);
-        let solid = solid.map_err(|fault| failed(format!("{file}: {fault}")))?;
+        let solid = solid.map_err(|fault| mass_error(format!("{file}: {fault}")))?;
         self.loaded_meshes.insert(file, mesh);
         Ok(solid)
     }

@@ -12,7 +12,7 @@ use crate::words::{Words, words};
 const PARALLEL: f64 = 1.0 - 1e-10;
 const PERPENDICULAR: f64 = 1e-6;
 
-/// Attributes of a joint that are read, or noted elsewhere, or act on limits alone.
+/// Attributes of a joint that are read, reported elsewhere, or affect only limits.
 const KNOWN_ATTRIBUTES: [&str; 13] = [
     "type",
     "axis",
@@ -97,32 +97,32 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         for &node in nodes {
             elements.push(self.element(node, class)?);
         }
-        let steps: Vec<(Kind, &[Element])> = match single_joint_kind(&elements) {
+        let series: Vec<(Kind, &[Element])> = match single_joint_kind(&elements) {
             Some(kind) => vec![(kind, &elements)],
             None => elements.chunks(1).filter_map(|one| Some((single_joint_kind(one)?, one))).collect(),
         };
         let is_only_joint = |kind: &Kind| matches!(kind, Kind::Ball | Kind::Free);
-        if steps.len() > 1 && steps.iter().any(|(kind, _)| is_only_joint(kind)) {
+        if series.len() > 1 && series.iter().any(|(kind, _)| is_only_joint(kind)) {
             let message =
-                "a ball or free joint is the only joint of its body in a scene: put a body with mass between them";
+                "a ball or free joint is the only joint of its body in a scene: insert a body with mass between them";
             return Err(self.source.error(body, message));
         }
-        if carrier.is_some() && steps.iter().any(|(kind, _)| *kind == Kind::Free) {
-            return Err(self.source.error(body, "only a body of the world moves freely"));
+        if carrier.is_some() && series.iter().any(|(kind, _)| *kind == Kind::Free) {
+            return Err(self.source.error(body, "only a child of the world can have a free joint"));
         }
         let (mut parent, mut at) = (carrier, *pose);
-        for (number, (kind, elements)) in (1..).zip(&steps) {
+        for (number, (kind, elements)) in (1..).zip(&series) {
             let index = self.description.bodies.len();
             let first = elements[0].node;
             let own = first.attribute("name");
             let body_name = match own {
-                _ if number == steps.len() => name.clone(),
+                _ if number == series.len() => name.clone(),
                 Some(own) => own.to_owned(),
                 None => format!("{name}_{number}"),
             };
             self.description.bodies.push(Body::new(&body_name, line));
             let springs = self.springs(elements, class, *kind)?;
-            // Of a cylindrical joint, the point on the axis of its hinge.
+            // The anchor of a cylindrical joint is that of its hinge.
             let anchor =
                 elements.iter().find(|element| element.joint_type == JointType::Hinge).unwrap_or(&elements[0]).anchor;
             let anchor = if *kind == Kind::Free { Vec3::zeros() } else { anchor };
@@ -179,8 +179,8 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                 self.description.omit(self.source.line(node), format!("stiffness and damping of a {joint_type} joint"));
                 continue;
             }
-            let turns = joint_type == JointType::Hinge;
-            let coordinate = match (kind, turns, at) {
+            let is_angle = joint_type == JointType::Hinge;
+            let coordinate = match (kind, is_angle, at) {
                 (Kind::Cylindrical(_), true, _) | (Kind::Universal(..), _, 0) => Some("angle"),
                 (Kind::Cylindrical(_), false, _) => Some("position"),
                 (Kind::Universal(..), ..) => Some("child_angle"),
@@ -193,8 +193,8 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             };
             // The scene's coordinate is 0 where MuJoCo's is `ref`.
             let rest = self.number(node, class, "springref")? - self.number(node, class, "ref")?;
-            let rest = sign * rest * if turns { self.angle_unit } else { 1.0 };
-            springs.push(Spring { coordinate, turns, stiffness, damping, rest });
+            let rest = sign * rest * if is_angle { self.angle_unit } else { 1.0 };
+            springs.push(Spring { coordinate, is_angle, stiffness, damping, rest });
         }
         Ok(springs)
     }

@@ -17,7 +17,7 @@ use super::{MAX_DEPTH, too_deep};
 use crate::cli::Failure;
 use crate::machine::{Mat3, Mesh, Quat, Vec3};
 
-/// Defaults of elements by their tag, of one class.
+/// Default attributes of one class, by tag.
 type Defaults<'n> = BTreeMap<&'n str, BTreeMap<&'n str, &'n str>>;
 
 /// A site.
@@ -41,7 +41,7 @@ struct Model<'s, 'n, 'i> {
     /// Default part of a mesh that has mass.
     mesh_inertia: MeshInertia,
     classes: BTreeMap<&'n str, Defaults<'n>>,
-    /// Meshes by name, and those that have been read, by file.
+    /// Mesh assets by name, and loaded meshes by file.
     meshes: BTreeMap<String, Node<'n, 'i>>,
     loaded_meshes: BTreeMap<String, Arc<Mesh>>,
     colours: BTreeMap<&'n str, &'n str>,
@@ -61,7 +61,7 @@ const MAIN: &str = "main";
 /// Reads `<mujoco>`.
 ///
 /// # Errors
-/// A missing or invalid part, joints of a body that a scene has no joint for, or a mesh without a mass that can be computed.
+/// A missing or invalid part, joints of a body that a scene cannot express, or a mesh whose mass cannot be computed.
 pub fn read<'n, 'i>(source: &Source<'_>, root: Node<'n, 'i>) -> Result<Description, Failure> {
     let mut model = Model {
         source,
@@ -169,7 +169,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         Ok(())
     }
 
-    /// Reads a class of defaults, which begins with those of `parent`.
+    /// Reads a class of defaults, which inherits those of `parent`.
     fn defaults(&mut self, node: Node<'n, 'i>, parent: Option<&'n str>, depth: usize) -> Result<(), Failure> {
         if depth > MAX_DEPTH {
             return Err(too_deep(self.source, node));
@@ -303,7 +303,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         Ok(Quat::identity())
     }
 
-    /// Reads a body, which lies at `pose` in the body `carrier`, and those in it. Without joints it is a part of its parent.
+    /// Reads a body at `pose` in the body `carrier`, and its child bodies. Without joints it is a part of its parent.
     fn body(
         &mut self,
         node: Node<'n, 'i>,
@@ -333,7 +333,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             let inner_pose = at.compose(&self.pose(inner, class)?);
             self.body(inner, owner, &inner_pose, class, depth + 1)?;
         }
-        // Parts without joints have their mass here, too.
+        // By now, child bodies without joints have added their mass.
         if let Some(index) = owner.filter(|_| !joints.is_empty())
             && !(self.description.bodies[index].inertial.mass > 0.0)
         {
