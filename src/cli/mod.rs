@@ -176,8 +176,8 @@ fn scenes() -> Result<String, Failure> {
 fn lessons(arguments: &LessonArguments) -> Result<String, Failure> {
     use crate::app::{Lesson, RunningLesson, lesson_titles};
     if let Some(lesson) = &arguments.lesson {
-        let mut course = RunningLesson::new(Lesson::load(lesson)?, 0);
-        return course.print().map_err(Failure::usage);
+        let mut running_lesson = RunningLesson::new(Lesson::load(lesson)?, 0);
+        return running_lesson.print().map_err(Failure::usage);
     }
     let mut out = String::new();
     for (name, title) in lesson_titles() {

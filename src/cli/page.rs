@@ -1,4 +1,4 @@
-//! The page that the window's links open.
+//! Address of the page that share links open.
 
 use super::Failure;
 use crate::app::{NOT_A_PAGE_ADDRESS, is_page_address};
@@ -6,14 +6,14 @@ use crate::app::{NOT_A_PAGE_ADDRESS, is_page_address};
 /// Environment variable with the address that links are appended to, read at start-up or else at build time.
 const PAGE: &str = "JOINTPLAY_PAGE";
 /// Its value at build time.
-const BUILT: Option<&str> = option_env!("JOINTPLAY_PAGE");
+const BUILD_TIME_PAGE: Option<&str> = option_env!("JOINTPLAY_PAGE");
 
 /// The address that links are appended to, from `--page` or else from [`PAGE`]; "" for none.
 ///
 /// # Errors
 /// Usage: it is not the address of a page.
 pub fn address(option: Option<&str>) -> Result<String, Failure> {
-    choose(option, std::env::var(PAGE).ok(), BUILT)
+    choose(option, std::env::var(PAGE).ok(), BUILD_TIME_PAGE)
 }
 
 fn choose(option: Option<&str>, variable: Option<String>, built: Option<&str>) -> Result<String, Failure> {

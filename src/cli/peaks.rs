@@ -27,9 +27,9 @@ const ROUNDING: f64 = 1e-12;
 impl Part<'_> {
     /// Kind and peaks, in words.
     pub fn description(&self) -> String {
-        let known = self.peaks.iter().zip(self.rounding).zip(LOADS);
-        let known =
-            known.filter_map(|((peak, least), (unit, ..))| Some((peak.filter(|(size, _)| *size > least)?, unit)));
+        let reported = self.peaks.iter().zip(self.rounding).zip(LOADS);
+        let reported =
+            reported.filter_map(|((peak, least), (unit, ..))| Some((peak.filter(|(size, _)| *size > least)?, unit)));
         let words: Vec<String> = known
             .map(|((size, time), unit)| format!("{} {unit} at {} s", significant(size, 6), significant(time, 6)))
             .collect();
@@ -42,8 +42,8 @@ impl Part<'_> {
 pub fn parts(simulation: &Simulation) -> Vec<Part<'_>> {
     let machine = simulation.machine();
     let elements = machine.elements.iter().map(|element| ("Element", &element.name, element.kind.word()));
-    let holding = machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
-    let joints = holding.chain(&machine.closing_joints).map(|joint| ("Joint", &joint.name, joint.kind.word()));
+    let constraining = machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
+    let joints = constraining.chain(&machine.closing_joints).map(|joint| ("Joint", &joint.name, joint.kind.word()));
     let peaks = simulation.load_peaks().map_or(&[][..], |peaks| peaks.parts());
     let largest = |i: usize| peaks.iter().filter_map(|part| part[i]).fold(0.0, |most, (size, _)| size.max(most));
     let rounding = [0, 1].map(|i| ROUNDING * largest(i));

@@ -1,4 +1,4 @@
-//! Progress of a long command on standard error: a bar on a terminal, otherwise a line now and then.
+//! Progress of a long command on standard error: a bar on a terminal, otherwise a line at regular intervals.
 
 use std::io::IsTerminal;
 use std::thread;
@@ -70,15 +70,15 @@ mod tests {
     fn progress_is_reported_at_each_interval_until_the_work_is_finished() {
         let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::hidden());
         let weak_bar = bar.downgrade();
-        // Half of it was done by an earlier run.
+        // Half of the work was done by an earlier run.
         bar.set_position(500);
-        let mut held = Some(bar);
+        let mut unfinished = Some(bar);
         let mut now = Duration::ZERO;
         let wait = || {
             now += INTERVAL;
             match now.as_secs() {
-                ..50 => held.as_ref().expect("at work").inc(100),
-                _ => held = None,
+                ..50 => unfinished.as_ref().expect("unfinished").inc(100),
+                _ => unfinished = None,
             }
             now
         };
@@ -99,6 +99,6 @@ mod tests {
     fn work_finished_before_the_first_interval_reports_nothing() {
         let bar = ProgressBar::with_draw_target(Some(10), ProgressDrawTarget::hidden());
         bar.finish_and_clear();
-        report_periodically(&bar.downgrade(), || INTERVAL, |line| panic!("it says {line}"));
+        report_periodically(&bar.downgrade(), || INTERVAL, |line| panic!("unexpected line: {line}"));
     }
 }

@@ -23,7 +23,7 @@ pub fn duration(option: &str, text: &str) -> Result<f64, Failure> {
 /// The options `--duration` and `--from` of statistics, s.
 ///
 /// # Errors
-/// Usage: as [`duration`]; a beginning that is not before the end.
+/// Usage: as [`duration`]; a start that is not before the end.
 pub fn span(text: &str, from: Option<&str>) -> Result<(f64, f64), Failure> {
     let end = duration("--duration", text)?;
     let begin = from.map_or(Ok(0.0), |from| duration("--from", from))?;

@@ -61,40 +61,39 @@ fn keys(table: &FileTable) -> String {
         Some(Variants::Presence(_)) => "form",
         None => "",
     };
-    let framed = table.keys.iter().any(|key| !key.frame.is_empty());
-    let columns = [true, !by.is_empty(), true, true, framed, true];
-    let shown = |cells: [String; 6]| {
+    let has_frames = table.keys.iter().any(|key| !key.frame.is_empty());
+    let columns = [true, !by.is_empty(), true, true, has_frames, true];
+    let selected = |cells: [String; 6]| {
         let cells = cells.into_iter().zip(columns);
-        cells.filter_map(|(cell, shown)| shown.then_some(cell)).collect::<Vec<_>>()
+        cells.filter_map(|(cell, selected)| selected.then_some(cell)).collect::<Vec<_>>()
     };
     let heads = ["key", by, "value", "default", "frame", "meaning"].map(str::to_owned);
-    let heads = shown(heads);
+    let heads = selected(heads);
     let row = |key: &FileKey| {
-        shown([
+        selected([
             format!("`{}`", key.name),
             key.of.join(", "),
             value(key, table),
-            absent(key),
+            default_text(key),
             key.frame.to_owned(),
             description(key),
         ])
     };
-    let own = own(table);
-    let mut rows: Vec<Vec<String>> = own.map(row).collect();
+    let mut rows: Vec<Vec<String>> = unshared_keys(table).map(row).collect();
     if let Some(also) = table.also {
         let any = format!("any key of {}", markdown_name(also));
-        let there = || "as there".to_owned();
-        let own = String::new;
-        rows.push(shown([any, own(), there(), there(), own(), "For this one only".to_owned()]));
+        let same = || "as there".to_owned();
+        let empty = String::new;
+        rows.push(selected([any, empty(), same(), same(), empty(), "For this one only".to_owned()]));
     }
     Table::new(&heads.join(" | "), rows).markdown()
 }
 
 /// Keys of a table without those shared with `table.also`.
-fn own(table: &FileTable) -> impl Iterator<Item = &FileKey> {
+fn unshared_keys(table: &FileTable) -> impl Iterator<Item = &FileKey> {
     let shared = |key: &FileKey| Some(table.also?.key(key.name, None).is_some());
-    let own = move |key: &&FileKey| shared(key) != Some(true);
-    table.keys.iter().filter(own)
+    let is_unshared = move |key: &&FileKey| shared(key) != Some(true);
+    table.keys.iter().filter(is_unshared)
 }
 
 /// Description of a key; only the first sentence for a parameter, whose own page says more.
@@ -191,8 +190,8 @@ fn bounds(dimension: Dimension, (least, most): (f64, f64)) -> String {
     }
 }
 
-/// Default of an omitted key, in words.
-pub fn absent(key: &FileKey) -> String {
+/// Default value of a key, in words.
+pub fn default_text(key: &FileKey) -> String {
     match (key.default, key.value_type) {
         (_, ValueType::Parameter(name)) => {
             let show = |parameter: &crate::scene::Parameter| parameter.show(&parameter.default);
@@ -234,7 +233,7 @@ fn frames() -> String {
     let mut frames: Vec<(&str, Vec<String>)> = Vec::new();
     for table in file_tables() {
         let mut of_table: Vec<(&str, Vec<&str>)> = Vec::new();
-        for key in own(table).filter(|key| !key.frame.is_empty()) {
+        for key in unshared_keys(table).filter(|key| !key.frame.is_empty()) {
             match of_table.iter_mut().find(|(frame, _)| *frame == key.frame) {
                 Some((_, names)) => names.push(key.name),
                 None => of_table.push((key.frame, vec![key.name])),

@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value as Json, json};
 
-use super::reference::{absent, capital, value};
+use super::reference::{capital, default_text, value};
 use crate::scene::{ABOVE_ZERO, DefaultRule, FILE, FileKey, FileTable, Kind, ValueType, Variants, file_tables, find};
 use crate::units::{Dimension, unit_names};
 
@@ -52,7 +52,7 @@ fn of_table(table: &FileTable) -> Json {
         "additionalProperties": false,
     });
     let common = table.keys.iter().filter(|key| key.of.is_empty());
-    merge(&mut schema, needs(&common.collect::<Vec<_>>()));
+    merge(&mut schema, requirements(&common.collect::<Vec<_>>()));
     let mut rules = schema["allOf"].as_array().cloned().unwrap_or_default();
     if let Some(variants) = table.variants {
         let words = table.words();
@@ -89,12 +89,12 @@ fn of_variant(table: &FileTable, word: &'static str) -> Json {
     }
     let own = table.of(Some(word)).filter(|key| !key.of.is_empty());
     let mut schema = json!({ "properties": properties });
-    merge(&mut schema, needs(&own.collect::<Vec<_>>()));
+    merge(&mut schema, requirements(&own.collect::<Vec<_>>()));
     schema
 }
 
-/// Requires the mandatory ones among `keys`.
-fn needs(keys: &[&FileKey]) -> Json {
+/// Schema that requires the mandatory keys among `keys`.
+fn requirements(keys: &[&FileKey]) -> Json {
     let needed = keys.iter().filter(|key| matches!(key.default, DefaultRule::Required));
     let needed: Vec<&str> = needed.map(|key| key.name).collect();
     let either = keys.iter().filter_map(|key| match key.default {
@@ -127,8 +127,8 @@ fn of_key(key: &FileKey, table: &FileTable) -> Json {
         description += &format!("; units {}", units.join(", "));
     }
     description += &match key.default {
-        DefaultRule::Required | DefaultRule::RequiredUnless(_) => format!(".\n{}.", capital(&absent(key))),
-        _ => format!(".\nDefault: {}.", absent(key)),
+        DefaultRule::Required | DefaultRule::RequiredUnless(_) => format!(".\n{}.", capital(&default_text(key))),
+        _ => format!(".\nDefault: {}.", default_text(key)),
     };
     if !key.frame.is_empty() {
         description += &format!("\nFrame: {}.", key.frame);

@@ -21,7 +21,7 @@ const NO_REST: i64 = 2;
 /// Input/output.
 pub fn npz(results: &Results, target: OutputFile) -> Result<PendingFile, FileError> {
     let shape = results.map.design().shape();
-    let with = |more: &[usize]| [&shape[..], more].concat();
+    let shape_with = |more: &[usize]| [&shape[..], more].concat();
     let points = || 0..results.points.len();
     let vectors = |of: &dyn Fn(usize) -> Vec3| -> Vec<f64> {
         points().flat_map(|p| of(p).iter().copied().collect::<Vec<_>>()).collect()
@@ -30,8 +30,8 @@ pub fn npz(results: &Results, target: OutputFile) -> Result<PendingFile, FileErr
     // A point with fewer directions than others has NaN in their place.
     let of_directions = |length: usize, of: &dyn Fn(&crate::mechanism::Farthest) -> Vec<f64>| -> Vec<f64> {
         let of_point = |point: usize| {
-            let own = results.points[point].as_ref().map_or(&[][..], |own| &own.farthest);
-            let mut values: Vec<f64> = own.iter().flat_map(of).collect();
+            let farthest = results.points[point].as_ref().map_or(&[][..], |at_point| &at_point.farthest);
+            let mut values: Vec<f64> = farthest.iter().flat_map(of).collect();
             values.resize(directions * length, f64::NAN);
             values
         };
@@ -41,7 +41,7 @@ pub fn npz(results: &Results, target: OutputFile) -> Result<PendingFile, FileErr
     let unknown = || vec![f64::NAN; 3];
     let status = |point: usize| match &results.points[point] {
         Err(_) => NO_POSE,
-        Ok(own) if own.settled.is_err() => NO_REST,
+        Ok(at_point) if at_point.settled.is_err() => NO_REST,
         Ok(_) => 0,
     };
     target.fill(|file| {
@@ -65,18 +65,18 @@ pub fn npz(results: &Results, target: OutputFile) -> Result<PendingFile, FileErr
                 ("largest_error_m", &|p| results.largest(p)),
                 ("largest_direction", &|p| results.largest_direction(p)),
             ] {
-                add_array(archive, name, with(&[3]), vectors(of))?;
+                add_array(archive, name, shape_with(&[3]), vectors(of))?;
             }
             let joint = points().map(|point| results.largest_joint(point).map_or(-1, |joint| joint as i64));
             add_array(archive, "largest_joint", shape.clone(), joint.collect())?;
             let joints = results.map.scene().machine.ball_joints.len();
-            add_array(archive, "share_m", with(&[joints]), points().flat_map(|p| results.shares(p)).collect())?;
+            add_array(archive, "share_m", shape_with(&[joints]), points().flat_map(|p| results.shares(p)).collect())?;
             let direction = of_directions(3, &|farthest| parts(&farthest.direction));
-            add_array(archive, "direction", with(&[directions, 3]), direction)?;
+            add_array(archive, "direction", shape_with(&[directions, 3]), direction)?;
             let support = of_directions(1, &|farthest| vec![farthest.support]);
-            add_array(archive, "support_m", with(&[directions]), support)?;
+            add_array(archive, "support_m", shape_with(&[directions]), support)?;
             let error = of_directions(3, &|farthest| farthest.error.as_ref().map_or_else(unknown, parts));
-            add_array(archive, "error_m", with(&[directions, 3]), error)?;
+            add_array(archive, "error_m", shape_with(&[directions, 3]), error)?;
             let meta = serde_json::to_vec(&results.meta()).map_err(io::Error::from)?;
             archive.add_array("meta", &Array1::from(meta)).map_err(as_io)
         })

@@ -26,8 +26,8 @@ enum Format {
 
 impl Format {
     fn of(path: &Path) -> Result<Self, Failure> {
-        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        match &*ending.to_ascii_lowercase() {
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        match &*extension.to_ascii_lowercase() {
             "npz" => Ok(Self::Npz),
             "vtk" => Ok(Self::Vtk),
             _ => Err(Failure::usage(format!(

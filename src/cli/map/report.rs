@@ -9,7 +9,7 @@ use crate::cli::tables::Table;
 use crate::machine::Vec3;
 use crate::units::format_quantity_digits;
 
-/// Points that are shown, by their place among those ranked.
+/// The points to be shown, by their rank.
 fn notable(results: &Results) -> Vec<(&'static str, usize)> {
     let ranked = results.ranked();
     match ranked[..] {
@@ -35,19 +35,19 @@ pub fn text(results: &Results, out: &[PathBuf]) -> String {
     text += "\n";
     let first = |is: &dyn Fn(usize) -> bool| (0..all).find(|&point| is(point));
     if let Some((point, Err(fault))) = first(&|p| results.points[p].is_err()).map(|p| (p, &results.points[p])) {
-        text += &format!("First without     {}: {fault}\n", results.describe(point));
+        text += &format!("No pose, first at {}: {fault}\n", results.describe(point));
     }
-    if let Some(point) = first(&|p| results.points[p].as_ref().is_ok_and(|own| own.settled.is_err()))
-        && let Ok(Err(fault)) = results.points[point].as_ref().map(|own| &own.settled)
+    if let Some(point) = first(&|p| results.points[p].as_ref().is_ok_and(|at_point| at_point.settled.is_err()))
+        && let Ok(Err(fault)) = results.points[point].as_ref().map(|at_point| &at_point.settled)
     {
-        text += &format!("First restless    {}: {fault}\n", results.describe(point));
+        text += &format!("No rest, first at {}: {fault}\n", results.describe(point));
     }
     if let Some(point) = first(&|p| !results.unbounded(p).is_empty()) {
-        let ways: Vec<String> = results.unbounded(point).iter().map(direction).collect();
+        let directions: Vec<String> = results.unbounded(point).iter().map(direction).collect();
         text += &format!(
             "Unbounded         at {unbounded} points the tip moves without play although the drives are held, at the first along {}; \
-             errors are those across that\n",
-            ways.join(" and ")
+             errors are those across these directions\n",
+            directions.join(" and ")
         );
     }
     text += &format!("Settled error     {SETTLED}\nLargest error     of {REACHABLE}\n\n");
@@ -65,9 +65,9 @@ pub fn text(results: &Results, out: &[PathBuf]) -> String {
                 format!("{} ({part:.0} %)", joints[joint].name)
             },
         );
-        let way = results.largest_direction(point);
-        let way = if way.x.is_nan() { "-".to_owned() } else { direction(&way) };
-        vec![which.to_owned(), results.describe(point), length(largest), way, length(settled), ratio, joint]
+        let along = results.largest_direction(point);
+        let along = if along.x.is_nan() { "-".to_owned() } else { direction(&along) };
+        vec![which.to_owned(), results.describe(point), length(largest), along, length(settled), ratio, joint]
     });
     text += &Table::new("point | at | largest error | along | settled | ratio | most from", rows).text();
     for path in out {
@@ -101,7 +101,7 @@ pub fn json(results: &Results, out: &[PathBuf]) -> Map<String, Json> {
             let word = axis.words().map(|words| json!(words[i]));
             (axis.key().to_owned(), word.unwrap_or_else(|| json!(axis.number(i))))
         });
-        let own = json!({
+        let entry = json!({
             "point": point,
             "at": Json::Object(at.collect()),
             "ideal_tip_m": results.ideal_tip(point).as_slice(),
@@ -112,7 +112,7 @@ pub fn json(results: &Results, out: &[PathBuf]) -> Map<String, Json> {
                 .collect::<Map<_, _>>(),
             "settled_error_m": results.settled(point).as_slice(),
         });
-        all.insert(which.into(), own);
+        all.insert(which.into(), entry);
     }
     all.insert("out".into(), out.iter().map(|path| json!(path.display().to_string())).collect());
     all

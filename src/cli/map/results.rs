@@ -1,4 +1,4 @@
-//! The points of a map as arrays, and what stands out among them.
+//! The points of a map as arrays, and the notable points among them.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -31,19 +31,19 @@ impl Results {
 
     /// Tip without play, m; NaN without a pose.
     pub fn ideal_tip(&self, point: usize) -> Vec3 {
-        self.computed(point).map_or(UNKNOWN, |own| own.ideal_tip)
+        self.computed(point).map_or(UNKNOWN, |at_point| at_point.ideal_tip)
     }
 
     /// Error at rest, m; NaN if there is none.
     pub fn settled(&self, point: usize) -> Vec3 {
-        self.computed(point).and_then(|own| own.settled.as_ref().ok().copied()).unwrap_or(UNKNOWN)
+        self.computed(point).and_then(|at_point| at_point.settled.as_ref().ok().copied()).unwrap_or(UNKNOWN)
     }
 
     /// Largest error in the bounded directions, m: 0 where play moves the tip nowhere, NaN without a pose.
     pub fn largest(&self, point: usize) -> Vec3 {
-        let of_point = |own: &MapPoint| match &own.largest {
+        let of_point = |at_point: &MapPoint| match &at_point.largest {
             Some(largest) => largest.error.unwrap_or(UNKNOWN),
-            None if own.farthest.iter().all(|farthest| farthest.error.is_some()) => Vec3::zeros(),
+            None if at_point.farthest.iter().all(|farthest| farthest.error.is_some()) => Vec3::zeros(),
             None => UNKNOWN,
         };
         self.computed(point).map_or(UNKNOWN, of_point)
@@ -51,19 +51,19 @@ impl Results {
 
     /// Direction of the largest error; NaN without one.
     pub fn largest_direction(&self, point: usize) -> Vec3 {
-        self.computed(point).and_then(|own| own.largest.as_ref()).map_or(UNKNOWN, |largest| largest.direction)
+        self.computed(point).and_then(|at_point| at_point.largest.as_ref()).map_or(UNKNOWN, |largest| largest.direction)
     }
 
-    /// Part of each ball joint in the support along the direction of the largest error, m; NaN without one.
+    /// Share of each ball joint in the support along the direction of the largest error, m; NaN without one.
     pub fn shares(&self, point: usize) -> Vec<f64> {
         let joints = self.map.scene().machine.ball_joints.len();
-        let own = self.computed(point).and_then(|own| own.largest.as_ref());
-        let mut shares = own.map_or_else(Vec::new, |largest| largest.shares.clone());
+        let largest = self.computed(point).and_then(|at_point| at_point.largest.as_ref());
+        let mut shares = largest.map_or_else(Vec::new, |largest| largest.shares.clone());
         shares.resize(joints, f64::NAN);
         shares
     }
 
-    /// Ball joint with the largest part in the largest error.
+    /// Ball joint with the largest share of the largest error.
     pub fn largest_joint(&self, point: usize) -> Option<usize> {
         let shares = self.shares(point);
         let most = (0..shares.len()).max_by(|&a, &b| shares[a].total_cmp(&shares[b]).then(b.cmp(&a)))?;
@@ -72,21 +72,21 @@ impl Results {
 
     /// Directions in which nothing bounds the error.
     pub fn unbounded(&self, point: usize) -> &[Vec3] {
-        self.computed(point).map_or(&[], |own| &own.freedoms.unbounded)
+        self.computed(point).map_or(&[], |at_point| &at_point.freedoms.unbounded)
     }
 
-    /// Most directions that a point has.
+    /// Largest number of directions of any point.
     pub fn directions(&self) -> usize {
-        self.points.iter().flatten().map(|own| own.farthest.len()).max().unwrap_or(0)
+        self.points.iter().flatten().map(|at_point| at_point.farthest.len()).max().unwrap_or(0)
     }
 
     /// Number of points without a pose, of those with a pose that do not rest, and of those with unbounded directions.
     pub fn counts(&self) -> [usize; 3] {
-        let posed = || self.points.iter().flatten();
+        let with_pose = || self.points.iter().flatten();
         [
-            self.points.len() - posed().count(),
-            posed().filter(|own| own.settled.is_err()).count(),
-            posed().filter(|own| !own.freedoms.unbounded.is_empty()).count(),
+            self.points.len() - with_pose().count(),
+            with_pose().filter(|at_point| at_point.settled.is_err()).count(),
+            with_pose().filter(|at_point| !at_point.freedoms.unbounded.is_empty()).count(),
         ]
     }
 
@@ -102,10 +102,10 @@ impl Results {
     pub fn describe(&self, point: usize) -> String {
         let indices = self.map.design().indices(point);
         let axes = self.map.design().axes().iter().zip(indices);
-        axes.map(|(axis, i)| format!("{} = {}", axis.key(), self.shown(axis, i))).collect::<Vec<_>>().join(", ")
+        axes.map(|(axis, i)| format!("{} = {}", axis.key(), self.format_value(axis, i))).collect::<Vec<_>>().join(", ")
     }
 
-    fn shown(&self, axis: &Axis, i: usize) -> String {
+    fn format_value(&self, axis: &Axis, i: usize) -> String {
         match axis.coordinate() {
             Some(coordinate) => {
                 let unit = if coordinate.dimension == crate::units::Dimension::Angle { "deg" } else { "mm" };
@@ -144,9 +144,9 @@ impl Results {
         meta.insert("directions".into(), json!(self.map.directions()));
         let joints = scene.machine.ball_joints.iter();
         meta.insert("ball_joints".into(), joints.map(|joint| json!(joint.name)).collect());
-        let faults = self.points.iter().enumerate().filter_map(|(point, own)| {
-            let fault = match own {
-                Ok(own) => own.settled.as_ref().err()?.to_string(),
+        let faults = self.points.iter().enumerate().filter_map(|(point, at_point)| {
+            let fault = match at_point {
+                Ok(at_point) => at_point.settled.as_ref().err()?.to_string(),
                 Err(fault) => fault.to_string(),
             };
             Some((point.to_string(), json!(fault)))

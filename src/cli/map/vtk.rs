@@ -17,14 +17,14 @@ pub struct Points<'a> {
     pub scalars: Vec<(String, Vec<f64>)>,
 }
 
-/// Largest length of a title.
-const TITLE: usize = 255;
+/// Longest title, characters.
+const MAX_TITLE_LENGTH: usize = 255;
 
 impl Points<'_> {
     /// Writes the file.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let count = self.points.len();
-        let title: String = self.title.chars().filter(|c| !c.is_control()).take(TITLE).collect();
+        let title: String = self.title.chars().filter(|c| !c.is_control()).take(MAX_TITLE_LENGTH).collect();
         write!(out, "# vtk DataFile Version 3.0\n{title}\nBINARY\nDATASET POLYDATA\nPOINTS {count} double\n")?;
         vectors(out, &self.points)?;
         write!(out, "\nVERTICES {count} {}\n", 2 * count)?;

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn twelve_digits_are_kept() {
+    fn twelve_digits_are_preserved() {
         let mut value = 1.234_567_890_123_456_7e-20;
         while value < 1e20 {
             let back: f64 = significant(value, 12).parse().unwrap();

@@ -33,13 +33,13 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format of a file by its ending.
+    /// The format of a file by its extension.
     ///
     /// # Errors
-    /// Any other ending than the three.
+    /// Any other extension.
     pub fn of(path: &Path) -> Result<Self, Failure> {
-        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        match ending.to_ascii_lowercase().as_str() {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        match extension.to_ascii_lowercase().as_str() {
             "csv" => Ok(Self::Csv),
             "json" => Ok(Self::Json),
             "npz" => Ok(Self::Npz),
@@ -63,7 +63,7 @@ impl RowsFile {
     /// Checks that `path` can be written.
     ///
     /// # Errors
-    /// Unknown ending (usage), existing file without `force`, unwritable folder (input/output).
+    /// Unknown extension (usage), existing file without `force`, unwritable folder (input/output).
     pub fn claim(path: &Path, force: bool) -> Result<Self, Failure> {
         let format = Format::of(path)?;
         // The user's own name is claimed first, so that an error names it.

@@ -46,8 +46,8 @@ pub fn write_archive<W: Write + Seek>(
     let mut out = BufWriter::new(Sink { file, failure: None });
     let mut archive = NpzWriter::new(&mut out);
     let filled = fill(&mut archive);
-    let ended = archive.finish().map_err(as_io).map(|_| ());
-    let outcome = filled.and(ended).and_then(|()| out.flush());
+    let finished = archive.finish().map_err(as_io).map(|_| ());
+    let outcome = filled.and(finished).and_then(|()| out.flush());
     out.get_mut().failure.take().map_or(outcome, Err)
 }
 

@@ -64,7 +64,7 @@ impl Rows {
     ///
     /// # Errors
     /// A disk error, or an error of `each`.
-    pub fn each(&self, mut each: impl FnMut(&[f64]) -> io::Result<()>) -> io::Result<()> {
+    pub fn for_each(&self, mut each: impl FnMut(&[f64]) -> io::Result<()>) -> io::Result<()> {
         let n = self.rows_per_block;
         let mut row = vec![0.0; self.width];
         for block in 0..self.spooled {
@@ -123,7 +123,7 @@ mod tests {
         }
         assert_eq!((rows.len(), rows.spooled, rows.block.len()), (11, 2, 9));
         let mut k = 0;
-        rows.each(|row| {
+        rows.for_each(|row| {
             assert_eq!(row, [0, 1, 2].map(|column| value(k, column)));
             k += 1;
             Ok(())
@@ -141,6 +141,6 @@ mod tests {
             assert_eq!(all, expected);
         }
         #[cfg(unix)]
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nameless");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "the spool has no name");
     }
 }

@@ -7,7 +7,7 @@ use crate::files::OutputFile;
 use crate::scene::Scene;
 use crate::simulate::{Frame, Reading, UnknownChannel, chosen_columns, run_columns};
 
-/// Rows of one run, row after row.
+/// Rows of one run, in order of time.
 #[derive(Debug)]
 pub struct Table {
     names: Vec<String>,
@@ -103,7 +103,7 @@ impl Table {
     /// # Errors
     /// A disk error, or an error of `each`.
     pub fn rows(&self, each: impl FnMut(&[f64]) -> io::Result<()>) -> io::Result<()> {
-        self.rows.each(each)
+        self.rows.for_each(each)
     }
 
     /// Calls `each` with every value of one column, in order of time.

@@ -1,4 +1,4 @@
-//! Where frames go: a folder of pictures, or a film.
+//! Destination of frames: a folder of pictures, or a film.
 
 use std::io::Write;
 use std::path::Path;
@@ -47,7 +47,7 @@ impl Destination {
         };
         let size = [arguments.size.0, arguments.size.1];
         let rate = arguments.fps.unwrap_or_default();
-        let film = Film::new(format, size, rate).map_err(unfilmable)?;
+        let film = Film::new(format, size, rate).map_err(film_failure)?;
         let file = OutputFile::claim(path, arguments.force)?;
         let metadata = claim_metadata(path, arguments.force)?;
         Ok(Self::Film { film: Box::new(film), file, metadata })
@@ -74,7 +74,7 @@ impl Destination {
                 entry.insert("file".into(), json!(file));
             }
             Self::Film { film, .. } => {
-                film.add(&image.rgba).map_err(unfilmable)?;
+                film.add(&image.rgba).map_err(film_failure)?;
                 // Checksum of the pixels before encoding, as in a PNG.
                 let checksum = format!("{:08x}", crc32fast::hash(&image.rgba));
                 entry.insert("pixels_crc32".into(), json!(checksum));
@@ -100,7 +100,7 @@ impl Destination {
                 print(&format!("{written} and {MANIFEST} in {}\n", place.display()))
             }
             Self::Film { film, file, metadata } => {
-                let bytes = film.finish().map_err(unfilmable)?;
+                let bytes = film.finish().map_err(film_failure)?;
                 let checksum = format!("{:08x}", crc32fast::hash(&bytes));
                 manifest.insert("film_crc32".into(), json!(checksum));
                 let place = file.path().to_owned();
@@ -113,7 +113,7 @@ impl Destination {
     }
 }
 
-fn unfilmable(error: FilmError) -> Failure {
+fn film_failure(error: FilmError) -> Failure {
     match error {
         FilmError::Encoder(_) => Failure::io(error.to_string()),
         _ => Failure::usage(error.to_string()),

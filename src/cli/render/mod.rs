@@ -158,9 +158,9 @@ fn common_reference(
         }
         simulation.sample(instant, &mut frame);
         simulation.take_peaks(&mut peaks);
-        let since: &[Peak] = if times.time_scale.is_some() && arrows.peaks { &peaks } else { &[] };
+        let peaks_since: &[Peak] = if times.time_scale.is_some() && arrows.peaks { &peaks } else { &[] };
         // Without fading, the largest forces remain.
-        marks.update(&frame, since, f64::INFINITY);
+        marks.update(&frame, peaks_since, f64::INFINITY);
     }
     Ok(Some(marks.reference(arrows)))
 }

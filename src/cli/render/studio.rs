@@ -44,7 +44,7 @@ enum Screen {
     /// The scene alone.
     Plain(Box<Offscreen>),
     /// The scene with text over it.
-    Written(Box<Headless>),
+    Annotated(Box<Headless>),
 }
 
 /// The scene alone, with text over it if requested.
@@ -83,10 +83,10 @@ impl SceneStudio {
         }
         // Magnified play and wear colours are never shown unlabelled.
         let screen = if arguments.overlay || options.magnification != 1.0 || wear {
-            Screen::Written(Box::new(Headless::new().map_err(|error| no_adapter(&error))?))
+            Screen::Annotated(Box::new(Headless::new().map_err(|error| no_adapter(&error))?))
         } else {
             let offscreen = Offscreen::new().map_err(|error| no_adapter(&error))?;
-            offscreen.check_size(size).map_err(|error| failed(&error))?;
+            offscreen.check_size(size).map_err(|error| render_failure(&error))?;
             Screen::Plain(Box::new(offscreen))
         };
         Ok(Self {
@@ -153,7 +153,7 @@ impl Studio for SceneStudio {
         }
         match &mut self.screen {
             Screen::Plain(offscreen) => offscreen.render(&self.list),
-            Screen::Written(headless) => {
+            Screen::Annotated(headless) => {
                 let mut overlay = Overlay { time: Some(instant), ..Overlay::default() };
                 if self.overlay {
                     overlay.notes = force_notes(self.simulation.pending(), &self.frame);
@@ -163,7 +163,7 @@ impl Studio for SceneStudio {
                 headless.picture(&self.list, &overlay, self.options.theme, 1.0)
             }
         }
-        .map_err(|error| failed(&error))
+        .map_err(|error| render_failure(&error))
     }
 
     fn fix_arrow_scale(&mut self, reference: f32) {
@@ -177,7 +177,7 @@ impl Studio for SceneStudio {
     fn adapter(&self) -> String {
         match &self.screen {
             Screen::Plain(offscreen) => offscreen.adapter(),
-            Screen::Written(headless) => headless.adapter(),
+            Screen::Annotated(headless) => headless.adapter(),
         }
     }
 }
@@ -199,20 +199,20 @@ impl ApplicationStudio {
     /// A scene that cannot start, no adapter.
     pub fn new(scene: &Scene, options: ViewOptions, arguments: &RenderArguments) -> Result<Self, Failure> {
         let headless = Headless::new().map_err(|error| no_adapter(&error))?;
-        let mut begin = AppOptions::new(scene.clone());
-        begin.playing = false;
+        let mut app_options = AppOptions::new(scene.clone());
+        app_options.playing = false;
         // Plots, camera and instruments of the link; `--at` and `--duration` name the instants.
-        begin.link = arguments.scene.link.as_deref().map(link::parse).transpose()?.map(|link| {
+        app_options.link = arguments.scene.link.as_deref().map(link::parse).transpose()?.map(|link| {
             let log = Log { base: link.log.base, ..Log::default() };
             Link { log, time: None, steps: None, hash: None, playing: Some(false), ..link }
         });
-        begin.view =
-            ViewOptions { magnification: arguments.magnification.unwrap_or(begin.view.magnification), ..options };
-        begin.theme = match arguments.theme {
+        app_options.view =
+            ViewOptions { magnification: arguments.magnification.unwrap_or(app_options.view.magnification), ..options };
+        app_options.theme = match arguments.theme {
             ThemeChoice::Light => eframe::egui::ThemePreference::Light,
             ThemeChoice::Dark => eframe::egui::ThemePreference::Dark,
         };
-        let app = headless.app(begin).map_err(|error| scene.locate(&error))?;
+        let app = headless.app(app_options).map_err(|error| scene.locate(&error))?;
         Ok(Self { headless, app, size: [arguments.size.0, arguments.size.1] })
     }
 }
@@ -243,7 +243,7 @@ impl Studio for ApplicationStudio {
             }
             None => self.app.run_to(instant),
         }
-        self.headless.app_frame(&mut self.app, self.size, 1.0).map_err(|error| failed(&error))
+        self.headless.app_frame(&mut self.app, self.size, 1.0).map_err(|error| render_failure(&error))
     }
 
     // The window scales its arrows by its own forces.
@@ -262,7 +262,7 @@ fn no_adapter(error: &NoAdapter) -> Failure {
     Failure::new(Failure::NO_ADAPTER, error.to_string())
 }
 
-fn failed(error: &RenderError) -> Failure {
+fn render_failure(error: &RenderError) -> Failure {
     match error {
         RenderError::Size { .. } => Failure::usage(error.to_string()),
         RenderError::Device(_) => Failure::io(error.to_string()),
