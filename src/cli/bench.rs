@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::args::BenchArguments;
-use super::tables::{Table, yes};
+use super::tables::{Table, yes_or_no};
 use super::tradeoff::{percent, times, value};
 use super::{DEFAULT_SCENE, Failure, machine, measuring, print};
 use crate::analysis::{GROWTH, GoalResult, LIMITS, LOOSE_MACHINES, LooseSpeed, Timed, growth, loose_speed, reach};
@@ -40,7 +40,7 @@ fn text(rows: &[GoalResult], machines: &[LooseSpeed], growth: f64) -> String {
             times(row.baseline.map(|other| row.speed / other)),
             percent(row.error),
             row.goal.error_of().to_owned(),
-            yes(row.is_met()),
+            yes_or_no(row.is_met()),
         ]
     });
     let mut out = String::new();
@@ -77,7 +77,7 @@ fn text(rows: &[GoalResult], machines: &[LooseSpeed], growth: f64) -> String {
         "\nA link of a chain of {long} costs {} times one of {short} over {}; goal: at most {most}; reached: {}",
         times(Some(growth)),
         format_quantity(span, "ms"),
-        yes(growth <= most)
+        yes_or_no(growth <= most)
     );
     out
 }

@@ -74,7 +74,7 @@ pub fn json(
         "doubts": simulation.doubts().iter().map(ToString::to_string).collect::<Vec<_>>(),
         "wall_s": stepping.wall,
         "ratio": stepping.ratio(time),
-        "slower_than_asked": slower_than_asked(scene, stepping.ratio(time)),
+        "slower_than_asked": misses_real_time(scene, stepping.ratio(time)),
         "state_hash": hash_text(simulation.state_hash()),
     });
     if let Json::Object(own) = own {
@@ -154,7 +154,7 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
             let undisturbed = count(check.undisturbed as u64, "undisturbed impact");
             let description = match check.median_excess {
                 Some(excess) => format!(
-                    "{} {} than asked for, median of {undisturbed}",
+                    "{} {} than requested, median of {undisturbed}",
                     significant(excess.abs(), 3),
                     if excess < 0.0 { "less" } else { "more" }
                 ),
@@ -200,8 +200,8 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
     if let Some(ratio) = ratio {
         speed += &format!(", {} times real time", significant(ratio, 3));
     }
-    if slower_than_asked(scene, ratio) {
-        speed += ": slower than the preset real-time asks for";
+    if misses_real_time(scene, ratio) {
+        speed += ": slower than the preset real-time requires";
     }
     line("Wall time", speed);
     line("State hash", hash_text(simulation.state_hash()));
@@ -215,13 +215,13 @@ pub fn line(text: &mut String, label: &str, words: &str) {
     let _ = writeln!(text, "{label:<17} {words}");
 }
 
-/// Adds what was found at the start to the summary of a run.
-pub fn start(facts: &mut Map<String, Json>, text: &mut String, found: &StartReport) {
-    facts.insert("assembly".into(), found.assembly.clone());
-    let loose = json!({"reactions": found.reactions, "actuators": found.actuators});
-    facts.insert("not_unique".into(), loose);
-    let loose = found.indeterminate_forces().map(|words| ("Not unique".to_owned(), words));
-    for (label, words) in found.lines.iter().chain(&loose) {
+/// Adds the report about the start to the summary of a run.
+pub fn start(facts: &mut Map<String, Json>, text: &mut String, report: &StartReport) {
+    facts.insert("assembly".into(), report.assembly.clone());
+    let indeterminate = json!({"reactions": report.reactions, "actuators": report.actuators});
+    facts.insert("not_unique".into(), indeterminate);
+    let indeterminate = report.indeterminate_forces().map(|words| ("Not unique".to_owned(), words));
+    for (label, words) in report.lines.iter().chain(&indeterminate) {
         line(text, label, words);
     }
 }
@@ -239,7 +239,7 @@ pub fn count(number: u64, what: &str) -> String {
 }
 
 /// Whether the real-time preset was chosen but not reached.
-fn slower_than_asked(scene: &Scene, ratio: Option<f64>) -> bool {
+fn misses_real_time(scene: &Scene, ratio: Option<f64>) -> bool {
     scene.machine.solver.preset == Some(Preset::RealTime) && ratio.is_some_and(|ratio| ratio < 1.0)
 }
 
@@ -253,21 +253,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_preset_real_time_asks_for_real_time() {
+    fn only_the_preset_real_time_requires_real_time() {
         for (preset, slow) in [("real-time", true), ("accurate", false)] {
             let change = ("solver.preset".to_owned(), preset.to_owned());
             let scene = Scene::load("pendulum", &[change]).unwrap();
-            assert_eq!(slower_than_asked(&scene, Some(0.9)), slow, "{preset}");
-            assert!(!slower_than_asked(&scene, Some(1.1)), "{preset}");
-            assert!(!slower_than_asked(&scene, None), "{preset}");
+            assert_eq!(misses_real_time(&scene, Some(0.9)), slow, "{preset}");
+            assert!(!misses_real_time(&scene, Some(1.1)), "{preset}");
+            assert!(!misses_real_time(&scene, None), "{preset}");
             let mut simulation = LiveScene::new(&scene).unwrap();
             simulation.advance_to(1e-3).unwrap();
-            for (wall, said) in [(1.0, slow), (1e-9, false)] {
+            for (wall, reported) in [(1.0, slow), (1e-9, false)] {
                 let stepping = Stepping { from: 0.0, wall };
                 let text = text(&simulation, Status::Done, stepping, None);
-                assert_eq!(text.contains("slower than"), said, "{text}");
+                assert_eq!(text.contains("slower than"), reported, "{text}");
                 let facts = json(&simulation, Status::Done, stepping, None);
-                assert_eq!(facts["slower_than_asked"], said);
+                assert_eq!(facts["slower_than_asked"], reported);
             }
         }
     }

@@ -34,7 +34,7 @@ impl Table {
     }
 
     /// The same table with a title.
-    pub fn titled(self, title: &str) -> Self {
+    pub fn with_title(self, title: &str) -> Self {
         Self { title: title.to_owned(), ..self }
     }
 
@@ -84,14 +84,14 @@ impl Table {
             let first = text.chars().next();
             text == "-" || first.is_none_or(|c| c.is_ascii_digit() || c == '<')
         };
-        let looks = self.heads.iter().enumerate().map(|(column, head)| {
+        let column_layouts = self.heads.iter().enumerate().map(|(column, head)| {
             let cells = || self.rows.iter().map(|row| &row[column]);
             let width = cells().chain([head]).map(|text| text.chars().count()).max().unwrap_or(0);
             (width, !self.rows.is_empty() && cells().all(is_number))
         });
-        let looks: Vec<(usize, bool)> = looks.collect();
+        let column_layouts: Vec<(usize, bool)> = column_layouts.collect();
         let line = |row: &Vec<String>| {
-            let cells = row.iter().zip(&looks).map(|(text, &(width, right))| {
+            let cells = row.iter().zip(&column_layouts).map(|(text, &(width, right))| {
                 if right { format!("{text:>width$}  ") } else { format!("{text:<width$}  ") }
             });
             cells.collect::<String>().trim_end().to_owned() + "\n"
@@ -117,7 +117,7 @@ pub fn fill(page: &str, gaps: &[(&str, String)]) -> String {
     for part in parts {
         let (name, rest) = part.split_once('}').expect("every gap ends");
         let gap = gaps.iter().find(|(of, _)| *of == name);
-        let (_, text) = gap.unwrap_or_else(|| panic!("nothing for {name}"));
+        let (_, text) = gap.unwrap_or_else(|| panic!("no text for the gap {name}"));
         out.push_str(text);
         out.push_str(rest);
     }
@@ -131,7 +131,7 @@ pub fn number(value: impl Into<Option<f64>>) -> String {
 }
 
 /// A yes/no cell.
-pub fn yes(holds: bool) -> String {
+pub fn yes_or_no(holds: bool) -> String {
     if holds { "yes" } else { "no" }.to_owned()
 }
 
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn words_stay_words() {
+    fn html_in_text_is_escaped() {
         let hostile = "<script>alert(1)</script> & <b>";
         let out = table("Place | Verdict .verdict", &[[hostile, "confirmed"], [hostile, hostile]]).html();
         assert!(!out.contains("<script>") && !out.contains(" & "), "{out}");
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn what_csv_cannot_hold_plainly_is_quoted() {
+    fn cells_with_special_characters_are_quoted_in_csv() {
         let rows = [["a \"b\"", &number(1.5)], ["c, d", &number(None)]];
         assert_eq!(table("x | y", &rows).csv(), "x,y\n\"a \"\"b\"\"\",1.5\n\"c, d\",\n");
     }

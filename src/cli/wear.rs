@@ -37,7 +37,7 @@ pub fn fill(
     let mut axes = Map::new();
     for (j, joint) in scene.machine.ball_joints.iter().enumerate() {
         let area = map.area(j);
-        for (cell, took) in map.cells(j).iter().enumerate() {
+        for (cell, totals) in map.cells(j).iter().enumerate() {
             let Edges { polar, azimuth } = map.grid().edges(cell);
             rows.push([
                 j as f64,
@@ -47,11 +47,11 @@ pub fn fill(
                 azimuth[0],
                 azimuth[1],
                 area,
-                took.contacts as f64,
-                took.impulse,
-                took.friction_work,
-                took.impulse / area,
-                took.friction_work / area,
+                totals.contacts as f64,
+                totals.impulse,
+                totals.friction_work,
+                totals.impulse / area,
+                totals.friction_work / area,
             ]);
         }
         let grid = map.grid_from_body(j);

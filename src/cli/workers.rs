@@ -6,7 +6,7 @@ use std::{sync::mpsc, thread};
 use super::{Failure, interrupt};
 
 /// Runs `work` for each job of `todo` and passes the results to `receive` on this thread as they arrive. No job starts after
-/// Ctrl-C or a failure. `work` gets a function that says whether to continue, and returns `None` if it stopped early.
+/// Ctrl-C or a failure. `work` gets a function that returns whether to continue, and returns `None` if it stopped early.
 ///
 /// # Errors
 /// The error of `work` or `receive` whose job comes first in `todo`.
@@ -18,10 +18,10 @@ pub fn run_jobs<T: Send>(
 ) -> Result<(), Failure> {
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
-    let go_on = || !(stop.load(Ordering::Relaxed) || interrupt::is_requested());
+    let may_continue = || !(stop.load(Ordering::Relaxed) || interrupt::is_requested());
     let worker = |send: mpsc::SyncSender<(usize, Result<T, Failure>)>| {
-        while let Some(&job) = todo.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| go_on()) {
-            let Some(result) = work(job, &go_on) else {
+        while let Some(&job) = todo.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| may_continue()) {
+            let Some(result) = work(job, &may_continue) else {
                 return;
             };
             // The receiver outlives the threads.

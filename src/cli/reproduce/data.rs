@@ -17,40 +17,40 @@ use crate::files::Folder;
 /// # Errors
 /// The file system.
 pub(super) fn write(folder: &Folder, report: &Report) -> Result<(), Failure> {
-    let put =
+    let write_data =
         |name: &str, content: &[u8]| -> Result<(), Failure> { Ok(folder.write(&format!("data/{name}"), content)?) };
-    for found in report.complete() {
-        let statements = results::statements("place | statement | criterion | verdict | evidence", found);
-        let tables = [("numbers", numbers(found)), ("statements", statements), ("settled_curves", curves(found))];
+    for findings in report.complete() {
+        let statements = results::statements("place | statement | criterion | verdict | evidence", findings);
+        let tables = [("numbers", numbers(findings)), ("statements", statements), ("settled_curves", curves(findings))];
         for (name, table) in tables {
-            put(&format!("{}{name}.csv", found.variant.prefix), table.csv().as_bytes())?;
+            write_data(&format!("{}{name}.csv", findings.variant.prefix), table.csv().as_bytes())?;
         }
     }
-    for found in &report.models {
-        for run in &found.runs {
-            put_run(run, report, &put)?;
+    for findings in &report.models {
+        for run in &findings.runs {
+            write_run(run, report, &write_data)?;
         }
-        for data in &found.sweeps {
-            put(&format!("{}.csv", data.file_name()), points(data).csv().as_bytes())?;
+        for data in &findings.sweeps {
+            write_data(&format!("{}.csv", data.file_name()), points(data).csv().as_bytes())?;
             // In the format that `sweep` writes.
             let target = folder.file(&format!("data/{}.npz", data.file_name()))?;
             Archive::of_sweep(meta(&data.sweep), &data.sweep, None).write(target, &mut &*data)?;
         }
     }
-    put_run(&report.models[0].ideal, report, &put)
+    write_run(&report.models[0].ideal, report, &write_data)
 }
 
-fn put_run(
+fn write_run(
     run: &RecordedRun,
     report: &Report,
-    put: &impl Fn(&str, &[u8]) -> Result<(), Failure>,
+    write_data: &impl Fn(&str, &[u8]) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    put(&format!("{}.csv", run.name), samples(run).csv().as_bytes())?;
+    write_data(&format!("{}.csv", run.name), samples(run).csv().as_bytes())?;
     let bytes = archive(run, report).map_err(|e| Failure::io(format!("cannot write {}: {e}", run.name)))?;
-    put(&format!("{}.npz", run.name), &bytes)
+    write_data(&format!("{}.npz", run.name), &bytes)
 }
 
-fn numbers(found: &Findings) -> Table {
+fn numbers(findings: &Findings) -> Table {
     let row = |c: &Comparison| {
         let Published { figure, case, quantity, value } = c.published;
         let mut row = vec![figure.clone(), case.clearance.to_string(), case.friction.to_string()];
@@ -60,7 +60,7 @@ fn numbers(found: &Findings) -> Table {
         row
     };
     let heads = "figure | clearance_mm | friction | quantity | unit | paper | full | sampled | ratio | sampled_ratio | agreement";
-    Table::new(heads, found.comparisons().iter().map(row))
+    Table::new(heads, findings.comparisons().iter().map(row))
 }
 
 /// A run at the paper's output step, without the last column, which marks these rows.
@@ -86,7 +86,7 @@ fn archive(run: &RecordedRun, report: &Report) -> Result<Vec<u8>, ndarray_npy::W
     Ok(bytes.into_inner())
 }
 
-fn curves(found: &Findings) -> Table {
+fn curves(findings: &Findings) -> Table {
     let row = |case: Case, curve: &SettledCurve, k: usize| {
         let last = curve.coordinates[0].len() - 1;
         let mut row = vec![case.clearance.to_string(), case.friction.to_string()];
@@ -96,7 +96,7 @@ fn curves(found: &Findings) -> Table {
         }
         row
     };
-    let curves = found.runs.iter().filter_map(|run| Some((run.case, run.settled.as_ref()?)));
+    let curves = findings.runs.iter().filter_map(|run| Some((run.case, run.settled.as_ref()?)));
     let rows = curves.flat_map(|(case, curve)| (0..curve.rates[0].len()).map(move |k| row(case, curve, k)));
     Table::new("clearance_mm | friction | phase | x_m | vx_m_s | beta_rad | beta_rate_rad_s", rows)
 }

@@ -15,25 +15,25 @@ const EARLY: f64 = 0.15;
 const EARLIEST: f64 = 0.1;
 
 /// Every figure by name, in the order of the page.
-pub(super) fn all(found: &Findings) -> impl Iterator<Item = (String, Sheet)> {
+pub(super) fn all(findings: &Findings) -> impl Iterator<Item = (String, Sheet)> {
     let figures = PAPER.sections.iter().flat_map(|section| &section.figures);
     figures.map(|figure| {
         let charts = match figure.shows {
-            Shows::Response { to, ref whole, ref early } => response(found, to, whole, early),
-            Shows::Forces(case) => forces(found.run(case)),
-            Shows::Verification(ref columns) => verification(found, columns),
-            Shows::Drift => drift(found),
-            Shows::Portraits(series) => portraits(found, series),
-            Shows::Sections(series) => sections(found, series),
-            Shows::Bifurcation(series) => bifurcation(found, series),
-            Shows::Exponents(series) => exponents(found, series),
-            Shows::Map => map(found),
-            Shows::Probe => probe(found),
+            Shows::Response { to, ref whole, ref early } => response(findings, to, whole, early),
+            Shows::Forces(case) => forces(findings.run(case)),
+            Shows::Verification(ref columns) => verification(findings, columns),
+            Shows::Drift => drift(findings),
+            Shows::Portraits(series) => portraits(findings, series),
+            Shows::Sections(series) => sections(findings, series),
+            Shows::Bifurcation(series) => bifurcation(findings, series),
+            Shows::Exponents(series) => exponents(findings, series),
+            Shows::Map => map(findings),
+            Shows::Probe => probe(findings),
         };
         // In rows of two.
         let size = (WIDTH, ROW * charts.len().div_ceil(2) as u32 + 34);
         let sheet = Sheet { title: String::new(), charts, columns: 2, size, note: String::new(), apart: false };
-        (picture_name(found.variant, &figure.name), sheet)
+        (picture_name(findings.variant, &figure.name), sheet)
     })
 }
 
@@ -73,14 +73,14 @@ fn columns(runs: &[(String, &RecordedRun, usize)], to: f64, title: &str, colour:
     over_time(title, to, of_column(runs[0].2), series.collect())
 }
 
-fn of_series(found: &Findings, series: Series, column: usize) -> [(String, &RecordedRun, usize); 3] {
-    series.cases().map(|case| (series.run_name(case), found.run(case), column))
+fn of_series(findings: &Findings, series: Series, column: usize) -> [(String, &RecordedRun, usize); 3] {
+    series.cases().map(|case| (series.run_name(case), findings.run(case), column))
 }
 
 /// The whole run in the upper row, its initial part in the lower.
-fn response(found: &Findings, to: Series, whole: &[String], early: &[String]) -> Vec<Chart> {
+fn response(findings: &Findings, to: Series, whole: &[String], early: &[String]) -> Vec<Chart> {
     let row = |names: &[String], end: f64, title: &str| -> Vec<Chart> {
-        let runs = names.iter().map(|name| of_series(found, to, column_of(name)));
+        let runs = names.iter().map(|name| of_series(findings, to, column_of(name)));
         runs.map(|runs| columns(&runs, end, title, 1)).collect()
     };
     [row(whole, PAPER.period, "One period"), row(early, EARLY, "While the balls bounce")].concat()
@@ -91,30 +91,30 @@ fn forces(run: &RecordedRun) -> Vec<Chart> {
     vec![columns(&joints, PAPER.period, "One period", 1), columns(&joints, EARLY, "While the balls bounce", 1)]
 }
 
-fn verification(found: &Findings, names: &[String]) -> Vec<Chart> {
+fn verification(findings: &Findings, names: &[String]) -> Vec<Chart> {
     let runs = [
-        ("ideal joints", &found.ideal),
-        ("tree formulation", &found.runs[0]),
-        ("lagrange formulation", found.lagrange()),
+        ("ideal joints", &findings.ideal),
+        ("tree formulation", &findings.runs[0]),
+        ("lagrange formulation", findings.lagrange()),
     ];
     let of = |name: &String| runs.map(|(label, run)| (label.to_owned(), run, column_of(name)));
     // The ideal motion is the reference and has the first colour.
     names.iter().map(|name| columns(&of(name), EARLIEST, "", 0)).collect()
 }
 
-fn drift(found: &Findings) -> Vec<Chart> {
-    let (tree, lagrange) = (found.runs[0].samples(), found.lagrange().samples());
-    let apart = Coordinate::ALL.map(|c| {
+fn drift(findings: &Findings) -> Vec<Chart> {
+    let (tree, lagrange) = (findings.runs[0].samples(), findings.lagrange().samples());
+    let difference = Coordinate::ALL.map(|c| {
         let column = derivative(c, 0);
-        let apart = tree.iter().zip(&lagrange).map(|(a, b)| (a[0], (a[column] - b[column]).abs() * 1e6));
-        Curve::line(["x", "β"][c as usize], apart.collect(), PALETTE[1 + c as usize])
+        let difference = tree.iter().zip(&lagrange).map(|(a, b)| (a[0], (a[column] - b[column]).abs() * 1e6));
+        Curve::line(["x", "β"][c as usize], difference.collect(), PALETTE[1 + c as usize])
     });
-    let violation = found.lagrange().curve(column_of("constraint_drift")).map(|(time, size)| (time, size * 1e6));
+    let violation = findings.lagrange().curve(column_of("constraint_drift")).map(|(time, size)| (time, size * 1e6));
     let violation = Curve::line("constraints", violation.collect(), PALETTE[3]);
     let size = |label: &str| Axis::logarithmic(label, "µm, µrad");
     let largest = size("Largest violation so far");
     vec![
-        over_time("Difference of the formulations", PAPER.period, size("|tree − lagrange|"), apart.to_vec()),
+        over_time("Difference of the formulations", PAPER.period, size("|tree − lagrange|"), difference.to_vec()),
         over_time("Drift of the lagrange formulation", PAPER.period, largest, vec![violation]),
     ]
 }
@@ -130,10 +130,10 @@ fn pairs<'a>(values: impl IntoIterator<Item = &'a f64>, rates: impl IntoIterator
     values.into_iter().zip(rates).map(|(value, rate)| (value * 1e3, *rate)).collect()
 }
 
-fn portraits(found: &Findings, series: Series) -> Vec<Chart> {
+fn portraits(findings: &Findings, series: Series) -> Vec<Chart> {
     let runs = || (1..).zip(series.cases());
     let settled = Coordinate::ALL.map(|c| {
-        let curves = runs().zip(found.loops(series)).map(|((n, case), l)| {
+        let curves = runs().zip(findings.loops(series)).map(|((n, case), l)| {
             let points = pairs(&l.coordinates[c as usize], &l.rates[c as usize]);
             Curve::line(&series.run_name(case), points, PALETTE[n])
         });
@@ -142,7 +142,7 @@ fn portraits(found: &Findings, series: Series) -> Vec<Chart> {
     let first = Coordinate::ALL.map(|c| {
         let [value, rate] = [0, 1].map(|nth| derivative(c, nth));
         let curves = runs().map(|(n, case)| {
-            let rows = &found.run(case).rows;
+            let rows = &findings.run(case).rows;
             let points = pairs(rows.iter().map(|row| &row[value]), rows.iter().map(|row| &row[rate]));
             Curve::line(&series.run_name(case), points, PALETTE[n])
         });
@@ -151,15 +151,15 @@ fn portraits(found: &Findings, series: Series) -> Vec<Chart> {
     [settled, first].concat()
 }
 
-fn sections(found: &Findings, series: Series) -> Vec<Chart> {
-    let data = found.sweep(&format!("runs_by_{series}"));
+fn sections(findings: &Findings, series: Series) -> Vec<Chart> {
+    let data = findings.sweep(&format!("runs_by_{series}"));
     let kept = data.sweep.layout().kept();
     let charts = Coordinate::ALL.map(|c| {
         let [values, rates] = [0, 1].map(|nth| data.values(&format!("section_{}", COLUMNS[derivative(c, nth)].name)));
-        let looks = [Marker::Disc, Marker::Square, Marker::Triangle].into_iter().enumerate();
-        let dots = looks.zip(series.cases()).map(|((n, marker), case)| {
+        let styles = [Marker::Disc, Marker::Square, Marker::Triangle].into_iter().enumerate();
+        let dots = styles.zip(series.cases()).map(|((n, marker), case)| {
             let part = n * kept..(n + 1) * kept;
-            let points = seen(pairs(&values[part.clone()], &rates[part]));
+            let points = without_duplicates(pairs(&values[part.clone()], &rates[part]));
             Curve::dots(&series.run_name(case), points, PALETTE[n + 1], marker)
         });
         phases(c, &format!("{kept} sections each"), dots)
@@ -167,22 +167,22 @@ fn sections(found: &Findings, series: Series) -> Vec<Chart> {
     charts.to_vec()
 }
 
-/// Removes points that a picture cannot tell apart.
-fn seen(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+/// Removes points that coincide in print.
+fn without_duplicates(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let mut cells = std::collections::HashSet::new();
     points.into_iter().filter(|(x, y)| cells.insert(format!("{x:.6} {y:.6}"))).collect()
 }
 
-fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
-    let all = found.branches(series);
+fn bifurcation(findings: &Findings, series: Series) -> Vec<Chart> {
+    let all = findings.branches(series);
     // Each start is drawn on top of the previous one and smaller, so that all remain visible.
-    let looks = [
+    let styles = [
         ("cold start", PALETTE[0], Marker::Disc),
         ("followed upward", PALETTE[5], Marker::Point),
         ("followed downward", PALETTE[6], Marker::Dot),
     ];
     let diagrams = Coordinate::ALL.map(|c| {
-        let dots = all.iter().zip(looks).map(|(points, (start, colour, marker))| {
+        let dots = all.iter().zip(styles).map(|(points, (start, colour, marker))| {
             let points = points.iter().flat_map(|p| p.sections[c as usize].iter().map(|s| (p.value, s * 1e3)));
             Curve::dots(start, points.collect(), colour, marker)
         });
@@ -195,14 +195,14 @@ fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
             Curve::line(label, points.collect(), PALETTE[colour])
         };
         let apart = |branch: usize| {
-            let label = format!("{} against cold", looks[branch].0);
+            let label = format!("{} against cold", styles[branch].0);
             along(&label, branch + 4, &|k, cold| (cold.latest(c) - all[branch][k].latest(c)).abs())
         };
         let spread = along("spread of the sections of a point", 0, &|_, p| p.spread(c));
         let (name, unit) = [("x", "µm"), ("β", "µrad")][c as usize];
         let title = format!("Spread and hysteresis in {name}");
         let distance = Axis::logarithmic("Distance", unit);
-        let resolution = found.resolution[c as usize] * 1e6;
+        let resolution = findings.resolution[c as usize] * 1e6;
         Chart {
             levels: vec![Level { y: resolution, text: "resolution: less counts as equal".to_owned() }],
             ..Chart::new(&title, parameter(series), distance, vec![spread, apart(1), apart(2)])
@@ -214,8 +214,8 @@ fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
 /// Smallest exponent plotted, 1/s: the smallest clearances would squeeze all others against 0.
 const MIN_EXPONENT: f64 = -10.0;
 
-fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
-    let data = found.cold(series);
+fn exponents(findings: &Findings, series: Series) -> Vec<Chart> {
+    let data = findings.cold(series);
     let points = &data.points;
     let (kept, discard) = (data.sweep.layout().kept(), data.plan.discard);
     let running = data.values("exponent_running_per_s");
@@ -238,12 +238,12 @@ fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
     let along = Curve::line("exponent", along, PALETTE[0]).marked(Marker::Dot);
     vec![
         exponents("Along the sweep", parameter(series), vec![along]),
-        exponents("How it converges", Axis::new("Periods run", ""), convergence.collect()),
+        exponents("Convergence", Axis::new("Periods run", ""), convergence.collect()),
     ]
 }
 
-fn map(found: &Findings) -> Vec<Chart> {
-    let data = found.sweep("map");
+fn map(findings: &Findings) -> Vec<Chart> {
+    let data = findings.sweep("map");
     let axes = data.sweep.design().axes();
     let heat = |title: &str, values: Vec<f64>, scale: Axis, names: Vec<(f64, String)>| {
         let (xs, ys) = (axes[1].numbers().map(|v| v * 1e3).collect(), axes[0].numbers().collect());
@@ -255,28 +255,28 @@ fn map(found: &Findings) -> Vec<Chart> {
     let codes: std::collections::BTreeSet<i64> = regimes.iter().map(|r| *r as i64).collect();
     let word = |code| Regime::of_code(code, 1).map_or(NO_REGIME, Regime::word);
     let names = codes.into_iter().map(|c| (c as f64, word(c).to_owned())).collect();
-    let joints = &found.runs[0].response.joints;
+    let joints = &findings.runs[0].response.joints;
     let peaks: Vec<Vec<f64>> = joints.iter().map(|j| data.values(&format!("{j}_peak_N"))).collect();
-    let hardest = (0..regimes.len()).map(|k| peaks.iter().map(|p| p[k]).fold(f64::NAN, f64::max)).collect();
+    let largest_peak = (0..regimes.len()).map(|k| peaks.iter().map(|p| p[k]).fold(f64::NAN, f64::max)).collect();
     // NaN, drawn in grey, where disturbances grow.
-    let memory = data.values("exponent_per_s").into_iter().map(|e| if e < 0.0 { -1.0 / e } else { f64::NAN });
+    let decay_time = data.values("exponent_per_s").into_iter().map(|e| if e < 0.0 { -1.0 / e } else { f64::NAN });
     vec![
         heat("Regime", regimes, Axis::default(), names),
-        size("Peak contact force of any joint", hardest, Axis::new("", "N")),
+        size("Peak contact force of any joint", largest_peak, Axis::new("", "N")),
         size("Largest tip error, settled", data.values("probe_error_max_um"), Axis::new("", "µm")),
-        size("Time in which a disturbance falls to 1/e", memory.collect(), Axis::logarithmic("", "s")),
+        size("Time in which a disturbance falls to 1/e", decay_time.collect(), Axis::logarithmic("", "s")),
     ]
 }
 
-fn probe(found: &Findings) -> Vec<Chart> {
-    let data = found.cold(Series::Clearance);
+fn probe(findings: &Findings) -> Vec<Chart> {
+    let data = findings.cold(Series::Clearance);
     let along = |label: &str, name: &str, colour: usize| {
         let values = data.points.iter().map(|p| p.value).zip(data.values(name));
         Curve::line(label, values.collect(), PALETTE[colour])
     };
     let error = column_of("probe_error_m");
     let settled = vec![along("largest", "probe_error_max_um", 4), along("root mean square", "probe_error_rms_um", 0)];
-    let first = of_series(found, Series::Clearance, error);
+    let first = of_series(findings, Series::Clearance, error);
     vec![
         Chart::new("Settled, against clearance", parameter(Series::Clearance), of_column(error), settled),
         columns(&first, PAPER.period, "The first period", 1),

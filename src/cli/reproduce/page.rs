@@ -37,7 +37,7 @@ pub(super) fn page(report: &Report, pictures: &Pictures) -> String {
         ("figures", figures(corrected, pictures, "h2", "")),
         ("clearances", results::by_clearance(report).html()),
         ("sweeps", results::sweeps(report).html()),
-        ("turned", results::turned(report).html()),
+        ("changed_verdicts", results::changed_verdicts(report).html()),
         ("models", results::models(report).html()),
         ("printed_figures", figures(printed, pictures, "h3", ", (13) as printed")),
         ("statements", results::statements(statements, corrected).html()),
@@ -58,15 +58,15 @@ fn contents() -> String {
 }
 
 /// Every figure of a model, section by section, with the tables that belong to it.
-fn figures(found: &Findings, pictures: &Pictures, tag: &str, of: &str) -> String {
-    let comparisons = found.comparisons();
+fn figures(findings: &Findings, pictures: &Pictures, tag: &str, of: &str) -> String {
+    let comparisons = findings.comparisons();
     let mut out = String::new();
     for section in &PAPER.sections {
-        let (id, title) = (picture_name(found.variant, &section.id), &section.title);
+        let (id, title) = (picture_name(findings.variant, &section.id), &section.title);
         let _ = writeln!(out, "<{tag} id=\"{id}\">{title}{of}</{tag}>");
         for figure in &section.figures {
             let Figure { heading, caption, .. } = figure;
-            let name = picture_name(found.variant, &figure.name);
+            let name = picture_name(findings.variant, &figure.name);
             // The height follows the width of the page.
             let svg = pictures[&name].replacen("<svg ", &format!("<svg role=\"img\" aria-label=\"{heading}\" "), 1);
             let _ = writeln!(
@@ -75,7 +75,7 @@ fn figures(found: &Findings, pictures: &Pictures, tag: &str, of: &str) -> String
                  <a href=\"plots/{name}.svg\">SVG</a>, <a href=\"plots/{name}.png\">PNG</a>.</figcaption>\n</figure>",
                 svg.trim()
             );
-            out.extend(results::of_figure(figure, &comparisons, found).iter().map(Table::html));
+            out.extend(results::of_figure(figure, &comparisons, findings).iter().map(Table::html));
         }
     }
     out

@@ -4,26 +4,26 @@
 use crate::analysis::paper::{Agreement, Case, Comparison, Coordinate, Figure, FigureValue, PAPER, Series, Shows};
 use crate::analysis::reproduction::{Findings, RecordedRun, Report, SettledPoint, Statement, exponents, regime_counts};
 use crate::cli::output::significant;
-use crate::cli::tables::{Table, yes};
+use crate::cli::tables::{Table, yes_or_no};
 
-/// Counts of the paper's numbers that a model agrees with, is near to and differs from, of the statements it confirms, and of
-/// all statements.
-pub(super) fn score(found: &Findings) -> [usize; 5] {
-    let (compared, statements) = (found.comparisons(), found.statements());
+/// Counts of the paper's numbers with which a model agrees, nearly agrees and disagrees, of the statements that it confirms, and
+/// of all statements.
+pub(super) fn score(findings: &Findings) -> [usize; 5] {
+    let (compared, statements) = (findings.comparisons(), findings.statements());
     let [agree, near, differ] =
         Agreement::ALL.map(|agreement| compared.iter().filter(|c| c.agreement() == agreement).count());
     [agree, near, differ, statements.iter().filter(|s| s.confirmed).count(), statements.len()]
 }
 
 /// Four digits for readability; a dash if there is no number.
-fn shown(value: impl Into<Option<f64>>) -> String {
+fn four_digits(value: impl Into<Option<f64>>) -> String {
     let value = value.into().filter(|value| !value.is_nan());
     value.map_or_else(|| "\u{2013}".to_owned(), |value| significant(value, 4))
 }
 
 /// A distance, m or rad, in micrometres or microradians.
 fn micro(value: f64) -> String {
-    shown(value * 1e6)
+    four_digits(value * 1e6)
 }
 
 /// Two decimals, or two significant digits below 0.1.
@@ -38,14 +38,14 @@ fn run_of(comparison: &Comparison) -> String {
 }
 
 /// The tables that belong to a figure.
-pub(super) fn of_figure(figure: &Figure, comparisons: &[Comparison], found: &Findings) -> Vec<Table> {
+pub(super) fn of_figure(figure: &Figure, comparisons: &[Comparison], findings: &Findings) -> Vec<Table> {
     let own: Vec<&Comparison> = comparisons.iter().filter(|c| figure.contains(&c.published.figure)).collect();
     let more = match figure.shows {
-        Shows::Verification(_) => Some(verification(found)),
-        Shows::Drift => Some(drift(found)),
-        Shows::Sections(series) => Some(sections(found, series)),
-        Shows::Bifurcation(series) => Some(branches(found, series)),
-        Shows::Probe => Some(probe(found)),
+        Shows::Verification(_) => Some(verification(findings)),
+        Shows::Drift => Some(drift(findings)),
+        Shows::Sections(series) => Some(sections(findings, series)),
+        Shows::Bifurcation(series) => Some(branches(findings, series)),
+        Shows::Probe => Some(probe(findings)),
         _ => (!figure.strongest_of.is_empty()).then(|| strongest(comparisons, &figure.strongest_of)),
     };
     (!own.is_empty()).then(|| numbers(&own)).into_iter().chain(more).collect()
@@ -57,11 +57,11 @@ fn numbers(rows: &[&Comparison]) -> Table {
             c.published.figure.clone(),
             run_of(c),
             format!("{} ({})", c.published.quantity, c.published.quantity.unit()),
-            shown(c.published.value),
-            shown(c.full),
+            four_digits(c.published.value),
+            four_digits(c.full),
             ratio(c.ratio()),
-            shown(c.sampled),
-            c.sampled_ratio().map_or_else(|| shown(None), ratio),
+            four_digits(c.sampled),
+            c.sampled_ratio().map_or_else(|| four_digits(None), ratio),
             c.agreement().to_string(),
         ]
     };
@@ -77,19 +77,26 @@ fn strongest(comparisons: &[Comparison], figures: &[String]) -> Table {
         let most = |of: fn(&Comparison) -> f64| own.iter().map(|c| of(c)).fold(0.0, f64::max);
         let (paper, here) = (most(|c| c.published.value), most(|c| c.full));
         let agreement = Agreement::of(here / paper).to_string();
-        Some(vec![figure.clone(), run_of(own.first()?), shown(paper), shown(here), ratio(here / paper), agreement])
+        Some(vec![
+            figure.clone(),
+            run_of(own.first()?),
+            four_digits(paper),
+            four_digits(here),
+            ratio(here / paper),
+            agreement,
+        ])
     };
     let heads = "Figure | Clearance, friction .run | Paper (N) .n | Here (N) .n | Ratio .n | Verdict .verdict";
     let table = Table::new(heads, figures.iter().filter_map(row));
-    table.titled("The largest contact force of any joint, whichever it is:")
+    table.with_title("The largest contact force of any joint, whichever it is:")
 }
 
-fn verification(found: &Findings) -> Table {
+fn verification(findings: &Findings) -> Table {
     let row = |figure: &str, quantity: FigureValue, paper: [Option<f64>; 2]| {
         let mut row = vec![figure.to_owned(), format!("{quantity} ({})", quantity.unit())];
-        row.extend(paper.map(shown));
-        for run in [&found.runs[0], found.lagrange()] {
-            row.extend([shown(quantity.of(&run.response)), shown(quantity.sampled(&run.response))]);
+        row.extend(paper.map(four_digits));
+        for run in [&findings.runs[0], findings.lagrange()] {
+            row.extend([four_digits(quantity.of(&run.response)), four_digits(quantity.sampled(&run.response))]);
         }
         row
     };
@@ -97,24 +104,24 @@ fn verification(found: &Findings) -> Table {
     let forces = FigureValue::NORMAL.map(|quantity| row("", quantity, [None, None]));
     let heads = "Figure | Quantity .what | Paper, own .n | Paper, commercial .n | Tree .n | Tree at 1 ms .n | Lagrange .n | Lagrange at 1 ms .n";
     let title = "The paper does not name the run of this figure. Its peaks, beside those of both formulations at 0.3 mm and friction 0.2:";
-    Table::new(heads, peaks.chain(forces)).titled(title)
+    Table::new(heads, peaks.chain(forces)).with_title(title)
 }
 
-fn drift(found: &Findings) -> Table {
-    let [x, beta] = Coordinate::ALL.map(|c| found.formulations_apart(c));
+fn drift(findings: &Findings) -> Table {
+    let [x, beta] = Coordinate::ALL.map(|c| findings.formulations_apart(c));
     let rows = [
         ("Difference of the formulations in x", x, "µm"),
         ("Difference of the formulations in beta", beta, "µrad"),
-        ("Violation of a constraint of the lagrange form", found.lagrange().response.constraint_drift, "µm, µrad"),
+        ("Violation of a constraint of the lagrange form", findings.lagrange().response.constraint_drift, "µm, µrad"),
     ];
     let rows = rows.map(|(what, size, unit)| vec![what.to_owned(), micro(size), unit.to_owned()]);
     Table::new("Quantity | At most .n | Unit", rows)
 }
 
-fn sections(found: &Findings, series: Series) -> Table {
+fn sections(findings: &Findings, series: Series) -> Table {
     let row = |run: &SettledPoint| {
-        let exponent = format!("{} ± {}", shown(run.exponent.0), significant(run.exponent.1, 2));
-        let mut row = vec![series.name(shown(run.value)), run.regime_word(), exponent];
+        let exponent = format!("{} ± {}", four_digits(run.exponent.0), significant(run.exponent.1, 2));
+        let mut row = vec![series.name(four_digits(run.value)), run.regime_word(), exponent];
         for c in Coordinate::ALL {
             row.extend([format!("{:.4}", run.latest(c) * 1e3), significant(run.spread(c) * 1e6, 2)]);
         }
@@ -122,35 +129,40 @@ fn sections(found: &Findings, series: Series) -> Table {
     };
     let heads =
         "Run | Regime | Exponent (1/s) .n | x (mm) .n | Spread of x (µm) .n | β (mrad) .n | Spread of β (µrad) .n";
-    Table::new(heads, found.sections(series).iter().map(row))
+    Table::new(heads, findings.sections(series).iter().map(row))
 }
 
 /// Largest distance of each followed branch from the cold starts.
-fn branches(found: &Findings, series: Series) -> Table {
-    let [cold, up, down] = found.branches(series);
+fn branches(findings: &Findings, series: Series) -> Table {
+    let [cold, up, down] = findings.branches(series);
     let row = |name: &str, other: &[SettledPoint]| {
         let most = Coordinate::ALL.map(|c| {
             let pairs = cold.iter().zip(other);
             pairs.map(|(a, b)| (a.latest(c) - b.latest(c)).abs()).fold(0.0, f64::max)
         });
-        let within = (0..2).all(|c| most[c] <= found.resolution[c]);
-        vec![name.to_owned(), cold.len().to_string(), micro(most[0]), micro(most[1]), yes(!within)]
+        let within = (0..2).all(|c| most[c] <= findings.resolution[c]);
+        vec![name.to_owned(), cold.len().to_string(), micro(most[0]), micro(most[1]), yes_or_no(!within)]
     };
-    let [x, beta] = found.resolution.map(micro);
+    let [x, beta] = findings.resolution.map(micro);
     let resolution = vec!["resolution".to_owned(), String::new(), x, beta, String::new()];
     let heads =
         "Branch | Values .n | Distance from the cold start in x (µm) .n | In β (µrad) .n | Hysteresis, or a transient";
     Table::new(heads, [row("followed upward", up), row("followed downward", down), resolution])
 }
 
-fn probe(found: &Findings) -> Table {
-    let data = found.cold(Series::Clearance);
+fn probe(findings: &Findings) -> Table {
+    let data = findings.cold(Series::Clearance);
     let [largest, rms] = ["probe_error_max_um", "probe_error_rms_um"].map(|name| data.values(name));
     let rows = 10.min(data.points.len());
     let row = |n: usize| {
         let k = n * (data.points.len() - 1) / (rows - 1).max(1);
         let clearance = data.points[k].value;
-        vec![shown(clearance), shown(largest[k]), shown(rms[k]), significant(largest[k] / (clearance * 1e3), 3)]
+        vec![
+            four_digits(clearance),
+            four_digits(largest[k]),
+            four_digits(rms[k]),
+            significant(largest[k] / (clearance * 1e3), 3),
+        ]
     };
     let heads = "Clearance (mm) .n | Largest error (µm) .n | Root mean square (µm) .n | Largest error / clearance .n";
     Table::new(heads, (0..rows).map(row))
@@ -169,27 +181,27 @@ fn verdict(statement: &Statement) -> String {
 }
 
 /// The paper's verbal statements with the criterion, the verdict and its numbers, under the headings `heads`.
-pub(super) fn statements(heads: &str, found: &Findings) -> Table {
+pub(super) fn statements(heads: &str, findings: &Findings) -> Table {
     let row = |s: &Statement| {
         vec![s.claim.place.clone(), s.claim.says.clone(), s.criterion.to_owned(), verdict(s), evidence(s)]
     };
-    Table::new(heads, found.statements().iter().map(row))
+    Table::new(heads, findings.statements().iter().map(row))
 }
 
 /// Statements whose verdict changes with (13) as printed.
-pub(super) fn turned(report: &Report) -> Table {
+pub(super) fn changed_verdicts(report: &Report) -> Table {
     let [corrected, printed] = report.complete().map(Findings::statements);
     let both = corrected.iter().zip(&printed).filter(|(a, b)| a.confirmed != b.confirmed);
     let row = |(a, b): (&Statement, &Statement)| {
         vec![a.claim.place.clone(), a.claim.says.clone(), verdict(a), evidence(a), verdict(b), evidence(b)]
     };
     let table = Table::new("Place | Statement | As corrected | Evidence | (13) as printed | Evidence", both.map(row));
-    table.titled("Statements of the paper that come out otherwise with (13) as printed:")
+    table.with_title("Statements of the paper whose verdict differs with (13) as printed:")
 }
 
 /// Mean of x in trajectory (59), m.
 const MEAN_X: f64 = 0.203;
-/// Largest ratio to the paper's settling and rates that counts as near.
+/// Largest ratio to the settling times and rates of the paper that counts as near.
 const NEAR: f64 = 1.25;
 
 /// A quantity compared by clearance: heading, value for a run and its sections, and the paper's quantity if it prints one.
@@ -209,13 +221,13 @@ const MEASURES: [Measure; 6] = {
 };
 
 /// A measure of a model at each clearance.
-fn measured(found: &Findings, (_, of, _): &Measure) -> [f64; 3] {
-    let (cases, sections) = (Series::Clearance.cases(), found.sections(Series::Clearance));
-    std::array::from_fn(|k| of(found.run(cases[k]), &sections[k]))
+fn computed_values(findings: &Findings, (_, of, _): &Measure) -> [f64; 3] {
+    let (cases, sections) = (Series::Clearance.cases(), findings.sections(Series::Clearance));
+    std::array::from_fn(|k| of(findings.run(cases[k]), &sections[k]))
 }
 
 /// The paper's values of a measure; the first if it prints two.
-fn printed((_, _, quantity): &Measure) -> Option<[f64; 3]> {
+fn published_values((_, _, quantity): &Measure) -> Option<[f64; 3]> {
     let of = |case| PAPER.numbers.iter().find(|p| p.case == case && Some(p.quantity) == *quantity);
     let [a, b, c] = Series::Clearance.cases().map(|case| of(case).map(|p| p.value));
     Some([a?, b?, c?])
@@ -225,10 +237,11 @@ fn printed((_, _, quantity): &Measure) -> Option<[f64; 3]> {
 pub(super) fn by_clearance(report: &Report) -> Table {
     let mut rows = Vec::new();
     for measure in &MEASURES {
-        let paper = printed(measure).map(|values| ("the paper", values));
-        let models = report.models.iter().map(|found| (found.variant.title.as_str(), measured(found, measure)));
+        let paper = published_values(measure).map(|values| ("the paper", values));
+        let models =
+            report.models.iter().map(|findings| (findings.variant.title.as_str(), computed_values(findings, measure)));
         for (model, values) in paper.into_iter().chain(models) {
-            rows.push([&[measure.0.to_owned(), model.to_owned()], &values.map(shown)[..]].concat());
+            rows.push([&[measure.0.to_owned(), model.to_owned()], &values.map(four_digits)[..]].concat());
         }
     }
     let heads = Series::Clearance.cases().map(|case| Series::Clearance.run_name(case));
@@ -240,15 +253,15 @@ pub(super) fn sweeps(report: &Report) -> Table {
     let mut rows = Vec::new();
     for series in Series::ALL {
         let ([from, to], unit) = (series.row().range, &series.row().unit);
-        for found in report.complete() {
-            let points = found.swept(series);
+        for findings in report.complete() {
+            let points = findings.swept(series);
             let (least, most) = exponents(points);
             let regimes = regime_counts(points).into_iter().map(|(word, n)| format!("{n} {word}"));
             let mut row = vec![
                 format!("{series}, {from} to {to} {unit}").trim_end().to_owned(),
-                found.variant.title.clone(),
+                findings.variant.title.clone(),
                 regimes.collect::<Vec<_>>().join(", "),
-                format!("{} to {}", shown(least), shown(most)),
+                format!("{} to {}", four_digits(least), four_digits(most)),
             ];
             row.extend(Coordinate::ALL.map(|c| micro(points.iter().map(|p| p.spread(c)).fold(0.0, f64::max))));
             rows.push(row);
@@ -259,26 +272,32 @@ pub(super) fn sweeps(report: &Report) -> Table {
     Table::new(heads, rows)
 }
 
-/// Each model against the paper: whether its sections scatter, and whether its impacts last as long and turn the platform as fast.
+/// Each model compared with the paper: whether its sections scatter, how long its impacts last, and how fast they rotate the platform.
 pub(super) fn models(report: &Report) -> Table {
-    let apart = |found: &Findings| {
-        let runs = found.sections(Series::Clearance).iter();
-        runs.filter(|run| run.spread(Coordinate::Beta) > found.resolution[1]).count()
+    let scattered_clearances = |findings: &Findings| {
+        let runs = findings.sections(Series::Clearance).iter();
+        runs.filter(|run| run.spread(Coordinate::Beta) > findings.resolution[1]).count()
     };
-    let before = apart(&report.models[0]);
-    let row = |(n, found): (usize, &Findings)| {
+    let before = scattered_clearances(&report.models[0]);
+    let row = |(n, findings): (usize, &Findings)| {
         // Combinations lack the runs behind most numbers and statements.
-        let score = if n < 2 { score(found).map(|count| count.to_string()) } else { [const { String::new() }; 5] };
-        let off = |measure: &Measure| {
-            let ratios = measured(found, measure).into_iter().zip(printed(measure)?).map(|(own, paper)| own / paper);
+        let score = if n < 2 { score(findings).map(|count| count.to_string()) } else { [const { String::new() }; 5] };
+        let deviation = |measure: &Measure| {
+            let ratios = computed_values(findings, measure)
+                .into_iter()
+                .zip(published_values(measure)?)
+                .map(|(own, paper)| own / paper);
             Some(ratios.map(|ratio| ratio.max(1.0 / ratio)).fold(1.0, f64::max))
         };
-        let offs: Vec<f64> = MEASURES.iter().filter_map(off).collect();
-        let mut row = vec![found.variant.title.clone()];
+        let deviations: Vec<f64> = MEASURES.iter().filter_map(deviation).collect();
+        let mut row = vec![findings.variant.title.clone()];
         row.extend_from_slice(&score[..4]);
-        row.extend([format!("{} of 3", apart(found)), yes(apart(found) > before)]);
-        row.extend(offs.iter().map(|off| significant(*off, 3)));
-        row.push(yes(offs.iter().all(|off| *off < NEAR)));
+        row.extend([
+            format!("{} of 3", scattered_clearances(findings)),
+            yes_or_no(scattered_clearances(findings) > before),
+        ]);
+        row.extend(deviations.iter().map(|deviation| significant(*deviation, 3)));
+        row.push(yes_or_no(deviations.iter().all(|deviation| *deviation < NEAR)));
         row
     };
     let heads = "Model | Numbers within 10 % .n | Within a factor of 2 .n | Further off .n | Statements confirmed .n | Clearances with scatter in β .n | More than as corrected | Ratio of the last separation .n | Ratio of the rate of β .n | Both within a quarter";

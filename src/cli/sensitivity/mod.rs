@@ -1,4 +1,4 @@
-//! `sensitivity`: which parameters move an output most, each alone and all together, and how far one must go to reach a target.
+//! `sensitivity`: which parameters influence an output most, each alone and all together, and which changes reach a target.
 
 mod picture;
 mod report;
@@ -33,12 +33,12 @@ pub fn sensitivity(arguments: &SensitivityArguments) -> Result<(), Failure> {
     }
     let folder = Folder::claim(&arguments.study.out, arguments.study.force)?;
     let mut study = Study::new(scene, inputs, outputs, &arguments.study)?;
-    let found = study::sensitivity(&mut study, &options)?;
-    let manifest = report::fill(&folder, &study, &found, arguments)?;
+    let results = study::sensitivity(&mut study, &options)?;
+    let manifest = report::fill(&folder, &study, &results, arguments)?;
     folder.finish(manifest)?;
     print(&match arguments.study.summary {
-        SummaryForm::Text => report::text(&study, &found, &arguments.study.out),
-        SummaryForm::Json => format!("{:#}\n", report::json(&study, &found)),
+        SummaryForm::Text => report::text(&study, &results, &arguments.study.out),
+        SummaryForm::Json => format!("{:#}\n", report::json(&study, &results)),
     })?;
     study.finish();
     Ok(())

@@ -11,7 +11,9 @@ use crate::analysis::yields::Estimate;
 use crate::cli::Failure;
 use crate::cli::args::SensitivityArguments;
 use crate::cli::output::significant;
-use crate::cli::study::{Study, digits_apart, estimate, number, shown, shown_with, value_of};
+use crate::cli::study::{
+    Study, display_value, display_value_digits, distinguishing_digits, estimate, number, value_of,
+};
 use crate::cli::summary::count;
 use crate::cli::tables::{Table, quoted};
 use crate::files::Folder;
@@ -20,7 +22,7 @@ use crate::files::Folder;
 pub fn fill(
     folder: &Folder,
     study: &Study,
-    found: &Sensitivity,
+    results: &Sensitivity,
     arguments: &SensitivityArguments,
 ) -> Result<Map<String, Json>, Failure> {
     let mut meta = study.meta();
@@ -30,9 +32,9 @@ pub fn fill(
         folder,
         "sensitivity",
         &meta,
-        json(study, found),
-        &table(study, found),
-        &picture::sheet(study, found),
+        json(study, results),
+        &table(study, results),
+        &picture::sheet(study, results),
     )?;
     Ok(meta)
 }
@@ -48,19 +50,19 @@ fn interval(estimate: Option<&Estimate>) -> String {
 }
 
 /// For a terminal.
-pub fn text(study: &Study, found: &Sensitivity, out: &Path) -> String {
+pub fn text(study: &Study, results: &Sensitivity, out: &Path) -> String {
     let mut text = format!(
         "Scene             {}: runs of {}\n{}Runs              {}\n",
         study.scene().name,
         study.describe(),
-        study.assumed(),
-        study.counted(),
+        study.assumption_lines(),
+        study.run_count_text(),
     );
-    if let Some(screening) = &found.screening {
+    if let Some(screening) = &results.screening {
         let first = &study.outputs()[0];
         let rows = study.inputs().iter().zip(&screening.effects).enumerate().map(|(i, (input, effects))| {
             let number = |of: fn(&crate::analysis::morris::ElementaryEffects) -> f64| {
-                effects.as_ref().map_or_else(|| "-".to_owned(), |effects| shown(of(effects), first.unit))
+                effects.as_ref().map_or_else(|| "-".to_owned(), |effects| display_value(of(effects), first.unit))
             };
             let kept = if screening.kept.contains(&i) { "kept" } else { "left out" };
             vec![
@@ -76,13 +78,13 @@ pub fn text(study: &Study, found: &Sensitivity, out: &Path) -> String {
         text += &Table::new(heads, rows).text();
     }
     for (o, output) in study.outputs().iter().enumerate() {
-        let nominal = found.alone.nominal[o];
-        let ends = found.alone.ends.iter().flatten().map(|(_, outputs)| outputs);
-        let digits = digits_apart(nominal, ends.chain(&found.alone.together).map(|outputs| outputs[o]));
-        let cell = |outputs: &[f64]| shown_with(outputs[o], output.unit, digits);
-        text += &format!("\n{}: {} with the values of the scene\n", output.name, cell(&found.alone.nominal));
-        let mut rows: Vec<Vec<String>> = (0..study.inputs().len()).map(|i| line(study, found, o, i, &cell)).collect();
-        let [low, high] = found.alone.together.each_ref().map(|outputs| cell(outputs));
+        let nominal = results.alone.nominal[o];
+        let ends = results.alone.ends.iter().flatten().map(|(_, outputs)| outputs);
+        let digits = distinguishing_digits(nominal, ends.chain(&results.alone.together).map(|outputs| outputs[o]));
+        let cell = |outputs: &[f64]| display_value_digits(outputs[o], output.unit, digits);
+        text += &format!("\n{}: {} with the values of the scene\n", output.name, cell(&results.alone.nominal));
+        let mut rows: Vec<Vec<String>> = (0..study.inputs().len()).map(|i| line(study, results, o, i, &cell)).collect();
+        let [low, high] = results.alone.together.each_ref().map(|outputs| cell(outputs));
         rows.push(vec![
             "all together".into(),
             "lower ends".into(),
@@ -94,9 +96,9 @@ pub fn text(study: &Study, found: &Sensitivity, out: &Path) -> String {
         ]);
         let heads = "parameter | from | output alone | to | output alone | first-order | total";
         text += &Table::new(heads, rows).text();
-        match &found.indices[o] {
+        match &results.indices[o] {
             Some(Err(IndicesError::NoVariance { value })) => {
-                let value = shown(*value, output.unit);
+                let value = display_value(*value, output.unit);
                 text += &format!("No indices: the variance of the result is 0: it is {value}, whatever the inputs\n");
             }
             Some(Err(error)) => text += &format!("No indices: {error}\n"),
@@ -109,25 +111,25 @@ pub fn text(study: &Study, found: &Sensitivity, out: &Path) -> String {
                     } else {
                         String::new()
                     },
-                    shown(indices.mean, output.unit),
-                    shown(indices.variance.sqrt(), output.unit),
+                    display_value(indices.mean, output.unit),
+                    display_value(indices.variance.sqrt(), output.unit),
                 );
             }
             None => {}
         }
     }
-    if let Some(answer) = &found.target {
+    if let Some(answer) = &results.target {
         text += &format!("\n{}\n", sentence(study, answer));
     }
     text + &format!("\nWritten           {}\nVersion           jointplay {}\n", out.display(), crate::VERSION)
 }
 
-/// Row of parameter `i` in the table of output `o`, of which `cell` writes a value.
-fn line(study: &Study, found: &Sensitivity, o: usize, i: usize, cell: &impl Fn(&[f64]) -> String) -> Vec<String> {
+/// Row of parameter `i` in the table of output `o`; `cell` formats a value of it.
+fn line(study: &Study, results: &Sensitivity, o: usize, i: usize, cell: &impl Fn(&[f64]) -> String) -> Vec<String> {
     let input = &study.inputs()[i];
-    let [(low, at_low), (high, at_high)] = &found.alone.ends[i];
-    let indices = found.indices_of(o);
-    let at = found.place_of(i);
+    let [(low, at_low), (high, at_high)] = &results.alone.ends[i];
+    let indices = results.indices_of(o);
+    let at = results.place_of(i);
     let [first, total] = match (indices, at) {
         (Some(indices), Some(at)) => [Some(&indices.first[at]), Some(&indices.total[at])],
         _ => [None, None],
@@ -146,7 +148,7 @@ fn line(study: &Study, found: &Sensitivity, o: usize, i: usize, cell: &impl Fn(&
 /// The answer to `--target` in words.
 fn sentence(study: &Study, answer: &TargetAnswer) -> String {
     let output = &study.outputs()[0];
-    let goal = format!("{} of at most {}", output.name, shown(answer.target, output.unit));
+    let goal = format!("{} of at most {}", output.name, display_value(answer.target, output.unit));
     let change = |change: &Change| {
         let input = &study.inputs()[change.input];
         format!("{} = {}", input.key, value_of(input, change.value))
@@ -155,19 +157,19 @@ fn sentence(study: &Study, answer: &TargetAnswer) -> String {
         let ways = answer
             .single
             .iter()
-            .map(|(one, value)| format!("  {} alone gives {}\n", change(one), shown(*value, output.unit)));
+            .map(|(one, value)| format!("  {} alone gives {}\n", change(one), display_value(*value, output.unit)));
         return format!("{goal} is reached by one of\n{}", ways.collect::<String>().trim_end());
     }
     match &answer.together {
         Some((changes, value)) if changes.is_empty() => {
-            format!("{goal} is held by the values of the scene: {}", shown(*value, output.unit))
+            format!("{goal} is held by the values of the scene: {}", display_value(*value, output.unit))
         }
         Some((changes, value)) => {
             let changes: Vec<String> = changes.iter().map(change).collect();
             format!(
                 "{goal} takes several changes together: {}, which give {}",
                 changes.join(", "),
-                shown(*value, output.unit)
+                display_value(*value, output.unit)
             )
         }
         None => format!("{goal} is not reached within the ranges"),
@@ -175,12 +177,12 @@ fn sentence(study: &Study, answer: &TargetAnswer) -> String {
 }
 
 /// Everything but the runs, SI.
-pub fn json(study: &Study, found: &Sensitivity) -> Json {
+pub fn json(study: &Study, results: &Sensitivity) -> Json {
     let of_output = |(o, output): (usize, &Output)| {
-        let indices = found.indices_of(o);
+        let indices = results.indices_of(o);
         let of_input = |(i, input): (usize, &Input)| {
-            let [(low, at_low), (high, at_high)] = &found.alone.ends[i];
-            let at = found.place_of(i);
+            let [(low, at_low), (high, at_high)] = &results.alone.ends[i];
+            let at = results.place_of(i);
             let own = indices.zip(at);
             json!({
                 "key": input.key,
@@ -194,9 +196,9 @@ pub fn json(study: &Study, found: &Sensitivity) -> Json {
         json!({
             "name": output.name,
             "unit": output.unit,
-            "value": number(found.alone.nominal[o]),
-            "all_low": number(found.alone.together[0][o]),
-            "all_high": number(found.alone.together[1][o]),
+            "value": number(results.alone.nominal[o]),
+            "all_low": number(results.alone.together[0][o]),
+            "all_high": number(results.alone.together[1][o]),
             "parameters": study.inputs().iter().enumerate().map(of_input).collect::<Vec<_>>(),
             "rows": indices.map(|indices| indices.rows),
             "incomplete_rows": indices.map(|indices| indices.incomplete_rows),
@@ -205,7 +207,7 @@ pub fn json(study: &Study, found: &Sensitivity) -> Json {
         })
     };
     let change = |one: &Change| json!({"key": study.inputs()[one.input].key, "value": one.value});
-    let target = found.target.as_ref().map(|answer| {
+    let target = results.target.as_ref().map(|answer| {
         json!({
             "target": answer.target,
             "single": answer.single.iter().map(|(one, value)| json!({"change": change(one), "output": value})).collect::<Vec<_>>(),
@@ -214,7 +216,7 @@ pub fn json(study: &Study, found: &Sensitivity) -> Json {
             }),
         })
     });
-    let screening = found.screening.as_ref().map(|screening| {
+    let screening = results.screening.as_ref().map(|screening| {
         let effects = study.inputs().iter().zip(&screening.effects).map(|(input, effects)| {
             json!({
                 "key": input.key,
@@ -233,15 +235,15 @@ pub fn json(study: &Study, found: &Sensitivity) -> Json {
 }
 
 /// One row per output and parameter, SI.
-fn table(study: &Study, found: &Sensitivity) -> String {
+fn table(study: &Study, results: &Sensitivity) -> String {
     let mut out = String::from(
         "output,unit,parameter,parameter_unit,low,high,alone_low,alone_high,first_order,first_order_low,first_order_high,total,total_low,total_high\n",
     );
     for (o, output) in study.outputs().iter().enumerate() {
-        let indices = found.indices_of(o);
+        let indices = results.indices_of(o);
         for (i, input) in study.inputs().iter().enumerate() {
-            let [(low, at_low), (high, at_high)] = &found.alone.ends[i];
-            let own = indices.zip(found.place_of(i));
+            let [(low, at_low), (high, at_high)] = &results.alone.ends[i];
+            let own = indices.zip(results.place_of(i));
             let both = own.map_or([None, None], |(indices, at)| [Some(indices.first[at]), Some(indices.total[at])]);
             let estimates = both.into_iter().flat_map(|e| e.map_or([f64::NAN; 3], |e| [e.value, e.low, e.high]));
             let numbers = [*low, *high, at_low[o], at_high[o]].into_iter().chain(estimates);
@@ -258,7 +260,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_index_of_nothing_has_no_sign() {
+    fn an_index_that_rounds_to_0_has_no_sign() {
         let estimate = Estimate { value: -1e-9, low: -0.014, high: 0.236 };
         assert_eq!(interval(Some(&estimate)), "0.00 (-0.01 to 0.24)");
         assert_eq!(interval(None), "-");

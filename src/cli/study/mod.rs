@@ -1,9 +1,9 @@
-//! Runs of a scene at points with many uncertain parameters, and the outputs of each: the files of `crate::analysis::study`.
+//! Runs of the studies in `crate::analysis::study` on several threads, stored in files so that an interrupted study resumes.
 
 mod report;
 mod rows;
 
-pub use report::{digits_apart, drawn, estimate, number, shown, shown_with, value_of};
+pub use report::{axis_value, display_value, display_value_digits, distinguishing_digits, estimate, number, value_of};
 pub use rows::{Row, rows};
 
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ impl From<StudyError> for Failure {
 /// The parameters of the file `--tolerances`, then those of the options `--over KEY[=DISTRIBUTION]`.
 ///
 /// # Errors
-/// Usage: as [`study::inputs`], or another form of the file, with its line. Input/output: an unreadable file.
+/// Usage: as [`study::inputs`], or a malformed file, with its line. Input/output: an unreadable file.
 pub fn inputs(scene: &Scene, tolerances: Option<&Path>, over: &[String]) -> Result<Vec<Input>, Failure> {
     let mut requested = Vec::new();
     if let Some(path) = tolerances {
@@ -49,7 +49,7 @@ pub fn outputs(scene: &Scene, option: &str, text: &str) -> Result<Vec<Output>, F
 
 /// A run.
 pub struct Run {
-    /// Stage that made it.
+    /// Stage of the study.
     pub stage: String,
     /// Values of the inputs, SI.
     pub values: Vec<f64>,
@@ -73,7 +73,7 @@ pub struct Study {
 }
 
 impl Study {
-    /// The runs of `inputs` of `scene`, of which `outputs` are kept. Files of an interrupted command lie beside its folder.
+    /// A study of the `outputs` of `scene` over its `inputs`. Files of an interrupted command are beside its folder.
     ///
     /// # Errors
     /// Usage: an invalid duration, or a scene that cannot start.
@@ -145,7 +145,7 @@ impl StudyRunner for Study {
         &self.outputs
     }
 
-    /// `stage` also names the file from which an interrupted command resumes. Fails with Ctrl-C and the file system, too.
+    /// `stage` also names the file from which an interrupted command resumes. Ctrl-C and the file system also cause errors.
     fn run(&mut self, stage: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Failure> {
         let keys: Vec<String> = self.inputs.iter().map(|input| input.key.clone()).collect();
         let study = StudyRuns::new(&self.scene, &keys, &self.outputs, self.span, &rows)?;

@@ -1,4 +1,4 @@
-//! What the results of all studies share: numbers for people and programs, the table of runs, and the files of a folder.
+//! Output common to all studies: numbers for people and programs, the table of runs, and the files of a folder.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -12,27 +12,26 @@ use crate::cli::{Failure, provenance};
 use crate::files::Folder;
 use crate::units::format_quantity_digits;
 
-/// Significant digits for people.
+/// Significant digits for people: by default, of the largest difference between values, and at most.
 const DIGITS: usize = 4;
-/// Of the largest of several differences, and of any number.
 const DISTINCT: usize = 3;
 const MAX_DIGITS: usize = 9;
 /// PNG pixels per pixel of a chart.
 const PNG_SCALE: f32 = 2.0;
 
 /// A value with its unit, lengths in mm; `-` if unknown or unlimited.
-pub fn shown(value: f64, unit: &str) -> String {
-    shown_with(value, unit, DIGITS)
+pub fn display_value(value: f64, unit: &str) -> String {
+    display_value_digits(value, unit, DIGITS)
 }
 
-/// The same with so many significant digits.
-pub fn shown_with(value: f64, unit: &str, digits: usize) -> String {
+/// The same with `digits` significant digits.
+pub fn display_value_digits(value: f64, unit: &str, digits: usize) -> String {
     let display = if unit == "m" { "mm" } else { unit };
     if value.is_finite() { format_quantity_digits(value, display, digits) } else { "-".to_owned() }
 }
 
-/// Significant digits with which the largest distance of `values` from `nominal` has three, within four and nine.
-pub fn digits_apart(nominal: f64, values: impl Iterator<Item = f64>) -> usize {
+/// Significant digits, from four to nine, that show the largest distance of `values` from `nominal` to three digits.
+pub fn distinguishing_digits(nominal: f64, values: impl Iterator<Item = f64>) -> usize {
     let distance = |value: f64| (value - nominal).abs();
     let largest = values.filter(|value| value.is_finite()).map(distance).fold(0.0, f64::max);
     let lost = libm::log10(nominal.abs() / largest);
@@ -45,7 +44,7 @@ pub fn value_of(input: &Input, value: f64) -> String {
 }
 
 /// A value on an axis, in mm for lengths, and its unit.
-pub fn drawn(value: f64, unit: &str) -> (f64, &str) {
+pub fn axis_value(value: f64, unit: &str) -> (f64, &str) {
     if unit == "m" { (1e3 * value, "mm") } else { (value, unit) }
 }
 
@@ -61,7 +60,7 @@ pub fn estimate(estimate: &Estimate) -> Json {
 
 impl Study {
     /// Number of runs, and of those without a result, for people.
-    pub fn counted(&self) -> String {
+    pub fn run_count_text(&self) -> String {
         let missing = self.runs().iter().filter(|run| run.outputs.iter().any(|value| !value.is_finite())).count();
         let missing = match missing {
             0 => String::new(),
@@ -83,7 +82,7 @@ impl Study {
     }
 
     /// A line for each parameter whose range was not given, for people.
-    pub fn assumed(&self) -> String {
+    pub fn assumption_lines(&self) -> String {
         let line = |input: &Input| {
             let (low, high) = input.assumed_range()?;
             let [low, high] = [low, high].map(|end| value_of(input, end));
@@ -151,8 +150,8 @@ mod tests {
     #[test]
     fn values_that_differ_little_have_enough_digits_to_distinguish_them() {
         let cells = |values: [f64; 3]| {
-            let digits = digits_apart(values[0], values.into_iter());
-            values.map(|value| shown_with(value, "m", digits))
+            let digits = distinguishing_digits(values[0], values.into_iter());
+            values.map(|value| display_value_digits(value, "m", digits))
         };
         assert_eq!(cells([0.1, 0.2, 0.301_234_56]), ["100 mm", "200 mm", "301.2 mm"]);
         assert_eq!(cells([-0.264_9, -0.264_901_234, f64::NAN]), ["-264.9 mm", "-264.901234 mm", "-"]);

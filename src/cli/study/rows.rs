@@ -1,4 +1,4 @@
-//! Files that give parameters something, one per row (CSV).
+//! CSV files with one row per parameter.
 
 use std::path::Path;
 
@@ -35,17 +35,17 @@ pub fn rows<const N: usize>(option: &str, path: &Path, heads: [&str; N]) -> Resu
         if content.matches('"').count() % 2 == 1 {
             return Err(wrong("a quoted cell does not end on this line".to_owned()));
         }
-        let own = cells(line);
+        let line_cells = cells(line);
         if heading.is_none() {
-            if own != heads {
+            if line_cells != heads {
                 return Err(wrong(format!("expected the heading {}, not {content}", heads.join(","))));
             }
-            heading = Some(own);
+            heading = Some(line_cells);
             continue;
         }
-        let cells = own.try_into().map_err(|own: Vec<String>| {
-            let quotes = if own.len() > N { "; a cell with a comma needs quotes" } else { "" };
-            wrong(format!("{} cells for the {N} of the heading {}{quotes}", own.len(), heads.join(",")))
+        let cells = line_cells.try_into().map_err(|line_cells: Vec<String>| {
+            let quotes = if line_cells.len() > N { "; a cell with a comma needs quotes" } else { "" };
+            wrong(format!("{} cells for the {N} of the heading {}{quotes}", line_cells.len(), heads.join(",")))
         })?;
         rows.push(Row { place, cells });
     }

@@ -106,7 +106,7 @@ impl Archive {
         }
     }
 
-    /// The archive of a whole sweep as its shards describe it; `None` if `meta` is not that of a sweep.
+    /// The archive of a whole sweep, described by the `meta` of its shards; `None` if `meta` is not that of a sweep.
     pub fn of_meta(meta: Map<String, Json>, axes: Vec<ArchivedAxis>) -> Option<Self> {
         let kept = usize::try_from(meta.get("kept")?.as_u64()?).ok()?;
         let column = |array: &Json| {

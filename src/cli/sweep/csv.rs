@@ -26,17 +26,17 @@ pub(super) fn write(
     let heads = starts.iter().take(1).map(|_| "start".to_owned()).chain(keys);
     let heads: Vec<String> = heads.chain(single.iter().map(|name| quoted(name))).collect();
     writeln!(out, "{}", heads.join(","))?;
-    let at_once = (MAX_VALUES_IN_MEMORY / single.len().max(1)).max(1);
-    for first in (0..archive.count()).step_by(at_once) {
-        let rows = first..(first + at_once).min(archive.count());
-        let mut held = Vec::new();
+    let rows_per_chunk = (MAX_VALUES_IN_MEMORY / single.len().max(1)).max(1);
+    for first in (0..archive.count()).step_by(rows_per_chunk) {
+        let rows = first..(first + rows_per_chunk).min(archive.count());
+        let mut columns = Vec::new();
         for name in &single {
             let values = archive.values(name, source).map_err(|error| {
                 let text = error.message.clone();
                 *failure = Some(error);
                 io::Error::other(text)
             })?;
-            held.push(values[rows.clone()].to_vec());
+            columns.push(values[rows.clone()].to_vec());
         }
         for point in rows {
             let (start, indices) = archive.indices(point);
@@ -44,7 +44,7 @@ pub(super) fn write(
                 AxisValues::Numbers(values) => significant(values[i], 12),
                 AxisValues::Words(words) => quoted(&words[i].0),
             });
-            let values = held.iter().map(|values| significant(values[point - first], 12));
+            let values = columns.iter().map(|values| significant(values[point - first], 12));
             let cells: Vec<String> = starts.get(start).cloned().into_iter().chain(settings).chain(values).collect();
             writeln!(out, "{}", cells.join(","))?;
         }

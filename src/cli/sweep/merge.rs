@@ -58,7 +58,7 @@ pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
             )));
         }
     }
-    let archive = Archive::of_meta(meta, axes).ok_or_else(|| no_shard(&parts[0].path))?;
+    let archive = Archive::of_meta(meta, axes).ok_or_else(|| not_a_shard(&parts[0].path))?;
     check_points(&parts, archive.count())?;
     let mut shards = Shards { names: archive.names(), parts };
     let summary = super::summarise(&archive, &mut shards)?;
@@ -72,7 +72,7 @@ fn check_points(parts: &[OpenShard], count: usize) -> Result<(), Failure> {
     for (i, part) in parts.iter().enumerate() {
         for &point in &part.points {
             match owner.get_mut(point) {
-                None => return Err(no_shard(&part.path)),
+                None => return Err(not_a_shard(&part.path)),
                 Some(Some(other)) => {
                     return Err(Failure::usage(format!(
                         "{} and {} hold the same points (shards {} and {})",
@@ -94,9 +94,9 @@ fn check_points(parts: &[OpenShard], count: usize) -> Result<(), Failure> {
     let numbers: Vec<_> = parts.iter().filter_map(|p| options::shard(&p.shard).ok()).collect();
     let of = numbers[0].of;
     let names: Vec<String> = if numbers.iter().all(|shard| shard.of == of) {
-        let there = |k: &usize| numbers.iter().any(|shard| shard.number == *k);
-        let gone = (1..=of).filter(|k| !there(k));
-        gone.map(|k| format!("{k}/{of}")).collect()
+        let is_given = |k: &usize| numbers.iter().any(|shard| shard.number == *k);
+        let missing_shards = (1..=of).filter(|k| !is_given(k));
+        missing_shards.map(|k| format!("{k}/{of}")).collect()
     } else {
         Vec::new()
     };
@@ -104,7 +104,7 @@ fn check_points(parts: &[OpenShard], count: usize) -> Result<(), Failure> {
     Err(Failure::usage(format!("{missing} of {count} points are in none of the files{which}")))
 }
 
-fn no_shard(path: &Path) -> Failure {
+fn not_a_shard(path: &Path) -> Failure {
     Failure::usage(format!("{} is not a shard of a sweep (jointplay sweep … --shard K/M writes them)", path.display()))
 }
 
@@ -121,16 +121,16 @@ impl OpenShard {
         let meta: Vec<u8> = part.array("meta")?.into_raw_vec_and_offset().0;
         let meta = serde_json::from_slice(&meta).ok();
         let Some(Json::Object(mut meta)) = meta else {
-            return Err(no_shard(path));
+            return Err(not_a_shard(path));
         };
         let Some(Json::String(shard)) = meta.shift_remove(SHARD) else {
-            return Err(no_shard(path));
+            return Err(not_a_shard(path));
         };
-        options::shard(&shard).map_err(|_| no_shard(path))?;
+        options::shard(&shard).map_err(|_| not_a_shard(path))?;
         (part.meta, part.shard) = (meta, shard);
         let points: ArrayD<i64> = part.array("point")?;
         let points = points.iter().map(|&point| usize::try_from(point));
-        part.points = points.collect::<Result<_, _>>().map_err(|_| no_shard(path))?;
+        part.points = points.collect::<Result<_, _>>().map_err(|_| not_a_shard(path))?;
         Ok(part)
     }
 
@@ -140,7 +140,7 @@ impl OpenShard {
         let mut axes = Vec::new();
         for axis in vary.unwrap_or_default() {
             let key = axis.get("key").and_then(Json::as_str);
-            let key = key.ok_or_else(|| no_shard(&self.path))?.to_owned();
+            let key = key.ok_or_else(|| not_a_shard(&self.path))?.to_owned();
             let unit = axis.get("unit").and_then(Json::as_str).unwrap_or_default().to_owned();
             let values = if axis.get("words").is_some() {
                 let words: ArrayD<Word> = self.array(&key)?;
@@ -174,10 +174,10 @@ struct Shards {
 impl Source for Shards {
     fn gather(&mut self, offset: usize, length: usize, out: &mut [f64]) -> Result<(), Failure> {
         let mut before = 0;
-        let array = self.names.iter().find(|(_, _, own)| {
-            let found = before == offset;
-            before += own;
-            found
+        let array = self.names.iter().find(|(_, _, array_length)| {
+            let is_at_offset = before == offset;
+            before += array_length;
+            is_at_offset
         });
         let Some((name, whole, _)) = array else {
             return Ok(());
@@ -191,7 +191,7 @@ impl Source for Shards {
                 values.iter().copied().collect()
             };
             if values.len() != part.points.len() * length {
-                return Err(no_shard(&part.path));
+                return Err(not_a_shard(&part.path));
             }
             for (point, values) in part.points.iter().zip(values.exact_chunks(length)) {
                 let out = &mut out[point * length..(point + 1) * length];

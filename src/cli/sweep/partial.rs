@@ -47,11 +47,11 @@ impl Partial {
     /// Opens or creates the file beside `out`, which has the blocks `blocks`.
     ///
     /// # Errors
-    /// Input/output: unreadable, damaged, in use; usage: begun with other settings.
+    /// Input/output: unreadable, damaged, in use; usage: started with other settings.
     pub fn open(out: &Path, settings: &Map<String, Json>, sweep: &Sweep, blocks: &[usize]) -> Result<Self, Failure> {
         let path = Self::path_of(out);
         let settings = Json::Object(settings.clone());
-        let file = open_or_create(&path, &beginning(&settings))?;
+        let file = open_or_create(&path, &header(&settings))?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -189,12 +189,12 @@ impl Partial {
         if read_u32(&mut reader).map_err(cut)? != crc32fast::hash(&text) {
             return Err(self.damaged("its settings do not match their checksum"));
         }
-        let own: Json = serde_json::from_slice(&text).map_err(|_| self.damaged("its settings cannot be read"))?;
-        if own != *settings {
+        let stored: Json = serde_json::from_slice(&text).map_err(|_| self.damaged("its settings cannot be read"))?;
+        if stored != *settings {
             return Err(Failure::usage(format!(
                 "{} was begun with other settings ({}); finish that sweep, delete the file, or choose another --out",
                 self.path.display(),
-                difference(&own, settings)
+                difference(&stored, settings)
             )));
         }
         let start = (MAGIC.len() + 8 + text.len() + 4) as u64;
@@ -205,7 +205,7 @@ impl Partial {
         while end < length && !cut {
             match self.next_block(&mut reader, &mut records)? {
                 Some(b) if std::mem::replace(&mut done[b], true) => {
-                    return Err(self.damaged("a block is in it twice"));
+                    return Err(self.damaged("it contains a block twice"));
                 }
                 Some(_) => end += 20 + 8 * records.len() as u64,
                 None => cut = true,
@@ -274,8 +274,8 @@ impl Partial {
     }
 }
 
-/// Content of a file without blocks.
-fn beginning(settings: &Json) -> Vec<u8> {
+/// The part of the file before its blocks.
+fn header(settings: &Json) -> Vec<u8> {
     let text = settings.to_string();
     let mut bytes = MAGIC.to_vec();
     bytes.extend((text.len() as u64).to_le_bytes());
@@ -301,15 +301,15 @@ impl Source for Partial {
 }
 
 /// The first setting that differs.
-pub fn difference(own: &Json, wanted: &Json) -> String {
-    let (Some(own), Some(wanted)) = (own.as_object(), wanted.as_object()) else {
+pub fn difference(stored: &Json, requested: &Json) -> String {
+    let (Some(stored), Some(requested)) = (stored.as_object(), requested.as_object()) else {
         return "unreadable".to_owned();
     };
-    let mut keys = wanted.keys().chain(own.keys());
-    let differing = keys.find(|key| own.get(*key) != wanted.get(*key));
+    let mut keys = requested.keys().chain(stored.keys());
+    let differing = keys.find(|key| stored.get(*key) != requested.get(*key));
     let show = |value: Option<&Json>| value.map_or("none".to_owned(), Json::to_string);
     differing.map_or("in their order".to_owned(), |key| {
-        format!("{key}: {} there, {} now", show(own.get(key)), show(wanted.get(key)))
+        format!("{key}: {} there, {} now", show(stored.get(key)), show(requested.get(key)))
     })
 }
 
@@ -348,45 +348,45 @@ mod tests {
         let open = || Partial::open(&out, &settings, &sweep, &[0, 1, 2]);
         let length = sweep.layout().record_length();
         let mut partial = open().unwrap();
-        let begin = partial.end as usize;
+        let header_length = partial.end as usize;
         for b in [2, 0, 1] {
             partial.append(b, &vec![b as f64; length]).unwrap();
         }
         drop(partial);
         let whole = std::fs::read(&path).unwrap();
         let block = 20 + 8 * length;
-        assert_eq!(whole.len(), begin + 3 * block);
+        assert_eq!(whole.len(), header_length + 3 * block);
         // Steps of 29 cover every offset within the eight-byte numbers; `ends` are the boundaries of whole blocks.
-        let ends = (0..=3).map(|blocks| begin + blocks * block);
-        for cut in (begin..whole.len()).step_by(29).chain(ends) {
+        let ends = (0..=3).map(|blocks| header_length + blocks * block);
+        for cut in (header_length..whole.len()).step_by(29).chain(ends) {
             std::fs::write(&path, &whole[..cut]).unwrap();
             let mut partial = open().unwrap_or_else(|e| panic!("cut at {cut}: {e}"));
-            let blocks = (cut - begin) / block;
+            let blocks = (cut - header_length) / block;
             let left: Vec<usize> = [2, 0, 1][..blocks].to_vec();
             assert!((0..3).all(|b| partial.has(b) == left.contains(&b)), "cut at {cut}");
-            // It continues after the last whole block.
+            // The sweep continues after the last whole block.
             for b in [2, 0, 1].into_iter().skip(blocks) {
                 partial.append(b, &vec![b as f64; length]).unwrap();
             }
             drop(partial);
             assert!(std::fs::read(&path).unwrap() == whole, "cut at {cut}");
         }
-        let refused = |bytes: &[u8]| {
+        let assert_refused = |bytes: &[u8]| {
             std::fs::write(&path, bytes).unwrap();
             let Err(failure) = open() else {
-                panic!("taken");
+                panic!("a damaged file is accepted");
             };
             assert!(failure.message.contains("a.npz.partial is damaged"), "{failure}");
-            assert!(std::fs::read(&path).unwrap() == bytes, "left as it was");
+            assert!(std::fs::read(&path).unwrap() == bytes, "the file is unchanged");
         };
-        for cut in (1..begin).step_by(97) {
-            refused(&whole[..cut]);
+        for cut in (1..header_length).step_by(97) {
+            assert_refused(&whole[..cut]);
         }
         for at in (0..whole.len()).step_by(37) {
             let mut bytes = whole.clone();
             bytes[at] ^= 0x10;
-            refused(&bytes);
+            assert_refused(&bytes);
         }
-        refused(&[&whole[..], &whole[whole.len() - 8..]].concat());
+        assert_refused(&[&whole[..], &whole[whole.len() - 8..]].concat());
     }
 }

@@ -65,7 +65,7 @@ fn protocol(arguments: &SweepArguments, scene: &Scene) -> Result<Protocol, Failu
             Span::Duration { duration, from }
         }
         None if arguments.section != PHASE => {
-            // An unknown word deserves its own error.
+            // An invalid section has its own error.
             let crossing =
                 Crossing::parse(scene, &arguments.section).map_err(|error| usage(format!("--section {error}")))?;
             return Err(usage(format!(

@@ -28,11 +28,12 @@ impl Target {
     /// Checks that `path` can be written; only an archive can hold a shard.
     ///
     /// # Errors
-    /// Another ending, an existing file without `force`, or an unwritable folder.
+    /// An unknown extension, an existing file without `force`, or an unwritable folder.
     pub fn claim(path: &Path, force: bool, is_shard: bool) -> Result<Self, Failure> {
         let wrong = |what: &str| Failure::usage(format!("--out {}: {what}", path.display()));
-        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
-        match &*ending {
+        let extension =
+            path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_ascii_lowercase();
+        match &*extension {
             "npz" => {}
             "csv" | "parquet" if is_shard => {
                 return Err(wrong("a shard is a NumPy archive; use the extension .npz, and a table for `merge`"));
@@ -45,7 +46,7 @@ impl Target {
             }
         }
         let file = OutputFile::claim(path, force)?;
-        let format = match &*ending {
+        let format = match &*extension {
             "csv" => Format::Csv(claim_metadata(path, force)?),
             "parquet" => Format::Parquet,
             _ => Format::Npz,
@@ -61,7 +62,7 @@ impl Target {
         let mut failure = None;
         let files = match self.format {
             Format::Npz => return archive.write(self.file, source),
-            Format::Csv(account) => {
+            Format::Csv(metadata) => {
                 let mut checksum = String::new();
                 let rows = self.file.fill(|file| {
                     let mut file = ChecksumWriter::new(file);
@@ -72,7 +73,7 @@ impl Target {
                 let mut meta = archive.meta().clone();
                 meta.insert("rows_crc32".into(), checksum.into());
                 // In this order, a kill between the two renames never leaves rows without metadata.
-                rows.and_then(|rows| Ok(vec![account.fill(|file| write_meta(file, &meta))?, rows]))
+                rows.and_then(|rows| Ok(vec![metadata.fill(|file| write_meta(file, &meta))?, rows]))
             }
             Format::Parquet => {
                 let rows = self.file.fill(|file| parquet::write(file, archive, source, &mut failure));

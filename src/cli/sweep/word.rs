@@ -7,7 +7,7 @@ use py_literal::Value;
 
 /// Width of every array of words, characters.
 const WIDTH: usize = 32;
-/// NumPy's name of the type: little-endian UTF-32, filled up with zeros.
+/// NumPy's name of the type: little-endian UTF-32, padded with zeros.
 const TYPE: &str = "<U32";
 
 /// A word of at most [`WIDTH`] characters.
@@ -37,7 +37,7 @@ impl ReadableElement for Word {
         }
         let length = len * WIDTH * size_of::<u32>();
         let mut bytes = Vec::new();
-        // One more byte shows whether there is too much.
+        // One more byte shows whether the data are too long.
         reader.take(length as u64 + 1).read_to_end(&mut bytes)?;
         if bytes.len() < length {
             return Err(ReadDataError::MissingData);

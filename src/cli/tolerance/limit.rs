@@ -3,7 +3,7 @@
 use crate::analysis::lot::Limit;
 use crate::analysis::study::Output;
 use crate::cli::Failure;
-use crate::cli::study::{outputs, shown};
+use crate::cli::study::{display_value, outputs};
 use crate::scene::Scene;
 
 /// Reads the options `--limit OUTPUT=HIGH`, `OUTPUT=LOW..HIGH` or `OUTPUT=LOW..`; a pattern of channels limits each of them.
@@ -43,10 +43,10 @@ fn read_one(output: &Output, text: &str) -> Result<Limit, String> {
 
 /// A limit in words.
 pub fn describe(limit: &Limit, unit: &str) -> String {
-    let shown = |value| shown(value, unit);
+    let display = |value| display_value(value, unit);
     match (limit.lower, limit.upper) {
-        (Some(lower), Some(upper)) => format!("from {} to {}", shown(lower), shown(upper)),
-        (Some(lower), None) => format!("at least {}", shown(lower)),
-        (None, upper) => format!("at most {}", shown(upper.unwrap_or(f64::NAN))),
+        (Some(lower), Some(upper)) => format!("from {} to {}", display(lower), display(upper)),
+        (Some(lower), None) => format!("at least {}", display(lower)),
+        (None, upper) => format!("at most {}", display(upper.unwrap_or(f64::NAN))),
     }
 }

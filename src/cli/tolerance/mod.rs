@@ -28,21 +28,21 @@ pub fn tolerance(arguments: &ToleranceArguments) -> Result<(), Failure> {
     };
     let folder = Folder::claim(&arguments.study.out, arguments.study.force)?;
     let mut study = Study::new(scene, inputs, outputs, &arguments.study)?;
-    let found = study::tolerance(&mut study, &limits, options)?;
-    let results = report::json(&study, &limits, &found);
+    let outcome = study::tolerance(&mut study, &limits, options)?;
+    let results = report::json(&study, &limits, &outcome);
     let meta = report::meta(&study, arguments);
-    let sheet = picture::sheet(&study, &limits, &found.lot);
-    study.write(&folder, "tolerance", &meta, results.clone(), &report::table(&study, &limits, &found), &sheet)?;
+    let sheet = picture::sheet(&study, &limits, &outcome.lot);
+    study.write(&folder, "tolerance", &meta, results.clone(), &report::table(&study, &limits, &outcome), &sheet)?;
     folder.finish(meta)?;
     print(&match arguments.study.summary {
-        SummaryForm::Text => report::text(&study, &limits, &found, arguments),
+        SummaryForm::Text => report::text(&study, &limits, &outcome, arguments),
         SummaryForm::Json => format!("{results:#}\n"),
     })?;
     study.finish();
     Ok(())
 }
 
-/// The search that `--cost`, `--yield` and `--evaluations` ask for.
+/// The search that `--cost`, `--yield` and `--evaluations` request.
 fn fits(scene: &Scene, inputs: &[Input], arguments: &ToleranceArguments) -> Result<Option<FitOptions>, Failure> {
     let Some(path) = &arguments.cost else {
         return Ok(None);

@@ -3,7 +3,7 @@
 use crate::analysis::lot::{Limit, Lot};
 use crate::analysis::study::StudyRunner as _;
 use crate::chart::{Axis, Chart, PALETTE, Series, Sheet};
-use crate::cli::study::{Study, drawn};
+use crate::cli::study::{Study, axis_value};
 
 /// Width and height of a chart, pixels.
 const SIZE: (u32, u32) = (640, 420);
@@ -26,7 +26,7 @@ pub fn sheet(study: &Study, limits: &[Limit], lot: &Lot) -> Sheet {
 
 fn chart(study: &Study, o: usize, limit: &Limit, lot: &Lot) -> Chart {
     let output = &study.outputs()[o];
-    let scaled = |value: f64| drawn(value, output.unit).0;
+    let scaled = |value: f64| axis_value(value, output.unit).0;
     let mut values: Vec<f64> = lot.outputs.iter().map(|outputs| outputs[o]).filter(|value| value.is_finite()).collect();
     values.sort_by(f64::total_cmp);
     // Units without a result count, so that the function stays below 100 % with them.
@@ -39,5 +39,5 @@ fn chart(study: &Study, o: usize, limit: &Limit, lot: &Lot) -> Chart {
         }
     }
     let y = Axis { range: Some((0.0, 100.0)), ..Axis::new("Part of the lot", "%") };
-    Chart::new(&output.name, Axis::new(&output.name, drawn(0.0, output.unit).1), y, series)
+    Chart::new(&output.name, Axis::new(&output.name, axis_value(0.0, output.unit).1), y, series)
 }

@@ -8,7 +8,7 @@ use crate::analysis::study::{CheapestFits, FitVerdict, Output, StudyRunner as _,
 use crate::analysis::yields::{Estimate, RejectDriver};
 use crate::cli::args::ToleranceArguments;
 use crate::cli::output::significant;
-use crate::cli::study::{Study, estimate, number, shown};
+use crate::cli::study::{Study, display_value, estimate, number};
 use crate::cli::summary::count;
 use crate::cli::tables::{Table, quoted};
 
@@ -26,7 +26,7 @@ pub fn meta(study: &Study, arguments: &ToleranceArguments) -> Map<String, Json> 
 }
 
 fn percent(part: f64) -> String {
-    shown(100.0 * part, "%")
+    display_value(100.0 * part, "%")
 }
 
 fn with_interval(part: &Estimate) -> String {
@@ -55,8 +55,8 @@ fn statistics(output: &Output, quality: &Quality) -> Vec<Statistic> {
 }
 
 /// Number of units of the lot that did not start, or diverged.
-fn without_result(found: &Tolerance) -> usize {
-    found.lot.outputs.iter().filter(|outputs| outputs.iter().any(|value| !value.is_finite())).count()
+fn without_result(outcome: &Tolerance) -> usize {
+    outcome.lot.outputs.iter().filter(|outputs| outputs.iter().any(|value| !value.is_finite())).count()
 }
 
 /// Indices of the parameters, the one that differs most between rejects and accepted units first.
@@ -67,25 +67,25 @@ fn order(drivers: &[RejectDriver]) -> Vec<usize> {
 }
 
 /// For a terminal.
-pub fn text(study: &Study, limits: &[Limit], found: &Tolerance, arguments: &ToleranceArguments) -> String {
-    let units = found.lot.accepted.len();
-    let rejects = found.lot.accepted.iter().filter(|accepted| !**accepted).count();
+pub fn text(study: &Study, limits: &[Limit], outcome: &Tolerance, arguments: &ToleranceArguments) -> String {
+    let units = outcome.lot.accepted.len();
+    let rejects = outcome.lot.accepted.iter().filter(|accepted| !**accepted).count();
     let mut text = format!(
         "Scene             {}: runs of {}\n{}Runs              {}\nLot               {}, {} rejected\n\
          Yield             {}, interval of 95 %\n",
         study.scene().name,
         study.describe(),
-        study.assumed(),
-        study.counted(),
+        study.assumption_lines(),
+        study.run_count_text(),
         count(units as u64, "unit"),
         rejects,
-        with_interval(&found.lot.yielded),
+        with_interval(&outcome.lot.yielded),
     );
-    let lost = without_result(found);
+    let lost = without_result(outcome);
     if lost > 0 {
         text += &format!("Statistics        of the {} with a result\n", count((units - lost) as u64, "unit"));
     }
-    for ((output, limit), quality) in study.outputs().iter().zip(limits).zip(&found.qualities) {
+    for ((output, limit), quality) in study.outputs().iter().zip(limits).zip(&outcome.qualities) {
         text += &format!(
             "\n{} {}: {} of the lot\n",
             output.name,
@@ -93,19 +93,20 @@ pub fn text(study: &Study, limits: &[Limit], found: &Tolerance, arguments: &Tole
             with_interval(&quality.yielded)
         );
         let rows = statistics(output, quality).into_iter().map(|(name, _, unit, value)| {
-            let number =
-                |of: fn(&Estimate) -> f64| value.as_ref().map_or("-".to_owned(), |value| shown(of(value), unit));
+            let number = |of: fn(&Estimate) -> f64| {
+                value.as_ref().map_or("-".to_owned(), |value| display_value(of(value), unit))
+            };
             vec![name, number(|e| e.value), number(|e| e.low), number(|e| e.high)]
         });
         text += &Table::new("statistic | value | 95 % from | to", rows).text();
     }
-    text += &match &found.drivers {
+    text += &match &outcome.drivers {
         Some(drivers) => {
             let rows = order(drivers).into_iter().map(|i| {
                 let driver = &drivers[i];
                 vec![
                     study.inputs()[i].key.clone(),
-                    shown(driver.mean_shift, ""),
+                    display_value(driver.mean_shift, ""),
                     format!("{:.2}", driver.distance),
                     p_value(driver.p_value),
                 ]
@@ -114,9 +115,9 @@ pub fn text(study: &Study, limits: &[Limit], found: &Tolerance, arguments: &Tole
             format!("\nWhat drives the rejects\n{}", Table::new(heads, rows).text())
         }
         None if rejects == 0 => "\nNo rejects\n".to_owned(),
-        None => "\nNothing but rejects: what drives them cannot be told\n".to_owned(),
+        None => "\nAll units are rejected, so nothing shows what drives the rejects\n".to_owned(),
     };
-    if let Some(cheapest) = &found.cheapest {
+    if let Some(cheapest) = &outcome.cheapest {
         text += &fits(study, cheapest);
     }
     text + &format!(
@@ -173,7 +174,7 @@ fn fits(study: &Study, cheapest: &CheapestFits) -> String {
 }
 
 /// Everything but the runs, SI.
-pub fn json(study: &Study, limits: &[Limit], found: &Tolerance) -> Json {
+pub fn json(study: &Study, limits: &[Limit], outcome: &Tolerance) -> Json {
     let of_output = |((output, limit), quality): ((&Output, &Limit), &Quality)| {
         let mut all = Map::new();
         all.insert("name".into(), json!(output.name));
@@ -188,8 +189,8 @@ pub fn json(study: &Study, limits: &[Limit], found: &Tolerance) -> Json {
         }
         all
     };
-    let outputs = study.outputs().iter().zip(limits).zip(&found.qualities).map(of_output);
-    let drivers = found.drivers.as_ref().map(|drivers| {
+    let outputs = study.outputs().iter().zip(limits).zip(&outcome.qualities).map(of_output);
+    let drivers = outcome.drivers.as_ref().map(|drivers| {
         let of_input = |i: usize| {
             let driver = &drivers[i];
             json!({
@@ -202,13 +203,13 @@ pub fn json(study: &Study, limits: &[Limit], found: &Tolerance) -> Json {
         order(drivers).into_iter().map(of_input).collect::<Vec<_>>()
     });
     json!({
-        "units": found.lot.accepted.len(),
-        "accepted": found.lot.accepted.iter().filter(|accepted| **accepted).count(),
-        "without_result": without_result(found),
-        "yield": estimate(&found.lot.yielded),
+        "units": outcome.lot.accepted.len(),
+        "accepted": outcome.lot.accepted.iter().filter(|accepted| **accepted).count(),
+        "without_result": without_result(outcome),
+        "yield": estimate(&outcome.lot.yielded),
         "outputs": outputs.collect::<Vec<_>>(),
         "reject_drivers": drivers,
-        "fits": found.cheapest.as_ref().map(|cheapest| fits_json(study, cheapest)),
+        "fits": outcome.cheapest.as_ref().map(|cheapest| fits_json(study, cheapest)),
         "runs": study.runs().len(),
     })
 }
@@ -236,14 +237,14 @@ fn fits_json(study: &Study, cheapest: &CheapestFits) -> Json {
 }
 
 /// One row per output and statistic, SI.
-pub fn table(study: &Study, limits: &[Limit], found: &Tolerance) -> String {
+pub fn table(study: &Study, limits: &[Limit], outcome: &Tolerance) -> String {
     let mut out = String::from("output,unit,lower,upper,statistic,value,low,high\n");
     let cell = |value: f64| significant(value, 12);
     let mut line = |heads: &str, name: &str, value: &Estimate| {
         out += &format!("{heads},{name},{},{},{}\n", cell(value.value), cell(value.low), cell(value.high));
     };
-    line("all,,NaN,NaN", "yield", &found.lot.yielded);
-    for ((output, limit), quality) in study.outputs().iter().zip(limits).zip(&found.qualities) {
+    line("all,,NaN,NaN", "yield", &outcome.lot.yielded);
+    for ((output, limit), quality) in study.outputs().iter().zip(limits).zip(&outcome.qualities) {
         let [lower, upper] = [limit.lower, limit.upper].map(|end| cell(end.unwrap_or(f64::NAN)));
         let heads = format!("{},{},{lower},{upper}", quoted(&output.name), output.unit);
         line(&heads, "yield", &quality.yielded);

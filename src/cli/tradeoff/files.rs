@@ -18,8 +18,8 @@ const PNG_SCALE: f32 = 2.0;
 const OF_PHASE: [&str; 8] = ["end", "simulated_s", "wall_s", "ratio", "steps", "evaluations", "rejected", "front"];
 
 /// Writes all files into `folder`; returns their provenance.
-pub(super) fn fill(folder: &Folder, found: &WorkPrecision, scene: &Scene) -> Result<Map<String, Json>, Failure> {
-    let sheet = picture(found, false, &machine::name());
+pub(super) fn fill(folder: &Folder, results: &WorkPrecision, scene: &Scene) -> Result<Map<String, Json>, Failure> {
+    let sheet = picture(results, false, &machine::name());
     let drawing = |error: crate::chart::SheetError| Failure::io(error.to_string());
     let mut meta = provenance::meta(scene);
     // All methods were run, whatever the scene asks for.
@@ -27,9 +27,9 @@ pub(super) fn fill(folder: &Folder, found: &WorkPrecision, scene: &Scene) -> Res
         meta.shift_remove(key);
     }
     meta.insert("machine".into(), json!(machine::name()));
-    let whole = json!({"meta": meta, "reference": reference(found), "points": found.points});
+    let whole = json!({"meta": meta, "reference": reference(results), "points": results.points});
     let files: [(&str, Vec<u8>); 4] = [
-        ("tradeoff.csv", points(found).csv().into_bytes()),
+        ("tradeoff.csv", points(results).csv().into_bytes()),
         ("tradeoff.json", format!("{whole:#}\n").into_bytes()),
         ("tradeoff.svg", sheet.svg().map_err(drawing)?.into_bytes()),
         ("tradeoff.png", sheet.png(PNG_SCALE).map_err(drawing)?),
@@ -40,8 +40,8 @@ pub(super) fn fill(folder: &Folder, found: &WorkPrecision, scene: &Scene) -> Res
     Ok(meta)
 }
 
-fn reference(found: &WorkPrecision) -> Json {
-    let reference = &found.reference;
+fn reference(results: &WorkPrecision) -> Json {
+    let reference = &results.reference;
     let names: Vec<&str> = reference.scene().machine.ball_joints.iter().map(|j| j.name.as_str()).collect();
     let peaks = reference.slots.iter().map(|slot| {
         json!({
@@ -73,7 +73,7 @@ fn cells(phase: &Phase) -> [String; OF_PHASE.len()] {
     [end.to_owned(), simulated, wall, ratio, steps, evaluations, rejected, front]
 }
 
-fn points(found: &WorkPrecision) -> Table {
+fn points(results: &WorkPrecision) -> Table {
     let [impacts, settled] =
         ["impacts", "settled"].map(|phase| OF_PHASE.map(|name| format!("{phase}_{name}")).join(" | "));
     let heads = format!(
@@ -92,5 +92,5 @@ fn points(found: &WorkPrecision) -> Table {
         row.push(number(errors.settled));
         row
     };
-    Table::new(&heads, found.points.iter().map(row))
+    Table::new(&heads, results.points.iter().map(row))
 }

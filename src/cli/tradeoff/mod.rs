@@ -25,13 +25,13 @@ use crate::scene::{BUILT_IN, Scene};
 pub fn tradeoff(arguments: &TradeoffArguments) -> Result<(), Failure> {
     let budget = if arguments.quick { WorkBudget::QUICK } else { WorkBudget::FULL };
     match (&arguments.scene, &arguments.write) {
-        (Some(scene), _) => one(scene, arguments, &budget),
-        (None, Some(root)) => all(root, arguments.quiet, &budget),
+        (Some(scene), _) => measure_scene(scene, arguments, &budget),
+        (None, Some(root)) => write_documentation(root, arguments.quiet, &budget),
         (None, None) => Err(Failure::usage("name a scene, or write --all --write FOLDER")),
     }
 }
 
-fn one(name: &OsStr, arguments: &TradeoffArguments, budget: &WorkBudget) -> Result<(), Failure> {
+fn measure_scene(name: &OsStr, arguments: &TradeoffArguments, budget: &WorkBudget) -> Result<(), Failure> {
     let scene = load(&SceneArguments { scene: Some(name.to_owned()), changes: arguments.changes.clone(), link: None })?;
     // From here on there is a temporary folder, which an interrupted run removes.
     interrupt::listen();
@@ -45,10 +45,10 @@ fn one(name: &OsStr, arguments: &TradeoffArguments, budget: &WorkBudget) -> Resu
             warn(&warning.to_string());
         }
     }
-    let found = measure(&scene, budget, arguments.quiet)?;
-    print(&points::text(&found))?;
+    let results = measure(&scene, budget, arguments.quiet)?;
+    print(&points::text(&results))?;
     if let Some((path, folder)) = folder {
-        let manifest = files::fill(&folder, &found, &scene)?;
+        let manifest = files::fill(&folder, &results, &scene)?;
         folder.finish(manifest)?;
         print(&format!("Written             {}\n", path.display()))?;
     }
@@ -59,21 +59,21 @@ fn measure(scene: &Scene, budget: &WorkBudget, quiet: bool) -> Result<WorkPrecis
     measuring::measure(quiet, Some(scene), |context| work_precision(scene, budget, context))
 }
 
-/// Measures everything that the documentation states, and writes it all at the end.
-fn all(root: &Path, quiet: bool, budget: &WorkBudget) -> Result<(), Failure> {
+/// Measures all built-in scenes for the documentation, and writes the documentation at the end.
+fn write_documentation(root: &Path, quiet: bool, budget: &WorkBudget) -> Result<(), Failure> {
     let files = page::claim(root)?;
-    let mut found = Vec::with_capacity(BUILT_IN.len());
+    let mut all_results = Vec::with_capacity(BUILT_IN.len());
     let mut paces = Vec::with_capacity(BUILT_IN.len());
     for name in BUILT_IN {
         let scene = Scene::load(name, &[])?;
-        found.push(measure(&scene, &budget.of(&scene), quiet)?);
+        all_results.push(measure(&scene, &budget.of(&scene), quiet)?);
         let pace = |context: &mut RunContext| presets::pace(&scene, budget, context);
         paces.push((name, measuring::measure(quiet, Some(&scene), pace)?));
     }
     let costs = measuring::measure(quiet, None, |context| model_costs(budget, context))?;
-    page::write(files, &found, &paces, &costs)?;
-    for found in &found {
-        print(&points::text(found))?;
+    page::write(files, &all_results, &paces, &costs)?;
+    for results in &all_results {
+        print(&points::text(results))?;
     }
     print(&points::costs(&costs).text())
 }

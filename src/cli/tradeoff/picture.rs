@@ -25,18 +25,18 @@ const FRONT: &str = "On the front: no other setting is both faster and more accu
 
 /// Error against time, both phases side by side. `relative`: times relative to Runge-Kutta 4 at 10 microseconds, which carry
 /// over to other machines.
-pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> Sheet {
-    let floor = &found.reference.floor;
-    let impacts = if found.reference.impacts == 0 { "Reactions" } else { "First impacts" };
+pub(super) fn picture(results: &WorkPrecision, relative: bool, machine: &str) -> Sheet {
+    let floor = &results.reference.floor;
+    let impacts = if results.reference.impacts == 0 { "Reactions" } else { "First impacts" };
     let peak = "Largest relative error of a peak force";
-    let mut charts = vec![diagram(found, relative, impacts, peak, Point::in_impacts, floor.peak)];
-    if found.reference.settled.is_some() {
+    let mut charts = vec![diagram(results, relative, impacts, peak, Point::in_impacts, floor.peak)];
+    if results.reference.settled.is_some() {
         let mean = "Largest relative error of a mean force";
-        charts.push(diagram(found, relative, "Settled motion", mean, Point::in_settled, floor.settled));
+        charts.push(diagram(results, relative, "Settled motion", mean, Point::in_settled, floor.settled));
     }
     let columns = charts.len();
     Sheet {
-        title: format!("{}: what accuracy costs", found.reference.scene().name),
+        title: format!("{}: what accuracy costs", results.reference.scene().name),
         size: (WIDTH * columns.max(2) as u32, HEIGHT),
         charts,
         columns,
@@ -45,7 +45,7 @@ pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> S
     }
 }
 
-fn diagram(found: &WorkPrecision, relative: bool, title: &str, error: &str, view: View, floor: Option<f64>) -> Chart {
+fn diagram(results: &WorkPrecision, relative: bool, title: &str, error: &str, view: View, floor: Option<f64>) -> Chart {
     let floor = floor.filter(|floor| *floor > 0.0);
     let place = |point: &Point| {
         let (phase, error) = view(point)?;
@@ -55,15 +55,15 @@ fn diagram(found: &WorkPrecision, relative: bool, title: &str, error: &str, view
         (error <= WORST).then_some((cost, error))
     };
     let series = Method::ALL.into_iter().enumerate().map(|(n, method)| {
-        let own = found.points.iter().filter(|p| p.setting.method == method);
+        let own = results.points.iter().filter(|p| p.setting.method == method);
         // A point without a position leaves a gap in the line.
         let points = own.map(|p| place(p).unwrap_or((f64::NAN, f64::NAN))).collect();
         let line = Series::line(method.word(), points, PALETTE[n % PALETTE.len()]);
         line.marked(MARKERS[n % MARKERS.len()])
     });
-    let on_front = found.points.iter().filter(|p| view(p).is_some_and(|(phase, _)| phase.front));
+    let on_front = results.points.iter().filter(|p| view(p).is_some_and(|(phase, _)| phase.front));
     let front = Series::dots(FRONT, on_front.filter_map(place).collect(), (90, 90, 90), Marker::Ring);
-    let labels = found.points.iter().filter_map(|point| {
+    let labels = results.points.iter().filter_map(|point| {
         let text = match point.preset {
             Some(preset) => preset.word().to_owned(),
             None if is_baseline(point) => format!("{} {}", point.setting.method, value(&point.setting)),

@@ -56,14 +56,14 @@ pub(super) fn end(phase: &Phase) -> &'static str {
 }
 
 /// Lines about the reference and about settings that failed.
-pub(super) fn facts(found: &WorkPrecision) -> Vec<(&'static str, String)> {
+pub(super) fn facts(results: &WorkPrecision) -> Vec<(&'static str, String)> {
     let ms = |time: f64| format!("{} ms", significant(1e3 * time, 5));
     let ReferenceSolution { setting, floor, slots, impacts, span, instant, instant_impact, settled, .. } =
-        &found.reference;
-    let joints = &found.reference.scene().machine.ball_joints;
+        &results.reference;
+    let joints = &results.reference.scene().machine.ball_joints;
     let names = slots.iter().map(|slot| joints.get(slot.joint).map_or("-", |joint| joint.name.as_str()));
     let names = names.collect::<Vec<_>>().join(", ");
-    let refused = found.points.iter().filter(|point| point.impacts.end.fault().is_some());
+    let refused = results.points.iter().filter(|point| point.impacts.end.fault().is_some());
     let refused = refused.map(|point| format!("{} {}", point.setting.method, value(&point.setting)));
     let [peak, position, force] = [floor.peak, floor.position_m, floor.settled].map(|change| error(change, None));
     vec![
@@ -86,12 +86,12 @@ pub(super) fn facts(found: &WorkPrecision) -> Vec<(&'static str, String)> {
 }
 
 /// The whole result as text.
-pub(super) fn text(found: &WorkPrecision) -> String {
-    let scene = found.reference.scene();
+pub(super) fn text(results: &WorkPrecision) -> String {
+    let scene = results.reference.scene();
     let mut values = vec![("Scene", scene.name.clone())];
     values.extend(scene.changes.iter().map(|(key, value)| ("  changed", format!("{key} = {value}"))));
     values.push(("Machine", machine::name()));
-    values.extend(facts(found));
+    values.extend(facts(results));
     let terms = [
         ("Speed", "simulated seconds in a second of stepping"),
         ("Ratio", "speed over that of rk4 at 10 us on the same span"),
@@ -100,13 +100,13 @@ pub(super) fn text(found: &WorkPrecision) -> String {
     values.extend(terms.map(|(label, meaning)| (label, meaning.to_owned())));
     let mut out = tables::lines(values);
     let impacts =
-        phase_table(found, |point| Some(&point.impacts), "peak error | position error (m) | energy error", 0..3);
-    out += &format!("\n{}", impacts.titled("First impacts").text());
-    if found.reference.settled.is_some() {
-        let settled = phase_table(found, |point| point.settled.as_ref(), "force error", 3..4);
-        out += &format!("\n{}", settled.titled("Settled motion").text());
+        phase_table(results, |point| Some(&point.impacts), "peak error | position error (m) | energy error", 0..3);
+    out += &format!("\n{}", impacts.with_title("First impacts").text());
+    if results.reference.settled.is_some() {
+        let settled = phase_table(results, |point| point.settled.as_ref(), "force error", 3..4);
+        out += &format!("\n{}", settled.with_title("Settled motion").text());
     }
-    for point in &found.points {
+    for point in &results.points {
         if let Some(why) = point.impacts.end.fault() {
             out += &format!("{} {}: {why}\n", point.setting.method, value(&point.setting));
         }
@@ -115,8 +115,8 @@ pub(super) fn text(found: &WorkPrecision) -> String {
 }
 
 /// Errors of a point in peaks, position, energy and settled forces.
-pub(super) fn errors(found: &WorkPrecision, point: &Point) -> [String; 4] {
-    let (errors, floor) = (&point.errors, &found.reference.floor);
+pub(super) fn errors(results: &WorkPrecision, point: &Point) -> [String; 4] {
+    let (errors, floor) = (&point.errors, &results.reference.floor);
     [
         error(errors.peak, floor.peak),
         error(errors.position_m, floor.position_m),
@@ -127,7 +127,7 @@ pub(super) fn errors(found: &WorkPrecision, point: &Point) -> [String; 4] {
 
 /// The points in one phase: settings, speeds, work, errors of that phase, and how it ended.
 fn phase_table(
-    found: &WorkPrecision,
+    results: &WorkPrecision,
     phase: fn(&Point) -> Option<&Phase>,
     heads: &str,
     own: std::ops::Range<usize>,
@@ -142,12 +142,12 @@ fn phase_table(
             times(phase.ratio),
         ];
         row.extend([phase.steps, phase.evaluations, phase.rejected].map(|count| count.to_string()));
-        row.extend_from_slice(&errors(found, point)[own.clone()]);
+        row.extend_from_slice(&errors(results, point)[own.clone()]);
         row.push(if phase.front { "*" } else { end(phase) }.to_owned());
         Some(row)
     };
     let heads = format!("method | value | preset | speed | ratio | steps | evaluations | rejected | {heads} | ");
-    Table::new(&heads, found.points.iter().filter_map(row))
+    Table::new(&heads, results.points.iter().filter_map(row))
 }
 
 /// Costs of the parts of the model per evaluation and per simulated second, relative to those of the first.
@@ -158,7 +158,7 @@ pub(super) fn costs(costs: &[CaseCost]) -> Table {
         [&[part.scene.to_owned(), part.label.to_owned()], &relative.map(|cost| times(Some(cost)))[..]].concat()
     };
     let table = Table::new("Scene | With | An evaluation | A simulated second", costs.iter().map(row));
-    table.titled("Cost of the parts of the model, the first row being 1")
+    table.with_title("Cost of the parts of the model, the first row being 1")
 }
 
 #[cfg(test)]
