@@ -1,24 +1,24 @@
-// From light to the bytes of a picture. Colours of the theme are given as they are to be seen; only light is tone-mapped.
+// Conversion of light to the bytes of a picture. Only light is tone-mapped; colours of the theme are shown unchanged.
 
-// Above this the curve bends; how fast what is brighter turns white.
-const BENDS_AT: f32 = 0.76;
-const WHITENS: f32 = 0.15;
+// Where the compression of highlights starts, and how fast they turn white.
+const COMPRESSION_START: f32 = 0.76;
+const DESATURATION: f32 = 0.15;
 
-// Khronos PBR Neutral: below BENDS_AT hue and saturation stay, and what 4 % of white reflection add is taken away.
+// Khronos PBR Neutral: below COMPRESSION_START, hue and saturation are preserved and the 4 % of white reflection are subtracted.
 // https://github.com/KhronosGroup/ToneMapping/blob/main/PBR_Neutral/README.md
 fn neutral(light: vec3<f32>) -> vec3<f32> {
     let least = min(light.r, min(light.g, light.b));
     let c = light - select(0.04, least - 6.25 * least * least, least < 0.08);
     let peak = max(c.r, max(c.g, c.b));
-    let room = 1.0 - BENDS_AT;
-    let bent = 1.0 - room * room / (max(peak, BENDS_AT) + room - BENDS_AT);
-    let white = 1.0 - 1.0 / (WHITENS * (peak - bent) + 1.0);
-    return select(mix(c * bent / max(peak, BENDS_AT), vec3<f32>(bent), white), c, peak < BENDS_AT);
+    let room = 1.0 - COMPRESSION_START;
+    let bent = 1.0 - room * room / (max(peak, COMPRESSION_START) + room - COMPRESSION_START);
+    let white = 1.0 - 1.0 / (DESATURATION * (peak - bent) + 1.0);
+    return select(mix(c * bent / max(peak, COMPRESSION_START), vec3<f32>(bent), white), c, peak < COMPRESSION_START);
 }
 
-// `given` is the share of the theme's colours in it.
-fn display(light: vec3<f32>, given: f32) -> vec3<f32> {
-    let c = mix(neutral(max(light, vec3<f32>(0.0))), light, given);
+// `theme_share` is the share of theme colours in `light`.
+fn display(light: vec3<f32>, theme_share: f32) -> vec3<f32> {
+    let c = mix(neutral(max(light, vec3<f32>(0.0))), light, theme_share);
     return clamp(c, vec3<f32>(0.0), vec3<f32>(1.0));
 }
 

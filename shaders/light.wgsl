@@ -1,45 +1,45 @@
-// How things are lit: every constant of the light, the surroundings, surfaces, and spheres in their sockets.
+// Lighting: all constants of the light, the surroundings, surfaces, and balls in their sockets.
 
-// Light that a diffuse surface gives off: in the key light, towards the eye, and under the lowest and the highest sky.
+// Light of a diffuse surface: from the key light, from the eye, and from the lowest and the highest part of the sky.
 const KEY_DIFFUSE: f32 = 0.66;
 const EYE_DIFFUSE: f32 = 0.12;
 const LOW_DIFFUSE: f32 = 0.20;
 const HIGH_DIFFUSE: f32 = 0.46;
-// Of the key light's highlight.
+// Strength of the key light's highlight.
 const KEY_SPECULAR: f32 = 2.0;
-// Reflected by what is no metal, seen straight on.
-const PLAIN: f32 = 0.04;
-// What shadow leaves of the reflected surroundings, and nearness of the key light.
+// Reflectance of non-metals at normal incidence.
+const DIELECTRIC_F0: f32 = 0.04;
+// Remaining part of the reflected surroundings in shadow, and of the key light next to a wall.
 const MIRROR_IN_SHADOW: f32 = 0.6;
 const KEY_WHEN_NEAR: f32 = 0.45;
-// Brightest light that is kept: more would outshine what is translucent before it, and make edges ragged.
+// Upper limit of light: more would outshine translucent parts in front of it, and make edges ragged.
 const BRIGHTEST: f32 = 1.5;
-// The studio: cosines of half the width of its window, about the key light, and of its strip, on the other side; brightness
-// of the strip against the window.
+// The studio: cosines of the half angles of its window, around the key light, and of its strip, on the other side; brightness
+// of the strip relative to the window.
 const WINDOW: f32 = 0.86;
 const STRIP: f32 = 0.93;
 const STRIP_LIGHT: f32 = 0.45;
-// Occlusion where ball and wall touch; how fast it ends, in the drawn gap of a centred ball.
+// Occlusion where ball and wall touch, and its decay per drawn gap of a centred ball.
 const OCCLUSION: f32 = 0.85;
-const GAPS: f32 = 1.52;
-// The rim about a touching point: cosine of its half angle seen from the ball's centre, and half its width, pixels.
+const OCCLUSION_DECAY: f32 = 1.52;
+// The rim around a contact point: cosine of its half angle seen from the ball's centre, and half its width, pixels.
 const RIM: f32 = 0.9;
 const RIM_WIDTH: f32 = 1.4;
-// Glass: light and opacity that its edge has more, opacity of its cut face, in opacities of the material; where the ball is
-// near; the most there is.
+// Glass: additional light and opacity of its edge, and opacity of its cut face, in opacities of the material; additional opacity
+// near the ball; largest opacity.
 const GLASS_EDGE_LIGHT: f32 = 0.15;
 const GLASS_EDGE: f32 = 2.25;
 const GLASS_CUT: f32 = 3.6;
 const GLASS_OCCLUDED: f32 = 0.35;
 const GLASS_MOST: f32 = 0.95;
-// What shadow leaves of the floor's light.
+// Remaining part of the floor's light in shadow.
 const FLOOR_IN_SHADOW: f32 = 0.55;
-// How far from its surface a shadow is looked for, texels: facing the light, and more where it grazes.
+// Distance from its surface at which a shadow is looked up, texels: facing the light, and in addition at grazing incidence.
 const SHADOW_LIFT: vec2<f32> = vec2<f32>(1.0, 2.5);
-// Brightness of a mark within its outline, where it turns away.
+// Brightness of a mark within its outline, where it faces away from the eye.
 const MARK_EDGE: f32 = 0.8;
 
-// A soft box of cosine `size` about `to`, seen in direction `d` by a surface that blurs it.
+// A soft box around direction `to` (`size`: cosine of its half angle), seen in direction `d` and blurred by a rough surface.
 fn box(d: vec3<f32>, to: vec3<f32>, size: f32, roughness: f32) -> f32 {
     let blur = 0.02 + 0.55 * roughness * roughness;
     let seen = smoothstep(size - blur, size + min(blur, 1.0 - size), dot(d, to));
@@ -74,7 +74,7 @@ fn shade(s: Finish, n: vec3<f32>, v: vec3<f32>, shadow: f32, open: f32) -> vec3<
     let d = a2 / (3.14159265 * lobe * lobe);
     let k = s.roughness * s.roughness * 0.5;
     let g = 0.25 / ((nl * (1.0 - k) + k) * (nv * (1.0 - k) + k));
-    let f0 = mix(vec3<f32>(PLAIN), s.base, s.metal);
+    let f0 = mix(vec3<f32>(DIELECTRIC_F0), s.base, s.metal);
     let away = 1.0 - max(dot(h, v), 0.0);
     let away2 = away * away;
     let f = f0 + (1.0 - f0) * (away2 * away2 * away);
@@ -88,22 +88,22 @@ fn shade(s: Finish, n: vec3<f32>, v: vec3<f32>, shadow: f32, open: f32) -> vec3<
     return (key * mix(KEY_WHEN_NEAR, 1.0, open) + (diffuse * sky + mirror) * open) * globals.light.w;
 }
 
-// What a wall at so many gaps' distance leaves of the light around a surface: 1 - 2 E3(x) for a plane whose shade falls off
-// exponentially along each ray, within 0.03.
-fn left_by_wall(gaps: f32) -> f32 {
-    return 1.0 - OCCLUSION * globals.rim.w * exp(-GAPS * max(gaps, 0.0));
+// Part of the surrounding light that reaches a surface at a distance of `gaps` from a wall: 1 - 2 E3(x) for a plane whose shade
+// falls off exponentially along each ray, to within 0.03.
+fn unoccluded(gaps: f32) -> f32 {
+    return 1.0 - OCCLUSION * globals.rim.w * exp(-OCCLUSION_DECAY * max(gaps, 0.0));
 }
 
-// Distance from a point p outside the middle along n to a sphere about c, m: that of the wall around a ball.
-fn to_wall(p: vec3<f32>, n: vec3<f32>, c: vec3<f32>, radius: f32) -> f32 {
+// Distance, m, from point p along n to the sphere around c: from a ball to the wall of its socket.
+fn distance_to_wall(p: vec3<f32>, n: vec3<f32>, c: vec3<f32>, radius: f32) -> f32 {
     let q = p - c;
     let along = dot(q, n);
     return -along + sqrt(max(along * along + radius * radius - dot(q, q), 0.0));
 }
 
-// The rim about the point where a ball touches: `out` is a direction from its centre, `spread` its change over a pixel.
+// The rim around a contact point: `cosine` of the angle to it at the centre of the ball, `spread` its change over a pixel.
 fn rim(cosine: f32, spread: f32, touch: f32) -> f32 {
-    // Where a surface turns away its neighbour pixels know nothing of it.
+    // On a silhouette, the change between neighbouring pixels means nothing.
     let pixels = abs(cosine - RIM) / clamp(spread, 1e-6, 0.12);
     return touch * (1.0 - smoothstep(RIM_WIDTH - 0.6, RIM_WIDTH + 0.6, pixels));
 }

@@ -1,5 +1,5 @@
 // The picture: background, solids with one shadow, floor, lines, translucent sockets, marks in front of everything.
-// Colours of the theme come linear, those of lines encoded. What a pass leaves is `left` of `linear.wgsl` or `encoded.wgsl`.
+// Colours of the theme are linear, those of lines encoded. `pass_output` is that of `linear.wgsl` or `encoded.wgsl`.
 
 struct Globals {
     clip_from_world: mat4x4<f32>,
@@ -24,9 +24,9 @@ struct Globals {
     floor_along: vec4<f32>,
     floor_colour: vec4<f32>,
     floor_lines: vec4<f32>,
-    // of marks; w: width, pixels
+    // xyz: colour around marks; w: width, pixels
     outline: vec4<f32>,
-    // of a touching point; w: occlusion, 0 or 1
+    // xyz: colour around contact points; w: occlusion, 0 or 1
     rim: vec4<f32>,
 }
 
@@ -35,8 +35,8 @@ struct Globals {
 @group(1) @binding(1) var shadow_sampler: sampler_comparison;
 
 // A colour of the theme.
-fn given(colour: vec3<f32>, pixel: vec4<f32>, opacity: f32) -> vec4<f32> {
-    return left(colour, 1.0, pixel.xy, opacity);
+fn theme_colour(colour: vec3<f32>, pixel: vec4<f32>, opacity: f32) -> vec4<f32> {
+    return pass_output(colour, 1.0, pixel.xy, opacity);
 }
 
 // Fraction of the key light that reaches a point: 3 x 3 filtered comparisons, or one.
@@ -48,7 +48,7 @@ fn lit(world: vec3<f32>, normal: vec3<f32>) -> f32 {
     let depth = min(clip.z, 1.0);
     let apart = globals.picture.w * globals.picture.z;
     let outside = any(uv < vec2<f32>(0.0)) || any(uv > vec2<f32>(1.0));
-    // Nothing is compared beyond the map. Software adapters run both sides of a branch, but leave a loop that no pixel needs.
+    // No comparisons outside the map. Software adapters run both sides of a branch, but skip a loop that no pixel enters.
     let around = select(i32(globals.background_top.w), -1, outside);
     var sum = 0.0;
     for (var i = -around; i <= around; i++) {
@@ -74,7 +74,7 @@ struct Vertex {
     @location(6) surface: vec4<f32>,
     // The sphere that this one faces: from centre to centre, m; w: its radius, 0 without one
     @location(7) other: vec4<f32>,
-    // xyz: from the ball's centre to where it touches; w: 1 while it does
+    // xyz: direction from the ball's centre to the contact point; w: 1 during contact
     @location(8) touch: vec4<f32>,
 }
 
@@ -87,7 +87,7 @@ struct Surface {
     @location(3) @interpolate(flat) surface: vec2<f32>,
 }
 
-// Of a ball joint: the ball or its socket.
+// The ball or the socket of a ball joint.
 struct Jointed {
     @builtin(position) clip: vec4<f32>,
     @location(0) world: vec3<f32>,
@@ -101,7 +101,7 @@ struct Jointed {
     @location(6) @interpolate(flat) touch: vec4<f32>,
 }
 
-fn turned(in: Vertex, p: vec3<f32>) -> vec3<f32> {
+fn rotated_and_scaled(in: Vertex, p: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(dot(in.row_0.xyz, p), dot(in.row_1.xyz, p), dot(in.row_2.xyz, p));
 }
 
@@ -119,7 +119,7 @@ fn normal(in: Vertex) -> vec3<f32> {
 
 fn place(in: Vertex) -> Surface {
     var out: Surface;
-    out.world = turned(in, in.position.xyz) + origin(in);
+    out.world = rotated_and_scaled(in, in.position.xyz) + origin(in);
     out.clip = globals.clip_from_world * vec4<f32>(out.world, 1.0);
     out.normal = normal(in);
     out.colour = in.colour;
@@ -131,7 +131,7 @@ fn place(in: Vertex) -> Surface {
     let cut = step(1.5, in.position.w);
     let inner = in.position.w - 2.0 * cut;
     var out: Jointed;
-    out.local = turned(in, in.position.xyz * mix(1.0, in.surface.z, inner));
+    out.local = rotated_and_scaled(in, in.position.xyz * mix(1.0, in.surface.z, inner));
     out.world = out.local + origin(in);
     out.clip = globals.clip_from_world * vec4<f32>(out.world, 1.0);
     out.normal = normal(in);
@@ -165,7 +165,7 @@ fn before_all(clip: vec4<f32>, slice: f32) -> vec4<f32> {
     return out;
 }
 
-// Its far side, expanded by the outline width (its `roughness`, pixels): what shows around the near side is the outline.
+// The far side of a ghost, expanded by the outline width (its `roughness`, pixels): the part around the near side is the outline.
 @vertex fn vs_ghost_edge(in: Vertex) -> Surface {
     var out = place(in);
     let n = globals.clip_from_world * vec4<f32>(out.normal, 0.0);
@@ -183,7 +183,7 @@ fn towards_eye(world: vec3<f32>) -> vec3<f32> {
     return normalize(globals.eye.xyz - world);
 }
 
-// Light of something solid.
+// Light of an opaque surface.
 fn solid(in: Surface) -> vec3<f32> {
     let n = normalize(in.normal);
     let finish = Finish(in.colour.rgb, in.surface.x, in.surface.y);
@@ -191,14 +191,14 @@ fn solid(in: Surface) -> vec3<f32> {
 }
 
 @fragment fn fs_solid(in: Surface) -> @location(0) vec4<f32> {
-    return left(solid(in), 0.0, in.clip.xy, 0.0);
+    return pass_output(solid(in), 0.0, in.clip.xy, 0.0);
 }
 
 @fragment fn fs_faded(in: Surface) -> @location(0) vec4<f32> {
-    return left(solid(in), 0.0, in.clip.xy, in.colour.a);
+    return pass_output(solid(in), 0.0, in.clip.xy, in.colour.a);
 }
 
-// Light of a ball: it shows how near its socket's wall is, and a rim where it touches.
+// Light of a ball: darker near the wall of its socket, with a rim around the contact point.
 fn ball(in: Jointed) -> vec3<f32> {
     let n = normalize(in.normal);
     let cosine = dot(n, in.touch.xyz);
@@ -206,7 +206,7 @@ fn ball(in: Jointed) -> vec3<f32> {
     var open = 1.0;
     if (in.other.w > 0.0) {
         let gap = in.other.w - length(in.local);
-        open = left_by_wall(to_wall(in.local, n, in.other.xyz, in.other.w) / gap);
+        open = unoccluded(distance_to_wall(in.local, n, in.other.xyz, in.other.w) / gap);
     }
     let finish = Finish(in.colour.rgb, in.surface.x, in.surface.y);
     let light = shade(finish, n, towards_eye(in.world), lit(in.world, n), open);
@@ -214,70 +214,70 @@ fn ball(in: Jointed) -> vec3<f32> {
 }
 
 @fragment fn fs_ball(in: Jointed) -> @location(0) vec4<f32> {
-    return left(ball(in), 0.0, in.clip.xy, 0.0);
+    return pass_output(ball(in), 0.0, in.clip.xy, 0.0);
 }
 
 @fragment fn fs_clear_ball(in: Jointed) -> @location(0) vec4<f32> {
-    return left(ball(in), 0.0, in.clip.xy, in.colour.a);
+    return pass_output(ball(in), 0.0, in.clip.xy, in.colour.a);
 }
 
-// Marks keep their colour within an outline; a little less where they turn away shows their shape.
+// Marks have their own colour within an outline; they are slightly darker where they face away, which shows their shape.
 fn mark(in: Surface) -> vec3<f32> {
     let facing = dot(normalize(in.normal), towards_eye(in.world));
     let shape = mix(MARK_EDGE, 1.0, smoothstep(0.2, 0.75, facing));
     // Pixels from the edge.
     let inside = facing / max(fwidth(facing), 1e-6);
     let width = globals.outline.w;
-    // A thin one keeps most of its width in colour.
+    // Most of the width of a thin mark is coloured.
     let body = max(smoothstep(width - 0.5, width + 0.5, inside), smoothstep(0.45, 0.7, facing));
     return mix(globals.outline.rgb, in.colour.rgb * shape, body);
 }
 
-// The triad lies on the background alone: it needs no outline.
+// The triad is drawn only over the background, so it needs no outline.
 @fragment fn fs_overlay(in: Surface) -> @location(0) vec4<f32> {
     let facing = dot(normalize(in.normal), towards_eye(in.world));
-    return given(in.colour.rgb * mix(MARK_EDGE, 1.0, smoothstep(0.2, 0.75, facing)), in.clip, 1.0);
+    return theme_colour(in.colour.rgb * mix(MARK_EDGE, 1.0, smoothstep(0.2, 0.75, facing)), in.clip, 1.0);
 }
 
 @fragment fn fs_mark(in: Surface) -> @location(0) vec4<f32> {
-    return given(mark(in), in.clip, 1.0);
+    return theme_colour(mark(in), in.clip, 1.0);
 }
 
 @fragment fn fs_mark_behind(in: Surface) -> @location(0) vec4<f32> {
-    return given(mark(in), in.clip, 0.6);
+    return theme_colour(mark(in), in.clip, 0.6);
 }
 
 // A cell of a wear map: its colour is a value.
 @fragment fn fs_wear(in: Surface) -> @location(0) vec4<f32> {
-    return given(in.colour.rgb, in.clip, 1.0);
+    return theme_colour(in.colour.rgb, in.clip, 1.0);
 }
 
 // The same where something is in front of it, or where it is seen from behind, through the wall.
 @fragment fn fs_wear_behind(in: Surface) -> @location(0) vec4<f32> {
-    return given(in.colour.rgb, in.clip, 0.5);
+    return theme_colour(in.colour.rgb, in.clip, 0.5);
 }
 
 // Another state of the machine, translucent: most opaque along its edges.
 @fragment fn fs_ghost(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), towards_eye(in.world)), 0.0);
     let edge = pow(1.0 - facing, 1.5);
-    return given(in.colour.rgb, in.clip, in.colour.a * mix(0.5, 1.0, edge));
+    return theme_colour(in.colour.rgb, in.clip, in.colour.a * mix(0.5, 1.0, edge));
 }
 
 @fragment fn fs_ghost_edge(in: Surface) -> @location(0) vec4<f32> {
-    return given(in.colour.rgb, in.clip, in.colour.a);
+    return theme_colour(in.colour.rgb, in.clip, in.colour.a);
 }
 
-// Halo of a joint that was hit: a ring outside its socket, which hides nothing of the contact.
+// Halo of a joint that was hit: a ring outside its socket, so that the contact stays visible.
 @fragment fn fs_halo(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), towards_eye(in.world)), 0.0);
-    // `facing` in units of what it is on the outline of the socket, whose radius is `surface.y` times that of this sphere.
+    // `facing` relative to its value on the outline of the socket, whose radius is `surface.y` times that of this sphere.
     let out = facing / sqrt(1.0 - in.surface.y * in.surface.y);
     let ring = smoothstep(0.12, 0.8, out) * (1.0 - smoothstep(0.865, 0.975, out));
-    return given(in.colour.rgb, in.clip, 0.85 * in.colour.a * ring);
+    return theme_colour(in.colour.rgb, in.clip, 0.85 * in.colour.a * ring);
 }
 
-// Glass, darker where the ball is near, with a rim where it touches.
+// Glass, darker where the ball is near, with a rim around the contact point.
 @fragment fn fs_socket(in: Jointed) -> @location(0) vec4<f32> {
     let from_ball = in.local - in.other.xyz;
     let cosine = dot(from_ball, in.touch.xyz) / max(length(from_ball), 1e-9);
@@ -288,12 +288,12 @@ fn mark(in: Surface) -> vec3<f32> {
     let facing = max(dot(n, towards_eye(in.world)), 0.0);
     let edge = (1.0 - facing) * (1.0 - facing) * (1.0 - facing);
     let gap = max(length(in.local) - in.other.w, 1e-9);
-    let open = left_by_wall((length(from_ball) - in.other.w) / gap);
+    let open = unoccluded((length(from_ball) - in.other.w) / gap);
     let finish = Finish(in.colour.rgb, in.surface.x, in.surface.y);
     let light = shade(finish, n, towards_eye(in.world), 1.0, open) + edge * GLASS_EDGE_LIGHT;
     let glass = in.colour.a * mix(1.0 + GLASS_EDGE * edge, GLASS_CUT, cut);
     let opacity = min(glass + GLASS_OCCLUDED * (1.0 - open) * step(0.1, in.colour.a), GLASS_MOST);
-    return left(mix(light, globals.rim.rgb, ring), 0.0, in.clip.xy, max(opacity, ring));
+    return pass_output(mix(light, globals.rim.rgb, ring), 0.0, in.clip.xy, max(opacity, ring));
 }
 
 // ---- background
@@ -306,7 +306,7 @@ fn mark(in: Surface) -> vec3<f32> {
 @fragment fn fs_background(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
     let height = smoothstep(0.0, 1.0, clip.y / globals.picture.y);
     let colour = mix(globals.background_top.rgb, globals.background_bottom.rgb, height);
-    return given(colour, clip, 1.0);
+    return theme_colour(colour, clip, 1.0);
 }
 
 // ---- floor
@@ -328,14 +328,14 @@ struct FloorPoint {
     return out;
 }
 
-// Coverage by lines of a grid of the given spacing, `width` pixels wide, over a pixel: the lines' share of it, not a sample, so
-// that there is no moire. `step` is the size of a pixel in spacings.
+// Coverage of a pixel by the lines of a grid of the given spacing, `width` pixels wide: the share that they cover, not a sample,
+// so that there is no moire. `step` is the size of a pixel in spacings.
 fn grid(at: vec2<f32>, step: vec2<f32>, width: f32) -> f32 {
     let line = min(step * width, vec2<f32>(1.0));
     let reach = max(step, line);
     let away = abs(fract(at - 0.5) - 0.5);
     let near = clamp(0.5 + (0.5 * line - away) / reach, vec2<f32>(0.0), vec2<f32>(1.0));
-    // Where lines crowd: their mean, and then nothing.
+    // Dense lines are drawn as their mean, and even denser lines not at all.
     let crowd = smoothstep(vec2<f32>(0.15), vec2<f32>(0.5), step);
     let seen = mix(near, line, crowd) * (1.0 - smoothstep(vec2<f32>(0.3), vec2<f32>(0.9), step));
     return max(seen.x, seen.y);
@@ -350,7 +350,7 @@ fn grid(at: vec2<f32>, step: vec2<f32>, width: f32) -> f32 {
     let fade = 1.0 - smoothstep(0.25, 1.0, length(in.plane) / globals.floor_centre.w);
     let light = mix(FLOOR_IN_SHADOW, 1.0, lit(in.world, globals.up.xyz));
     let colour = mix(globals.floor_colour.rgb, globals.floor_lines.rgb, max(0.25 * thin, 0.6 * thick));
-    return given(colour * light, in.clip, fade * select(0.3, 1.0, above));
+    return theme_colour(colour * light, in.clip, fade * select(0.3, 1.0, above));
 }
 
 // Change over a pixel of each component, whatever its direction.
@@ -393,5 +393,5 @@ struct LinePoint {
 }
 
 @fragment fn fs_line(in: LinePoint) -> @location(0) vec4<f32> {
-    return given(in.colour.rgb, in.clip, in.colour.a);
+    return theme_colour(in.colour.rgb, in.clip, in.colour.a);
 }
