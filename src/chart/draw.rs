@@ -60,12 +60,12 @@ impl Sheet {
         }
         // The page has the requested size; its content keeps the finer units. Round line joins, because mitred ones overshoot
         // peaks.
-        let (found, wanted) = (
+        let (fine_size, page_size) = (
             format!("width=\"{width}\" height=\"{height}\""),
             format!("width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"", self.size.0, self.size.1),
         );
         // XML allows no control characters, not even escaped ones.
-        Ok(visible(&text).replacen(&found, &wanted, 1))
+        Ok(visible(&text).replacen(&fine_size, &page_size, 1))
     }
 
     fn draw(&self, root: &Canvas) -> Result<(), SheetError> {
@@ -199,8 +199,8 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
         .axis_style(rgb(FAINT).stroke_width(FINE))
         .label_style(style(TEXT, INK, HPos::Center, VPos::Center))
         .axis_desc_style(style(TEXT + 1.0, INK, HPos::Center, VPos::Center))
-        .x_desc(described(&chart.x.label, &chart.x.unit))
-        .y_desc(described(&chart.y.label, &chart.y.unit))
+        .x_desc(axis_title(&chart.x.label, &chart.x.unit))
+        .y_desc(axis_title(&chart.y.label, &chart.y.unit))
         .x_label_formatter(&|tick| x.label(*tick))
         .y_label_formatter(&|tick| y.label(*tick))
         .set_all_tick_mark_size(fine(4.0))
@@ -211,14 +211,14 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
         let is_inside = (x.from..=x.to).contains(&position.0) && (y.from..=y.to).contains(&position.1);
         is_inside.then_some(position)
     };
-    let mut taken: Vec<Area> = Vec::new();
+    let mut occupied: Vec<Area> = Vec::new();
     if let Some(map) = &chart.map {
         heat::cells(root, &plot, map, &x, &y)?;
         let (xs, ys) = plot.plotting_area().get_pixel_range();
         let pixels = |at: i32| f64::from(at) / f64::from(FINE);
         heat::scale(root, map, pixels(xs.end) + 14.0, pixels(ys.start) + 16.0, pixels(ys.end))?;
     }
-    draw_levels(root, &plot, chart, &x, &y, &mut taken)?;
+    draw_levels(root, &plot, chart, &x, &y, &mut occupied)?;
     for series in &chart.series {
         if let Some(width) = series.line {
             for part in series.points.split(|point| inside(point).is_none()) {
@@ -229,7 +229,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
                 // Detail below a quarter of a pixel is invisible.
                 let path = thin::line(&path, 1.0);
                 if !chart.labels.is_empty() {
-                    along(&path, &mut taken);
+                    occupy_path(&path, &mut occupied);
                 }
                 root.draw(&PathElement::new(path, stroke(series.colour, width))).map_err(failed)?;
             }
@@ -249,7 +249,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
                 continue;
             }
             let half = f64::from(fine(MARKER + 1.0));
-            taken.push(Area {
+            occupied.push(Area {
                 x: f64::from(at.0) - half,
                 y: f64::from(at.1) - half,
                 width: 2.0 * half,
@@ -257,11 +257,11 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
             });
         }
     }
-    draw_labels(root, &plot, chart, inside, taken)
+    draw_labels(root, &plot, chart, inside, occupied)
 }
 
-/// Adds small areas along a line, which labels must avoid.
-fn along(path: &[(i32, i32)], taken: &mut Vec<Area>) {
+/// Covers a path with small areas that labels must avoid.
+fn occupy_path(path: &[(i32, i32)], occupied: &mut Vec<Area>) {
     let step = f64::from(fine(MARKER));
     for ends in path.windows(2) {
         let (from, to) = (ends[0], ends[1]);
@@ -269,7 +269,7 @@ fn along(path: &[(i32, i32)], taken: &mut Vec<Area>) {
         let parts = (dx.hypot(dy) / step).ceil().clamp(1.0, 1000.0);
         for n in 0..parts as u32 {
             let theta = f64::from(n) / parts;
-            taken.push(Area {
+            occupied.push(Area {
                 x: f64::from(from.0) + theta * dx - 0.5 * step,
                 y: f64::from(from.1) + theta * dy - 0.5 * step,
                 width: step,
@@ -285,7 +285,7 @@ fn draw_levels(
     chart: &Chart,
     x: &Ruler,
     y: &Ruler,
-    taken: &mut Vec<Area>,
+    occupied: &mut Vec<Area>,
 ) -> Result<(), SheetError> {
     for level in &chart.levels {
         let position = y.position(level.y);
@@ -308,7 +308,7 @@ fn draw_levels(
         let style = style(TEXT - 1.0, FAINT, HPos::Left, vertical);
         let text = Text::new(level.text.clone(), (left + fine(6.0), at + gap), style);
         root.draw(&text).map_err(failed)?;
-        taken.push(Area {
+        occupied.push(Area {
             x: f64::from(left),
             y: f64::from(if below { at } else { at - fine(TEXT + 3.0) }),
             width: f64::from(fine(6.0 + text_width(&level.text, TEXT))),
@@ -323,7 +323,7 @@ fn draw_labels(
     plot: &Plot,
     chart: &Chart,
     inside: impl Fn(&(f64, f64)) -> Option<(f64, f64)>,
-    taken: Vec<Area>,
+    occupied: Vec<Area>,
 ) -> Result<(), SheetError> {
     let (xs, ys) = plot.plotting_area().get_pixel_range();
     let frame = Area {
@@ -337,7 +337,7 @@ fn draw_labels(
         .iter()
         .filter_map(|label| inside(&label.at).map(|position| (label, plot.backend_coord(&position))))
         .collect();
-    let wanted: Vec<_> = labels
+    let requested: Vec<_> = labels
         .iter()
         .map(|(label, (x, y))| {
             let size = (fine(text_width(&label.text, TEXT)), fine(TEXT + 2.0));
@@ -346,7 +346,7 @@ fn draw_labels(
         .collect();
     let unit = f64::from(fine(MARKER + 3.0));
     let centre = style(TEXT, INK, HPos::Center, VPos::Center);
-    for ((label, (x, y)), area) in labels.iter().zip(place_labels(&wanted, taken, frame, unit)) {
+    for ((label, (x, y)), area) in labels.iter().zip(place_labels(&requested, occupied, frame, unit)) {
         let middle = ((area.x + 0.5 * area.width) as i32, (area.y + 0.5 * area.height) as i32);
         // A thin line connects a label to its point.
         let edge = (
@@ -361,7 +361,7 @@ fn draw_labels(
     Ok(())
 }
 
-fn described(label: &str, unit: &str) -> String {
+fn axis_title(label: &str, unit: &str) -> String {
     if unit.is_empty() { label.to_owned() } else { format!("{label} ({unit})") }
 }
 

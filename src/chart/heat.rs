@@ -37,8 +37,8 @@ impl ColourScale {
 
     fn colour(&self, map: &Map, value: f64) -> Colour {
         if !map.names.is_empty() {
-            let place = map.names.iter().position(|(code, _)| *code == value);
-            return place.map_or(NO_VALUE, |n| PALETTE[(n + 1) % PALETTE.len()]);
+            let index = map.names.iter().position(|(code, _)| *code == value);
+            return index.map_or(NO_VALUE, |n| PALETTE[(n + 1) % PALETTE.len()]);
         }
         let position = self.ruler.position(value);
         if !position.is_finite() {
@@ -71,17 +71,17 @@ pub(super) fn ends(map: &Map) -> Vec<(f64, f64)> {
 
 /// Draws the cells.
 pub(super) fn cells(root: &Canvas, plot: &Plot, map: &Map, x: &Ruler, y: &Ruler) -> Result<(), SheetError> {
-    let legend = ColourScale::new(map);
+    let colour_scale = ColourScale::new(map);
     let (xs, ys) = (edges(&map.xs), edges(&map.ys));
     for (j, rows) in ys.windows(2).enumerate() {
         for (i, columns) in xs.windows(2).enumerate() {
             let value = map.values.get(j * map.xs.len() + i).copied().unwrap_or(f64::NAN);
             let a = plot.backend_coord(&(x.position(columns[0]), y.position(rows[0])));
             let b = plot.backend_coord(&(x.position(columns[1]), y.position(rows[1])));
-            let filled = rgb(legend.colour(map, value)).filled();
+            let filled = rgb(colour_scale.colour(map, value)).filled();
             // Overlaps the next cells, which are drawn on top, to avoid seams.
-            let more = |edge: usize, cells: usize| if edge + 1 < cells { 2 } else { 0 };
-            let b = (b.0 + more(i, map.xs.len()), b.1 - more(j, map.ys.len()));
+            let overlap = |edge: usize, cells: usize| if edge + 1 < cells { 2 } else { 0 };
+            let b = (b.0 + overlap(i, map.xs.len()), b.1 - overlap(j, map.ys.len()));
             root.draw(&Rectangle::new([a, b], filled)).map_err(failed)?;
         }
     }
@@ -90,7 +90,7 @@ pub(super) fn cells(root: &Canvas, plot: &Plot, map: &Map, x: &Ruler, y: &Ruler)
 
 /// Draws the scale in the column of width [`SCALE_WIDTH`] from `left`, between `top` and `bottom`, pixels.
 pub(super) fn scale(root: &Canvas, map: &Map, left: f64, top: f64, bottom: f64) -> Result<(), SheetError> {
-    let legend = ColourScale::new(map);
+    let colour_scale = ColourScale::new(map);
     let words = style(TEXT, INK, HPos::Left, VPos::Center);
     let patch = |from: f64, to: f64, colour: Colour| {
         let corners = [(fine(left), fine(from)), (fine(left + BAR_WIDTH), fine(to))];
@@ -99,14 +99,14 @@ pub(super) fn scale(root: &Canvas, map: &Map, left: f64, top: f64, bottom: f64) 
     if !map.names.is_empty() {
         for (n, (code, name)) in map.names.iter().enumerate() {
             let y = top + 20.0 * n as f64;
-            patch(y, y + 14.0, legend.colour(map, *code))?;
+            patch(y, y + 14.0, colour_scale.colour(map, *code))?;
             write(root, name, (left + BAR_WIDTH + 6.0, y + 7.0), &words)?;
         }
         return Ok(());
     }
     const PARTS: u32 = 64;
     let at = |share: f64| bottom + (top - bottom) * share;
-    let ruler = &legend.ruler;
+    let ruler = &colour_scale.ruler;
     for n in 0..PARTS {
         let (a, b) = (f64::from(n) / f64::from(PARTS), f64::from(n + 1) / f64::from(PARTS));
         let position = ruler.from + (ruler.to - ruler.from) * 0.5 * (a + b);

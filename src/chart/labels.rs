@@ -20,9 +20,9 @@ impl Area {
     }
 }
 
-/// Places each text, of the given size, as near to its point as possible without covering anything in `taken`, inside
+/// Places each text, of the given size, as near to its point as possible without covering anything in `occupied`, inside
 /// `frame`.
-pub(super) fn place_labels(requested: &[(Pair, Pair)], mut taken: Vec<Area>, frame: Area, unit: f64) -> Vec<Area> {
+pub(super) fn place_labels(requested: &[(Pair, Pair)], mut occupied: Vec<Area>, frame: Area, unit: f64) -> Vec<Area> {
     let mut placed = Vec::new();
     for &((x, y), (width, height)) in requested {
         let mut best: Option<(f64, Area)> = None;
@@ -43,7 +43,7 @@ pub(super) fn place_labels(requested: &[(Pair, Pair)], mut taken: Vec<Area>, fra
             for (x, y) in corners {
                 let area = Area { x, y, width, height };
                 let outside = width * height - area.overlap(&frame);
-                let covered: f64 = taken.iter().map(|other| area.overlap(other)).sum();
+                let covered: f64 = occupied.iter().map(|other| area.overlap(other)).sum();
                 // Distance breaks ties.
                 let cost = covered + 4.0 * outside + 1e-3 * gap * unit;
                 if best.is_none_or(|(least, _)| cost < least) {
@@ -52,7 +52,7 @@ pub(super) fn place_labels(requested: &[(Pair, Pair)], mut taken: Vec<Area>, fra
             }
         }
         if let Some((_, area)) = best {
-            taken.push(area);
+            occupied.push(area);
             placed.push(area);
         }
     }

@@ -27,10 +27,10 @@ impl Sheet {
         let mut pdf = Pdf::new();
         pdf.catalog(catalog).pages(pages);
         pdf.pages(pages).kids([page]).count(1);
-        let mut written = pdf.page(page);
-        written.parent(pages).media_box(Rect::new(0.0, 0.0, width, height)).contents(stream);
-        written.resources();
-        written.finish();
+        let mut page_writer = pdf.page(page);
+        page_writer.parent(pages).media_box(Rect::new(0.0, 0.0, width, height)).contents(stream);
+        page_writer.resources();
+        page_writer.finish();
         pdf.stream(stream, &content).filter(Filter::FlateDecode);
         let mut about = pdf.document_info(info);
         about.creator(TextStr(&format!("jointplay {}", crate::VERSION)));
@@ -51,7 +51,7 @@ fn write_group(content: &mut Content, group: &Group, page: Transform) -> Result<
         && group.mask().is_none()
         && group.filters().is_empty();
     if !plain {
-        return Err(unknown());
+        return Err(unsupported());
     }
     for node in group.children() {
         match node {
@@ -59,7 +59,7 @@ fn write_group(content: &mut Content, group: &Group, page: Transform) -> Result<
             Node::Text(text) => write_group(content, text.flattened(), page)?,
             Node::Path(path) if path.is_visible() => write_path(content, path, page)?,
             Node::Path(_) => {}
-            Node::Image(_) => return Err(unknown()),
+            Node::Image(_) => return Err(unsupported()),
         }
     }
     Ok(())
@@ -81,7 +81,7 @@ fn write_path(content: &mut Content, path: &resvg::usvg::Path, page: Transform) 
     }
     if let Some(stroke) = path.stroke() {
         if stroke.dasharray().is_some() {
-            return Err(unknown());
+            return Err(unsupported());
         }
         let [red, green, blue] = rgb(stroke.paint(), stroke.opacity())?;
         content.set_stroke_rgb(red, green, blue);
@@ -151,11 +151,11 @@ fn rgb(paint: &Paint, opacity: Opacity) -> Result<[f32; 3], SheetError> {
         Paint::Color(Color { red, green, blue }) if opacity == Opacity::ONE => {
             Ok([red, green, blue].map(|part| f32::from(*part) / 255.0))
         }
-        _ => Err(unknown()),
+        _ => Err(unsupported()),
     }
 }
 
 /// Charts never cause this error: all their paths are opaque and of one colour.
-fn unknown() -> SheetError {
-    SheetError("PDF files are written of opaque paths of one colour alone".to_owned())
+fn unsupported() -> SheetError {
+    SheetError("only opaque paths of a single colour can be written to a PDF file".to_owned())
 }

@@ -19,7 +19,7 @@ pub(super) struct Ruler {
     names: Vec<(f64, String)>,
 }
 
-/// Most ticks on an axis.
+/// Largest number of ticks on an axis.
 const MAX_TICKS: f64 = 8.0;
 
 impl Ruler {
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_without_data_still_stands() {
+    fn an_axis_without_data_has_ticks() {
         for values in [&[][..], &[f64::NAN], &[3.0], &[0.0], &[-1.0]] {
             for scale in [Scale::Linear, Scale::Logarithmic] {
                 let axis = Axis { scale, ..Axis::default() };

@@ -4,7 +4,7 @@ use gif::{Encoder, Frame, Repeat};
 
 use super::{Encode, FilmError};
 
-/// Largest frame rate, 1/s: browsers take delays below 2 hundredths of a second for errors and play such films slowly.
+/// Largest frame rate, 1/s: browsers treat delays below 2 hundredths of a second as errors and play such films slowly.
 const MAX_RATE: f64 = 50.0;
 /// Trade-off of the palette search, 1 (best) to 30.
 const SPEED: i32 = 10;
@@ -15,13 +15,13 @@ pub struct Gif {
     size: [usize; 2],
     rate: f64,
     frames: u64,
-    /// The previous frame, as given.
-    before: Vec<u8>,
+    /// The last frame added.
+    previous: Vec<u8>,
     /// The changed rectangle.
     changed: Vec<u8>,
 }
 
-/// Width and height of a film of `size` pixels with `rate` frames per second, as the file holds them.
+/// Width and height, as stored in the file, of a film of `size` pixels with `rate` frames per second.
 ///
 /// # Errors
 /// A size or rate beyond the limits of GIF.
@@ -46,7 +46,7 @@ impl Gif {
             size: size.map(|edge| edge as usize),
             rate,
             frames: 0,
-            before: Vec::new(),
+            previous: Vec::new(),
             changed: Vec::new(),
         })
     }
@@ -54,17 +54,17 @@ impl Gif {
     /// Left, top, width and height of the area that differs from the previous frame; one pixel if none does.
     fn difference(&self, rgba: &[u8]) -> [usize; 4] {
         let [width, height] = self.size;
-        if self.before.is_empty() {
+        if self.previous.is_empty() {
             return [0, 0, width, height];
         }
         let row = 4 * width;
         let mut bounds: Option<[usize; 4]> = None;
-        let rows = rgba.chunks_exact(row).zip(self.before.chunks_exact(row));
-        for (y, (now, before)) in rows.enumerate() {
-            if now == before {
+        let rows = rgba.chunks_exact(row).zip(self.previous.chunks_exact(row));
+        for (y, (now, previous)) in rows.enumerate() {
+            if now == previous {
                 continue;
             }
-            let differs = |x: &usize| now[4 * x..4 * x + 4] != before[4 * x..4 * x + 4];
+            let differs = |x: &usize| now[4 * x..4 * x + 4] != previous[4 * x..4 * x + 4];
             let (Some(first), Some(last)) = ((0..width).find(differs), (0..width).rev().find(differs)) else {
                 continue;
             };
@@ -96,8 +96,8 @@ impl Encode for Gif {
         frame.delay = (hundredths(self.frames + 1) - hundredths(self.frames)) as u16;
         self.encoder.write_frame(&frame).map_err(encoder_error)?;
         self.frames += 1;
-        self.before.clear();
-        self.before.extend_from_slice(rgba);
+        self.previous.clear();
+        self.previous.extend_from_slice(rgba);
         Ok(())
     }
 

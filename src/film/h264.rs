@@ -61,8 +61,8 @@ pub fn check([width, height]: [u32; 2], rate: f64) -> Result<u8, FilmError> {
     if width == 0 || height == 0 || width % 2 == 1 || height % 2 == 1 {
         return Err(FilmError::Odd { width, height });
     }
-    let found = level([width, height], rate).filter(|_| rate > 0.0);
-    found.ok_or(FilmError::BeyondLimit {
+    let lowest = level([width, height], rate).filter(|_| rate > 0.0);
+    lowest.ok_or(FilmError::BeyondLimit {
         width,
         height,
         rate,
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_are_those_of_the_sizes_that_they_are_known_for() {
+    fn common_sizes_and_rates_have_their_known_levels() {
         // Table A-6 of ITU-T H.264 names the largest rates of common sizes.
         let known = [
             ([176, 144], 15.0, 10),

@@ -98,12 +98,12 @@ impl Resources {
         let limit = device.limits().max_texture_dimension_2d;
         let size = list.size.map(|n| n.clamp(1, limit));
         let fits = |shown: &CachedPicture| shown.target.fits(list, size);
-        let before = &mut self.shown[slot as usize];
-        let shown = before.take().filter(fits).unwrap_or_else(|| {
+        let previous = &mut self.shown[slot as usize];
+        let shown = previous.take().filter(fits).unwrap_or_else(|| {
             let target = self.renderer.target(device, size, list.quality.samples);
             CachedPicture { group: self.finish.group(device, &target.light), target, revision: None }
         });
-        (&mut self.renderer, before.insert(shown))
+        (&mut self.renderer, previous.insert(shown))
     }
 }
 
@@ -121,10 +121,10 @@ impl egui_wgpu::CallbackTrait for Viewport {
             return Vec::new();
         };
         let (renderer, shown) = resources.target_for(device, &self.list, self.slot);
-        let before = std::mem::replace(&mut shown.revision, self.revision);
-        if before.is_none() || before != self.revision {
+        let previous = std::mem::replace(&mut shown.revision, self.revision);
+        if previous.is_none() || previous != self.revision {
             // The first picture does not wait for other pipelines.
-            if before.is_some() {
+            if previous.is_some() {
                 renderer.create_next_pipeline(device, &shown.target);
             }
             // A submission of its own: the pictures of a window share the renderer's buffers.

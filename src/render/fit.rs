@@ -12,7 +12,7 @@ pub(super) struct BoundingSphere {
 }
 
 impl BoundingSphere {
-    /// Bounding sphere of an instance of a mesh with these `bounds`, centre and half size; `round`: a part of the unit sphere.
+    /// Bounding sphere of an instance of a mesh with `bounds`, centre and half size; `round` for a part of the unit sphere.
     pub fn around(instance: &Instance, bounds: &[Vec3; 2], round: bool) -> Self {
         let rows = instance.world_from_mesh.map(Vec4::from);
         let column = |j: usize| Vec3::new(rows[0][j], rows[1][j], rows[2][j]);
@@ -65,7 +65,7 @@ pub(super) fn shadow_region(
     floor: Option<(Vec3, Vec3)>,
     eye: &Eye,
 ) -> Region {
-    let sight = Frustum::new(eye);
+    let frustum = Frustum::new(eye);
     let steep = floor.filter(|(_, up)| light.dot(*up) > 0.05);
     let on_floor = |sphere: &BoundingSphere| {
         let (point, up) = steep?;
@@ -75,7 +75,7 @@ pub(super) fn shadow_region(
             // Elongated by a low light.
             radius: sphere.radius / light.dot(up),
         };
-        sight.may_contain(&shadow).then_some(())
+        frustum.may_contain(&shadow).then_some(())
     };
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let mut depths = [f32::INFINITY, f32::NEG_INFINITY];
@@ -143,16 +143,16 @@ mod tests {
         let (scene, frame) = fixture::pendulum();
         let camera = SceneView::new(&scene, &frame).camera();
         let eye = camera.view([640, 360]);
-        let sight = Frustum::new(&eye);
+        let frustum = Frustum::new(&eye);
         let (right, up, back) = camera.axes();
         let half = camera.distance * (camera.field_of_view / 2.0).tan();
-        let shows = |centre, radius| sight.may_contain(&BoundingSphere { centre, radius });
+        let shows = |centre, radius| frustum.may_contain(&BoundingSphere { centre, radius });
         assert!(shows(camera.target, 1e-3));
         for (axis, edge) in [(right, half * 640.0 / 360.0), (up, half)] {
             for side in [-1.0, 1.0] {
                 let at = |part: f32| camera.target + axis * (side * part * edge);
                 assert!(shows(at(0.99), 1e-6) && !shows(at(1.01), 1e-6));
-                assert!(shows(at(1.01), 0.05 * edge), "a part of it");
+                assert!(shows(at(1.01), 0.05 * edge), "partly inside");
             }
         }
         assert!(!shows(camera.eye() + back, 1e-3), "behind the eye");

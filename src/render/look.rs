@@ -11,7 +11,7 @@ fn look() {
     for (name, (scene, frame)) in [("pendulum", fixture::pendulum()), ("legs", fixture::three_legs())] {
         let view = SceneView::new(&scene, &frame);
         let mut marks = PeakMarks::new();
-        for (theme, mood) in [(Theme::Light, "light"), (Theme::Dark, "dark")] {
+        for (theme, theme_name) in [(Theme::Light, "light"), (Theme::Dark, "dark")] {
             for (shot, magnification) in
                 [("whole", 1.0), ("play", 20.0), ("close", 20.0), ("hit", 20.0), ("front", 1.0)]
             {
@@ -54,9 +54,9 @@ fn look() {
                 view.build(&input, &mut list);
                 let started = web_time::Instant::now();
                 let image = offscreen.render(&list).expect("a picture");
-                println!("{name} {mood} {shot}: {:?}, {}", started.elapsed(), list.magnification_text);
+                println!("{name} {theme_name} {shot}: {:?}, {}", started.elapsed(), list.magnification_text);
                 let png = image.png(&[("Title", name)]).expect("a PNG");
-                std::fs::write(folder.join(format!("{name}-{mood}-{shot}.png")), png).expect("a writable folder");
+                std::fs::write(folder.join(format!("{name}-{theme_name}-{shot}.png")), png).expect("a writable folder");
             }
         }
     }

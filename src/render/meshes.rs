@@ -50,7 +50,7 @@ fn circle(u: f32) -> (f32, f32) {
 }
 
 /// Point of the unit sphere: `u` turns of azimuth, polar angle `theta` from the south pole.
-fn on_ball(u: f32, theta: f32) -> [f32; 3] {
+fn on_sphere(u: f32, theta: f32) -> [f32; 3] {
     let (x, y) = circle(u);
     [theta.sin() * x, theta.sin() * y, -theta.cos()]
 }
@@ -58,7 +58,7 @@ fn on_ball(u: f32, theta: f32) -> [f32; 3] {
 fn sphere(nu: u32, nv: u32) -> MeshData {
     let mut mesh = MeshData::default();
     patch(&mut mesh, nu, nv, |u, v| {
-        let n = on_ball(u, v * PI);
+        let n = on_sphere(u, v * PI);
         ([n[0], n[1], n[2], 0.0], n)
     });
     mesh
@@ -113,13 +113,13 @@ fn cube() -> MeshData {
     mesh
 }
 
-/// Depth of a socket's cut face between its outer and inner edge, in inner radii: a ball in front of it stands clear of it.
+/// Depth of a socket's cut face between its outer and inner edge, in inner radii, so that a ball in front of it stays clear of it.
 const CUT: f32 = 0.2;
 /// Approximate normal of the cut face, outwards and up.
 const CUT_NORMAL: [f32; 2] = [-0.6, 0.8];
 
-/// Half shell, open towards +z: outer face, inner face (fourth coordinate 1), cut face (2 outside, 3 inside). Each comes twice,
-/// for its front and its back, in an order that is from far to near for any line of sight.
+/// Half shell, open towards +z: outer face, inner face (fourth coordinate 1), cut face (2 outside, 3 inside). Each is present twice,
+/// front and back, in an order that is from far to near for any line of sight.
 fn socket(nu: u32, half: u32) -> MeshData {
     let face = |nv: u32, point: &dyn Fn(f32, f32) -> ([f32; 4], [f32; 3])| {
         let mut mesh = MeshData::default();
@@ -129,11 +129,11 @@ fn socket(nu: u32, half: u32) -> MeshData {
     let brim = (-CUT).acos();
     let rim = (1.0 - CUT * CUT).sqrt();
     let outer = face(half, &|u, v| {
-        let n = on_ball(u, v * PI / 2.0);
+        let n = on_sphere(u, v * PI / 2.0);
         ([n[0], n[1], n[2], 0.0], n)
     });
     let inner = face(half, &|u, v| {
-        let n = on_ball(u, (1.0 - v) * (PI - brim));
+        let n = on_sphere(u, (1.0 - v) * (PI - brim));
         ([n[0], n[1], n[2], 1.0], n.map(|x| -x))
     });
     let cut = face(1, &|u, v| {

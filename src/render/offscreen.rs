@@ -118,7 +118,7 @@ impl Offscreen {
     }
 }
 
-/// Measures the time of the adapter by timestamp queries.
+/// Measures the time on the adapter with timestamp queries.
 struct Timer {
     stamps: wgpu::QuerySet,
     resolved: wgpu::Buffer,

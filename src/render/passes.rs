@@ -8,7 +8,7 @@ use wgpu::Face::{self, Back, Front};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PassContent {
     /// The whole picture.
-    Everywhere,
+    FullScreen,
     /// The floor, where the list has one.
     Floor,
     /// Lines, hidden by solids in front of them.
@@ -53,7 +53,7 @@ pub(super) enum Blend {
     /// Shaded light, blended by its opacity.
     Light,
     /// A colour of the theme, blended by its opacity; the last pass does not tone-map its share.
-    Given,
+    Theme,
 }
 
 /// One pass.
@@ -91,7 +91,7 @@ const fn clear(label: &'static str, group: Group, fragment: &'static str, blend:
 
 /// A pass without meshes.
 const fn flat(label: &'static str, draws: PassContent, vertex: &'static str, fragment: &'static str) -> Pass {
-    Pass { draws, vertex, cull: None, ..clear(label, Group::Solid, fragment, Blend::Given) }
+    Pass { draws, vertex, cull: None, ..clear(label, Group::Solid, fragment, Blend::Theme) }
 }
 
 /// All passes: one to the shadow map, the others to the picture. The last, `shaders/finish.wgsl`, is `finish.rs`.
@@ -100,37 +100,37 @@ pub(super) const PASSES: &[Pass] = &[
     Pass {
         blend: Blend::Opaque,
         compare: Always,
-        ..flat("background", PassContent::Everywhere, "vs_background", "fs_background")
+        ..flat("background", PassContent::FullScreen, "vs_background", "fs_background")
     },
     solid("solid", Group::Solid, "fs_solid"),
     Pass { vertex: "vs_joint", ..solid("balls", Group::Balls, "fs_ball") },
     flat("floor", PassContent::Floor, "vs_floor", "fs_floor"),
     flat("lines", PassContent::Lines, "vs_line", "fs_line"),
     clear("faded", Group::Faded, "fs_faded", Blend::Light),
-    clear("halos", Group::Halos, "fs_halo", Blend::Given),
+    clear("halos", Group::Halos, "fs_halo", Blend::Theme),
     // The mesh has both sides of its faces, in an order that is from far to near for any line of sight.
     Pass { vertex: "vs_joint", ..clear("sockets", Group::Sockets, "fs_socket", Blend::Light) },
     // After the sockets, whose glass would tint their colours.
-    Pass { cull: None, compare: Always, ..clear("wear behind others", Group::Wear, "fs_wear_behind", Blend::Given) },
+    Pass { cull: None, compare: Always, ..clear("wear behind others", Group::Wear, "fs_wear_behind", Blend::Theme) },
     solid("wear", Group::Wear, "fs_wear"),
     Pass { vertex: "vs_joint", ..clear("clear balls", Group::ClearBalls, "fs_clear_ball", Blend::Light) },
-    // Only its nearest surface is visible: its own back parts would show through in patches.
+    // Only the nearest surface of a ghost is drawn; otherwise its back parts would show through in patches.
     Pass { vertex: "vs_ghost", blend: Blend::Nothing, ..solid("ghost, depth", Group::Ghost, "fs_ghost") },
     Pass {
         vertex: "vs_ghost",
         // The same vertices as in the depth pass.
         compare: LessEqual,
-        ..clear("ghost", Group::Ghost, "fs_ghost", Blend::Given)
+        ..clear("ghost", Group::Ghost, "fs_ghost", Blend::Theme)
     },
     Pass {
         vertex: "vs_ghost_edge",
         cull: Some(Front),
-        blend: Blend::Given,
+        blend: Blend::Theme,
         ..solid("ghost, outline", Group::GhostEdges, "fs_ghost_edge")
     },
     // After the sockets, so that glass does not dim a force.
     Pass { compare: Always, ..flat("marks", PassContent::Marks, "vs_line", "fs_line") },
-    Pass { compare: Greater, ..clear("arrows behind others", Group::Arrows, "fs_mark_behind", Blend::Given) },
+    Pass { compare: Greater, ..clear("arrows behind others", Group::Arrows, "fs_mark_behind", Blend::Theme) },
     solid("arrows", Group::Arrows, "fs_mark"),
     Pass { vertex: "vs_overlay", ..solid("overlay", Group::Overlay, "fs_overlay") },
 ];
@@ -151,7 +151,7 @@ impl Pass {
         let share = match self.blend {
             Blend::Nothing | Blend::Opaque => return None,
             Blend::Light => wgpu::BlendFactor::Zero,
-            Blend::Given => wgpu::BlendFactor::One,
+            Blend::Theme => wgpu::BlendFactor::One,
         };
         Some(wgpu::BlendState { color: over(wgpu::BlendFactor::SrcAlpha), alpha: over(share) })
     }

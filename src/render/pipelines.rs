@@ -80,8 +80,8 @@ impl Pipelines {
 
     /// Creates the next pipeline not used yet, so that a later picture need not wait for it.
     pub fn create_next(&self, device: &wgpu::Device, samples: u32) {
-        let made = &self.passes[usize::from(samples > 1)];
-        if let Some(index) = made.iter().position(|made| made.get().is_none()) {
+        let slots = &self.passes[usize::from(samples > 1)];
+        if let Some(index) = slots.iter().position(|slot| slot.get().is_none()) {
             self.pass(device, samples, index);
         }
     }
@@ -104,7 +104,7 @@ fn pipeline(device: &wgpu::Device, common: &Pipelines, samples: u32, pass: &Pass
     let lines = [buffer(size_of::<Line>() as u64, Step::Instance, &line_ends[..])];
     use wgpu::PrimitiveTopology::{TriangleList, TriangleStrip};
     let (buffers, topology) = match pass.draws {
-        PassContent::Everywhere => (&[][..], TriangleList),
+        PassContent::FullScreen => (&[][..], TriangleList),
         PassContent::Floor => (&[][..], TriangleStrip),
         PassContent::Lines | PassContent::Marks => (&lines[..], TriangleStrip),
         PassContent::Meshes(_) => (&meshes[..], TriangleList),

@@ -221,8 +221,8 @@ impl Renderer {
                 self.step(&mut pass, step.draws, list, &batches);
             }
         }
-        let (view, resolve_target, store) = match &target.several {
-            Some(several) => (several, Some(&target.light), wgpu::StoreOp::Discard),
+        let (view, resolve_target, store) = match &target.multisampled {
+            Some(multisampled) => (multisampled, Some(&target.light), wgpu::StoreOp::Discard),
             None => (&target.light, None, wgpu::StoreOp::Store),
         };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -277,7 +277,7 @@ impl Renderer {
         batches: &[Vec<Batch>; Group::COUNT],
     ) {
         match draws {
-            PassContent::Everywhere => pass.draw(0..3, 0..1),
+            PassContent::FullScreen => pass.draw(0..3, 0..1),
             PassContent::Floor => pass.draw(0..4, 0..1),
             PassContent::Lines => draw_lines(pass, &self.lines, &list.lines),
             PassContent::Marks => draw_lines(pass, &self.marks, &list.marks),
@@ -294,15 +294,15 @@ impl Renderer {
 
     /// Packs all instances of `list` for a picture of `size`, and collects the shadow casters.
     fn pack(&mut self, list: &DrawList, size: [u32; 2]) -> [Vec<Batch>; Group::COUNT] {
-        let mut packing = InstancePacker {
+        let mut packer = InstancePacker {
             eye: &list.eye,
             height: size[1],
             meshes: &self.meshes,
             packed: &mut self.packed,
             casters: &mut self.casters,
         };
-        packing.packed.clear();
-        packing.casters.clear();
+        packer.packed.clear();
+        packer.casters.clear();
         let mut batches = [const { Vec::new() }; Group::COUNT];
         for (group, layer) in [
             (Group::Solid, &list.solid),
@@ -316,7 +316,7 @@ impl Renderer {
             let casts = CASTERS.contains(&group);
             for (mesh, all) in layer.by_mesh.iter().enumerate() {
                 let plain = all.iter().filter(|one| group != Group::Solid || !has_facing_sphere(one));
-                packing.mesh(mesh, plain, casts, &mut batches[group as usize]);
+                packer.mesh(mesh, plain, casts, &mut batches[group as usize]);
             }
         }
         let sphere = Mesh::Sphere.index();
@@ -326,9 +326,9 @@ impl Renderer {
         {
             let casts = CASTERS.contains(&group);
             let balls = balls.iter().filter(|one| group != Group::Balls || has_facing_sphere(one));
-            packing.mesh(sphere, balls, casts, &mut batches[group as usize]);
+            packer.mesh(sphere, balls, casts, &mut batches[group as usize]);
         }
-        packing.in_order(Mesh::Socket.index(), &list.sockets, &mut batches[Group::Sockets as usize]);
+        packer.in_order(Mesh::Socket.index(), &list.sockets, &mut batches[Group::Sockets as usize]);
         batches
     }
 
@@ -355,9 +355,9 @@ impl Renderer {
         let region = shadow_region(&self.casters, light.direction, plane, &list.eye);
         let texels = self.shadow.size;
         let texel = 2.0 * region.radius / texels as f32;
-        let soft = (SHADOW_EDGE * light.radius / texel).clamp(SHADOW_EDGE_TEXELS[0], SHADOW_EDGE_TEXELS[1]);
+        let shadow_edge = (SHADOW_EDGE * light.radius / texel).clamp(SHADOW_EDGE_TEXELS[0], SHADOW_EDGE_TEXELS[1]);
         let flag = |on: bool| f32::from(u8::from(on));
-        let around = flag(list.quality.fine_shadows);
+        let shadow_neighbours = flag(list.quality.fine_shadows);
         Globals {
             clip_from_world: list.eye.clip_from_world.to_cols_array_2d(),
             light_from_world: region.light_from_world(light.direction, texels).to_cols_array_2d(),
@@ -366,9 +366,9 @@ impl Renderer {
             up: with(light.up, texel),
             studio: light.studio,
             strip: with(light.strip, 0.0),
-            background_top: coloured(list.background.top, around),
+            background_top: coloured(list.background.top, shadow_neighbours),
             background_bottom: coloured(list.background.bottom, 1.0),
-            picture: [size[0] as f32, size[1] as f32, 1.0 / texels as f32, soft],
+            picture: [size[0] as f32, size[1] as f32, 1.0 / texels as f32, shadow_edge],
             floor_centre: floor.map_or([0.0; 4], |f| with(f.centre, f.radius)),
             floor_along: floor.map_or([0.0; 4], |f| with(f.along, f.spacing)),
             floor_colour: floor.map_or([0.0; 4], |f| coloured(f.colour, 1.0)),
@@ -379,7 +379,7 @@ impl Renderer {
     }
 }
 
-/// Whether it is a ball shaded by its socket's wall or marked at its contact point.
+/// Whether the instance is a ball shaded by its socket's wall or marked at its contact point.
 fn has_facing_sphere(instance: &&Instance) -> bool {
     instance.other[3] > 0.0 || instance.touch[3] > 0.0
 }
@@ -408,10 +408,10 @@ impl InstancePacker<'_> {
         let Some(GpuMesh { bounds, .. }) = self.meshes[0].get(mesh) else {
             return;
         };
-        let sight = fit::Frustum::new(self.eye);
+        let frustum = fit::Frustum::new(self.eye);
         let place = |instance: &'i Instance| {
             let ball = BoundingSphere::around(instance, bounds, Mesh::is_round(mesh));
-            let in_view = sight.may_contain(&ball);
+            let in_view = frustum.may_contain(&ball);
             (instance, self.level(mesh, instance, in_view), in_view, ball)
         };
         let places: Vec<(&Instance, usize, bool, BoundingSphere)> = all.map(place).collect();
@@ -424,10 +424,10 @@ impl InstancePacker<'_> {
         for level in 0..LEVELS.len() {
             let first = self.packed.len();
             let mut count = 0;
-            for wanted in [true, false].into_iter().filter(|wanted| *wanted || casts) {
-                let chosen = places.iter().filter(|(_, of, in_view, _)| (*of, *in_view) == (level, wanted));
+            for is_in_view in [true, false].into_iter().filter(|is_in_view| *is_in_view || casts) {
+                let chosen = places.iter().filter(|(_, of, in_view, _)| (*of, *in_view) == (level, is_in_view));
                 self.packed.extend(chosen.map(|(instance, ..)| linear(instance)));
-                if wanted {
+                if is_in_view {
                     count = self.packed.len() - first;
                 }
             }
@@ -437,11 +437,11 @@ impl InstancePacker<'_> {
 
     /// Packs instances of one mesh in the given order: translucent ones run from far to near.
     fn in_order(&mut self, mesh: usize, all: &[Instance], batches: &mut Vec<Batch>) {
-        let sight = fit::Frustum::new(self.eye);
+        let frustum = fit::Frustum::new(self.eye);
         let bounds = self.meshes[0][mesh].bounds;
         let (mut first, mut run) = (self.packed.len(), 0);
         for instance in all {
-            if !sight.may_contain(&BoundingSphere::around(instance, &bounds, Mesh::is_round(mesh))) {
+            if !frustum.may_contain(&BoundingSphere::around(instance, &bounds, Mesh::is_round(mesh))) {
                 continue;
             }
             let level = self.level(mesh, instance, true);
@@ -507,7 +507,7 @@ impl GrowableBuffer {
 /// of a second to create each pipeline.
 fn draws_something(draws: PassContent, list: &DrawList, batches: &[Vec<Batch>; Group::COUNT]) -> bool {
     match draws {
-        PassContent::Everywhere => true,
+        PassContent::FullScreen => true,
         PassContent::Floor => list.floor.is_some(),
         PassContent::Lines => !list.lines.is_empty(),
         PassContent::Marks => !list.marks.is_empty(),
@@ -547,7 +547,7 @@ fn load(device: &wgpu::Device, mesh: &MeshData) -> GpuMesh {
 
 /// Radius across an instance's axis, pixels, at the nearer of its origin and its tip (0, 0, 1): the size of its visible
 /// curvature. Infinite if either is not in front of the eye. For an instance that is not `in_view` but casts a shadow, the radius
-/// if it were looked at.
+/// if the eye faced it.
 fn radius_on_screen(eye: &Eye, height: u32, instance: &Instance, in_view: bool) -> f32 {
     let rows = instance.world_from_mesh.map(Vec4::from);
     let column = |j: usize| Vec3::new(rows[0][j], rows[1][j], rows[2][j]);
@@ -591,8 +591,8 @@ mod tests {
                 panic!("the target is behind the eye");
             };
             let spanned = from.distance(to) / 2.0;
-            for found in at(camera.target, radius) {
-                assert!((found / spanned - 1.0).abs() < 1e-2, "{found} {spanned}");
+            for computed in at(camera.target, radius) {
+                assert!((computed / spanned - 1.0).abs() < 1e-2, "{computed} {spanned}");
             }
         }
         let [in_view, unseen] = at(camera.eye() + back, 1e-3);

@@ -5,7 +5,7 @@ use super::wgpu;
 /// A module: its name, its files, their text.
 pub(super) struct Module {
     pub name: &'static str,
-    #[cfg_attr(not(test), expect(dead_code, reason = "tests look for files that nothing uses"))]
+    #[cfg_attr(not(test), expect(dead_code, reason = "tests look for unused files"))]
     pub files: &'static [&'static str],
     pub text: &'static str,
 }

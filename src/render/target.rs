@@ -46,7 +46,7 @@ pub struct RenderTarget {
     size: [u32; 2],
     samples: u32,
     /// Multisampled colour, resolved to `light`; `None`: `light` itself is drawn to.
-    pub(super) several: Option<wgpu::TextureView>,
+    pub(super) multisampled: Option<wgpu::TextureView>,
     pub(super) depth: wgpu::TextureView,
     pub(super) light: wgpu::TextureView,
 }
@@ -73,7 +73,7 @@ impl RenderTarget {
         Self {
             size,
             samples,
-            several: (samples > 1).then(|| texture("samples", format, samples, drawn)),
+            multisampled: (samples > 1).then(|| texture("samples", format, samples, drawn)),
             depth: texture("depth", DEPTH, samples, drawn),
             light: texture("light", format, 1, drawn | Usage::TEXTURE_BINDING),
         }

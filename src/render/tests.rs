@@ -71,16 +71,16 @@ fn difference(a: [u8; 3], b: [u8; 3]) -> u8 {
 }
 
 #[test]
-fn every_shader_is_valid_and_translates_to_what_webgl2_runs() {
+fn every_shader_is_valid_and_translates_to_webgl2() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
-    let house = include_str!("../../ARCHITECTURE.md");
+    let architecture = include_str!("../../ARCHITECTURE.md");
     let modules = [shaders::LINEAR, shaders::ENCODED, shaders::FINISH];
     for file in std::fs::read_dir(folder).expect("the folder of shaders") {
         let name = file.expect("an entry").file_name();
         let name = name.to_str().expect("ASCII");
         let used = modules.iter().any(|module| module.files.contains(&name));
         assert!(used, "no module has {name}");
-        assert!(house.contains(&format!("`{name}`")), "{name}: ARCHITECTURE.md");
+        assert!(architecture.contains(&format!("`{name}`")), "{name}: ARCHITECTURE.md");
     }
     let mut entries = 0;
     for shaders::Module { name, text, .. } in modules {
@@ -273,14 +273,14 @@ fn three_sockets_behind_one_another_are_blended_from_far_to_near_whatever_their_
                 let at = Vec3::from(half.world_from_mesh.map(|row| row[3]));
                 let k = centres.iter().position(|c| c.distance(at) < 1e-6);
                 let [r, g, b, opacity] = tints[k.expect("one of the three")];
-                // The half that is cut away stays the fainter one.
+                // The cut-away half stays fainter.
                 let kept = half.colour[3] > 0.1;
                 half.colour = [r, g, b, if kept { opacity } else { 0.15 * opacity }];
             }
             glass = list;
         }
         let same = whole.iter().all(|picture| *picture == whole[0]);
-        assert!(same, "the order in the scene is seen");
+        assert!(same, "the order in the scene changes the picture");
 
         // Mean light in the middle of the picture on each grey.
         let mut middle = |sockets: &dyn Fn(&crate::view::Instance) -> bool| {
@@ -303,24 +303,24 @@ fn three_sockets_behind_one_another_are_blended_from_far_to_near_whatever_their_
                 sum
             })
         };
-        let given = middle(&|_| false);
-        // Transmittance and own light of each socket alone.
-        let alone: Vec<(f32, [f32; 3])> = centres
+        let backdrop = middle(&|_| false);
+        // Transmittance and emitted light of each single socket.
+        let single_sockets: Vec<(f32, [f32; 3])> = centres
             .iter()
             .map(|centre| {
                 let [dark, bright] = middle(&|half| {
                     let at = Vec3::from(half.world_from_mesh.map(|row| row[3]));
                     centre.distance(at) < 1e-6
                 });
-                let through = (0..3).map(|k| (bright[k] - dark[k]) / (given[1][k] - given[0][k]));
+                let through = (0..3).map(|k| (bright[k] - dark[k]) / (backdrop[1][k] - backdrop[0][k]));
                 let through = through.sum::<f32>() / 3.0;
-                let own = |k| dark[k] - through * given[0][k] + 0.04 * (1.0 - through);
+                let own = |k| dark[k] - through * backdrop[0][k] + 0.04 * (1.0 - through);
                 (through, [0, 1, 2].map(own))
             })
             .collect();
         let over = |order: [usize; 3], ground: [f32; 3]| {
             let (light, share) = order.iter().fold((ground, 1.0), |(light, share), &k| {
-                let (through, own) = alone[k];
+                let (through, own) = single_sockets[k];
                 let light = [0, 1, 2].map(|c| own[c] + through * light[c]);
                 (light, share * through)
             });
@@ -328,7 +328,7 @@ fn three_sockets_behind_one_another_are_blended_from_far_to_near_whatever_their_
         };
         let off = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max);
         let far_to_near = if behind { [2, 1, 0] } else { [0, 1, 2] };
-        for (seen, ground) in middle(&|_| true).into_iter().zip(given) {
+        for (seen, ground) in middle(&|_| true).into_iter().zip(backdrop) {
             let expected = over(far_to_near, ground);
             assert!(off(seen, expected) < 0.004, "{seen:?} {expected:?}");
             for wrong in ORDERS.into_iter().filter(|order| *order != far_to_near) {
@@ -403,7 +403,7 @@ fn a_hit_joint_lights_up_and_themes_differ() {
         warmth(&hit, distance) - warmth(&quiet, distance) > 20
     });
     assert!(warmer.count() > 5, "warm light beside the socket");
-    // Nothing of the joint is painted over: neither the contact, nor the ball, nor the socket.
+    // The halo covers no part of the joint: neither the contact, nor the ball, nor the socket.
     let centre = to_f32(&frame.joints[0].socket_centre);
     let (right, up, _) = camera.axes();
     for k in 0..400 {
@@ -413,21 +413,21 @@ fn a_hit_joint_lights_up_and_themes_differ() {
     }
     let dark = draw(&ViewOptions { theme: Theme::Dark, ..options.clone() }, false);
     assert!(brightness(quiet.pixel(5, 5)) > 600 && brightness(dark.pixel(5, 5)) < 200);
-    let calm = draw(&ViewOptions { flash: false, ..options }, true);
-    assert_eq!(calm, quiet, "no flash where none is wanted");
+    let without_flash = draw(&ViewOptions { flash: false, ..options }, true);
+    assert_eq!(without_flash, quiet, "no flash if flashes are off");
 }
 
 /// Pixels at which two pictures differ by more than `by`.
 fn differing(a: &Image, b: &Image, by: u8) -> Vec<[u32; 2]> {
-    let mut found = Vec::new();
+    let mut pixels = Vec::new();
     for y in 0..a.height {
         for x in 0..a.width {
             if difference(a.pixel(x, y), b.pixel(x, y)) > by {
-                found.push([x, y]);
+                pixels.push([x, y]);
             }
         }
     }
-    found
+    pixels
 }
 
 #[test]
@@ -558,19 +558,19 @@ fn ghosts_are_outlined_and_coincident_ghosts_do_not_flicker() {
         for part in [0.1, 0.4, 0.7] {
             let point = centre + 0.95 * radius * part * out;
             let change = difference(at(&both, &camera, point), at(&twin, &camera, point));
-            assert!(change <= 1, "the nearer alone is seen: {change} at {point}");
+            assert!(change <= 1, "only the nearer is visible: {change} at {point}");
         }
-        for (found, (image, which)) in edged.iter_mut().zip([(&twin, Ghost::Twin), (&both, Ghost::Ideal)]) {
+        for (count, (image, which)) in edged.iter_mut().zip([(&twin, Ghost::Twin), (&both, Ghost::Ideal)]) {
             let edge = palette.ghost(which).edge.to_rgba8();
             // About the outline of the ball, which perspective makes a little larger.
             let ring = |step: i32| centre + (radius + 0.25 * step as f32 * pixel) * out;
-            *found += usize::from((-4..16).any(|step| near(image, ring(step), edge)));
+            *count += usize::from((-4..16).any(|step| near(image, ring(step), edge)));
         }
     }
     // The rod leaves the ball on one side, with an outline of its own.
     assert!(edged[0] > 100 && edged[1] > 75, "{edged:?}");
     let apart = differing(&twin, &ideal, 30).len();
-    assert!(apart > 3000, "told from each other: {apart}");
+    assert!(apart > 3000, "distinguishable: {apart}");
 }
 
 #[test]
@@ -617,7 +617,7 @@ fn every_standard_view_shows_the_moving_parts() {
                 assert!(possible > 75, "{name} {preset:?}: {possible}");
                 assert!(
                     seen as f64 > 0.8 * possible as f64,
-                    "{name} at {time} s, {preset:?}: {seen} of {possible} pixels of what moves are seen"
+                    "{name} at {time} s, {preset:?}: {seen} of {possible} pixels of the moving parts are visible"
                 );
             }
         }
@@ -672,7 +672,7 @@ fn cells_with_contact_have_the_colour_of_their_value_and_others_none() {
     simulation.commit_wear();
     let mut frame = Frame::default();
     simulation.sample(simulation.time(), &mut frame);
-    let wear = simulation.wear().expect("kept");
+    let wear = simulation.wear().expect("tracked");
     let (view, marks) = (SceneView::new(&scene, &frame), PeakMarks::new());
     let mut device = offscreen();
     for (theme, map) in [(Theme::Light, WearMap::Impulse), (Theme::Dark, WearMap::FrictionWork)] {
@@ -725,7 +725,7 @@ fn cells_with_contact_have_the_colour_of_their_value_and_others_none() {
                 _ => cell.impulse,
             } / (wear.area(0) * 1e6);
             if cell.impulse == 0.0 {
-                assert!(difference(before, after) <= 1, "cell {i} took nothing");
+                assert!(difference(before, after) <= 1, "cell {i} had no contact");
                 clear += 1;
                 continue;
             }
@@ -910,30 +910,30 @@ fn light_is_tone_mapped_and_theme_colours_are_unchanged() {
     let mut texels = Vec::new();
     for r in values {
         for g in [0.03125, 0.5, 4.0] {
-            for given in [0.0, 0.5, 1.0] {
-                texels.push([r, g, 0.25, given]);
+            for theme_share in [0.0, 0.5, 1.0] {
+                texels.push([r, g, 0.25, theme_share]);
             }
         }
     }
     let image = offscreen().finished(&texels);
-    for (i, [r, g, b, given]) in texels.into_iter().enumerate() {
+    for (i, [r, g, b, theme_share]) in texels.into_iter().enumerate() {
         let light = [r, g, b].map(f64::from);
         let mapped = neutral(light);
         let expected = [0, 1, 2].map(|k| {
-            let given = f64::from(given);
-            let c = (mapped[k] + given * (light[k] - mapped[k])).clamp(0.0, 1.0);
+            let theme_share = f64::from(theme_share);
+            let c = (mapped[k] + theme_share * (light[k] - mapped[k])).clamp(0.0, 1.0);
             let encoded = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
             (255.0 * encoded).round() as u8
         });
-        let found = image.pixel(i as u32, 0);
-        assert!(difference(found, expected) <= 1, "{r} {g} {given}: {found:?} {expected:?}");
+        let computed = image.pixel(i as u32, 0);
+        assert!(difference(computed, expected) <= 1, "{r} {g} {theme_share}: {computed:?} {expected:?}");
     }
 }
 
 #[test]
 fn the_longest_chain_needs_few_triangles_from_afar_and_from_within() {
     let links = [("chain.links".to_owned(), "4096".to_owned())];
-    let scene = Scene::load("chain", &links).expect("as many are allowed");
+    let scene = Scene::load("chain", &links).expect("within the limit");
     let mut frame = Frame::default();
     let mut simulation = Simulation::new(&scene.machine).expect("starts");
     simulation.sample(0.0, &mut frame);
