@@ -170,7 +170,7 @@ mod tests {
                 return;
             }
         }
-        panic!("is never reached");
+        panic!("the ideal motion never catches up");
     }
 
     /// Output point of `machine` at `time`, from an independent run.
@@ -233,7 +233,7 @@ mod tests {
         let before = bins.len();
         bins.clear();
         player.history().bins(channel, 0.0, 0.02, 4000, &mut bins);
-        assert!(bins.len() <= before + 1, "what was not computed is not drawn");
+        assert!(bins.len() <= before + 1, "no new points without the ideal motion");
     }
 
     #[test]
@@ -249,7 +249,7 @@ mod tests {
         player.run_to(0.12);
         catch_up_fully(&mut player);
         let time = player.frame().time;
-        let there = |player: &Player| {
+        let ideal_output = |player: &Player| {
             let ideal = player.ideal().expect("on").frame(player.frame().time);
             output_point(&scene.machine.output, ideal.expect("reached")).expect("has a body")
         };
@@ -264,13 +264,13 @@ mod tests {
         other.advance_to(time).expect("runs");
         other.sample(time, &mut frame);
         let expected = output_point(&scene.machine.output, &frame).expect("has a body");
-        let deviation = (there(&player) - expected).norm();
+        let deviation = (ideal_output(&player) - expected).norm();
         assert!(deviation < 1e-9, "{deviation:e}");
-        // Switched on late, it still applies the change.
+        // If switched on later, the ideal motion still applies the change.
         player.set_ideal(false);
         player.set_ideal(true);
         catch_up_fully(&mut player);
-        assert_eq!(there(&player), expected);
+        assert_eq!(ideal_output(&player), expected);
         // Single steps back.
         for _ in 0..20 {
             player.single_step();
@@ -282,15 +282,15 @@ mod tests {
         }
         let time = player.frame().time;
         other.advance_to(time).expect("runs");
-        let mut straight = Simulation::new(&closed(&scene.machine)).expect("starts");
-        while straight.time() < change {
-            straight.step_until(change).expect("runs");
+        let mut uninterrupted = Simulation::new(&closed(&scene.machine)).expect("starts");
+        while uninterrupted.time() < change {
+            uninterrupted.step_until(change).expect("runs");
         }
-        straight.set_gravity(weightless);
-        straight.advance_to(time).expect("runs");
-        straight.sample(time, &mut frame);
+        uninterrupted.set_gravity(weightless);
+        uninterrupted.advance_to(time).expect("runs");
+        uninterrupted.sample(time, &mut frame);
         let expected = output_point(&scene.machine.output, &frame).expect("has a body");
-        assert!((there(&player) - expected).norm() < 1e-9);
+        assert!((ideal_output(&player) - expected).norm() < 1e-9);
     }
 
     #[test]
@@ -323,7 +323,7 @@ mod tests {
         ";
         let text = text.replace("-30 deg", "0 deg") + second;
         let scene = Scene::parse(&text, None, &[]).expect("reads");
-        let mut player = Player::new(&scene).expect("has play enough");
+        let mut player = Player::new(&scene).expect("has enough play");
         player.set_ideal(true);
         player.run_to(0.01);
         player.update_ghosts();

@@ -118,8 +118,8 @@ mod tests {
         let find = |index: usize| points.get(index)?.as_ref();
         for (index, section) in [(2, 0), (1, 1), (0, 0)] {
             let load = Load::new(&task.scene, find, index, task.discard + section, 3);
-            let mut load = load.expect("all came");
-            let scene = load.scene.scene().expect("its settings");
+            let mut load = load.expect("all points are computed");
+            let scene = load.scene.scene().expect("valid settings");
             let mut player = Player::new(&scene).expect("starts");
             let arrival = loop {
                 let mut left = 100;
@@ -132,11 +132,11 @@ mod tests {
                 }
             };
             assert_eq!((arrival, load.fraction(&player)), (Ok(()), 1.0));
-            let point = find(index).expect("came");
+            let point = find(index).expect("computed");
             let state = observed(&player.frame().pose);
             assert_eq!(state[..6], point.sections[section], "point {index}");
-            let wanted = player.pending().machine.contact.clearance;
-            assert_eq!(wanted, point.values[0]);
+            let clearance = player.pending().machine.contact.clearance;
+            assert_eq!(clearance, point.values[0]);
         }
         // A point that was cancelled makes those after it unreachable.
         points[1] = None;

@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_path_holds_the_positions_of_the_ball_in_the_axes_of_its_socket() {
-        // The crank turns the socket of B; slider-crank has a clearance at C alone, so that B is ideal and stays where it is.
+        // The crank turns the socket of B, which is ideal in the built-in scene: only C has clearance there.
         let changes = [("joint.B.clearance".to_owned(), "0.3 mm".to_owned())];
         let scene = Scene::load("slider-crank", &changes).expect("built in");
         let mut player = Player::new(&scene).expect("starts");
@@ -119,8 +119,8 @@ mod tests {
             other.sample(point.time, &mut frame);
             let joint = &frame.joints[0];
             let carrier = axes_of(&frame, scene.machine.ball_joints[0].socket.body);
-            let seen = carrier * crate::machine::Vec3::from(point.position.map(f64::from));
-            let deviation = (seen - joint.eccentricity).norm();
+            let eccentricity = carrier * crate::machine::Vec3::from(point.position.map(f64::from));
+            let deviation = (eccentricity - joint.eccentricity).norm();
             assert!(deviation < 1e-9, "{deviation:e} m at {} s", point.time);
             rotation_change = rotation_change.max((carrier - Mat3::identity()).norm());
             at += 7;

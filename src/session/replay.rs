@@ -171,8 +171,8 @@ mod tests {
             original.set("contact.clearance", "0.1 mm").expect("in range");
             play(&mut original, 3);
             let joint = original.running().machine.ball_joints[0].name.clone();
-            let own = format!("joint.{joint}.clearance");
-            original.set(&own, "0.4 mm").expect("in range");
+            let joint_key = format!("joint.{joint}.clearance");
+            original.set(&joint_key, "0.4 mm").expect("in range");
             original.set_playing(false);
             for _ in 0..9 {
                 original.single_step();
@@ -185,7 +185,7 @@ mod tests {
             original.set_playing(true);
             play(&mut original, 3);
             original.set("solver.method", "automatic").expect("a method");
-            original.set_original("contact.clearance").expect("the file's");
+            original.set_original("contact.clearance").expect("the value of the file");
             play(&mut original, 5);
             assert!(original.log().entries.len() >= 8);
             assert_reproduced(&original);
@@ -255,7 +255,7 @@ mod tests {
         let mut link = link_to(&original);
         link.log.set(3, "contact.clearance", "0.5 kg");
         let Verdict::Failed(reason) = follow(link, 50).1 else {
-            panic!("a mass is no clearance");
+            panic!("a mass is not a clearance");
         };
         assert!(reason.contains("wrong unit"), "{reason}");
 
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_time_alone_is_reached_and_shown_exactly() {
+    fn a_link_with_only_a_time_is_reached_and_displayed_exactly() {
         let link = Link::parse("?scene=spcmm&c=0.5mm&t=9.5ms").expect("a link");
         let (player, verdict, _) = follow(link, 5);
         assert_eq!(verdict, Verdict::Reached);

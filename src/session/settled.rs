@@ -154,16 +154,16 @@ mod tests {
     fn changes_of_state(scene: &Scene, to: f64) -> Vec<f64> {
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut settling = Settling::new(scene);
-        let (mut frame, mut turns) = (Frame::default(), Vec::new());
+        let (mut frame, mut switch_times) = (Frame::default(), Vec::new());
         while simulation.time() < to {
             simulation.step().expect("runs");
             simulation.sample(simulation.time(), &mut frame);
             settling.record(&frame);
-            if settling.has_settled() != (turns.len() % 2 == 1) {
-                turns.push(frame.time);
+            if settling.has_settled() != (switch_times.len() % 2 == 1) {
+                switch_times.push(frame.time);
             }
         }
-        turns
+        switch_times
     }
 
     fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
@@ -174,8 +174,8 @@ mod tests {
 
     #[test]
     fn the_papers_mechanism_settles_after_rattling_and_stays_settled() {
-        let turns = changes_of_state(&scene("spcmm", &[]), 2.2);
-        assert!(turns.len() == 1 && (0.1..0.45).contains(&turns[0]), "{turns:?}");
+        let switch_times = changes_of_state(&scene("spcmm", &[]), 2.2);
+        assert!(switch_times.len() == 1 && (0.1..0.45).contains(&switch_times[0]), "{switch_times:?}");
     }
 
     #[test]
@@ -188,8 +188,8 @@ mod tests {
             ("slider-crank-driven", &[("contact.friction", "0")], 3.0),
             ("slider-crank-driven", &[("contact.friction", "0.5")], 3.0),
         ] {
-            let turns = changes_of_state(&scene(name, changes), to);
-            assert!(turns.is_empty(), "{name} {changes:?}: {turns:?}");
+            let switch_times = changes_of_state(&scene(name, changes), to);
+            assert!(switch_times.is_empty(), "{name} {changes:?}: {switch_times:?}");
         }
     }
 
@@ -199,7 +199,7 @@ mod tests {
         let hanging = text.replace("-30 deg", "0 deg");
         assert_ne!(hanging, text);
         let hanging = Scene::parse(&hanging, None, &[]).expect("a scene");
-        let turns = changes_of_state(&hanging, 1.5);
-        assert!(turns.len() == 1 && turns[0] > REST_TIME, "{turns:?}");
+        let switch_times = changes_of_state(&hanging, 1.5);
+        assert!(switch_times.len() == 1 && switch_times[0] > REST_TIME, "{switch_times:?}");
     }
 }

@@ -265,9 +265,9 @@ mod tests {
 
     #[test]
     fn a_slider_steps_to_round_values_in_proportion_to_its_range() {
-        let given =
+        let cases =
             [(1.0, 2), (0.3, 3), (2.0, 2), (40.0, 1), (500.0, 0), (1e5, 0), (1e-3, 5), (0.0, 15), (f64::NAN, 15)];
-        for (span, expected) in given {
+        for (span, expected) in cases {
             assert_eq!(decimals(span), expected, "{span}");
         }
     }

@@ -211,7 +211,7 @@ mod tests {
         let scene = Scene::load("pendulum", &[]).expect("built in");
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut watch = RunWatch::new(&scene);
-        assert!(watch.period().expect_err("hangs").contains("no drive that repeats"));
+        assert!(watch.period().expect_err("no drive").contains("no drive that repeats"));
         run(&mut watch, &mut simulation, 0.1);
         assert!(watch.orbit().count() > 20 && watch.sections().len() == 0);
     }

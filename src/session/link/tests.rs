@@ -5,9 +5,9 @@ use crate::session::log::Event;
 use crate::view::WearMap;
 
 /// Deterministic pseudo-random numbers (splitmix64).
-struct Chance(u64);
+struct Random(u64);
 
-impl Chance {
+impl Random {
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -20,7 +20,7 @@ impl Chance {
         self.next() % end
     }
 
-    fn maybe<T>(&mut self, make: impl FnOnce(&mut Self) -> T) -> Option<T> {
+    fn optional<T>(&mut self, make: impl FnOnce(&mut Self) -> T) -> Option<T> {
         (self.below(3) > 0).then(|| make(self))
     }
 
@@ -61,45 +61,45 @@ impl Chance {
             },
             log,
             steps: Some(steps + self.below(100)),
-            time: self.maybe(|c| c.unit() * 1e3),
-            hash: self.maybe(Self::next),
-            time_scale: self.maybe(|c| 1e-4 + 0.9 * c.unit()),
-            camera: self.maybe(|c| CameraPose {
+            time: self.optional(|c| c.unit() * 1e3),
+            hash: self.optional(Self::next),
+            time_scale: self.optional(|c| 1e-4 + 0.9 * c.unit()),
+            camera: self.optional(|c| CameraPose {
                 yaw: c.unit() as f32,
                 pitch: 1.5 - 3.0 * c.unit() as f32,
                 distance: 0.1 + c.unit() as f32,
                 target: [0; 3].map(|_| c.unit() as f32 - 0.5),
-                fitted: c.maybe(|c| 0.5 + c.unit() as f32),
+                fitted: c.optional(|c| 0.5 + c.unit() as f32),
             }),
-            magnification: self.maybe(|c| 1.0 + 99.0 * c.unit() as f32),
-            follow: self.maybe(|c| format!("joint.x{}x", c.text(6)).replace('\n', " ")),
-            plots: self.maybe(|c| {
+            magnification: self.optional(|c| 1.0 + 99.0 * c.unit() as f32),
+            follow: self.optional(|c| format!("joint.x{}x", c.text(6)).replace('\n', " ")),
+            plots: self.optional(|c| {
                 let one = Quantity::ALL[c.below(16) as usize];
                 Quantity::ALL.into_iter().filter(|q| c.below(3) == 0 || *q == one && c.below(2) == 0).collect()
             }),
-            channels: self.maybe(|c| {
+            channels: self.optional(|c| {
                 let names = 0..c.below(4);
                 names.map(|n| format!("S{n}.*_-?x{}", c.below(9))).collect()
             }),
-            window: self.maybe(|c| match c.below(3) {
+            window: self.optional(|c| match c.below(3) {
                 0 => PlotWindow::Automatic,
                 1 => PlotWindow::Everything,
                 _ => PlotWindow::Last(1e-6 + c.unit()),
             }),
-            instruments: self.maybe(|c| Instruments {
-                microscope: c.maybe(|c| format!("S{}", c.below(9))),
+            instruments: self.optional(|c| Instruments {
+                microscope: c.optional(|c| format!("S{}", c.below(9))),
                 ideal: c.below(2) == 0,
                 wear: [WearMap::Off, WearMap::Impulse, WearMap::FrictionWork][c.below(3) as usize],
             }),
-            lesson: self.maybe(|c| format!("x{}x", c.text(9)).replace('\n', " ")),
-            step: self.maybe(|c| 1 + c.below(40) as usize),
-            embedded: self.maybe(|c| {
+            lesson: self.optional(|c| format!("x{}x", c.text(9)).replace('\n', " ")),
+            step: self.optional(|c| 1 + c.below(40) as usize),
+            embedded: self.optional(|c| {
                 let words = ["", "controls", "timeline,bench", "controls,plots"];
                 Embedded::read(words[c.below(4) as usize]).expect("panels")
             }),
-            playing: self.maybe(|c| c.below(2) == 0),
-            theme: self.maybe(|c| ThemeChoice::ALL[c.below(3) as usize]),
-            version: self.maybe(|_| "0.1.0".to_owned()),
+            playing: self.optional(|c| c.below(2) == 0),
+            theme: self.optional(|c| ThemeChoice::ALL[c.below(3) as usize]),
+            version: self.optional(|_| "0.1.0".to_owned()),
             beside: Texts::new(),
         }
     }
@@ -107,9 +107,9 @@ impl Chance {
 
 #[test]
 fn every_link_reads_back_to_the_same_bits() {
-    let mut chance = Chance(1);
+    let mut random = Random(1);
     for _ in 0..500 {
-        let link = chance.link();
+        let link = random.link();
         let text = link.format();
         for form in [
             text.clone(),
@@ -127,16 +127,16 @@ fn every_link_reads_back_to_the_same_bits() {
 
 #[test]
 fn no_text_causes_a_panic() {
-    let mut chance = Chance(2);
+    let mut random = Random(2);
     let mut read = 0;
     for _ in 0..1000 {
-        let mut bytes = chance.link().format().into_bytes();
-        for _ in 0..=chance.below(4) {
-            let at = chance.below(bytes.len() as u64) as usize;
-            match chance.below(3) {
-                0 => bytes[at] = chance.below(256) as u8,
+        let mut bytes = random.link().format().into_bytes();
+        for _ in 0..=random.below(4) {
+            let at = random.below(bytes.len() as u64) as usize;
+            match random.below(3) {
+                0 => bytes[at] = random.below(256) as u8,
                 1 => bytes.truncate(at.max(1)),
-                _ => bytes.insert(at, b"&=%#?-+0"[chance.below(8) as usize]),
+                _ => bytes.insert(at, b"&=%#?-+0"[random.below(8) as usize]),
             }
         }
         if let Ok(link) = Link::parse(&String::from_utf8_lossy(&bytes)) {
@@ -145,15 +145,15 @@ fn no_text_causes_a_panic() {
             assert!(link.load().is_err() || link.log.base.is_empty());
         }
         // Arbitrary text does not panic, either.
-        let _ = Link::parse(&chance.text(200));
+        let _ = Link::parse(&random.text(200));
     }
-    assert!(read > 40, "{read} were links still");
+    assert!(read > 40, "{read} are still links");
 }
 
 #[test]
 fn a_handwritten_link_accepts_short_names_and_full_keys() {
     let link = Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50").expect("a link");
-    let scene = link.load().expect("the scene has these");
+    let scene = link.load().expect("known keys");
     assert_eq!(scene.name, "pendulum");
     assert_eq!(scene.machine.contact.clearance, 0.5e-3);
     assert_eq!((scene.machine.contact.friction, scene.machine.contact.restitution), (0.2, 0.8));
@@ -163,22 +163,22 @@ fn a_handwritten_link_accepts_short_names_and_full_keys() {
 
     let link = Link::parse("joint.S1.clearance=0.5+mm&view.down=%2Bx").expect("a link");
     assert_eq!(link.scene, SceneText::BuiltIn(DEFAULT_SCENE.to_owned()));
-    let scene = link.load().expect("the scene has these");
+    let scene = link.load().expect("known keys");
     assert_eq!(scene.machine.ball_joints[0].contact.clearance, 0.5e-3);
     assert!(!link.has_instant());
 
     // The fragment overrides the query, and replaces it if it names a scene.
-    let both = |text: &str| Link::parse(text).expect("a link").log.base;
+    let changes_of = |text: &str| Link::parse(text).expect("a link").log.base;
     let clearance = |value: &str| vec![("contact.clearance".to_owned(), value.to_owned())];
-    assert_eq!(both("/?c=1mm#c=2mm"), clearance("2mm"));
-    assert_eq!(both("/?c=1mm#scene=pendulum"), Vec::new());
-    assert_eq!(both("http://localhost:1/a?c=1mm"), clearance("1mm"));
-    assert_eq!(both("http://localhost:1/a"), Vec::new());
-    assert_eq!(both(""), Vec::new());
+    assert_eq!(changes_of("/?c=1mm#c=2mm"), clearance("2mm"));
+    assert_eq!(changes_of("/?c=1mm#scene=pendulum"), Vec::new());
+    assert_eq!(changes_of("http://localhost:1/a?c=1mm"), clearance("1mm"));
+    assert_eq!(changes_of("http://localhost:1/a"), Vec::new());
+    assert_eq!(changes_of(""), Vec::new());
 }
 
 #[test]
-fn errors_in_a_link_are_named() {
+fn errors_in_a_link_state_key_and_cause() {
     for (text, words) in [
         ("clearance=0.5mm", "link: clearance: unknown word (did you mean `contact.clearance`?); allowed:"),
         ("clearence=0.5mm", "(did you mean `contact.clearance`?)"),
@@ -224,7 +224,7 @@ fn errors_in_a_link_are_named() {
 }
 
 #[test]
-fn a_decompression_bomb_is_refused() {
+fn a_decompression_bomb_is_rejected() {
     let zeros = "0".repeat(MAX_UNPACKED_LINK + 1);
     let packed = pack(&zeros);
     assert!(packed.len() < 10_000);
@@ -238,11 +238,11 @@ fn a_decompression_bomb_is_refused() {
 
 #[test]
 fn a_link_that_is_too_long_omits_the_run_or_is_refused() {
-    let mut chance = Chance(3);
+    let mut random = Random(3);
     let scene = Scene::load("pendulum", &[("contact.friction".into(), "0.3".into())]).expect("built in");
     let mut link = Link { scene: SceneText::of(&scene), steps: Some(1 << 40), hash: Some(7), ..Link::default() };
     for index in 0..8000 {
-        let value = format!("{} mm", chance.unit());
+        let value = format!("{} mm", random.unit());
         link.log.set(index, "contact.clearance", &value);
     }
     assert!(link.format().len() > MAX_LINK_LENGTH);
@@ -252,7 +252,7 @@ fn a_link_that_is_too_long_omits_the_run_or_is_refused() {
     assert_eq!(start.log.base, scene.changes);
     assert!(!start.has_instant() && start.hash.is_none());
 
-    let noise: String = (0..40_000).map(|_| char::from(b'a' + chance.below(26) as u8)).collect();
+    let noise: String = (0..40_000).map(|_| char::from(b'a' + random.below(26) as u8)).collect();
     link.scene = SceneText::File { name: "mine.toml".to_owned(), text: noise };
     let error = link.format_short(&scene).expect_err("does not fit");
     assert!(error.contains("too large for a link"), "{error}");
@@ -260,30 +260,30 @@ fn a_link_that_is_too_long_omits_the_run_or_is_refused() {
 
 #[test]
 fn a_link_too_long_for_an_address_is_stored_and_read_back() {
-    let mut chance = Chance(5);
+    let mut random = Random(5);
     let (mut plain, mut packed) = (0, 0);
     for _ in 0..100 {
-        let mut link = chance.link();
+        let mut link = random.link();
         let fragment = link.format();
         assert_eq!(link.to_storage_text(), fragment);
         plain += 1;
         link.beside.insert("a lift.csv".to_owned(), "time_s,y_mm\n0,0\n".into());
-        assert_eq!(link.format(), fragment, "no link carries a file");
-        let kept = link.to_storage_text();
-        assert!(kept.starts_with("kept:"));
-        assert_eq!(Link::parse(&kept).expect("reads"), link);
+        assert_eq!(link.format(), fragment, "links contain no data files");
+        let stored = link.to_storage_text();
+        assert!(stored.starts_with("kept:"));
+        assert_eq!(Link::parse(&stored).expect("reads"), link);
         packed += 1;
     }
     assert_eq!((plain, packed), (100, 100));
-    let noise: String = (0..60_000).map(|_| char::from(b'a' + chance.below(26) as u8)).collect();
+    let noise: String = (0..60_000).map(|_| char::from(b'a' + random.below(26) as u8)).collect();
     let (name, text) = ("mine.toml".to_owned(), noise);
     let large = Link { scene: SceneText::File { name, text }, ..Link::default() };
     assert!(Link::parse(&format!("#{}", large.format())).is_err());
-    let kept = large.to_storage_text();
-    assert_eq!(Link::parse(&kept).expect("reads"), large);
-    let error = Link::parse(&kept[..kept.len() / 2]).expect_err("cut");
+    let stored = large.to_storage_text();
+    assert_eq!(Link::parse(&stored).expect("reads"), large);
+    let error = Link::parse(&stored[..stored.len() / 2]).expect_err("cut");
     assert!(error.to_string().contains("cut short or damaged"), "{error}");
-    let error = Link::parse("#kept=1").expect_err("elsewhere");
+    let error = Link::parse("#kept=1").expect_err("stored by another browser");
     assert!(error.to_string().contains("open the scene file here"), "{error}");
 }
 

@@ -336,7 +336,7 @@ mod tests {
         // Retraced steps would add nothing; those of a new branch do.
         record.truncate(8e-3, 8);
         assert_eq!(numbers(&record, 1.0), [1]);
-        assert_eq!(record.next_peak(None, 4e-3, false), None, "it is under way again");
+        assert_eq!(record.next_peak(None, 4e-3, false), None, "the impact is in progress again");
         contact(&mut record, 0, 9, &[0.0, 1.0, 0.5], true);
         record.record_joint(
             1,
@@ -380,8 +380,8 @@ mod tests {
             record.record_joint(0, &peak(k, if k == 30 { 9.0 } else { 4.0 }, None), None);
         }
         assert_eq!(record.next_peak(None, 0.0, false), Some(3e-3));
-        assert!(record.in_progress(None, 35e-3).is_none(), "it rests");
-        let (_, lasting) = record.in_progress(None, 9e-3).expect("it touches");
+        assert!(record.in_progress(None, 35e-3).is_none(), "a resting contact");
+        let (_, lasting) = record.in_progress(None, 9e-3).expect("in contact");
         assert!(lasting.finished().is_none() && lasting.force_peak.force.x == 8.0);
         (record.steps, record.latest_step) = (40, [39e-3, 40e-3]);
         let impact = Impact { start: 1e-3, end: 40e-3, peak: 9.0, ..Impact::default() };
@@ -390,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rising_force_is_no_peak_yet_and_an_impact_without_an_end_ends_with_the_next() {
+    fn a_rising_force_has_no_peak_yet_and_an_impact_without_an_end_ends_when_the_next_begins() {
         let mut record = ImpactRecord::default();
         // An impact begins with the run.
         record.begin(&[peak(0, 0.0, Some(0.1))]);

@@ -41,8 +41,8 @@ fn a_long_step_is_recorded_as_a_curve() {
     }
 }
 
-/// Frame, record, peaks and sections are all at the displayed instant, whatever the run has computed beyond it.
-fn one_clock(player: &Player) {
+/// Checks that frame, record, peaks and sections are at the displayed instant, however far the run has been computed.
+fn assert_at_displayed_instant(player: &Player) {
     let shown = player.pacer.shown();
     assert_eq!(player.frame().time, shown);
     let (_, end) = player.history().span().expect("recorded");
@@ -57,40 +57,40 @@ fn one_clock(player: &Player) {
 #[test]
 fn record_and_peaks_contain_nothing_after_the_displayed_instant() {
     let mut player = player("spcmm");
-    one_clock(&player);
+    assert_at_displayed_instant(&player);
     player.pacer.set_scale(0.01);
     player.set_playing(true);
-    let mut within = 0;
+    let mut frames_within_steps = 0;
     for frame in 0..150 {
         player.advance(1.0 / 60.0);
-        one_clock(&player);
+        assert_at_displayed_instant(&player);
         let far = player.simulation().time() - player.pacer.shown();
-        within += usize::from(far > 1e-4);
+        frames_within_steps += usize::from(far > 1e-4);
         if frame == 60 {
             player.set_playing(false);
             player.advance(1.0 / 60.0);
-            one_clock(&player);
+            assert_at_displayed_instant(&player);
             player.set_playing(true);
         }
     }
-    assert!(within > 20, "in the midst of long steps: {within}");
-    // Strictly after the peak of the second impact: the record has its top, and its last value is the displayed one.
+    assert!(frames_within_steps > 20, "in the middle of long steps: {frames_within_steps}");
+    // Strictly after the peak of the second impact: the record contains the peak, and its last value is the displayed one.
     let forces = recorded(&player, Quantity::NormalForce, 1.0);
     let peak = player.simulation().statistics().peak_normal[0];
     let top = forces.iter().map(|p| p[1]).fold(0.0, f64::max);
     assert!((top / peak - 1.0).abs() < 1e-6, "{top} {peak}");
     for back in 0..6 {
         player.single_step();
-        one_clock(&player);
+        assert_at_displayed_instant(&player);
         if back > 2 {
             player.step_back();
-            one_clock(&player);
+            assert_at_displayed_instant(&player);
         }
     }
     player.run_to(0.2);
-    one_clock(&player);
+    assert_at_displayed_instant(&player);
     player.reset().expect("starts");
-    one_clock(&player);
+    assert_at_displayed_instant(&player);
     assert!(player.peaks().iter().all(|peak| *peak == Peak::default()));
     assert_eq!(player.history().rows(9).len(), 1);
 }
@@ -104,11 +104,11 @@ fn a_warning_is_found_by_the_key_of_its_parameter() {
             player.set(key, value).expect("in range");
         }
         for key in [Some(key), of_joint].into_iter().flatten() {
-            let said = player.warning(key).unwrap_or_else(|| panic!("nothing about {key}"));
-            assert!(said.contains(key.rsplit('.').next().unwrap_or(key)), "{key}: {said}");
+            let warning = player.warning(key).unwrap_or_else(|| panic!("no warning about {key}"));
+            assert!(warning.contains(key.rsplit('.').next().unwrap_or(key)), "{key}: {warning}");
         }
-        for silent in ["contact.friction", "gravity.x", "solver.preset"] {
-            assert_eq!(player.warning(silent), None, "{key}");
+        for unaffected in ["contact.friction", "gravity.x", "solver.preset"] {
+            assert_eq!(player.warning(unaffected), None, "{key}");
         }
     };
     check(&[("contact.restitution", "0.3")], "contact.restitution", Some("joint.S2.restitution"));
@@ -120,36 +120,36 @@ fn a_warning_is_found_by_the_key_of_its_parameter() {
 }
 
 thread_local! {
-    static LOOKS: std::cell::Cell<f64> = const { std::cell::Cell::new(0.0) };
+    static CLOCK_READING: std::cell::Cell<f64> = const { std::cell::Cell::new(0.0) };
 }
 
 #[test]
 fn steps_between_frames_are_displayed_at_once_and_change_no_bit() {
     let mut player = player("spcmm");
     // Each clock reading adds half a millisecond, so that a slice between frames has several steps.
-    player.clock = || LOOKS.replace(LOOKS.get() + 5e-4);
+    player.clock = || CLOCK_READING.replace(CLOCK_READING.get() + 5e-4);
     player.pacer.set_scale(0.02);
     player.set_playing(true);
     let (mut impacts, mut between, mut longest) = (0, 0, 0);
     for frame in 0..40 {
         player.advance(0.06);
-        one_clock(&player);
+        assert_at_displayed_instant(&player);
         impacts += player.peaks().iter().map(|peak| peak.impacts).sum::<u32>();
-        for spell in 1..=5 {
+        for slice in 1..=5 {
             let (steps, shown) = (player.steps(), player.pacer.shown());
-            player.step_between(0.01 * f64::from(spell));
+            player.step_between(0.01 * f64::from(slice));
             assert!(player.pacer.shown() >= shown);
-            one_clock(&player);
+            assert_at_displayed_instant(&player);
             between += player.steps() - steps;
             longest = longest.max(player.steps() - steps);
         }
         if frame == 20 {
-            // A script of the page may pause in between.
+            // A script of the page may pause between frames.
             player.set_playing(false);
             let (hash, shown) = (player.simulation().state_hash(), player.pacer.shown());
             assert_eq!(player.step_between(0.05), None);
             player.advance(0.06);
-            one_clock(&player);
+            assert_at_displayed_instant(&player);
             assert_eq!((hash, shown), (player.simulation().state_hash(), player.pacer.shown()));
             player.set_playing(true);
         }
@@ -157,7 +157,7 @@ fn steps_between_frames_are_displayed_at_once_and_change_no_bit() {
     player.advance(0.0);
     impacts += player.peaks().iter().map(|peak| peak.impacts).sum::<u32>();
     assert!(between > player.steps() / 2, "{between} of {}", player.steps());
-    assert!(longest <= 17, "a spell of 8 ms: {longest}");
+    assert!(longest <= 17, "a slice of 8 ms: {longest}");
     let mut other = self::player("spcmm");
     other.run_to(player.pacer.shown());
     assert_eq!((other.steps(), other.simulation().state_hash()), (player.steps(), player.simulation().state_hash()));
@@ -179,7 +179,7 @@ fn after_steps_back_the_record_is_unchanged_and_a_new_future_continues_it() {
         player.single_step();
     }
     assert!(player.history().rows(200) != rows);
-    let (all, there) = (player.history().rows(200), player.pacer.shown());
+    let (all, former_end) = (player.history().rows(200), player.pacer.shown());
     for _ in 0..40 {
         player.step_back();
     }
@@ -189,15 +189,15 @@ fn after_steps_back_the_record_is_unchanged_and_a_new_future_continues_it() {
     assert!(player.has_future() && player.abandoned_future().is_none());
     // A change keeps the past, and the former future is stored separately.
     player.set("contact.friction", "0.3").expect("in range");
-    let left = player.abandoned_future().expect("left");
-    assert_eq!((left.from, left.to), (player.pacer.shown(), there));
-    assert!(left.history.rows(200) == all);
+    let former = player.abandoned_future().expect("a former future");
+    assert_eq!((former.from, former.to), (player.pacer.shown(), former_end));
+    assert!(former.history.rows(200) == all);
     let again = player.history().rows(200);
     assert_eq!(again.last().map(|row| row.0), rows.last().map(|row| row.0));
-    one_clock(&player);
+    assert_at_displayed_instant(&player);
     player.run_to(12e-3);
     assert!(player.abandoned_future().is_none(), "replaced");
-    one_clock(&player);
+    assert_at_displayed_instant(&player);
     let forces = recorded(&player, Quantity::NormalForce, 8.6e-3);
     assert!(forces.iter().any(|point| point[1] > 300.0));
 }
@@ -232,17 +232,17 @@ fn a_change_within_a_step_leaves_the_rest_of_that_step_unchanged() {
     }
     let change = player.simulation().time();
     player.set("contact.clearance", "0.6 mm").expect("in range");
-    one_clock(&player);
+    assert_at_displayed_instant(&player);
     // The run continues as if it had been changed directly at that instant.
-    let mut straight = LiveScene::new(other.running()).expect("starts");
-    straight.restore(&other.simulation().snapshot());
-    straight.set("contact.clearance", "0.6 mm").expect("in range");
-    assert_eq!(player.simulation().state_hash(), straight.state_hash());
+    let mut uninterrupted = LiveScene::new(other.running()).expect("starts");
+    uninterrupted.restore(&other.simulation().snapshot());
+    uninterrupted.set("contact.clearance", "0.6 mm").expect("in range");
+    assert_eq!(player.simulation().state_hash(), uninterrupted.state_hash());
     let mut frames = 0;
     loop {
         player.advance(1.0 / 60.0);
         other.advance(1.0 / 60.0);
-        one_clock(&player);
+        assert_at_displayed_instant(&player);
         if player.pacer.shown() >= change {
             break;
         }
@@ -278,12 +278,12 @@ fn a_window_hidden_for_minutes_resumes_without_catching_up() {
         player.advance(1.0 / 60.0);
     }
     let passed = player.pacer.shown() - before;
-    assert!(passed <= 0.01 + 1e-9, "nothing is owed: {passed}");
+    assert!(passed <= 0.01 + 1e-9, "no backlog: {passed}");
     assert!(player.is_playing());
 }
 
 #[test]
-fn another_number_of_links_is_recorded_after_the_reset() {
+fn the_record_follows_a_new_number_of_links_after_the_reset() {
     let mut player = player("chain");
     let before = player.channels().len();
     assert_eq!(player.set("chain.links", "3").expect("in range"), Effect::AtReset);
@@ -312,9 +312,9 @@ fn names(names: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn a_picked_channel_is_recorded_from_then_on_and_changes_no_bit() {
-    let [mut player, mut straight] = [0; 2].map(|_| self::player("slider-crank-driven"));
-    for player in [&mut player, &mut straight] {
+fn a_picked_channel_is_recorded_from_the_pick_on_and_changes_no_bit() {
+    let [mut player, mut uninterrupted] = [0; 2].map(|_| self::player("slider-crank-driven"));
+    for player in [&mut player, &mut uninterrupted] {
         player.run_to(8e-3);
     }
     let before = recorded(&player, Quantity::Position, 8e-3);
@@ -325,11 +325,11 @@ fn a_picked_channel_is_recorded_from_then_on_and_changes_no_bit() {
     // The record starts at the displayed instant.
     let first = picked(&player, "crank.angle", 1.0);
     assert!(first.len() == 1 && first[0][0] > 7.9e-3, "{first:?}");
-    for player in [&mut player, &mut straight] {
+    for player in [&mut player, &mut uninterrupted] {
         player.run_to(16e-3);
         player.advance(0.0);
     }
-    assert_eq!(player.simulation().state_hash(), straight.simulation().state_hash());
+    assert_eq!(player.simulation().state_hash(), uninterrupted.simulation().state_hash());
     let end = player.history().span().expect("recorded").1;
     let angle = picked(&player, "crank.angle", end);
     assert!(angle.len() > 5 && angle[0][0] > 7.9e-3);
@@ -342,11 +342,11 @@ fn a_picked_channel_is_recorded_from_then_on_and_changes_no_bit() {
     assert!(picked(&player, "crank.angle", end) == angle);
     assert_eq!(player.picked().len(), 2);
     let position = |player: &Player| recorded(player, Quantity::Position, end);
-    assert!(position(&player) == position(&straight));
+    assert!(position(&player) == position(&uninterrupted));
 }
 
 #[test]
-fn picked_channels_go_back_and_branch_with_the_record() {
+fn picked_channels_rewind_and_branch_with_the_record() {
     let mut player = player("slider-crank-driven");
     player.run_to(4e-3);
     player.pick(&names(&["crank.angle"]));
@@ -354,7 +354,7 @@ fn picked_channels_go_back_and_branch_with_the_record() {
     let reached = player.reached();
     let all = picked(&player, "crank.angle", reached);
     player.go_to(10e-3);
-    one_clock(&player);
+    assert_at_displayed_instant(&player);
     // Retracing the time before the pick records the channel there, too.
     player.go_to(2e-3);
     let mut bins = Vec::new();
@@ -362,11 +362,11 @@ fn picked_channels_go_back_and_branch_with_the_record() {
     assert!(!bins.is_empty());
     player.go_to(10e-3);
     player.set("contact.friction", "0.3").expect("in range");
-    let cut = picked(&player, "crank.angle", 1.0);
-    assert!(cut.iter().all(|point| point[0] < 10.1e-3));
+    let truncated = picked(&player, "crank.angle", 1.0);
+    assert!(truncated.iter().all(|point| point[0] < 10.1e-3));
     player.run_to(20e-3);
-    let anew = picked(&player, "crank.angle", player.reached());
-    assert!((anew[anew.len() - 1][1] - all[all.len() - 1][1]).abs() < 2e-2);
+    let new_branch = picked(&player, "crank.angle", player.reached());
+    assert!((new_branch[new_branch.len() - 1][1] - all[all.len() - 1][1]).abs() < 2e-2);
     player.reset().expect("starts");
     player.run_to(5e-3);
     assert!(picked(&player, "crank.angle", 5e-3)[0][0] < 1e-3);
@@ -463,10 +463,10 @@ fn any_past_instant_is_displayed_with_the_same_bits_again() {
             let (time, hash) = hashes[(random.next() * hashes.len() as f64) as usize];
             player.go_to(time);
             assert_eq!(player.simulation().state_hash(), hash, "{scene} at {time}");
-            one_clock(&player);
+            assert_at_displayed_instant(&player);
             // Between two steps the display is consistent, too.
             player.go_to(time + 1e-7);
-            one_clock(&player);
+            assert_at_displayed_instant(&player);
         }
         assert!(player.history().rows(300) == rows, "the record stays");
         player.go_to(player.reached());
@@ -480,8 +480,8 @@ fn any_past_instant_is_displayed_with_the_same_bits_again() {
 fn full_a_thousand_jumps_over_a_thousand_impacts_have_the_bits_of_the_run() {
     // Balls that lose almost no energy keep rattling.
     let changes = [("contact.restitution", "1"), ("contact.friction", "0")];
-    let own = |(key, value): (&str, &str)| (key.to_owned(), value.to_owned());
-    let scene = Scene::load("spcmm", &changes.map(own)).expect("in range");
+    let owned = |(key, value): (&str, &str)| (key.to_owned(), value.to_owned());
+    let scene = Scene::load("spcmm", &changes.map(owned)).expect("in range");
     let mut player = Player::new(&scene).expect("starts");
     let mut hashes = Vec::new();
     let impacts = |player: &Player| {
@@ -505,7 +505,7 @@ fn full_a_thousand_jumps_over_a_thousand_impacts_have_the_bits_of_the_run() {
 }
 
 #[test]
-fn the_twin_goes_back_and_forward_with_the_run() {
+fn the_twin_follows_the_run_back_and_forward() {
     let mut player = player("spcmm");
     player.run_to(10e-3);
     player.set_twin(true);
@@ -519,18 +519,18 @@ fn the_twin_goes_back_and_forward_with_the_run() {
         seen.push((player.pacer.shown(), twin.frame().clone()));
     }
     let distances = player.twin().expect("on").distances().to_vec();
-    let began = player.twin().expect("on").start_time();
+    let twin_start = player.twin().expect("on").start_time();
     let mut random = Uniform(5);
     for _ in 0..100 {
         let (time, frame) = &seen[(random.next() * seen.len() as f64) as usize];
         player.go_to(*time);
         let twin = player.twin().expect("stays on");
-        if *time < began {
-            assert!(twin.frame().time > *time, "it began after the change");
-        } else if *time > began {
+        if *time < twin_start {
+            assert!(twin.frame().time > *time, "the twin starts later");
+        } else if *time > twin_start {
             assert_eq!(twin.frame().bodies, frame.bodies, "at {time}");
         }
-        assert_eq!(twin.distances(), distances, "what was known stays so");
+        assert_eq!(twin.distances(), distances, "known distances are unchanged");
     }
     // On a new branch, the twin of the abandoned future is dropped.
     player.go_to(seen[10].0);
@@ -571,13 +571,13 @@ fn resident() -> usize {
 fn an_hour_takes_no_more_memory_than_ten_minutes() {
     let mut player = player("spcmm");
     player.set_ideal(true);
-    let mut held = Vec::new();
+    let mut bytes_held = Vec::new();
     for part in 1..=6 {
         player.run_to(600.0 * f64::from(part));
-        held.push((resident(), player.rewind_bytes()));
-        println!("{} s: {:?} bytes", 600 * part, held[held.len() - 1]);
+        bytes_held.push((resident(), player.rewind_bytes()));
+        println!("{} s: {:?} bytes", 600 * part, bytes_held[bytes_held.len() - 1]);
     }
-    assert!(held[5].0 < held[0].0 + (32 << 20), "{held:?}");
+    assert!(bytes_held[5].0 < bytes_held[0].0 + (32 << 20), "{bytes_held:?}");
 }
 
 #[test]
@@ -593,7 +593,7 @@ fn the_distant_past_is_displayed_in_full_detail_again() {
         player.bins(channel, 7.6e-3, 8.2e-3, 400, &mut bins);
         bins
     };
-    assert!(bins(&player).len() < 5, "only wide bins are left");
+    assert!(bins(&player).len() < 5, "only wide bins remain");
     player.go_to(8e-3);
     let again = bins(&player);
     assert!(again.len() >= 20, "{}", again.len());
@@ -615,7 +615,7 @@ fn playing_backwards_passes_the_same_states_to_the_start() {
         let shown = player.pacer.shown();
         let expected = (before - 0.02 / 60.0).max(0.0);
         assert!((shown - expected).abs() < 1e-12, "{shown} {expected}");
-        one_clock(&player);
+        assert_at_displayed_instant(&player);
         before = shown;
         frames += 1;
     }
@@ -625,9 +625,9 @@ fn playing_backwards_passes_the_same_states_to_the_start() {
     assert_eq!(player.simulation().state_hash(), start.simulation().state_hash());
     // And forwards again through the same states.
     player.go_to(20e-3);
-    let mut straight = self::player("spcmm");
-    straight.run_to(20e-3);
-    assert_eq!(player.simulation().state_hash(), straight.simulation().state_hash());
+    let mut uninterrupted = self::player("spcmm");
+    uninterrupted.run_to(20e-3);
+    assert_eq!(player.simulation().state_hash(), uninterrupted.simulation().state_hash());
 }
 
 #[test]
@@ -637,28 +637,28 @@ fn resuming_from_the_past_abandons_later_changes() {
     assert_eq!(player.flags().count(), 2);
     player.go_to(0.08);
     assert_eq!(player.pending().machine.contact.friction, FRICTION);
-    assert_eq!(player.log().entries.len(), 1, "the link knows what was done until here");
+    assert_eq!(player.log().entries.len(), 1, "the link contains the changes up to here");
     player.set_playing(true);
-    let left = player.abandoned_future().expect("left");
-    assert_eq!((left.from, left.to), (0.08, 0.15_f64.max(left.to)));
-    assert_eq!(left.flags.len(), 1);
+    let former = player.abandoned_future().expect("a former future");
+    assert_eq!((former.from, former.to), (0.08, 0.15_f64.max(former.to)));
+    assert_eq!(former.flags.len(), 1);
     assert_eq!(player.flags().count(), 1);
     player.run_to(0.16);
-    let mut straight = self::player("spcmm");
-    let _ = run_with(&mut straight, &CHANGES[..1], 0.08);
-    straight.run_to(0.16);
-    assert_eq!(player.simulation().state_hash(), straight.simulation().state_hash());
+    let mut uninterrupted = self::player("spcmm");
+    let _ = run_with(&mut uninterrupted, &CHANGES[..1], 0.08);
+    uninterrupted.run_to(0.16);
+    assert_eq!(player.simulation().state_hash(), uninterrupted.simulation().state_hash());
 }
 
 /// Ball joint, start and peak time of every impact of an independent run up to `to`, s, sorted by peak time.
 fn peaks_of_run(player: &Player, to: f64) -> Vec<(usize, f64, f64)> {
-    let mut alone = Simulation::new(&player.running().machine).expect("starts");
+    let mut simulation = Simulation::new(&player.running().machine).expect("starts");
     let (mut peaks, mut steps, mut impacts) = (Vec::new(), Vec::new(), Vec::new());
-    while alone.time() < to {
-        alone.step().expect("runs");
-        alone.take_peaks(&mut peaks);
+    while simulation.time() < to {
+        simulation.step().expect("runs");
+        simulation.take_peaks(&mut peaks);
         steps.extend(peaks.iter().copied().enumerate());
-        alone.take_impacts(&mut impacts);
+        simulation.take_impacts(&mut impacts);
     }
     let top = |impact: &crate::simulate::Impact| {
         let within =
@@ -667,21 +667,21 @@ fn peaks_of_run(player: &Player, to: f64) -> Vec<(usize, f64, f64)> {
         assert_eq!(top.normal, impact.peak);
         (impact.joint, impact.start, top.time)
     };
-    let mut tops: Vec<_> = impacts.iter().map(top).collect();
-    tops.sort_by(|a, b| a.2.total_cmp(&b.2));
-    tops
+    let mut impact_peaks: Vec<_> = impacts.iter().map(top).collect();
+    impact_peaks.sort_by(|a, b| a.2.total_cmp(&b.2));
+    impact_peaks
 }
 
 #[test]
-fn next_and_previous_impact_go_to_its_peak() {
+fn navigation_to_the_next_or_previous_impact_ends_at_its_peak() {
     let mut player = player("spcmm");
-    let tops = peaks_of_run(&player, 80e-3);
-    let known = 60e-3;
-    player.run_to(known);
+    let impact_peaks = peaks_of_run(&player, 80e-3);
+    let end = 60e-3;
+    player.run_to(end);
     player.go_to(0.0);
     let reached = player.reached();
     // Later impacts may still be in progress.
-    let before: Vec<_> = tops.iter().filter(|top| top.2 <= reached - 10e-3).collect();
+    let before: Vec<_> = impact_peaks.iter().filter(|top| top.2 <= reached - 10e-3).collect();
     assert!(before.len() >= 6);
     // The first impact of the paper's mechanism.
     assert!((before[0].2 - 7.86e-3).abs() < 0.05e-3, "{before:?}");
@@ -689,7 +689,7 @@ fn next_and_previous_impact_go_to_its_peak() {
         player.go_to_impact(None, true);
         assert!(!player.is_seeking());
         assert_eq!(player.pacer.shown(), *time);
-        one_clock(&player);
+        assert_at_displayed_instant(&player);
         let (_, impact) = player.impact_record().in_progress(None, *time).expect("an impact");
         assert_eq!((impact.joint, impact.start), (*joint, *start));
         // The displayed force is the peak.
@@ -703,10 +703,10 @@ fn next_and_previous_impact_go_to_its_peak() {
     while player.is_seeking() {
         player.advance(1.0 / 60.0);
     }
-    let next = tops.iter().find(|top| top.2 > reached).expect("goes on");
+    let next = impact_peaks.iter().find(|top| top.2 > reached).expect("another impact");
     assert_eq!(player.pacer.shown(), next.2);
     assert!(!player.is_playing());
-    one_clock(&player);
+    assert_at_displayed_instant(&player);
     player.go_to(before[before.len() - 1].2 + 1e-9);
     for (_, _, time) in before.iter().rev() {
         player.go_to_impact(None, false);
@@ -715,16 +715,16 @@ fn next_and_previous_impact_go_to_its_peak() {
     player.go_to_impact(None, false);
     assert_eq!(player.pacer.shown(), 0.0);
     player.go_to_impact(Some(1), true);
-    let of_one = tops.iter().find(|top| top.0 == 1).expect("hit");
+    let of_one = impact_peaks.iter().find(|top| top.0 == 1).expect("hit");
     assert_eq!(player.pacer.shown(), of_one.2);
 }
 
 #[test]
 fn an_impact_in_progress_is_continued_to_its_peak() {
     let mut player = player("spcmm");
-    let tops = peaks_of_run(&player, 20e-3);
-    let first = tops[0];
-    // Halfway up the rise, searched from there and from the start.
+    let impact_peaks = peaks_of_run(&player, 20e-3);
+    let first = impact_peaks[0];
+    // Halfway up the rise; the search starts from there and from the start of the run.
     let rising = 0.5 * (first.1 + first.2);
     player.run_to(rising);
     player.go_to_impact(Some(first.0), false);
@@ -751,7 +751,7 @@ fn an_impact_in_progress_is_continued_to_its_peak() {
         player.advance(1.0 / 60.0);
     }
     let number = player.impact_record().in_progress(Some(first.0), player.pacer.shown()).map(|(number, _)| number);
-    let before = tops.iter().filter(|top| top.2 < player.pacer.shown()).count() as u64;
+    let before = impact_peaks.iter().filter(|top| top.2 < player.pacer.shown()).count() as u64;
     assert!(number.is_some_and(|number| number > 1), "{number:?}, {before}");
 }
 
@@ -769,7 +769,7 @@ fn the_search_for_an_impact_ends_in_a_run_without_further_impacts() {
     }
     let shown = player.pacer.shown();
     assert!(shown >= 5.4 - 1e-9 || player.impact_record().next_peak(None, latest, true).is_some(), "{shown}");
-    one_clock(&player);
+    assert_at_displayed_instant(&player);
     // The balls rest on their walls: their last impacts have no end.
     assert!(player.impact_record().in_progress(None, shown).is_none());
     player.go_to_impact(None, false);
@@ -781,9 +781,9 @@ fn the_search_for_an_impact_ends_in_a_run_without_further_impacts() {
 #[test]
 fn the_wear_map_includes_only_completed_steps() {
     let mut player = player("spcmm");
-    let kept = |player: &Player| player.wear().expect("kept").clone();
+    let wear_map = |player: &Player| player.wear().expect("tracked").clone();
     let contacts = |player: &Player| -> u64 {
-        let wear = kept(player);
+        let wear = wear_map(player);
         let cells = (0..3).flat_map(|j| wear.cells(j));
         cells.map(|cell| cell.contacts).sum()
     };
@@ -795,29 +795,29 @@ fn the_wear_map_includes_only_completed_steps() {
         player.advance(1.0 / 60.0);
         let shown = player.pacer.shown();
         // The first contacts of S1, S2 and S3 (`tests/physics/reference.rs`), within the tolerance of the preset.
-        let begun = [7.80142e-3, 7.80768e-3, 7.80781e-3];
-        if begun.iter().all(|time: &f64| (time - shown).abs() > 1e-6) {
-            let expected = begun.iter().filter(|time| **time < shown).count();
+        let first_contacts = [7.80142e-3, 7.80768e-3, 7.80781e-3];
+        if first_contacts.iter().all(|time: &f64| (time - shown).abs() > 1e-6) {
+            let expected = first_contacts.iter().filter(|time| **time < shown).count();
             assert_eq!(contacts(&player), expected as u64, "t = {shown}");
         }
         let computed: u64 = player.simulation().statistics().impacts.iter().sum();
         ahead += usize::from(computed > contacts(&player));
     }
-    assert!(ahead > 0, "the run itself was further on");
+    assert!(ahead > 0, "the run is ahead of the displayed instant");
     player.set_playing(false);
     player.single_step();
-    let before = kept(&player);
+    let before = wear_map(&player);
     for _ in 0..30 {
         player.single_step();
     }
-    assert!(kept(&player) != before);
+    assert!(wear_map(&player) != before);
     for _ in 0..30 {
         player.step_back();
     }
-    assert!(kept(&player) == before);
+    assert!(wear_map(&player) == before);
     player.reset().expect("starts");
     assert_eq!(contacts(&player), 0);
-    let after = kept(&player);
+    let after = wear_map(&player);
     assert!(after.cells(0).iter().all(|cell| cell.impulse == 0.0));
 }
 
@@ -835,14 +835,14 @@ fn a_preset_chosen_live_replaces_solver_keys_set_by_name() {
 }
 
 #[test]
-fn a_refused_value_changes_nothing() {
+fn a_rejected_value_changes_nothing() {
     let mut player = player("spcmm");
     let before = player.pending().machine.contact;
     assert!(player.set("contact.clearance", "-1 mm").is_err());
     assert!(player.set("contact.clearence", "1 mm").is_err());
     assert_eq!(player.pending().machine.contact, before);
     player.set("contact.clearance", "0.7 mm").expect("in range");
-    player.set_original("contact.clearance").expect("the scene's own");
+    player.set_original("contact.clearance").expect("the value of the scene");
     assert_eq!(player.pending().machine.contact, before);
 }
 
@@ -850,10 +850,10 @@ fn a_refused_value_changes_nothing() {
 fn the_duration_of_frames_changes_the_steps_per_frame_and_no_bit() {
     fn slow() -> f64 {
         thread_local! {
-            static LOOKS: std::cell::Cell<f64> = const { std::cell::Cell::new(0.0) };
+            static CLOCK_READING: std::cell::Cell<f64> = const { std::cell::Cell::new(0.0) };
         }
-        LOOKS.set(LOOKS.get() + 1e-3);
-        LOOKS.get()
+        CLOCK_READING.set(CLOCK_READING.get() + 1e-3);
+        CLOCK_READING.get()
     }
     let mut counts = Vec::new();
     for frames in [&[1.0 / 60.0][..], &[0.4], &[0.9, 0.02, 3.0, 0.1, 0.1]] {
@@ -864,11 +864,11 @@ fn the_duration_of_frames_changes_the_steps_per_frame_and_no_bit() {
         for dt in frames.iter().cycle().take(12) {
             player.advance(*dt);
         }
-        let mut straight = Simulation::new(&player.running().machine).expect("starts");
-        while straight.statistics().steps < player.steps() {
-            straight.step().expect("runs");
+        let mut uninterrupted = Simulation::new(&player.running().machine).expect("starts");
+        while uninterrupted.statistics().steps < player.steps() {
+            uninterrupted.step().expect("runs");
         }
-        assert_eq!(player.simulation().state_hash(), straight.state_hash());
+        assert_eq!(player.simulation().state_hash(), uninterrupted.state_hash());
         counts.push(player.steps());
     }
     assert!(counts[1] > 10 * counts[0], "{counts:?}");
