@@ -1,5 +1,5 @@
-//! A body hangs in a socket by a ball with 0.2 mm of play. It is let go at the centre of the socket, falls on its wall and rattles
-//! there: one line per impact, with the restitution that resulted beside the one its force law predicts.
+//! A body hangs in a socket by a ball with 0.2 mm of play. It is released at the centre of the socket, falls on the wall and
+//! rattles there. Prints one line per impact, with the effective restitution beside the one that the force law predicts.
 //!
 //!     cargo run --example fall_and_rattle
 
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut simulation = Simulation::new(&machine)?;
     let mut impacts = Vec::new();
-    println!("  begins   approach   largest force   restitution   of its law");
+    println!("   start   approach   largest force   restitution   of its law");
     while impacts.len() < 8 {
         let first_new = impacts.len();
         simulation.step()?;

@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     live.sample_now(&mut frame);
     assert_eq!(frame.joints[0].clearance, 0.5e-3);
 
-    // Until the ball lies on the wall of the larger socket.
+    // Until the ball rests on the wall of the larger socket.
     live.advance_to(1.0)?;
     assert_eq!(live.set("contact.clearance", "0.1 mm")?, Effect::Now);
     let changed = live.time();

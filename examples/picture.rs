@@ -13,8 +13,8 @@ use jointplay_scene::Scene;
 const SIZE: [u32; 2] = [640, 360];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let named = std::env::args_os().nth(1).map(PathBuf::from);
-    let file = named.unwrap_or_else(|| std::env::temp_dir().join("jointplay-pendulum.png"));
+    let argument = std::env::args_os().nth(1).map(PathBuf::from);
+    let file = argument.unwrap_or_else(|| std::env::temp_dir().join("jointplay-pendulum.png"));
 
     let scene = Scene::load("pendulum", &[])?;
     let mut simulation = Simulation::new(&scene.machine)?;
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     simulation.advance_to(0.5)?;
     simulation.sample(0.5, &mut frame);
 
-    // What is drawn is a list of plain data, made of the scene and one instant of it. Only `Offscreen` knows the graphics card.
+    // The draw list is plain data, built from the scene and one instant of its motion. Only `Offscreen` knows the graphics card.
     let view = SceneView::new(&scene, &frame);
     let (options, mut marks) = (ViewOptions::default(), PeakMarks::new());
     marks.update(&frame, &[], f64::INFINITY);
@@ -46,7 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::write(&file, image.png(&[("Title", "A pendulum with play")])?)?;
     println!("{}x{} pixels by {}: {}", image.width, image.height, offscreen.adapter(), file.display());
 
-    // There is something to see: the middle of the picture is not all of its background.
+    // The picture is not empty: many pixels differ from the background.
     let background = image.pixel(0, 0);
     let drawn = (0..SIZE[0] * SIZE[1]).filter(|&i| image.pixel(i % SIZE[0], i / SIZE[0]) != background).count();
     assert!(drawn > 1000, "{drawn} pixels");

@@ -1,5 +1,5 @@
 //! A slider-crank built in code instead of read from a scene file. The crank turns five times a second; the ball at its pin is ideal,
-//! the one at the slider has 0.1 mm of play. Where in the turn is that joint loaded most?
+//! the one at the slider has 0.1 mm of play. At which crank angle is that joint loaded most?
 //!
 //!     cargo run --example slider_crank_in_code
 
@@ -20,7 +20,7 @@ const LENGTH: f64 = 0.2;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let inertia = |x: f64, y: f64, z: f64| Mat3::from_diagonal(&Vec3::new(x, y, z));
-    // The frame of the crank is in its hinge, that of the rod in its middle with x along it.
+    // The crank has its frame at its hinge; the rod has its frame at its middle, with x along the rod.
     let crank = Body::new("crank", 0.3, inertia(1e-5, 1e-4, 1e-4));
     let rod = Body::new("rod", 0.2, inertia(1e-5, 7e-4, 7e-4));
     let slider = Body::new("slider", 0.5, inertia(2e-4, 2e-4, 2e-4));
@@ -40,12 +40,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             Joint::prismatic(None, SLIDER, Vec3::x()).with_start(RADIUS + LENGTH, 0.0),
         ],
         ball_joints: vec![pin.with_clearance(0.0), loose.with_clearance(0.1e-3)],
-        // The positions above are guesses, and the velocities follow from the drive.
+        // The positions above are initial guesses; the velocities follow from the drive.
         start: StartRule::Ideal,
         ..Machine::default()
     };
 
-    // The first half second is a transient. Peaks are those since they were last taken.
+    // The first half second is a transient. Each call of `take_peaks` returns the peaks since the previous call.
     let mut simulation = Simulation::new(&machine)?;
     let mut peaks = Vec::new();
     simulation.advance_to(0.5)?;
@@ -56,11 +56,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("the loose joint begins {} contacts in half a second", peak.impacts);
     println!("largest force {:.0} N, where the crank is at {:.0}°", peak.normal, (360.0 * TURNS * peak.time) % 360.0);
 
-    // Whole turns later the slider is back at its dead centre, but for the play.
+    // After whole turns the slider is back at its dead centre, apart from the play.
     let mut frame = Frame::default();
     simulation.sample(1.0, &mut frame);
-    let reach = frame.bodies[SLIDER].position.x;
-    assert!((reach - (RADIUS + LENGTH)).abs() < 0.2e-3);
+    let slider_position = frame.bodies[SLIDER].position.x;
+    assert!((slider_position - (RADIUS + LENGTH)).abs() < 0.2e-3);
     assert!(peak.normal > 100.0 && peak.impacts > 1);
     Ok(())
 }

@@ -3,9 +3,9 @@
 #
 #     examples/sweep-parallel.sh SHARDS FILE.npz SCENE --vary … --periods P --discard D …
 #
-# JOINTPLAY names the program (default: jointplay), PARALLEL_OPTIONS what else parallel is told, e.g. "--jobs 4" or
-# "--sshloginfile nodes" for machines that share this folder. After an interruption the same command goes on: shards that
-# are done stay, one that was under way goes on from its own partial file.
+# JOINTPLAY names the program (default: jointplay), PARALLEL_OPTIONS further options for parallel, e.g. "--jobs 4" or
+# "--sshloginfile nodes" for machines that share this folder. After an interruption the same command resumes: finished shards
+# remain, and an unfinished shard resumes from its own partial file.
 set -euo pipefail
 
 if (($# < 3)); then
@@ -24,7 +24,7 @@ for ((k = 1; k <= shards; k++)); do
 done
 if ((${#missing[@]})); then
     read -ra options <<< "${PARALLEL_OPTIONS:-}"
-    # -q: the words reach the program as they are. --halt: the first failure ends it and is its exit code.
+    # -q: the arguments are passed unchanged. --halt: the first failure ends the run and is its exit code.
     parallel --will-cite -q --halt now,fail=1 "${options[@]}" \
         "$jointplay" sweep "$@" --shard "{}/$shards" --threads 1 --quiet --out "$folder/{}.npz" ::: "${missing[@]}" \
         > /dev/null

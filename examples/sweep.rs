@@ -1,6 +1,6 @@
 //! A bifurcation table: the driven slider-crank with little friction, for three clearances. Once per turn of the crank the slider's
 //! position is recorded (a Poincaré section): the less regular the motion, the wider these positions spread, and the faster
-//! neighbouring motions part (largest Lyapunov exponent). A study takes more values and at least forty periods of each.
+//! neighbouring motions diverge (largest Lyapunov exponent). A study needs more values and at least forty periods of each.
 //!
 //!     cargo run --example sweep
 
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     println!("{:26} {:>16} {:>10} {:>12} {:>8}", "", "exponent", "regime", "spread of x", "peak");
     let mut rows = Vec::new();
-    // Blocks are independent: a larger sweep gives each of its threads some of them.
+    // Blocks are independent, so a larger sweep distributes them over its threads.
     for block in 0..sweep.design().blocks() {
         let mut run = sweep.begin(block);
         while !run.is_done() {

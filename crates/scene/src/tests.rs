@@ -67,7 +67,7 @@ fn changed(name: &str, changes: &[(&str, &str)]) -> Scene {
 }
 
 #[test]
-fn every_row_of_the_table_reads_writes_and_shows_its_default() {
+fn every_parameter_reads_writes_and_displays_its_default() {
     for parameter in table() {
         if parameter.default != Value::Unset {
             let text = parameter.write(&parameter.default);
@@ -86,7 +86,7 @@ fn every_row_of_the_table_reads_writes_and_shows_its_default() {
 }
 
 #[test]
-fn every_parameter_of_every_scene_can_be_read_and_set_to_what_it_is() {
+fn every_parameter_of_every_scene_can_be_read_and_set_to_the_same_value() {
     for name in BUILT_IN {
         let original = Scene::load(name, &[]).unwrap();
         for parameter in original.parameters() {
@@ -105,7 +105,7 @@ fn every_parameter_of_every_scene_can_be_read_and_set_to_what_it_is() {
 }
 
 #[test]
-fn a_joint_s_own_value_beats_the_scene_s_whichever_is_set_last() {
+fn a_joint_value_overrides_the_scene_value_whichever_is_set_last() {
     let orders = [["joint.S1.clearance", "contact.clearance"], ["contact.clearance", "joint.S1.clearance"]];
     for [first, second] in orders {
         let value = |key: &str| {
@@ -118,7 +118,7 @@ fn a_joint_s_own_value_beats_the_scene_s_whichever_is_set_last() {
         assert_eq!(scene.get("joint.S2.clearance"), Ok(Value::Number(0.1e-3)));
         assert_eq!(scene.overrides[0], ["clearance"]);
     }
-    // The file's own override at B stays.
+    // The override at B in the file is unaffected.
     let scene = changed("slider-crank", &[("contact.clearance", "0.5 mm")]);
     assert_eq!(scene.machine.ball_joints[0].contact.clearance, 0.0);
     assert_eq!(scene.machine.ball_joints[1].contact.clearance, 0.5e-3);
@@ -135,7 +135,7 @@ fn the_last_of_two_changes_wins_and_only_the_result_is_checked() {
 }
 
 #[test]
-fn explicit_solver_settings_beat_a_preset_in_either_order() {
+fn explicit_solver_settings_override_a_preset_in_either_order() {
     let preset = ("solver.preset", "reference");
     let method = ("solver.method", "rk4");
     for changes in [[preset, method], [method, preset]] {
@@ -148,14 +148,14 @@ fn explicit_solver_settings_beat_a_preset_in_either_order() {
     let file = text("[solver]\ntolerance = 1e-5\npreset = \"accurate\"");
     assert_eq!(Scene::parse(&file, None, &[]).unwrap().machine.solver.tolerance, 1e-5);
     // A preset requested later does not replace explicit settings of the file either.
-    let ask = [("solver.preset".to_owned(), "reference".to_owned())];
-    let solver = Scene::parse(&file, None, &ask).unwrap().machine.solver;
+    let change = [("solver.preset".to_owned(), "reference".to_owned())];
+    let solver = Scene::parse(&file, None, &change).unwrap().machine.solver;
     assert_eq!(solver.tolerance, 1e-5);
     assert_eq!(solver.method, jointplay_physics::integrate::Method::DormandPrince5);
 }
 
 #[test]
-fn a_key_of_the_file_alone_says_so() {
+fn a_change_of_a_key_that_only_the_file_can_set_is_rejected_with_that_reason() {
     for key in ["closed_form.frequency", "output.body", "name", "title"] {
         let error = Scene::load("spcmm", &[(key.to_owned(), "1".to_owned())]).unwrap_err();
         assert!(error.message.starts_with("only in the scene file"), "{error}");
@@ -163,7 +163,7 @@ fn a_key_of_the_file_alone_says_so() {
 }
 
 #[test]
-fn a_drive_is_asked_for_in_the_unit_of_its_joint() {
+fn a_missing_drive_value_is_requested_in_the_unit_of_its_joint() {
     for (kind, like) in [("revolute", "10 deg"), ("prismatic", "10 mm")] {
         let text = format!(
             "[[body]]\nname = \"rod\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
@@ -176,7 +176,7 @@ fn a_drive_is_asked_for_in_the_unit_of_its_joint() {
 }
 
 #[test]
-fn presets_say_in_their_help_what_they_are() {
+fn the_help_of_the_presets_states_their_settings() {
     let help = table().iter().find(|p| p.key == "solver.preset").unwrap().help;
     for preset in Preset::ALL {
         for loose in [1, Preset::MANY_JOINTS] {
@@ -191,7 +191,7 @@ fn presets_say_in_their_help_what_they_are() {
 }
 
 #[test]
-fn a_change_can_be_taken_back() {
+fn a_change_can_be_undone() {
     let mut scene = changed("spcmm", &[("joint.S1.friction", "0"), ("contact.friction", "0.4")]);
     scene.undo_change("joint.S1.friction").unwrap();
     assert_eq!(scene.get("joint.S1.friction"), Ok(Value::Number(0.4)));
@@ -201,7 +201,7 @@ fn a_change_can_be_taken_back() {
 }
 
 #[test]
-fn a_chain_is_rebuilt_with_its_links() {
+fn a_chain_is_rebuilt_when_its_number_of_links_changes() {
     let mut scene = changed("chain", &[("joint.J2.friction", "0.4"), ("joint.J7.friction", "0.5")]);
     assert_eq!((scene.machine.bodies.len(), scene.machine.ball_joints.len()), (8, 8));
     scene.set("chain.links", "3").unwrap();
@@ -209,7 +209,7 @@ fn a_chain_is_rebuilt_with_its_links() {
     assert_eq!(scene.machine.ball_joints[1].contact.friction, 0.4);
     assert_eq!(scene.machine.output.body, 2);
     assert_eq!(scene.get("chain.links"), Ok(Value::Count(3)));
-    // A change of a joint that no longer exists is dropped with it.
+    // A change of a joint that no longer exists is dropped, too.
     assert!(scene.get("joint.J7.friction").is_err());
     assert_eq!(scene.changes.len(), 2);
     scene.set("chain.links", "9").unwrap();
@@ -232,7 +232,7 @@ fn a_copy_of_a_pattern_refers_to_the_previous_one() {
     let mut scene = Scene::parse(text, None, &[]).unwrap();
     let parents = |scene: &Scene| scene.machine.joints.iter().map(|joint| joint.parent).collect::<Vec<_>>();
     assert_eq!(parents(&scene), [None, Some(0), Some(1)]);
-    // Coordinates of the previous bar are its own, and do not shift with the copy.
+    // Coordinates on the previous bar are in its frame and do not shift with the copy.
     assert!(scene.machine.joints[1..].iter().all(|joint| joint.parent_point == Vec3::new(0.0, 0.0, -1.0)));
     let springs: Vec<&str> = scene.machine.elements.iter().map(|element| &*element.name).collect();
     assert_eq!(springs, ["k2", "k3"]);
@@ -255,11 +255,11 @@ fn the_slider_plane_moves_sliders_and_rails() {
 }
 
 #[test]
-fn doubtful_choices_are_warned_of() {
+fn doubtful_parameter_values_cause_warnings() {
     assert!(changed("spcmm", &[]).machine.warnings().is_empty());
     let warnings = changed("spcmm", &[("contact.restitution", "0.3")]).machine.warnings();
     assert!(warnings.len() == 1 && warnings[0].to_string().contains("S1, S2, S3: restitution 0.3"), "{warnings:?}");
-    for (law, asked, given) in [
+    for (law, requested, effective) in [
         ("lankarani-nikravesh", "0.9", None),
         ("lankarani-nikravesh", "0.8", Some("0.847")),
         ("hunt-crossley", "0.8", Some("0.833")),
@@ -270,13 +270,14 @@ fn doubtful_choices_are_warned_of() {
         ("gonthier", "0.1", None),
     ] {
         let warnings =
-            changed("spcmm", &[("contact.restitution", asked), ("contact.normal_law", law)]).machine.warnings();
-        let said: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-        match given {
-            None => assert_eq!(said, [""; 0], "{law} {asked}"),
-            Some(given) => assert!(
-                said.len() == 1 && said[0].contains(&format!("restitution {asked} with {law} gives {given} ")),
-                "{law} {asked}: {said:?}"
+            changed("spcmm", &[("contact.restitution", requested), ("contact.normal_law", law)]).machine.warnings();
+        let texts: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+        match effective {
+            None => assert_eq!(texts, [""; 0], "{law} {requested}"),
+            Some(effective) => assert!(
+                texts.len() == 1
+                    && texts[0].contains(&format!("restitution {requested} with {law} gives {effective} ")),
+                "{law} {requested}: {texts:?}"
             ),
         }
     }
@@ -288,7 +289,7 @@ fn doubtful_choices_are_warned_of() {
 }
 
 #[test]
-fn the_built_in_scenes_carry_the_published_numbers() {
+fn the_built_in_scenes_have_the_published_numbers() {
     let scene = changed("spcmm", &[]);
     let find = |name: &str| scene.machine.bodies.iter().find(|body| body.name == name).unwrap();
     assert_eq!(find("platform").inertia.diagonal(), Vec3::new(4.44e-4, 3.31e-4, 1.35e-4));
@@ -308,14 +309,14 @@ fn the_built_in_scenes_carry_the_published_numbers() {
 }
 
 #[test]
-fn the_slider_crank_starts_with_velocities_that_fit_together() {
+fn the_slider_crank_starts_with_consistent_velocities() {
     let scene = changed("slider-crank", &[]);
     let rod = scene.machine.bodies.iter().position(|body| body.name == "rod").unwrap();
     let JointStart::Pose { rotation, velocity, angular_velocity, .. } = scene.machine.joints[rod].start else {
         panic!("the rod is free")
     };
     let end = |x: f64| velocity + angular_velocity.cross(&(rotation * Vec3::new(x, 0.0, 0.0)));
-    // Crank pin: 6 rad/s times 0.08 m against Y; slider: 0.24 m/s along X.
+    // Crank pin: 6 rad/s times 0.08 m along -Y; slider: 0.24 m/s along X.
     assert!((end(-0.15) - Vec3::new(0.0, -0.48, 0.0)).norm() < 1e-15);
     assert!((end(0.15) - Vec3::new(0.24, 0.0, 0.0)).norm() < 1e-15);
     assert!(angular_velocity.dot(&(rotation * Vec3::x())).abs() < 1e-15);
@@ -359,7 +360,7 @@ fn all_forms_of_a_rotation_agree() {
 }
 
 /// A rod on a slide, with a user-defined parameter.
-const OWN: &str = "
+const SCENE_WITH_PARAMETERS: &str = "
 [[parameter]]
 name = \"stroke\"
 label = \"Stroke\"
@@ -387,8 +388,8 @@ start = { position = \"0.5 * stroke\", velocity = \"speed\" }
 ";
 
 #[test]
-fn every_number_of_a_file_is_a_key() {
-    let scene = Scene::parse(OWN, None, &[]).expect("reads");
+fn every_number_in_a_file_has_a_key() {
+    let scene = Scene::parse(SCENE_WITH_PARAMETERS, None, &[]).expect("reads");
     let joint = |scene: &Scene| (scene.machine.joints[0].parent_point, scene.machine.joints[0].start);
     let start = |position, velocity| JointStart::Scalar { position, velocity };
     assert_eq!(joint(&scene), (Vec3::new(0.01, 0.0, -0.03), start(0.01, 0.04)));
@@ -410,7 +411,7 @@ fn every_number_of_a_file_is_a_key() {
     assert_eq!((changed.machine.bodies[0].mass, changed.machine.bodies[0].centre.y), (3.0, 0.007));
     assert_eq!(changed.get("parameter.speed"), Ok(Value::Number(0.08)));
     // Changed values are replaced in place; nothing else changes.
-    let text = changed.to_toml().expect("has its places");
+    let text = changed.to_toml().expect("can be written back");
     for line in [
         "value = \"40 mm\"",
         "mass = \"3 kg\" # a comment",
@@ -427,8 +428,8 @@ fn every_number_of_a_file_is_a_key() {
 }
 
 #[test]
-fn a_parameter_of_the_file_is_a_row_like_the_others() {
-    let scene = Scene::parse(OWN, None, &[]).expect("reads");
+fn a_user_parameter_is_listed_like_the_built_in_ones() {
+    let scene = Scene::parse(SCENE_WITH_PARAMETERS, None, &[]).expect("reads");
     let rows = scene.parameters();
     let row = rows.iter().find(|row| row.key == "parameter.stroke");
     let row = row.expect("listed");
@@ -440,13 +441,13 @@ fn a_parameter_of_the_file_is_a_row_like_the_others() {
 }
 
 #[test]
-fn wrong_numbers_and_expressions_say_what_is_wrong() {
+fn errors_in_numbers_and_expressions_state_the_cause() {
     let error = |from: &str, to: &str| {
-        let text = OWN.replace(from, to);
-        assert_ne!(text, OWN);
+        let text = SCENE_WITH_PARAMETERS.replace(from, to);
+        assert_ne!(text, SCENE_WITH_PARAMETERS);
         Scene::parse(&text, Some("own.toml"), &[]).expect_err(to).to_string()
     };
-    for (from, to, wanted) in [
+    for (from, to, cause) in [
         ("\"stroke / 2\"", "\"strok / 2\"", "no variable `strok` (did you mean `stroke`?)"),
         ("\"stroke / 2\"", "\"stroke * stroke\"", "gives 0.0004 m^2, which is not in m; units m, cm"),
         ("\"stroke / 2\"", "\"stroke + speed\"", "adds or compares quantities of different dimensions"),
@@ -466,13 +467,13 @@ fn wrong_numbers_and_expressions_say_what_is_wrong() {
         ("unit = \"mm/s\"\n", "", "its unit cannot be told from an expression"),
     ] {
         let error = error(from, to);
-        assert!(error.contains(wanted) && error.starts_with("own.toml:"), "{error}");
+        assert!(error.contains(cause) && error.starts_with("own.toml:"), "{error}");
     }
     let change = |key: &str, value: &str| {
         let change = (key.to_owned(), value.to_owned());
-        Scene::parse(OWN, None, &[change]).expect_err(key).to_string()
+        Scene::parse(SCENE_WITH_PARAMETERS, None, &[change]).expect_err(key).to_string()
     };
-    for (key, value, wanted) in [
+    for (key, value, cause) in [
         ("parameter.stroke", "5 mm", "parameter.stroke = 5 mm: out of range; allowed 10 mm to 50 mm"),
         ("body.rod.mass", "-1 kg", "body.rod.mass = -1 kg: out of range; allowed above 0"),
         ("body.rod.mass", "1", "body.rod.mass = 1: needs a unit"),
@@ -481,7 +482,7 @@ fn wrong_numbers_and_expressions_say_what_is_wrong() {
         ("body.rod.centre", "0 0 0 mm", "body.rod.centre = 0 0 0 mm: unknown key"),
     ] {
         let error = change(key, value);
-        assert!(error.contains(wanted), "{error}");
+        assert!(error.contains(cause), "{error}");
     }
 }
 
@@ -543,7 +544,7 @@ role = \"frame\"
         let joint = &scene.machine.ball_joints[copy];
         assert_eq!(joint.name, format!("S{}", copy + 1));
         near(joint.socket.point, place);
-        // In the rod's own frame nothing moves.
+        // Points in the rod's frame are the same in every copy.
         near(joint.ball.point, Vec3::new(0.0, 0.0, 0.001));
         near(joint.opening, radial);
         assert_eq!(joint.ball.body, Some(copy + 1));
@@ -563,15 +564,15 @@ role = \"frame\"
         };
         near(centre, place);
     }
-    // A box that turns is the plate of its shape.
+    // A rotated box becomes a plate of the same shape.
     let boxes = text.replace("form = \"sphere\"", "form = \"box\"").replace("radius = \"1 mm\"", "size = \"2 4 6 mm\"");
     let boxes = Scene::parse(&boxes, None, &[]).expect("reads").machine.fixed_shapes;
     let Geometry::Box { centre, .. } = boxes[0].geometry else {
-        panic!("the first copy does not turn");
+        panic!("the first copy is not rotated");
     };
     near(centre, Vec3::new(0.02, 0.0, 0.0));
     let Geometry::Plate { corners, triangles, thickness } = &boxes[1].geometry else {
-        panic!("the second copy turns");
+        panic!("the second copy is rotated");
     };
     let angle = std::f64::consts::TAU / 3.0;
     let (x, y) =
@@ -584,9 +585,9 @@ role = \"frame\"
     let mut changed = scene.clone();
     changed.set("body.rod2.mass", "9 kg").expect("a key");
     assert_eq!(changed.machine.bodies[2].mass, 9.0);
-    let error = changed.to_toml().expect_err("has no place of its own");
+    let error = changed.to_toml().expect_err("cannot be written back");
     assert!(error.message.contains("every copy of a pattern has it"), "{error}");
-    for (from, to, wanted) in [
+    for (from, to, cause) in [
         ("count = 3", "count = 0", "out of range; allowed 1 to 10000"),
         (
             "about = { point = \"10 0 0 mm\", axis = [0, 0, 1] }\nalong = \"0 0 5 mm\"\n",
@@ -597,12 +598,12 @@ role = \"frame\"
         ("count = 3", "count = 3\nsize = 2", "unknown key"),
     ] {
         let error = Scene::parse(&text.replace(from, to), None, &[]).expect_err(to);
-        assert!(error.message.contains(wanted), "{error}");
+        assert!(error.message.contains(cause), "{error}");
     }
 }
 
 #[test]
-fn a_file_takes_its_parts_from_others() {
+fn a_scene_file_includes_parts_from_other_files() {
     let leg = "
 [[parameter]]
 name = \"reach\"
@@ -629,8 +630,8 @@ ball = { body = \"leg\" }
 ";
     let with = |leg: &str, text: &str, changes: &[(&str, &str)]| {
         let beside = Texts::from([("leg.toml".to_owned(), Arc::from(leg))]);
-        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
-        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        let owned = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(owned).collect();
         Scene::parse_with(text, Some("scene.toml"), &beside, &changes)
     };
     let mut scene = with(leg, text, &[("body.leg.mass", "3 kg")]).expect("reads");
@@ -642,7 +643,7 @@ ball = { body = \"leg\" }
     assert_eq!(scene.machine.bodies[0].mass, 3.0);
     let error = scene.to_toml().expect_err("two files").to_string();
     assert!(error.contains("another file, which this one includes"), "{error}");
-    for (leg, text, place, wanted) in [
+    for (leg, text, place, cause) in [
         (leg.replace("2 kg", "2"), text.to_owned(), "leg.toml:8:8: body.leg.mass", "needs a unit"),
         (leg.replace("[[body]]", "[[body"), text.to_owned(), "leg.toml:6:7: ", "not valid TOML"),
         (
@@ -684,13 +685,13 @@ ball = { body = \"leg\" }
             "in line 12 of leg.toml",
         ),
     ] {
-        let error = with(&leg, &text, &[]).expect_err(wanted).to_string();
-        assert!(error.starts_with(place) && error.contains(wanted), "{error}");
+        let error = with(&leg, &text, &[]).expect_err(cause).to_string();
+        assert!(error.starts_with(place) && error.contains(cause), "{error}");
     }
 }
 
 #[test]
-fn a_body_of_a_density_weighs_what_its_shapes_do() {
+fn a_body_with_a_density_has_the_mass_of_its_shapes() {
     let text = |body: &str| {
         format!(
             "[[body]]\nname = \"bar\"\n{body}\n[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"bar\"\nstart = {{ position = [0, 0, 0] }}\n"
@@ -704,7 +705,7 @@ fn a_body_of_a_density_weighs_what_its_shapes_do() {
     let moments = Vec3::new(0.01 * 0.01 + 0.02 * 0.02, 0.1 * 0.1 + 0.01 * 0.01, 0.1 * 0.1 + 0.02 * 0.02);
     let expected = Mat3::from_diagonal(&(moments * (0.157 / 12.0)));
     assert!((body.inertia - expected).amax() < 1e-18);
-    for (body, wanted) in [
+    for (body, cause) in [
         (
             format!("density = \"7850 kg/m^3\"\nmass = \"1 kg\"\n{bar}"),
             "bar.toml:4:8: body.bar.mass = \"1 kg\": not allowed here: it follows",
@@ -715,13 +716,13 @@ fn a_body_of_a_density_weighs_what_its_shapes_do() {
             "out of range; allowed above 0 up to 100000 kg/m^3; units kg/m^3, g/cm^3",
         ),
     ] {
-        let error = read(body).expect_err(wanted).to_string();
-        assert!(error.contains(wanted), "{error}");
+        let error = read(body).expect_err(cause).to_string();
+        assert!(error.contains(cause), "{error}");
     }
 }
 
 #[test]
-fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
+fn expressions_are_accepted_for_every_number_and_their_units_are_checked() {
     let text = |value: &str, more: &str| {
         format!(
             "[contact]\n{more}\n[[parameter]]\nname = \"radius\"\nvalue = \"50 mm\"\n[[parameter]]\nname = \"rate\"\nvalue = \"60 rpm\"\n\
@@ -757,7 +758,7 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
     let drive = |law: &str| format!("drive = {{ law = {law} }}");
     let spin = "\"constant\", velocity = \"rate\"";
     assert!(read(&drive(spin), "").is_ok());
-    for (value, more, wanted) in [
+    for (value, more, cause) in [
         (
             drive("\"harmonic\", amplitude = \"1 deg\", frequency = \"rate\""),
             "",
@@ -777,8 +778,8 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
         (String::new(), "friction = \"2 * radius\"", "gives 0.1 m, but must be a pure number; allowed 0 to 10"),
         (String::new(), "friction = \"2 * radiu\"", "no variable `radiu` (did you mean `radius`?)"),
     ] {
-        let error = read(&value, more).expect_err(wanted).to_string();
-        assert!(error.contains(wanted), "{error}");
+        let error = read(&value, more).expect_err(cause).to_string();
+        assert!(error.contains(cause), "{error}");
     }
     let unit = text("", "").replace("\"radius\"", "\"mm\"");
     let error = Scene::parse(&unit, None, &[]).expect_err("a unit").to_string();
@@ -786,7 +787,7 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
 }
 
 #[test]
-fn names_of_bodies_and_joints_in_a_pattern_are_apart() {
+fn bodies_and_joints_in_a_pattern_have_separate_namespaces() {
     let text = "
 [[body]]
 name = \"hub\"
@@ -830,7 +831,7 @@ stiffness = \"1 N m/rad\"
     let shapes = format!("shapes = [{}]\n\n[[pattern.joint]]", "0, ".repeat(9999));
     let many = text.replace("count = 3", "count = 10000");
     let many = many.replacen("[[pattern.joint]]", &shapes, 1);
-    let error = Scene::parse(&many, None, &[]).expect_err("a lot");
+    let error = Scene::parse(&many, None, &[]).expect_err("too many copies");
     assert!(error.message.contains("copies of"), "{error}");
     let twice = format!(
         "{text}[[pattern]]\nname = \"blades\"\ncount = 1\nalong = [0, 0, 0]\nfixed_shape = [{{ form = \"sphere\", centre = [0, 0, 0], radius = \"1 mm\", role = \"pin\" }}]\n"
@@ -851,11 +852,11 @@ fn a_fast_preset_follows_the_number_of_loose_balls_in_whatever_order_it_is_set()
     for changes in [[preset, ideal, one], [ideal, one, preset], [ideal, preset, one]] {
         assert_eq!(solver(&changes), Preset::RealTime.solver(1), "{changes:?}");
     }
-    // What is set by name stays.
-    let own = [preset, ("solver.steps_per_impact", "8"), ("solver.tolerance", "1e-5")];
-    let found = solver(&own);
-    assert_eq!((found.method, found.steps_per_impact, found.tolerance), (many.method, 8, 1e-5));
-    let mut scene = changed("hexapod", &own);
+    // Explicit settings are unaffected.
+    let explicit = [preset, ("solver.steps_per_impact", "8"), ("solver.tolerance", "1e-5")];
+    let result = solver(&explicit);
+    assert_eq!((result.method, result.steps_per_impact, result.tolerance), (many.method, 8, 1e-5));
+    let mut scene = changed("hexapod", &explicit);
     scene.undo_change("solver.steps_per_impact").unwrap();
     assert_eq!(scene.machine.solver.steps_per_impact, many.steps_per_impact);
     scene.set("contact.clearance", "0").unwrap();

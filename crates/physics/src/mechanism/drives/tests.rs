@@ -1,4 +1,4 @@
-//! Laws of drives against finite differences and closed solutions.
+//! Drive laws compared with finite differences and closed-form solutions.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ fn law(drive: &str) -> Arc<dyn Law> {
     let (freedom, drive) = joint.drives().next().expect("driven");
     match trajectory_of(drive, freedom.turns()) {
         Trajectory::Own(law) => law,
-        Trajectory::Function(_) => panic!("a law of its own"),
+        Trajectory::Function(_) => panic!("expected a drive law"),
     }
 }
 
@@ -78,8 +78,8 @@ proptest! {
             prop_assert!((rate - now.rate).abs() < 1e-2 * h * size, "{text} at {t}: {rate} {now:?}");
             // Where the rate has a corner, as at the ends of a table, the error is half the jump.
             let jump = (right.acceleration - left.acceleration).abs();
-            let off = (acceleration - now.acceleration).abs();
-            prop_assert!(off < 100.0 * h * size + jump, "{text} at {t}: {acceleration} {now:?}");
+            let deviation = (acceleration - now.acceleration).abs();
+            prop_assert!(deviation < 100.0 * h * size + jump, "{text} at {t}: {acceleration} {now:?}");
         }
     }
 
@@ -94,7 +94,7 @@ proptest! {
             let is_one_shot_table = text.contains("table") && !text.contains("repeat");
             let mut t = -1.0;
             while t < 4.0 {
-                // Either an instant at which the law changes, or any other.
+                // The next end of a step that the law requires, or an arbitrary instant before it.
                 let next = law.step_end(t).min(t + 0.1);
                 let eps = 1e-9;
                 let (left, right) = (law.at(next - eps), law.at(next + eps));
@@ -120,7 +120,7 @@ fn a_ramp_and_a_pulse_have_their_stated_values() {
     for t in [1.0, 3.0] {
         assert_eq!((ramp.at(t).rate, ramp.at(t).acceleration), (0.0, 0.0));
     }
-    // 30/16 of the mean rate at half time.
+    // Half-way, the rate is 30/16 of the mean.
     assert!((ramp.at(2.0).rate - 1.875).abs() < 1e-15);
     let pulse = law("law = \"pulse\", base = \"1 m\", height = \"4 mm\", start = \"1 s\", duration = \"10 ms\"");
     assert!((pulse.at(1.005).value - 1.004).abs() < 1e-15);
@@ -209,8 +209,8 @@ fn a_spline_reproduces_a_cubic_and_converges_with_the_fourth_order() {
             samples[n as usize].1 = samples[0].1;
             let spline = law(&format!("law = \"table\", repeat = {repeats}, points = [{}]", points(&samples)));
             let at = |i: u32| f64::from(i) / 1000.0;
-            let off = (0..1000).map(|i| (spline.at(at(i)).value - wave(at(i))).abs());
-            off.fold(0.0, f64::max)
+            let deviation = (0..1000).map(|i| (spline.at(at(i)).value - wave(at(i))).abs());
+            deviation.fold(0.0, f64::max)
         };
         let (coarse, fine) = (error(20), error(40));
         // Fourth order in the spacing.
@@ -221,8 +221,8 @@ fn a_spline_reproduces_a_cubic_and_converges_with_the_fourth_order() {
 
 #[test]
 fn a_periodic_table_repeats_on_both_sides_and_its_steps_end_at_its_points() {
-    let given = [(0.2, 0.0), (0.3, 1.0), (0.5, -1.0), (0.9, 0.0)];
-    let law = law(&format!("law = \"table\", repeat = true, points = [{}]", points(&given)));
+    let samples = [(0.2, 0.0), (0.3, 1.0), (0.5, -1.0), (0.9, 0.0)];
+    let law = law(&format!("law = \"table\", repeat = true, points = [{}]", points(&samples)));
     for n in 0..70 {
         let t = 0.2 + f64::from(n) / 100.0;
         for k in [-3.0, 1.0, 5.0, 1000.0] {
@@ -231,7 +231,7 @@ fn a_periodic_table_repeats_on_both_sides_and_its_steps_end_at_its_points() {
             assert!((here.rate - there.rate).abs() < 1e-7, "{t} {k}");
         }
     }
-    for (t, value) in given {
+    for (t, value) in samples {
         assert!((law.at(t).value - value).abs() < 1e-14);
     }
     let (mut t, mut steps) = (0.0, 0);
