@@ -58,7 +58,7 @@ impl Sheet {
             self.draw(&root)?;
             root.present().map_err(failed)?;
         }
-        // The page has the requested size; its content keeps the finer units. Round line joins, because mitred ones overshoot
+        // The page has the requested size; its content has the finer units. Round line joins, because mitred ones overshoot
         // peaks.
         let (fine_size, page_size) = (
             format!("width=\"{width}\" height=\"{height}\""),

@@ -254,8 +254,8 @@ fn freedoms(contents: &Summary) -> String {
 fn rows(contents: &Summary) -> String {
     match contents.dependent_rows {
         0 => contents.constraint_rows.to_string(),
-        1 => format!("{}, one of which the others imply", contents.constraint_rows),
-        more => format!("{}, {more} of which the others imply", contents.constraint_rows),
+        1 => format!("{}, one of which is redundant", contents.constraint_rows),
+        more => format!("{}, {more} of which are redundant", contents.constraint_rows),
     }
 }
 
@@ -299,7 +299,7 @@ fn computed_and_skipped(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<
             0 => "the motion that the drives prescribe, with the loops closed after each step".to_owned(),
             free => format!("differential equations of {} of freedom", count(free, "degree")),
         },
-        "differential equations: nothing is free, the drives prescribe the motion",
+        "differential equations: there is no degree of freedom, the drives prescribe the motion",
     );
     list(
         contents.contacts > 0,
@@ -313,7 +313,7 @@ fn computed_and_skipped(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<
     list(
         with_friction().next().is_some(),
         format!("friction at {}", names(with_friction())),
-        "friction: no contact has any",
+        "friction: no contact has friction",
     );
     list(
         contents.ideal_joints > 0,

@@ -22,10 +22,10 @@ pub fn restart_with_runtime_dir() {
     let mut arguments = std::env::args_os();
     let name = arguments.next().unwrap_or_else(|| program.clone().into());
     let error = Command::new(program).arg0(name).args(arguments).env(FOLDER, Path::new("/nonexistent")).exec();
-    // Continues despite the complaints.
+    // The program works without the folder, only with complaints.
     log::info!("cannot restart: {error}");
 }
 
-/// Other systems are not known to need it.
+/// Does nothing: no other system is known to need it.
 #[cfg(not(target_os = "linux"))]
 pub fn restart_with_runtime_dir() {}

@@ -1,4 +1,4 @@
-//! Why a command ended early, and the exit code that tells a script.
+//! Reason why a command ended early: a message, and the exit code for scripts.
 
 use crate::files::FileError;
 use crate::scene::SceneError;

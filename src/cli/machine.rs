@@ -1,4 +1,4 @@
-//! Name of the machine, without which timings mean nothing.
+//! Name of the machine, which belongs to every timing.
 
 /// Model of the processor, as far as the system reports it.
 pub fn name() -> String {
@@ -8,7 +8,7 @@ pub fn name() -> String {
     });
     let model = model.filter(|model| !model.is_empty());
     let system = format!("{} {}", std::env::consts::OS, std::env::consts::ARCH);
-    // An unoptimised build says nothing about the machine.
+    // Timings of an unoptimised build do not characterise the machine.
     let build = if cfg!(debug_assertions) { ", debug build" } else { "" };
     match model {
         Some(model) => format!("{model}, {system}{build}"),

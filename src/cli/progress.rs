@@ -37,7 +37,7 @@ pub fn bar(is_visible: bool, length: u64) -> ProgressBar {
 
 /// Reports the progress of `bar` until the work is over, whenever `wait` returns; `wait` gives the time since the start.
 fn report_periodically(bar: &WeakProgressBar, mut wait: impl FnMut() -> Duration, mut print: impl FnMut(&str)) {
-    // Progress before the first report may be from an earlier run, and says nothing about the speed.
+    // Progress before the first report may be from an earlier run, so it does not count for the speed.
     let mut first = None;
     loop {
         let elapsed = wait();

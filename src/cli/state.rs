@@ -16,7 +16,7 @@ use crate::simulate::State;
 /// Size limit of a state file, bytes.
 const MAX_SIZE: u64 = 1 << 30;
 
-/// Output file for the state of a run, claimed and known to be writable before the run starts.
+/// Output file for the state of a run, claimed and checked to be writable before the run starts.
 pub struct StateFile {
     file: OutputFile,
     saved: Option<State>,

@@ -179,8 +179,8 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
             ),
         );
         if !scene.machine.elements.is_empty() {
-            let (given, lost) = (joules(ledger.external_work), joules(ledger.damping_loss));
-            let description = format!("loads from outside {given} J, lost in dampers {lost} J");
+            let (supplied, lost) = (joules(ledger.external_work), joules(ledger.damping_loss));
+            let description = format!("loads from outside {supplied} J, lost in dampers {lost} J");
             line("  elements", description);
         }
         line(

@@ -274,8 +274,8 @@ fn three_sockets_behind_one_another_are_blended_from_far_to_near_whatever_their_
                 let k = centres.iter().position(|c| c.distance(at) < 1e-6);
                 let [r, g, b, opacity] = tints[k.expect("one of the three")];
                 // The cut-away half stays fainter.
-                let kept = half.colour[3] > 0.1;
-                half.colour = [r, g, b, if kept { opacity } else { 0.15 * opacity }];
+                let is_opaque_half = half.colour[3] > 0.1;
+                half.colour = [r, g, b, if is_opaque_half { opacity } else { 0.15 * opacity }];
             }
             glass = list;
         }
@@ -751,7 +751,7 @@ fn the_interface_shows_the_same_picture_as_headless_rendering() {
     let mut camera = view.camera();
     view.fit(&mut camera, &scene, &frame, &options, SIZE);
     let list = picture(&scene, &frame, &options, &camera, false);
-    let alone = offscreen().render(&list).expect("a picture");
+    let headless = offscreen().render(&list).expect("a picture");
     let mut harness = egui_kittest::Harness::builder()
         .with_size(eframe::egui::vec2(SIZE[0] as f32, SIZE[1] as f32))
         .with_pixels_per_point(1.0)
@@ -763,7 +763,7 @@ fn the_interface_shows_the_same_picture_as_headless_rendering() {
     harness.run();
     let shown = harness.render().expect("a picture");
     assert_eq!((shown.width(), shown.height()), (SIZE[0], SIZE[1]));
-    let worst = shown.as_raw().iter().zip(&alone.rgba).map(|(a, b)| a.abs_diff(*b)).max();
+    let worst = shown.as_raw().iter().zip(&headless.rgba).map(|(a, b)| a.abs_diff(*b)).max();
     assert!(worst.is_some_and(|worst| worst <= 1), "bytes are copied: {worst:?}");
 }
 
@@ -873,7 +873,7 @@ fn a_ball_is_darker_near_its_wall() {
     for ball in &mut list.solid.by_mesh[crate::view::Mesh::Sphere.index()] {
         ball.other = [0.0; 4];
     }
-    let alone = device.render(&list).expect("a picture");
+    let without_wall = device.render(&list).expect("a picture");
     let report = &frame.joints[0];
     let outwards = to_f32(&report.eccentricity).normalize();
     let centre = to_f32(&(report.socket_centre + 20.0 * report.eccentricity));
@@ -881,7 +881,7 @@ fn a_ball_is_darker_near_its_wall() {
     let share = |part: f32| {
         let side = (outwards * part + back * (1.0 - part.abs())).normalize();
         let point = centre + 0.0099 * side;
-        let [a, b] = [&near, &alone].map(|image| brightness(at(image, &camera, point)) as f32);
+        let [a, b] = [&near, &without_wall].map(|image| brightness(at(image, &camera, point)) as f32);
         a / b
     };
     let (touching, front, opposite) = (share(0.8), share(0.0), share(-0.8));

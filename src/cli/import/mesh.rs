@@ -106,7 +106,7 @@ pub fn solid(
 }
 
 /// Triangles of the convex hull of `points`, counter-clockwise seen from outside, as indices. Each point in turn replaces the faces that
-/// it lies beyond by the cone to their outline, so that the surface stays closed whatever rounding decides
+/// it sees by the cone to their outline, so that the surface stays closed despite rounding
 /// (O'Rourke, *Computational Geometry in C*, second edition, 1998, section 4.3).
 fn hull(points: &[Vec3]) -> Result<Vec<[usize; 3]>, String> {
     let flat = || "its points lie in one plane".to_owned();

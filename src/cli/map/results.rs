@@ -130,7 +130,7 @@ impl Results {
         dimension.map_or("", si_unit)
     }
 
-    /// Provenance, with what the numbers are.
+    /// Provenance, with the meaning of the numbers.
     pub fn meta(&self) -> Map<String, Json> {
         let scene = self.map.scene();
         let mut meta = provenance::meta(scene);

@@ -51,11 +51,11 @@ impl Format {
     }
 }
 
-/// Output file for the rows of a run, claimed and known to be writable before the run starts.
+/// Output file for the rows of a run, claimed and checked to be writable before the run starts.
 pub struct RowsFile {
     format: Format,
     rows: OutputFile,
-    /// Metadata of a CSV file, which cannot hold any: a plain reader takes every line after the header for data.
+    /// Metadata of a CSV file, kept apart because plain readers treat every line after the header as data.
     metadata: Option<OutputFile>,
 }
 

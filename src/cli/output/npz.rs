@@ -138,7 +138,7 @@ mod tests {
             out.flush().unwrap();
             let written = write_archive(disk(), |archive| {
                 archive.add_array("a", &values).and_then(|()| archive.add_array("b", &values)).unwrap();
-                // Whatever is returned here, the disk error takes precedence.
+                // A disk error takes precedence over this one.
                 Err(io::Error::other("not this"))
             });
             let kind = written.unwrap_err().kind();

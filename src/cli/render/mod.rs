@@ -52,7 +52,7 @@ impl Times {
         })
     }
 
-    /// Frame numbers in order of time: the simulation only goes forward.
+    /// Frame numbers in order of time, because the simulation only runs forward.
     fn in_order(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.instants.len()).collect();
         order.sort_by(|&a, &b| self.instants[a].total_cmp(&self.instants[b]));

@@ -29,7 +29,7 @@ pub fn sensitivity(arguments: &SensitivityArguments) -> Result<(), Failure> {
     };
     options.check()?;
     if !arguments.study.quiet && options.rows > 0 && !options.rows.is_power_of_two() {
-        warn(&format!("--rows {}: a Sobol sequence is even only at a power of two", options.rows));
+        warn(&format!("--rows {}: a Sobol sequence is evenly distributed only for a power of two", options.rows));
     }
     let folder = Folder::claim(&arguments.study.out, arguments.study.force)?;
     let mut study = Study::new(scene, inputs, outputs, &arguments.study)?;

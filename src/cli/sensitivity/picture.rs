@@ -35,7 +35,7 @@ pub fn sheet(study: &Study, results: &Sensitivity) -> Sheet {
     }
     let columns = if with_indices { 2 } else { 1 };
     Sheet {
-        title: format!("{}: what moves the output", study.scene().name),
+        title: format!("{}: influences on the output", study.scene().name),
         size: (WIDTH * 2.min(columns as u32 + 1), (FRAME + ROW * bars) * outputs as u32),
         charts,
         columns,

@@ -99,7 +99,7 @@ pub fn text(study: &Study, results: &Sensitivity, out: &Path) -> String {
         match &results.indices[o] {
             Some(Err(IndicesError::NoVariance { value })) => {
                 let value = display_value(*value, output.unit);
-                text += &format!("No indices: the variance of the result is 0: it is {value}, whatever the inputs\n");
+                text += &format!("No indices: the result is {value} for all inputs, so its variance is 0\n");
             }
             Some(Err(error)) => text += &format!("No indices: {error}\n"),
             Some(Ok(indices)) => {
@@ -162,12 +162,12 @@ fn sentence(study: &Study, answer: &TargetAnswer) -> String {
     }
     match &answer.together {
         Some((changes, value)) if changes.is_empty() => {
-            format!("{goal} is held by the values of the scene: {}", display_value(*value, output.unit))
+            format!("{goal} is already met by the values of the scene: {}", display_value(*value, output.unit))
         }
         Some((changes, value)) => {
             let changes: Vec<String> = changes.iter().map(change).collect();
             format!(
-                "{goal} takes several changes together: {}, which give {}",
+                "{goal} requires several changes together: {}, which give {}",
                 changes.join(", "),
                 display_value(*value, output.unit)
             )

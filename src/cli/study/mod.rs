@@ -68,7 +68,7 @@ pub struct Study {
     threads: usize,
     quiet: bool,
     runs: Vec<Run>,
-    /// Finished stages, kept until the results are written.
+    /// Files of the finished stages, removed once the results are written.
     partials: Vec<Partial>,
 }
 

@@ -90,7 +90,7 @@ fn check_points(parts: &[OpenShard], count: usize) -> Result<(), Failure> {
     if missing == 0 {
         return Ok(());
     }
-    // Missing shards can be named only if all given ones have the same number of parts.
+    // Missing shards can be named only if all shards have the same number of parts.
     let numbers: Vec<_> = parts.iter().filter_map(|p| options::shard(&p.shard).ok()).collect();
     let of = numbers[0].of;
     let names: Vec<String> = if numbers.iter().all(|shard| shard.of == of) {

@@ -155,7 +155,7 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
     meta
 }
 
-/// A varied parameter in `meta`. Listed values are in the arrays; a checksum of them tells sweeps apart.
+/// A varied parameter in `meta`. Listed values are in the arrays; their checksum distinguishes sweeps.
 fn axis_meta(scene: &Scene, axis: &Axis) -> Json {
     let mut own = Map::new();
     let mut add = |key: &str, value: Json| own.insert(key.to_owned(), value);

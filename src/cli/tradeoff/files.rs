@@ -22,7 +22,7 @@ pub(super) fn fill(folder: &Folder, results: &WorkPrecision, scene: &Scene) -> R
     let sheet = picture(results, false, &machine::name());
     let drawing = |error: crate::chart::SheetError| Failure::io(error.to_string());
     let mut meta = provenance::meta(scene);
-    // All methods were run, whatever the scene asks for.
+    // All methods were run, not only that of the scene.
     for key in ["method", "step_s", "tolerance"] {
         meta.shift_remove(key);
     }
