@@ -30,7 +30,7 @@ impl Part<'_> {
         let reported = self.peaks.iter().zip(self.rounding).zip(LOADS);
         let reported =
             reported.filter_map(|((peak, least), (unit, ..))| Some((peak.filter(|(size, _)| *size > least)?, unit)));
-        let words: Vec<String> = known
+        let words: Vec<String> = reported
             .map(|((size, time), unit)| format!("{} {unit} at {} s", significant(size, 6), significant(time, 6)))
             .collect();
         let peaks = if words.is_empty() { "no force".to_owned() } else { format!("peak {}", words.join(", ")) };
