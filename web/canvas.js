@@ -1,18 +1,18 @@
-// The canvas: how many pixels it has (eframe asks a `ResizeObserver`, and lays the interface out by `devicePixelRatio`), and what
-// drawing on it costs a processor.
+// Canvas helpers: its size in device pixels (eframe reads it from a `ResizeObserver`, and lays the interface out by
+// `devicePixelRatio`), and cheaper shaders for software rendering.
 
 /**
- * A `ResizeObserver` that also tells when the pixels of the screen change and nothing else does, as on the way from a laptop's
- * screen to a projector's, and whose numbers agree with `devicePixelRatio` where the browser's own do not.
+ * A `ResizeObserver` that also fires when only `devicePixelRatio` changes, as when a window moves from a laptop's screen to a
+ * projector, and whose sizes agree with `devicePixelRatio` where the browser's own do not.
  */
 export class CanvasObserver extends ResizeObserver {
-    /** What is observed, and how. */
+    /** Observed elements and their options. */
     #targets = new Map();
     #ratio = null;
 
-    constructor(told) {
-        super((entries) => told(entries.map(agreeing)));
-        this.#follow();
+    constructor(callback) {
+        super((entries) => callback(entries.map(consistentEntry)));
+        this.#watchRatio();
     }
 
     observe(target, options) {
@@ -27,52 +27,52 @@ export class CanvasObserver extends ResizeObserver {
 
     disconnect() {
         this.#targets.clear();
-        this.#ratio?.removeEventListener('change', this.#changed);
+        this.#ratio?.removeEventListener('change', this.#ratioChanged);
         super.disconnect();
     }
 
-    #follow() {
+    #watchRatio() {
         this.#ratio = matchMedia(`(resolution: ${devicePixelRatio}dppx)`);
-        this.#ratio.addEventListener('change', this.#changed, { once: true });
+        this.#ratio.addEventListener('change', this.#ratioChanged, { once: true });
     }
 
-    #changed = () => {
-        this.#follow();
+    #ratioChanged = () => {
+        this.#watchRatio();
         for (const [target, options] of this.#targets) {
-            // What is observed anew is told at once.
+            // Observing an element again reports its size immediately.
             super.unobserve(target);
             super.observe(target, options);
         }
     };
 }
 
-/** `entry`, without its number of device pixels where that is not `devicePixelRatio` times the size: on an emulated screen. */
-function agreeing(entry) {
-    const own = entry.devicePixelContentBoxSize?.[0];
+/** `entry` without its size in device pixels if that is not `devicePixelRatio` times the CSS size, as on an emulated screen. */
+function consistentEntry(entry) {
+    const devicePixels = entry.devicePixelContentBoxSize?.[0];
     const size = entry.contentBoxSize[0];
-    if (!own || !size || Math.abs(own.inlineSize - size.inlineSize * devicePixelRatio) < 2) return entry;
+    if (!devicePixels || !size || Math.abs(devicePixels.inlineSize - size.inlineSize * devicePixelRatio) < 2) return entry;
     return new Proxy(entry, {
         has: (target, key) => key !== 'devicePixelContentBoxSize' && key in target,
         get: (target, key) => target[key],
     });
 }
 
-/** What a context says of itself where the processor draws. */
-const BY_PROCESSOR = /swiftshader|llvmpipe|softpipe|software|basic render/i;
-/** A switch that egui's shader reads for every pixel: whether to filter its textures by itself, as pictures in tests do. */
-const FILTER = /\b\w+\.predictable_texture_filtering\b/g;
+/** Renderer names of software rasterisers. */
+const SOFTWARE_RENDERER = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+/** A uniform that egui's shader reads for every pixel: whether the shader filters textures itself, as egui's snapshot tests need. */
+const FILTER_SWITCH = /\b\w+\.predictable_texture_filtering\b/g;
 
 /**
- * Has the contexts of `canvas` compile egui's shader with that switch off: the processor would run both sides of the branch, which
- * makes a third of a frame.
+ * Makes software WebGL contexts of `canvas` compile egui's shader with that switch off. A software rasteriser executes both sides
+ * of the branch, which takes a third of each frame.
  */
-export function drawLightly(canvas) {
-    canvas.getContext = (...asked) => {
-        const context = HTMLCanvasElement.prototype.getContext.apply(canvas, asked);
-        const about = context?.getExtension?.('WEBGL_debug_renderer_info');
-        if (about && BY_PROCESSOR.test(context.getParameter(about.UNMASKED_RENDERER_WEBGL))) {
+export function simplifyShaders(canvas) {
+    canvas.getContext = (...request) => {
+        const context = HTMLCanvasElement.prototype.getContext.apply(canvas, request);
+        const info = context?.getExtension?.('WEBGL_debug_renderer_info');
+        if (info && SOFTWARE_RENDERER.test(context.getParameter(info.UNMASKED_RENDERER_WEBGL))) {
             const { shaderSource } = WebGL2RenderingContext.prototype;
-            context.shaderSource = (shader, text) => shaderSource.call(context, shader, text.replaceAll(FILTER, '0u'));
+            context.shaderSource = (shader, text) => shaderSource.call(context, shader, text.replaceAll(FILTER_SWITCH, '0u'));
         }
         return context;
     };

@@ -1,24 +1,24 @@
-// The page within another one, as in a course page or in slides. It takes nothing that it was not given: no focus, no wheel, no
-// Tab, no graphics while it is out of sight. And it does what the page around it asks for in messages (docs/embedding.md).
+// The page in a frame of a course page or slides. It takes no focus, wheel or Tab unasked, holds no graphics while it is out of
+// sight, and answers messages from the embedding page (docs/embedding.md).
 
-/** Whether there is a page around this one. */
-export const framed = window !== window.top;
+/** Whether another page embeds this one. */
+export const isFramed = window !== window.top;
 
-/** Version of the messages. */
+/** Version of the message protocol. */
 const VERSION = 1;
-/** How often the page around is told what happens, ms. */
-const PACE = 100;
+/** Interval between reports to the embedding page, ms. */
+const REPORT_INTERVAL = 100;
 
 const canvas = () => document.getElementById('laboratory');
 
-/** Comes to pass when the page is in sight for the first time; `told(shown)` hears of every change after that. */
-export function inSight(told) {
+/** Resolves when the page becomes visible for the first time; later changes call `changed(visible)`. */
+export function firstVisible(changed) {
     return new Promise((done) => {
         let first = true;
         const observer = new IntersectionObserver((entries) => {
-            const shown = entries.at(-1).isIntersecting;
-            if (!first) return told(shown);
-            if (shown) {
+            const visible = entries.at(-1).isIntersecting;
+            if (!first) return changed(visible);
+            if (visible) {
                 first = false;
                 done();
             }
@@ -27,12 +27,12 @@ export function inSight(told) {
     });
 }
 
-/** Leaves wheel and Tab to the page around, but for what a click or tap has given to this one. */
-export function stayPolite(page) {
+/** Leaves the wheel to the embedding page until this one is clicked, and Tab once the last control is reached. */
+export function yieldInput(page) {
     let active = false;
-    const early = { capture: true, passive: true };
-    addEventListener('pointerdown', () => (active = true), early);
-    addEventListener('wheel', (event) => active || event.stopImmediatePropagation(), early);
+    const capture = { capture: true, passive: true };
+    addEventListener('pointerdown', () => (active = true), capture);
+    addEventListener('wheel', (event) => active || event.stopImmediatePropagation(), capture);
     addEventListener('blur', () => {
         active = false;
         page.release();
@@ -40,14 +40,14 @@ export function stayPolite(page) {
     addEventListener('keydown', (event) => {
         if (event.key === 'Escape') active = false;
         if (event.key === 'Tab' && isLast(page, event.shiftKey)) {
-            // Past the last control comes what follows in the page around: the browser goes there if nobody is in its way.
+            // The browser moves on to the embedding page, unless eframe sees the key.
             event.stopImmediatePropagation();
             page.release();
         }
-    }, early);
+    }, capture);
 }
 
-/** Whether no control follows the one that has the focus. */
+/** Whether no control follows the focused one. */
 function isLast(page, backwards) {
     const controls = JSON.parse(page.widgets() || '[]').filter(({ focusable, disabled }) => focusable && !disabled);
     const at = controls.findIndex(({ focused }) => focused);
@@ -55,74 +55,74 @@ function isLast(page, backwards) {
     return backwards ? at <= 0 : at === controls.length - 1;
 }
 
-/** Answers the page around; `laboratory` is what web/main.js knows. */
+/** Answers the embedding page; `laboratory` is that of web/main.js. */
 export class Messages {
-    /** What came before there was a picture. */
-    #waiting = [];
-    #begun = false;
-    #told = { time: null, impact: 0 };
+    /** Messages that arrived before the first picture. */
+    #queue = [];
+    #isStarted = false;
+    #reported = { time: null, impact: 0 };
 
     constructor(laboratory) {
         this.laboratory = laboratory;
-        const hear = ({ source, data }) => {
+        const receive = ({ source, data }) => {
             if (source !== window.parent || data?.jointplay !== VERSION) return;
-            if (this.#begun) this.#obey(data);
-            else this.#waiting.push(data);
+            if (this.#isStarted) this.#handle(data);
+            else this.#queue.push(data);
         };
-        // stuck.js has listened so far, and goes on to.
-        globalThis.jointplayMail.forEach(hear);
-        globalThis.jointplayMail = { push: hear };
+        // The listener in stuck.js remains and pushes later messages.
+        globalThis.jointplayMail.forEach(receive);
+        globalThis.jointplayMail = { push: receive };
     }
 
-    /** There is a picture. */
-    begin() {
+    /** Call once the first picture is shown. */
+    start() {
         const { scene, version } = JSON.parse(this.laboratory.page.state());
-        this.#tell('ready', { scene, version });
-        this.#begun = true;
-        for (const message of this.#waiting) this.#obey(message);
-        // A key that is of no use here may be one for the page around, as when slides go on.
+        this.#post('ready', { scene, version });
+        this.#isStarted = true;
+        for (const message of this.#queue) this.#handle(message);
+        // A key without a function here may be one of the embedding page, such as the next slide.
         addEventListener('keydown', (event) => {
             const { key, code, shiftKey: shift, ctrlKey: control, altKey: alt, metaKey: meta } = event;
-            if (!this.laboratory.page.uses(key, control || meta, alt)) this.#tell('key', { key, code, shift, control, alt, meta });
+            if (!this.laboratory.page.uses(key, control || meta, alt)) this.#post('key', { key, code, shift, control, alt, meta });
         }, { capture: true });
-        setInterval(() => this.#watch(), PACE);
+        setInterval(() => this.#report(), REPORT_INTERVAL);
     }
 
-    #tell(event, values) {
-        // It goes to whoever shows this page: nothing in it is secret.
+    #post(event, values) {
+        // Any page may embed this one and receives this; nothing in it is secret.
         window.parent.postMessage({ jointplay: VERSION, event, ...values }, '*');
     }
 
-    #obey(message) {
+    #handle(message) {
         const { page, trouble } = this.laboratory;
-        if (trouble) return this.#tell('problem', { text: trouble.title, message });
-        const obey = {
+        if (trouble) return this.#post('problem', { text: trouble.title, message });
+        const actions = {
             open: ({ link }) => page.openLink(`#${String(link).replace(/^[?#]/, '')}`),
             set: ({ key, value }) => page.set(String(key), String(value)),
             play: () => page.play(true),
             pause: () => page.play(false),
             reset: () => page.reset(),
-            state: () => this.#tell('state', { state: JSON.parse(page.state()), link: page.link() }),
+            state: () => this.#post('state', { state: JSON.parse(page.state()), link: page.link() }),
         };
-        const known = Object.hasOwn(obey, message.do);
-        const problem = known ? obey[message.do](message) : `allowed: ${Object.keys(obey).join(', ')}`;
-        return problem ? this.#tell('problem', { text: problem, message }) : undefined;
+        const known = Object.hasOwn(actions, message.do);
+        const problem = known ? actions[message.do](message) : `allowed: ${Object.keys(actions).join(', ')}`;
+        return problem ? this.#post('problem', { text: problem, message }) : undefined;
     }
 
-    /** Tells what has happened since the last time. */
-    #watch() {
+    /** Reports what has changed since the last call. */
+    #report() {
         const { page, ready, trouble } = this.laboratory;
         if (!ready || trouble) return;
         const { shown_s: time, playing } = JSON.parse(page.state());
-        const told = this.#told;
-        // After going back, what comes again is told again.
-        told.impact = Math.min(told.impact, time);
-        for (const impact of JSON.parse(page.impacts(told.impact))) {
-            this.#tell('impact', impact);
-            told.impact = impact.end_s;
+        const reported = this.#reported;
+        // After a jump back in time, repeated impacts are reported again.
+        reported.impact = Math.min(reported.impact, time);
+        for (const impact of JSON.parse(page.impacts(reported.impact))) {
+            this.#post('impact', impact);
+            reported.impact = impact.end_s;
         }
         const now = `${time} ${playing}`;
-        if (told.time !== now) this.#tell('time', { time_s: time, playing });
-        told.time = now;
+        if (reported.time !== now) this.#post('time', { time_s: time, playing });
+        reported.time = now;
     }
 }

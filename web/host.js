@@ -1,29 +1,29 @@
-// The browser's services for the laboratory: the other half of src/web/host.rs.
+// The browser's services for the laboratory; src/web/host.rs declares them.
 
 const build = new URL(import.meta.url).search;
 const $ = (id) => document.getElementById(id);
 
-/** Least time between two reports to a screen reader while nothing happens, ms: it speaks slower than they are made. */
+/** Least interval between routine reports to a screen reader, ms, which cannot read them out faster. */
 const REPORT_INTERVAL = 10_000;
-/** Time that a download needs its data for, ms. */
-const KEEP = 60_000;
-/** From a frame to its sound, s: longer than it takes to hand it over, so that the clicks of a frame keep their distances. */
+/** How long the data of a download must exist, ms. */
+const DOWNLOAD_TIME = 60_000;
+/** Delay from a frame to its sound, s: longer than the transfer takes, so that the clicks of a frame keep their intervals. */
 const LATENCY = 0.04;
 
-/** `laboratory`: what web/main.js knows; `lost(start, why)`: called when the graphics of that start are gone. */
-export function makeHost(laboratory, lost) {
+/** `laboratory` is that of web/main.js; `graphicsLost(start, why)` is called when the graphics of that start are lost. */
+export function makeHost(laboratory, graphicsLost) {
     let reported = -Infinity;
-    /** Computations: number to {worker, messages, rest}. */
+    /** Background computations by number: {worker, messages, rest}. */
     const work = new Map();
-    let works = 0;
+    let latestWork = 0;
 
-    /** On the clipboard, by whatever way the browser allows. */
+    /** Copies to the clipboard; returns whether the browser allows it. */
     async function copy(text) {
         try {
             await navigator.clipboard.writeText(text);
             return true;
         } catch {
-            // Not a secure address, or not allowed: as pages did before.
+            // The address is not secure, or permission is denied: use the older interface.
             const field = document.createElement('textarea');
             field.value = text;
             field.className = 'apart';
@@ -36,9 +36,9 @@ export function makeHost(laboratory, lost) {
         }
     }
 
-    /** Nothing moves on a page that is out of sight. */
-    const restAsTold = ({ worker, rest }) => worker.postMessage({ rest: document.hidden ? 0 : rest });
-    document.addEventListener('visibilitychange', () => work.forEach(restAsTold));
+    /** Workers need not pause for the frames of a page that is out of sight. */
+    const sendRest = ({ worker, rest }) => worker.postMessage({ rest: document.hidden ? 0 : rest });
+    document.addEventListener('visibilitychange', () => work.forEach(sendRest));
 
     const picker = document.createElement('input');
     picker.type = 'file';
@@ -49,60 +49,60 @@ export function makeHost(laboratory, lost) {
     picker.hidden = true;
     picker.addEventListener('change', () => {
         if (picker.files.length > 0) laboratory.page.openFiles([...picker.files]);
-        // The same files, changed meanwhile, can be chosen again.
+        // Otherwise choosing the same files again would fire no event.
         picker.value = '';
         $('laboratory').focus();
     });
     document.body.append(picker);
 
-    // The browser's own key for it is Escape, which it keeps to itself.
+    // The browser consumes Escape, which leaves full screen.
     document.addEventListener('fullscreenchange', () => {
         if (!document.fullscreenElement) laboratory.page?.present(false);
     });
-    // It would load the page anew. On the way down: the canvas keeps its keys to itself.
-    const keep = (event) => {
+    // F5 presents, and must not reload the page. In the capture phase, because the canvas stops the propagation of keys.
+    const preventReload = (event) => {
         if (event.key === 'F5' && !event.ctrlKey && !event.shiftKey) event.preventDefault();
     };
-    addEventListener('keydown', keep, { capture: true });
-    // A finger's comes before its touchstart, and for that moment eframe takes it for a mouse's; the touchstart tells it all.
-    const finger = (event) => event.pointerType === 'touch' && event.stopPropagation();
-    addEventListener('pointerdown', finger, { capture: true });
+    addEventListener('keydown', preventReload, { capture: true });
+    // eframe would take the pointerdown of a finger, which precedes its touchstart, for that of a mouse.
+    const ignoreTouch = (event) => event.pointerType === 'touch' && event.stopPropagation();
+    addEventListener('pointerdown', ignoreTouch, { capture: true });
 
     let audio;
-    let heard = false;
-    const resume = () => void (heard && audio.state !== 'running' && audio.resume().catch(() => {}));
-    // Browsers let sound begin with a gesture alone, some within its event alone.
+    let isSoundOn = false;
+    const resume = () => void (isSoundOn && audio.state !== 'running' && audio.resume().catch(() => {}));
+    // Browsers start sound only on a gesture, some only inside its event handler.
     for (const gesture of ['pointerup', 'keyup']) addEventListener(gesture, resume, { capture: true });
 
-    /** Between two frames: what the user does meanwhile is seen to after each spell. */
-    const { port1: next, port2: turn } = new MessageChannel();
-    let goesOn = false;
+    // Steps between two frames run in short spells; the browser handles input after each.
+    const { port1: trigger, port2: spells } = new MessageChannel();
+    let isStepping = false;
     function spell() {
-        const pause = laboratory.trouble ? undefined : laboratory.page.stepBetween();
-        goesOn = pause !== undefined;
-        if (pause === 0) next.postMessage(null);
-        else if (goesOn) setTimeout(spell, pause);
+        const delay = laboratory.trouble ? undefined : laboratory.page.stepBetween();
+        isStepping = delay !== undefined;
+        if (delay === 0) trigger.postMessage(null);
+        else if (isStepping) setTimeout(spell, delay);
     }
-    turn.onmessage = spell;
+    spells.onmessage = spell;
 
     return {
-        goOn() {
-            if (!goesOn) next.postMessage(null);
-            goesOn = true;
+        scheduleSteps() {
+            if (!isStepping) trigger.postMessage(null);
+            isStepping = true;
         },
 
         address: () => location.origin + location.pathname,
 
         shared(link) {
-            // The query stays for what is not in the link: which renderer to use.
-            history.replaceState(null, '', location.pathname + laboratory.ownQuery() + new URL(link).hash);
+            // The renderer, which is not part of the link, stays in the query.
+            history.replaceState(null, '', location.pathname + laboratory.browserQuery() + new URL(link).hash);
             copy(link).then((done) => {
-                if (!done) laboratory.page.say('The link is in the address bar: this browser keeps it off the clipboard');
+                if (!done) laboratory.page.say('The link is in the address bar: this browser does not allow the clipboard');
             });
         },
 
         save(name, mime, bytes) {
-            // A copy: the view into the program's memory is gone when this returns.
+            // A copy, because the view into the program's memory is invalid after this call.
             const address = URL.createObjectURL(new Blob([bytes.slice()], { type: mime }));
             const link = document.createElement('a');
             link.href = address;
@@ -110,12 +110,12 @@ export function makeHost(laboratory, lost) {
             document.body.append(link);
             link.click();
             link.remove();
-            setTimeout(() => URL.revokeObjectURL(address), KEEP);
+            setTimeout(() => URL.revokeObjectURL(address), DOWNLOAD_TIME);
         },
 
         pick: () => picker.click(),
 
-        /** A browser may refuse, as on a phone: the page then fills what it has. */
+        /** A browser may refuse, as on some phones; the page then fills its viewport. */
         fillScreen(on) {
             if (on) document.documentElement.requestFullscreen?.().catch(() => {});
             else if (document.fullscreenElement) document.exitFullscreen().catch(() => {});
@@ -126,14 +126,14 @@ export function makeHost(laboratory, lost) {
             try {
                 worker = new Worker(new URL(`worker.js${build}`, import.meta.url), { type: 'module' });
             } catch {
-                // There are none here, or not for a frame without an origin.
+                // The browser has no workers, or none for a frame without an origin.
                 return undefined;
             }
             const messages = [];
             const failed = (reason) => messages.push(JSON.stringify({ Failed: `the computation was aborted: ${reason}` }));
             worker.addEventListener('message', ({ data }) => messages.push(data));
             worker.addEventListener('error', (event) => {
-                // Told in the window instead of as a failure of the page.
+                // The window shows it; it is no failure of the page.
                 event.preventDefault();
                 failed(event.message ?? 'the worker could not start');
             });
@@ -142,15 +142,15 @@ export function makeHost(laboratory, lost) {
             } catch (error) {
                 failed(error);
             }
-            works += 1;
-            work.set(works, { worker, messages, rest: 0 });
-            return works;
+            latestWork += 1;
+            work.set(latestWork, { worker, messages, rest: 0 });
+            return latestWork;
         },
         pollWork: (number) => work.get(number)?.messages.shift(),
         restWork(number, rest) {
             if (!work.has(number)) return;
             work.get(number).rest = rest;
-            restAsTold(work.get(number));
+            sendRest(work.get(number));
         },
         endWork(number) {
             work.get(number)?.worker.terminate();
@@ -163,7 +163,7 @@ export function makeHost(laboratory, lost) {
             } catch (error) {
                 return typeof AudioContext === 'function' ? String(error) : 'this browser cannot make it';
             }
-            heard = on;
+            isSoundOn = on;
             if (on) resume();
             else audio.suspend().catch(() => {});
             return '';
@@ -185,8 +185,8 @@ export function makeHost(laboratory, lost) {
             $('report-aloud').textContent = text;
         },
 
-        // Not within the call: the laboratory is busy with a frame.
-        graphicsLost: (start, why) => setTimeout(() => lost(start, why)),
+        // Deferred, because the laboratory may be in the middle of a frame.
+        graphicsLost: (start, why) => setTimeout(() => graphicsLost(start, why)),
 
         areGraphicsLost: () => laboratory.backend === 'webgl' && Boolean($('laboratory').getContext('webgl2')?.isContextLost()),
     };

@@ -1,32 +1,32 @@
-// Loads the laboratory, shows how far that is, and says what is wrong where it cannot run.
+// Loads the laboratory, shows the progress, and explains why it cannot run.
 
 const script = document.getElementById('program');
 const build = new URL(import.meta.url).search;
 const query = new URLSearchParams(location.search);
-/** With what the page was opened, and what the user has put there since: it leads to a start, the state may lead to what stopped it. */
-let opened = location.hash;
+/** Latest fragment that was opened or typed. `Start over` returns to it, because the recorded state may lead to the same failure. */
+let openedFragment = location.hash;
 const $ = (id) => document.getElementById(id);
 
-/** Losses of the graphics within `LOSS_SPAN`, ms, after which the page does not start them again by itself. */
-const MOST_LOSSES = 3;
-const LOSS_SPAN = 60_000;
-/** Where the tab keeps what no address holds: a large scene of the user's own, files that it names, very many changes. */
-const KEPT = `jointplay ${location.pathname}`;
-/** Where it keeps, for loading it anew, what was on the page that was left: the address follows once a second only. */
-const LEFT = `${KEPT} left`;
-/** What gives an element the focus. */
+/** The page restarts lost graphics unless they were lost more than `MAX_LOSSES` times within `LOSS_WINDOW`, ms. */
+const MAX_LOSSES = 3;
+const LOSS_WINDOW = 60_000;
+/** Delays before the attempts to restart them, ms: after a crash the browser needs a moment. */
+const RESTART_DELAYS = [0, 500, 3000];
+/** `sessionStorage` key of a state that no address can hold: a large scene of the user's own, files that it names, many changes. */
+const SESSION_KEY = `jointplay ${location.pathname}`;
+/** `sessionStorage` key of the state at a reload, which is newer than the address: that is updated only once a second. */
+const RELOAD_KEY = `${SESSION_KEY} left`;
 const { focus } = HTMLElement.prototype;
-/** Pauses before the attempts to start them again, ms: after a crash the browser needs a moment. */
-const PAUSES = [0, 500, 3000];
 
-/** What the tests and the rest of the page hold on to: `page` (src/web/page.rs), its mirror, the compiled code, how the starts went. */
+/** Shared with the other scripts and the tests: `page` (src/web/page.rs), its mirror, the compiled code, the outcome of the starts. */
 const laboratory = { page: null, mirror: null, code: null, backend: null, ready: false, trouble: null, starts: 0, losses: [] };
 globalThis.jointplay = laboratory;
 
-const LEFT_OUT = {
+/** Messages about missing features of the browser. */
+const MISSING = {
     wasm:
-        'This browser cannot run WebAssembly with vectors, which the laboratory is compiled to. Firefox from 89, Chrome and Edge ' +
-        'from 91 and Safari from 16.4 can.',
+        'This browser does not support WebAssembly SIMD, which the laboratory needs. Firefox 89, Chrome and Edge 91, Safari 16.4 ' +
+        'and newer versions do.',
     graphics:
         'The laboratory draws with WebGPU or WebGL2, and this browser offers neither. They may be switched off in its ' +
         'settings, or the graphics driver is not supported. A current Firefox, Chrome, Edge or Safari has at least WebGL2.',
@@ -34,48 +34,48 @@ const LEFT_OUT = {
     webgl: 'The address asks for WebGL2, which this browser does not offer.',
 };
 
-/** The smallest module with an instruction on vectors. */
-const WITH_VECTORS = Uint8Array.of(
+/** The smallest module with a SIMD instruction. */
+const SIMD_MODULE = Uint8Array.of(
     ...[0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11],
 );
 
-/** The way to draw that the address asks for, if any. */
-const asked = () => new URLSearchParams(location.hash.slice(1)).get('renderer') ?? query.get('renderer');
+/** The renderer that the address requests, if any. */
+const requestedRenderer = () => new URLSearchParams(location.hash.slice(1)).get('renderer') ?? query.get('renderer');
 
-/** Words of an address that belong to the browser and are in no link that the laboratory makes. */
-const OWN_WORDS = ['renderer', 'theme'];
-/** The query without the words of a link: once the fragment holds those, they would say the same twice. */
-function ownQuery() {
-    const own = OWN_WORDS.filter((word) => query.has(word)).map((word) => `${word}=${encodeURIComponent(query.get(word))}`);
-    return own.length ? `?${own.join('&')}` : '';
+/** Keys of an address that concern this browser; links of the laboratory do not contain them. */
+const BROWSER_KEYS = ['renderer', 'theme'];
+/** The query with only these keys: the fragment holds the others. */
+function browserQuery() {
+    const pairs = BROWSER_KEYS.filter((key) => query.has(key)).map((key) => `${key}=${encodeURIComponent(query.get(key))}`);
+    return pairs.length ? `?${pairs.join('&')}` : '';
 }
-laboratory.ownQuery = ownQuery;
+laboratory.browserQuery = browserQuery;
 
-/** What the page is to open: the address from its `?` on, or what this tab has kept in its place. */
-function wanted() {
+/** The link to open: the address from its `?` on, or the state that this tab has stored for it. */
+function linkToOpen() {
     const fragment = new URLSearchParams(location.hash.slice(1));
-    // The page has written its state behind the `#` and taken the words of the link from the query: what is there now was typed.
+    // Once the page has written its state into the fragment, it removes the pairs of the link from the query: any left were typed.
     const written = window === window.top && (fragment.has('hash') || fragment.has('kept'));
-    const typed = [...new URLSearchParams(location.search).keys()].some((word) => !OWN_WORDS.includes(word));
+    const typed = [...new URLSearchParams(location.search).keys()].some((key) => !BROWSER_KEYS.includes(key));
     if (written && typed) return location.search;
     if (fragment.has('kept')) {
         try {
-            const kept = sessionStorage.getItem(KEPT);
-            if (kept) return kept;
+            const stored = sessionStorage.getItem(SESSION_KEY);
+            if (stored) return stored;
         } catch {
-            // The laboratory says that it is not here.
+            // The laboratory reports that the state is missing.
         }
     }
     return location.search + location.hash;
 }
 
-/** What was here when the page at this address was left, if it is loaded anew or come back to: for `Page.start`. */
-function takeLeft() {
+/** The state of this page before a reload or a return to it, for `Page.start`; null if there is none. */
+function takeReloadState() {
     if (window !== window.top) return null;
     try {
-        const { address, session, unsaved } = JSON.parse(sessionStorage.getItem(LEFT)) ?? {};
-        sessionStorage.removeItem(LEFT);
-        // A link that is opened says itself what it leads to.
+        const { address, session, unsaved } = JSON.parse(sessionStorage.getItem(RELOAD_KEY)) ?? {};
+        sessionStorage.removeItem(RELOAD_KEY);
+        // An opened link takes precedence.
         if (address !== location.href || performance.getEntriesByType('navigation')[0]?.type === 'navigate') return null;
         history.replaceState({ unsaved }, '', address);
         return session;
@@ -83,25 +83,22 @@ function takeLeft() {
         return null;
     }
 }
-const left = takeLeft();
+const reloadState = takeReloadState();
 
-/** The fragment for a state as src/web/page.rs gives it; none where it does not fit and the browser does not keep it. */
+/** The fragment for a state from `Page.session`; null if no address can hold it and the browser does not store it. */
 function fragmentOf(session) {
     if (!session?.startsWith('kept:')) return session;
     try {
-        sessionStorage.setItem(KEPT, session);
+        sessionStorage.setItem(SESSION_KEY, session);
         return 'kept=1';
     } catch {
         return null;
     }
 }
 
-/**
- * Replaces whatever is on the page by a message; `report` is a text that the user can copy, `session` what leads back to where
- * the laboratory was.
- */
+/** Replaces the laboratory by a message; the user can copy `report`, and reload into `session`. */
 function showTrouble(title, text, report, session) {
-    // What went wrong first is the cause of the rest.
+    // The first failure causes any others.
     if (laboratory.trouble) return;
     const link = fragmentOf(session);
     laboratory.trouble = { title, text, report, link };
@@ -112,11 +109,11 @@ function showTrouble(title, text, report, session) {
     $('report').hidden = $('copy').hidden = !report;
     if (report) $('report').value = report;
     $('again').hidden = !link;
-    // A graphics driver may be at fault; the other way to draw avoids most of it.
+    // The graphics driver may be at fault; WebGL2 avoids most of it.
     $('plainer').hidden = laboratory.backend !== 'webgpu';
     $('laboratory').hidden = true;
     $('notice').hidden = false;
-    $('reload').textContent = link ? 'Start anew' : 'Reload';
+    $('reload').textContent = link ? 'Start over' : 'Reload';
     if (window === window.top) (link ? $('again') : $('reload')).focus();
     document.title = `${title} - Jointplay`;
 }
@@ -126,19 +123,19 @@ function crashed(message, link) {
     const report = `${message}\naddress: ${location.href}\nbrowser: ${navigator.userAgent}`;
     showTrouble(
         'The laboratory has stopped',
-        'This is a mistake in the program. Please report the text below with what you did just before.',
+        'This is a bug in the program. Please report the text below, and what you did just before.',
         report,
         link,
     );
 }
 globalThis.jointplayCrashed = crashed;
 
-/** Loads the page anew, with another query or fragment. */
+/** Reloads the page with this query and fragment. */
 function reload(search, fragment) {
     history.replaceState(history.state, '', location.pathname + search + (fragment ? `#${fragment}` : ''));
     location.reload();
 }
-$('reload').addEventListener('click', () => reload(location.search, laboratory.trouble.link ? '' : opened.slice(1)));
+$('reload').addEventListener('click', () => reload(location.search, laboratory.trouble.link ? '' : openedFragment.slice(1)));
 $('again').addEventListener('click', () => reload(location.search, laboratory.trouble.link));
 $('plainer').addEventListener('click', () => {
     query.set('renderer', 'webgl');
@@ -156,9 +153,9 @@ $('copy').addEventListener('click', async () => {
         $('copy').textContent = 'Selected: press Ctrl+C';
     }
 });
-// A file that misses the laboratory, or comes before it is there, must not take its place in the browser.
+// A file dropped beside the canvas, or before it exists, must not replace the page.
 for (const kind of ['dragover', 'drop']) addEventListener(kind, (event) => event.preventDefault());
-// What no panic hook sees: a trap in the compiled code, and anything that keeps the laboratory from starting.
+// Errors that the panic hook does not see: traps in the compiled code, and failures before the laboratory has started.
 function uncaught(error) {
     const fatal = !laboratory.ready || error instanceof WebAssembly.RuntimeError;
     if (fatal && error) crashed(error.stack ?? String(error), null);
@@ -166,325 +163,328 @@ function uncaught(error) {
 addEventListener('error', (event) => uncaught(event.error));
 addEventListener('unhandledrejection', (event) => uncaught(event.reason));
 
-function stage(text, part) {
+function showProgress(text, part) {
     $('stage').textContent = text;
     if (part === undefined) $('progress').removeAttribute('value');
     else $('progress').value = part;
 }
 
-/** The compiled code; the progress of its download is on the page. */
+/** Downloads and compiles the program, and shows the progress. */
 async function download(address, bytes) {
     const response = await fetch(address);
     if (!response.ok) {
         const reason = `${address}: ${response.status} ${response.statusText}`;
-        throw new Error(`${reason}. Files of this page are missing on its server: please tell whoever runs it, with this line`);
+        throw new Error(`${reason}. Files of this page are missing on its server: please report this line to its operator`);
     }
     const megabytes = (n) => (n / 1e6).toFixed(1);
-    // The browser hands out what it has unpacked, and tells the length of what comes over the line.
-    const packed = response.headers.get('content-encoding') ? Number(response.headers.get('content-length')) : bytes;
-    let got = 0;
+    // The browser delivers decompressed data, but reports the compressed length.
+    const transferred = response.headers.get('content-encoding') ? Number(response.headers.get('content-length')) : bytes;
+    let received = 0;
     const counted = response.body.pipeThrough(
         new TransformStream({
             transform(chunk, out) {
-                got += chunk.byteLength;
-                const part = Math.min(got / bytes, 1);
-                stage(packed ? `Loading: ${megabytes(part * packed)} of ${megabytes(packed)} MB` : 'Loading', part);
+                received += chunk.byteLength;
+                const part = Math.min(received / bytes, 1);
+                const text = transferred ? `Loading: ${megabytes(part * transferred)} of ${megabytes(transferred)} MB` : 'Loading';
+                showProgress(text, part);
                 out.enqueue(chunk);
             },
         }),
     );
-    // Compiled while it arrives, which a browser does only for this type.
+    // The browser compiles during the download only for this type.
     return WebAssembly.compileStreaming(new Response(counted, { headers: { 'Content-Type': 'application/wasm' } }));
 }
 
 /** Backends to try, best first. */
 async function backends() {
-    const wanted = asked();
-    const webgl = letGo(document.createElement('canvas').getContext('webgl2'));
+    const requested = requestedRenderer();
+    const webgl = releaseContext(document.createElement('canvas').getContext('webgl2'));
     let webgpu = false;
-    if (wanted !== 'webgl') {
+    if (requested !== 'webgl') {
         try {
             const adapter = await navigator.gpu?.requestAdapter();
-            // Where the processor draws, it does so faster with WebGL2.
-            webgpu = Boolean(adapter) && !(adapter.info?.isFallbackAdapter && webgl && wanted !== 'webgpu');
+            // Software rendering is faster with WebGL2.
+            webgpu = Boolean(adapter) && !(adapter.info?.isFallbackAdapter && webgl && requested !== 'webgpu');
         } catch {
-            // A browser that has the object but no adapter for this page.
+            // The browser has the API, but no adapter for this page.
         }
     }
-    const found = [];
-    if (webgpu) found.push('webgpu');
-    if (webgl && wanted !== 'webgpu') found.push('webgl');
-    return found;
+    const available = [];
+    if (webgpu) available.push('webgpu');
+    if (webgl && requested !== 'webgpu') available.push('webgl');
+    return available;
 }
 
-/** `drawLightly` of canvas.js, once it is there. */
-let lighten;
+/** `simplifyShaders` of canvas.js, once loaded. */
+let simplifyShaders;
 
-/** A canvas keeps the kind of its first context: each attempt gets a fresh one. */
+/** Replaces the canvas. A canvas keeps the type of its first context, so each attempt needs a new one. */
 function freshCanvas() {
     const old = $('laboratory');
     const canvas = old.cloneNode(false);
-    lighten(canvas);
+    simplifyShaders(canvas);
     canvas.hidden = false;
     old.replaceWith(canvas);
     const start = laboratory.starts;
-    canvas.addEventListener('webglcontextlost', () => lost(start, 'the WebGL2 context was lost'));
+    canvas.addEventListener('webglcontextlost', () => graphicsLost(start, 'the WebGL2 context was lost'));
     return canvas;
 }
 
-/** What the user's system asks of all pages, in the words of `Page.start`. */
-function wishes() {
-    const asks = (what) => matchMedia(`(${what})`).matches;
-    const calm = asks('prefers-reduced-motion: reduce') ? 'calm ' : '';
-    return calm + (asks('prefers-contrast: more') || asks('forced-colors: active') ? 'contrast' : '');
+/** Preferences of the user's system, as `Page.start` expects them. */
+function preferences() {
+    const matches = (feature) => matchMedia(`(${feature})`).matches;
+    const calm = matches('prefers-reduced-motion: reduce') ? 'calm ' : '';
+    return calm + (matches('prefers-contrast: more') || matches('forced-colors: active') ? 'contrast' : '');
 }
 
-/** Starts on the first backend that works; what the others said goes to the console. */
-async function begin(found) {
+/** Starts on the first backend that works, and logs why others failed. Returns the failures if none works. */
+async function start(candidates) {
     const { page } = laboratory;
     const failures = [];
-    for (const backend of found) {
+    for (const backend of candidates) {
         laboratory.backend = backend;
         laboratory.starts += 1;
         try {
-            // A laboratory that starts takes the focus, which in a frame is another's.
+            // eframe takes the focus, which in a frame belongs to the embedding page.
             if (window !== window.top) HTMLElement.prototype.focus = () => {};
-            await page.start(freshCanvas(), backend, laboratory.starts, left ?? wanted(), wishes());
-            // What eframe takes typed text by is no stop of its own on the way of Tab.
+            await page.start(freshCanvas(), backend, laboratory.starts, reloadState ?? linkToOpen(), preferences());
+            // Tab skips eframe's hidden field for typed text.
             for (const field of document.querySelectorAll('main > input')) field.tabIndex = -1;
             return null;
         } catch (error) {
             failures.push(`${backend}: ${error?.message ?? error}`);
-            console.warn('no start with', failures.at(-1));
+            console.warn('start failed:', failures.at(-1));
         } finally {
             HTMLElement.prototype.focus = focus;
         }
     }
-    return failures.join('\n') || 'neither WebGPU nor WebGL2 is there';
+    return failures.join('\n') || 'neither WebGPU nor WebGL2 is available';
 }
 
-/** Shows the canvas once it holds a picture. */
-async function firstPicture() {
+/** Shows the canvas once it has a picture. */
+async function showFirstPicture() {
     const { page, starts } = laboratory;
-    const gone = () => laboratory.trouble || laboratory.starts !== starts;
+    const aborted = () => laboratory.trouble || laboratory.starts !== starts;
     const frame = () => new Promise((done) => requestAnimationFrame(done));
     const before = page.frames();
-    // The frame that is drawn is on the screen when the next begins.
-    while (page.frames() < before + 2 && !gone()) await frame();
+    // A frame is on the screen when the next one begins.
+    while (page.frames() < before + 2 && !aborted()) await frame();
     await frame();
-    if (gone()) return;
+    if (aborted()) return;
     $('notice').hidden = true;
     if (window === window.top) $('laboratory').focus();
     laboratory.ready = true;
     performance.mark('first picture');
 }
 
-/** The graphics of start number `start` are gone: the laboratory goes on with others. */
-async function lost(start, why) {
+/** Restarts the graphics after those of start number `start` were lost. */
+async function graphicsLost(start, why) {
     if (laboratory.trouble || start !== laboratory.starts) return;
     restarting = true;
     try {
-        await restart(why);
+        await restartGraphics(why);
     } finally {
         restarting = false;
     }
 }
 
-/** Whether lost graphics are being started again. */
+/** Whether lost graphics are being restarted. */
 let restarting = false;
 
-async function restart(why) {
+async function restartGraphics(why) {
     const { page, losses } = laboratory;
     console.warn('graphics lost:', why);
     laboratory.ready = false;
-    // What still comes from the old ones is no news.
+    // Later events of the old graphics are ignored.
     laboratory.starts += 1;
     page.suspend();
     $('loading').hidden = $('notice').hidden = false;
-    stage('The graphics of this browser were lost: starting them again');
+    showProgress('The graphics were lost: restarting them');
     const now = performance.now();
     losses.push(now);
     let failure = `${why}, ${losses.length} times since the page was opened`;
-    if (losses.filter((time) => now - time < LOSS_SPAN).length <= MOST_LOSSES) {
-        for (const pause of PAUSES) {
-            await new Promise((done) => setTimeout(done, pause));
-            failure = await begin(await backends());
-            if (!failure) return firstPicture();
+    if (losses.filter((time) => now - time < LOSS_WINDOW).length <= MAX_LOSSES) {
+        for (const delay of RESTART_DELAYS) {
+            await new Promise((done) => setTimeout(done, delay));
+            failure = await start(await backends());
+            if (!failure) return showFirstPicture();
         }
     }
     showTrouble(
         'The graphics were lost',
-        `This browser took its graphics back and does not give them again (${failure}). The simulation is still there: ` +
-            'reload to go on from the same state.',
+        `The browser withdrew its graphics and does not provide them again (${failure}). The simulation is not lost: ` +
+            'reload to continue from the same state.',
         null,
         page.session(),
     );
 }
 
-/** Without graphics while nobody sees it; the simulation waits. One after the other, however fast it comes and goes. */
-let change = Promise.resolve();
-function showOrHide(shown) {
-    change = change.then(async () => {
-        if (laboratory.trouble || restarting || shown === laboratory.ready) return undefined;
-        if (shown) {
-            const failure = await begin(await backends());
-            return failure ? showTrouble('The graphics were lost', failure, null, laboratory.page.session()) : firstPicture();
+/** Latest change of visibility: the changes are processed one after the other. */
+let latestChange = Promise.resolve();
+/** Releases the graphics while the page is out of sight; the simulation waits. */
+function visibilityChanged(visible) {
+    latestChange = latestChange.then(async () => {
+        if (laboratory.trouble || restarting || visible === laboratory.ready) return undefined;
+        if (visible) {
+            const failure = await start(await backends());
+            return failure ? showTrouble('The graphics were lost', failure, null, laboratory.page.session()) : showFirstPicture();
         }
         laboratory.ready = false;
-        // What still comes from these graphics is no news.
+        // Later events of these graphics are ignored.
         laboratory.starts += 1;
         laboratory.page.suspend();
-        letGo($('laboratory').getContext('webgl2'));
+        releaseContext($('laboratory').getContext('webgl2'));
         return undefined;
     });
 }
 
-/** A browser has only so many contexts, and takes one back long after it is forgotten. */
-function letGo(context) {
+/** Releases a context at once: a browser has few of them, and collects an unused one late. Returns whether there was one. */
+function releaseContext(context) {
     context?.getExtension('WEBGL_lose_context')?.loseContext();
     return Boolean(context);
 }
 
-/** Begins to load the compiled code and the scripts around it, all at once. */
+/** Starts to load the compiled code and the scripts around it, in parallel. */
 function load() {
     const code = download(`jointplay_bg.wasm${build}`, Number(script.dataset.wasmBytes));
     const parts = Promise.all(['host', 'canvas', 'mirror', 'jointplay'].map((name) => import(`./${name}.js${build}`)));
-    // Should one fail before it is waited for: it is reported where it is.
+    // A failure before the `await` is reported there.
     for (const part of [code, parts]) part.catch(() => {});
     return [code, parts];
 }
 
 async function main() {
-    if (typeof WebAssembly !== 'object' || !WebAssembly.validate(WITH_VECTORS)) return showTrouble('Something is missing', LEFT_OUT.wasm);
+    if (typeof WebAssembly !== 'object' || !WebAssembly.validate(SIMD_MODULE)) return showTrouble('Something is missing', MISSING.wasm);
     $('loading').hidden = false;
-    stage('Loading', 0);
-    const { framed, inSight, Messages, stayPolite } = await import(`./guest.js${build}`);
-    const messages = framed && new Messages(laboratory);
+    showProgress('Loading', 0);
+    const { firstVisible, isFramed, Messages, yieldInput } = await import(`./guest.js${build}`);
+    const messages = isFramed && new Messages(laboratory);
     let started;
-    change = new Promise((done) => (started = done));
-    if (framed) await inSight(showOrHide);
+    latestChange = new Promise((done) => (started = done));
+    if (isFramed) await firstVisible(visibilityChanged);
     const [code, parts] = load();
-    const found = await backends();
-    if (found.length === 0) {
-        showTrouble('Something is missing', LEFT_OUT[asked()] ?? LEFT_OUT.graphics);
-        // There may be the other way to draw.
-        $('plainer').hidden = asked() !== 'webgpu';
+    const available = await backends();
+    if (available.length === 0) {
+        showTrouble('Something is missing', MISSING[requestedRenderer()] ?? MISSING.graphics);
+        // WebGL2 may be available.
+        $('plainer').hidden = requestedRenderer() !== 'webgpu';
         return;
     }
     let bindings;
     let Mirror;
     try {
-        const [{ makeHost }, { CanvasObserver, drawLightly }, mirror, glue] = await parts;
+        const [{ makeHost }, canvas, mirror, glue] = await parts;
         ({ Mirror } = mirror);
-        lighten = drawLightly;
+        ({ simplifyShaders } = canvas);
         bindings = glue;
-        globalThis.ResizeObserver = CanvasObserver;
-        globalThis.jointplayHost = makeHost(laboratory, lost);
+        globalThis.ResizeObserver = canvas.CanvasObserver;
+        globalThis.jointplayHost = makeHost(laboratory, graphicsLost);
         laboratory.code = await code;
         await bindings.default({ module_or_path: laboratory.code });
     } catch (error) {
         return showTrouble('The laboratory could not be loaded', `${error?.message ?? error}`);
     }
-    stage('Starting');
+    showProgress('Starting');
     laboratory.page = new bindings.Page();
     laboratory.mirror = new Mirror(laboratory.page, $('mirror'));
-    const failure = await begin(found);
+    const failure = await start(available);
     if (failure) return showTrouble('The laboratory could not start', failure);
-    // Another link pasted into the address bar of the open page.
+    // The user has edited the address of the open page.
     addEventListener('hashchange', ({ newURL }) => {
-        // The address of the state may have been written over the link before this event came.
+        // The address of the state may have overwritten the link before this event.
         if (location.href !== newURL) history.replaceState(null, '', newURL);
-        opened = location.hash;
-        // What came with the page has been read.
-        if (!framed && location.search !== ownQuery()) history.replaceState(history.state, '', location.pathname + ownQuery() + opened);
-        // Another way to draw needs another start.
-        if (['webgl', 'webgpu'].includes(asked()) && asked() !== laboratory.backend) {
-            mendable = Infinity;
+        openedFragment = location.hash;
+        // The initial query has been read.
+        if (!isFramed && location.search !== browserQuery()) {
+            history.replaceState(history.state, '', location.pathname + browserQuery() + openedFragment);
+        }
+        // Another renderer needs a reload.
+        if (['webgl', 'webgpu'].includes(requestedRenderer()) && requestedRenderer() !== laboratory.backend) {
+            graceEnd = Infinity;
             location.reload();
-        } else mendable = laboratory.page.openLink(wanted()) ? Date.now() + MENDABLE : 0;
+        } else graceEnd = laboratory.page.openLink(linkToOpen()) ? Date.now() + LINK_GRACE : 0;
     });
-    if (framed) stayPolite(laboratory.page);
-    await firstPicture();
+    if (isFramed) yieldInput(laboratory.page);
+    await showFirstPicture();
     started();
-    if (framed) {
-        messages.begin();
+    if (isFramed) {
+        messages.start();
     } else {
-        keepForOffline();
-        keepSession();
+        enableOffline();
+        recordSession();
         askBeforeLeaving();
     }
 }
 
-/** How often the address follows what is shown, ms. */
-const SESSION_PACE = 1000;
-/** How long a link that could not be opened stays in the address, to be mended there, ms; until when it does. */
-const MENDABLE = 60_000;
-let mendable = 0;
-/** Pauses between two looks are so many times as long as one takes: a large scene takes a while to pack. */
-const SPARING = 20;
+/** Least interval between updates of the address, ms. */
+const SESSION_INTERVAL = 1000;
+/** How long a link that failed to open stays in the address, so that the user can correct it, ms; the end of that time. */
+const LINK_GRACE = 60_000;
+let graceEnd = 0;
+/** Least interval between updates, as a multiple of the time that one takes: packing a large scene is slow. */
+const IDLE_FACTOR = 20;
 
-/** Keeps the state in the address, or in the tab, so that loading the page anew, or coming back to it, goes on from there. */
-function keepSession() {
-    let told = false;
-    // A link that could not be opened stays in the address as well, until something else is done.
-    const mended = () => Date.now() >= mendable && !laboratory.page.refused();
-    const present = () => (laboratory.trouble || !mended() ? null : laboratory.page.session());
-    function withOwnWords(fragment) {
-        const words = [new URLSearchParams(location.hash.slice(1)), query];
-        const own = OWN_WORDS.map((word) => [word, words.map((from) => from.get(word)).find(Boolean)]);
-        const rest = own.filter(([, value]) => value).map(([word, value]) => `&${word}=${encodeURIComponent(value)}`);
+/** Stores the state in the address or in the tab, so that the page continues from it after a reload or a return. */
+function recordSession() {
+    let warned = false;
+    // A link that was refused at the start also stays in the address, until the user does something else.
+    const isAddressFree = () => Date.now() >= graceEnd && !laboratory.page.refused();
+    const currentSession = () => (laboratory.trouble || !isAddressFree() ? null : laboratory.page.session());
+    function withBrowserKeys(fragment) {
+        const sources = [new URLSearchParams(location.hash.slice(1)), query];
+        const pairs = BROWSER_KEYS.map((key) => [key, sources.map((source) => source.get(key)).find(Boolean)]);
+        const rest = pairs.filter(([, value]) => value).map(([key, value]) => `&${key}=${encodeURIComponent(value)}`);
         return `#${fragment}${rest.join('')}`;
     }
-    function keep() {
-        const session = laboratory.ready && present();
+    function record() {
+        const session = laboratory.ready && currentSession();
         if (!session) return;
         const fragment = fragmentOf(session);
         if (!fragment) {
-            if (!told) laboratory.page.say('This scene is too large for this browser to keep: loading the page anew loses it');
-            told = true;
+            if (!warned) laboratory.page.say('This scene is too large for this browser to store: a reload loses it');
+            warned = true;
             return;
         }
-        const address = withOwnWords(fragment);
         const unsaved = isUnsaved();
-        const place = location.pathname + ownQuery() + address;
-        if (place === location.pathname + location.search + location.hash && unsaved === wasUnsaved()) return;
-        history.replaceState({ unsaved }, '', place);
+        const address = location.pathname + browserQuery() + withBrowserKeys(fragment);
+        if (address === location.pathname + location.search + location.hash && unsaved === wasUnsaved()) return;
+        history.replaceState({ unsaved }, '', address);
     }
-    function follow() {
-        const began = Date.now();
-        keep();
+    function update() {
+        const startTime = Date.now();
+        record();
         const state = laboratory.ready && laboratory.page.state();
         if (state) document.title = `${JSON.parse(state).scene} - Jointplay`;
-        setTimeout(follow, Math.max(SESSION_PACE, SPARING * (Date.now() - began)));
+        setTimeout(update, Math.max(SESSION_INTERVAL, IDLE_FACTOR * (Date.now() - startTime)));
     }
-    setTimeout(follow, SESSION_PACE);
+    setTimeout(update, SESSION_INTERVAL);
     addEventListener('pagehide', () => {
-        const now = present();
-        if (!now) return;
-        const session = now.startsWith('kept:') ? now : withOwnWords(now);
+        const current = currentSession();
+        if (!current) return;
+        const session = current.startsWith('kept:') ? current : withBrowserKeys(current);
         try {
-            sessionStorage.setItem(LEFT, JSON.stringify({ address: location.href, session, unsaved: isUnsaved() }));
+            sessionStorage.setItem(RELOAD_KEY, JSON.stringify({ address: location.href, session, unsaved: isUnsaved() }));
         } catch {
-            // What the last second brought is lost.
+            // Only the last second is lost.
         }
     });
 }
 
-/** Whether the page was loaded with changes that were in no file; they still are until the laboratory knows better. */
+/** Whether the page was loaded with changes that are in no file; the laboratory reports only later ones. */
 const wasUnsaved = () => Boolean(history.state?.unsaved);
 const isUnsaved = () => laboratory.page.unsaved() ?? wasUnsaved();
 
-/** Only a scene of the user's own can be lost; its changes may be in the address, which nobody takes for a file. */
+/** Asks only about the user's own scene: its changes may be in the address, but not in a file. */
 function askBeforeLeaving() {
     addEventListener('beforeunload', (event) => {
         if (!laboratory.trouble && isUnsaved()) event.preventDefault();
     });
 }
 
-/** Where the browser offers it: over TLS, or on this machine. */
-function keepForOffline() {
+/** Stores the page for offline use where the browser allows it: over TLS, or on this machine. */
+function enableOffline() {
     if (!navigator.serviceWorker) return;
-    navigator.serviceWorker.register('offline.js').catch((error) => console.warn('not kept for offline:', error));
+    navigator.serviceWorker.register('offline.js').catch((error) => console.warn('not stored for offline use:', error));
 }
 
 main();

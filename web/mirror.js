@@ -1,13 +1,13 @@
-// What the canvas shows, as elements of the page: for screen readers and other assistive programs. They lie over the canvas in the
-// places of what they stand for, unseen and out of the pointer's way. The keyboard stays with the canvas, which names the element
-// that has the focus; what an assistive program does to an element goes to the control that it stands for.
+// Mirrors the controls on the canvas as page elements, for screen readers and other assistive software. The elements lie invisibly
+// over their controls and ignore the pointer. The keyboard focus stays on the canvas, whose `aria-activedescendant` names the focused
+// element. Actions of assistive software on an element are passed to its control.
 
-/** How often the elements follow the picture, ms. */
-const PACE = 200;
-/** Steps in the range of a slider that has no steps of its own. */
+/** Interval between updates, ms. */
+const UPDATE_INTERVAL = 200;
+/** Steps in the range of a slider that defines none. */
 const STEPS = 100;
 
-/** Element and attributes by AccessKit's role; what is not here is a text. */
+/** Element and attributes by AccessKit role; all other roles are text. */
 const KINDS = {
     Button: ['button', {}],
     CheckBox: ['input', { type: 'checkbox' }],
@@ -26,68 +26,68 @@ const KINDS = {
     Splitter: ['input', { type: 'range' }],
     TextInput: ['input', { type: 'text' }],
 };
-/** Written while drawing; or told elsewhere on the page, when it changes. */
-const LEFT_OUT = ['TextRun', 'Status'];
+/** Roles without an element: parts of a text, and the status, which `#summary` contains. */
+const OMITTED = ['TextRun', 'Status'];
 
-/** Sets attributes; takes away those that are null. */
-function attributes(element, values) {
+/** Sets attributes, and removes those whose value is null, undefined or empty. */
+function setAttributes(element, values) {
     for (const [name, value] of Object.entries(values)) {
         if (value === null || value === undefined || value === '') element.removeAttribute(name);
         else element.setAttribute(name, value);
     }
 }
 
-/** Keeps the elements in the box `mirror` as the laboratory of `page` is. */
+/** Updates the elements in `box` from the controls of `page`. */
 export class Mirror {
-    /** By AccessKit's number: the element, and the widget that it was made after, as text. */
+    /** By AccessKit id: the element, and the JSON of its widget. */
     #shown = new Map();
     #frames = -1;
-    /** What the control that has the focus last said of itself. */
-    #said = '';
+    /** Latest announcement of the focused control. */
+    #announced = '';
 
     constructor(page, box) {
         this.page = page;
         this.box = box;
         box.addEventListener('click', (event) => {
-            // Whether it is on is for the laboratory to say.
+            // The laboratory decides whether a box is checked.
             event.preventDefault();
-            this.#ask(event.target, 'Click');
+            this.#request(event.target, 'Click');
         });
         box.addEventListener('focusin', ({ target }) => {
-            this.#ask(target, 'Focus');
+            this.#request(target, 'Focus');
             document.getElementById('laboratory').focus({ preventScroll: true });
         });
         box.addEventListener('input', ({ target }) => this.#changed(target));
-        setInterval(() => this.follow(), PACE);
+        setInterval(() => this.follow(), UPDATE_INTERVAL);
     }
 
-    /** Makes the elements what the laboratory shows now. */
+    /** Updates all elements. */
     follow() {
         this.box.hidden = document.getElementById('laboratory').hidden;
         if (this.box.hidden || this.#frames === this.page.frames()) return;
         const text = this.page.widgets();
-        // The first picture with this in mind is still to come.
+        // The mirror is enabled from the next frame on.
         if (!text) return;
         this.#frames = this.page.frames();
-        const widgets = JSON.parse(text).filter(({ role }) => !LEFT_OUT.includes(role));
+        const widgets = JSON.parse(text).filter(({ role }) => !OMITTED.includes(role));
         const shown = new Map(widgets.map((widget) => [widget.id, this.#element(widget)]));
         for (const [id, { element }] of this.#shown) {
             if (shown.get(id)?.element !== element) element.remove();
         }
         this.#shown = shown;
-        // By the part of the window: the element in the next place.
+        // By part of the window: its next element in document order.
         const next = new Map();
         for (const { element, inside } of shown.values()) {
             const part = shown.get(inside)?.element ?? this.box;
-            const there = next.has(part) ? next.get(part) : part.querySelector(':scope > [data-id]');
-            // What is in its place stays there: a reader may be at it.
-            if (element !== there) part.insertBefore(element, there);
-            next.set(part, element === there ? there.nextElementSibling : there);
+            const following = next.has(part) ? next.get(part) : part.querySelector(':scope > [data-id]');
+            // An element in its place is not moved, because a screen reader may be on it.
+            if (element !== following) part.insertBefore(element, following);
+            next.set(part, element === following ? following.nextElementSibling : following);
         }
         this.#focus(widgets.find(({ focused }) => focused));
     }
 
-    /** The element of a widget: the one it had, where that still fits. */
+    /** The element of a widget, reused if its role and part are unchanged. */
     #element(widget) {
         const text = JSON.stringify(widget);
         const before = this.#shown.get(widget.id);
@@ -96,7 +96,7 @@ export class Mirror {
         let element = before?.role === widget.role && before.inside === widget.inside ? before.element : null;
         if (!element) {
             element = document.createElement(tag);
-            attributes(element, { ...fixed, id: `mirror-${widget.id}`, tabindex: tag === 'span' ? null : -1 });
+            setAttributes(element, { ...fixed, id: `mirror-${widget.id}`, tabindex: tag === 'span' ? null : -1 });
             element.dataset.id = widget.id;
         }
         const [x0, y0, x1, y1] = widget.rect;
@@ -106,59 +106,59 @@ export class Mirror {
         return { element, text, role: widget.role, inside: widget.inside };
     }
 
-    /** Tells where the keyboard is. */
+    /** Marks the focused element, and announces its changes. */
     #focus(widget) {
         const canvas = document.getElementById('laboratory');
-        attributes(canvas, { 'aria-activedescendant': widget && `mirror-${widget.id}` });
-        // What eframe takes typed text by has no name of its own.
+        setAttributes(canvas, { 'aria-activedescendant': widget && `mirror-${widget.id}` });
+        // eframe's hidden field for typed text has no name of its own.
         for (const field of document.querySelectorAll('main > input')) {
-            attributes(field, { 'aria-label': widget?.label ?? 'Typed text' });
+            setAttributes(field, { 'aria-label': widget?.label ?? 'Typed text' });
         }
-        // As when the cursor of a plot moves.
-        const said = widget?.live ? widget.label : '';
-        if (said && said !== this.#said) document.getElementById('report-aloud').textContent = said;
-        this.#said = said;
+        // For example the values at the cursor of a plot.
+        const announcement = widget?.live ? widget.label : '';
+        if (announcement && announcement !== this.#announced) document.getElementById('report-aloud').textContent = announcement;
+        this.#announced = announcement;
     }
 
     #changed(element) {
         const { step, value, dataset } = element;
-        if (!('value' in dataset)) return this.#ask(element, 'SetValue', value);
-        // One step is one of the control's own, which may be logarithmic.
+        if (!('value' in dataset)) return this.#request(element, 'SetValue', value);
+        // A single step is one of the control, which may be logarithmic.
         const steps = Math.round((Number(value) - Number(dataset.value)) / Number(step));
-        if (Math.abs(steps) === 1) this.#ask(element, steps > 0 ? 'Increment' : 'Decrement');
-        else this.#ask(element, 'SetValue', Number(value));
+        if (Math.abs(steps) === 1) this.#request(element, steps > 0 ? 'Increment' : 'Decrement');
+        else this.#request(element, 'SetValue', Number(value));
     }
 
-    #ask(element, action, value) {
-        this.page.ask(element.dataset.id, action, value);
+    #request(element, action, value) {
+        this.page.request(element.dataset.id, action, value);
     }
 }
 
-/** Gives `element` the state of `widget`. */
+/** Sets the name and state of `element` from its widget. */
 function describe(element, tag, { role, label, text, value, min, max, step, on, expanded, disabled }) {
     if (tag === 'span') {
         element.textContent = label;
         return;
     }
     const name = ['ComboBox', 'Image'].includes(role) && text ? `${label}: ${text}` : label;
-    attributes(element, { 'aria-label': name, 'aria-expanded': expanded });
+    setAttributes(element, { 'aria-label': name, 'aria-expanded': expanded });
     if (tag === 'div' || tag === 'section') {
         const number = role === 'ProgressIndicator' ? value : null;
-        attributes(element, { 'aria-disabled': disabled || null, 'aria-valuenow': number });
+        setAttributes(element, { 'aria-disabled': disabled || null, 'aria-valuenow': number });
         return;
     }
     element.disabled = disabled;
     if (tag === 'button') {
-        attributes(element, { 'aria-pressed': on });
+        setAttributes(element, { 'aria-pressed': on });
     } else if (element.type === 'checkbox' || element.type === 'radio') {
         element.checked = on;
     } else if (value === null) {
         element.value = text ?? '';
     } else {
-        const own = min === null || max === null ? 'any' : (max - min) / STEPS;
-        attributes(element, { min, max, step: step ?? own, 'aria-valuetext': text });
+        const defaultStep = min === null || max === null ? 'any' : (max - min) / STEPS;
+        setAttributes(element, { min, max, step: step ?? defaultStep, 'aria-valuetext': text });
         element.value = value;
-        // As the element holds it: a multiple of its step.
+        // As the element has rounded it to its steps.
         element.dataset.value = element.value;
     }
 }

@@ -1,62 +1,63 @@
-// Keeps the page for when there is no network: all files of one build, or none.
+// Service worker: stores the page for offline use, all files of one build or none.
 
 const BUILD = '{{build}}';
-/** Every file of this build, and what it must hold: one of another build is refused. */
+/** Every file of this build with its checksum: a file of another build is refused. */
 const FILES = {
 {{files}}
 };
-/** How long a start waits for the network before it takes what is kept, ms. */
-const PATIENCE = 4000;
+/** How long a start waits for the network before it uses the stored files, ms. */
+const NETWORK_TIMEOUT = 4000;
 
-/** Names of what is kept for pages of this folder, whatever their build. */
-const OURS = `jointplay ${registration.scope} `;
-const KEPT = OURS + BUILD;
-/** What the page asks for: `index.html` by its folder, all else with the build. */
+/** Prefix of the caches of this folder, and the cache of this build. */
+const CACHE_PREFIX = `jointplay ${registration.scope} `;
+const CACHE = CACHE_PREFIX + BUILD;
+/** Address as the page requests it: `index.html` by its folder, other files with the build. */
 const address = (name) => (name === 'index.html' ? './' : `${name}?${BUILD}`);
 
-async function keep() {
-    const kept = await caches.open(KEPT);
+/** Stores all files of this build. */
+async function store() {
+    const cache = await caches.open(CACHE);
     const all = Object.entries(FILES).map(async ([name, integrity]) => {
         const response = await fetch(address(name), { integrity });
         if (!response.ok) throw new Error(`${name}: ${response.status}`);
-        await kept.put(address(name), response);
+        await cache.put(address(name), response);
     });
     try {
         await Promise.all(all);
     } catch (error) {
-        await caches.delete(KEPT);
+        await caches.delete(CACHE);
         throw error;
     }
 }
 
-/** Comes to pass when no page of an older build is open any more. */
-async function replace() {
+/** Deletes older builds; called once no page of them is open. */
+async function deleteOlder() {
     for (const name of await caches.keys()) {
-        if (name.startsWith(OURS) && name !== KEPT) await caches.delete(name);
+        if (name.startsWith(CACHE_PREFIX) && name !== CACHE) await caches.delete(name);
     }
     await clients.claim();
 }
 
-/** A page starts with the newest build that can be had, and goes on with the files of the build that it started with. */
+/** A page starts with the newest build available, and continues with the files of that build. */
 async function answer(request) {
     if (request.mode !== 'navigate') return (await caches.match(request)) ?? fetch(request);
-    const patience = new AbortController();
-    const timer = setTimeout(() => patience.abort(), PATIENCE);
+    const timeout = new AbortController();
+    const timer = setTimeout(() => timeout.abort(), NETWORK_TIMEOUT);
     try {
-        const response = await fetch(request, { signal: patience.signal });
+        const response = await fetch(request, { signal: timeout.signal });
         if (response.status < 500) return response;
     } catch {
         // No network.
     } finally {
-        // What has begun to arrive may take its time.
+        // A response that has begun may take longer.
         clearTimeout(timer);
     }
-    const kept = await caches.open(KEPT);
-    return (await kept.match('./')) ?? Response.error();
+    const cache = await caches.open(CACHE);
+    return (await cache.match('./')) ?? Response.error();
 }
 
-addEventListener('install', (event) => event.waitUntil(keep()));
-addEventListener('activate', (event) => event.waitUntil(replace()));
+addEventListener('install', (event) => event.waitUntil(store()));
+addEventListener('activate', (event) => event.waitUntil(deleteOlder()));
 addEventListener('fetch', (event) => {
     const { method, url } = event.request;
     if (method === 'GET' && url.startsWith(registration.scope)) event.respondWith(answer(event.request));

@@ -1,7 +1,6 @@
-// What has to be there before the program of the page: the one script that any browser takes, from a file as well.
+// Runs before the program of the page, in any browser, also from a file.
 
-// A page around this one may speak as soon as this one has loaded, for which the browser waits for this script: what it says waits
-// for guest.js.
+// The embedding page may send messages as soon as this page has loaded; guest.js reads them later.
 window.jointplayMail = [];
 if (window !== window.top) {
     addEventListener('message', function (event) {
@@ -9,17 +8,17 @@ if (window !== window.top) {
     });
 }
 
-// The program did not come: the page says so.
-function stuck() {
-    // A page that was opened as a file has no origin either.
+// Explains that the program could not be loaded.
+function showStuck() {
+    // A page opened as a file has no origin either, but is not framed.
     var sealed = window !== window.top && window.origin === 'null';
     document.getElementById(sealed ? 'sealed' : 'stuck').hidden = false;
 }
 
-// A script that cannot be loaded tells nobody but itself, and who listens on the way down to it.
+// The error event of a script does not bubble; it is visible only in the capture phase.
 addEventListener('error', function (event) {
-    if (event.target.id === 'program') stuck();
+    if (event.target.id === 'program') showStuck();
 }, true);
 
-// Too old for modules: it leaves the program out and says nothing.
-if (!('noModule' in HTMLScriptElement.prototype)) addEventListener('load', stuck);
+// A browser without modules skips the program silently.
+if (!('noModule' in HTMLScriptElement.prototype)) addEventListener('load', showStuck);

@@ -1,28 +1,28 @@
-// A long computation beside the page: the same code, without a picture.
+// A web worker for long computations, with the same compiled code as the page.
 
 const build = new URL(import.meta.url).search;
 
-/** How long it computes before it rests, or looks at least what the page says, ms. */
+/** Computing time between two pauses, in which messages of the page are handled, ms. */
 const SPELL = 40;
-/** How long it rests, as a multiple of that. */
-let rest = 0;
-let began = 0;
-/** A way to look that takes no longer than that: a timer waits for 4 ms. */
-const { port1: look, port2: seen } = new MessageChannel();
+/** Idle time of a pause, as a multiple of the computing time. */
+let idleFactor = 0;
+let spellStart = 0;
+/** Yields to waiting messages without delay; a timer would take at least 4 ms. */
+const { port1: trigger, port2: yielded } = new MessageChannel();
 
 globalThis.jointplayWork = {
-    tell: (message) => postMessage(message),
+    post: (message) => postMessage(message),
     rest() {
-        const computed = performance.now() - began;
+        const computed = performance.now() - spellStart;
         if (computed < SPELL) return undefined;
         return new Promise((done) => {
-            const goOn = () => {
-                began = performance.now();
+            const resume = () => {
+                spellStart = performance.now();
                 done();
             };
-            if (rest > 0) return setTimeout(goOn, rest * computed);
-            seen.onmessage = goOn;
-            return look.postMessage(null);
+            if (idleFactor > 0) return setTimeout(resume, idleFactor * computed);
+            yielded.onmessage = resume;
+            return trigger.postMessage(null);
         });
     },
 };
@@ -30,17 +30,17 @@ globalThis.jointplayWork = {
 async function perform({ code, job }) {
     const bindings = await import(`./jointplay.js${build}`);
     await bindings.default({ module_or_path: code });
-    began = performance.now();
+    spellStart = performance.now();
     await bindings.perform(job);
 }
 
-/** `code`: the compiled module, which the page has already; `job`: JSON, crates/analysis/src/task.rs. Later on `rest`. */
+/** First message: the compiled module `code` and the `job` as JSON (crates/analysis/src/task.rs). Later ones: `rest`. */
 addEventListener('message', ({ data }) => {
     if (data.job) return perform(data);
-    rest = data.rest;
+    idleFactor = data.rest;
     return undefined;
 });
-// An error that nobody catches is seen by the page only if it is thrown outside of a promise.
+// The page sees an uncaught error only if it is thrown outside a promise.
 addEventListener('unhandledrejection', ({ reason }) => {
     throw reason;
 });

@@ -18,22 +18,22 @@ extern "C" {
     fn crashed(report: &str, link: &str) -> Result<(), JsValue>;
 }
 
-/// Shows panics on the page from now on.
-pub fn explain_panics() {
+/// Installs a panic hook that shows a report on the page.
+pub fn install_hook() {
     let previous = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        let what = info.payload_as_str().unwrap_or("unknown cause");
-        let place = info.location().map(|place| format!("{}:{}", place.file(), place.line())).unwrap_or_default();
+        let message = info.payload_as_str().unwrap_or("unknown cause");
+        let location = info.location().map(|at| format!("{}:{}", at.file(), at.line())).unwrap_or_default();
         let (running, link) = RUNNING.with_borrow(Clone::clone);
-        let report = format!("internal error in jointplay {}: {what}\nat {place}\n{running}", crate::VERSION);
-        // Without a page, as in a script, there is nothing to show it on.
+        let report = format!("internal error in jointplay {}: {message}\nat {location}\n{running}", crate::VERSION);
+        // Fails without a page, as in a script.
         let _ = crashed(&report, &link);
         previous(info);
     }));
 }
 
 /// Records the running session for a report. `link` is the fragment that restores it ([`super::Page::session`]).
-pub fn note(scene: &Scene, renderer: &str, link: String) {
+pub fn record_session(scene: &Scene, renderer: &str, link: String) {
     let mut text = format!("scene: {}\n", scene.name);
     for (key, value) in &scene.changes {
         let (key, value) = (visible_line(key), visible_line(value));

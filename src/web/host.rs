@@ -37,8 +37,8 @@ extern "C" {
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn click(samples: &[f32], after: f64);
     /// Schedules calls of [`super::page::Page::step_between`] until the next frame.
-    #[wasm_bindgen(js_namespace = jointplayHost, js_name = goOn)]
-    pub fn go_on();
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = scheduleSteps)]
+    pub fn schedule_steps();
     /// Reports that the graphics of start number `start` are lost.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = graphicsLost)]
     pub fn graphics_lost(start: u32, why: &str);
@@ -66,15 +66,15 @@ impl Inbox {
     }
 
     /// Adds files that arrived together.
-    pub fn put(&self, files: Vec<OpenedFile>) {
+    pub fn push(&self, files: Vec<OpenedFile>) {
         self.files.borrow_mut().push_back(files);
         self.ctx().request_repaint();
     }
 
     /// Reads browser files and adds them. Oversized files are not read, because a page has little memory.
-    pub fn take(self: Rc<Self>, files: Vec<File>) {
+    pub fn read(self: Rc<Self>, files: Vec<File>) {
         wasm_bindgen_futures::spawn_local(async move {
-            let mut read = Vec::with_capacity(files.len());
+            let mut opened = Vec::with_capacity(files.len());
             for file in files {
                 let name = file.name();
                 let content = if file.size() > max_file_size(&name) as f64 {
@@ -85,9 +85,9 @@ impl Inbox {
                         Err(_) => Err("cannot be read; it may be a folder".to_owned()),
                     }
                 };
-                read.push(OpenedFile { name, content });
+                opened.push(OpenedFile { name, content });
             }
-            self.put(read);
+            self.push(opened);
         });
     }
 }
@@ -96,7 +96,7 @@ impl Inbox {
 pub struct WebHost {
     /// Incoming files.
     pub inbox: Rc<Inbox>,
-    /// Why there is no sound.
+    /// Why sound is unavailable, until the application has shown it.
     pub no_sound: Option<String>,
 }
 
@@ -125,7 +125,7 @@ impl Host for WebHost {
 
     fn read_dropped(&mut self, files: Vec<DroppedFile>) {
         let files = files.iter().filter_map(|file| file.web_file().cloned());
-        self.inbox.clone().take(files.collect());
+        self.inbox.clone().read(files.collect());
     }
 
     fn opened(&mut self) -> Option<Vec<OpenedFile>> {

@@ -61,9 +61,9 @@ impl Mirror {
         Value::Array(widgets).to_string()
     }
 
-    /// Requests `action` of a control in the next frame: `Click`, `Focus`, `Increment`, `Decrement`, or `SetValue` with `data`.
+    /// Requests `action` on a control in the next frame: `Click`, `Focus`, `Increment`, `Decrement`, or `SetValue` with `data`.
     /// Other actions are ignored.
-    pub fn ask(&mut self, id: u64, action: &str, data: Option<accesskit::ActionData>) {
+    pub fn request(&mut self, id: u64, action: &str, data: Option<accesskit::ActionData>) {
         use accesskit::Action;
         let action = match action {
             "Click" => Action::Click,

@@ -12,14 +12,14 @@ use serde_json::json;
 use wasm_bindgen::prelude::*;
 
 use super::crash;
-use super::host::{Inbox, WebHost, are_graphics_lost, go_on, graphics_lost};
+use super::host::{Inbox, WebHost, are_graphics_lost, graphics_lost, schedule_steps};
 use super::mirror::Mirror;
 use crate::app::{App, AppOptions};
 use crate::render::wgpu::Backends;
 use crate::simulate::SPELL;
 
-/// Interval between snapshots of the session, s; crash reports and restarts use the latest.
-const NOTE_INTERVAL: f64 = 2.0;
+/// Interval between snapshots of the session, s; a crash report and the reload after it use the latest.
+const SNAPSHOT_INTERVAL: f64 = 2.0;
 
 /// The laboratory on a page.
 #[wasm_bindgen]
@@ -37,13 +37,13 @@ struct Laboratory {
     renderer: String,
     frames: u32,
     /// Time of the latest snapshot on egui's clock, s.
-    noted: Option<f64>,
+    snapshot_time: Option<f64>,
     /// Start of the latest frame on the player's clock, s.
-    began: f64,
+    frame_start: f64,
 }
 
-/// The eframe application: the laboratory on one canvas.
-struct OnCanvas(Rc<RefCell<Option<Laboratory>>>);
+/// The eframe application that draws the laboratory on one canvas.
+struct CanvasApp(Rc<RefCell<Option<Laboratory>>>);
 
 #[wasm_bindgen]
 impl Page {
@@ -51,15 +51,15 @@ impl Page {
     #[wasm_bindgen(constructor)]
     #[allow(clippy::new_without_default, reason = "JavaScript knows no Default")]
     pub fn new() -> Self {
-        crash::explain_panics();
+        crash::install_hook();
         // Fails if another page of the same module has installed the logger.
         let _ = eframe::WebLogger::init(log::LevelFilter::Warn);
         Self { runner: eframe::WebRunner::new(), laboratory: Rc::default(), inbox: Rc::default() }
     }
 
     /// Draws on `canvas` with `backend` (`webgpu` or `webgl`); `start` numbers the calls. The first call opens `link`: the
-    /// address from its `?` on, or a result of [`Self::session`]; errors in it are shown beside the default scene. `wishes` are
-    /// preferences of the user's system: `calm` for reduced motion, `contrast` for high contrast, or both.
+    /// address from its `?` on, or a result of [`Self::session`]; errors in it are shown beside the default scene. `preferences`
+    /// are those of the user's system: `calm` for reduced motion, `contrast` for high contrast, or both.
     ///
     /// # Errors
     /// Text: the backend does not work here. A running laboratory survives for the next attempt.
@@ -69,7 +69,7 @@ impl Page {
         backend: String,
         start: u32,
         link: String,
-        wishes: String,
+        preferences: String,
     ) -> Result<(), JsValue> {
         let mut setup = WgpuSetupCreateNew::without_display_handle();
         setup.instance_descriptor.backends = if backend == "webgl" { Backends::GL } else { Backends::BROWSER_WEBGPU };
@@ -86,10 +86,10 @@ impl Page {
             let mut slot = laboratory.borrow_mut();
             match &mut *slot {
                 Some(laboratory) => laboratory.attach(cc),
-                None => *slot = Some(Laboratory::new(cc, &link, &wishes, inbox)?),
+                None => *slot = Some(Laboratory::new(cc, &link, &preferences, inbox)?),
             }
             drop(slot);
-            Ok(Box::new(OnCanvas(laboratory)))
+            Ok(Box::new(CanvasApp(laboratory)))
         });
         self.runner.start(canvas, options, create).await
     }
@@ -148,7 +148,7 @@ impl Page {
     #[wasm_bindgen(js_name = openFiles)]
     pub fn open_files(&self, files: &Array) {
         let files = files.iter().filter_map(|file| file.dyn_into::<File>().ok());
-        self.inbox.clone().take(files.collect());
+        self.inbox.clone().read(files.collect());
     }
 
     /// Shows a message for a few seconds.
@@ -197,7 +197,7 @@ impl Page {
         self.with(|laboratory| laboratory.impacts(time))
     }
 
-    /// Clears the keyboard focus, which the page has moved elsewhere.
+    /// Clears the focus in the laboratory once the keyboard focus has left it.
     pub fn release(&self) {
         self.with(|laboratory| {
             laboratory.ctx.memory_mut(|memory| {
@@ -221,8 +221,8 @@ impl Page {
         })
     }
 
-    /// Passes a request of assistive software to the control `id` ([`Mirror::ask`]); `value` is a number or a text.
-    pub fn ask(&self, id: &str, action: &str, value: &JsValue) {
+    /// Passes a request of assistive software to the control `id` ([`Mirror::request`]); `value` is a number or a text.
+    pub fn request(&self, id: &str, action: &str, value: &JsValue) {
         let number = value.as_f64().map(ActionData::NumericValue);
         let text = || Some(ActionData::Value(value.as_string()?.into()));
         let data = number.or_else(text);
@@ -230,7 +230,7 @@ impl Page {
             let ctx = &laboratory.ctx;
             let mirror = ctx.plugin_or_default::<Mirror>();
             if let Ok(id) = id.parse() {
-                mirror.lock().ask(id, action, data);
+                mirror.lock().request(id, action, data);
                 ctx.request_repaint();
             }
         });
@@ -249,15 +249,15 @@ impl Page {
     #[wasm_bindgen(js_name = stepBetween)]
     pub fn step_between(&self) -> Option<f64> {
         let behind = self.with(|laboratory| {
-            let since = (laboratory.app.player().clock)() - laboratory.began;
+            let since = (laboratory.app.player().clock)() - laboratory.frame_start;
             laboratory.app.step_between(since)
         })??;
         Some(if behind { 0.0 } else { 1000.0 * SPELL })
     }
 
-    fn with<T>(&self, ask: impl FnOnce(&mut Laboratory) -> T) -> Option<T> {
+    fn with<T>(&self, action: impl FnOnce(&mut Laboratory) -> T) -> Option<T> {
         // It stays borrowed after a panic.
-        self.laboratory.try_borrow_mut().ok()?.as_mut().map(ask)
+        self.laboratory.try_borrow_mut().ok()?.as_mut().map(action)
     }
 }
 
@@ -278,7 +278,8 @@ fn watch(state: &RenderState, backend: &str, start: u32) {
     }
 }
 
-fn describe(cc: &eframe::CreationContext<'_>) -> String {
+/// Backend and adapter, for crash reports and tests.
+fn renderer_name(cc: &eframe::CreationContext<'_>) -> String {
     cc.wgpu_render_state.as_ref().map_or_else(
         || "none".to_owned(),
         |state| {
@@ -296,18 +297,25 @@ impl Laboratory {
     fn new(
         cc: &eframe::CreationContext<'_>,
         link: &str,
-        wishes: &str,
+        preferences: &str,
         inbox: Rc<Inbox>,
     ) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
         let options = AppOptions {
-            calm: wishes.contains("calm"),
-            contrast: wishes.contains("contrast"),
+            calm: preferences.contains("calm"),
+            contrast: preferences.contains("contrast"),
             ..AppOptions::from_link_or_default(link)
         };
         let mut app = App::new(cc, options)?;
         app.set_host(Box::new(WebHost { inbox, no_sound: None }));
         app.follow_frame_rate();
-        Ok(Self { app, ctx: cc.egui_ctx.clone(), renderer: describe(cc), frames: 0, noted: None, began: 0.0 })
+        Ok(Self {
+            app,
+            ctx: cc.egui_ctx.clone(),
+            renderer: renderer_name(cc),
+            frames: 0,
+            snapshot_time: None,
+            frame_start: 0.0,
+        })
     }
 
     /// Attaches new graphics.
@@ -315,17 +323,17 @@ impl Laboratory {
         let theme = self.ctx.options(|options| options.theme_preference);
         self.app.attach(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), theme);
         self.ctx = cc.egui_ctx.clone();
-        self.renderer = describe(cc);
-        self.noted = None;
+        self.renderer = renderer_name(cc);
+        self.snapshot_time = None;
     }
 
     /// Updates the snapshot for crash reports.
-    fn note(&mut self) {
+    fn update_snapshot(&mut self) {
         let now = self.ctx.input(|input| input.time);
-        if self.noted.is_none_or(|noted| now - noted > NOTE_INTERVAL) {
-            self.noted = Some(now);
+        if self.snapshot_time.is_none_or(|snapshot_time| now - snapshot_time > SNAPSHOT_INTERVAL) {
+            self.snapshot_time = Some(now);
             let scene = self.app.player().pending();
-            crash::note(scene, &self.renderer, self.app.session());
+            crash::record_session(scene, &self.renderer, self.app.session());
         }
     }
 
@@ -385,13 +393,13 @@ impl Laboratory {
     }
 }
 
-impl eframe::App for OnCanvas {
+impl eframe::App for CanvasApp {
     fn logic(&mut self, ctx: &egui::Context, frame: &mut eframe::Frame) {
         if let Some(laboratory) = &mut *self.0.borrow_mut() {
-            laboratory.began = (laboratory.app.player().clock)();
+            laboratory.frame_start = (laboratory.app.player().clock)();
             laboratory.app.logic(ctx, frame);
-            laboratory.note();
-            go_on();
+            laboratory.update_snapshot();
+            schedule_steps();
         }
     }
 

@@ -14,7 +14,7 @@ use crate::app::BackgroundTask;
 extern "C" {
     /// In the worker: posts a message to the page.
     #[wasm_bindgen(js_namespace = jointplayWork)]
-    fn tell(message: &str);
+    fn post(message: &str);
     /// In the worker: the promise to await before continuing, if any.
     #[wasm_bindgen(js_namespace = jointplayWork)]
     fn rest() -> Option<Promise>;
@@ -32,25 +32,25 @@ extern "C" {
     fn end_work(worker: u32);
 }
 
-fn say(message: &Message) {
+fn post_message(message: &Message) {
     // Serialising plain data cannot fail.
-    tell(&serde_json::to_string(message).expect("a message is JSON"));
+    post(&serde_json::to_string(message).expect("a message is JSON"));
 }
 
 /// In the worker: computes a job, given as JSON, and posts each message as JSON.
 #[wasm_bindgen]
 pub async fn perform(job: String) {
     std::panic::set_hook(Box::new(|info| {
-        say(&Message::Failed(format!("internal error in the computation: {info}")));
+        post_message(&Message::Failed(format!("internal error in the computation: {info}")));
     }));
     let start = Instant::now();
     let job = match serde_json::from_str::<Job>(&job) {
         Ok(job) => job,
-        Err(error) => return say(&Message::Failed(format!("not a computation: {error}"))),
+        Err(error) => return post_message(&Message::Failed(format!("not a computation: {error}"))),
     };
     let mut clock = || start.elapsed().as_secs_f64();
-    let mut tell = |message| {
-        say(&message);
+    let mut send = |message| {
+        post_message(&message);
         // The page terminates the worker to cancel the job.
         ControlFlow::Continue(())
     };
@@ -60,7 +60,7 @@ pub async fn perform(job: String) {
             let _ = JsFuture::from(promise).await;
         }
     };
-    task::perform_with_rests(&job, &mut clock, &mut tell, &mut wait).await;
+    task::perform_with_rests(&job, &mut clock, &mut send, &mut wait).await;
 }
 
 /// On the page: a running worker, terminated on drop.
