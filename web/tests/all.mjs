@@ -1,4 +1,4 @@
-// What only a browser can answer, in one process, so that the tests share the browser and the server. They need Chromium alone.
+// Tests in Chromium, in one process, so that they share the browser and the server.
 
 import './assist.test.mjs';
 import './bits.test.mjs';

@@ -1,4 +1,4 @@
-// The page for those who do not see the canvas: what a screen reader finds on it and does to it.
+// The page for users who do not see the canvas: the elements that a screen reader finds, and its actions on them.
 
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
@@ -11,11 +11,11 @@ after(quit);
 
 const axe = fs.readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
-const reads = async (lab, role, name) => (await lab.element(role, name)).evaluate((element) => element.value);
+const valueOf = async (lab, role, name) => (await lab.element(role, name)).evaluate((element) => element.value);
 
-test('without pointer and canvas the most important actions work, and the focus is the same on the canvas and for a screen reader', async () => {
+test('the most important actions work without pointer and canvas, and the canvas and a screen reader agree on the focus', async () => {
     const lab = await open('play=0', { backend: 'webgl' });
-    // From the start of the page it is not far to the button that plays.
+    // Play is among the first stops of Tab.
     await lab.page.evaluate(() => document.activeElement.blur());
     const stops = [];
     while (!stops.includes('Play')) {
@@ -37,24 +37,24 @@ test('without pointer and canvas the most important actions work, and the focus 
     assert.equal((await lab.state()).steps, 1);
 
     await lab.activate('button', 'Next impact');
-    await lab.still();
+    await lab.settle();
     const impact = (await lab.state()).shown_s;
     assert.ok(impact > 5e-3, `${impact}`);
-    // One step of the timeline and back, then straight to an instant.
+    // Back by one step of the timeline, then directly to an instant.
     await lab.adjust('slider', 'Timeline, s', { steps: -1 });
     const before = (await lab.state()).shown_s;
     assert.ok(before > 0 && before < impact, `${before} after ${impact}`);
     await lab.runTo(0.0435);
-    const said = async (name) => (await lab.element('slider', name)).getAttribute('aria-valuetext');
-    assert.equal(await said('Timeline, s'), '43.5 milliseconds');
-    assert.equal(await said('Clearance'), '0.3 millimetres');
-    assert.equal(await said('Friction coefficient'), '0.15');
-    assert.equal(await said('Time scale'), '1 to 50');
-    assert.match(await said('Height of the plots'), /^\d+ percent$/);
+    const spokenValue = async (name) => (await lab.element('slider', name)).getAttribute('aria-valuetext');
+    assert.equal(await spokenValue('Timeline, s'), '43.5 milliseconds');
+    assert.equal(await spokenValue('Clearance'), '0.3 millimetres');
+    assert.equal(await spokenValue('Friction coefficient'), '0.15');
+    assert.equal(await spokenValue('Time scale'), '1 to 50');
+    assert.match(await spokenValue('Height of the plots'), /^\d+ percent$/);
     await lab.adjust('slider', 'Timeline, s', { value: 0 });
     assert.equal((await lab.state()).shown_s, 0);
 
-    // A plot is a sentence; with the focus on it arrow keys read its values out.
+    // A plot is a sentence; with the focus on it, the arrow keys read out its values.
     const plot = lab.page.getByRole('img', { name: /^Plot of Normal force: 0 to [\d.]+ milliseconds, from 0 to [\d.]+ newtons, largest in S\d at [\d.]+ milliseconds$/ });
     await plot.evaluate((element) => element.focus());
     await lab.key('ArrowRight');
@@ -68,8 +68,8 @@ test('without pointer and canvas the most important actions work, and the focus 
 
     await lab.adjust('slider', 'Friction coefficient', { value: 0.5 });
     assert.ok(Math.abs((await lab.state()).changed_parameters['contact.friction'] - 0.5) < 5e-3);
-    assert.equal(await reads(lab, 'textbox', 'Friction coefficient'), '0.5');
-    // A logarithmic slider takes a step of its own, not a hundredth of its range.
+    assert.equal(await valueOf(lab, 'textbox', 'Friction coefficient'), '0.5');
+    // A logarithmic slider has its own step, not a hundredth of its range.
     const clearance = async () => Number((await lab.find('Slider', 'Clearance')).value);
     const narrow = await clearance();
     await lab.adjust('slider', 'Clearance', { steps: 1 });
@@ -82,19 +82,19 @@ test('without pointer and canvas the most important actions work, and the focus 
         const element = document.getElementById(canvas.getAttribute('aria-activedescendant') ?? '');
         return document.activeElement === canvas ? element?.getAttribute('aria-label') : document.activeElement.outerHTML;
     });
-    // From the page to the laboratory: the canvas keeps the keyboard.
+    // A focused element passes the focus to its control; the keyboard focus stays on the canvas.
     await (await lab.element('button', 'Step')).evaluate((element) => element.focus());
     await lab.element('button', 'Step');
     assert.equal(await focused(), 'Step');
     await lab.key('Space');
     assert.equal((await lab.state()).steps, 1);
-    // And back.
+    // And in the other direction.
     await lab.key('Tab');
     const { label } = (await lab.widgets()).find((widget) => widget.focused);
     assert.notEqual(label, 'Step');
     await lab.element('button', 'Step');
     assert.ok((await focused()).startsWith(label), `${await focused()} and ${label}`);
-    // Typed text goes to a field of eframe's, which has the name of the control.
+    // Typed text goes to eframe's hidden field, which gets the name of the control.
     await (await lab.element('textbox', 'Clearance')).evaluate((element) => element.focus());
     await lab.element('textbox', 'Clearance');
     const name = await lab.page.evaluate(() => document.activeElement.getAttribute('aria-label'));
@@ -102,7 +102,7 @@ test('without pointer and canvas the most important actions work, and the focus 
     await lab.close();
 });
 
-test('a screen reader is told what goes on; elements lie where their controls are, have names, and axe finds nothing to blame', async () => {
+test('a screen reader hears events; elements have names and the places of their controls; axe finds no violations', async () => {
     const [wide, phone] = [{ width: 1280, height: 720 }, { width: 390, height: 780 }];
     const lab = await open('scene=pendulum', { backend: 'webgl', size: phone });
     await lab.until(async () => /Running at time scale 1:5[,. ]/.test(await lab.summary()), 'no summary');
@@ -112,27 +112,27 @@ test('a screen reader is told what goes on; elements lie where their controls ar
     await lab.until(async () => /Paused at .*S1 /.test(await lab.summary()), 'the summary does not say that it is paused');
     const aloud = lab.page.locator('[aria-live=polite]');
     await lab.until(async () => (await aloud.textContent()) === (await lab.summary()), 'what happens is not read out');
-    // Outside of the canvas, and not hidden from a screen reader.
+    // Outside the canvas, and visible to a screen reader.
     const tree = await lab.page.locator('body').ariaSnapshot();
     for (const part of ['What the mechanism is doing', 'Scene and files', 'Transport', 'The machine']) {
         assert.ok(tree.includes(`region "${part}"`), `${part} is not in ${tree}`);
     }
     assert.match(tree, /Paused at/);
 
-    // As a script of the page would be kept out by its policy.
+    // Evaluated, because the page's policy would block an added script.
     await lab.page.evaluate(`(() => { ${axe} })()`);
     const clean = async (state) => {
         await lab.frame(2);
         await lab.page.evaluate(() => globalThis.jointplay.mirror.follow());
-        const dumb = await lab.page.locator('#mirror [type=range]:not([aria-valuetext])').evaluateAll((all) => all.map(({ outerHTML }) => outerHTML));
-        assert.deepEqual(dumb, [], `no words for a value ${state}`);
+        const wordless = await lab.page.locator('#mirror [type=range]:not([aria-valuetext])').evaluateAll((all) => all.map(({ outerHTML }) => outerHTML));
+        assert.deepEqual(wordless, [], `no words for a value ${state}`);
         const { violations } = await lab.page.evaluate(() => globalThis.axe.run());
         assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`), [], state);
     };
     for (const size of [phone, wide]) {
         await lab.page.setViewportSize(size);
         await lab.frame(3);
-        // The elements follow the controls a moment later.
+        // The elements are updated a moment after the controls.
         let misplaced;
         await lab.until(async () => {
             const places = await lab.page.evaluate(() => Array.from(document.querySelectorAll('#mirror [data-id]:not(section)'), (element) => {
@@ -142,7 +142,7 @@ test('a screen reader is told what goes on; elements lie where their controls ar
             const widgets = new Map((await lab.widgets()).map((widget) => [widget.id, widget.rect]));
             misplaced = places.filter(([id, , rect]) => !rect.every((x, side) => Math.abs(x - widgets.get(id)?.[side]) < 1));
             return places.length > 20 && misplaced.length === 0;
-        }, () => `elements lie elsewhere than their controls: ${JSON.stringify(misplaced)}`);
+        }, () => `misplaced elements: ${JSON.stringify(misplaced)}`);
         const nameless = (await lab.widgets()).filter(({ label }) => !label.trim());
         assert.deepEqual(nameless.map(({ role, rect }) => `${role} at ${rect}`), []);
         await clean(`as opened, ${size.width} pixels wide`);

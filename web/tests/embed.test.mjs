@@ -1,4 +1,4 @@
-// The page within another one: what it shows, what it leaves to the page around it, what they say to each other.
+// The page in a frame: its contents, the input that it leaves to the embedding page, and their messages.
 
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
@@ -13,45 +13,45 @@ after(quit);
 /** Frames on one page. */
 const COUNT = 8;
 
-/** Puts a page around frames in place of what `lab` shows: `body` with `{page}` for the address of the laboratory. */
-async function course(lab, body) {
+/** Loads an embedding page into `lab`; in its `body`, `{page}` stands for the address of the laboratory. */
+async function embed(lab, body) {
     const address = await serve();
     const html = `<!doctype html><title>Course</title><style>body { margin: 0 } p { height: 120px } iframe { border: 0; display: block }</style>${body.replaceAll('{page}', address)}`;
     await lab.page.route('**/course.html', (route) => route.fulfill({ contentType: 'text/html', body: html }));
     await lab.page.goto(`${address}course.html`);
 }
 
-/** What a frame says of its laboratory; undefined while it is not there. */
-const ready = (frame) => frame.evaluate(() => Boolean(globalThis.jointplay?.ready));
+/** Whether the laboratory of a frame is running. */
+const isReady = (frame) => frame.evaluate(() => Boolean(globalThis.jointplay?.ready));
 
-/** The frames of a page, once as many as `count` are running. */
-async function running(lab, count = 1) {
+/** The frames of a page, once `count` of them are running. */
+async function runningFrames(lab, count = 1) {
     const frames = lab.page.frames().slice(1);
-    await lab.until(async () => (await Promise.all(frames.map(ready))).filter(Boolean).length >= count, 'the frames do not start');
+    await lab.until(async () => (await Promise.all(frames.map(isReady))).filter(Boolean).length >= count, 'the frames do not start');
     return frames;
 }
 
-test('the line of the menu shows the same state in another page, which keeps focus, wheel and Tab', async () => {
+test('the copied line shows the same state in another page, which keeps focus, wheel and Tab', async () => {
     const lab = await open('scene=pendulum&c=0.5mm&play=0', { backend: 'webgl', ownTime: true });
     await lab.runTo(0.01);
     const { state_hash: hash } = await lab.state();
     await lab.click('Button', 'Save');
     await lab.click('Button', 'Embed');
     const line = await lab.until(() => lab.page.evaluate(() => navigator.clipboard.readText()), 'nothing on the clipboard');
-    await course(lab, `<p><a id="before" href="#">before</a></p>${line.replace(/width="\d+" height="\d+"/, 'width="640" height="360"')}
+    await embed(lab, `<p><a id="before" href="#">before</a></p>${line.replace(/width="\d+" height="\d+"/, 'width="640" height="360"')}
         <p><a id="after" href="#">after</a></p><p style="height: 2000px">more</p>`);
-    const [frame] = await running(lab);
+    const [frame] = await runningFrames(lab);
     await lab.until(async () => (await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.state()).state_hash)) === hash, 'another state');
     assert.equal(await frame.evaluate(() => document.querySelector('canvas').hidden), false);
     const { page } = lab;
-    const around = () => page.evaluate(() => [document.activeElement.tagName, document.activeElement.id, scrollY]);
-    assert.deepEqual(await around(), ['BODY', '', 0]);
+    const parentState = () => page.evaluate(() => [document.activeElement.tagName, document.activeElement.id, scrollY]);
+    assert.deepEqual(await parentState(), ['BODY', '', 0]);
 
-    // In, through its controls, and out again.
+    // Tab enters the frame, passes its controls, and leaves it.
     await page.focus('#before');
     let tabs = 0;
     const visited = new Set();
-    while ((await around())[1] !== 'after') {
+    while ((await parentState())[1] !== 'after') {
         tabs += 1;
         const widgets = await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.widgets() || '[]'));
         const focused = widgets.find((widget) => widget.focused && widget.focusable);
@@ -63,13 +63,13 @@ test('the line of the menu shows the same state in another page, which keeps foc
     assert.ok(visited.has('Clearance') && visited.has('Play'), `${[...visited]}`);
     await page.evaluate(() => scrollTo(0, 0));
 
-    // The wheel is the page's until the laboratory was clicked, and again after Escape.
+    // The wheel scrolls the embedding page until the laboratory is clicked, and again after Escape.
     const scrolls = async () => {
-        const [, , before] = await around();
+        const [, , before] = await parentState();
         await page.mouse.move(450, 250);
         await page.mouse.wheel(0, 100);
-        for (let wait = 0; wait < 10; wait += 1) await lab.frame(2);
-        const [, , now] = await around();
+        for (let k = 0; k < 10; k += 1) await lab.frame(2);
+        const [, , now] = await parentState();
         await page.evaluate((before) => scrollTo(0, before), before);
         return now !== before;
     };
@@ -81,12 +81,12 @@ test('the line of the menu shows the same state in another page, which keeps foc
     await lab.close();
 });
 
-test('the example of the documents works as it stands, keys of no use go to the page around, and a bad link says so', async () => {
+test('the documented example works, keys without a function reach the embedding page, and a bad link is explained', async () => {
     const lab = await blank({ size: { width: 820, height: 520 }, ownTime: true });
     const text = fs.readFileSync(path.join(ROOT, 'docs/embedding.md'), 'utf8');
     const [html, js] = ['html', 'js'].map((language) => text.split(`\`\`\`${language}\n`)[1].split('```')[0]);
-    await course(lab, `${html.replace('https://example.org/lab/', '{page}')}<script>${js}</script>`);
-    const [frame] = await running(lab);
+    await embed(lab, `${html.replace('https://example.org/lab/', '{page}')}<script>${js}</script>`);
+    const [frame] = await runningFrames(lab);
     const state = (frame) => frame.evaluate(() => JSON.parse(globalThis.jointplay.page.state()));
     await lab.until(async () => {
         const { playing, changed_parameters: changed } = await state(frame);
@@ -98,97 +98,97 @@ test('the example of the documents works as it stands, keys of no use go to the 
     });
     await lab.page.mouse.click(500, 150);
     for (const key of ['PageDown', 'Space', 'b', 'Control+Alt+k', 'PageUp']) await lab.page.keyboard.press(key);
-    await lab.until(async () => (await lab.page.evaluate(() => globalThis.keys)).includes('PageUp'), 'no key is told');
+    await lab.until(async () => (await lab.page.evaluate(() => globalThis.keys)).includes('PageUp'), 'no key is reported');
     const keys = await lab.page.evaluate(() => globalThis.keys);
     assert.deepEqual(keys.filter((code) => !/^(Control|Alt)/.test(code)), ['PageDown', 'KeyK', 'PageUp']);
 
-    await course(lab, '<iframe src="{page}?embed=controls&scene=pendulun&renderer=webgl" width="320" height="240"></iframe>');
-    const [bad] = await running(lab);
+    await embed(lab, '<iframe src="{page}?embed=controls&scene=pendulun&renderer=webgl" width="320" height="240"></iframe>');
+    const [bad] = await runningFrames(lab);
     const { playing, time_s: time } = await state(bad);
     assert.deepEqual([playing, time], [false, 0]);
     assert.ok(await bad.evaluate(() => globalThis.jointplay.page.refused()));
     const labels = () => bad.evaluate(() => JSON.parse(globalThis.jointplay.page.widgets() || '[]').map(({ label }) => label));
-    await lab.until(async () => (await labels()).some((label) => label.includes('did you mean `pendulum`')), 'it is not said');
+    await lab.until(async () => (await labels()).some((label) => label.includes('did you mean `pendulum`')), 'no explanation');
     assert.ok((await labels()).includes('Clearance'), 'the panels of the link are not there');
     assert.match(bad.url(), /\?embed=controls&scene=pendulun&renderer=webgl$/);
 
     assert.deepEqual(lab.errors, []);
-    // To a frame without an origin a server that does not allow it gives no module.
+    // A frame without an origin gets no module from a server that does not allow it.
     await lab.page.route('**/main.js*', (route) => route.abort());
-    await course(lab, '<iframe sandbox="allow-scripts" src="{page}?embed" width="320" height="240"></iframe>');
+    await embed(lab, '<iframe sandbox="allow-scripts" src="{page}?embed" width="320" height="240"></iframe>');
     const sealed = () => lab.page.frameLocator('iframe').locator('#sealed');
-    await lab.until(async () => (await sealed().count()) > 0 && (await sealed().isVisible()), 'it is not said why nothing shows');
+    await lab.until(async () => (await sealed().count()) > 0 && (await sealed().isVisible()), 'no explanation');
     assert.match(await sealed().textContent(), /allow-same-origin/);
     await lab.close({ errors: true });
 });
 
-test('the page around opens, sets, plays and pauses by messages, and hears what happens', async () => {
+test('the embedding page opens, sets, plays and pauses by messages, and receives events', async () => {
     const lab = await blank({ size: { width: 340, height: 240 }, ownTime: true });
-    await course(lab, '<iframe src="{page}?embed&scene=pendulum&play=0&renderer=webgl" width="320" height="200"></iframe>');
+    await embed(lab, '<iframe src="{page}?embed&scene=pendulum&play=0&renderer=webgl" width="320" height="200"></iframe>');
     await lab.page.evaluate(() => {
         globalThis.heard = [];
         addEventListener('message', ({ data }) => data.jointplay === 1 && heard.push(data));
-        globalThis.say = (message) => frames[0].postMessage({ jointplay: 1, ...message }, '*');
+        globalThis.send = (message) => frames[0].postMessage({ jointplay: 1, ...message }, '*');
     });
-    const [frame] = await running(lab);
+    const [frame] = await runningFrames(lab);
     const heard = (event) => lab.page.evaluate((event) => globalThis.heard.filter((message) => message.event === event), event);
-    const say = (message) => lab.page.evaluate((message) => globalThis.say(message), message);
+    const send = (message) => lab.page.evaluate((message) => globalThis.send(message), message);
     const state = async () => {
         const before = (await heard('state')).length;
-        await say({ do: 'state' });
+        await send({ do: 'state' });
         return (await lab.until(async () => (await heard('state'))[before], 'no state')).state;
     };
-    await say({ do: 'set', key: 'contact.clearance', value: '0.5 mm' });
-    await say({ do: 'set', key: 'contact.clearence', value: '0.5 mm' });
+    await send({ do: 'set', key: 'contact.clearance', value: '0.5 mm' });
+    await send({ do: 'set', key: 'contact.clearence', value: '0.5 mm' });
     const [problem] = await lab.until(async () => ((await heard('problem')).length ? heard('problem') : null), 'no problem');
     assert.match(problem.text, /contact\.clearance/);
-    await say({ do: 'jump' });
-    await say({ do: 'open', link: 'scene=pendulun' });
-    await lab.until(async () => (await heard('problem')).length === 3, 'an unknown message or a bad link is taken');
+    await send({ do: 'jump' });
+    await send({ do: 'open', link: 'scene=pendulun' });
+    await lab.until(async () => (await heard('problem')).length === 3, 'an unknown message or a bad link is accepted');
     assert.match((await heard('problem'))[1].text, /open, set, play, pause, reset, state/);
     assert.match((await heard('problem'))[2].text, /did you mean `pendulum`/);
 
-    await say({ do: 'open', link: 'scene=spcmm&scale=0.02&play=0' });
+    await send({ do: 'open', link: 'scene=spcmm&scale=0.02&play=0' });
     await lab.until(async () => (await state()).scene === 'spcmm', 'the link is not opened');
-    await say({ do: 'play' });
+    await send({ do: 'play' });
     await lab.until(async () => (await heard('impact')).length > 0, 'no impact');
-    await say({ do: 'pause' });
+    await send({ do: 'pause' });
     await lab.until(async () => !(await state()).playing, 'it does not pause');
     const { shown_s: shown } = await state();
-    await lab.until(async () => (await heard('time')).some(({ time_s: time, playing }) => time === shown && !playing), 'the last instant is not told');
+    await lab.until(async () => (await heard('time')).some(({ time_s: time, playing }) => time === shown && !playing), 'the last instant is not reported');
     const own = await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.impacts(0)));
     await lab.until(async () => (await heard('impact')).length === own.length, 'other impacts');
     for (const [at, { joint, end_s: end, peak_N: peak }] of (await heard('impact')).entries()) {
         assert.deepEqual([joint, end, peak], [own[at].joint, own[at].end_s, own[at].peak_N]);
     }
-    await say({ do: 'reset' });
+    await send({ do: 'reset' });
     await lab.until(async () => (await state()).shown_s === 0, 'no reset');
 
-    // Changes of an own scene are the page's around it: nobody is asked on the way out.
+    // The embedding page is responsible for changes of the user's own scene: leaving asks nothing.
     const mine = fs.readFileSync(path.join(ROOT, 'assets/scenes/pendulum.toml'), 'utf8').replace(/^name = .*$/m, 'name = "mine"');
-    await say({ do: 'open', link: `file=mine.toml&text=${deflateRawSync(mine).toString('base64url')}&play=0` });
+    await send({ do: 'open', link: `file=mine.toml&text=${deflateRawSync(mine).toString('base64url')}&play=0` });
     await lab.until(async () => (await state()).scene === 'mine', 'the own scene is not opened');
-    // What it was opened with is known from its first picture on.
+    // Changes count from the first picture on.
     await lab.frame(5);
-    await say({ do: 'set', key: 'contact.clearance', value: '0.4 mm' });
+    await send({ do: 'set', key: 'contact.clearance', value: '0.4 mm' });
     await lab.until(() => frame.evaluate(() => globalThis.jointplay.page.unsaved()), 'the change is not seen');
     assert.ok(await frame.evaluate(() => dispatchEvent(new Event('beforeunload', { cancelable: true }))));
     await lab.close();
 });
 
-test('of many frames those out of sight hold no graphics, and go on where they were when they are seen again', async () => {
+test('frames out of sight hold no graphics, and continue from the same state when they are visible again', async () => {
     const frame = '<iframe src="{page}?embed&scene=pendulum&t=10ms&renderer=webgl" width="300" height="200"></iframe>';
     const lab = await blank({ size: { width: 320, height: 300 }, ownTime: true });
-    await course(lab, frame.repeat(COUNT));
-    const frames = await running(lab, 2);
+    await embed(lab, frame.repeat(COUNT));
+    const frames = await runningFrames(lab, 2);
     assert.equal(frames.length, COUNT);
     const holding = () => Promise.all(frames.map((frame) => frame.evaluate(() => {
-        // One that was never in sight has not asked for any, and must not get one by being asked here.
+        // One that was never visible has no context, and getContext would create it.
         if (!globalThis.jointplay?.starts) return false;
         return !document.getElementById('laboratory').getContext('webgl2').isContextLost();
     })));
     const count = async () => (await holding()).filter(Boolean).length;
-    await lab.until(async () => (await count()) === 2, 'not the two in sight alone');
+    await lab.until(async () => (await count()) === 2, 'not only the two visible frames hold graphics');
     const state = () => frames[0].evaluate(() => JSON.parse(globalThis.jointplay.page.state()));
     await lab.until(async () => (await state()).shown_s === 0.01, 'the instant is not reached');
     const before = await state();
@@ -197,10 +197,10 @@ test('of many frames those out of sight hold no graphics, and go on where they w
         const now = await holding();
         return now[COUNT - 1] && !now[0] && !now[1] && now.filter(Boolean).length <= 3;
     }, 'those out of sight keep their graphics');
-    await lab.until(() => ready(frames[COUNT - 1]), 'the last does not draw');
+    await lab.until(() => isReady(frames[COUNT - 1]), 'the last does not draw');
     for (const frame of [lab.page, frames[0]]) await frame.evaluate(() => (globalThis.drawsNothing = false));
     await lab.page.evaluate(() => scrollTo(0, 0));
-    await lab.until(() => ready(frames[0]), 'the first does not come back');
+    await lab.until(() => isReady(frames[0]), 'the first does not come back');
     await lab.until(async () => colours(await lab.pixels({ x: 0, y: 0, width: 300, height: 200 })) > 200, 'it shows nothing');
     assert.ok((await holding())[0]);
     const { shown_s: shown, state_hash: hash } = await state();

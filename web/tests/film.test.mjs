@@ -1,4 +1,4 @@
-// The film that the page makes, as a browser plays it. What a film shows: tests/interface/film.rs.
+// Films that the page makes can be played by a browser. tests/interface/film.rs tests their contents.
 
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
@@ -9,13 +9,13 @@ import { play } from './play.mjs';
 
 after(quit);
 
-test('the page makes a film of its timeline, which a browser plays, and stands where it stood', async () => {
+test('the page makes a film of its timeline, which a browser plays, and keeps its own state', async () => {
     const lab = await open('scene=pendulum&play=0', { backend: 'webgl' });
     await lab.runTo(0.02);
     const before = await lab.state();
     const download = lab.page.waitForEvent('download');
     let file;
-    download.then((came) => (file = came));
+    download.then((download) => (file = download));
     await lab.click('Button', 'Save');
     await lab.click('Button', 'Film…');
     await lab.click('ComboBox', 'Size of the film');
@@ -28,7 +28,7 @@ test('the page makes a film of its timeline, which a browser plays, and stands w
     assert.equal(file.suggestedFilename(), 'pendulum.mp4');
     const bytes = fs.readFileSync(await file.path());
     await lab.close();
-    // 20 ms at a fifth of real time, 30 frames a second.
+    // 20 ms at a fifth of real time with 30 frames per second.
     const empty = await blank({ ownTime: true });
     const film = await play(empty, bytes, [0.05]);
     assert.deepEqual([film.width, film.height], [640, 360]);

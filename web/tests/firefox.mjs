@@ -1,19 +1,19 @@
-// Firefox for the tests of `npm run test:full`: `open(query, { empty: emptyFirefox })`, where `lab.page` is Puppeteer's.
+// Firefox for the tests of `npm run test:full`: `open(query, { empty: emptyFirefox })`, where `lab.page` is a page of Puppeteer.
 //
-// `FIREFOX`: the browser.
+// Environment: `FIREFOX`, the browser.
 
 import { spawn } from 'node:child_process';
 
 import puppeteer from 'puppeteer-core';
 
-import { PATIENCE } from './harness.mjs';
+import { TIMEOUT } from './harness.mjs';
 
-/** The browser, and the screen it is on. */
-let fox;
+/** The browser and its screen. */
+let firefox;
 
-/** Firefox has WebGL2 on a screen alone, and Playwright drives none but its own build of it. */
+/** Starts Firefox on a virtual screen, without which it has no WebGL2, and with Puppeteer: Playwright drives only its own build. */
 async function launch() {
-    if (fox) return fox.browser;
+    if (firefox) return firefox.browser;
     const screen = spawn('Xvfb', ['-displayfd', '1', '-screen', '0', '1280x1024x24'], { stdio: ['ignore', 'pipe', 'ignore'] });
     const display = await new Promise((found, failed) => {
         screen.once('error', failed);
@@ -26,9 +26,9 @@ async function launch() {
         headless: false,
         env: { ...process.env, DISPLAY: display, LIBGL_ALWAYS_SOFTWARE: '1', MOZ_CRASHREPORTER_DISABLE: '1' },
         extraPrefsFirefox: { 'webgl.force-enabled': true },
-        protocolTimeout: 2 * PATIENCE,
+        protocolTimeout: 2 * TIMEOUT,
     });
-    fox = { browser, screen };
+    firefox = { browser, screen };
     return browser;
 }
 
@@ -40,10 +40,10 @@ export async function emptyFirefox(size) {
     return { context, page, first: (script) => page.evaluateOnNewDocument(script), end: () => context.close() };
 }
 
-/** Ends the browser and its screen; after the last test. */
+/** Ends the browser and its screen. To be called after the last test. */
 export async function quitFirefox() {
-    await fox?.browser.close();
-    fox?.screen.removeAllListeners('exit');
-    fox?.screen.kill();
-    fox = undefined;
+    await firefox?.browser.close();
+    firefox?.screen.removeAllListeners('exit');
+    firefox?.screen.kill();
+    firefox = undefined;
 }

@@ -1,4 +1,4 @@
-// The page in Firefox: what it does there as in Chromium.
+// The page in Firefox behaves as in Chromium.
 
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
@@ -17,7 +17,7 @@ after(quitFirefox);
 
 const empty = emptyFirefox;
 
-test('Firefox: a link from Chromium reproduces its state; a slider changes the run, and the link back agrees', async () => {
+test('Firefox: a link from Chromium reproduces its state, a slider changes the run, and a link back to Chromium agrees', async () => {
     const there = await open('scene=spcmm&cf=0.2&play=0', { backend: 'webgl' });
     await there.runTo(0.009);
     const { state_hash: hash } = await there.state();
@@ -26,7 +26,7 @@ test('Firefox: a link from Chromium reproduces its state; a slider changes the r
 
     const lab = await open('', { empty, picture: true, fragment: link });
     assert.equal(await lab.page.evaluate(() => globalThis.jointplay.backend), 'webgl');
-    await lab.says(`State reproduced: hash ${hash} agrees`);
+    await lab.findText(`State reproduced: hash ${hash} agrees`);
     assert.ok(colours(await lab.pixels()) > 200, 'the picture is empty');
     await lab.slide('Clearance', 0.8);
     const { changed_parameters: changed } = await lab.state();
@@ -42,28 +42,28 @@ test('Firefox: a link from Chromium reproduces its state; a slider changes the r
     await lab.close();
 
     const again = await open('', { backend: 'webgl', fragment: back });
-    await again.says(`State reproduced: hash ${here.state_hash} agrees`);
+    await again.findText(`State reproduced: hash ${here.state_hash} agrees`);
     await again.close();
 });
 
-test('Firefox: lost graphics come back, and the simulation goes on as it was', async () => {
+test('Firefox: lost graphics are restarted, and the simulation continues', async () => {
     const lab = await open('c=0.5mm&play=0', { empty, picture: true });
     await lab.runTo(0.00785);
     const before = await lab.state();
     await lab.page.evaluate(() => {
         document.getElementById('laboratory').getContext('webgl2').getExtension('WEBGL_lose_context').loseContext();
     });
-    await lab.until(() => lab.page.evaluate(() => globalThis.jointplay.losses.length === 1), 'the loss is not seen');
+    await lab.until(() => lab.page.evaluate(() => globalThis.jointplay.losses.length === 1), 'the loss is not noticed');
     await lab.started();
     assert.equal(await lab.page.evaluate(() => globalThis.jointplay.trouble), null);
     assert.equal((await lab.state()).state_hash, before.state_hash);
     assert.ok(colours(await lab.pixels()) > 200, 'the picture is empty');
     await lab.key(' ');
-    await lab.until(async () => (await lab.state()).time_s > before.time_s, 'it does not go on');
+    await lab.until(async () => (await lab.state()).time_s > before.time_s, 'it does not continue');
     await lab.close();
 });
 
-test('Chromium and Firefox play a film of the program, and its frames are those that render draws', async () => {
+test('Chromium and Firefox play a film of the program, with the frames that render draws', async () => {
     const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'jointplay-film-'));
     try {
         const line = ['render', 'spcmm', '--duration', '12ms', '--fps', '10', '--slow', '100', '--size', '640x360', '--quiet'];
@@ -73,7 +73,7 @@ test('Chromium and Firefox play a film of the program, and its frames are those 
         const bytes = fs.readFileSync(path.join(folder, 'film.mp4'));
         for (const [where, options] of Object.entries({ Chromium: {}, Firefox: { empty } })) {
             const lab = await blank({ ...options, ownTime: true });
-            // In the middle of the time that each is shown.
+            // In the middle of the time for which each frame is shown.
             const film = await play(lab, bytes, numbers.map((k) => (k + 0.5) / 10));
             await lab.close();
             assert.deepEqual([film.width, film.height], [640, 360]);

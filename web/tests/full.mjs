@@ -1,4 +1,4 @@
-// What `npm test` leaves out: the page in Firefox, and, of the page as it is shipped, its weight and the bits of every method.
+// Tests that `npm test` omits: the page in Firefox, and the size of the shipped page and its bits with every method.
 
 import './every-bit.test.mjs';
 import './firefox.test.mjs';

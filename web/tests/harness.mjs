@@ -1,15 +1,15 @@
-// Opens the page in a real browser and drives it by the role and label of its controls, as a person would.
+// Opens the page in a real browser and drives it by the role and label of its controls, as a user would.
 //
 //     const lab = await open('scene=pendulum&play=0', { backend: 'webgl' });
 //     await lab.click('Button', 'Step');
 //     assert.equal((await lab.state()).steps, 1);
 //     await lab.close();        // fails the test if the console has errors
 //
-// Time stands still on an open page: it passes by the frames that a gesture or a wait of the test asks for, 50 ms each
-// (inside.mjs). Nothing passes by that a slow machine could miss.
+// Time on an open page advances only with the frames that a gesture or a wait of the test requests, 50 ms each (inside.mjs), so that
+// a slow machine misses nothing.
 //
-// `PAGE`: folder of the page; `NATIVE`: the native program; `TOOL`: what serves the page; `CHROMIUM`: the browser. Nothing else is
-// needed; Firefox is in firefox.mjs.
+// Environment: `PAGE`, folder of the page; `NATIVE`, the native program; `TOOL`, the server of the page; `CHROMIUM`, the browser.
+// Firefox is in firefox.mjs.
 
 import assert from 'node:assert/strict';
 import { spawn, execFile } from 'node:child_process';
@@ -29,10 +29,10 @@ export const ROOT = fileURLToPath(new URL('../../', import.meta.url));
 export const PAGE = path.resolve(process.env.PAGE ?? path.join(ROOT, 'target/page'));
 const NATIVE = process.env.NATIVE ?? path.join(ROOT, 'target/debug/jointplay');
 const TOOL = process.env.TOOL ?? path.join(ROOT, 'target/tools/debug/jointplay-web');
-/** What a failed test leaves behind. */
+/** Folder for pictures of failed tests. */
 const FAILED = path.join(ROOT, 'web/failed');
 
-/** A name that leads to this machine: for the page an address that others find, too. */
+/** A host name of this machine that the page takes for a public address. */
 export const ELSEWHERE = 'laboratory.example';
 
 // One set for both backends. Without the Vulkan flags WebGPU starts and draws nothing.
@@ -49,31 +49,28 @@ const FLAGS = [
     '--disable-sync',
     `--host-resolver-rules=MAP ${ELSEWHERE} 127.0.0.1`,
     '--no-proxy-server',
-    // Compiling well what runs for a moment only takes longer than it saves.
+    // Optimising code that runs only briefly costs more time than it saves.
     `--js-flags=${process.env.JS_FLAGS ?? '--wasm-tiering-budget=500000000'}`,
 ];
 
-/** The least that has its panels side by side, because a software adapter draws some hundred thousand pixels a second. */
+/** The smallest window with its panels side by side: software rendering draws some hundred thousand pixels a second. */
 export const SIZE = { width: 760, height: 480 };
 
-/**
- * What has not come after so long, ms, and after so many looks will never come. Of a machine that is busy with a dozen other
- * things the looks are what counts.
- */
-export const PATIENCE = 300_000;
-const LOOKS = 100;
+/** A wait fails after this time, ms, and at least so many attempts: on a busy machine the attempts decide. */
+export const TIMEOUT = 300_000;
+const MIN_ATTEMPTS = 100;
 
 let server;
 let browser;
-/** The page that opens the others. */
+/** The page that opens all others. */
 let opener;
-/** Pages that a failed test left open: they would take the time of the next. */
+/** Open pages: one that a failed test left open would slow down the next test. */
 const opened = new Set();
 
-/** Serves `folder`; `rest`: port, host. What it says first, and a function that ends it. */
+/** Serves `folder`; `rest`: port, host. Returns its first output, its address, and a function that ends it. */
 export async function serveFolder(folder, ...rest) {
     const child = spawn(TOOL, ['serve', folder, ...rest.map(String)], { stdio: ['ignore', 'pipe', 'inherit'] });
-    const said = await new Promise((found, failed) => {
+    const output = await new Promise((found, failed) => {
         child.once('error', failed);
         child.once('exit', (code) => failed(new Error(`${TOOL} ended with ${code}`)));
         child.stdout.once('data', (text) => found(String(text)));
@@ -84,10 +81,10 @@ export async function serveFolder(folder, ...rest) {
         child.kill();
         return ended;
     };
-    return { said, address: said.split('\n')[0], end };
+    return { output, address: output.split('\n')[0], end };
 }
 
-/** Serves the page below a sub-path; the address of its folder. */
+/** Serves the page below a sub-path; returns the address of its folder. */
 export async function serve() {
     if (!server) {
         const { address, end } = await serveFolder(path.dirname(PAGE));
@@ -102,7 +99,7 @@ async function launch() {
     return browser;
 }
 
-/** Ends browser and server; after the last test of all files that run together. */
+/** Ends browser and server. To be called after the last test of all files that run together. */
 export async function quit() {
     await browser?.close();
     await server?.end();
@@ -110,8 +107,8 @@ export async function quit() {
 }
 
 /**
- * An empty page of Chromium: its context and itself, how a script is made to run in it before all others, how it ends. Pages that
- * want no context of their own are opened by one that stays: so one process has them all, and compiles the program once.
+ * An empty page of Chromium: {context, page, first, end}, where `first` adds a script that runs before all others. Pages without a
+ * context of their own are opened by one page, so that they share a process, which compiles the program once.
  */
 async function emptyPage(size, options) {
     const started = await launch();
@@ -131,14 +128,14 @@ async function emptyPage(size, options) {
     return { context, page, first: (script) => page.addInitScript(script), end: () => (options ? context : page).close() };
 }
 
-/** What opens nothing yet: see `open`. */
+/** A page under test that has loaded nothing yet; options as for `open`. */
 export async function blank({ size = SIZE, before = [], context, ownTime = false, picture = false, empty = emptyPage } = {}) {
     for (const lab of opened) await lab.close({ errors: true });
     const { first, ...own } = await empty(size, context);
     const lab = new Lab(own);
     opened.add(lab);
-    // Of what Playwright waits for by itself.
-    lab.page.setDefaultTimeout(2 * PATIENCE);
+    // For Playwright's own waits.
+    lab.page.setDefaultTimeout(2 * TIMEOUT);
     for (const script of [ownTime ? [] : driveTime, picture ? [] : drawNothing, before].flat()) await first(script);
     return lab;
 }
@@ -147,8 +144,8 @@ export async function blank({ size = SIZE, before = [], context, ownTime = false
  * Opens the page. `query`: what follows `?`. Options: `backend` 'webgl' or 'webgpu' (appended to the query), `size`
  * {width, height}, `fragment` (what follows `#`), `before` (functions that run in the page before its scripts),
  * `context` (options of a Playwright context, e.g. {hasTouch: true}), `expectTrouble` (do not wait for a picture),
- * `picture` (it is drawn, and can be looked at), `ownTime` (time passes by the clock on the wall, as for a user), `empty` (an empty
- * page of another browser, firefox.mjs), `at` (the address of a page that the test serves itself).
+ * `picture` (draw it), `ownTime` (time follows the clock, as for a user), `empty` (opens an empty page of another browser,
+ * firefox.mjs), `at` (the address of a page that the test itself serves).
  */
 export async function open(query = '', options = {}) {
     const { backend, fragment = '', expectTrouble = false } = options;
@@ -158,7 +155,7 @@ export async function open(query = '', options = {}) {
     await lab.page.goto(`${address}${parts ? `?${parts}` : ''}${fragment ? `#${fragment}` : ''}`);
     await lab.started();
     if (!expectTrouble) {
-        const trouble = await lab.ask(() => globalThis.jointplay.trouble);
+        const trouble = await lab.evaluate(() => globalThis.jointplay.trouble);
         assert.equal(trouble, null, `the page did not start: ${JSON.stringify(trouble)}`);
     }
     return lab;
@@ -171,52 +168,52 @@ export class Lab {
         this.end = end;
         /** The Playwright page. */
         this.page = page;
-        /** What the console said as an error. */
+        /** Errors on the console. */
         this.errors = [];
         page.on('console', (message) => message.type() === 'error' && this.errors.push(message.text()));
         page.on('pageerror', (error) => this.errors.push(String(error)));
     }
 
-    /** Closes the page. Errors on its console fail the test unless `errors` says that they belong to it. */
+    /** Closes the page. Errors on its console fail the test unless `errors` expects them. */
     async close({ errors = false } = {}) {
         opened.delete(this);
         await this.end();
         if (!errors) assert.deepEqual(this.errors, [], 'errors on the console');
     }
 
-    /** What a function gives that runs in the page; `undefined` while the page is being replaced by another. */
-    async ask(question, argument) {
+    /** Runs a function in the page and returns its result; `undefined` while another page replaces it. */
+    async evaluate(call, argument) {
         try {
-            return await this.page.evaluate(question, argument);
+            return await this.page.evaluate(call, argument);
         } catch (error) {
             if (/context was destroyed|navigation/.test(error.message)) return undefined;
             throw error;
         }
     }
 
-    /** Waits until the laboratory, or what keeps it from running, is on show. Time stands still from there. */
+    /** Waits until the laboratory, or the reason why it cannot run, is visible. Time stands still from then on. */
     async started() {
         await this.until(async () => {
-            await this.ask(() => globalThis.drivenTime?.free());
-            return this.ask(() => globalThis.jointplay?.ready || globalThis.jointplay?.trouble);
+            await this.evaluate(() => globalThis.drivenTime?.free());
+            return this.evaluate(() => globalThis.jointplay?.ready || globalThis.jointplay?.trouble);
         }, 'the page does not start');
-        await this.ask(() => globalThis.drivenTime && (globalThis.drivenTime.held = true));
+        await this.evaluate(() => globalThis.drivenTime && (globalThis.drivenTime.held = true));
     }
 
-    /** Draws so many frames, and lets the time pass that they stand for. */
+    /** Draws `count` frames; time advances with them. */
     async frame(count = 1) {
-        await this.ask(async (count) => {
+        await this.evaluate(async (count) => {
             if (globalThis.drivenTime) return globalThis.drivenTime.step(count);
             for (; count > 0; count -= 1) await new Promise(requestAnimationFrame);
         }, count);
     }
 
-    /** What the laboratory is doing: see `state` in src/web/page.rs. */
+    /** State of the laboratory: `state` in src/web/page.rs. */
     async state() {
         return JSON.parse(await this.page.evaluate(() => globalThis.jointplay.page.state()));
     }
 
-    /** Controls and texts on show: [{role, label, text, value, on, disabled, rect}], see src/web/mirror.rs. */
+    /** Visible controls and texts: [{role, label, text, value, on, disabled, rect}], see src/web/mirror.rs. */
     async widgets() {
         return JSON.parse((await this.page.evaluate(() => globalThis.jointplay.page.widgets())) || '[]');
     }
@@ -231,7 +228,7 @@ export class Lab {
         return found;
     }
 
-    /** Whether such a control is on show now. */
+    /** Whether such a control is visible now. */
     async has(role, label) {
         return (await this.widgets()).some((widget) => widget.role === role && widget.label === label);
     }
@@ -247,7 +244,7 @@ export class Lab {
         await this.drag([[x, y]]);
     }
 
-    /** Drags with the left button along `points` [[x, y], …], a frame at least between two of them. */
+    /** Drags with the left button along `points` [[x, y], …], with at least one frame between two of them. */
     async drag(points) {
         const [first, ...rest] = points;
         const { mouse } = this.page;
@@ -260,11 +257,11 @@ export class Lab {
             await this.frame();
         }
         await mouse.up();
-        // The first shows what the release did at once, the second what follows from it.
+        // The first frame handles the release, the second shows its consequences.
         await this.frame(2);
     }
 
-    /** An element by what a screen reader says of it; the laboratory is asked for what it shows now. */
+    /** An element of the updated mirror, by its accessible role and name. */
     async element(role, name) {
         await this.frame(2);
         const found = this.page.getByRole(role, { name, exact: true });
@@ -275,13 +272,13 @@ export class Lab {
         return found.first();
     }
 
-    /** Activates an element without pointer or keyboard, also where it is out of sight. */
+    /** Activates an element without pointer or keyboard, even out of sight. */
     async activate(role, name) {
         await (await this.element(role, name)).evaluate((element) => element.click());
         await this.frame(2);
     }
 
-    /** Adjusts a field likewise: its value becomes `value`, or goes `steps` steps on. */
+    /** Adjusts a field likewise: sets `value`, or moves it by `steps` steps. */
     async adjust(role, name, { value, steps }) {
         await (await this.element(role, name)).evaluate((element, [value, steps]) => {
             if (steps) element.stepUp(steps);
@@ -301,11 +298,11 @@ export class Lab {
     }
 
     /**
-     * Fingers on the screen: each of `paths` is one's way [[x, y], …], all of one length. They come down one after the other,
-     * move together, and are lifted; a function behind them is called before that.
+     * Fingers on the screen, one for each of `paths` [[x, y], …], all of one length. They touch down one after the other, move
+     * together, and are lifted. A function as the last argument is called before they are lifted.
      */
     async fingers(...paths) {
-        const look = typeof paths.at(-1) === 'function' ? paths.pop() : () => {};
+        const beforeLift = typeof paths.at(-1) === 'function' ? paths.pop() : () => {};
         const cdp = await this.context.newCDPSession(this.page);
         const send = async (type, touchPoints) => {
             await cdp.send('Input.dispatchTouchEvent', { type, touchPoints });
@@ -318,7 +315,7 @@ export class Lab {
         for (let step = 1; step < paths[0].length; step += 1) {
             await send('touchMove', at(step));
         }
-        await look();
+        await beforeLift();
         await send('touchEnd', []);
         await cdp.detach();
         await this.frame();
@@ -330,7 +327,7 @@ export class Lab {
         await this.fingers([middle(await this.find(role, label))]);
     }
 
-    /** Lets a file fall on the laboratory. */
+    /** Drops a file on the laboratory. */
     async drop(name, text) {
         await this.page.evaluate(([name, text]) => {
             const dataTransfer = new DataTransfer();
@@ -343,21 +340,21 @@ export class Lab {
         await this.frame();
     }
 
-    /** What a screen reader can read of the machine. */
+    /** The summary for screen readers. */
     async summary() {
         return this.page.locator('#summary').textContent();
     }
 
-    /** The widget whose text has `words`; waits for it. */
-    async says(words) {
+    /** The widget whose text contains `words`; waits for it. */
+    async findText(words) {
         let widgets = [];
         return this.until(async () => {
             widgets = await this.widgets();
             return widgets.find(({ label, text }) => label?.includes(words) || text?.includes(words));
-        }, () => `nothing says "${words}": ${widgets.map((w) => w.label).join(' | ')}`);
+        }, () => `no text "${words}": ${widgets.map((w) => w.label).join(' | ')}`);
     }
 
-    /** Presses a key, as Playwright names it. */
+    /** Presses a key, by its name in Playwright. */
     async key(name) {
         await this.page.keyboard.down(name);
         await this.frame();
@@ -365,7 +362,7 @@ export class Lab {
         await this.frame();
     }
 
-    /** Pauses and runs on to `seconds`. */
+    /** Pauses, and runs to `seconds`. */
     async runTo(seconds) {
         await this.page.evaluate((time) => globalThis.jointplay.page.runTo(time), seconds);
         await this.frame();
@@ -376,8 +373,8 @@ export class Lab {
         return this.page.evaluate(() => globalThis.jointplay.page.frames());
     }
 
-    /** Waits until nothing moves on the page any more: until it wants no new picture in three quarters of a second. */
-    async still() {
+    /** Waits until the page has drawn no new picture for three quarters of a second. */
+    async settle() {
         await this.until(async () => {
             const before = await this.frames();
             await this.frame(15);
@@ -386,41 +383,41 @@ export class Lab {
     }
 
     /**
-     * Waits until `test` gives something true, and gives that back; frames are drawn meanwhile, after each look one.
-     * `message`: a text, or a function that makes one.
+     * Waits until `test` returns something true, and returns it. Draws a frame after each attempt. `message`: a text, or a function
+     * that returns one.
      */
     async until(test, message) {
-        const end = Date.now() + PATIENCE;
-        for (let looks = 1; ; looks += 1) {
+        const end = Date.now() + TIMEOUT;
+        for (let attempts = 1; ; attempts += 1) {
             const result = await test();
             if (result) return result;
-            if (Date.now() > end && looks > LOOKS) assert.fail(typeof message === 'function' ? message() : message);
+            if (Date.now() > end && attempts > MIN_ATTEMPTS) assert.fail(typeof message === 'function' ? message() : message);
             await this.frame();
         }
     }
 
-    /** Lets what workers say through up to the next message of this kind, waits for that and gives it. Needs `holdWorkers`. */
-    async hear(kind) {
+    /** Delivers the messages of workers up to the next one of this kind, which is awaited and returned. Needs `holdWorkers`. */
+    async nextMessage(kind) {
         let timer;
-        // A worker computes as long as the machine takes.
+        // The duration of a computation depends on the machine.
         const late = new Promise((_, failed) => {
-            timer = setTimeout(() => failed(new Error(`the worker says no ${kind}`)), 2 * PATIENCE);
+            timer = setTimeout(() => failed(new Error(`no message ${kind} of the worker`)), 2 * TIMEOUT);
         });
-        const heard = this.page.evaluate((kind) => globalThis.heldPost.pass(kind), kind);
-        return Promise.race([heard, late]).finally(() => clearTimeout(timer));
+        const delivered = this.page.evaluate((kind) => globalThis.heldPost.deliver(kind), kind);
+        return Promise.race([delivered, late]).finally(() => clearTimeout(timer));
     }
 
-    /** From here on what the page shows is drawn. */
+    /** Enables drawing from here on. */
     async draw() {
         await this.page.evaluate(() => (globalThis.drawsNothing = false));
-        // It draws what is news; a pointer that moves is.
+        // The page redraws only after a change, such as a moved pointer.
         await this.page.mouse.move(1, 1);
         await this.frame();
         await this.page.mouse.move(2, 2);
         await this.frame();
     }
 
-    /** What stands on the screen, a pngjs picture. `clip`: {x, y, width, height}. */
+    /** The screen as a pngjs picture. `clip`: {x, y, width, height}. */
     async pixels(clip) {
         assert.ok(!(await this.page.evaluate(() => globalThis.drawsNothing)), 'opened without a picture');
         return PNG.sync.read(await this.page.screenshot({ clip }));
@@ -438,7 +435,7 @@ export function colours(picture) {
     return seen.size;
 }
 
-/** Share of the pixels that differ visibly; with `name`, both pictures and their difference are kept if it is above `limit`. */
+/** Share of the pixels that differ visibly. If it is above `limit`, both pictures and their difference are saved under `name`. */
 export function difference(a, b, name, limit) {
     assert.deepEqual([a.width, a.height], [b.width, b.height]);
     const out = new PNG({ width: a.width, height: a.height });
@@ -460,7 +457,7 @@ export async function native(...args) {
     return stdout;
 }
 
-/** The frame that the native program draws of the whole window at `seconds`. */
+/** The whole window at `seconds`, drawn by the native program. */
 export async function nativeWindow(scene, seconds, { width, height } = SIZE, theme = 'light') {
     const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'jointplay-frame-'));
     try {

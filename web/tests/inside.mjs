@@ -1,20 +1,20 @@
-// What runs in the page before its scripts do. It takes time and workers into the hand of the test, so that no test depends on
-// how fast the machine is.
+// Scripts that run in the page before its own. They give the test control over time and workers, so that no test depends on the
+// speed of the machine.
 
 /**
- * Lets time pass by frames alone: each is `frame` ms after the last, however long it took, and a look at the clock within one
- * costs `look` ms. While `held`, frames come only as `step(count)` asks for them. Where `hasty`, what the page waits for longer than
- * a moment (the address that follows, lost graphics) comes after a twentieth of the time.
+ * Time advances only with frames: each comes `frame` ms after the previous one, however long it took, and each reading of the clock
+ * adds `look` ms. While `held`, frames come only when `step(count)` requests them. With `hasty`, long timers of the page (updates of
+ * the address, restarts of lost graphics) take a twentieth of their time.
  */
 export function driveTime() {
-    const ask = globalThis.requestAnimationFrame.bind(globalThis);
+    const requestFrame = globalThis.requestAnimationFrame.bind(globalThis);
     const wait = globalThis.setTimeout.bind(globalThis);
     globalThis.setTimeout = (call, delay, ...rest) => wait(call, time.hasty && delay > 100 ? delay / 20 : delay, ...rest);
     const soon = new MessageChannel();
     soon.port2.onmessage = tick;
     const waiting = new Map();
     let steps = [];
-    let [last, asked] = [0, false];
+    let [last, isArmed] = [0, false];
     const time = { now: 0, frame: 50, look: 1e-3, held: false, hasty: true, step, free };
     globalThis.drivenTime = time;
     Performance.prototype.now = () => (time.now += time.look);
@@ -27,15 +27,15 @@ export function driveTime() {
     globalThis.cancelAnimationFrame = (id) => void waiting.delete(id);
 
     function arm() {
-        if (asked || waiting.size === 0 || (time.held && steps.length === 0)) return;
-        asked = true;
-        // What nobody sees need not wait for the screen.
+        if (isArmed || waiting.size === 0 || (time.held && steps.length === 0)) return;
+        isArmed = true;
+        // Without drawing there is no need to wait for the screen.
         if (time.held && globalThis.drawsNothing) soon.port1.postMessage(null);
-        else ask(tick);
+        else requestFrame(tick);
     }
 
     function tick() {
-        asked = false;
+        isArmed = false;
         if (time.held && steps.length === 0) return;
         time.now += time.frame;
         for (const id of [...waiting.keys()]) {
@@ -53,7 +53,7 @@ export function driveTime() {
         arm();
     }
 
-    /** Draws so many frames. A page that wants none, as one that has stopped, is given a moment instead. */
+    /** Draws `count` frames. A page that requests none, such as one that has stopped, gets a short pause instead. */
     function step(count) {
         if (waiting.size === 0) return new Promise((done) => wait(done, 10));
         return new Promise((done) => {
@@ -68,10 +68,7 @@ export function driveTime() {
     }
 }
 
-/**
- * Has WebGL2 draw nothing, until `drawsNothing` is false: of what a page costs where the processor draws, pixels that nobody looks at
- * are most.
- */
+/** Makes WebGL2 draw nothing until `drawsNothing` is false: with software rendering, unseen pixels take most of the time. */
 export function drawNothing() {
     globalThis.drawsNothing = true;
     const { prototype } = WebGL2RenderingContext;
@@ -83,18 +80,18 @@ export function drawNothing() {
     }
 }
 
-/** Keeps what workers say to the page until the test lets it through. */
+/** Holds back messages of workers until the test delivers them. */
 export function holdWorkers() {
-    const post = { waiting: [], pass };
+    const post = { waiting: [], deliver };
     globalThis.heldPost = post;
     let arrived = () => {};
 
-    /** Lets messages through up to the first of this kind, and gives that one. */
-    async function pass(kind) {
+    /** Delivers messages up to the first of this kind, and returns that one. */
+    async function deliver(kind) {
         for (;;) {
             while (post.waiting.length > 0) {
-                const { data, tell } = post.waiting.shift();
-                tell();
+                const { data, send } = post.waiting.shift();
+                send();
                 const message = JSON.parse(data);
                 if (message === kind || kind in Object(message)) return message;
             }
@@ -104,10 +101,10 @@ export function holdWorkers() {
 
     const { Worker } = globalThis;
     globalThis.Worker = class extends Worker {
-        addEventListener(kind, told, ...rest) {
-            if (kind !== 'message') return super.addEventListener(kind, told, ...rest);
+        addEventListener(kind, listener, ...rest) {
+            if (kind !== 'message') return super.addEventListener(kind, listener, ...rest);
             const hold = (event) => {
-                post.waiting.push({ from: this, data: event.data, tell: () => told(event) });
+                post.waiting.push({ from: this, data: event.data, send: () => listener(event) });
                 arrived();
             };
             return super.addEventListener(kind, hold, ...rest);

@@ -1,4 +1,4 @@
-// The page in a browser: it starts, shows what the native window shows, obeys, and says what is wrong where it cannot.
+// The page in a browser: it starts, shows the picture of the native window, reacts to input, and explains failures.
 
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
@@ -10,21 +10,21 @@ import { blank, colours, difference, nativeWindow, open, PAGE, quit, serve, SIZE
 
 after(quit);
 
-/** An instant of the first impacts, s: arrows are on show. */
+/** An instant during the first impacts, s, with visible force arrows. */
 const INSTANT = 0.00785;
 
 /**
- * Largest share of pixels that may differ from the native frame of the same state. Edges and letters lie elsewhere by
- * parts of a pixel on another driver; a missing body or panel is some per cent.
+ * Largest share of pixels that may differ from the native frame of the same state. Another driver shifts edges and letters by
+ * fractions of a pixel; a missing body or panel changes some per cent.
  */
 const TOLERANCE = 0.01;
 
 let frames;
-/** What the native program draws of that instant, and of another phase. */
+/** Frames of the native program at that instant, and at another one. */
 const nativeFrames = () => (frames ??= Promise.all([INSTANT, 0.3].map((seconds) => nativeWindow('spcmm', seconds))));
 
-/** Notes every shader that is compiled. */
-function noteShaders() {
+/** Records the text of every compiled shader. */
+function recordShaders() {
     globalThis.compiled = [];
     const { shaderSource } = WebGL2RenderingContext.prototype;
     WebGL2RenderingContext.prototype.shaderSource = function (shader, text) {
@@ -36,12 +36,12 @@ function noteShaders() {
 for (const backend of ['webgl', 'webgpu']) {
     test(`${backend}: the page shows the same picture as the native window`, async (t) => {
         const frames = nativeFrames();
-        const lab = await open('play=0&theme=light', { backend, picture: true, before: noteShaders });
+        const lab = await open('play=0&theme=light', { backend, picture: true, before: recordShaders });
         const { renderer } = await lab.state();
         assert.match(renderer, backend === 'webgl' ? /^gl / : /^webgpu\b(?!.*\(\))/i);
         const start = await lab.pixels();
         await lab.runTo(INSTANT);
-        await lab.still();
+        await lab.settle();
         assert.equal((await lab.state()).shown_s, INSTANT);
         const shown = await lab.pixels();
         assert.ok(colours(shown) > 500, `${colours(shown)} colours: an empty picture?`);
@@ -49,23 +49,23 @@ for (const backend of ['webgl', 'webgpu']) {
         const share = difference(shown, same, `window_${backend}`, TOLERANCE);
         t.diagnostic(`${share} of the pixels differ from the native frame`);
         assert.ok(share < TOLERANCE, `${share} of the pixels differ`);
-        // The comparison sees a change of the mechanism alone, and the picture has followed it.
+        // The comparison detects a change of the pose, and the picture has followed it.
         for (const [what, other] of Object.entries({ start, later })) {
             const far = difference(shown, other);
             assert.ok(far > 2 * share, `${what} differs by ${far}, the same by ${share}`);
         }
         if (backend === 'webgl') {
-            // A processor that draws runs no branch of the interface that is there for tests (canvas.js). The switch is still called
-            // so, and no shader asks for it.
+            // Software rendering skips a branch that egui needs for its own tests (canvas.js). The switch still has this name, and no
+            // shader reads it.
             const texts = await lab.page.evaluate(() => globalThis.compiled);
-            assert.ok(texts.some((text) => /uint predictable_texture_filtering;/.test(text)), 'another name?');
+            assert.ok(texts.some((text) => /uint predictable_texture_filtering;/.test(text)), 'has the switch another name?');
             assert.ok(!texts.some((text) => /\.predictable_texture_filtering/.test(text)));
         }
         await lab.close();
     });
 }
 
-test('keys and mouse play, step, reset, slide and present, before anything was clicked', async () => {
+test('keys and mouse play, step, reset, move a slider and present, without a first click', async () => {
     const lab = await open('', { backend: 'webgl' });
     await lab.until(async () => (await lab.state()).time_s > 0, 'time does not pass');
     await lab.key('Space');
@@ -78,14 +78,14 @@ test('keys and mouse play, step, reset, slide and present, before anything was c
     await lab.key('ArrowLeft');
     assert.equal((await lab.state()).state_hash, paused.state_hash, 'a step back');
 
-    // The browser would load the page anew.
+    // F5 must not reload the page.
     await lab.page.evaluate(() => {
-        addEventListener('keydown', (event) => (globalThis.kept = event.defaultPrevented), { capture: true });
+        addEventListener('keydown', (event) => (globalThis.isPrevented = event.defaultPrevented), { capture: true });
     });
     await lab.key('F5');
     await lab.find('Button', 'Leave');
     assert.ok(!(await lab.has('Button', 'Save')), 'the panels are still there');
-    assert.equal(await lab.page.evaluate(() => globalThis.kept), true, 'the browser loads the page anew');
+    assert.equal(await lab.page.evaluate(() => globalThis.isPrevented), true, 'the browser reloads the page');
     await lab.key('Escape');
     await lab.find('Button', 'Save');
     assert.equal((await lab.state()).state_hash, paused.state_hash);
@@ -104,12 +104,12 @@ test('keys and mouse play, step, reset, slide and present, before anything was c
     await lab.runTo(0.02);
     const loose = await lab.state();
     assert.notEqual(loose.state_hash, plain.state_hash);
-    // A longer fall through the play: the first impact is harder.
+    // More play means a longer fall and a harder first impact.
     assert.ok(Math.max(...loose.peak_normal_N) > Math.max(...plain.peak_normal_N));
     await lab.close();
 });
 
-test('loading shows its progress, and then time passes by the clock on the wall', async () => {
+test('loading shows its progress, and then time follows the clock', async () => {
     const lab = await open('', {
         backend: 'webgl',
         ownTime: true,
@@ -119,7 +119,7 @@ test('loading shows its progress, and then time passes by the clock on the wall'
                 const [bar, stage] = [document.getElementById('progress'), document.getElementById('stage')];
                 new MutationObserver(() => globalThis.stages.push([bar.value, stage.textContent])).observe(stage, { childList: true });
             });
-            // The program comes in four parts, each when the one before was seen.
+            // The program arrives in four parts, each after the progress of the previous one is shown.
             const { fetch } = globalThis;
             globalThis.fetch = async (address, ...rest) => {
                 const response = await fetch(address, ...rest);
@@ -141,8 +141,8 @@ test('loading shows its progress, and then time passes by the clock on the wall'
     const stages = await lab.page.evaluate(() => globalThis.stages);
     const loading = stages.filter(([, text]) => /^Loading: .* of .* MB$/.test(text));
     const bytes = fs.statSync(path.join(PAGE, 'jointplay_bg.wasm')).size;
-    const told = [1, 2, 3, 4].map((part) => `Loading: ${((Math.floor((part * bytes) / 4)) / 1e6).toFixed(1)} of ${(bytes / 1e6).toFixed(1)} MB`);
-    assert.deepEqual(loading.map(([, text]) => text), told);
+    const expected = [1, 2, 3, 4].map((part) => `Loading: ${((Math.floor((part * bytes) / 4)) / 1e6).toFixed(1)} of ${(bytes / 1e6).toFixed(1)} MB`);
+    assert.deepEqual(loading.map(([, text]) => text), expected);
     assert.equal(loading.at(-1)[0], 1, 'the bar ends full');
     assert.ok(await lab.page.locator('#notice').isHidden());
     const { shown_s: before } = await lab.state();
@@ -161,7 +161,7 @@ test('a hidden tab stands still, and does not catch up', async () => {
         }, hidden);
     await hide(true);
     const before = await lab.state();
-    // Ten minutes. A hidden page has no frames: timers of 10 ms drive it, and these come between them.
+    // Ten minutes. A hidden page has no frames; eframe drives it by timers of 10 ms, which fire in between.
     await lab.page.evaluate(async () => {
         for (let k = 0; k < 20; k += 1) {
             globalThis.drivenTime.now += 30_000;
@@ -172,12 +172,12 @@ test('a hidden tab stands still, and does not catch up', async () => {
     await hide(false);
     await lab.frame(5);
     const passed = (await lab.state()).shown_s - before.shown_s;
-    // At 1:50; of the first frame after the pause a quarter of a second counts at most.
+    // The time scale is 1:50; the first frame after the pause counts for at most a quarter of a second.
     assert.ok(passed > 0.003 && passed < 0.02 * (0.25 + 5 * 0.05), `${passed} s`);
     await lab.close();
 });
 
-/** Keeps ways to draw from the page: what the tab has been told to keep, or else the device of an adapter that promises one. */
+/** Withholds the renderers named in the tab's `withheld`; by default, the device of a WebGPU adapter that claims hardware. */
 function withhold() {
     const withheld = sessionStorage.getItem('withheld');
     if (!withheld) {
@@ -196,17 +196,17 @@ function withhold() {
     };
 }
 
-test('where WebGPU fails or is missing, WebGL2 draws; where both are, a plain page says so', async () => {
+test('WebGL2 draws where WebGPU fails or is missing; without both, a message explains it', async () => {
     const lab = await open('scene=pendulum&c=0.5mm&play=0', { before: withhold });
-    assert.equal(await lab.page.evaluate(() => globalThis.refused), true, 'no device was asked for');
+    assert.equal(await lab.page.evaluate(() => globalThis.refused), true, 'no device was requested');
     assert.match((await lab.state()).renderer, /^gl /);
     const trouble = () => lab.page.locator('#trouble');
     const withheld = (what) => lab.page.evaluate((what) => sessionStorage.setItem('withheld', what), what);
 
-    // A link in the address bar that asks for another way to draw starts the page anew.
+    // A link in the address bar that requests another renderer reloads the page.
     await withheld('webgpu');
     await lab.page.evaluate(() => (location.hash = '#scene=pendulum&c=0.2mm&play=0&renderer=webgpu'));
-    await lab.until(() => lab.ask(() => Boolean(globalThis.jointplay?.trouble)), 'the page does not start anew');
+    await lab.until(() => lab.evaluate(() => Boolean(globalThis.jointplay?.trouble)), 'the page does not reload');
     assert.match(await trouble().innerText(), /asks for WebGPU, which this browser does not offer/);
     await Promise.all([lab.page.waitForEvent('load'), lab.page.locator('#plainer').click()]);
     await lab.started();
@@ -225,7 +225,7 @@ test('where WebGPU fails or is missing, WebGL2 draws; where both are, a plain pa
     await lab.close();
 });
 
-test('a program that does not come is told, and why where the page was opened as a file', async () => {
+test('a failed download is explained, and so is a page opened as a file', async () => {
     const lab = await blank();
     await lab.page.route('**/*.wasm*', (route) => route.fulfill({ status: 503 }));
     await lab.page.goto(await serve());
@@ -233,7 +233,7 @@ test('a program that does not come is told, and why where the page was opened as
     const text = await lab.page.locator('#trouble').innerText();
     assert.match(text, /could not be loaded/);
     assert.match(text, /503/);
-    // It can be tried again; this time not even the script comes.
+    // The user can try again; this time even the script is missing.
     const stuck = lab.page.locator('#stuck');
     assert.ok(await stuck.isHidden());
     await lab.page.route('**/main.js*', (route) => route.abort());
@@ -245,9 +245,8 @@ test('a program that does not come is told, and why where the page was opened as
     await lab.close({ errors: true });
 });
 
-test('the policy of the page lets nothing in that is not its own', async () => {
-    // That the page itself keeps to it, with worker, clipboard and downloads, each test sees: what is refused is an error on the
-    // console.
+test('the policy of the page blocks everything foreign', async () => {
+    // Every test checks that the page itself complies, with worker, clipboard and downloads: a violation is an error on the console.
     const lab = await open('', { before: [() => sessionStorage.setItem('withheld', 'both'), withhold], expectTrouble: true });
     assert.deepEqual(lab.errors, []);
     const outcome = await lab.page.evaluate(async () => {
@@ -276,8 +275,8 @@ test('the policy of the page lets nothing in that is not its own', async () => {
         ran: false,
         failed: true,
     });
-    assert.ok(lab.errors.length >= 5, 'the console says nothing of it');
-    // Nor does the mark-up hold anything that a stricter host would refuse.
+    assert.ok(lab.errors.length >= 5, 'the console does not report it');
+    // The mark-up contains nothing that a stricter host would block.
     const page = fs.readFileSync(path.join(PAGE, 'index.html'), 'utf8');
     assert.doesNotMatch(page, /\son[a-z]+\s*=|\sstyle\s*=|data:|<script(?![^>]*\ssrc=)|<style/i);
     await lab.close({ errors: true });
@@ -285,17 +284,17 @@ test('the policy of the page lets nothing in that is not its own', async () => {
 
 test('a crash leaves a report that names version, scene and renderer', async () => {
     const lab = await open('scene=pendulum&c=0.5mm&play=0', { backend: 'webgl' });
-    // A picture of another size needs other buffers, and the graphics give none.
+    // Another size of the picture needs new buffers, whose creation fails.
     await lab.page.evaluate(() => (WebGL2RenderingContext.prototype.createRenderbuffer = () => null));
     await lab.page.setViewportSize({ width: SIZE.width, height: SIZE.height + 40 });
-    await lab.until(() => lab.page.locator('#trouble').isVisible(), 'nothing is said');
+    await lab.until(() => lab.page.locator('#trouble').isVisible(), 'no message');
     const report = await lab.page.locator('#report').inputValue();
     for (const part of [/^internal error in jointplay \d+\.\d+\.\d+: .*renderbuffer/m, /^at \S+\.rs:\d+$/m, /^scene: pendulum$/m, /^changed: contact\.clearance = 0\.5/m, /^renderer: gl /m, /^browser: /m, /^address: http/m]) {
         assert.match(report, part);
     }
     assert.ok(await lab.page.locator('#copy').isVisible());
     assert.ok(await lab.page.locator('#reload').isVisible());
-    // This was WebGL2 already: there is nothing plainer to try.
+    // WebGL2 was already in use; no other renderer is offered.
     assert.ok(await lab.page.locator('#plainer').isHidden());
     assert.ok(await lab.page.locator('canvas').isHidden());
     await lab.close({ errors: true });

@@ -1,4 +1,4 @@
-// How the page comes to a browser: over a network, packed, kept for when there is none, replaced by a newer one.
+// Delivery of the page: over a network, compressed, stored for offline use, and replaced by a newer build.
 
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
@@ -16,7 +16,7 @@ import { drawNothing } from './inside.mjs';
 
 after(quit);
 
-/** A file as the server sends it: nothing is unpacked. `path`: as it stands, in place of the address's. */
+/** A file as the server sends it, not decompressed. `path` replaces that of the address, and is not normalised. */
 function get(address, headers = {}, path = undefined) {
     return new Promise((done, failed) => {
         http.get(address, { headers, ...(path && { path }) }, (response) => {
@@ -27,8 +27,8 @@ function get(address, headers = {}, path = undefined) {
     });
 }
 
-/** What a QR code of a terminal says: each sign is two modules, one above the other. */
-function read(lines) {
+/** Decodes a QR code printed in a terminal: each character is two modules, one above the other. */
+function decodeQr(lines) {
     const [pixels, light] = [4, { '█': [1, 1], '▀': [1, 0], '▄': [0, 1], ' ': [0, 0] }];
     const rows = lines.flatMap((line) => [0, 1].map((half) => [...line].map((sign) => light[sign][half])));
     const [width, height] = [rows[0].length * pixels, rows.length * pixels];
@@ -40,8 +40,8 @@ function read(lines) {
     return jsQR(picture, width, height)?.data;
 }
 
-/** A folder with this page's scripts as a build packs them, however small that makes them. */
-function packed() {
+/** A folder with files of this page, compressed as by a build. */
+function packedFolder() {
     const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'jointplay-page-'));
     for (const name of ['index.html', 'main.js']) {
         const bytes = fs.readFileSync(path.join(PAGE, name));
@@ -52,8 +52,8 @@ function packed() {
     return folder;
 }
 
-test('the server packs as the browser accepts, sends nothing twice, and answers what is no request for a file', async () => {
-    const folder = packed();
+test('the server compresses as the browser accepts, sends nothing twice, and answers bad requests', async () => {
+    const folder = packedFolder();
     const server = await serveFolder(folder);
     try {
         const address = `${server.address}main.js?build`;
@@ -93,8 +93,8 @@ test('the server packs as the browser accepts, sends nothing twice, and answers 
     }
 });
 
-test('every connection that is opened is answered, and kept', async () => {
-    // A browser opens six at once, and keeps them.
+test('every connection is answered and kept alive', async () => {
+    // A browser opens six at once, and reuses them.
     const count = 12;
     for (let round = 0; round < 10; round += 1) {
         const server = await serveFolder(PAGE);
@@ -105,7 +105,7 @@ test('every connection that is opened is answered, and kept', async () => {
                     response.resume();
                     response.on('end', () => done(request.reusedSocket));
                 });
-                request.setTimeout(20_000, () => request.destroy(new Error('a connection waits for good')));
+                request.setTimeout(20_000, () => request.destroy(new Error('a connection gets no answer')));
                 request.on('error', failed);
             });
             const all = () => Promise.all(Array.from({ length: count }, ask));
@@ -118,11 +118,11 @@ test('every connection that is opened is answered, and kept', async () => {
     }
 });
 
-test('a server for the room says its address in words and as a QR code, and is reached there', async () => {
-    const room = await serveFolder(PAGE, 0, '0.0.0.0');
-    const here = await serveFolder(PAGE);
+test('a server for other devices prints its address as text and as a QR code, and is reachable there', async () => {
+    const shared = await serveFolder(PAGE, 0, '0.0.0.0');
+    const local = await serveFolder(PAGE);
     try {
-        const [address, ...lines] = room.said.trimEnd().split('\n');
+        const [address, ...lines] = shared.output.trimEnd().split('\n');
         const { hostname, port } = new URL(address);
         const own = Object.values(os.networkInterfaces()).flat().map((network) => network.address);
         assert.ok(own.includes(hostname), `${hostname} is none of ${own}`);
@@ -130,18 +130,18 @@ test('a server for the room says its address in words and as a QR code, and is r
             assert.equal((await get(`http://${found}:${port}/`)).status, 200, found);
         }
         if (hostname !== '127.0.0.1') {
-            assert.equal(read(lines), address);
-            // One that was not asked to is not found from there.
-            const closed = here.address.replace('127.0.0.1', hostname);
+            assert.equal(decodeQr(lines), address);
+            // A server without the option is not reachable there.
+            const closed = local.address.replace('127.0.0.1', hostname);
             await assert.rejects(get(closed), /ECONNREFUSED/);
         }
-        assert.equal(here.said.trim(), here.address);
+        assert.equal(local.output.trim(), local.address);
     } finally {
-        await Promise.all([room.end(), here.end()]);
+        await Promise.all([shared.end(), local.end()]);
     }
 });
 
-test('where others find the page, its menu shows the link as a QR code, which a phone reads', async () => {
+test('on a page that other devices can reach, the menu shows the link as a QR code', async () => {
     const server = await serveFolder(PAGE);
     const at = server.address.replace('127.0.0.1', ELSEWHERE);
     try {
@@ -159,8 +159,8 @@ test('where others find the page, its menu shows the link as a QR code, which a 
     }
 });
 
-/** Another build in `folder`: as this one, but for a mark, and a worker that no page of this build may get. */
-function buildAnew(folder) {
+/** Turns `folder` into another build: with a mark, and a worker that throws in a page of the first build. */
+function makeSecondBuild(folder) {
     const write = (name, change) => {
         const file = path.join(folder, name);
         const text = change(fs.readFileSync(file, 'utf8'));
@@ -181,18 +181,18 @@ function buildAnew(folder) {
     ));
 }
 
-test('the page is there without a network, and a newer one replaces it whole', async () => {
+test('the page works without a network, and a newer build replaces it completely', async () => {
     const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'jointplay-page-'));
     fs.cpSync(PAGE, folder, { recursive: true });
     let server = await serveFolder(folder);
     const { address } = server;
     const { port } = new URL(address);
-    const kept = (lab) => lab.page.evaluate(() => caches.keys());
+    const storedBuilds = (lab) => lab.page.evaluate(() => caches.keys());
     const isSecond = (lab) => lab.page.evaluate(() => Boolean(globalThis.secondBuild));
     const first = await open('scene=pendulum&c=0.2mm&play=0', { at: address, backend: 'webgl', context: { serviceWorkers: 'allow' } });
     try {
-        await first.until(() => first.page.evaluate(() => Boolean(navigator.serviceWorker.controller)), 'nothing is kept');
-        assert.equal((await kept(first)).length, 1);
+        await first.until(() => first.page.evaluate(() => Boolean(navigator.serviceWorker.controller)), 'nothing is stored');
+        assert.equal((await storedBuilds(first)).length, 1);
 
         await server.end();
         await first.page.reload();
@@ -201,17 +201,17 @@ test('the page is there without a network, and a newer one replaces it whole', a
         await first.runTo(0.01);
         assert.ok((await first.state()).steps > 0);
 
-        buildAnew(folder);
+        makeSecondBuild(folder);
         server = await serveFolder(folder, port);
-        // The page that is open goes on with its own files: with the newer worker it would stop.
+        // The open page continues with its own files; the newer worker would throw.
         await first.page.evaluate(async () => (await navigator.serviceWorker.getRegistration()).update());
         await first.activate('button', 'Accuracy');
         await first.activate('button', 'Measure preset');
         await first.until(async () => (await first.widgets()).some(({ role, value }) => role === 'ProgressIndicator' && value > 0), 'no worker');
         assert.equal(await isSecond(first), false);
-        await first.until(async () => (await kept(first)).length === 2, 'the newer one is not kept beside it');
+        await first.until(async () => (await storedBuilds(first)).length === 2, 'the newer build is not stored');
 
-        // A second tab is the newer one, and it alone remains when the first is closed.
+        // A second tab gets the newer build, which alone remains once the first tab is closed.
         const second = await first.context.newPage();
         await second.addInitScript(drawNothing);
         const goto = async () => {
@@ -221,15 +221,15 @@ test('the page is there without a network, and a newer one replaces it whole', a
         };
         await goto();
         await first.page.close();
-        // The browser takes a moment to see that pages are gone; one that comes meanwhile, here a file alone, keeps the older worker.
-        let left;
-        for (let look = 0; look < 300 && left !== 1; look += 1) {
+        // The browser notices closed pages late; a page opened meanwhile, here a single file, keeps the older service worker.
+        let remaining;
+        for (let attempt = 0; attempt < 300 && remaining !== 1; attempt += 1) {
             await second.goto('about:blank');
             await new Promise((done) => setTimeout(done, 10));
             await second.goto(`${address}icon.svg`);
-            left = (await second.evaluate(() => caches.keys())).length;
+            remaining = (await second.evaluate(() => caches.keys())).length;
         }
-        assert.equal(left, 1, 'the older one stays');
+        assert.equal(remaining, 1, 'the older build stays');
         await server.end();
         await goto();
     } finally {

@@ -1,4 +1,4 @@
-// What a user of the page meets beside the picture: links, files, saving, long computations, and lost graphics.
+// Links, files, saving, long computations, and lost graphics.
 
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
@@ -15,17 +15,17 @@ after(quit);
 
 const backend = 'webgl';
 
-/** Pauses, and gives the state in which it stands. */
+/** Pauses, and returns the state. */
 async function pause(lab) {
     await lab.key('Space');
     await lab.until(async () => !(await lab.state()).playing, 'it does not pause');
     return lab.state();
 }
 
-test('a link reproduces scene, changes, camera and state in another page, and where the clipboard is closed it is in the address bar', async () => {
+test('a link reproduces scene, changes, camera and state in another page, and is in the address bar if the clipboard is blocked', async () => {
     const lab = await open('scene=spcmm&cf=0.2', { backend });
     await lab.until(async () => (await lab.state()).time_s > 2e-3, 'time does not pass');
-    // Changed while it runs: the log travels.
+    // Changes during the run are part of the link.
     await lab.slide('Clearance', 0.8);
     await lab.drag([[560, 150], [600, 170], [640, 200]]);
     await lab.until(async () => (await lab.state()).time_s > 9e-3, 'time does not pass');
@@ -35,7 +35,7 @@ test('a link reproduces scene, changes, camera and state in another page, and wh
     const link = await lab.until(() => lab.page.evaluate(() => navigator.clipboard.readText()), 'nothing on the clipboard');
     const { hash, search } = new URL(link);
     assert.equal(search, '');
-    // Which follows what is shown, and then names the renderer that the query asks for.
+    // The address is updated during the run, and also names the renderer of the query.
     const inBar = async () => (await lab.page.evaluate(() => location.hash)).replace(/&renderer=webgl$/, '');
     assert.equal(await inBar(), hash, 'the address bar has it, too');
     await lab.page.evaluate(() => {
@@ -44,61 +44,61 @@ test('a link reproduces scene, changes, camera and state in another page, and wh
         history.replaceState(null, '', '#');
     });
     await lab.click('Button', 'Copy link');
-    await lab.until(async () => /^The link is in the address bar/.test(await lab.summary()), 'nothing says so');
+    await lab.until(async () => /^The link is in the address bar/.test(await lab.summary()), 'no message');
     assert.equal(await inBar(), hash);
     await lab.close();
 
     const other = await open('', { backend, fragment: hash.slice(1) });
-    await other.says(`State reproduced: hash ${here.state_hash} agrees`);
+    await other.findText(`State reproduced: hash ${here.state_hash} agrees`);
     const there = await other.state();
     for (const key of ['scene', 'steps', 'shown_s', 'state_hash', 'changed_parameters', 'camera']) assert.deepEqual(there[key], here[key], key);
     assert.equal(there.playing, false);
-    // The page that is open already takes another link, too; one that lies about the state is found out.
+    // An open page accepts another link; a wrong hash is detected.
     const wrong = hash.replace(/hash=./, (found) => `hash=${found.at(-1) === '0' ? '1' : '0'}`);
     await other.page.evaluate((fragment) => (location.hash = fragment), wrong);
-    await other.says('State differs');
-    // The address of the state may be written between a link and the event that tells of it.
+    await other.findText('State differs');
+    // The page may write its state to the address between the change to a link and the hashchange event.
     await other.page.evaluate(() => {
         const { href } = location;
         location.hash = '#scene=slider-crank&play=0';
         history.replaceState(null, '', href);
     });
-    await other.until(async () => (await other.state()).scene === 'slider-crank', 'a link is lost to the address of the state');
+    await other.until(async () => (await other.state()).scene === 'slider-crank', 'the address of the state has replaced the link');
     await other.page.evaluate(() => (location.hash = '#scene=pendulun'));
-    await other.says('did you mean `pendulum`');
+    await other.findText('did you mean `pendulum`');
     assert.equal((await other.state()).scene, 'slider-crank');
     await other.close();
 });
 
-/** A scene of the user's own by the name `name`; `more` characters of noise, which does not pack, make it large. */
-function own(name, more = 0) {
+/** A scene of the user's own named `name`; `more` characters of incompressible noise make it large. */
+function ownScene(name, more = 0) {
     const text = fs.readFileSync(path.join(ROOT, 'assets/scenes/pendulum.toml'), 'utf8').replace(/^name = .*$/m, `name = "${name}"`);
     const noise = Array.from({ length: Math.ceil(more / 44) }, (_, k) => createHash('sha256').update(String(k)).digest('base64'));
     return `${text}\n${noise.map((line) => `# ${line}\n`).join('')}`;
 }
 
-/** A scene with a file beside it, as the browser's dialog gives them. */
+/** A scene and a file that it names, for the browser's dialog. */
 const LIFTED = [
     ['lifted.toml', `name = "lifted"\n[[body]]\nname = "a"\nmass = "1 kg"\ninertia = "1 1 1 kg m^2"\n[[joint]]\nname = "a"\nkind = "prismatic"
 child = "a"\naxis = [0, 0, 1]\ndrive = { law = "table", file = "lift.csv" }\n`],
     ['lift.csv', 'time_s,position_mm\n0,0\n1,3\n'],
 ].map(([name, text]) => ({ name, mimeType: 'text/plain', buffer: Buffer.from(text) }));
 
-/** Chooses files by the button. */
+/** Opens files with the button. */
 async function choose(lab, files) {
     const chosen = lab.page.waitForEvent('filechooser');
     await lab.click('Button', 'Open…');
     await (await chosen).setFiles(files);
 }
 
-test('loading the page anew goes on from what was shown, and what no address holds is kept in the tab', async () => {
+test('a reload continues from the same state, and the tab stores a state that no address can hold', async () => {
     const lab = await open('scene=spcmm&c=0.5mm&theme=dark&play=0', { backend });
     lab.page.on('dialog', (dialog) => dialog.accept());
     const hash = () => lab.page.evaluate(() => location.hash);
     const again = async (state) => {
         await lab.page.reload();
         await lab.started();
-        await lab.says(`State reproduced: hash ${state.state_hash} agrees`);
+        await lab.findText(`State reproduced: hash ${state.state_hash} agrees`);
         const now = await lab.state();
         for (const key of ['scene', 'state_hash', 'shown_s', 'changed_parameters', 'playing']) assert.deepEqual(now[key], state[key], key);
     };
@@ -113,23 +113,23 @@ test('loading the page anew goes on from what was shown, and what no address hol
     await follows();
     assert.match(await hash(), /play=0.*theme=dark|theme=dark.*play=0/);
     assert.match(await hash(), /renderer=webgl/);
-    assert.equal(await lab.page.evaluate(() => history.length), entries, 'every state is an entry of its own');
-    // The words of the link are in the fragment now; what is typed before it wins.
+    assert.equal(await lab.page.evaluate(() => history.length), entries, 'each state makes a history entry');
+    // The pairs of the link have moved to the fragment; a typed query takes precedence.
     const search = () => lab.page.evaluate(() => location.search);
     assert.match(await search(), /^\?renderer=webgl(&theme=dark)?$/);
     const { origin, pathname, hash: written } = new URL(lab.page.url());
     await lab.page.goto(`${origin}${pathname}?scene=chain&play=0&renderer=webgl${written}`);
     await lab.started();
     assert.equal((await lab.state()).scene, 'chain');
-    await lab.until(async () => (await search()) === '?renderer=webgl', 'the words stay in the query');
+    await lab.until(async () => (await search()) === '?renderer=webgl', 'the pairs stay in the query');
     await lab.page.evaluate(() => (location.hash = '#scene=spcmm&play=0'));
     await lab.until(async () => (await lab.state()).scene === 'spcmm', 'the link is not opened');
 
-    await lab.drop('large.toml', own('large', 60_000));
+    await lab.drop('large.toml', ownScene('large', 60_000));
     await lab.until(async () => (await lab.state()).scene === 'large', 'the file does not open');
     await lab.slide('Clearance', 0.8);
     await lab.runTo(0.03);
-    await lab.until(async () => /^#kept=1(&|$)/.test(await hash()), 'the address keeps what it cannot hold');
+    await lab.until(async () => /^#kept=1(&|$)/.test(await hash()), 'the address does not refer to the stored state');
     const second = await lab.state();
     assert.ok(second.changed_parameters['contact.clearance']);
     await again(second);
@@ -140,53 +140,52 @@ test('loading the page anew goes on from what was shown, and what no address hol
     await lab.runTo(0.04);
     await again(await lab.state());
 
-    // Back in the address where it fits.
+    // A small state returns to the address.
     await lab.page.evaluate(() => (location.hash = '#scene=pendulum&play=0'));
-    await lab.until(async () => /^#scene=pendulum&.*hash=/.test(await hash()), 'the address stays behind');
-    // In another tab there is nothing of what is kept, and the page says so.
+    await lab.until(async () => /^#scene=pendulum&.*hash=/.test(await hash()), 'the address is not updated');
+    // Another tab does not have the stored state, and says so.
     await lab.page.evaluate((address) => {
         sessionStorage.clear();
         location.hash = address;
     }, address);
-    await lab.says('stored only in the browser tab');
+    await lab.findText('stored only in the browser tab');
     await lab.close();
 });
 
-test('leaving asks where changes of an own scene are in no file, and nowhere else', async () => {
-    // The address does not follow by itself what happens here.
+test('leaving asks for confirmation only with unsaved changes of the user\'s own scene', async () => {
+    // With slow timers the address is not updated during the test.
     const lab = await open('scene=pendulum&play=0', { backend, before: () => (globalThis.drivenTime.hasty = false) });
-    const asked = [];
+    const dialogs = [];
     let answer = 'dismiss';
     lab.page.on('dialog', (dialog) => {
-        asked.push(dialog.type());
+        dialogs.push(dialog.type());
         return dialog[answer]();
     });
-    /** Whether the page would have the browser ask. */
+    /** Whether the page would request a confirmation. */
     const asks = () => lab.page.evaluate(() => !dispatchEvent(new Event('beforeunload', { cancelable: true })));
     await lab.slide('Clearance', 0.7);
     assert.equal(await asks(), false, 'a built-in scene');
-    await lab.drop('mine.toml', own('mine'));
+    await lab.drop('mine.toml', ownScene('mine'));
     await lab.until(async () => (await lab.state()).scene === 'mine', 'the file does not open');
     await lab.frame(2);
     assert.equal(await asks(), false, 'as it was opened');
     await lab.slide('Clearance', 0.6);
     assert.equal(await asks(), true, 'changed');
-    // The browser does ask, and stays where it is told to.
+    // The browser asks, and stays on the page if the user refuses.
     await lab.page.evaluate(() => {
         globalThis.stayed = true;
         location.reload();
     });
-    await lab.until(() => asked.length === 1, 'nobody is asked');
+    await lab.until(() => dialogs.length === 1, 'no confirmation');
     answer = 'accept';
     assert.equal(await lab.page.evaluate(() => globalThis.stayed), true);
     await lab.page.evaluate(() => history.replaceState(null, '', '#scene=pendulum&play=0'));
     await lab.page.reload();
     await lab.started();
-    assert.deepEqual(asked, ['beforeunload', 'beforeunload']);
+    assert.deepEqual(dialogs, ['beforeunload', 'beforeunload']);
     assert.equal(await lab.page.evaluate(() => globalThis.stayed), undefined);
     await lab.until(async () => (await lab.state()).scene === 'mine' && (await lab.state()).replaying === null, 'it is not back');
-    // Nothing is forgotten by that.
-    assert.equal(await asks(), true, 'changed before it was loaded anew');
+    assert.equal(await asks(), true, 'changed before the reload');
     const saved = lab.page.waitForEvent('download');
     await lab.click('Button', 'Save');
     await lab.click('Button', 'Scene…');
@@ -204,12 +203,12 @@ test('files open by drop and dialog, a bad one leaves the running scene, and sce
         ['film.mp4', '#'.repeat(5 << 20), 'film.mp4: too large for a scene file'],
     ]) {
         await lab.drop(name, text);
-        await lab.says(words);
+        await lab.findText(words);
         assert.equal((await lab.state()).state_hash, hash);
     }
-    // One that misses the laboratory does not take its place in the browser.
-    const kept = await lab.page.evaluate(() => !document.body.dispatchEvent(new DragEvent('drop', { bubbles: true, cancelable: true })));
-    assert.ok(kept, 'the browser would open the file');
+    // A file dropped beside the canvas does not replace the page.
+    const prevented = await lab.page.evaluate(() => !document.body.dispatchEvent(new DragEvent('drop', { bubbles: true, cancelable: true })));
+    assert.ok(prevented, 'the browser would open the file');
 
     const save = async (what, count) => {
         const files = new Map();
@@ -246,15 +245,15 @@ test('files open by drop and dialog, a bad one leaves the running scene, and sce
     await lab.close();
 });
 
-test('computations run in workers: they say how far they are, the page goes on, and what is cancelled ends', async () => {
+test('computations run in workers: they report progress, the page keeps running, and cancelling ends them', async () => {
     const lab = await open('scene=pendulum&c=0.2mm&play=0', { backend, before: holdWorkers });
     const progress = async () => (await lab.widgets()).find(({ role }) => role === 'ProgressIndicator');
     const workers = () => lab.page.workers().length;
-    const ended = () => lab.until(() => workers() === 0, 'the worker goes on');
+    const ended = () => lab.until(() => workers() === 0, 'the worker does not end');
     await lab.activate('button', 'Accuracy');
     await lab.activate('button', 'Measure preset');
-    // However soon it is done, no more than this is heard of it until further notice.
-    while ((await lab.hear('Progress')).Progress === 0);
+    // Later messages are held back, even if the computation is already done.
+    while ((await lab.nextMessage('Progress')).Progress === 0);
     await lab.until(async () => (await progress())?.value > 0, 'no progress');
     assert.equal(workers(), 1);
     await lab.click('Button', 'Play');
@@ -265,24 +264,24 @@ test('computations run in workers: they say how far they are, the page goes on, 
     await ended();
 
     const error = async () => {
-        // What stands on its right.
+        // The label to the right of the name.
         const labels = (await lab.widgets()).filter(({ role }) => role === 'Label');
         const name = labels.find(({ label }) => label === 'Peak force error');
         return labels.find(({ rect }) => Math.abs(rect[1] - name.rect[1]) < 4 && rect[0] > name.rect[2])?.label;
     };
     assert.equal(await error(), 'not measured');
     await lab.activate('button', 'Measure preset');
-    await lab.hear('Done');
+    await lab.nextMessage('Done');
     await lab.until(async () => /^[\d.e-]+ %$/.test(await error()), 'no number');
     await ended();
 
-    // A sweep has as many as there are cores, but one, which is left for the picture.
+    // A sweep uses all cores except one, which draws the picture.
     await lab.page.evaluate(() => (location.hash = '#scene=spcmm&spcmm.frequency=50Hz&play=0'));
     await lab.until(async () => (await lab.state()).scene === 'spcmm', 'the link does not open');
     await lab.key('b');
     for (const [name, value] of [['Values', 9], ['Periods', 4], ['Discard', 1]]) await lab.adjust('spinbutton', name, { value });
     await lab.activate('button', 'Start sweep');
-    for (let point = 0; point < 3; point += 1) await lab.hear('Point');
+    for (let point = 0; point < 3; point += 1) await lab.nextMessage('Point');
     await lab.until(async () => (await lab.widgets()).some(({ label }) => /^3 of 9 values/.test(label)), 'no points are shown');
     const cores = await lab.page.evaluate(() => navigator.hardwareConcurrency);
     assert.equal(workers(), Math.max(cores - 1, 1));
@@ -290,21 +289,21 @@ test('computations run in workers: they say how far they are, the page goes on, 
     await lab.find('Button', 'Start sweep');
     await ended();
 
-    // The tornado fills run by run, and ends with its panel.
+    // The tornado fills run by run, and ends when its panel is closed.
     await lab.activate('button', 'What play costs');
     for (const [name, value] of [['Duration', 0.06], ['Observed from', 0.02]]) await lab.adjust('spinbutton', name, { value });
     await lab.activate('button', 'Start runs');
-    for (let run = 0; run < 3; run += 1) await lab.hear('Run');
+    for (let run = 0; run < 3; run += 1) await lab.nextMessage('Run');
     await lab.until(async () => (await lab.widgets()).some(({ label }) => /; 3 of 7 runs$/.test(label)), 'no runs are shown');
     await lab.activate('button', 'Bench');
     await ended();
     await lab.close();
 });
 
-/** Takes the graphics away. */
-const lose = () => document.getElementById('laboratory').getContext('webgl2').getExtension('WEBGL_lose_context').loseContext();
+/** Makes the browser lose the graphics context. */
+const loseGraphics = () => document.getElementById('laboratory').getContext('webgl2').getExtension('WEBGL_lose_context').loseContext();
 
-test('lost graphics come back and the simulation goes on as it was; where they do not, a reload leads to the same state', async () => {
+test('lost graphics are restarted and the simulation continues; otherwise a reload restores the same state', async () => {
     const lab = await open('c=0.5mm&theme=dark&play=0', { backend, before: () => {
         const { getContext } = HTMLCanvasElement.prototype;
         HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
@@ -313,32 +312,32 @@ test('lost graphics come back and the simulation goes on as it was; where they d
     } });
     await lab.draw();
     await lab.runTo(0.00785);
-    await lab.still();
+    await lab.settle();
     const [before, picture] = [await lab.state(), await lab.pixels()];
     const same = async () => {
         const now = await lab.state();
         for (const key of ['state_hash', 'shown_s', 'camera', 'changed_parameters', 'playing']) assert.deepEqual(now[key], before[key], key);
     };
-    await lab.page.evaluate(lose);
-    await lab.until(() => lab.page.evaluate(() => globalThis.jointplay.losses.length === 1), 'the loss is not seen');
+    await lab.page.evaluate(loseGraphics);
+    await lab.until(() => lab.page.evaluate(() => globalThis.jointplay.losses.length === 1), 'the loss is not noticed');
     await lab.started();
     assert.equal(await lab.page.evaluate(() => globalThis.jointplay.trouble), null);
-    await lab.still();
+    await lab.settle();
     await same();
     const share = difference(await lab.pixels(), picture, 'after_loss', 0.01);
     assert.ok(share < 0.01, `${share} of the pixels differ after the loss`);
 
-    // In one turn: the page asks for new graphics as soon as it is told.
-    await lab.page.evaluate(`(${lose})(); globalThis.refused = true;`);
+    // In one task, because the page requests new graphics as soon as it is notified.
+    await lab.page.evaluate(`(${loseGraphics})(); globalThis.refused = true;`);
     const again = lab.page.locator('#again');
     await again.waitFor();
     assert.match(await lab.page.locator('#trouble').innerText(), /The graphics were lost/);
     assert.ok(await lab.page.locator('canvas').isHidden());
     await Promise.all([lab.page.waitForEvent('load'), again.click()]);
     await lab.started();
-    await lab.says(`hash ${before.state_hash} agrees`);
+    await lab.findText(`hash ${before.state_hash} agrees`);
     await same();
     await lab.key('Space');
-    await lab.until(async () => (await lab.state()).time_s > before.time_s, 'it does not go on');
+    await lab.until(async () => (await lab.state()).time_s > before.time_s, 'it does not continue');
     await lab.close();
 });

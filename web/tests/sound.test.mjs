@@ -1,4 +1,4 @@
-// Sound, as the browser is asked to make it. What sounds and when: tests/interface/sound.rs.
+// Sound through Web Audio. tests/interface/sound.rs tests which sounds are made, and when.
 
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
@@ -7,8 +7,8 @@ import { open, quit } from './harness.mjs';
 
 after(quit);
 
-/** Notes every click that is scheduled: how far ahead, s, how long, s, and its largest sample. */
-function listen() {
+/** Records every scheduled click: its lead time, s, duration, s, and largest sample. */
+function recordClicks() {
     const heard = { clicks: [], contexts: [] };
     globalThis.heard = heard;
     globalThis.AudioContext = class extends AudioContext {
@@ -31,17 +31,17 @@ function listen() {
     };
 }
 
-test('with sound on impacts are clicks of Web Audio; a browser without it says so, and the run goes on', async () => {
-    const lab = await open('scene=pendulum&play=0', { backend: 'webgl', before: listen });
+test('with sound on, impacts are clicks of Web Audio; without Web Audio a message says so and the run continues', async () => {
+    const lab = await open('scene=pendulum&play=0', { backend: 'webgl', before: recordClicks });
     const contexts = () => lab.page.evaluate(() => globalThis.heard.contexts.map(({ state }) => state));
     await lab.page.evaluate(() => {
         globalThis.withheld = AudioContext;
         delete globalThis.AudioContext;
     });
     await lab.key('m');
-    await lab.until(async () => (await lab.summary()).includes('No sound: this browser cannot make it'), 'nothing is said');
+    await lab.until(async () => (await lab.summary()).includes('No sound: this browser cannot make it'), 'no message');
     await lab.page.evaluate(() => (globalThis.AudioContext = globalThis.withheld));
-    assert.deepEqual(await contexts(), [], 'no sound is asked for before it is switched on');
+    assert.deepEqual(await contexts(), [], 'no context before sound is switched on');
     await lab.key('m');
     await lab.until(async () => (await contexts())[0] === 'running', 'the browser makes no sound');
 
@@ -55,13 +55,13 @@ test('with sound on impacts are clicks of Web Audio; a browser without it says s
     assert.ok(impacts.length > 3, `${impacts.length} impacts until ${shown} s`);
     assert.equal(clicks.length, impacts.length);
     for (const { ahead, duration, loudest } of clicks) {
-        // A frame has 50 ms, and its sound comes a little later.
+        // A frame takes 50 ms, and its sound follows a little later.
         assert.ok(ahead >= 0 && ahead <= 0.1, `${ahead} s ahead`);
         assert.ok(duration > 0.005 && duration < 0.5, `${duration} s long`);
         assert.ok(loudest > 0.001 && loudest <= 1, `${loudest} loud`);
     }
     await lab.key('m');
-    await lab.until(async () => (await contexts())[0] === 'suspended', 'the sound goes on');
+    await lab.until(async () => (await contexts())[0] === 'suspended', 'the sound continues');
     assert.equal((await contexts()).length, 1);
     await lab.close();
 });

@@ -1,4 +1,4 @@
-// The page on a phone: that fingers and fine pixels come to the canvas. What fingers do there: tests/interface/touch.rs.
+// The page on a phone: touches and the pixel density reach the canvas. tests/interface/touch.rs tests the gestures themselves.
 
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
@@ -7,7 +7,7 @@ import { open, quit } from './harness.mjs';
 
 after(quit);
 
-test('on a phone fingers tap, turn and pinch, and the canvas has all pixels of its screen, also of another one later on', async () => {
+test('on a phone fingers tap, turn and pinch, and the canvas has all pixels of its screen, also after a change of screen', async () => {
     const size = { width: 390, height: 600 };
     const lab = await open('play=0', { backend: 'webgl', size, context: { hasTouch: true, isMobile: true, deviceScaleFactor: 2 } });
     const canvas = () => lab.page.evaluate(() => [document.getElementById('laboratory').width, document.getElementById('laboratory').height]);
@@ -17,7 +17,7 @@ test('on a phone fingers tap, turn and pinch, and the canvas has all pixels of i
         assert.ok(x1 > 0.3 * size.width && x1 <= size.width && y1 <= size.height, `${label} ends at ${x1}, ${y1}`);
     }
     await lab.tap('Button', 'Step');
-    await lab.until(async () => (await lab.state()).steps === 1, 'the finger misses');
+    await lab.until(async () => (await lab.state()).steps === 1, 'the tap has no effect');
 
     const camera = async () => (await lab.state()).camera;
     await lab.fingers([[200, 150], [190, 150], [180, 150]]);
@@ -33,11 +33,11 @@ test('on a phone fingers tap, turn and pinch, and the canvas has all pixels of i
     assert.ok(Math.abs(near.yaw_rad - turned.yaw_rad) < 0.02, 'a pinch does not orbit');
 
     const cdp = await lab.context.newCDPSession(lab.page);
-    // Not back to 1, which the emulation does without telling the page.
+    // Not back to 1, for which the emulation fires no event.
     for (const ratio of [1.5, 3]) {
         await cdp.send('Emulation.setDeviceMetricsOverride', { ...size, deviceScaleFactor: ratio, mobile: false });
         await lab.until(async () => {
-            // The browser tells the page with the next frame that somebody sees.
+            // The browser fires the event only with the next visible frame.
             await cdp.send('Page.captureScreenshot');
             const [width, height] = await canvas();
             return width === ratio * size.width && height === ratio * size.height;

@@ -1,4 +1,4 @@
-// What the page weighs, packed as it is shipped.
+// Size of the page, compressed as it is shipped.
 
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
@@ -9,7 +9,7 @@ import { PAGE } from './harness.mjs';
 
 test('the page weighs at most 2.5 MB as a browser downloads it', (t) => {
     const LIMIT = 2_500_000;
-    // What other sites show of it is no part of it.
+    // The preview is loaded only by other sites.
     const files = fs.readdirSync(PAGE).filter((file) => !/\.(br|gz)$/.test(file) && file !== 'preview.png');
     assert.ok(files.includes('jointplay_bg.wasm'));
     const sizes = files.map((file) => [file, fs.statSync(path.join(PAGE, `${file}.br`)).size]);
