@@ -1,4 +1,4 @@
-"""Links to the page (`docs/links.md`), and frames that show it within a notebook (`docs/embedding.md`)."""
+"""Links to the page (`docs/links.md`), and frames that show it in a notebook (`docs/embedding.md`)."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from . import _native
 if TYPE_CHECKING:
     from ._scene import Scene
 
-LONGEST = 32_000
-"""Longest link that the page accepts, in characters."""
+MAX_LENGTH = 32_000
+"""Length limit of a link that the page accepts, in characters."""
 
 
 def link_of(scene: Scene, time: float | None = None) -> str | None:
     """Pairs of a link that opens `scene`, and runs it to `time`, s.
 
-    None for a scene that no link can hold: it needs further files, or is too long.
+    None for a scene that needs further files or is too long for a link.
     """
-    text, _, beside, changes = scene._native.origin()
+    text, _, files, changes = scene._native.origin()
     pairs: dict[str, str] = {}
-    known = [name for names in _native.scenes() for name in names]
-    if scene.name in known and text_of_built_in(scene.name) == text:
+    built_in = [name for names in _native.scenes() for name in names]
+    if scene.name in built_in and text_of_built_in(scene.name) == text:
         pairs["scene"] = scene.name
-    elif beside:
+    elif files:
         return None
     else:
-        packer = zlib.compressobj(9, zlib.DEFLATED, -15)
-        packed = packer.compress(text.encode()) + packer.flush()
+        compressor = zlib.compressobj(9, zlib.DEFLATED, -15)
+        packed = compressor.compress(text.encode()) + compressor.flush()
         pairs["text"] = base64.urlsafe_b64encode(packed).decode().rstrip("=")
     pairs.update(changes)
     if time is not None:
         pairs["t"] = f"{time!r}s"
     link = urlencode(pairs)
-    return link if len(link) <= LONGEST else None
+    return link if len(link) <= MAX_LENGTH else None
 
 
 def text_of_built_in(name: str) -> str:
@@ -47,7 +47,7 @@ def text_of_built_in(name: str) -> str:
 
 
 def frame_of(scene: Scene, time: float | None = None) -> str | None:
-    """HTML of a frame with the page that shows `scene` at `time`, if the environment variable JOINTPLAY_PAGE names the page."""
+    """HTML of a frame in which the page shows `scene` at `time`; None unless the environment variable JOINTPLAY_PAGE is set."""
     page = os.environ.get("JOINTPLAY_PAGE")
     link = link_of(scene, time) if page else None
     if not page or link is None:

@@ -12,9 +12,9 @@ from . import _native
 if TYPE_CHECKING:
     from ._simulation import Simulation
 
-ABSENT = (
+NO_GRAPHICS = (
     "this jointplay was built without graphics: "
-    "pip install ./python --config-settings=maturin.build-args='--features render' builds one that draws"
+    "pip install ./python --config-settings=maturin.build-args='--features render' builds one with graphics"
 )
 
 
@@ -26,6 +26,6 @@ def render(simulation: Simulation, size: tuple[int, int] = (960, 540)) -> NDArra
     """
     draw = getattr(_native, "render", None)
     if draw is None:
-        raise ImportError(ABSENT)
+        raise ImportError(NO_GRAPHICS)
     pixels: NDArray[np.uint8] = draw(simulation, *size)
     return pixels

@@ -22,32 +22,32 @@ if TYPE_CHECKING:
 
 
 class Run:
-    """Results of `Scene.run`. Arrays share their memory with the run, cannot be changed, and outlive it."""
+    """Results of `Scene.run`. Arrays share the memory of the run, are read-only, and outlive it."""
 
-    def __init__(self, scene: Scene, found: dict[str, Any]) -> None:
+    def __init__(self, scene: Scene, results: dict[str, Any]) -> None:
         self.scene = scene
         """The scene that was run."""
-        self._values: NDArray[np.float64] = found["values"]
-        self._rows: int = found["rows"]
-        self._channels: list[tuple[str, str, str, str]] = found["channels"]
-        self._places = {column: i for i, (_, column, _, _) in enumerate(self._channels)}
-        self._places.update({name: i for i, (name, _, _, _) in enumerate(self._channels)})
-        self.hash: str = found["hash"]
-        """State hash at the end: the same 16 digits as those of `jointplay run`."""
-        self.end: float = found["end"]
+        self._values: NDArray[np.float64] = results["values"]
+        self._rows: int = results["rows"]
+        self._channels: list[tuple[str, str, str, str]] = results["channels"]
+        self._indices = {column: i for i, (_, column, _, _) in enumerate(self._channels)}
+        self._indices.update({name: i for i, (name, _, _, _) in enumerate(self._channels)})
+        self.hash: str = results["hash"]
+        """State hash at the end: the 16 digits that `jointplay run` prints."""
+        self.end: float = results["end"]
         """Simulated time at the end, s."""
-        self.doubts: list[str] = found["doubts"]
+        self.doubts: list[str] = results["doubts"]
         """Reasons to doubt the results."""
-        self.ledger: dict[str, float] | None = found["ledger"]
-        """Energy exchanged, J, as in the summary of `jointplay run`; None where `solver.energy_ledger` is off."""
-        self.statistics: dict[str, Any] = found["statistics"]
+        self.ledger: dict[str, float] | None = results["ledger"]
+        """Energy exchanged, J, as in the summary of `jointplay run`; None if `solver.energy_ledger` is off."""
+        self.statistics: dict[str, Any] = results["statistics"]
         """Steps, evaluations and rejected steps; under `joints` the `peak_normal`, N, `peak_time`, s, and `impacts` of each."""
-        self.impacts = table_of_impacts(*found["impacts"])
+        self.impacts = impact_table(*results["impacts"])
         """One row per finished impact: the columns of `jointplay run --impacts`, with the names of the joints."""
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        # NumPy forgets it.
+        # Pickling loses this flag.
         self._values.flags.writeable = False
 
     @property
@@ -70,25 +70,25 @@ class Run:
 
         A name without its component (`A.force`) gives all three of a vector: shape (rows, 3).
         """
-        place = self._places.get(channel)
-        if place is not None:
-            return self._values[place, : self._rows]
+        index = self._indices.get(channel)
+        if index is not None:
+            return self._values[index, : self._rows]
         parts = [name.rsplit(".", 1) for name in self.channels]
-        own = {part[1]: i for i, part in enumerate(parts) if part[0] == channel and part[1:] not in ([], ["size"])}
-        first = own.get("x")
-        if first is not None and own == {"x": first, "y": first + 1, "z": first + 2}:
+        components = {part[1]: i for i, part in enumerate(parts) if part[0] == channel and part[1:] not in ([], ["size"])}
+        first = components.get("x")
+        if first is not None and components == {"x": first, "y": first + 1, "z": first + 2}:
             return self._values[first : first + 3, : self._rows].T
         raise ChannelError(self._explain(channel))
 
     def _explain(self, channel: str) -> str:
-        below = [name for name in self.channels if name.startswith(f"{channel}.")]
-        if below:
-            return f"`{channel}` stands for several channels: {', '.join(below)}"
+        members = [name for name in self.channels if name.startswith(f"{channel}.")]
+        if members:
+            return f"`{channel}` stands for several channels: {', '.join(members)}"
         if any(channel in (known.name, known.column) for known in self.scene.channels()):
-            return f"`{channel}` was not recorded: give it to Scene.run, channels=[{channel!r}, …]"
-        near = get_close_matches(channel, self._places, n=1)
+            return f"`{channel}` was not recorded: pass channels=[{channel!r}, …] to Scene.run"
+        near = get_close_matches(channel, self._indices, n=1)
         hint = f" (did you mean `{near[0]}`?)" if near else ""
-        return f"`{channel}` is none of the channels of this run{hint}"
+        return f"`{channel}` is not a channel of this run{hint}"
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.channels)
@@ -115,12 +115,12 @@ INTEGERS = ("steps",)
 FLAGS = ("floored", "disturbed")
 
 
-def table_of_impacts(ball_joints: list[str], names: list[str], values: NDArray[np.float64]) -> NDArray[Any]:
-    """Structured array of impacts, whose values have one row per column."""
+def impact_table(ball_joints: list[str], names: list[str], values: NDArray[np.float64]) -> NDArray[Any]:
+    """Structured array of impacts; each row of `values` becomes a column."""
     joints = np.array(ball_joints or [""])
-    kinds: dict[str, Any] = {name: float for name in names}
-    kinds.update({name: int for name in INTEGERS}, joint=joints.dtype, **{name: bool for name in FLAGS})
-    table = np.zeros(values.shape[1], dtype=list(kinds.items()))
+    types: dict[str, Any] = {name: float for name in names}
+    types.update({name: int for name in INTEGERS}, joint=joints.dtype, **{name: bool for name in FLAGS})
+    table = np.zeros(values.shape[1], dtype=list(types.items()))
     for name, column in zip(names, values, strict=True):
         table[name] = joints[column.astype(int)] if name == "joint" else column
     return table
@@ -135,13 +135,13 @@ def run_scene(
     progress: Callable[[float], object] | None,
     warn: bool,
 ) -> Run:
-    """As `Scene.run`."""
+    """Implements `Scene.run`."""
     names = [channels] if isinstance(channels, str) else list(channels)
-    found = _native.run(native, duration, every, names, progress)
-    run = Run(scene, found)
+    results = _native.run(native, duration, every, names, progress)
+    run = Run(scene, results)
     if warn:
         for doubt in run.doubts:
             warnings.warn(f"{scene.name}: {doubt}", DoubtWarning, stacklevel=3)
-    if found["fault"] is not None:
-        raise Stopped(found["fault"], time=run.end, advice=found["advice"], run=run)
+    if results["fault"] is not None:
+        raise Stopped(results["fault"], time=run.end, advice=results["advice"], run=run)
     return run

@@ -25,7 +25,7 @@ class Parameter:
     key: str
     """Key, such as `contact.clearance` or `joint.A.friction`."""
     label: str
-    """Name for people."""
+    """Name in the interface."""
     group: str
     """Heading under which it is listed."""
     value: float | int | str | None
@@ -43,14 +43,14 @@ class Parameter:
     at_reset: bool
     """Whether a change takes effect at the next reset only."""
     help: str
-    """What the quantity is."""
+    """Description."""
     equation: str
-    """Which equation it enters."""
+    """Equations in which it appears."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """What a scene consists of once it is assembled."""
+    """Counts and warnings of the assembled scene."""
 
     bodies: int
     """Moving bodies."""
@@ -61,13 +61,13 @@ class Check:
     constraint_rows: int
     """Constraint rows of the formulation."""
     dependent_rows: int
-    """Those of them that the others imply."""
+    """Constraint rows that the others imply."""
     contacts: int
     """Ball joints with clearance."""
     ideal_joints: int
     """Ball joints without clearance."""
     warnings: list[str]
-    """What is probably not intended: what `jointplay check` warns of."""
+    """Warnings of `jointplay check` about probable mistakes."""
     not_unique: str | None
     """Which reactions and actuator forces are not unique; None if all are."""
     doubts: list[str]
@@ -85,7 +85,7 @@ class Channel:
     unit: str
     """SI unit."""
     help: str
-    """What it measures."""
+    """Description."""
     unasked: bool
     """Whether a run records it if no channels are named."""
 
@@ -127,12 +127,12 @@ class Scene:
 
     @property
     def title(self) -> str:
-        """Title of one line."""
+        """One-line title."""
         return self._native.title
 
     @property
     def description(self) -> str:
-        """What the machine is."""
+        """Description of the machine."""
         return self._native.description
 
     @property
@@ -161,7 +161,7 @@ class Scene:
         return {key: self.parameter(key) for key in self._native.keys()}
 
     def parameter(self, key: str) -> Parameter:
-        """The parameter `key`, also a number of the file such as `body.rod.mass`."""
+        """The parameter `key`, which may also be a number of the file such as `body.rod.mass`."""
         return Parameter(**self._native.parameter(key))
 
     def __getitem__(self, key: str) -> float | int | str | None:
@@ -178,8 +178,8 @@ class Scene:
         A keyword is the last part of a key of the scene: `set(clearance="0.5 mm")` changes `contact.clearance`. A mapping has
         whole keys: `set({"joint.A.clearance": 1e-4})`. Numbers are SI; None returns to the value of the file.
         """
-        own = [(self._key_of(name), value) for name, value in by_name.items()]
-        return Scene(self._native.set([*(changes or {}).items(), *own]))
+        named = [(self._key_of(name), value) for name, value in by_name.items()]
+        return Scene(self._native.set([*(changes or {}).items(), *named]))
 
     def _key_of(self, name: str) -> str:
         keys = [key for key in self._native.keys() if not key.startswith("joint.")]
@@ -189,7 +189,7 @@ class Scene:
         return found[0] if found else name
 
     def check(self) -> Check:
-        """Assembles the machine, and counts what it consists of."""
+        """Assembles the machine, counts its bodies, degrees of freedom and constraints, and collects warnings."""
         return Check(**self._native.check())
 
     def run(
@@ -204,7 +204,7 @@ class Scene:
         """Runs the scene for `duration`, s, with a row every `every`, s (a thousandth of the duration by default).
 
         `channels` are names or patterns (`"A.*"`); without any, the run records those that `jointplay run` writes. `progress`
-        is called with the part that is done, from 0 to 1. Doubts about the results become warnings unless `warn` is False.
+        is called with the fraction done, from 0 to 1. Doubts about the results become warnings unless `warn` is False.
         """
         return run_scene(self, self._native, duration, every, channels, progress, warn)
 
@@ -214,7 +214,7 @@ class Scene:
     __hash__ = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _read_again, (self._native.origin(),)
+        return _unpickle, (self._native.origin(),)
 
     def __repr__(self) -> str:
         changed = "".join(f", {key} = {value}" for key, value in self.changes.items())
@@ -233,5 +233,5 @@ class Scene:
         return f"{head}<table><tr><th>parameter</th><th>value</th><th></th></tr>{rows}</table>"
 
 
-def _read_again(origin: Any) -> Scene:
+def _unpickle(origin: Any) -> Scene:
     return Scene(_native.Scene.read_again(origin))

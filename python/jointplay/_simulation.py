@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from ._link import frame_of
-from ._run import table_of_impacts
+from ._run import impact_table
 
 if TYPE_CHECKING:
     from typing import Self
@@ -34,9 +34,9 @@ class Frame:
     angular_velocities: NDArray[np.float64]
     """Angular velocities, rad/s: shape (bodies, 3)."""
     eccentricities: NDArray[np.float64]
-    """Centre of each ball from that of its socket, m: shape (ball joints, 3)."""
+    """From the centre of each socket to that of its ball, m: shape (ball joints, 3)."""
     normal_forces: NDArray[np.float64]
-    """Normal force on each ball, N; of an ideal joint the reaction: shape (ball joints, 3)."""
+    """Normal force on each ball, N, or the reaction of an ideal joint: shape (ball joints, 3)."""
     friction_forces: NDArray[np.float64]
     """Friction force on each ball, N: shape (ball joints, 3)."""
     values: NDArray[np.float64] = field(repr=False)
@@ -44,7 +44,7 @@ class Frame:
 
 
 class Simulation(_native.Simulation):
-    """A running simulation. Two simulations step in two threads at the same time; one belongs to one thread at a time."""
+    """A running simulation. Simulations in different threads step at the same time; each belongs to one thread at a time."""
 
     scene: Scene
     """The scene as it was given."""
@@ -67,11 +67,11 @@ class Simulation(_native.Simulation):
     def restore(self, state: _native.State) -> None:
         """Returns to a state of a simulation of the same scene."""
         super().restore(state)
-        # The state may have had changes.
+        # The state may contain changes.
         self._is_plain = False
 
     def frame(self) -> Frame:
-        """Everything about this instant."""
+        """The machine at this instant."""
         return Frame(**self._instant())
 
     def __getitem__(self, channel: str) -> float:
@@ -79,11 +79,11 @@ class Simulation(_native.Simulation):
         return self._read(channel)
 
     def take_impacts(self) -> NDArray[Any]:
-        """One row per impact that finished since the last call, as `Run.impacts`; only the latest 64 are sure to be there."""
-        return table_of_impacts(*self._take_impacts())
+        """One row per impact that finished since the last call, as `Run.impacts`. At least the latest 64 are available."""
+        return impact_table(*self._take_impacts())
 
     def _repr_html_(self) -> str:
-        # A link says nothing about changes during the run.
+        # The link does not contain changes during the run.
         frame = frame_of(self.scene, self.time) if self._is_plain else None
         return frame or html.escape(repr(self))
 

@@ -1,4 +1,4 @@
-"""Studies of uncertain parameters: which of them matter, and what part of a lot holds its limits."""
+"""Studies of uncertain parameters: which of them matter, and what fraction of a lot meets its limits."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from ._scene import Quantity, Scene
 
 Over = Mapping[str, str | None] | Sequence[str]
-"""Parameters by key or pattern, each with a distribution as text, or None: half to one and a half of its value."""
+"""Parameters by key or pattern, each with a distribution as text, or None for 0.5 to 1.5 times its value."""
 Progress = Callable[[float], object]
 
 
 class Estimate(NamedTuple):
-    """An estimate with its interval of 95 %."""
+    """An estimate with its 95 % interval."""
 
     value: float
     """Best value."""
@@ -34,7 +34,7 @@ class Estimate(NamedTuple):
 
 
 class Study:
-    """Runs of a scene over uncertain parameters, reduced to a few numbers: the model that other libraries call."""
+    """Runs of a scene over uncertain parameters, reduced to a few numbers: a model function for other libraries."""
 
     def __init__(
         self,
@@ -48,9 +48,10 @@ class Study:
         """A study of `scene` over parameters with distributions.
 
         `over` has a distribution for each key or pattern, as in `jointplay sensitivity --over`: `"0.05mm..0.2mm"`,
-        `"normal(0.15, 0.02)"`, `"H7/g6"`, or None for half to one and a half of the value. `output` names what each run is
-        reduced to: `tip-error`, `tip-error-rms`, `peak-force`, `impacts`, `energy-lost`, or CHANNEL:STATISTIC. A run takes
-        `duration`, s, and is observed from `start_after`, s, on; by default three periods of the drives, the first a transient.
+        `"normal(0.15, 0.02)"`, `"H7/g6"`, or None for 0.5 to 1.5 times the value. `output` names the numbers recorded of each
+        run: `tip-error`, `tip-error-rms`, `peak-force`, `impacts`, `energy-lost`, or CHANNEL:STATISTIC. A run takes
+        `duration`, s, and is observed from `start_after`, s, on; by default three periods of the drives, the first of them a
+        transient.
         """
         requested: list[tuple[str, str | None]] = []
         requested += over.items() if isinstance(over, Mapping) else [(key, None) for key in over]
@@ -69,7 +70,7 @@ class Study:
 
     @property
     def assumed_ranges(self) -> dict[str, tuple[float, float]]:
-        """Ends, SI, of each range that was not given: half to one and a half of the value, within what is allowed."""
+        """Ends, SI, of each range that was not given: 0.5 to 1.5 times the value, within the allowed range."""
         return dict(self._native.assumed_ranges)
 
     @property
@@ -115,7 +116,7 @@ class Effects(NamedTuple):
     mean: float
     """Mean effect."""
     mean_magnitude: float
-    """Mean size of the effect: the influence of the parameter."""
+    """Mean magnitude of the effect: the influence of the parameter."""
     deviation: float
     """Standard deviation: interactions and curvature."""
 
@@ -131,14 +132,14 @@ class Changes(NamedTuple):
 
 @dataclass(frozen=True)
 class Target:
-    """How far parameters must go for the first output to be no larger than a target."""
+    """Changes of parameters with which the first output does not exceed a target."""
 
     target: float
     """Largest allowed value of the first output, SI."""
     single: list[Changes]
-    """Changes of one parameter that suffice, each the smallest that was run."""
+    """For each parameter that suffices alone, the smallest sufficient change that was run."""
     together: Changes | None
-    """Where none suffices: changes of several. Without values if the scene holds the target; None if nothing reaches it."""
+    """Changes of several parameters if none suffices alone. Empty if the scene meets the target; None if nothing reaches it."""
 
 
 @dataclass(frozen=True)
@@ -150,19 +151,19 @@ class Sensitivity:
     units: dict[str, str]
     """SI unit of each parameter and output."""
     assumed_ranges: dict[str, tuple[float, float]]
-    """Ends, SI, of each range that was not given: half to one and a half of the value, within what is allowed."""
+    """Ends, SI, of each range that was not given: 0.5 to 1.5 times the value, within the allowed range."""
     nominal: dict[str, float]
     """Each output with the values of the scene, SI."""
     alone: dict[str, dict[str, Ends]]
-    """For each output, every parameter alone."""
+    """For each output, the effect of every parameter alone."""
     together: dict[str, tuple[float, float]]
     """Each output with all parameters at their lower ends, and at their upper ends, SI."""
     screening: dict[str, Effects | None] | None
-    """Effects of each parameter (None without results) on the first output; None without a screening."""
+    """Effects of each parameter on the first output (None if the runs failed); None without a screening."""
     kept: list[str]
-    """Parameters of the indices; a screening leaves out the others."""
+    """Parameters with indices; a screening omits the others."""
     indices: dict[str, Indices | str]
-    """Indices of each output, or why there are none; empty with rows=0."""
+    """Indices of each output, or the reason why there are none; empty with rows=0."""
     target: Target | None
     """Changes that reach the target; None if none was given."""
     values: NDArray[np.float64] = field(repr=False)
@@ -182,8 +183,8 @@ class Sensitivity:
                 row |= {"parameter": key, "parameter_unit": self.units[key]}
                 row |= {"low": low, "high": high, "alone_low": at_low, "alone_high": at_high}
                 for name, of_key in (("first_order", "first"), ("total", "total")):
-                    found = getattr(indices, of_key).get(key) if isinstance(indices, Indices) else None
-                    row |= dict(zip((name, f"{name}_low", f"{name}_high"), found or UNKNOWN, strict=True))
+                    estimate = getattr(indices, of_key).get(key) if isinstance(indices, Indices) else None
+                    row |= dict(zip((name, f"{name}_low", f"{name}_high"), estimate or UNKNOWN, strict=True))
                 rows.append(row)
         return pandas.DataFrame(rows)
 
@@ -207,51 +208,51 @@ def sensitivity(
 ) -> Sensitivity:
     """Which uncertain parameters move an output most, as `jointplay sensitivity` computes it.
 
-    Every parameter alone; a screening with `screen` trajectories (10 by default if more than 8 parameters vary, else none), which
-    leaves out of the rest what hardly matters; first-order and total indices from `rows` rows of a Sobol sequence, rows (k + 2)
-    runs for k parameters, for which a power of two is best (0 for none); changes after which the first output is at most
-    `target`. `progress` is called with the part of each of these stages that is done. The other arguments are those of `Study`.
+    The stages are: every parameter alone; a screening with `screen` trajectories (by default 10 if more than 8 parameters vary,
+    otherwise none), after which unimportant parameters are omitted; first-order and total indices from `rows` rows of a Sobol
+    sequence (rows (k + 2) runs for k parameters; a power of two is best, 0 for none); changes with which the first output is at
+    most `target`. `progress` is called with the fraction of the present stage. The other arguments are those of `Study`.
     """
     study = Study(scene, over, output, duration=duration, start_after=start_after)
-    found = study._native.sensitivity(rows, screen, target, seed, threads or os.cpu_count() or 1, progress)
+    results = study._native.sensitivity(rows, screen, target, seed, threads or os.cpu_count() or 1, progress)
     keys, outputs = list(study.inputs), list(study.outputs)
-    kept = [keys[i] for i in found["kept"]]
-    effects = found["screening"]
+    kept = [keys[i] for i in results["kept"]]
+    effects = results["screening"]
     return Sensitivity(
         inputs=study.inputs,
         units=study.units | study.outputs,
         assumed_ranges=study.assumed_ranges,
-        nominal=dict(zip(outputs, found["nominal"], strict=True)),
+        nominal=dict(zip(outputs, results["nominal"], strict=True)),
         alone={
             name: {
                 key: Ends(low, at_low[o], high, at_high[o])
-                for key, ((low, at_low), (high, at_high)) in zip(keys, found["alone"], strict=True)
+                for key, ((low, at_low), (high, at_high)) in zip(keys, results["alone"], strict=True)
             }
             for o, name in enumerate(outputs)
         },
-        together=dict(zip(outputs, zip(*found["together"], strict=True), strict=True)),
-        screening=effects and {key: own and Effects(*own) for key, own in zip(keys, effects, strict=True)},
+        together=dict(zip(outputs, zip(*results["together"], strict=True), strict=True)),
+        screening=effects and {key: one and Effects(*one) for key, one in zip(keys, effects, strict=True)},
         kept=kept,
-        indices={name: _indices(kept, own) for name, own in zip(outputs, found["indices"])},
-        target=found["target"] and _target(found["target"]),
-        values=found["values"],
-        results=found["results"],
+        indices={name: _indices(kept, data) for name, data in zip(outputs, results["indices"])},
+        target=results["target"] and _target(results["target"]),
+        values=results["values"],
+        results=results["results"],
     )
 
 
-def _indices(kept: list[str], own: dict[str, Any]) -> Indices | str:
-    if "fault" in own:
-        return str(own["fault"])
-    by_key = {name: {key: Estimate(*one) for key, one in zip(kept, own[name], strict=True)} for name in ("first", "total")}
-    return Indices(own["mean"], own["variance"], **by_key)
+def _indices(kept: list[str], data: dict[str, Any]) -> Indices | str:
+    if "fault" in data:
+        return str(data["fault"])
+    by_key = {name: {key: Estimate(*one) for key, one in zip(kept, data[name], strict=True)} for name in ("first", "total")}
+    return Indices(data["mean"], data["variance"], **by_key)
 
 
-def _target(own: dict[str, Any]) -> Target:
-    def changes(found: tuple[list[tuple[str, float]], float]) -> Changes:
-        return Changes(dict(found[0]), found[1])
+def _target(data: dict[str, Any]) -> Target:
+    def changes(pair: tuple[list[tuple[str, float]], float]) -> Changes:
+        return Changes(dict(pair[0]), pair[1])
 
-    together = own["together"]
-    return Target(own["target"], [changes(one) for one in own["single"]], None if together is None else changes(together))
+    together = data["together"]
+    return Target(data["target"], [changes(one) for one in data["single"]], None if together is None else changes(together))
 
 
 @dataclass(frozen=True)
@@ -259,7 +260,7 @@ class Quality:
     """Statistics of one limited output over a lot."""
 
     yield_: Estimate
-    """Part of the lot that holds this limit."""
+    """Fraction of the lot that meets this limit."""
     mean: float
     """Mean of the units with a result, SI."""
     deviation: float
@@ -276,7 +277,7 @@ class RejectDriver(NamedTuple):
     """How one parameter differs between rejected and accepted units."""
 
     mean_shift: float
-    """Mean over the rejects less mean over the accepted, in standard deviations."""
+    """Mean of the rejected minus mean of the accepted units, in standard deviations."""
     distance: float
     """Kolmogorov-Smirnov distance of the two distributions."""
     p_value: float
@@ -284,32 +285,32 @@ class RejectDriver(NamedTuple):
 
 
 class FitChoice(NamedTuple):
-    """A candidate for each parameter that has any."""
+    """One of the candidates of each parameter that has candidates."""
 
     fits: dict[str, str]
     """Fit of each parameter, as it was given."""
     cost: float
     """Sum of the costs."""
     yield_: Estimate
-    """Part of the lot that holds all limits with these fits."""
+    """Fraction of the lot that meets all limits with these fits."""
 
 
 @dataclass(frozen=True)
 class Fits:
-    """The cheapest fits that hold a required yield."""
+    """The cheapest fits that reach a required yield."""
 
     best: FitChoice | None
-    """The cheapest choice found; None if not even the tightest fits hold the yield."""
+    """The cheapest choice found; None if even the tightest fits miss the yield."""
     is_proven: bool
-    """Whether every cheaper choice is known to fail, if a tighter fit never lowers the yield."""
+    """Whether every cheaper choice is known to fail, provided that a tighter fit never lowers the yield."""
     evaluations: int
-    """Choices that were tried."""
+    """Number of choices that were evaluated."""
     check: Estimate | None
     """Yield of the best choice in another lot."""
     verdict: str | None
-    """What the check says about the required yield: `held` with 95 % confidence, `missed`, or `open` for too few units."""
+    """Whether the check confirms the required yield: `held` with 95 % confidence, `missed`, or `open` with too few units."""
     order_not_checked: list[str]
-    """Parameters with a candidate without limits, of which it is not known whether it is tighter than the one before it."""
+    """Parameters with a candidate without limits, which may not be tighter than the one before it."""
 
 
 @dataclass(frozen=True)
@@ -317,17 +318,17 @@ class Tolerance:
     """Result of `tolerance`."""
 
     yield_: Estimate
-    """Part of the lot that holds all limits."""
+    """Fraction of the lot that meets all limits."""
     qualities: dict[str, Quality]
     """Statistics of each limited output."""
     drivers: dict[str, RejectDriver] | None
-    """What distinguishes the rejects, by parameter; None if all units or none are accepted."""
+    """How rejects differ from accepted units, by parameter; None if all units or none are accepted."""
     fits: Fits | None
     """The cheapest fits; None without `cost`."""
     assumed_ranges: dict[str, tuple[float, float]]
-    """Ends, SI, of each range that was not given: half to one and a half of the value, within what is allowed."""
+    """Ends, SI, of each range that was not given: 0.5 to 1.5 times the value, within the allowed range."""
     accepted: NDArray[np.bool_] = field(repr=False)
-    """Whether each unit holds all limits."""
+    """Whether each unit meets all limits."""
     values: NDArray[np.float64] = field(repr=False)
     """Values of the parameters of each unit, SI."""
     results: NDArray[np.float64] = field(repr=False)
@@ -350,56 +351,56 @@ def tolerance(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Tolerance:
-    """What part of a lot of `units` units holds its limits, and what drives the rejects, as `jointplay tolerance` computes them.
+    """Which fraction of a lot meets its limits, and what drives the rejects, as `jointplay tolerance` computes it.
 
-    `limits` has an upper limit for each output, or a lower and an upper one, of which one may be None. `sampling` is `sobol`,
-    `latin-hypercube` or `random`.
+    The lot has `units` units. `limits` has an upper limit for each output, or a lower and an upper one, of which one may be None.
+    `sampling` is `sobol`, `latin-hypercube` or `random`.
 
-    With `cost`, the result also has the cheapest fits with a yield of at least `required_yield`, of at most `evaluations` choices
-    that are tried. It has the cost of each candidate of a parameter or pattern, from the loosest to the tightest:
-    `{"joint.S1.clearance": {"H8/f7": 1.0, "H7/g6": 2.5}}`. `progress` is called with the part of each lot that is done. The other
-    arguments are those of `Study`.
+    `cost` has the cost of each candidate of a parameter or pattern, from the loosest to the tightest:
+    `{"joint.S1.clearance": {"H8/f7": 1.0, "H7/g6": 2.5}}`. With it, the result also has the cheapest fits with a yield of at
+    least `required_yield`, found with at most `evaluations` evaluated choices. `progress` is called with the fraction of each
+    lot. The other arguments are those of `Study`.
     """
     study = Study(scene, over, list(limits), duration=duration, start_after=start_after)
     ends = [end if isinstance(end, tuple) else (None, end) for end in limits.values()]
     priced = None if cost is None else [(key, fit, price) for key, of_key in cost.items() for fit, price in of_key.items()]
-    found = study._native.tolerance(
+    results = study._native.tolerance(
         ends, units, sampling, seed, priced, required_yield, evaluations, threads or os.cpu_count() or 1, progress
     )
-    drivers = found["drivers"]
+    drivers = results["drivers"]
     return Tolerance(
-        yield_=Estimate(*found["yield"]),
-        qualities={name: _quality(own) for name, own in zip(study.outputs, found["qualities"], strict=True)},
-        drivers=None if drivers is None else {key: RejectDriver(*own) for key, own in zip(study.inputs, drivers, strict=True)},
-        fits=found["fits"] and _fits(found["fits"]),
+        yield_=Estimate(*results["yield"]),
+        qualities={name: _quality(data) for name, data in zip(study.outputs, results["qualities"], strict=True)},
+        drivers=None if drivers is None else {key: RejectDriver(*one) for key, one in zip(study.inputs, drivers, strict=True)},
+        fits=results["fits"] and _fits(results["fits"]),
         assumed_ranges=study.assumed_ranges,
-        accepted=np.array(found["accepted"]),
-        values=found["values"],
-        results=found["results"],
+        accepted=np.array(results["accepted"]),
+        values=results["values"],
+        results=results["results"],
     )
 
 
-def _quality(own: dict[str, Any]) -> Quality:
+def _quality(data: dict[str, Any]) -> Quality:
     def estimate(name: str) -> Estimate | None:
-        return None if own[name] is None else Estimate(*own[name])
+        return None if data[name] is None else Estimate(*data[name])
 
     return Quality(
-        yield_=Estimate(*own["yield"]),
-        mean=own["mean"],
-        deviation=own["deviation"],
+        yield_=Estimate(*data["yield"]),
+        mean=data["mean"],
+        deviation=data["deviation"],
         percentiles={p: estimate(f"percentile_{p}") for p in (50, 95, 99)},
-        cp=own["cp"],
+        cp=data["cp"],
         cpk=estimate("cpk"),
     )
 
 
-def _fits(own: dict[str, Any]) -> Fits:
-    best, check = own["best"], own["check"]
+def _fits(data: dict[str, Any]) -> Fits:
+    best, check = data["best"], data["check"]
     return Fits(
         best=best and FitChoice(dict(best[1]), best[0], Estimate(*best[2])),
-        is_proven=own["is_proven"],
-        evaluations=own["evaluations"],
+        is_proven=data["is_proven"],
+        evaluations=data["evaluations"],
         check=check and Estimate(*check[0]),
         verdict=check and check[1],
-        order_not_checked=own["order_not_checked"],
+        order_not_checked=data["order_not_checked"],
     )

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 
 class Sweep:
-    """The points of a sweep, computed here or elsewhere.
+    """A sweep whose points can be computed in this or other processes.
 
-    A sweep consists of blocks that can be computed in any order, in any process: `compute(block)` returns the numbers of one,
-    which depend on nothing else, and `assemble` makes the result of all of them. A sweep can be pickled.
+    A sweep consists of independent blocks, which can be computed in any order, in any process: `compute(block)` returns the
+    numbers of one block, and `assemble` combines all blocks into the result. A sweep can be pickled.
     """
 
     def __init__(
@@ -47,8 +47,8 @@ class Sweep:
         """A sweep of `scene`.
 
         `vary` has the values of each parameter: text as in `jointplay sweep --vary` (`"0.1mm..1mm:10"`, `"0.1mm..1mm:10:log"`),
-        or a list of numbers (SI) or texts. All combinations are run, the last parameter varying fastest; with `zip`, value i of
-        each together.
+        or a list of numbers (SI) or texts. All combinations are run, the last parameter varying fastest; with `zip`, the lists
+        are run in parallel.
 
         The run of a point is one of
 
@@ -77,17 +77,17 @@ class Sweep:
             "start": [start] if isinstance(start, str) else list(start),
             "zip": zip,
         }
-        self._is_tried = False
-        # Errors come here, not at the first use.
+        self._is_checked = False
+        # Raises errors here, not at the first use.
         _ = self._native
 
     @cached_property
     def _native(self) -> _native.Sweep:
-        return _native.Sweep(self.scene._native, self._vary, self._options, self._is_tried)
+        return _native.Sweep(self.scene._native, self._vary, self._options, self._is_checked)
 
     def __getstate__(self) -> dict[str, Any]:
         state = {name: value for name, value in self.__dict__.items() if name != "_native"}
-        return {**state, "_is_tried": True}
+        return {**state, "_is_checked": True}
 
     @property
     def blocks(self) -> int:
@@ -108,20 +108,20 @@ class Sweep:
         return self._native.compute(block)
 
     def assemble(self, blocks: Iterable[NDArray[np.float64]]) -> SweepResult:
-        """The result of all blocks, given in their order."""
-        own = list(blocks)
-        if len(own) != self.blocks:
-            raise OptionError(f"blocks: {len(own)} of them are given, and the sweep has {self.blocks}")
-        for block, rows in enumerate(own):
+        """Combines all blocks, given in order, into the result."""
+        given = list(blocks)
+        if len(given) != self.blocks:
+            raise OptionError(f"blocks: {len(given)} given, but the sweep has {self.blocks}")
+        for block, rows in enumerate(given):
             first, end = self._native.block(block)
             if len(rows) != end - first:
-                raise OptionError(f"blocks: block {block} has {len(rows)} points, and should have {end - first}")
-        return SweepResult(self, np.concatenate(own))
+                raise OptionError(f"blocks: block {block} has {len(rows)} points, but should have {end - first}")
+        return SweepResult(self, np.concatenate(given))
 
     def run(self, threads: int | None = None, progress: Callable[[float], object] | None = None) -> SweepResult:
-        """Computes all blocks on `threads` threads (one for each core by default), which change no bit of the result.
+        """Computes all blocks on `threads` threads (by default one per core), which do not affect the result.
 
-        `progress` is called with the part that is done, from 0 to 1.
+        `progress` is called with the fraction done, from 0 to 1.
         """
         return SweepResult(self, self._native.run(threads or os.cpu_count() or 1, progress))
 
@@ -138,7 +138,7 @@ class SweepResult(Mapping[str, NDArray[Any]]):
         self._arrays: dict[str, NDArray[Any]] = dict(self.axes)
         self._single: list[str] = []
         shape, first = tuple(sweep._native.shape), 0
-        for name, whole, count in sweep._native.columns():
+        for name, is_integer, count in sweep._native.columns():
             values = records[:, first : first + count]
             first += count
             if sweep._native.is_per_section(name):
@@ -146,14 +146,14 @@ class SweepResult(Mapping[str, NDArray[Any]]):
             else:
                 self._single.append(name)
                 values = values.reshape(shape)
-            self._arrays[name] = values.astype(np.int64) if whole else values
+            self._arrays[name] = values.astype(np.int64) if is_integer else values
         self.sweep = sweep
         """The sweep."""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """An array: the first axes are those of the sweep; the last, if it has one more, counts the sections."""
+        """An array over the axes of the sweep; an additional last axis counts sections."""
         if name not in self._arrays:
-            raise ChannelError(f"`{name}` is none of the arrays of this sweep: {', '.join(self._arrays)}")
+            raise ChannelError(f"`{name}` is not an array of this sweep, which has: {', '.join(self._arrays)}")
         return self._arrays[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -163,7 +163,7 @@ class SweepResult(Mapping[str, NDArray[Any]]):
         return len(self._arrays)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """One row per point: its parameters, SI, and its single numbers."""
+        """One row per point: its parameters, SI, and its results without a section axis."""
         import pandas
 
         settings = pandas.DataFrame([dict(self.sweep._native.settings(point)) for point in range(self.sweep.points)])

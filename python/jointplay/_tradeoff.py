@@ -20,7 +20,7 @@ class Tradeoff:
 
     def __init__(self, points: list[dict[str, Any]]) -> None:
         self.points = points
-        """One per method and step or tolerance, as `tradeoff.json` has them (`docs/tradeoff.md`)."""
+        """One per method and step or tolerance, as in `tradeoff.json` (`docs/tradeoff.md`)."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """One row per point; nested names are joined by dots: `impacts.ratio`, `errors.peak`."""
@@ -35,7 +35,7 @@ class Tradeoff:
 def tradeoff(scene: Scene, *, quick: bool = True, progress: Callable[[float], object] | None = None) -> Tradeoff:
     """Runs every method on `scene` over its steps or tolerances, and measures cost and error, as `jointplay tradeoff` does.
 
-    A `quick` measurement has a coarse grid and takes seconds, the other one minutes. Times are processor times of the calling
-    thread. `progress` is called with the part that is done, from 0 to 1.
+    A `quick` measurement uses a coarse grid and takes seconds; a full one takes minutes. Times are processor times of the calling
+    thread. `progress` is called with the fraction done, from 0 to 1.
     """
     return Tradeoff(json.loads(_native.tradeoff(scene._native, quick, time.thread_time, progress)))

@@ -1,4 +1,4 @@
-"""Exceptions and warnings of the package. Each message is a sentence for a person; the attributes are for programs."""
+"""Exceptions and warnings of the package. Messages are for people, attributes for programs."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ class JointplayError(Exception):
         self.__dict__.update(details)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made_again, (type(self), self.args[0], self.__dict__)
+        return _unpickle, (type(self), self.args[0], self.__dict__)
 
 
-def _made_again(kind: type[JointplayError], message: str, details: dict[str, Any]) -> JointplayError:
+def _unpickle(kind: type[JointplayError], message: str, details: dict[str, Any]) -> JointplayError:
     return kind(message, **details)
 
 
 class SceneError(JointplayError, ValueError):
     """A scene or parameter that is invalid, or a scene that cannot start.
 
-    Attributes: `file` as it was named, `line` and `column` counted from 1, `key` and `value` at fault, and `allowed`, the range
-    and the units of a parameter in words. Each is None where it is unknown.
+    Attributes: `file` as it was named, `line` and `column` counted from 1, the invalid `key` and `value`, and `allowed`, the
+    range and units of a parameter in words. Each is None if unknown.
     """
 
     file: str | None
@@ -53,7 +53,8 @@ class ChannelError(JointplayError, KeyError):
 class Stopped(JointplayError, RuntimeError):
     """A run that the divergence guard stopped.
 
-    Attributes: `time` of the last good state, s; `advice`, what to try, or None; `run` with the rows so far, of `Scene.run`.
+    Attributes: `time` of the last good state, s; `advice` about what to try, or None; `run` with the rows so far, if `Scene.run`
+    raised it.
     """
 
     time: float

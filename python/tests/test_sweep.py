@@ -94,7 +94,7 @@ def test_bad_sweeps_are_refused(vary, options, said):
 
 def test_blocks_that_are_missing_are_noticed():
     sweep = jp.Sweep(jp.Scene.load("pendulum"), {"contact.clearance": [1e-4, 2e-4]}, duration="1 ms")
-    with pytest.raises(jp.OptionError, match="1 of them"):
+    with pytest.raises(jp.OptionError, match="1 given"):
         sweep.assemble([sweep.compute(0)])
     with pytest.raises(jp.OptionError, match="blocks 0 to 1"):
         sweep.compute(2)
