@@ -1,8 +1,8 @@
-"""Times of the package: a step called from Python, and two simulations in two threads.
+"""Speed of the package: a step called from Python, and two simulations in two threads.
 
     pip install ./python && python python/bench.py
 
-The package of `./test python` is not optimised: its calls take some microseconds.
+The package built by `./test python` is not optimised; its calls take some microseconds.
 """
 
 import statistics
@@ -16,7 +16,7 @@ REPETITIONS = 7
 
 
 def seconds(work):
-    """Shortest of several times, s: what else runs on the machine only adds."""
+    """Shortest of several times, s; other load on the machine only adds."""
     times = []
     for _ in range(REPETITIONS):
         start = time.perf_counter()
@@ -26,7 +26,7 @@ def seconds(work):
 
 
 def cost_of_a_call():
-    """Time that a call adds to a step: steps one by one less the same steps in one call, s."""
+    """Time that a call adds to a step, s: steps one by one minus the same steps in one call."""
     scene = jp.Scene.load("pendulum").set({"solver.method": "rk4", "solver.step": "1 us"})
     simulation = jp.Simulation(scene)
     state = simulation.state
@@ -46,7 +46,7 @@ def cost_of_a_call():
 
 
 def speed_of_two_threads():
-    """Time of two simulations one after the other over their time in two threads."""
+    """Time of two simulations in sequence over their time in two threads."""
     simulations = [jp.Simulation(jp.Scene.load("four-bar")) for _ in range(2)]
     states = [simulation.state for simulation in simulations]
 

@@ -1,4 +1,4 @@
-"""What the tests share: the program that the package must agree with."""
+"""Shared fixtures: the program with which the package must agree."""
 
 import json
 import os
@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(autouse=True)
 def interruptible():
-    """Ctrl-C raises KeyboardInterrupt, as in a terminal: a process that a script starts in the background ignores it."""
+    """Ctrl-C raises KeyboardInterrupt, as in a terminal; a background process of a script would ignore it."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -21,7 +21,7 @@ def interruptible():
 
 @pytest.fixture(scope="session")
 def program():
-    """Calls the program, which `./test` has built, and returns what it prints."""
+    """Calls the program that `./test` has built, and returns its output."""
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     path = Path(os.environ.get("JOINTPLAY", target / "debug" / "jointplay"))
 

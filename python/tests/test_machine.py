@@ -1,4 +1,4 @@
-"""Machines built in code: the same as their scene files."""
+"""Machines built in code equal their scene files."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ import jointplay as jp
 
 
 def chain(links, clearance):
-    """Links of 100 mm that hang from each other by balls with clearance, m."""
+    """A hanging chain of 100 mm links joined by balls with clearance, m."""
     bodies = [{"name": f"L{i}", "mass": 0.1, "inertia": [1e-5, 1e-4, 1e-4]} for i in range(links)]
     joints = [
         {"name": f"L{i}", "kind": "free", "child": f"L{i}", "start": {"position": np.array([0, 0, -0.05 - 0.1 * i])}}
@@ -33,7 +33,7 @@ def test_a_machine_in_code_is_its_scene_file():
     assert "[[body]]" in scene.toml and 'mass = "0.1 kg"' in scene.toml
     run = scene.run("30 ms", channels=["*.normal"], warn=False)
     assert run.hash == jp.Scene.from_toml(scene.toml).run("30 ms", warn=False).hash
-    # It falls through its play, and hangs.
+    # The chain falls through its play, then hangs.
     assert run["S0.normal"][0] == 0.0 and run["S0.normal"].max() > 3 * 0.1 * 9.81
 
 
@@ -92,7 +92,7 @@ def test_a_number_of_a_joint_has_the_unit_of_its_coordinate():
 
 
 @pytest.mark.parametrize(
-    "change, said",
+    "change, message",
     [
         ({"body": [{"name": "L0", "mass": object()}]}, r"body\[0\].mass: expected a number"),
         ({"body": [{"name": "L0", "mass": float("nan")}]}, r"body\[0\].mass: expected a finite number"),
@@ -102,6 +102,6 @@ def test_a_number_of_a_joint_has_the_unit_of_its_coordinate():
         ({"motor": [{"name": "m", "joint": "nowhere", "stiffness": 5.0}]}, r"motor\[0\].stiffness: the unit depends"),
     ],
 )
-def test_what_is_wrong_is_named(change, said):
-    with pytest.raises(jp.JointplayError, match=said):
+def test_errors_name_their_cause(change, message):
+    with pytest.raises(jp.JointplayError, match=message):
         jp.Scene.from_dict(chain(1, 1e-4) | change)

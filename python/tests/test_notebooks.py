@@ -1,4 +1,4 @@
-"""The gallery: every notebook runs from the top, and what it claims about its results holds."""
+"""Every notebook runs from top to bottom, and its assertions hold."""
 
 import ast
 import json
@@ -28,14 +28,14 @@ def test_a_notebook_runs(notebook, tmp_path, monkeypatch):
         if shown is not None:
             value = eval(compile(ast.Expression(shown.value), place, "eval"), names)
             assert value is None or (value._repr_html_() if hasattr(value, "_repr_html_") else repr(value))
-    # Each compares its results with what it says about them, and draws them.
+    # Each notebook asserts its statements about the results, and plots them.
     assert any("assert " in source for source in cells)
     assert pyplot.get_fignums()
     pyplot.close("all")
 
 
-def test_there_are_notebooks():
+def test_notebooks_are_stored_without_outputs():
     assert len(list(FOLDER.glob("*.ipynb"))) >= 5
-    # Results would be those of another version.
+    # Stored outputs could be those of another version.
     for notebook in FOLDER.glob("*.ipynb"):
         assert all(not cell.get("outputs") for cell in json.loads(notebook.read_text())["cells"]), notebook.name

@@ -1,4 +1,4 @@
-"""The package as it is installed: typed, documented, and as its documents say."""
+"""The installed package: typed, documented, and consistent with its documents."""
 
 import ast
 import inspect
@@ -31,28 +31,28 @@ def test_no_graphics_library_is_in_the_wheel():
         assert name not in library, name
 
 
-def test_stubs_name_what_there_is():
+def test_stubs_match_the_library():
     tree = ast.parse((FOLDER / "_native.pyi").read_text())
 
     def public(names):
         return {name for name in names if not name.startswith("_")}
 
-    named = [node for node in tree.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))]
-    assert public(node.name for node in named) == public(vars(_native))
-    for node in named:
+    stubs = [node for node in tree.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))]
+    assert public(node.name for node in stubs) == public(vars(_native))
+    for node in stubs:
         if isinstance(node, ast.ClassDef):
-            methods = {own.name for own in node.body if isinstance(own, ast.FunctionDef)}
+            methods = {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
             assert public(methods) == public(vars(getattr(_native, node.name))), node.name
 
 
-def test_everything_public_says_what_it_is():
+def test_everything_public_is_documented():
     for name in jp.__all__:
         thing = getattr(jp, name)
         assert inspect.getdoc(thing), name
         if not inspect.isclass(thing):
             continue
-        for member, own in vars(thing).items():
-            if not member.startswith("_") and (callable(own) or isinstance(own, (property, staticmethod, classmethod))):
+        for member, value in vars(thing).items():
+            if not member.startswith("_") and (callable(value) or isinstance(value, (property, staticmethod, classmethod))):
                 assert inspect.getdoc(getattr(thing, member)), f"{name}.{member}"
 
 
@@ -62,10 +62,10 @@ def blocks(document):
 
 def test_the_examples_of_the_document_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    own = blocks("python.md")
-    assert len(own) >= 5
+    examples = blocks("python.md")
+    assert len(examples) >= 5
     names = {}
-    for block in own:
+    for block in examples:
         exec(compile(block, "docs/python.md", "exec"), names)
     assert "contact.clearance -3 mm allowed 0 mm" in capsys.readouterr().out
     assert os.listdir(tmp_path) == []
@@ -73,7 +73,7 @@ def test_the_examples_of_the_document_run(tmp_path, monkeypatch, capsys):
 
 def test_the_example_for_clusters_runs(monkeypatch, tmp_path):
     block = blocks("cluster.md")[0]
-    # As it is written, but on this machine and smaller.
+    # Smaller, and on a local cluster.
     smaller = block.replace('"0.01mm..1mm:200"', '"0.01mm..1mm:3"').replace("periods=100, discard=40", "periods=3, discard=1")
     assert smaller.count(':3"') == 1 and "periods=3" in smaller
     with distributed.LocalCluster(

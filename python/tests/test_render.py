@@ -1,4 +1,4 @@
-"""Pictures: those of the program, where the package has graphics; else it says how to get them."""
+"""Pictures equal those of the program if the package has graphics; otherwise the error explains how to get them."""
 
 import struct
 import zlib
@@ -42,12 +42,12 @@ def test_a_picture_is_that_of_the_program(program, tmp_path):
     options = ["--at", "20ms", "--size", "160x90", "--hide", "trail,peaks", "--quiet"]
     program("render", "pendulum", *options, "--out", tmp_path / "frames")
     (path,) = (tmp_path / "frames").glob("*.png")
-    told = pixels(path)
+    expected = pixels(path)
     simulation = jp.Simulation(jp.Scene.load("pendulum"))
     simulation.run_until("20 ms")
     picture = jp.render(simulation, (160, 90))
     assert picture.shape == (90, 160, 4) and picture.dtype == np.uint8 and (picture[..., 3] == 255).all()
-    assert np.abs(picture[..., :3].astype(int) - told[..., :3].astype(int)).max() <= 2
+    assert np.abs(picture[..., :3].astype(int) - expected[..., :3].astype(int)).max() <= 2
     assert len(np.unique(picture.reshape(-1, 4), axis=0)) > 100
     with pytest.raises(jp.OptionError, match="width = 0"):
         jp.render(simulation, (0, 90))

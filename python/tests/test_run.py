@@ -1,4 +1,4 @@
-"""Runs: the same bits as the program's, arrays without copies, doubts, errors, interruption."""
+"""Runs: the same bits as those of the program, arrays without copies, doubts, errors, interruption."""
 
 import _thread
 import gc
@@ -19,9 +19,9 @@ SCENES = [("four-bar", {}), ("spcmm", {"contact.clearance": "0.5 mm"}), ("slider
 def test_bits_are_those_of_the_program(name, changes, summary, tmp_path):
     files = [tmp_path / "rows.npz", tmp_path / "impacts.npz"]
     options = [f"--set={key}={value}" for key, value in changes.items()]
-    told = summary("run", name, *options, "--duration", "20ms", "--every", "0.1ms", "--out", files[0], "--impacts", files[1])
+    expected = summary("run", name, *options, "--duration", "20ms", "--every", "0.1ms", "--out", files[0], "--impacts", files[1])
     run = jp.Scene.load(name).set(changes).run("20 ms", every="0.1 ms", warn=False)
-    assert run.hash == told["state_hash"]
+    assert run.hash == expected["state_hash"]
     rows = np.load(files[0])
     columns = [column for _, column, _, _ in run._channels]
     assert [column for column in rows.files if column != "meta"] == columns
@@ -31,9 +31,9 @@ def test_bits_are_those_of_the_program(name, changes, summary, tmp_path):
     assert len(run.impacts) == len(impacts["start_s"]) > 0
     for column in ["start_s", "end_s", "peak_N", "steps"]:
         assert np.array_equal(impacts[column], run.impacts[column]), column
-    assert run.ledger == told["energy_J"] and run.doubts == told["doubts"]
-    assert run.statistics["steps"] == told["steps"]
-    assert {name: own["peak_normal"] for name, own in run.statistics["joints"].items()} == told["peak_normal_N"]
+    assert run.ledger == expected["energy_J"] and run.doubts == expected["doubts"]
+    assert run.statistics["steps"] == expected["steps"]
+    assert {name: joint["peak_normal"] for name, joint in run.statistics["joints"].items()} == expected["peak_normal_N"]
 
 
 def test_arrays_share_the_memory_of_the_run_and_outlive_it():
@@ -61,7 +61,7 @@ def test_a_run_survives_pickling():
     assert again["A.force"].tobytes() == run["A.force"].tobytes() and not again["A.force"].flags.writeable
 
 
-def test_rows_lie_where_they_were_asked_for():
+def test_rows_are_at_the_requested_times():
     scene = jp.Scene.load("pendulum")
     assert np.allclose(scene.run("10 ms", every="3 ms").time, [0.0, 0.003, 0.006, 0.009], rtol=1e-15)
     assert len(scene.run(0.02)) == 1001 and len(scene.run(0)) == 1
@@ -74,14 +74,14 @@ def test_channels_are_chosen_by_name_and_pattern():
     names = ["time", "A.normal", "B.normal", "crank.reaction.x", "crank.reaction.y", "crank.reaction.z"]
     assert run.channels == names and list(run) == names and run.units["A.normal"] == "N"
     assert np.all(np.isfinite(run["crank.reaction"]))
-    for wrong, said in [
+    for wrong, message in [
         ("A.nromal", "did you mean `A.normal`?"),
         ("A.penetration", "was not recorded"),
         ("crank", "several channels"),
     ]:
         with pytest.raises(jp.ChannelError) as caught:
             run[wrong]
-        assert said in str(caught.value) and isinstance(caught.value, KeyError)
+        assert message in str(caught.value) and isinstance(caught.value, KeyError)
     with pytest.raises(jp.OptionError, match="A.froce"):
         jp.Scene.load("four-bar").run("2 ms", channels=["A.froce"])
 
@@ -119,7 +119,7 @@ def test_a_stopped_run_has_its_rows():
 
 
 @pytest.mark.parametrize(
-    "arguments, said",
+    "arguments, message",
     [
         (("20",), "duration"),
         (("20 mm",), "duration"),
@@ -131,8 +131,8 @@ def test_a_stopped_run_has_its_rows():
         (("1 ms", 0.0), "every = 0"),
     ],
 )
-def test_times_are_checked(arguments, said):
-    with pytest.raises(jp.OptionError, match=said):
+def test_times_are_checked(arguments, message):
+    with pytest.raises(jp.OptionError, match=message):
         jp.Scene.load("pendulum").run(*arguments)
 
 

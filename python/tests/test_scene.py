@@ -1,4 +1,4 @@
-"""Scenes: loaded, changed, checked, and refused with their reasons."""
+"""Scenes: loading, changes, checks, and errors."""
 
 import pickle
 import random
@@ -47,7 +47,7 @@ def test_values_that_fit_only_together_are_set_together():
     assert scene.set(changes)["contact.clearance"] == 2 * radius
 
 
-def test_parameters_say_what_they_are():
+def test_parameters_are_described():
     parameters = jp.Scene.load("four-bar").parameters
     clearance = parameters["contact.clearance"]
     assert clearance.label == "Clearance" and clearance.text == "0.1 mm" and clearance.value == 1e-4
@@ -63,7 +63,7 @@ def test_a_scene_survives_pickling(falling):
         assert again == scene and again.changes == scene.changes
 
 
-def test_the_check_counts_what_there_is():
+def test_the_check_counts_bodies_joints_and_degrees_of_freedom():
     check = jp.Scene.load("four-bar").check()
     assert (check.bodies, check.degrees_of_freedom, check.contacts, check.ideal_joints) == (3, 7, 2, 0)
     assert check.warnings == [] and check.doubts == []
@@ -71,14 +71,15 @@ def test_the_check_counts_what_there_is():
     assert warned.warnings
 
 
-def test_the_check_warns_of_what_the_program_warns_of(program, tmp_path):
+def test_the_check_has_the_warnings_of_the_program(program, tmp_path):
     text = jp.Scene.load("slider-crank").toml
     moved = 'start = "ideal"\n' + text.replace('position = "200 mm"', 'position = "230 mm"')
     file = tmp_path / "moved.toml"
     file.write_text(moved)
-    told = [line.removeprefix("Warning").strip() for line in program("check", file).splitlines() if line.startswith("Warning")]
+    lines = program("check", file).splitlines()
+    expected = [line.removeprefix("Warning").strip() for line in lines if line.startswith("Warning")]
     check = jp.Scene.load(file).check()
-    assert sorted(check.warnings) == sorted(told) and any("moved bodies far" in warning for warning in told)
+    assert sorted(check.warnings) == sorted(expected) and any("moved bodies far" in warning for warning in expected)
     assert check.not_unique is None
 
 
@@ -97,7 +98,7 @@ def test_an_error_in_a_file_names_line_key_and_range(falling):
 
 
 @pytest.mark.parametrize(
-    "change, key, said",
+    "change, key, message",
     [
         ({"contact.clearence": 1e-4}, "contact.clearence", "did you mean `contact.clearance`?"),
         ({"contact.clearance": "5 kg"}, "contact.clearance", "mm"),
@@ -105,18 +106,18 @@ def test_an_error_in_a_file_names_line_key_and_range(falling):
         ({"joint.A.friction": 99.0}, "joint.A.friction", "allowed"),
     ],
 )
-def test_a_refused_change_names_key_and_range(change, key, said):
+def test_a_refused_change_names_key_and_range(change, key, message):
     scene = jp.Scene.load("four-bar")
     with pytest.raises(jp.SceneError) as caught:
         scene.set(change)
-    assert caught.value.key == key and said in str(caught.value) and caught.value.line is None
+    assert caught.value.key == key and message in str(caught.value) and caught.value.line is None
     if "clearence" not in key:
         assert caught.value.allowed.startswith("allowed ")
     assert scene.changes == {}
 
 
 @pytest.mark.parametrize("value", [True, [1], {}, float("nan"), float("inf"), b"1", object()])
-def test_what_is_no_number_is_refused(value):
+def test_a_value_that_is_no_number_is_refused(value):
     with pytest.raises(jp.OptionError, match="contact.friction"):
         jp.Scene.load("four-bar").set(friction=value)
 
@@ -153,10 +154,10 @@ def test_a_scene_shows_its_parameters_or_the_page(monkeypatch):
 
 def test_a_link_opens_the_same_scene_in_the_program(falling, summary):
     for scene in [jp.Scene.load("four-bar").set(clearance="0.5 mm"), jp.Scene.from_toml(falling).set(friction=0.3)]:
-        told = summary("run", "--link", f"?{link_of(scene)}", "--duration", "5ms")
-        assert told["state_hash"] == scene.run("5 ms").hash
-        told = summary("run", "--link", f"?{link_of(scene, 0.005)}")
-        assert told["time_s"] >= 0.005
+        expected = summary("run", "--link", f"?{link_of(scene)}", "--duration", "5ms")
+        assert expected["state_hash"] == scene.run("5 ms").hash
+        expected = summary("run", "--link", f"?{link_of(scene, 0.005)}")
+        assert expected["time_s"] >= 0.005
 
 
 def test_runs_and_simulations_show_the_page_at_their_end(monkeypatch):
@@ -172,7 +173,7 @@ def test_runs_and_simulations_show_the_page_at_their_end(monkeypatch):
     assert "iframe" not in simulation._repr_html_()
 
 
-def test_whatever_the_text_the_errors_are_those_of_the_package(falling):
+def test_any_malformed_text_raises_only_errors_of_the_package(falling):
     chance = random.Random(3)
     refused = 0
     for _ in range(400):

@@ -1,4 +1,4 @@
-"""Simulations: stepped, changed, restored, in threads."""
+"""Simulations: steps, changes, states, threads."""
 
 import _thread
 import copy
@@ -15,14 +15,14 @@ from jointplay import _native
 
 
 def test_the_end_of_a_run_is_that_of_the_program(summary):
-    told = summary("run", "four-bar", "--duration", "20ms")
+    expected = summary("run", "four-bar", "--duration", "20ms")
     simulation = jp.Simulation(jp.Scene.load("four-bar"))
     simulation.run_until("20 ms")
-    assert (simulation.hash, simulation.time) == (told["state_hash"], 0.02)
-    assert simulation.statistics["steps"] == told["steps"] and simulation.ledger == told["energy_J"]
+    assert (simulation.hash, simulation.time) == (expected["state_hash"], 0.02)
+    assert simulation.statistics["steps"] == expected["steps"] and simulation.ledger == expected["energy_J"]
 
 
-def test_steps_by_one_and_by_many_are_the_same():
+def test_single_steps_equal_steps_in_one_call():
     scene = jp.Scene.load("four-bar")
     one, many = jp.Simulation(scene), jp.Simulation(scene)
     for _ in range(300):
@@ -32,7 +32,7 @@ def test_steps_by_one_and_by_many_are_the_same():
     assert one.statistics["steps"] == 300
 
 
-def test_a_state_is_returned_to_with_the_same_bits():
+def test_a_restored_state_continues_with_the_same_bits():
     simulation = jp.Simulation(jp.Scene.load("four-bar"))
     simulation.run_until("5 ms")
     state = simulation.state
@@ -67,7 +67,7 @@ def test_a_pickled_or_copied_state_continues_with_the_same_bits(name, falling):
         other.restore(one)
         other.step(500)
         stepped = (other.hash, other.ledger, other.statistics, other.take_impacts().tolist())
-        # Without play: the change that waited.
+        # The reset applies the pending change.
         other.reset()
         other.run_until("5 ms")
         ends.append((stepped, other.hash))
@@ -102,26 +102,26 @@ def test_a_pickle_has_the_text_of_a_state_file(summary, tmp_path):
     file = tmp_path / "state"
     file.write_text(text)
     simulation.run_until("20 ms")
-    told = summary("run", "four-bar", "--duration", "20ms", "--from-state", file)
-    assert told["state_hash"] == simulation.hash
+    expected = summary("run", "four-bar", "--duration", "20ms", "--from-state", file)
+    assert expected["state_hash"] == simulation.hash
     summary("run", "four-bar", "--duration", "5ms", "--save-state", tmp_path / "own")
     other = jp.Simulation(jp.Scene.load("four-bar"))
     other.restore(_native.State((tmp_path / "own").read_text(), changes))
     other.run_until("20 ms")
     assert other.hash == summary("run", "four-bar", "--duration", "20ms")["state_hash"]
-    for damaged, said in [
+    for damaged, message in [
         (text.replace('"time_s":0.005', '"time_s":0.006'), "state: damaged: the checksum"),
         (text.replace('"version":"', '"version":"9'), "state: written by version 9"),
         (text[:-2], "state: not a state that `run --save-state` wrote, or a damaged one"),
         ("{}", "state: not a state"),
     ]:
-        with pytest.raises(jp.OptionError, match=said):
+        with pytest.raises(jp.OptionError, match=message):
             _native.State(damaged, changes)
     with pytest.raises(jp.OptionError, match="do not describe a state of this scene"):
         _native.State(text, [[], [], [("contact.friction", "0.3")]])
 
 
-def test_a_reset_may_change_what_there_is():
+def test_a_reset_may_change_the_number_of_bodies():
     simulation = jp.Simulation(jp.Scene.load("chain").set({"chain.links": 2}))
     simulation.step(100)
     before, channels = simulation.state, simulation.channels
@@ -154,7 +154,7 @@ def test_a_live_change_takes_effect_now_or_at_the_reset():
         simulation.set("contact.friction", None)
 
 
-def test_a_frame_has_what_a_run_records():
+def test_a_frame_has_the_values_of_a_run():
     scene = jp.Scene.load("four-bar")
     simulation = jp.Simulation(scene)
     simulation.run_until("10 ms")
@@ -178,13 +178,13 @@ def test_a_frame_has_what_a_run_records():
 
 def test_impacts_are_taken_once():
     simulation = jp.Simulation(jp.Scene.load("four-bar"))
-    found = []
+    taken = []
     for _ in range(100):
         simulation.step(20)
-        found.extend(simulation.take_impacts().tolist())
+        taken.extend(simulation.take_impacts().tolist())
     end = simulation.time
-    own = [tuple(row) for row in jp.Scene.load("four-bar").run(end).impacts.tolist()]
-    assert found[: len(own) - 1] == own[: len(own) - 1] and len(found) > 3
+    of_run = [tuple(row) for row in jp.Scene.load("four-bar").run(end).impacts.tolist()]
+    assert taken[: len(of_run) - 1] == of_run[: len(of_run) - 1] and len(taken) > 3
     assert len(simulation.take_impacts()) == 0
 
 
@@ -198,12 +198,12 @@ def test_a_stopped_simulation_keeps_its_last_good_state():
 
 def test_threads_give_the_same_bits_as_one():
     scenes = [jp.Scene.load("four-bar"), jp.Scene.load("spcmm")]
-    alone = [scene.run("30 ms", warn=False).hash for scene in scenes]
+    expected = [scene.run("30 ms", warn=False).hash for scene in scenes]
     simulations = [jp.Simulation(scene) for scene in scenes]
     threads = [threading.Thread(target=simulation.run_until, args=(0.03,)) for simulation in simulations]
     [thread.start() for thread in threads]
     [thread.join() for thread in threads]
-    assert [simulation.hash for simulation in simulations] == alone
+    assert [simulation.hash for simulation in simulations] == expected
 
 
 def test_stepping_lets_other_threads_run():
@@ -213,7 +213,7 @@ def test_stepping_lets_other_threads_run():
     turns = 0
     while thread.is_alive():
         turns += 1
-    # With the interpreter's lock held, this thread would get no turn before the end.
+    # If the step held the interpreter's lock, this loop would not run before its end.
     assert turns > 100
     thread.join()
 
@@ -230,7 +230,7 @@ def test_a_simulation_in_use_is_refused_to_another_thread():
     simulation.step()
 
 
-def test_ctrl_c_ends_steps_and_the_simulation_goes_on():
+def test_ctrl_c_ends_steps_and_the_simulation_continues():
     simulation = jp.Simulation(jp.Scene.load("four-bar"))
     threading.Timer(0.2, _thread.interrupt_main).start()
     with pytest.raises(KeyboardInterrupt):
@@ -251,11 +251,11 @@ def test_a_million_steps_leak_nothing():
         return psutil.Process().memory_info().rss
 
     first = work(10_000)
-    # A leak of one object a step would be 16 MB or more.
+    # A leak of one object per step would be 16 MB or more.
     assert work(1_000_000) - first < 4 << 20
 
 
-def test_a_simulation_is_given_back():
+def test_a_simulation_is_freed():
     scene = jp.Scene.load("four-bar")
 
     def work(count):

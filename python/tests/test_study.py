@@ -9,73 +9,75 @@ import pytest
 import jointplay as jp
 
 OVER = {"joint.*.clearance": "0.05mm..0.2mm", "contact.friction": "normal(0.15, 0.02, 0.05..0.25)"}
-ASKED = [f"--over={pattern}={text}" for pattern, text in OVER.items()]
+OVER_OPTIONS = [f"--over={pattern}={text}" for pattern, text in OVER.items()]
 
 
-def same(estimate, told):
-    # JSON has no infinity: an interval without an end has null there.
-    return [value if np.isfinite(value) else None for value in estimate] == [told[name] for name in ("value", "low", "high")]
+def is_same(estimate, expected):
+    # JSON has no infinity: an infinite end of an interval is null.
+    return [value if np.isfinite(value) else None for value in estimate] == [expected[name] for name in ("value", "low", "high")]
 
 
 def test_indices_are_those_of_the_program(program, tmp_path):
     options = ["--duration", "20ms", "--from", "2ms", "--rows", "16", "--seed", "5", "--summary", "json", "--quiet"]
     outputs = ["tip-error", "A.normal:max", "impacts"]
-    told = json.loads(
-        program("sensitivity", "four-bar", *ASKED, "--output", ",".join(outputs), *options, "--out", tmp_path / "found")
+    expected = json.loads(
+        program("sensitivity", "four-bar", *OVER_OPTIONS, "--output", ",".join(outputs), *options, "--out", tmp_path / "results")
     )
-    found = jp.sensitivity(
+    result = jp.sensitivity(
         jp.Scene.load("four-bar"), OVER, outputs, rows=16, seed=5, duration="20 ms", start_after="2 ms", threads=2
     )
-    assert list(found.inputs) == ["joint.A.clearance", "joint.B.clearance", "contact.friction"]
-    assert list(found.indices) == outputs and found.values.shape == (16 * 5, 3) and found.results.shape == (80, 3)
-    for own in told["outputs"]:
-        indices = found.indices[own["name"]]
-        for parameter in own["parameters"]:
-            assert same(indices.first[parameter["key"]], parameter["first_order"]), parameter
-            assert same(indices.total[parameter["key"]], parameter["total"]), parameter
-    table = found.to_pandas()
+    assert list(result.inputs) == ["joint.A.clearance", "joint.B.clearance", "contact.friction"]
+    assert list(result.indices) == outputs and result.values.shape == (16 * 5, 3) and result.results.shape == (80, 3)
+    for output in expected["outputs"]:
+        indices = result.indices[output["name"]]
+        for parameter in output["parameters"]:
+            assert is_same(indices.first[parameter["key"]], parameter["first_order"]), parameter
+            assert is_same(indices.total[parameter["key"]], parameter["total"]), parameter
+    table = result.to_pandas()
     assert len(table) == 9 and table["total_high"].ge(table["total_low"]).all()
 
 
 def test_effects_alone_screening_and_target_are_those_of_the_program(program, tmp_path):
     options = ["--duration=5ms", "--rows=8", "--screen=2", "--target=1um", "--seed=3", "--summary=json", "--quiet"]
     outputs = ["tip-error", "peak-force"]
-    told = json.loads(program("sensitivity", "four-bar", *ASKED, "--output", ",".join(outputs), *options, "--out", tmp_path / "found"))
-    found = jp.sensitivity(
+    expected = json.loads(
+        program("sensitivity", "four-bar", *OVER_OPTIONS, "--output", ",".join(outputs), *options, "--out", tmp_path / "results")
+    )
+    result = jp.sensitivity(
         jp.Scene.load("four-bar"), OVER, outputs, rows=8, screen=2, target="1 um", seed=3, duration="5 ms", threads=2
     )
-    for own in told["outputs"]:
-        name = own["name"]
-        assert (found.nominal[name], found.units[name]) == (own["value"], own["unit"])
-        assert found.together[name] == (own["all_low"], own["all_high"])
-        for parameter in own["parameters"]:
+    for output in expected["outputs"]:
+        name = output["name"]
+        assert (result.nominal[name], result.units[name]) == (output["value"], output["unit"])
+        assert result.together[name] == (output["all_low"], output["all_high"])
+        for parameter in output["parameters"]:
             key = parameter["key"]
-            assert found.alone[name][key] == tuple(parameter[end] for end in ("low", "alone_low", "high", "alone_high"))
-            indices = found.indices[name]
-            assert (key in indices.total) == (parameter["total"] is not None) == (key in found.kept)
-    assert found.screening is not None and found.target is not None
-    for effects in told["screening"]:
-        assert found.screening[effects["key"]] == tuple(effects[name] for name in ("mean", "mean_magnitude", "deviation"))
+            assert result.alone[name][key] == tuple(parameter[end] for end in ("low", "alone_low", "high", "alone_high"))
+            indices = result.indices[name]
+            assert (key in indices.total) == (parameter["total"] is not None) == (key in result.kept)
+    assert result.screening is not None and result.target is not None
+    for effects in expected["screening"]:
+        assert result.screening[effects["key"]] == tuple(effects[name] for name in ("mean", "mean_magnitude", "deviation"))
 
-    def changes(told):
-        return told and ({change["key"]: change["value"] for change in told["changes"]}, told["output"])
+    def changes(expected):
+        return expected and ({change["key"]: change["value"] for change in expected["changes"]}, expected["output"])
 
-    target = told["target"]
-    assert found.target.target == target["target"] == 1e-6
-    assert found.target.together == changes(target["together"])
-    assert found.target.single == [
+    target = expected["target"]
+    assert result.target.target == target["target"] == 1e-6
+    assert result.target.together == changes(target["together"])
+    assert result.target.single == [
         ({one["change"]["key"]: one["change"]["value"]}, one["output"]) for one in target["single"]
     ]
-    table = pandas.read_csv(tmp_path / "found" / "sensitivity.csv", keep_default_na=False, na_values="NaN")
-    pandas.testing.assert_frame_equal(found.to_pandas(), table, rtol=1e-11, check_dtype=False)
+    table = pandas.read_csv(tmp_path / "results" / "sensitivity.csv", keep_default_na=False, na_values="NaN")
+    pandas.testing.assert_frame_equal(result.to_pandas(), table, rtol=1e-11, check_dtype=False)
     # Without indices.
     easy = jp.sensitivity(
-        jp.Scene.load("four-bar"), ["joint.*.clearance"], rows=0, target=found.nominal["tip-error"] * 0.99, duration="5 ms"
+        jp.Scene.load("four-bar"), ["joint.*.clearance"], rows=0, target=result.nominal["tip-error"] * 0.99, duration="5 ms"
     )
     assert easy.target is not None and easy.indices == {} and len(easy.values) == 0
     assert easy.target.single or easy.target.together is not None
     assert easy.assumed_ranges == {f"joint.{name}.clearance": (0.5 * 1e-4, 1.5 * 1e-4) for name in "AB"}
-    assert found.assumed_ranges == {}
+    assert result.assumed_ranges == {}
 
 
 def test_the_cheapest_fits_are_those_of_the_program(program, tmp_path):
@@ -87,11 +89,11 @@ def test_the_cheapest_fits_are_those_of_the_program(program, tmp_path):
     (tmp_path / "costs.csv").write_text("\n".join(["parameter,fit,cost", *rows]))
     verdicts = set()
     options = ["--duration=20ms", "--runs=32", "--yield=0.5", "--summary=json", "--quiet", "--force"]
-    # No machine holds the second limit.
+    # No machine meets the second limit.
     for limit in (125.0, 1.0):
-        search = [f"--cost={tmp_path / 'costs.csv'}", f"--limit=peak-force={limit}", "--out", tmp_path / "found"]
-        told = json.loads(program("tolerance", "four-bar", *ASKED, *options, *search))["fits"]
-        found = jp.tolerance(
+        search = [f"--cost={tmp_path / 'costs.csv'}", f"--limit=peak-force={limit}", "--out", tmp_path / "results"]
+        expected = json.loads(program("tolerance", "four-bar", *OVER_OPTIONS, *options, *search))["fits"]
+        result = jp.tolerance(
             jp.Scene.load("four-bar"),
             OVER,
             {"peak-force": limit},
@@ -102,45 +104,48 @@ def test_the_cheapest_fits_are_those_of_the_program(program, tmp_path):
             duration="20 ms",
             threads=2,
         ).fits
-        assert (found.is_proven, found.evaluations) == (told["is_proven"], told["evaluations"])
-        assert found.order_not_checked == told["order_not_checked"] == []
-        if told["best"] is None:
-            assert found.best is None and found.check is None and found.verdict is None
+        assert (result.is_proven, result.evaluations) == (expected["is_proven"], expected["evaluations"])
+        assert result.order_not_checked == expected["order_not_checked"] == []
+        if expected["best"] is None:
+            assert result.best is None and result.check is None and result.verdict is None
             verdicts.add(None)
             continue
-        assert found.best.cost == told["best"]["cost"] and same(found.best.yield_, told["best"]["yield"])
-        assert found.best.fits == {one["key"]: one["fit"] for one in told["best"]["fits"]}
-        assert same(found.check, told["check"]["yield"]) and found.verdict == told["check"]["verdict"]
-        verdicts.add(found.verdict)
+        assert result.best.cost == expected["best"]["cost"] and is_same(result.best.yield_, expected["best"]["yield"])
+        assert result.best.fits == {one["key"]: one["fit"] for one in expected["best"]["fits"]}
+        assert is_same(result.check, expected["check"]["yield"]) and result.verdict == expected["check"]["verdict"]
+        verdicts.add(result.verdict)
     assert len(verdicts) == 2 and None in verdicts
 
 
 def test_yields_are_those_of_the_program(program, tmp_path):
     options = ["--duration", "20ms", "--runs", "40", "--seed", "2", "--sampling", "sobol", "--summary", "json", "--quiet"]
-    told = json.loads(
+    expected = json.loads(
         program(
             "tolerance",
             "four-bar",
-            *ASKED,
+            *OVER_OPTIONS,
             "--limit",
             "tip-error=250um",
             "--limit",
             "peak-force=20N..120N",
             *options,
             "--out",
-            tmp_path / "found",
+            tmp_path / "results",
         )
     )
     limits = {"tip-error": "250 um", "peak-force": (20.0, "120 N")}
-    found = jp.tolerance(jp.Scene.load("four-bar"), OVER, limits, units=40, seed=2, sampling="sobol", duration="20 ms", threads=2)
-    assert same(found.yield_, told["yield"]) and found.accepted.sum() == told["accepted"]
-    for own in told["outputs"]:
-        quality = found.qualities[own["name"]]
-        assert same(quality.yield_, own["yield"]) and quality.mean == own["mean"] and quality.cp == own.get("cp")
-        assert same(quality.percentiles[95], own["percentile_95"]) and same(quality.cpk, own["cpk"])
-    drivers = {driver["key"]: driver for driver in told["reject_drivers"]}
-    assert 0 < told["accepted"] < 40 and list(found.drivers) == ["joint.A.clearance", "joint.B.clearance", "contact.friction"]
-    for key, driver in found.drivers.items():
+    result = jp.tolerance(
+        jp.Scene.load("four-bar"), OVER, limits, units=40, seed=2, sampling="sobol", duration="20 ms", threads=2
+    )
+    assert is_same(result.yield_, expected["yield"]) and result.accepted.sum() == expected["accepted"]
+    for output in expected["outputs"]:
+        quality = result.qualities[output["name"]]
+        assert is_same(quality.yield_, output["yield"]) and quality.mean == output["mean"] and quality.cp == output.get("cp")
+        assert is_same(quality.percentiles[95], output["percentile_95"]) and is_same(quality.cpk, output["cpk"])
+    drivers = {driver["key"]: driver for driver in expected["reject_drivers"]}
+    assert 0 < expected["accepted"] < 40
+    assert list(result.drivers) == ["joint.A.clearance", "joint.B.clearance", "contact.friction"]
+    for key, driver in result.drivers.items():
         assert (driver.mean_shift, driver.distance, driver.p_value) == tuple(
             drivers[key][name] for name in ("mean_shift", "distance", "p_value")
         )
@@ -169,7 +174,7 @@ def test_a_study_is_a_function_of_its_parameters():
     ],
 )
 def test_a_panic_within_a_study_is_an_internal_error(work, calls):
-    # PyO3 panics in Rust where it calls a function that raises this: at first where a stage begins, then between its runs.
+    # PyO3 panics in Rust when a called function raises this: at the beginning of a stage, or between its runs.
     panic = next(kind for kind in BaseException.__subclasses__() if kind.__name__ == "PanicException")
     seen = []
 
@@ -184,7 +189,7 @@ def test_a_panic_within_a_study_is_an_internal_error(work, calls):
 
 
 @pytest.mark.parametrize(
-    "work, said",
+    "work, message",
     [
         (lambda scene: jp.sensitivity(scene, {"contact.clearence": None}), "did you mean"),
         (lambda scene: jp.sensitivity(scene, {"contact.clearance": "normal(1)"}), "contact.clearance"),
@@ -214,6 +219,6 @@ def test_a_panic_within_a_study_is_an_internal_error(work, calls):
         ),
     ],
 )
-def test_bad_studies_are_refused(work, said):
-    with pytest.raises(jp.JointplayError, match=said.replace("*", r"\*")):
+def test_bad_studies_are_refused(work, message):
+    with pytest.raises(jp.JointplayError, match=message.replace("*", r"\*")):
         work(jp.Scene.load("four-bar"))

@@ -1,4 +1,4 @@
-"""Sweeps: the bytes of the program's archive, in this process, in others, and with a worker killed half-way."""
+"""Sweeps: the bytes of the program's archive, in this and other processes, and with a worker killed half-way."""
 
 import _thread
 import os
@@ -43,7 +43,7 @@ def archive(program, tmp_path, name, vary, options):
     return np.load(path)
 
 
-def same(result, written):
+def assert_same(result, written):
     assert list(result) == [name for name in written.files if name not in ("meta", "start")]
     for name, array in result.items():
         assert array.shape == written[name].shape and array.dtype.kind == written[name].dtype.kind, name
@@ -58,8 +58,8 @@ def test_arrays_are_those_of_the_program(name, vary, options, arguments, program
     written = archive(program, tmp_path, name, vary, arguments)
     sweep = jp.Sweep(jp.Scene.load(name), vary, **options)
     for threads in [1, 3]:
-        same(sweep.run(threads), written)
-    same(sweep.assemble(sweep.compute(block) for block in range(sweep.blocks)), written)
+        assert_same(sweep.run(threads), written)
+    assert_same(sweep.assemble(sweep.compute(block) for block in range(sweep.blocks)), written)
 
 
 def test_listed_values_are_numbers_or_texts():
@@ -73,7 +73,7 @@ def test_listed_values_are_numbers_or_texts():
 
 
 @pytest.mark.parametrize(
-    "vary, options, said",
+    "vary, options, message",
     [
         ({"contact.clearance": "0.1mm..0.2mm:3"}, {}, "either periods and discard, or duration"),
         ({"contact.clearance": "0.1mm"}, {"duration": 0.01}, "expected"),
@@ -87,12 +87,12 @@ def test_listed_values_are_numbers_or_texts():
         ({}, {"duration": 0.01}, "at least one"),
     ],
 )
-def test_bad_sweeps_are_refused(vary, options, said):
-    with pytest.raises(jp.JointplayError, match=said):
+def test_bad_sweeps_are_refused(vary, options, message):
+    with pytest.raises(jp.JointplayError, match=message):
         jp.Sweep(jp.Scene.load("pendulum"), vary, **options)
 
 
-def test_blocks_that_are_missing_are_noticed():
+def test_missing_blocks_are_an_error():
     sweep = jp.Sweep(jp.Scene.load("pendulum"), {"contact.clearance": [1e-4, 2e-4]}, duration="1 ms")
     with pytest.raises(jp.OptionError, match="1 given"):
         sweep.assemble([sweep.compute(0)])
@@ -122,7 +122,7 @@ def test_joblib_computes_the_same(program, tmp_path):
     name, vary, options, arguments = CASES[0]
     sweep = jp.Sweep(jp.Scene.load(name), vary, **options)
     blocks = joblib.Parallel(n_jobs=2)(joblib.delayed(sweep.compute)(block) for block in range(sweep.blocks))
-    same(sweep.assemble(blocks), archive(program, tmp_path, name, vary, arguments))
+    assert_same(sweep.assemble(blocks), archive(program, tmp_path, name, vary, arguments))
 
 
 def test_dask_loses_no_point_with_a_worker(program, tmp_path):
@@ -132,17 +132,17 @@ def test_dask_loses_no_point_with_a_worker(program, tmp_path):
     cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path))
     with cluster, distributed.Client(cluster) as client:
         futures = client.map(sweep.compute, range(sweep.blocks), pure=False)
-        # Half-way: a worker with finished blocks and one under way disappears.
+        # Half-way, kills a worker that has finished blocks and is computing one.
         distributed.wait(futures[: sweep.blocks // 3])
         victim = client.run(os.getpid)
         os.kill(next(iter(victim.values())), signal.SIGKILL)
         assert any(not future.done() for future in futures), "the worker was killed too late"
         result = sweep.assemble(client.gather(futures))
-    same(result, archive(program, tmp_path, name, vary, arguments))
+    assert_same(result, archive(program, tmp_path, name, vary, arguments))
 
 
 @pytest.mark.parametrize(
-    "vary, options, said",
+    "vary, options, message",
     [
         ({"contact.clearance": "1mm..0.1mm:3"}, {"periods": 2, "discard": 1}, "^vary: contact.clearance=1mm..0.1mm:3: the range"),
         ({"contact.clearance": []}, {"periods": 2, "discard": 1}, "^vary: contact.clearance: the range is empty"),
@@ -155,7 +155,7 @@ def test_dask_loses_no_point_with_a_worker(program, tmp_path):
         ),
     ],
 )
-def test_errors_name_arguments_and_no_options_of_the_command_line(vary, options, said):
-    with pytest.raises(jp.OptionError, match=said) as caught:
+def test_errors_name_arguments_and_no_options_of_the_command_line(vary, options, message):
+    with pytest.raises(jp.OptionError, match=message) as caught:
         jp.Sweep(jp.Scene.load("spcmm"), vary, **options)
     assert "--" not in str(caught.value)
