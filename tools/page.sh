@@ -7,26 +7,26 @@ page_tool() {
 # Writes the page into folder $1; further arguments go to the tool.
 build_page() {
     say "building the page (the first time takes some minutes)"
-    # Messages name the sources of dependencies; where they lie on this machine is nobody's business and makes the page heavier.
+    # Panic messages name the sources of dependencies; their full paths would be private, and make the page larger.
     local sources=${CARGO_HOME:-$HOME/.cargo}/registry/src
-    # What the optimiser would copy into its callers beyond this makes the page a twentieth heavier and nothing faster; what is
-    # marked #[inline], as all arithmetic is, has a limit of its own.
+    # The default threshold makes the page 5 % larger and no faster. Functions marked #[inline], such as all arithmetic, have a
+    # separate limit.
     compile_page web "--remap-path-prefix=$sources=" -Cllvm-args=-inline-threshold=25
     pack_page web "$@"
 }
 
-# Writes a page that does the same, compiled as the tests are, and heavier, into folder $1.
+# Writes the page into folder $1, compiled with the profile of the tests: built faster, and larger.
 build_quick_page() {
     compile_page dev
     pack_page debug "$1"
 }
 
-# Compiles it with the profile $1; further arguments go to the compiler.
+# Compiles the page's library with the profile $1; further arguments go to the compiler.
 compile_page() {
     prepare_wasm
     local profile=$1
-    # Letters are drawn in vectors of four, which the page would otherwise imitate: slower, and 48 kB more to download. Browsers have
-    # them since 2021, Safari since 2023.
+    # The text rasteriser uses vectors of four. Without SIMD they are emulated, which is slower and adds 48 kB to the download.
+    # Browsers support SIMD since 2021, Safari since 2023.
     local flags=(-Ctarget-feature=+simd128 "${@:2}")
     CARGO_ENCODED_RUSTFLAGS=$(IFS=$'\x1f' && printf '%s' "${flags[*]}") \
         cargo rustc --locked --manifest-path "$root/Cargo.toml" --profile "$profile" --target $wasm_target --lib --crate-type cdylib
@@ -65,7 +65,7 @@ run_web() {
         "" | --port | --host) serve_page "$@" ;;
         --build)
             if (($# != 2)); then
-                say "which folder? ./run web --build dist/"
+                say "name the folder: ./run web --build dist/"
                 exit 2
             fi
             build_page "$2" --compress

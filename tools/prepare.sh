@@ -1,7 +1,7 @@
-# What ./run and ./test need of the machine. Sourced by both, never run by itself.
+# Installs what ./run and ./test need. Sourced by both, never run by itself.
 
-# System packages (Debian, Ubuntu): a linker; a software graphics driver where there is no GPU; what a window opens at run
-# time; the scheduler of the example that spreads a sweep.
+# System packages (Debian, Ubuntu): a linker; a software graphics driver for machines without a GPU; libraries that a window loads at
+# run time; GNU parallel for the example that distributes a sweep.
 packages=(
     gcc libc6-dev
     libvulkan1 mesa-vulkan-drivers libegl1
@@ -9,16 +9,16 @@ packages=(
     parallel
 )
 
-# What building with sound needs besides, which a machine can be without.
+# Further packages for sound, which is optional.
 sound_packages=(libasound2-dev pkg-config)
-# What cargo is told where they are there.
+# Arguments for cargo if they are installed.
 sound=()
 
 say() {
     printf '== %s\n' "$*" >&2
 }
 
-# Installs those of the given packages that are missing where that needs no password; else prints the command and goes on.
+# Installs the missing ones of the given packages if that needs no password; otherwise prints the command and continues.
 prepare_packages() {
     command -v dpkg-query > /dev/null && command -v apt-get > /dev/null || return 0
     local missing=() package
@@ -30,27 +30,27 @@ prepare_packages() {
     local root=()
     if [[ $(id -u) != 0 ]]; then
         if ! command -v sudo > /dev/null || ! sudo -n true 2> /dev/null; then
-            say "missing system packages; if something fails, install them first: sudo ${install[*]}"
+            say "system packages are missing; if something fails, install them first: sudo ${install[*]}"
             return 0
         fi
         root=(sudo -n)
     fi
     say "installing ${missing[*]}"
-    if ! patient_apt "${root[@]}" apt-get update -qq ||
-        ! patient_apt "${root[@]}" env DEBIAN_FRONTEND=noninteractive "${install[@]}"; then
-        say "that did not work; if something fails below, try it by hand: ${install[*]}"
+    if ! apt_with_wait "${root[@]}" apt-get update -qq ||
+        ! apt_with_wait "${root[@]}" env DEBIAN_FRONTEND=noninteractive "${install[@]}"; then
+        say "the installation failed; if something fails below, run it by hand: ${install[*]}"
     fi
 }
 
-# Runs apt-get, and waits while another one holds its locks: apt's own DPkg::Lock::Timeout covers only one of the three.
-patient_apt() {
+# Runs apt-get, and waits while another process holds its locks: apt's own DPkg::Lock::Timeout covers only one of the three.
+apt_with_wait() {
     local errors waited=0
     until errors=$("$@" 2>&1 > /dev/null); do
         if [[ $errors != *"Could not get lock"* && $errors != *"Unable to lock"* ]] || ((waited >= 1800)); then
             printf '%s\n' "$errors" >&2
             return 1
         fi
-        ((waited)) || say "another installation is under way on this machine: waiting for it to end"
+        ((waited)) || say "waiting for another installation on this machine to end"
         sleep 2
         waited=$((waited + 2))
     done
@@ -61,18 +61,18 @@ prepare_rust() {
         PATH=$HOME/.cargo/bin:$PATH
     fi
     if ! command -v cargo > /dev/null; then
-        say "Rust is missing. Install it as https://rustup.rs says, then try again:"
+        say "Rust is missing. Install it as described at https://rustup.rs, then try again:"
         say "    curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh"
         exit 1
     fi
-    # rustup fetches the compiler that rust-toolchain.toml names; without a network the one that is here has to do.
+    # rustup downloads the compiler that rust-toolchain.toml names; without a network the installed one is used.
     if ! (cd "$root" && rustc --version) > /dev/null 2>&1 && rustc +stable --version > /dev/null 2>&1; then
         export RUSTUP_TOOLCHAIN=stable
-        say "the compiler that rust-toolchain.toml names is not to be had; going on with $(rustc --version)"
+        say "the compiler that rust-toolchain.toml names is not available; continuing with $(rustc --version)"
     fi
 }
 
-# The software driver complains on every start without one.
+# Sets XDG_RUNTIME_DIR: without it the software graphics driver prints a warning at every start.
 prepare_environment() {
     if [[ -z ${XDG_RUNTIME_DIR:-} ]]; then
         XDG_RUNTIME_DIR=${TMPDIR:-/tmp}/jointplay-runtime-$(id -u)
@@ -81,8 +81,8 @@ prepare_environment() {
     fi
 }
 
-# What the tests of the page need: Node with the packages of web/package-lock.json, and Chromium; given `firefox`, that too, with a
-# screen and what it decodes films with. `lacking` then says in a sentence what could not be had; it is empty if all is there.
+# Installs what the tests of the page need: Node with the packages of web/package-lock.json, and Chromium; with the argument
+# `firefox` also Firefox, a virtual screen and a film decoder. Sets `lacking` to a sentence about what is missing, or to nothing.
 prepare_browser() {
     local needed=() with_firefox=${1:-}
     lacking=
@@ -100,9 +100,9 @@ prepare_browser() {
     elif ! find_chromium; then
         lacking="the tests of the page need Chromium: install it, or name it: CHROMIUM=/path/to/chromium"
     elif [[ -n $with_firefox ]] && ! find_firefox; then
-        lacking="the tests in Firefox need it: install it, or name it: FIREFOX=/path/to/firefox"
+        lacking="the tests in Firefox need Firefox: install it, or name it: FIREFOX=/path/to/firefox"
     elif ! cmp -s "$root/web/package-lock.json" "$root/web/node_modules/.from"; then
-        say "installing what the tests of the page use"
+        say "installing the packages of the page's tests"
         if npm ci --silent --no-audit --no-fund --prefix "$root/web"; then
             cp "$root/web/package-lock.json" "$root/web/node_modules/.from"
         else
@@ -111,7 +111,7 @@ prepare_browser() {
     fi
 }
 
-# Name the browsers, unless the caller did.
+# Find the browsers, unless the caller has named them.
 find_chromium() {
     export CHROMIUM=${CHROMIUM:-$(command -v chromium || command -v chromium-browser || command -v google-chrome)}
     [[ -n $CHROMIUM ]]
@@ -123,12 +123,12 @@ find_firefox() {
 
 prepare_sound() {
     case $(uname) in
-        # Sound needs nothing there.
+        # No packages are needed there.
         Darwin | MINGW* | MSYS* | CYGWIN*) ;;
         *)
             prepare_packages "${sound_packages[@]}"
             if ! pkg-config --exists alsa 2> /dev/null; then
-                say "building without sound: ${sound_packages[*]} are not there"
+                say "building without sound: ${sound_packages[*]} are not installed"
                 return
             fi
             ;;

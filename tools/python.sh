@@ -1,29 +1,29 @@
-# The package for Python. Sourced by ./test, never run by itself.
+# Builds and tests the package for Python. Sourced by ./test, never run by itself.
 
-# Environment in which the package is built and tested, with what python/requirements.txt names.
+# Environment in which the package is built and tested, with the packages of python/requirements.txt.
 python_env=target/python
 
-# Prints a sentence and fails if there is no Python that can make environments.
+# Prepares that environment. Fails if there is no Python that can create one.
 prepare_python() {
     python3 -c 'import ensurepip, venv' 2> /dev/null || prepare_packages python3 python3-venv
     cmp -s python/requirements.txt "$python_env/.from" && return
-    say "installing what the tests of the package for Python use"
+    say "installing the packages of the Python tests"
     python3 -m venv --clear "$python_env"
     "$python_env/bin/pip" install --quiet --disable-pip-version-check --no-compile --requirement python/requirements.txt
     cp python/requirements.txt "$python_env/.from"
 }
 
-# Builds the wheel, installs it as anyone would, and tests it.
+# Builds the wheel, installs it as a user would, and tests it.
 python_test() {
     local wheels=$python_env/wheels
     rm -rf "$wheels"
     "$python_env/bin/maturin" build --quiet --locked --profile dev --features alike --manifest-path python/Cargo.toml --out "$wheels"
     "$python_env/bin/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall "$wheels"/*.whl
-    # Without the folder of the tests in the path: what is tested is the installed package.
+    # -P: without the current folder in the path, the installed package is tested.
     "$python_env/bin/python" -P -B -m pytest --quiet -p no:cacheprovider python/tests "$@"
 }
 
-# The same with graphics, for the pictures alone. Built beside the examples, whose libraries it shares.
+# Builds the package with graphics and tests its pictures. Built together with the examples, which share its libraries.
 python_pictures_test() {
     local site=$python_env/pictures
     cargo build --quiet --locked --workspace "${sound[@]}" --features jointplay-python/render --lib --examples

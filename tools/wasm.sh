@@ -1,8 +1,8 @@
-# Makes this Rust compile to wasm32-unknown-unknown. Sourced by ./run and ./test, after prepare.sh.
+# Prepares Rust for wasm32-unknown-unknown. Sourced by ./run and ./test, after prepare.sh.
 
 wasm_target=wasm32-unknown-unknown
 
-# Whether this Rust compiles and links a library with the standard library in it.
+# Whether Rust compiles and links a library that uses the standard library.
 wasm_works() {
     local scratch works=1
     scratch=$(mktemp -d)
@@ -12,17 +12,17 @@ wasm_works() {
     return $works
 }
 
-# Fails, with a sentence about why, where that cannot be had.
+# Adds the target if necessary; fails with an explanation if that is not possible.
 prepare_wasm() {
     wasm_works && return
     if ! command -v rustup > /dev/null; then
         say "the page needs Rust's standard library for $wasm_target, and there is no rustup to add it: install Rust from"
-        say "https://rustup.rs, or that library from where this Rust comes from"
+        say "https://rustup.rs, or that library from the source of this Rust"
         return 1
     fi
     say "rustup target add $wasm_target"
     if ! rustup target add $wasm_target || ! wasm_works; then
-        say "this Rust still does not compile for $wasm_target; try by hand: rustup target add $wasm_target"
+        say "Rust still does not compile for $wasm_target; run by hand: rustup target add $wasm_target"
         return 1
     fi
 }
