@@ -82,7 +82,7 @@ prepare_environment() {
 }
 
 # Installs what the tests of the page need: Node with the packages of web/package-lock.json, and Chromium; with the argument
-# `firefox` also Firefox, a virtual screen and a film decoder. Sets `lacking` to a sentence about what is missing, or to nothing.
+# `firefox` also Firefox, a virtual screen and a film decoder. Sets `lacking` to a sentence about what is missing, or clears it.
 prepare_browser() {
     local needed=() with_firefox=${1:-}
     lacking=
