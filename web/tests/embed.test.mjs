@@ -126,39 +126,39 @@ test('the embedding page opens, sets, plays and pauses by messages, and receives
     const lab = await blank({ size: { width: 340, height: 240 }, ownTime: true });
     await embed(lab, '<iframe src="{page}?embed&scene=pendulum&play=0&renderer=webgl" width="320" height="200"></iframe>');
     await lab.page.evaluate(() => {
-        globalThis.heard = [];
-        addEventListener('message', ({ data }) => data.jointplay === 1 && heard.push(data));
+        globalThis.received = [];
+        addEventListener('message', ({ data }) => data.jointplay === 1 && received.push(data));
         globalThis.send = (message) => frames[0].postMessage({ jointplay: 1, ...message }, '*');
     });
     const [frame] = await runningFrames(lab);
-    const heard = (event) => lab.page.evaluate((event) => globalThis.heard.filter((message) => message.event === event), event);
+    const received = (event) => lab.page.evaluate((event) => globalThis.received.filter((message) => message.event === event), event);
     const send = (message) => lab.page.evaluate((message) => globalThis.send(message), message);
     const state = async () => {
-        const before = (await heard('state')).length;
+        const before = (await received('state')).length;
         await send({ do: 'state' });
-        return (await lab.until(async () => (await heard('state'))[before], 'no state')).state;
+        return (await lab.until(async () => (await received('state'))[before], 'no state')).state;
     };
     await send({ do: 'set', key: 'contact.clearance', value: '0.5 mm' });
     await send({ do: 'set', key: 'contact.clearence', value: '0.5 mm' });
-    const [problem] = await lab.until(async () => ((await heard('problem')).length ? heard('problem') : null), 'no problem');
+    const [problem] = await lab.until(async () => ((await received('problem')).length ? received('problem') : null), 'no problem');
     assert.match(problem.text, /contact\.clearance/);
     await send({ do: 'jump' });
     await send({ do: 'open', link: 'scene=pendulun' });
-    await lab.until(async () => (await heard('problem')).length === 3, 'an unknown message or a bad link is accepted');
-    assert.match((await heard('problem'))[1].text, /open, set, play, pause, reset, state/);
-    assert.match((await heard('problem'))[2].text, /did you mean `pendulum`/);
+    await lab.until(async () => (await received('problem')).length === 3, 'an unknown message or a bad link is accepted');
+    assert.match((await received('problem'))[1].text, /open, set, play, pause, reset, state/);
+    assert.match((await received('problem'))[2].text, /did you mean `pendulum`/);
 
     await send({ do: 'open', link: 'scene=spcmm&scale=0.02&play=0' });
     await lab.until(async () => (await state()).scene === 'spcmm', 'the link is not opened');
     await send({ do: 'play' });
-    await lab.until(async () => (await heard('impact')).length > 0, 'no impact');
+    await lab.until(async () => (await received('impact')).length > 0, 'no impact');
     await send({ do: 'pause' });
     await lab.until(async () => !(await state()).playing, 'it does not pause');
     const { shown_s: shown } = await state();
-    await lab.until(async () => (await heard('time')).some(({ time_s: time, playing }) => time === shown && !playing), 'the last instant is not reported');
+    await lab.until(async () => (await received('time')).some(({ time_s: time, playing }) => time === shown && !playing), 'the last instant is not reported');
     const own = await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.impacts(0)));
-    await lab.until(async () => (await heard('impact')).length === own.length, 'other impacts');
-    for (const [at, { joint, end_s: end, peak_N: peak }] of (await heard('impact')).entries()) {
+    await lab.until(async () => (await received('impact')).length === own.length, 'other impacts');
+    for (const [at, { joint, end_s: end, peak_N: peak }] of (await received('impact')).entries()) {
         assert.deepEqual([joint, end, peak], [own[at].joint, own[at].end_s, own[at].peak_N]);
     }
     await send({ do: 'reset' });

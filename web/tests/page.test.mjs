@@ -150,7 +150,7 @@ test('loading shows its progress, and then time follows the clock', async () => 
     await lab.close();
 });
 
-test('a hidden tab stands still, and does not catch up', async () => {
+test('a hidden tab pauses, and does not catch up', async () => {
     const lab = await open('scene=spcmm', { backend: 'webgl' });
     await lab.until(async () => (await lab.state()).time_s > 0, 'time does not pass');
     const hide = (hidden) =>

@@ -257,7 +257,7 @@ test('computations run in workers: they report progress, the page keeps running,
     await lab.until(async () => (await progress())?.value > 0, 'no progress');
     assert.equal(workers(), 1);
     await lab.click('Button', 'Play');
-    await lab.until(async () => (await lab.state()).time_s > 0, 'the page stands still meanwhile');
+    await lab.until(async () => (await lab.state()).time_s > 0, 'the page does not continue during the computation');
     await lab.click('Button', 'Pause');
     await lab.activate('button', 'Cancel');
     await lab.find('Button', 'Measure preset');

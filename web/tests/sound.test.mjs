@@ -9,12 +9,12 @@ after(quit);
 
 /** Records every scheduled click: its lead time, s, duration, s, and largest sample. */
 function recordClicks() {
-    const heard = { clicks: [], contexts: [] };
-    globalThis.heard = heard;
+    const recorded = { clicks: [], contexts: [] };
+    globalThis.recorded = recorded;
     globalThis.AudioContext = class extends AudioContext {
         constructor(...rest) {
             super(...rest);
-            heard.contexts.push(this);
+            recorded.contexts.push(this);
         }
 
         createBufferSource() {
@@ -23,7 +23,7 @@ function recordClicks() {
             source.start = (when) => {
                 const { duration } = source.buffer;
                 const loudest = source.buffer.getChannelData(0).reduce((most, sample) => Math.max(most, Math.abs(sample)), 0);
-                heard.clicks.push({ ahead: when - this.currentTime, duration, loudest });
+                recorded.clicks.push({ ahead: when - this.currentTime, duration, loudest });
                 start(when);
             };
             return source;
@@ -33,7 +33,7 @@ function recordClicks() {
 
 test('with sound on, impacts are clicks of Web Audio; without Web Audio a message says so and the run continues', async () => {
     const lab = await open('scene=pendulum&play=0', { backend: 'webgl', before: recordClicks });
-    const contexts = () => lab.page.evaluate(() => globalThis.heard.contexts.map(({ state }) => state));
+    const contexts = () => lab.page.evaluate(() => globalThis.recorded.contexts.map(({ state }) => state));
     await lab.page.evaluate(() => {
         globalThis.withheld = AudioContext;
         delete globalThis.AudioContext;
@@ -50,7 +50,7 @@ test('with sound on, impacts are clicks of Web Audio; without Web Audio a messag
     await lab.key('Space');
     const { shown_s: shown, playing } = await lab.state();
     assert.equal(playing, false);
-    const clicks = await lab.page.evaluate(() => globalThis.heard.clicks);
+    const clicks = await lab.page.evaluate(() => globalThis.recorded.clicks);
     const impacts = JSON.parse(await lab.page.evaluate(() => globalThis.jointplay.page.impacts(0)));
     assert.ok(impacts.length > 3, `${impacts.length} impacts until ${shown} s`);
     assert.equal(clicks.length, impacts.length);
