@@ -77,7 +77,7 @@ fn rows_of_the_default_scene_have_the_promised_columns_and_times() {
         assert!((time - k as f64 * 1e-4).abs() <= 1e-14, "row {k}: {time}");
     }
 
-    // The columns of one row tell one story.
+    // The columns of a row are consistent.
     for joint in ["S1", "S2", "S3"] {
         let column = |quantity: &str| csv.column(&format!("{joint}_{quantity}"));
         let clearance = 0.3e-3;
@@ -106,14 +106,14 @@ fn sampling_never_changes_the_steps_and_the_same_run_gives_the_same_bits() {
         let line = format!("run spcmm --duration 15ms --every {every} --out {out} --summary json");
         jointplay(folder.path(), &line).expect(0).json()
     };
-    let (fine, coarse, again) = (run("0.1ms", "a.csv"), run("1ms", "b.csv"), run("0.1ms", "c.csv"));
+    let (fine, coarse, repeated) = (run("0.1ms", "a.csv"), run("1ms", "b.csv"), run("0.1ms", "c.csv"));
     for key in ["state_hash", "steps", "evaluations", "rejected", "peak_normal_N"] {
         assert_eq!(fine[key], coarse[key], "{key}");
-        assert_eq!(fine[key], again[key], "{key}");
+        assert_eq!(fine[key], repeated[key], "{key}");
     }
     let bytes = |name: &str| fs::read(folder.path().join(name)).unwrap();
-    assert!(bytes("a.csv") == bytes("c.csv"), "the same run writes the same file");
-    assert!(bytes("a.csv.meta.json") == bytes("c.csv.meta.json"), "and the same account of it");
+    assert!(bytes("a.csv") == bytes("c.csv"), "the same run writes the same bytes");
+    assert!(bytes("a.csv.meta.json") == bytes("c.csv.meta.json"), "and the same metadata");
     // Rows at common times are the same rows.
     let (fine, coarse) = (Csv::read(&folder.path().join("a.csv")), Csv::read(&folder.path().join("b.csv")));
     assert_eq!(coarse.rows.len(), 16);
@@ -175,7 +175,7 @@ fn the_three_formats_hold_the_same_values_and_their_provenance() {
         assert_eq!(meta["changed_parameters"]["contact.friction"], "0.25");
         assert!(meta["method"].is_string());
         assert_eq!(meta["status"], "done");
-        // The same run again, from nothing but this.
+        // The metadata alone reproduces the run.
         let text = meta["scene_text"].as_str().unwrap();
         fs::write(folder.path().join("again.toml"), text).unwrap();
         let changed = meta["changed_parameters"].as_object().unwrap();
@@ -184,14 +184,14 @@ fn the_three_formats_hold_the_same_values_and_their_provenance() {
         let line = format!("run again.toml {} --duration {}s --summary json", changed.join(" "), meta["duration_s"]);
         let again = jointplay(folder.path(), &line).expect(0).json();
         assert_eq!(again["state_hash"], meta["state_hash"]);
-        assert!(again["scene_text"].is_null(), "it stands with rows, not in a summary");
+        assert!(again["scene_text"].is_null(), "it belongs to the rows, not to a summary");
     }
     for (i, name) in csv.header.iter().enumerate() {
         let columns: ndarray::Array1<f64> = npz.by_name(name).unwrap();
         let json = json["columns"][name].as_array().unwrap();
         assert_eq!((columns.len(), json.len()), (31, 31));
         for (k, row) in csv.rows.iter().enumerate() {
-            // The file holds every bit; this reader of it may be one off in the last.
+            // The file holds every bit; this JSON reader may be off by one in the last.
             let json = json[k].as_f64().unwrap();
             assert!((json - columns[k]).abs() <= f64::EPSILON * json.abs(), "{name} row {k}");
             assert!((row[i] - columns[k]).abs() <= 5.1e-12 * columns[k].abs(), "{name} row {k}");
@@ -219,7 +219,7 @@ fn misplaced(folder: &Path) {
 }
 
 #[test]
-fn displacements_by_the_assembly_are_printed_and_warned_of() {
+fn displacements_by_the_assembly_are_printed_with_a_warning() {
     let folder = folder();
     misplaced(folder.path());
     let check = jointplay(folder.path(), "check moved.toml").expect(0).stdout;
@@ -233,7 +233,7 @@ fn displacements_by_the_assembly_are_printed_and_warned_of() {
     assert_eq!(assembly["largest_gap_joint"], "C");
     assert!((assembly["largest_gap_m"].as_f64().unwrap() - 0.03).abs() < 1e-6);
     let moved = |body: &str| assembly["bodies"][body]["moved_m"].as_f64().unwrap();
-    // Slider, rod and crank share the way.
+    // Slider, rod and crank share the displacement.
     assert!(moved("slider") > 5e-3 && moved("slider") < 0.03, "{assembly}");
     for (scene, words) in [
         ("spcmm", "no gap in the drives' closed form"),
@@ -259,7 +259,7 @@ fn a_probe_is_compared_with_the_same_scene_with_every_ball_joint_closed() {
         (summary["state_hash"].clone(), Csv::read(&folder.path().join(out)))
     };
     let (hash, rows) = run("", "1ms", "play.csv");
-    // Whoever looks more often changes nothing.
+    // Denser sampling changes nothing.
     assert_eq!(run("", "0.1ms", "often.csv").0, hash);
     let line = "run pendulum --duration 60ms --summary json";
     assert_eq!(jointplay(folder.path(), line).expect(0).json()["state_hash"], hash);
@@ -294,7 +294,7 @@ fn a_probe_is_compared_with_the_same_scene_with_every_ball_joint_closed() {
 #[test]
 fn existing_files_are_refused_before_the_run_unless_force_is_given() {
     let folder = folder();
-    let long = "run pendulum --duration 1000000s --every 1s";
+    let endless = "run pendulum --duration 1000000s --every 1s";
     fs::write(folder.path().join("mine.csv"), "mine").unwrap();
     // Each of these would run for hours if it started.
     for (out, word) in [
@@ -304,7 +304,7 @@ fn existing_files_are_refused_before_the_run_unless_force_is_given() {
         ("run.txt", ".npz"),
         ("run", ".json"),
     ] {
-        let run = jointplay(folder.path(), &format!("{long} --out {out}"));
+        let run = jointplay(folder.path(), &format!("{endless} --out {out}"));
         assert!(matches!(run.code, Some(1 | 2)), "{out}: {:?}", run.code);
         assert!(run.stderr.contains(word), "{out}: {}", run.stderr);
     }
@@ -365,9 +365,9 @@ fn each_kind_of_failure_has_its_exit_code_and_a_clear_line() {
 }
 
 #[test]
-fn a_stopped_run_keeps_its_rows_and_reports_the_reason() {
+fn a_stopped_run_writes_its_rows_and_reports_the_reason() {
     let folder = folder();
-    // Explicit steps a hundred times longer than an impact cannot hold the contact.
+    // Explicit steps a hundred times longer than an impact cannot resolve the contact.
     let line =
         "run spcmm --set solver.method=rk4 --set solver.step=2ms --duration 10s --every 1ms --out a.csv --summary json";
     let run = jointplay(folder.path(), line).expect(4);
@@ -379,33 +379,33 @@ fn a_stopped_run_keeps_its_rows_and_reports_the_reason() {
     assert_eq!(meta["status"], "diverged");
 }
 
-/// Whether signal `number` is among those that `child` does with as `what` says: `SigCgt` catches, `SigIgn` ignores.
+/// Whether `child` has signal `number` in the mask called `disposition`: `SigCgt` for caught, `SigIgn` for ignored.
 #[cfg(target_os = "linux")]
-fn treats(child: &std::process::Child, what: &str, number: u32) -> bool {
+fn has_signal_in(child: &std::process::Child, disposition: &str, number: u32) -> bool {
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
-    let mask = status.lines().find_map(|line| line.strip_prefix(what)?.strip_prefix(':')).unwrap();
+    let mask = status.lines().find_map(|line| line.strip_prefix(disposition)?.strip_prefix(':')).unwrap();
     u64::from_str_radix(mask.trim(), 16).unwrap() & (1 << (number - 1)) != 0
 }
 
-/// Starts `command` and waits until it has said what it does at Ctrl-C, SIGTERM and SIGHUP.
+/// Starts `command` and waits until it has set its handling of Ctrl-C, SIGTERM and SIGHUP.
 #[cfg(target_os = "linux")]
 pub fn start_and_listen(command: &mut Command) -> std::process::Child {
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let hangs_up = || treats(&child, "SigCgt", 1) || treats(&child, "SigIgn", 1);
-    until(|| treats(&child, "SigCgt", 2) && treats(&child, "SigCgt", 15) && hangs_up());
+    let handles_hangup = || has_signal_in(&child, "SigCgt", 1) || has_signal_in(&child, "SigIgn", 1);
+    until(|| has_signal_in(&child, "SigCgt", 2) && has_signal_in(&child, "SigCgt", 15) && handles_hangup());
     child
 }
 
 #[cfg(target_os = "linux")]
 pub fn signal(child: &std::process::Child, name: &str) {
     let id = child.id().to_string();
-    let told = Command::new("kill").args([name, &id]).status().unwrap();
-    assert!(told.success());
+    let status = Command::new("kill").args([name, &id]).status().unwrap();
+    assert!(status.success());
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn an_interrupted_run_keeps_its_complete_rows() {
+fn an_interrupted_run_writes_its_complete_rows() {
     for name in ["-INT", "-TERM", "-HUP"] {
         interrupted_run("1000000s --every 1s", &|child, _| signal(child, name));
     }
@@ -416,13 +416,13 @@ fn an_interrupted_run_keeps_its_complete_rows() {
 #[test]
 fn a_repeated_signal_while_rows_are_written_changes_nothing() {
     interrupted_run("100s --every 10us", &|child, folder| {
-        // Rows wait in a file without a name.
-        let waiting = || {
+        // Rows are buffered in an unnamed file.
+        let buffered = || {
             let files = fs::read_dir(format!("/proc/{}/fd", child.id())).unwrap();
             let lengths = files.filter_map(|file| Some(fs::metadata(file.ok()?.path()).ok()?.len()));
             lengths.max().unwrap_or(0)
         };
-        until(|| waiting() > 4 << 20);
+        until(|| buffered() > 4 << 20);
         signal(child, "-INT");
         until(|| names(folder).iter().any(|name| name.starts_with(".jointplay-")));
         signal(child, "-INT");
@@ -439,7 +439,7 @@ fn a_run_started_by_nohup_outlives_its_terminal() {
     );
     let mut command = Command::new("sh");
     let mut child = start_and_listen(command.args(["-c", &run]).current_dir(folder.path()));
-    assert!(treats(&child, "SigIgn", 1));
+    assert!(has_signal_in(&child, "SigIgn", 1));
     signal(&child, "-HUP");
     assert!(child.try_wait().unwrap().is_none());
     signal(&child, "-TERM");
@@ -451,7 +451,7 @@ fn a_run_started_by_nohup_outlives_its_terminal() {
 fn interrupted_run(times: &str, interrupt: &dyn Fn(&std::process::Child, &Path)) {
     let folder = folder();
     let line = format!("run pendulum --duration {times} --out a.json --summary json");
-    // Under nohup this program ignores SIGHUP, and what it starts would, too.
+    // If the tests run under nohup they ignore SIGHUP, and the child would inherit that.
     let mut command = Command::new("env");
     command.args(["--default-signal=HUP", env!("CARGO_BIN_EXE_jointplay")]);
     command.args(line.split_whitespace()).current_dir(folder.path());
@@ -488,19 +488,19 @@ fn lessons_are_listed_and_a_file_is_checked() {
 }
 
 #[test]
-fn validation_cases_produce_their_page() {
+fn validation_cases_reproduce_their_page() {
     let folder = folder();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation.md");
-    let kept = fs::read_to_string(path).unwrap();
-    assert!(jointplay(folder.path(), "validate").expect(0).stdout == kept);
+    let stored = fs::read_to_string(path).unwrap();
+    assert!(jointplay(folder.path(), "validate").expect(0).stdout == stored);
     let out = jointplay(folder.path(), "validate --out page.md").expect(0).stdout;
     assert_eq!(out, "");
-    assert!(fs::read_to_string(folder.path().join("page.md")).unwrap() == kept);
+    assert!(fs::read_to_string(folder.path().join("page.md")).unwrap() == stored);
     jointplay(folder.path(), "validate --out page.md").expect(1);
 }
 
 #[test]
-fn scenes_are_listed_and_each_says_what_it_contains() {
+fn scenes_are_listed_and_checked_with_their_contents() {
     let folder = folder();
     let list = jointplay(folder.path(), "scenes").expect(0).stdout;
     for (scene, words) in [
@@ -531,15 +531,15 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
         let line = report.lines().find(|line| line.starts_with(label)).unwrap_or_else(|| panic!("{report}"));
         line[label.len()..].trim().to_owned()
     };
-    // Balls that begin in the middle of their play fall onto their walls: how hard is said before any run.
-    let falls = jointplay(folder.path(), "check suspension").expect(0).stdout;
+    // Balls that start in the middle of their clearance fall onto the wall; `check` predicts the peak forces without a run.
+    let prediction = jointplay(folder.path(), "check suspension").expect(0).stdout;
     let summary = "run suspension --duration 50ms --every 1ms --out fall.csv --summary json";
     let summary = jointplay(folder.path(), summary).expect(0).stdout;
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     for (joint, peak) in summary["peak_normal_N"].as_object().unwrap() {
-        let own = falls.lines().rfind(|line| line.trim_start().starts_with(&format!("{joint} "))).unwrap();
-        let said: f64 = own.split_whitespace().nth(1).unwrap().parse().unwrap();
-        assert!((said / peak.as_f64().unwrap() - 1.0).abs() < 1e-3, "{own}: {peak}");
+        let row = prediction.lines().rfind(|line| line.trim_start().starts_with(&format!("{joint} "))).unwrap();
+        let predicted: f64 = row.split_whitespace().nth(1).unwrap().parse().unwrap();
+        assert!((predicted / peak.as_f64().unwrap() - 1.0).abs() < 1e-3, "{row}: {peak}");
     }
     let free = jointplay(folder.path(), "check spcmm").expect(0).stdout;
     assert_eq!(line_of(&free, "Degrees of freedom"), "9");
@@ -554,7 +554,7 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
     assert!(line_of(&low, "Warning").contains("restitution"), "{low}");
     let singular = jointplay(folder.path(), "check spcmm --set spcmm.slider_plane=170mm").expect(0).stdout;
     assert!(line_of(&singular, "Warning").contains("singular"), "{singular}");
-    // Reactions to a load tell nothing of the pose.
+    // Large reactions to a load do not indicate a singular pose.
     let text = std::fs::read_to_string("assets/scenes/spcmm.toml").unwrap();
     let load = "[[load]]\nname = \"press\"\non = { body = \"platform\" }\nforce = \"0 0 -900 N\"\n";
     std::fs::write(folder.path().join("pressed.toml"), format!("{text}\n{load}")).unwrap();
@@ -566,18 +566,18 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
 }
 
 #[test]
-fn a_scene_whose_sliders_rest_can_be_checked() {
-    // A drive without a period has no period to look through: this once never came back.
-    let here = folder();
+fn a_scene_with_resting_sliders_can_be_checked() {
+    // A drive at rest has no period to scan; this check once never returned.
+    let folder = folder();
     for changes in ["", " --set formulation=lagrange"] {
         let line = format!("check spcmm --set spcmm.frequency=0{changes}");
-        let checked = jointplay(here.path(), &line).expect(0);
+        let checked = jointplay(folder.path(), &line).expect(0);
         assert!(!checked.stdout.contains("singular"), "{}", checked.stdout);
     }
 }
 
 #[test]
-fn a_file_works_wherever_a_name_does() {
+fn a_file_works_wherever_a_built_in_name_does() {
     let folder = folder();
     let source = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/scenes/pendulum.toml");
     fs::copy(source, folder.path().join("mine.toml")).unwrap();
@@ -611,7 +611,7 @@ fn a_file_name_need_not_be_unicode() {
     assert_eq!(missing.status.code(), Some(1), "{missing:?}");
 }
 
-/// The shell has every write beyond a few kilobytes fail, as on a full disk.
+/// The shell's file size limit makes every write beyond a few kilobytes fail, as on a full disk.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_is_reported_in_one_line_and_leaves_no_file() {
@@ -718,7 +718,7 @@ mod frames {
             let mut colours: Vec<&[u8]> = pixels.chunks_exact(4).collect();
             colours.sort_unstable();
             colours.dedup();
-            assert!(colours.len() > 200, "a picture of something, not {} colours", colours.len());
+            assert!(colours.len() > 200, "too few colours for a real picture: {}", colours.len());
         }
         let first = picture(&a.join("frame_00000.png")).2;
         assert!(first != picture(&a.join("frame_00001.png")).2, "an impact is visible");
@@ -737,7 +737,7 @@ mod frames {
     #[test]
     fn a_film_marks_the_impacts_between_its_frames_and_a_single_picture_does_not() {
         let folder = folder();
-        // At 9 ms every ball flies free; each joint was hit 1.2 ms before.
+        // At 9 ms every ball is in free flight; each joint was hit 1.2 ms before.
         let common = "--size 320x180 --hide trail,flash";
         for (name, arrows) in [("with", "both"), ("without", "none")] {
             let film = format!(
@@ -752,7 +752,7 @@ mod frames {
         let last = |name: &str, frame: &str| picture(&folder.path().join(name).join(frame)).2;
         let (film, single) = ("frame_00001.png", "frame_00000.png");
         assert!(last("film_with", film) != last("single_with", single), "peaks are marked");
-        assert!(last("film_without", film) == last("single_without", single), "and are all that differs");
+        assert!(last("film_without", film) == last("single_without", single), "the marks are the only difference");
     }
 
     #[test]
@@ -779,7 +779,7 @@ mod frames {
 
     #[cfg(unix)]
     #[test]
-    fn frames_of_a_render_killed_at_any_instant_are_the_old_or_the_new_folder() {
+    fn a_render_killed_at_any_instant_leaves_the_old_or_the_new_folder() {
         let work = folder();
         let render = |friction: &str| {
             format!(
@@ -787,11 +787,11 @@ mod frames {
             )
         };
         let film = |folder: &Path| -> Vec<(String, Vec<u8>)> {
-            // Between two renames the old one is beside its name; the next command restores it.
-            let beside = || names(folder).iter().map(|name| folder.join(name).join("old")).find(|old| old.is_dir());
-            let place = Some(folder.join("film")).filter(|film| film.is_dir()).or_else(beside).unwrap();
-            let content = |name: String| (name.clone(), fs::read(place.join(name)).unwrap());
-            names(&place).into_iter().map(content).collect()
+            // Between the two renames the old folder is in a temporary one; the next command restores it.
+            let backup = || names(folder).iter().map(|name| folder.join(name).join("old")).find(|old| old.is_dir());
+            let path = Some(folder.join("film")).filter(|film| film.is_dir()).or_else(backup).unwrap();
+            let content = |name: String| (name.clone(), fs::read(path.join(name)).unwrap());
+            names(&path).into_iter().map(content).collect()
         };
         jointplay(work.path(), &render("0.1")).expect(0);
         let old = film(work.path());
@@ -801,7 +801,7 @@ mod frames {
         let new = film(work.path());
         assert!(old != new);
         crate::common::at_random_instants(length, 3, |instant| {
-            // As the first run left it.
+            // Restores the result of the first run.
             fs::remove_dir_all(work.path().join("film")).unwrap();
             fs::create_dir(work.path().join("film")).unwrap();
             old.iter().for_each(|(name, content)| fs::write(work.path().join("film").join(name), content).unwrap());
@@ -809,8 +809,8 @@ mod frames {
             std::thread::sleep(instant);
             child.kill().unwrap();
             child.wait().unwrap();
-            let found = film(work.path());
-            assert!(found == old || found == new);
+            let left = film(work.path());
+            assert!(left == old || left == new);
             jointplay(work.path(), &render("0.2")).expect(0);
             assert!(film(work.path()) == new);
             assert_eq!(names(work.path()), ["film"]);
@@ -818,7 +818,7 @@ mod frames {
     }
 
     #[test]
-    fn the_whole_application_can_be_drawn() {
+    fn the_whole_window_can_be_rendered() {
         let folder = folder();
         jointplay(folder.path(), "render spcmm --at 1ms --size 800x500 --ui --out ui").expect(0);
         let (width, height, _) = picture(&folder.path().join("ui/frame_00000.png"));
@@ -826,7 +826,7 @@ mod frames {
     }
 
     #[test]
-    fn frames_fail_with_the_right_code() {
+    fn failures_of_render_have_the_right_exit_code() {
         let folder = folder();
         for (line, code, word) in [
             ("render spcmm --out a", 2, "--at"),
@@ -845,7 +845,7 @@ mod frames {
         assert_eq!(names(folder.path()), [""; 0]);
     }
 
-    /// Mesa's Wayland client complains without one.
+    /// Mesa's Wayland client complains without a runtime folder.
     #[cfg(target_os = "linux")]
     #[test]
     fn without_a_runtime_folder_drivers_write_nothing_to_standard_error() {
@@ -878,7 +878,7 @@ mod frames {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn without_any_adapter_the_code_is_three_and_the_line_says_what_to_install() {
+    fn without_a_graphics_adapter_the_exit_code_is_three_and_the_message_names_a_package() {
         let folder = folder();
         let output = command(folder.path(), "render spcmm --at 0s --size 64x64 --out a")
             .env("VK_DRIVER_FILES", "/dev/null")
@@ -910,31 +910,31 @@ fn a_bad_link_is_refused_before_any_window_opens() {
     assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
 }
 
-/// Everything that a person can write, with what would set a terminal's title, clear it, or turn its direction.
+/// Every text a user can supply, with sequences that set a terminal's title, clear it or reverse its direction.
 #[test]
 fn control_characters_of_foreign_text_do_not_reach_the_terminal() {
-    const STEERING: &str = "\u{1b}]0;title\u{7}\u{9b}2J\u{7f}\r\u{202e}\u{2066}";
+    const CONTROL: &str = "\u{1b}]0;title\u{7}\u{9b}2J\u{7f}\r\u{202e}\u{2066}";
     let folder = folder();
     let good = fs::read_to_string("assets/scenes/pendulum.toml").unwrap();
     let escape = |c: char| format!("\\u{:04x}", u32::from(c));
-    let escaped: String = STEERING.chars().map(escape).collect();
+    let escaped: String = CONTROL.chars().map(escape).collect();
     let title = good.lines().find(|line| line.starts_with("title")).unwrap();
-    let titled = good.replace(title, &format!("title = \"{escaped}\""));
-    let own_name = |line: &&str| !line.starts_with("name = \"pendulum\"");
-    let unnamed = good.lines().filter(own_name).collect::<Vec<_>>().join("\n");
+    let with_title = good.replace(title, &format!("title = \"{escaped}\""));
+    let not_name = |line: &&str| !line.starts_with("name = \"pendulum\"");
+    let unnamed = good.lines().filter(not_name).collect::<Vec<_>>().join("\n");
     let file = |name: &str, text: &str| {
         fs::write(folder.path().join(name), text).unwrap();
         format!("./{name}")
     };
     let hostile = |of: &str| good.replace(of, &format!("{} = \"{escaped}\"", of.split(' ').next().unwrap()));
     let scenes = [
-        file("title.toml", &titled),
-        file(&format!("{STEERING}.toml"), &unnamed),
+        file("title.toml", &with_title),
+        file(&format!("{CONTROL}.toml"), &unnamed),
         file("joint.toml", &hostile("name = \"S1\"")),
         file("body.toml", &hostile("child = \"rod\"")),
         file("key.toml", &format!("\"{escaped}\" = 1\n{good}")),
-        file("raw.toml", &format!("{STEERING}\n{good}")),
-        STEERING.to_owned(),
+        file("raw.toml", &format!("{CONTROL}\n{good}")),
+        CONTROL.to_owned(),
     ];
     let title = scenes[0].clone();
     let mut lines: Vec<Vec<String>> = Vec::new();
@@ -943,10 +943,10 @@ fn control_characters_of_foreign_text_do_not_reach_the_terminal() {
         lines.push(words(&["check", scene]));
     }
     for change in [
-        format!("{STEERING}=1"),
-        format!("contact.clearance={STEERING}"),
-        format!("joint.{STEERING}.clearance=1mm"),
-        STEERING.to_owned(),
+        format!("{CONTROL}=1"),
+        format!("contact.clearance={CONTROL}"),
+        format!("joint.{CONTROL}.clearance=1mm"),
+        CONTROL.to_owned(),
     ] {
         lines.push(words(&["check", "pendulum", "--set", &change]));
     }
@@ -954,31 +954,31 @@ fn control_characters_of_foreign_text_do_not_reach_the_terminal() {
     for more in [
         words(&[]),
         words(&["--summary", "json"]),
-        words(&["--every", STEERING, "--out", "rows.csv"]),
-        words(&["--every", "1ms", "--out", &format!("{STEERING}.csv")]),
-        words(&["--every", "1ms", "--out", &format!("{STEERING}.txt")]),
+        words(&["--every", CONTROL, "--out", "rows.csv"]),
+        words(&["--every", "1ms", "--out", &format!("{CONTROL}.csv")]),
+        words(&["--every", "1ms", "--out", &format!("{CONTROL}.txt")]),
     ] {
         lines.push([words(&run), more].concat());
     }
-    lines.push(words(&[STEERING]));
-    lines.push(words(&["run", &format!("--{STEERING}")]));
+    lines.push(words(&[CONTROL]));
+    lines.push(words(&["run", &format!("--{CONTROL}")]));
     #[cfg(feature = "gui")]
     for link in ["?scene=%1b]0;title%07", "?%9b=1&%1b=2", "?c=%1b]0;", "?log=%1b"] {
         lines.push(words(&["view", "--link", link]));
     }
-    let mut shown = 0;
+    let mut escaped_count = 0;
     for line in lines {
         let output = command(folder.path(), "").args(&line).output().unwrap();
         for stream in [output.stdout, output.stderr] {
             let text = String::from_utf8(stream).unwrap();
-            let steers = |c: char| (c.is_control() && c != '\n') || STEERING[10..].contains(c) && !c.is_ascii();
-            assert!(!text.contains(steers), "{line:?}: {text:?}");
+            let is_control = |c: char| (c.is_control() && c != '\n') || CONTROL[10..].contains(c) && !c.is_ascii();
+            assert!(!text.contains(is_control), "{line:?}: {text:?}");
             assert!(!text.contains("internal error"), "{text}");
-            shown += usize::from(text.contains("\\u001b"));
+            escaped_count += usize::from(text.contains("\\u001b"));
         }
     }
-    // They are said, not left out.
-    assert!(shown >= 12, "{shown}");
+    // They are printed escaped, not dropped.
+    assert!(escaped_count >= 12, "{escaped_count}");
     let summary = jointplay(folder.path(), &format!("run {title} --duration 1ms --summary json"));
     summary.expect(0).json();
 }

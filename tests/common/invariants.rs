@@ -1,4 +1,4 @@
-//! What no frame may show, whatever the scene and the method.
+//! Invariants of a frame, whatever the scene and the method.
 
 use jointplay::machine::{BallJoint, Machine, Vec3};
 use jointplay::simulate::{Frame, JointReport};
@@ -6,7 +6,7 @@ use jointplay::simulate::{Frame, JointReport};
 /// Penetration over ball radius beyond which a ball has left its socket.
 const OUT_OF_SOCKET: f64 = 0.1;
 
-/// Whether every number in it is one.
+/// Whether every number of the frame is finite.
 pub fn finite(frame: &Frame) -> bool {
     let mut all = vec![frame.time, frame.kinetic, frame.potential, frame.elastic];
     let mut push = |v: &Vec3| all.extend_from_slice(v.as_slice());
@@ -33,8 +33,8 @@ pub fn finite(frame: &Frame) -> bool {
     all.iter().all(|x| x.is_finite())
 }
 
-/// What no frame may show; `None` where all is well.
-pub fn fault(frame: &Frame, machine: &Machine, form: &str) -> Option<String> {
+/// The first violated invariant of a frame, if any.
+pub fn violation(frame: &Frame, machine: &Machine, form: &str) -> Option<String> {
     if !finite(frame) {
         return Some(format!("not finite at t = {:e} s", frame.time));
     }
@@ -46,15 +46,15 @@ pub fn fault(frame: &Frame, machine: &Machine, form: &str) -> Option<String> {
     }
     let pairs = frame.joints.iter().zip(&machine.ball_joints);
     pairs
-        .filter_map(|(report, joint)| joint_fault(report, joint, form))
+        .filter_map(|(report, joint)| joint_violation(report, joint, form))
         .next()
         .map(|what| format!("{what} at t = {:e} s", frame.time))
 }
 
-fn joint_fault(report: &JointReport, joint: &BallJoint, form: &str) -> Option<String> {
+fn joint_violation(report: &JointReport, joint: &BallJoint, form: &str) -> Option<String> {
     let radius = joint.contact.ball_radius;
     if joint.contact.clearance == 0.0 {
-        // The other form only stabilises its constraints.
+        // The `lagrange` formulation only stabilises its constraints.
         let limit = if form == "tree" { 1e-9 } else { 1e-3 };
         let open = report.eccentricity.norm();
         return (open > limit).then(|| format!("{} open by {open:e} m", joint.name));
@@ -62,6 +62,7 @@ fn joint_fault(report: &JointReport, joint: &BallJoint, form: &str) -> Option<St
     if report.penetration > OUT_OF_SOCKET * radius {
         return Some(format!("{} {:.3} radii inside the wall", joint.name, report.penetration / radius));
     }
-    let unheld = report.penetration > 1e-9 && report.penetration_rate > 0.0;
-    (unheld && report.normal_force.norm() == 0.0).then(|| format!("{} leaves its socket without a force", joint.name))
+    let separating = report.penetration > 1e-9 && report.penetration_rate > 0.0;
+    (separating && report.normal_force.norm() == 0.0)
+        .then(|| format!("{} leaves its socket without a force", joint.name))
 }

@@ -1,9 +1,9 @@
-//! Texts of scenes of one kind and any size: shared by tests and benchmarks.
+//! Scene texts of any size, shared by tests and benchmarks.
 
-/// A scene of `kind` with `n` bodies, its ball joints with this clearance.
+/// A scene of `kind` with `n` bodies, whose ball joints have this clearance.
 ///
 /// # Panics
-/// A kind that there is not.
+/// If the kind is unknown.
 pub fn scene_text(kind: &str, n: usize, clearance: &str) -> String {
     let mut text = format!("[contact]\nball_radius = \"1 mm\"\nclearance = \"{clearance}\"\n");
     for i in 0..n {

@@ -1,14 +1,14 @@
-//! The matrix of methods and formulations that tests go through, and cases side by side.
+//! The matrix of methods and formulations that tests cover, and a parallel loop over cases.
 
 use std::fmt;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::METHODS;
 
-/// Words of `formulation`.
+/// Values of `formulation`.
 pub const FORMULATIONS: [&str; 2] = ["tree", "lagrange"];
 
-/// A cell of the matrix.
+/// A method in a formulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Way {
     pub method: &'static str,
@@ -22,12 +22,12 @@ impl fmt::Display for Way {
 }
 
 impl Way {
-    /// As a user asks for it.
+    /// The changes that select it.
     pub fn changes(self) -> [(&'static str, &'static str); 2] {
         [("solver.method", self.method), ("formulation", self.formulation)]
     }
 
-    /// The same for smooth motion against a closed solution: with steps that suit the method's order.
+    /// Changes for a comparison of smooth motion with a closed form: step sizes suit the method's order.
     pub fn close(self) -> [(&'static str, &'static str); 5] {
         let step = match self.method {
             "semi-implicit-euler" => "1 us",
@@ -38,7 +38,7 @@ impl Way {
         [method, ("solver.step", step), ("solver.tolerance", "1e-10"), ("solver.steps_per_impact", "256"), formulation]
     }
 
-    /// How close that comes, m.
+    /// Error bound of such a comparison, m.
     pub fn bound(self) -> f64 {
         match self.method {
             "semi-implicit-euler" | "discrete-gradient" => 2e-6,
@@ -47,8 +47,8 @@ impl Way {
         }
     }
 
-    /// Methods of first order pay for closeness with a hundred times the steps.
-    fn is_dear(self) -> bool {
+    /// First-order methods need a hundred times the steps for this accuracy.
+    fn is_expensive(self) -> bool {
         self.method.ends_with("euler")
     }
 }
@@ -58,20 +58,20 @@ pub fn every_way() -> impl Iterator<Item = Way> {
     METHODS.into_iter().flat_map(|method| FORMULATIONS.map(|formulation| Way { method, formulation }))
 }
 
-/// Calls `check` with every case and every method, each in the formulation whose turn it is: every case meets both
-/// formulations, and every method does but those of first order, which meet the first case alone.
+/// Calls `check` with every case and every method, alternating the formulation. Every case meets both formulations, and so does
+/// every method except those of first order, which meet only the first case.
 pub fn for_every<C: Copy>(cases: impl IntoIterator<Item = C>, mut check: impl FnMut(C, Way)) {
     for (turn, case) in cases.into_iter().enumerate() {
         for (place, method) in METHODS.into_iter().enumerate() {
             let way = Way { method, formulation: FORMULATIONS[(turn + place) % 2] };
-            if turn == 0 || !way.is_dear() {
+            if turn == 0 || !way.is_expensive() {
                 check(case, way);
             }
         }
     }
 }
 
-/// Calls `check` with every case, on as many threads as there are cores; the dearest come first, best.
+/// Calls `check` with every case, on as many threads as there are cores; `cases` should begin with the most expensive.
 pub fn side_by_side<C: Sync>(cases: &[C], check: impl Fn(&C) + Sync) {
     let next = AtomicUsize::new(0);
     std::thread::scope(|scope| {

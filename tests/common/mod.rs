@@ -1,4 +1,4 @@
-//! What several test files need.
+//! Helpers shared by several test files.
 #![allow(dead_code, reason = "each test file is a crate of its own and uses some of this")]
 
 pub mod invariants;
@@ -11,27 +11,27 @@ use std::time::Duration;
 use jointplay::scene::{LiveScene, Scene};
 use jointplay::simulate::{Frame, Simulation};
 
-/// Calls `kill` with instants within `length`, `JOINTPLAY_KILLS` of them or `few`.
-pub fn at_random_instants(length: Duration, few: u32, mut kill: impl FnMut(Duration)) {
-    let asked = std::env::var("JOINTPLAY_KILLS").ok();
-    let number = asked.and_then(|n| n.parse().ok()).unwrap_or(few);
-    for k in 0..number {
-        // Seeded anew by the system each time; spread so that few kills, too, meet start, middle and end.
+/// Calls `kill` with `JOINTPLAY_KILLS` instants within `length`, by default `default_count`.
+pub fn at_random_instants(length: Duration, default_count: u32, mut kill: impl FnMut(Duration)) {
+    let requested = std::env::var("JOINTPLAY_KILLS").ok();
+    let count = requested.and_then(|n| n.parse().ok()).unwrap_or(default_count);
+    for k in 0..count {
+        // Seeded by the system on each run; stratified so that even a few kills cover start, middle and end.
         let random = RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64;
-        let instant = length.mul_f64((f64::from(k) + random) / f64::from(number));
+        let instant = length.mul_f64((f64::from(k) + random) / f64::from(count));
         eprintln!("killed after {instant:?} of {length:?}");
         kill(instant);
     }
 }
 
-/// The built-in scenes with few joints, which every method runs through in no time.
+/// The built-in scenes with few joints, which every method runs quickly.
 pub const SCENES: [&str; 5] = ["spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain"];
-/// The others, whose long runs take their time: `tests/physics/machines.rs` checks what each of them is.
+/// The other built-in scenes, whose long runs are slow; `tests/physics/machines.rs` checks each of them.
 pub const MACHINES: [&str; 5] = ["hexapod", "delta", "four-bar", "suspension", "press"];
 /// Words of `solver.method`.
 pub const METHODS: [&str; 6] = ["semi-implicit-euler", "discrete-gradient", "rk4", "dopri5", "radau5", "automatic"];
 
-/// Keys and values as a user writes them.
+/// Changed parameters: keys and values as in `--set`.
 pub type Changes<'a> = [(&'a str, &'a str)];
 
 fn owned(changes: &Changes) -> Vec<(String, String)> {
@@ -44,10 +44,10 @@ pub fn scene(name: &str, changes: &Changes) -> Scene {
     Scene::load(name, &owned(changes)).unwrap()
 }
 
-/// Methods with formulations that between them have every kind of Jacobian and error control.
+/// Pairs of method and formulation that together cover every kind of Jacobian and error control.
 pub const FOUR_WAYS: [(&str, &str); 4] =
     [("dopri5", "tree"), ("radau5", "lagrange"), ("automatic", "tree"), ("discrete-gradient", "lagrange")];
-/// Those of them that hold an error at a tolerance.
+/// Those of [`FOUR_WAYS`] that control the error.
 pub const THREE_WAYS: [(&str, &str); 3] = [("dopri5", "tree"), ("radau5", "lagrange"), ("automatic", "tree")];
 
 /// A scene from its text with changes.
@@ -55,8 +55,8 @@ pub fn parse(text: &str, changes: &Changes) -> Scene {
     Scene::parse(text, None, &owned(changes)).unwrap()
 }
 
-/// The text of a scene: a free ball of 0.1 kg in a socket at rest, without friction, `place` (mm) from the middle along z and moving at
-/// `speed` (m/s), under a gravity along z (m/s^2); more lines of `[contact]`.
+/// The text of a scene: a free ball of 0.1 kg in a fixed socket, without friction, at `place` (mm) from the centre along z, moving at
+/// `speed` (m/s) under `gravity` along z (m/s^2); `contact` holds more lines of `[contact]`.
 pub fn free_ball(place: f64, speed: f64, gravity: f64, contact: &str) -> String {
     format!(
         r#"
@@ -82,24 +82,24 @@ pub fn free_ball(place: f64, speed: f64, gravity: f64, contact: &str) -> String 
     )
 }
 
-/// The machine of a built-in scene in motion.
+/// A simulation of a built-in scene.
 pub fn simulation(name: &str, changes: &Changes) -> Simulation {
     Simulation::new(&scene(name, changes).machine).unwrap()
 }
 
-/// A built-in scene in motion, whose parameters may be changed.
+/// A running built-in scene whose parameters can be changed.
 pub fn live(name: &str, changes: &Changes) -> LiveScene {
     LiveScene::new(&scene(name, changes)).unwrap()
 }
 
-/// Steps exactly to `end`, the last step cut.
+/// Steps exactly to `end`, truncating the last step.
 pub fn run_until(simulation: &mut Simulation, end: f64) {
     while simulation.time() < end {
         simulation.step_until(end).unwrap();
     }
 }
 
-/// Everything at the latest state.
+/// The frame of the latest state.
 pub fn frame_now(simulation: &mut Simulation) -> Frame {
     let mut frame = Frame::default();
     simulation.sample(simulation.time(), &mut frame);
@@ -120,8 +120,8 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
     (n * sxy - sx * sy) / (n * sxx - sx * sx)
 }
 
-/// A clock for the interface, by which each look costs so many microseconds: what a frame has time for does not depend on
-/// the machine.
+/// A clock for the interface that advances by `MICROSECONDS` at each reading, so that the work done in a frame does not depend on
+/// the computer.
 pub fn looks<const MICROSECONDS: u32>() -> f64 {
     thread_local! {
         static LOOKS: std::cell::Cell<u32> = const { std::cell::Cell::new(0) };
@@ -130,7 +130,7 @@ pub fn looks<const MICROSECONDS: u32>() -> f64 {
     f64::from(LOOKS.get()) * f64::from(MICROSECONDS) * 1e-6
 }
 
-/// Mean size of every contact force over a span, N, sampled at a thousand instants.
+/// Mean magnitude of each contact force between `from` and `to`, N, sampled at 1001 instants.
 pub fn mean_forces(simulation: &mut Simulation, from: f64, to: f64) -> Vec<f64> {
     let mut frame = Frame::default();
     let mut sums = vec![0.0; simulation.machine().ball_joints.len()];

@@ -1,4 +1,4 @@
-//! What can be found in the pixels of a picture: `#[path = "common/pixels.rs"] mod pixels;`.
+//! Searches the pixels of a picture: `#[path = "common/pixels.rs"] mod pixels;`.
 #![allow(dead_code, reason = "each test file is a crate of its own and uses some of this")]
 
 /// A picture: rows of red, green, blue, alpha from the top left corner.
@@ -7,28 +7,28 @@ pub struct Picture {
     rgba: Vec<u8>,
 }
 
-/// Pixels from a left and upper edge to a right and lower one, these not included.
+/// Left, top, right and bottom edges in pixels; the last two are exclusive.
 pub type Area = [usize; 4];
 
 impl Picture {
-    /// Of so many pixels across; `Picture::new(image.width(), image.into_raw())`.
+    /// From the width in pixels and the raw data, as in `Picture::new(image.width(), image.into_raw())`.
     pub fn new(width: u32, rgba: Vec<u8>) -> Self {
         let width = width as usize;
         Self { width, rgba }
     }
 
-    /// All of it.
+    /// The whole picture.
     pub fn area(&self) -> Area {
         [0, 0, self.width, self.rgba.len() / 4 / self.width]
     }
 
-    /// Red, green and blue at a place.
+    /// Red, green and blue at column `x` and row `y`.
     pub fn at(&self, x: usize, y: usize) -> [u8; 3] {
         let at = 4 * (y * self.width + x);
         [self.rgba[at], self.rgba[at + 1], self.rgba[at + 2]]
     }
 
-    /// Places in `area` whose colour differs from `colour` by no more than `most` in red, green and blue each: column, row.
+    /// Pixels (column, row) in `area` whose red, green and blue each differ from `colour` by at most `most`.
     pub fn coloured(&self, area: Area, colour: [u8; 3], most: u8) -> Vec<(usize, usize)> {
         let [left, top, right, bottom] = self.area();
         let (left, top) = (area[0].max(left), area[1].max(top));
@@ -41,23 +41,23 @@ impl Picture {
         places.filter(near).collect()
     }
 
-    /// Places in `area` that are about half covered with `colour`, or more, over a background: column, row.
+    /// Pixels (column, row) in `area` that `colour` covers by about half or more over a background.
     pub fn covered(&self, area: Area, colour: [u8; 3], background: [u8; 3]) -> Vec<(usize, usize)> {
-        let less = |a: [u8; 3]| [0, 1, 2].map(|i| f32::from(a[i]) - f32::from(background[i]));
+        let minus_background = |a: [u8; 3]| [0, 1, 2].map(|i| f32::from(a[i]) - f32::from(background[i]));
         let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let whole = less(colour);
+        let full = minus_background(colour);
         let mut places = self.coloured(area, colour, 255);
         places.retain(|&(x, y)| {
-            let seen = less(self.at(x, y));
-            let share = dot(seen, whole) / dot(whole, whole);
-            let rest = [0, 1, 2].map(|i| seen[i] - share * whole[i]);
+            let seen = minus_background(self.at(x, y));
+            let share = dot(seen, full) / dot(full, full);
+            let rest = [0, 1, 2].map(|i| seen[i] - share * full[i]);
             share > 0.45 && dot(rest, rest) < 300.0
         });
         places
     }
 }
 
-/// The highest row of some places.
+/// The topmost row of some pixels.
 pub fn top(places: &[(usize, usize)]) -> Option<usize> {
     places.iter().map(|(_, y)| *y).min()
 }

@@ -1,4 +1,4 @@
-//! The chaos bench of the window, driven by role and label.
+//! The chaos bench of the window, operated by role and label.
 
 use std::cell::Cell;
 use std::collections::{HashSet, VecDeque};
@@ -18,14 +18,14 @@ use jointplay::analysis::ready::READY;
 use jointplay::analysis::task::{Job, Message, perform};
 use jointplay::app::{App, BackgroundTask, DesktopHost, Host, Link, OpenedFile, Player, Replay, Verdict};
 
-/// Computes at once, shared by so many, and is heard of as many points of a sweep, or runs of a study, as the test allows: it is neither too quick nor
-/// too slow.
-struct Held(Rc<Cell<usize>>, usize);
+/// A host that computes a job at once with a number of workers, but delivers only as many sweep points or study runs as the test
+/// allows, so that results do not depend on timing.
+struct ThrottledHost(Rc<Cell<usize>>, usize);
 
-/// A computation of it: what it says, and of how many points still.
-struct Saying(VecDeque<Message>, Rc<Cell<usize>>);
+/// A job's undelivered messages, and the number of points that may still be delivered.
+struct ThrottledTask(VecDeque<Message>, Rc<Cell<usize>>);
 
-impl Host for Held {
+impl Host for ThrottledHost {
     fn read_dropped(&mut self, _files: Vec<Arc<dyn egui::DroppedFile + Send + Sync>>) {}
 
     fn opened(&mut self) -> Option<Vec<OpenedFile>> {
@@ -37,22 +37,22 @@ impl Host for Held {
     }
 
     fn start(&mut self, job: Job) -> Option<Box<dyn BackgroundTask>> {
-        let mut said = VecDeque::new();
+        let mut messages = VecDeque::new();
         perform(&job, &mut || 0.0, &mut |message| {
-            said.push_back(message);
+            messages.push_back(message);
             ControlFlow::Continue(())
         });
-        Some(Box::new(Saying(said, self.0.clone())))
+        Some(Box::new(ThrottledTask(messages, self.0.clone())))
     }
 }
 
-impl BackgroundTask for Saying {
+impl BackgroundTask for ThrottledTask {
     fn poll(&mut self) -> Option<Message> {
-        let Self(said, points) = self;
-        if let Message::Point(_) | Message::Run(_) = said.front()? {
+        let Self(messages, points) = self;
+        if let Message::Point(_) | Message::Run(_) = messages.front()? {
             points.set(points.get().checked_sub(1)?);
         }
-        said.pop_front()
+        messages.pop_front()
     }
 
     fn rest(&mut self, _rest: f64) {}
@@ -62,20 +62,20 @@ impl BackgroundTask for Saying {
     }
 }
 
-/// Gives the window a host that is held, and the number of points that it may still tell.
+/// Installs a throttled host; returns the number of points that it may still deliver.
 pub fn hold(harness: &mut Harness<'_, App>) -> Rc<Cell<usize>> {
     hold_shared(harness, 1)
 }
 
-/// The same, of a host that shares sweeps among so many.
+/// As [`throttle`], for a host that shares sweeps among `workers`.
 pub fn hold_shared(harness: &mut Harness<'_, App>, workers: usize) -> Rc<Cell<usize>> {
     let points = Rc::new(Cell::new(0));
-    let host = Held(points.clone(), workers);
+    let host = ThrottledHost(points.clone(), workers);
     harness.state_mut().set_host(Box::new(host));
     points
 }
 
-/// The window on `scene` with some changes, paused at t = 0, its bench open.
+/// The window on `scene` with some changes, paused at t = 0, with the bench open.
 pub fn sized(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
     let mut harness = opened(scene, changes, size, theme, crate::common::looks::<100>);
     harness.state_mut().set_host(Box::new(DesktopHost::default()));
@@ -85,7 +85,7 @@ pub fn sized(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui:
     harness
 }
 
-/// Large enough that all of the bench is on it.
+/// A window large enough to show the whole bench.
 fn window(scene: &str, changes: &[(&str, &str)]) -> Harness<'static, App> {
     sized(scene, changes, [1400.0, 1600.0], egui::Theme::Light)
 }
@@ -104,7 +104,7 @@ pub fn set_number(harness: &mut Harness<'_, App>, label: &str, number: f64) {
     harness.step();
 }
 
-/// Asks for a sweep of so many values from `from` to `to`.
+/// Starts a sweep of `values` values from `from` to `to`.
 fn sweep(harness: &mut Harness<'_, App>, from: &str, to: &str, values: f64) {
     type_over(harness, "From", from);
     type_over(harness, "To", to);
@@ -115,14 +115,15 @@ fn sweep(harness: &mut Harness<'_, App>, from: &str, to: &str, values: f64) {
 }
 
 pub fn wait(harness: &mut Harness<'_, App>, mut done: impl FnMut(&App) -> bool) {
-    let begun = std::time::Instant::now();
+    let start = std::time::Instant::now();
     while !done(harness.state()) {
-        assert!(begun.elapsed().as_secs() < 600, "no end");
+        assert!(start.elapsed().as_secs() < 600, "no result after 600 s");
         std::thread::sleep(std::time::Duration::from_millis(20));
         harness.run_steps(1);
     }
 }
 
+/// Number of sweep points received so far.
 fn come(app: &App) -> usize {
     let swept = app.bench().swept();
     swept.map_or(0, |swept| swept.points.iter().flatten().count())
@@ -137,18 +138,18 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
     points.set(3);
     harness.step();
     assert!(!harness.state().bench().is_sweeping());
-    assert_eq!(come(harness.state()), 3);
+    assert_eq!(received_points(harness.state()), 3);
     harness.run_steps(3);
     harness.get_by_label("3 of 3 values");
-    // Four periods tell no regime. The number stands first: "periodic 3" would be a period of three.
+    // Four periods do not determine a regime. The number comes first: "periodic 3" would mean a period of three.
     harness.get_by_label("3 unclear");
 
     let bench = harness.state().bench();
     let point = bench.swept().expect("swept").points[2].clone();
-    let point = point.expect("came");
+    let point = point.expect("received");
     assert_eq!(point.sections.len(), 3);
     let at = bench.place(2, 1).expect("drawn");
-    // The nearest of the marks is meant, whichever lies there.
+    // A click selects the nearest mark.
     let value = point.sections[1];
     harness.hover_at(at);
     harness.step();
@@ -156,7 +157,7 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
     harness.step();
     harness.drop_at(at);
     harness.step();
-    assert!(harness.state().loading().is_some(), "on its way");
+    assert!(harness.state().loading().is_some(), "in progress");
     assert!(!harness.state().player().is_playing());
     harness.get_by_label_contains("Running to the chosen section…");
     wait(&mut harness, |app| app.loading().is_none());
@@ -178,7 +179,7 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
     };
     let link = Link::parse(&link.format()).expect("a link");
     let replay = Replay::new(link, &mut again).expect("an instant");
-    // On the way it passes the very section of the sweep.
+    // The replay passes exactly the section of the sweep.
     let mut passed = false;
     let verdict = loop {
         let verdict = replay.advance(&mut again, {
@@ -188,19 +189,19 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
                 steps > 0
             }
         });
-        let found = observed(&again.frame().pose);
-        passed |= again.simulation().time() == 0.6000000000000001 && found[..6] == value;
+        let section = observed(&again.frame().pose);
+        passed |= again.simulation().time() == 0.6000000000000001 && section[..6] == value;
         if let Some(verdict) = verdict {
             break verdict;
         }
     };
     assert!(matches!(verdict, Verdict::Agrees(_)), "{verdict:?}");
-    assert!(passed, "bit by bit the section that was clicked");
+    assert!(passed, "the clicked section, bit for bit");
     assert!(again.simulation().time() < 0.7, "it plays from there");
 }
 
 #[test]
-fn several_workers_share_a_sweep_and_one_bad_range_is_told_once() {
+fn several_workers_share_a_sweep_and_a_bad_range_is_reported_once() {
     let mut harness = window("spcmm", &[FAST]);
     let points = hold_shared(&mut harness, 4);
     sweep(&mut harness, "0.2 mm", "0.4", 5.0);
@@ -232,7 +233,7 @@ fn the_diagram_comes_into_sight_when_a_sweep_starts() {
         let start = harness.get_by_role_and_label(Role::Button, "Start sweep");
         start.scroll_to_me();
         harness.run_steps(60);
-        // Nothing of it is there yet; no point comes meanwhile.
+        // The diagram is not visible yet; no point arrives meanwhile.
         assert_eq!(harness.state().bench().diagram_seen(), 0.0);
         click(&mut harness, Role::Button, "Start sweep");
         harness.run_steps(60);
@@ -268,7 +269,7 @@ fn a_sweep_of_another_scene_is_labelled_and_a_click_asks_before_replacing_the_cu
         harness.drop_at(at);
         harness.run_steps(3);
     };
-    // Its own parameter is no difference, another is.
+    // A change of the swept parameter does not count as another scene; any other change does.
     let player = harness.state_mut().player_mut();
     player.set("contact.clearance", "0.5 mm").expect("in range");
     harness.run_steps(2);
@@ -295,7 +296,7 @@ fn a_sweep_of_another_scene_is_labelled_and_a_click_asks_before_replacing_the_cu
 }
 
 #[test]
-fn a_sweep_that_goes_on_can_be_cancelled_over_a_scene_without_a_drive() {
+fn a_running_sweep_can_be_cancelled_over_a_scene_without_a_drive() {
     let mut harness = window("spcmm", &[FAST]);
     let points = hold(&mut harness);
     sweep(&mut harness, "0.1 mm", "0.9 mm", 5.0);
@@ -311,7 +312,7 @@ fn a_sweep_that_goes_on_can_be_cancelled_over_a_scene_without_a_drive() {
 }
 
 #[test]
-fn a_sweep_is_cancelled_and_keeps_what_it_has() {
+fn a_cancelled_sweep_keeps_its_points() {
     let mut harness = window("spcmm", &[FAST]);
     let start = harness.get_by_label("Start sweep").rect();
     let points = hold(&mut harness);
@@ -325,7 +326,7 @@ fn a_sweep_is_cancelled_and_keeps_what_it_has() {
     assert!(!harness.state().bench().is_sweeping());
     points.set(5);
     harness.run_steps(10);
-    assert_eq!(come(harness.state()), 2);
+    assert_eq!(received_points(harness.state()), 2);
     harness.get_by_role_and_label(Role::Button, "Start sweep");
 }
 
@@ -342,7 +343,7 @@ fn a_bad_range_is_explained() {
         harness.run_steps(2);
         harness.get_by_label_contains(words);
         assert!(harness.query_by_label_contains("--vary").is_none());
-        assert_eq!(come(harness.state()), 0);
+        assert_eq!(received_points(harness.state()), 0);
     }
 }
 
@@ -371,7 +372,7 @@ fn the_portrait_and_the_section_fill_while_the_scene_runs() {
 }
 
 #[test]
-fn a_scene_without_a_drive_says_that_it_has_no_phase() {
+fn a_scene_without_a_drive_explains_why_it_has_no_phase() {
     let mut harness = window("pendulum", &[]);
     harness.get_by_label_contains("No Poincaré section");
     harness.get_by_label_contains("No sweep");
@@ -430,7 +431,7 @@ fn the_bench_shows_what_is_stored() {
         harness.run();
         compare_window(&mut harness, name);
     }
-    // Parted, seen from near. It begins after a while of friction, in which the rounding of all before is forgotten.
+    // A diverged twin in close-up. It starts after a time with friction, which erases earlier rounding errors.
     let player = harness.state_mut().player_mut();
     player.set_twin(false);
     player.set("contact.friction", "0").expect("in range");
@@ -457,7 +458,7 @@ fn every_control_beside_the_bench_has_a_name_of_its_own() {
     assert!(controls > 60, "{controls}");
 }
 
-/// Number of controls, each of which has a name of its own.
+/// Number of controls; panics unless each has a unique name.
 pub fn named_controls(harness: &Harness<'_, App>) -> usize {
     let mut controls = 0;
     let mut names = HashSet::new();
@@ -483,10 +484,10 @@ pub fn named_controls(harness: &Harness<'_, App>) -> usize {
     controls
 }
 
-/// Says which sweep was asked for, and computes nothing.
-struct Asking(Rc<std::cell::RefCell<Vec<Job>>>);
+/// A host that records requested jobs and computes nothing.
+struct RecordingHost(Rc<std::cell::RefCell<Vec<Job>>>);
 
-impl Host for Asking {
+impl Host for RecordingHost {
     fn read_dropped(&mut self, _files: Vec<Arc<dyn egui::DroppedFile + Send + Sync>>) {}
 
     fn opened(&mut self) -> Option<Vec<OpenedFile>> {
@@ -495,16 +496,16 @@ impl Host for Asking {
 
     fn start(&mut self, job: Job) -> Option<Box<dyn BackgroundTask>> {
         self.0.borrow_mut().push(job);
-        Some(Box::new(Saying(VecDeque::new(), Rc::default())))
+        Some(Box::new(ThrottledTask(VecDeque::new(), Rc::default())))
     }
 }
 
 #[test]
-fn a_ready_sweep_says_what_it_shows_and_one_click_opens_its_scene_and_starts_it() {
+fn a_ready_sweep_is_described_and_one_click_opens_its_scene_and_starts_it() {
     // The pendulum has no drive, so no sweep of its own.
     let mut harness = window("pendulum", &[]);
-    let asked = Rc::new(std::cell::RefCell::new(Vec::new()));
-    harness.state_mut().set_host(Box::new(Asking(asked.clone())));
+    let jobs = Rc::new(std::cell::RefCell::new(Vec::new()));
+    harness.state_mut().set_host(Box::new(RecordingHost(jobs.clone())));
     for ready in &READY {
         harness.get_by_label(ready.shows);
         click(&mut harness, Role::Button, ready.name);
@@ -516,15 +517,15 @@ fn a_ready_sweep_says_what_it_shows_and_one_click_opens_its_scene_and_starts_it(
             assert!(changes.iter().any(|(k, v)| k == key && v == value), "{key}");
         }
         let mut expected = ready.task(player.pending());
-        let Some(Job::Sweep(task, _)) = asked.borrow_mut().pop() else {
+        let Some(Job::Sweep(task, _)) = jobs.borrow_mut().pop() else {
             panic!("{}: no sweep", ready.name);
         };
         assert_eq!(task, expected);
         assert!(harness.state().bench().is_sweeping());
-        // The settings are its own: the same sweep again by hand.
+        // The click also set the controls: the same sweep can be started by hand.
         click(&mut harness, Role::Button, "Cancel sweep");
         click(&mut harness, Role::Button, "Start sweep");
-        let Some(Job::Sweep(again, _)) = asked.borrow_mut().pop() else {
+        let Some(Job::Sweep(again, _)) = jobs.borrow_mut().pop() else {
             panic!("{}: no second sweep", ready.name);
         };
         expected.vary.clone_from(&again.vary);
@@ -536,10 +537,10 @@ fn a_ready_sweep_says_what_it_shows_and_one_click_opens_its_scene_and_starts_it(
 }
 
 #[test]
-fn a_ready_sweep_asks_before_a_changed_scene_is_replaced() {
+fn a_ready_sweep_asks_before_it_replaces_a_changed_scene() {
     let mut harness = window("pendulum", &[]);
-    let asked = Rc::new(std::cell::RefCell::new(Vec::new()));
-    harness.state_mut().set_host(Box::new(Asking(asked.clone())));
+    let jobs = Rc::new(std::cell::RefCell::new(Vec::new()));
+    harness.state_mut().set_host(Box::new(RecordingHost(jobs.clone())));
     let player = harness.state_mut().player_mut();
     player.set("contact.clearance", "0.5 mm").expect("in range");
     harness.run_steps(2);
@@ -551,27 +552,27 @@ fn a_ready_sweep_asks_before_a_changed_scene_is_replaced() {
         click(&mut harness, Role::Button, answer);
         harness.run_steps(2);
         assert_eq!(harness.state().player().running().name, scene);
-        assert_eq!(asked.borrow().len(), sweeps);
+        assert_eq!(jobs.borrow().len(), sweeps);
     }
 }
 
 #[test]
-fn from_the_start_of_the_window_chaos_is_two_gestures_away() {
+fn chaos_is_two_gestures_away_from_a_new_window() {
     let mut harness = sized("spcmm", &[], [1280.0, 800.0], egui::Theme::Light);
-    let asked = Rc::new(std::cell::RefCell::new(Vec::new()));
-    harness.state_mut().set_host(Box::new(Asking(asked.clone())));
+    let jobs = Rc::new(std::cell::RefCell::new(Vec::new()));
+    harness.state_mut().set_host(Box::new(RecordingHost(jobs.clone())));
     let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1280.0, 800.0));
-    let within = |harness: &Harness<'_, App>, label: &str| {
+    let is_visible = |harness: &Harness<'_, App>, label: &str| {
         let node = harness.get_by_role_and_label(Role::Button, label);
         screen.contains_rect(node.rect())
     };
     // Key B has opened the bench.
-    assert!(within(&harness, READY[0].name));
+    assert!(is_visible(&harness, READY[0].name));
     click(&mut harness, Role::Button, READY[0].name);
     harness.run_steps(60);
-    assert_eq!(asked.borrow().len(), 1);
-    // Its progress has come into sight.
-    assert!(within(&harness, "Cancel sweep"));
+    assert_eq!(jobs.borrow().len(), 1);
+    // The view has scrolled to the sweep's progress.
+    assert!(is_visible(&harness, "Cancel sweep"));
 }
 
 /// Pixels of the 3D view.
@@ -583,7 +584,7 @@ fn view(harness: &mut Harness<'_, App>) -> Vec<[u8; 4]> {
     pixels.map(|(x, y)| picture.get_pixel(x, y).0).collect()
 }
 
-fn differing(a: &[[u8; 4]], b: &[[u8; 4]]) -> usize {
+fn count_differing(a: &[[u8; 4]], b: &[[u8; 4]]) -> usize {
     a.iter().zip(b).filter(|(a, b)| a != b).count()
 }
 
@@ -591,7 +592,7 @@ fn differing(a: &[[u8; 4]], b: &[[u8; 4]]) -> usize {
 fn a_map_of_the_tip_error_is_drawn_while_its_panel_is_open() {
     let mut harness = window("four-bar", &[]);
     hold(&mut harness);
-    let without = view(&mut harness);
+    let before_map = view(&mut harness);
     let toggle = |harness: &mut Harness<'_, App>| {
         harness.get_by_label("Tip error over the workspace").click();
         harness.run();
@@ -604,20 +605,20 @@ fn a_map_of_the_tip_error_is_drawn_while_its_panel_is_open() {
     click(&mut harness, Role::Button, "Map tip error");
     harness.run();
     harness.get_by_label("24 points");
-    let with = view(&mut harness);
+    let with_map = view(&mut harness);
     if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
         let path = std::path::Path::new(&keep).join("map.png");
         harness.render().unwrap().save(path).unwrap();
     }
-    let arrows = differing(&without, &with);
+    let arrows = count_differing(&before_map, &with_map);
     assert!(arrows > 200, "{arrows}");
     harness.get_by_role_and_label(Role::Slider, "Scale of the arrows").set_value_accesskit(1.0);
     harness.run();
     let small = view(&mut harness);
-    assert!(differing(&without, &small) < arrows);
+    assert!(count_differing(&before_map, &small) < arrows);
     toggle(&mut harness);
     let closed = view(&mut harness);
-    assert_eq!(differing(&without, &closed), 0);
+    assert_eq!(count_differing(&before_map, &closed), 0);
 }
 
 #[test]

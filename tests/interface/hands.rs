@@ -1,4 +1,4 @@
-//! The window as a user opens it, and gestures.
+//! Opens windows for tests and performs gestures.
 
 use std::collections::BTreeSet;
 
@@ -12,13 +12,13 @@ use jointplay::scene::Scene;
 
 use crate::golden::{self, PLAIN, Picture, compare};
 
-/// A graphics adapter of its own.
+/// A new graphics adapter.
 fn graphics() -> RenderState {
     create_render_state(default_wgpu_setup(), RendererOptions::PREDICTABLE)
 }
 
-/// A window of `size` that takes a graphics adapter when a test first asks for its picture: most ask for what stands in it alone, and
-/// an adapter with its shaders takes longer than such a test.
+/// A window of `size` that creates its graphics adapter when a test first asks for a picture: most tests read only texts, and
+/// creating an adapter with its shaders takes longer than such a test.
 pub fn builder(size: [f32; 2], theme: egui::Theme) -> HarnessBuilder<App> {
     let renderer = LazyRenderer::new(|| {
         let graphics = graphics();
@@ -28,14 +28,14 @@ pub fn builder(size: [f32; 2], theme: egui::Theme) -> HarnessBuilder<App> {
     Harness::builder().with_size(size).with_theme(theme).with_step_dt(1.0 / 60.0).with_max_steps(60).renderer(renderer)
 }
 
-/// Gives the window an adapter for what it draws off screen: pictures and films.
+/// Gives the window an adapter for off-screen drawing: pictures and films.
 pub fn give_graphics(harness: &mut Harness<'_, App>) {
     let ctx = harness.ctx.clone();
     let theme = ctx.theme();
     harness.state_mut().attach(&ctx, Some(&graphics()), theme.into());
 }
 
-/// The window on `scene` with some changes, paused at t = 0, by a `clock` that the test drives.
+/// The window on `scene` with some changes, paused at t = 0; `clock` replaces the real one.
 pub fn opened(
     scene: &str,
     changes: &[(&str, &str)],
@@ -46,7 +46,7 @@ pub fn opened(
     paced(scene, changes, size, theme, clock, 1.0 / 60.0)
 }
 
-/// The same with frames `dt` s after each other.
+/// As [`opened`], with `dt` seconds between frames.
 pub fn paced(
     scene: &str,
     changes: &[(&str, &str)],
@@ -67,15 +67,15 @@ pub fn paced(
     harness
 }
 
-/// The window on `scene` with some changes by [`PLAIN`] steps, to be compared with what is stored.
+/// The window on `scene` with some changes and [`PLAIN`] steps, for comparison with stored texts.
 pub fn plain(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
     opened(scene, &[changes, &PLAIN].concat(), size, theme, crate::common::looks::<10>)
 }
 
-/// Where texts and pictures of the window are stored.
+/// Folder of the stored texts and pictures of windows.
 const STORED: &str = "tests/golden/window";
 
-/// Windows that have a picture, too: between them they show all that is drawn.
+/// Windows with a stored picture; together they show everything that is drawn.
 const PICTURED: [&str; 8] = [
     "bench_sweep",
     "energy_balance",
@@ -87,12 +87,12 @@ const PICTURED: [&str; 8] = [
     "wear_phone",
 ];
 
-/// Compares every text in sight, to the letter, with those stored under `name`; and the picture, at half its size, of the
-/// [`PICTURED`]: it must leave room for other drivers, in which a digit would hide.
+/// Compares all visible texts exactly with those stored under `name`, and for [`PICTURED`] windows the picture at half its size. The
+/// picture's tolerance for other drivers would hide a changed digit.
 #[track_caller]
 pub fn compare_window(harness: &mut Harness<'_, App>, name: &str) {
     let method = harness.state().player().running().machine.solver.method;
-    assert_eq!(method, Method::RungeKutta4, "{name} follows the steps of an adaptive method");
+    assert_eq!(method, Method::RungeKutta4, "{name} runs with an adaptive method");
     let path = format!("{}/{STORED}/{name}.txt", env!("CARGO_MANIFEST_DIR"));
     let mut texts = String::new();
     for part in &harness.output().shapes {
@@ -112,7 +112,7 @@ pub fn compare_window(harness: &mut Harness<'_, App>, name: &str) {
 }
 
 #[test]
-fn windows_that_are_stored_have_few_and_small_pictures() {
+fn stored_windows_have_few_and_small_pictures() {
     if golden::storing() {
         return;
     }
@@ -129,7 +129,7 @@ fn windows_that_are_stored_have_few_and_small_pictures() {
     assert!(size < 1_000_000, "{size} bytes");
 }
 
-/// The texts of `shape` that are in sight within `clip`, a line each.
+/// Appends the texts of `shape` visible within `clip`, one per line.
 pub fn add_texts(shape: &Shape, clip: egui::Rect, out: &mut String) {
     match shape {
         Shape::Vec(shapes) => shapes.iter().for_each(|shape| add_texts(shape, clip, out)),
@@ -141,7 +141,7 @@ pub fn add_texts(shape: &Shape, clip: egui::Rect, out: &mut String) {
     }
 }
 
-/// Replaces what stands in a text field; nothing is entered yet.
+/// Replaces the content of a text field without pressing Enter.
 pub fn type_over(harness: &mut Harness<'_, App>, label: &str, text: &str) {
     harness.get_by_role_and_label(Role::TextInput, label).focus();
     harness.step();
@@ -151,8 +151,8 @@ pub fn type_over(harness: &mut Harness<'_, App>, label: &str, text: &str) {
     harness.step();
 }
 
-/// Fingers on the screen, each with its way: they come down one after the other, move together and are lifted. The first is the
-/// pointer, too, as in a real window.
+/// Fingers on the screen, each with its path: they touch down one after the other, move together and are lifted. The first also
+/// moves the pointer, as in a real window.
 pub fn fingers(harness: &mut Harness<'_, App>, paths: &[&[Pos2]]) {
     fingers_down(harness, paths);
     lift(harness, paths);
@@ -172,7 +172,7 @@ pub fn fingers_down(harness: &mut Harness<'_, App>, paths: &[&[Pos2]]) {
     }
 }
 
-/// Lifts the fingers at the ends of their ways.
+/// Lifts the fingers at the ends of their paths.
 pub fn lift(harness: &mut Harness<'_, App>, paths: &[&[Pos2]]) {
     for (finger, path) in paths.iter().enumerate() {
         touch(harness, finger, TouchPhase::End, path[path.len() - 1]);

@@ -1,4 +1,4 @@
-//! The lecture instrument: what a teacher does in front of a class, each in at most three gestures.
+//! The lecture instrument: each task of a teacher in front of a class takes at most three gestures.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -14,16 +14,16 @@ use crate::hands::{compare_window, fingers, fingers_down, give_graphics, lift, p
 use crate::page::Calls;
 use crate::window::{CURVES, WHITE, click, picture, shown, sized, window};
 
-/// Where the timeline's strip stands.
+/// Rectangle of the timeline's strip.
 fn strip(harness: &Harness<'_, App>) -> egui::Rect {
     let strip = harness.get_by_role_and_label(Role::Slider, "Timeline, s");
     let mut rect = strip.rect();
-    // The lanes, without the flags above them.
+    // The lanes only, without the flags above them.
     rect.min.y += 9.0;
     rect
 }
 
-/// Where an instant stands in it, when all of the run is shown.
+/// Position of an instant on the timeline when the whole run is shown.
 fn place(harness: &Harness<'_, App>, time: f64) -> Pos2 {
     let rect = strip(harness);
     let share = time / harness.state().player().reached();
@@ -36,7 +36,7 @@ fn key(harness: &mut Harness<'_, App>, key: Key) {
     harness.run();
 }
 
-/// One gesture: presses at the first place and lets go at the last.
+/// One gesture: presses at the first position and releases at the last.
 fn drag(harness: &mut Harness<'_, App>, places: &[Pos2]) {
     harness.drag_at(places[0]);
     harness.step();
@@ -54,7 +54,7 @@ fn run_to(harness: &mut Harness<'_, App>, time: f64) {
 }
 
 #[test]
-fn a_click_on_the_timeline_shows_that_instant_and_a_drag_passes_over_all_between() {
+fn a_click_on_the_timeline_shows_that_instant_and_a_drag_scrubs() {
     for size in [[1280.0, 800.0], [420.0, 800.0], [844.0, 390.0]] {
         let mut harness = sized("spcmm", size, egui::Theme::Light);
         run_to(&mut harness, 40e-3);
@@ -75,7 +75,7 @@ fn a_click_on_the_timeline_shows_that_instant_and_a_drag_passes_over_all_between
 }
 
 #[test]
-fn the_lanes_have_the_colours_of_the_states_that_were() {
+fn the_lanes_have_the_colours_of_past_contact_states() {
     let mut harness = window("spcmm");
     run_to(&mut harness, 20e-3);
     let player = harness.state().player();
@@ -93,12 +93,12 @@ fn the_lanes_have_the_colours_of_the_states_that_were() {
         drawn.covered(area, CURVES[0], WHITE).len()
     };
     assert_eq!(blue(before), 0, "free before the first impact");
-    assert!(blue(strikes) > 0, "a mark where the ball comes to touch");
+    assert!(blue(strikes) > 0, "a mark where contact begins");
     assert_eq!(blue(after), 0, "free after it");
 }
 
 #[test]
-fn keys_go_from_impact_to_impact_to_both_ends_and_backwards() {
+fn keys_jump_between_impacts_and_ends_and_play_backwards() {
     let mut harness = window("spcmm");
     run_to(&mut harness, 30e-3);
     key(&mut harness, Key::Home);
@@ -131,7 +131,7 @@ fn keys_go_from_impact_to_impact_to_both_ends_and_backwards() {
 }
 
 #[test]
-fn resuming_from_the_past_with_another_clearance_leaves_a_pale_future_that_a_link_omits() {
+fn resuming_from_the_past_leaves_an_abandoned_future_that_a_link_omits() {
     let mut harness = window("spcmm");
     run_to(&mut harness, 10e-3);
     harness.state_mut().player_mut().set("contact.friction", "0").expect("in range");
@@ -141,20 +141,20 @@ fn resuming_from_the_past_with_another_clearance_leaves_a_pale_future_that_a_lin
     let player = harness.state_mut().player_mut();
     assert_eq!(player.pending().machine.contact.friction, 0.15, "as it was then");
     player.set("contact.clearance", "0.6 mm").expect("in range");
-    let left = player.abandoned_future().expect("left");
-    assert!((left.from - 5e-3).abs() < 1e-4 && left.to == 30e-3);
-    assert_eq!(left.flags.len(), 1);
+    let abandoned = player.abandoned_future().expect("an abandoned future");
+    assert!((abandoned.from - 5e-3).abs() < 1e-4 && abandoned.to == 30e-3);
+    assert_eq!(abandoned.flags.len(), 1);
     player.run_to(12e-3);
     harness.run();
-    // The branch is in the link.
+    // The link reproduces the branch.
     let player = harness.state().player();
-    follows(player);
+    check_link_reproduces(player);
     run_to(&mut harness, 31e-3);
     assert!(harness.state().player().abandoned_future().is_none(), "replaced");
 }
 
-/// A link to the instant on show leads there again, to the same bits.
-fn follows(player: &Player) {
+/// Checks that a link to the current instant reproduces it to the bit.
+fn check_link_reproduces(player: &Player) {
     let link = Link {
         scene: SceneText::of(player.running()),
         log: player.log(),
@@ -171,7 +171,7 @@ fn follows(player: &Player) {
 }
 
 #[test]
-fn a_body_that_is_pressed_and_dragged_is_pulled_until_it_is_let_go() {
+fn a_body_that_is_pressed_and_dragged_is_pulled_until_release() {
     let mut harness = window("spcmm");
     let image = harness.get_by_role_and_label(Role::Image, "3D view").rect();
     let platform = platform(&harness);
@@ -201,9 +201,9 @@ fn a_body_that_is_pressed_and_dragged_is_pulled_until_it_is_let_go() {
         pulls.count()
     };
     assert!(pulls(&player.log()) >= 2);
-    follows(player);
+    check_link_reproduces(player);
     let log = player.log();
-    // Beside the machine a drag turns the view.
+    // Outside the machine a drag orbits the view.
     let beside = image.left_center() + vec2(30.0, 0.0);
     drag(&mut harness, &[beside, beside + vec2(40.0, 0.0)]);
     assert_ne!(self::camera(&harness), camera);
@@ -215,7 +215,7 @@ fn camera(harness: &Harness<'_, App>) -> String {
 }
 
 #[test]
-fn plots_zoom_pan_and_go_to_the_clicked_instant() {
+fn plots_zoom_pan_and_seek_to_the_clicked_instant() {
     let mut harness = window("spcmm");
     run_to(&mut harness, 30e-3);
     let place = |harness: &mut Harness<'_, App>, time: f64| {
@@ -242,7 +242,7 @@ fn plots_zoom_pan_and_go_to_the_clicked_instant() {
     harness.run();
     assert!(width(&mut harness) > 4.0 * before, "an impact enlarged");
     assert!((place(&mut harness, 7.85e-3).x - impact.x).abs() < 2.0, "about the pointer");
-    // A click goes there, and the cursor stands there.
+    // A click seeks to that instant, and the cursor marks it.
     harness.drag_at(impact);
     harness.step();
     harness.drop_at(impact);
@@ -251,12 +251,12 @@ fn plots_zoom_pan_and_go_to_the_clicked_instant() {
     let now = shown(&harness);
     let line = place(&mut harness, now);
     assert!((line.x - impact.x).abs() < 2.0);
-    // A drag shifts the stretch that is shown.
+    // A drag pans the visible time window.
     drag(&mut harness, &[impact, impact + vec2(20.0, 0.0), impact + vec2(40.0, 0.0)]);
     harness.run();
     let shifted = place(&mut harness, 7.85e-3).x - impact.x;
     assert!((shifted - 40.0).abs() < 10.0, "{shifted}");
-    // A double click: the chosen window again.
+    // A double click restores the chosen window.
     for _ in 0..2 {
         harness.event(egui::Event::PointerButton {
             pos: impact,
@@ -324,7 +324,7 @@ fn wear_and_a_pull_show_what_is_stored() {
         // A colour of the scale that nothing else in the view has.
         let area = [0, 0, size[0] as usize, (0.6 * size[1]) as usize];
         let purple = picture(&mut harness).coloured(area, [0x47, 0x2D, 0x7B], 12);
-        assert!(purple.len() > 30, "{name}: nothing is mapped");
+        assert!(purple.len() > 30, "{name}: no wear map");
         compare_window(&mut harness, name);
     }
     for (name, size, theme) in [
@@ -345,7 +345,7 @@ fn wear_and_a_pull_show_what_is_stored() {
     }
 }
 
-/// A point of the picture on the platform at t = 0.
+/// Screen position of the platform at t = 0.
 pub(crate) fn platform(harness: &Harness<'_, App>) -> Pos2 {
     let app = harness.state();
     let scene = app.player().running();
@@ -354,10 +354,10 @@ pub(crate) fn platform(harness: &Harness<'_, App>) -> Pos2 {
     app.place_in_view(&body.position).expect("in sight")
 }
 
-/// Begins what it is asked to compute, and says nothing of it.
-struct Patient;
+/// Accepts sweeps and never reports on them.
+struct SilentHost;
 
-impl Host for Patient {
+impl Host for SilentHost {
     fn read_dropped(&mut self, _files: Vec<Arc<dyn egui::DroppedFile + Send + Sync>>) {}
 
     fn opened(&mut self) -> Option<Vec<OpenedFile>> {
@@ -369,7 +369,7 @@ impl Host for Patient {
     }
 }
 
-impl BackgroundTask for Patient {
+impl BackgroundTask for SilentHost {
     fn poll(&mut self) -> Option<Message> {
         None
     }
@@ -379,7 +379,7 @@ impl BackgroundTask for Patient {
     fn cancel(&mut self) {}
 }
 
-/// A class watches: what was done so far for the task at hand.
+/// A window with a count of the gestures used for the current task.
 struct Lecture {
     harness: Harness<'static, App>,
     gestures: usize,
@@ -410,7 +410,7 @@ impl Lecture {
         self.harness.run_steps(3);
     }
 
-    /// A slider dragged to a part of its track.
+    /// Drags a slider to a fraction of its track.
     fn slide(&mut self, label: &str, part: f32) {
         self.gestures += 1;
         let track = self.harness.get_by_role_and_label(Role::Slider, label);
@@ -421,22 +421,22 @@ impl Lecture {
         self.harness.run_steps(2);
     }
 
-    /// One gesture of so many fingers.
+    /// One gesture with a finger per path.
     fn fingers(&mut self, paths: &[&[Pos2]]) {
         self.gestures += 1;
         fingers(&mut self.harness, paths);
         self.harness.run_steps(3);
     }
 
-    /// The host of a page, that keeps what it is given.
+    /// Installs a page's host and returns its recorded calls.
     fn share_with_page(&mut self) -> Rc<RefCell<Calls>> {
         let (host, calls) = Calls::host();
         self.harness.state_mut().set_host(host);
         calls
     }
 
-    /// Draws a control into sight that lies farther down.
-    fn draw_near(&mut self, role: Role, label: &str) {
+    /// Scrolls a control into view.
+    fn scroll_to(&mut self, role: Role, label: &str) {
         self.gestures += 1;
         let found = self.harness.get_by_role_and_label(role, label);
         found.scroll_to_me();
@@ -448,7 +448,7 @@ impl Lecture {
         self.fingers(&[&[at.center()]]);
     }
 
-    /// A finger that draws a slider's handle to a part of its track.
+    /// Swipes a slider's handle to a fraction of its track.
     fn swipe(&mut self, label: &str, part: f32) {
         let track = self.harness.get_by_role_and_label(Role::Slider, label);
         let track = track.rect();
@@ -468,8 +468,8 @@ impl Lecture {
         self.harness.run_steps(count);
     }
 
-    /// The task is done; the next one.
-    fn done(&mut self, task: &str) {
+    /// Checks the number of gestures and starts the next task in a new window.
+    fn finish_task(&mut self, task: &str) {
         assert!(self.gestures <= 3, "{task}: {} gestures", self.gestures);
         let size = self.harness.ctx.content_rect().size();
         *self = Self::on(size.into());
@@ -479,16 +479,16 @@ impl Lecture {
 #[test]
 fn tasks_of_a_lecture_take_at_most_three_gestures() {
     let mut class = Lecture::new();
-    // 1: the ball rattling in its gap, large and in numbers.
+    // 1: the ball rattling in its gap, enlarged and with numbers.
     class.key(Key::Num5);
     class.key(Key::L);
     class.key(Key::Space);
     class.frames(60);
     assert!(class.app().microscope().is_open());
     assert!(class.app().player().paths().between(0, 0.0, 1.0).len() > 10);
-    class.done("the ball in its gap");
+    class.finish_task("the ball in its gap");
 
-    // 2: why the first impact comes at 7.8 ms: there it is, with how fast the ball came.
+    // 2: why the first impact comes at 7.8 ms: the impact with the ball's approach speed.
     class.key(Key::Period);
     while class.app().player().is_seeking() {
         class.frames(1);
@@ -497,22 +497,22 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     class.key(Key::Num5);
     class.key(Key::L);
     assert!(class.app().microscope().is_open());
-    class.done("the first impact");
+    class.finish_task("the first impact");
 
-    // 3: the clearance doubled while it runs.
+    // 3: the clearance is doubled during the run.
     class.key(Key::Space);
     class.slide("Clearance", 0.62);
     let clearance = class.app().player().running().machine.contact.clearance;
     assert!((0.5e-3..0.8e-3).contains(&clearance), "{clearance}");
     assert!(class.app().player().is_playing());
-    class.done("clearance live");
+    class.finish_task("clearance live");
 
     // 4: friction off, and on again.
     class.slide("Friction coefficient", 0.0);
     assert_eq!(class.app().player().running().machine.contact.friction, 0.0);
     class.click(Role::Button, "Reset Friction coefficient");
     assert_eq!(class.app().player().running().machine.contact.friction, 0.15);
-    class.done("friction off and on");
+    class.finish_task("friction off and on");
 
     // 5: an impact a thousand times slower, the next one, the one before.
     class.key(Key::Period);
@@ -527,7 +527,7 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     class.frames(30);
     let passed = shown(&class.harness) - first;
     assert!((passed / (30.0 * scale / 60.0) - 1.0).abs() < 0.2, "{passed}");
-    class.done("an impact slowly");
+    class.finish_task("an impact slowly");
     class.harness.state_mut().player_mut().run_to(30e-3);
     class.key(Key::Comma);
     let last = shown(&class.harness);
@@ -535,7 +535,7 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     assert!(shown(&class.harness) < last && last < 30e-3);
     class.key(Key::Period);
     assert_eq!(shown(&class.harness), last);
-    class.done("impact before, impact after");
+    class.finish_task("impact before, impact after");
 
     // 6: the ideal machine beside the real one, with the error of the probe.
     class.key(Key::G);
@@ -543,10 +543,10 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     class.frames(90);
     let player = class.app().player();
     let error = player.ideal().and_then(|ideal| ideal.output_error(player.frame()));
-    assert!(error.expect("came there").norm() > 1e-6);
-    class.done("ideal beside real");
+    assert!(error.expect("reached this instant").norm() > 1e-6);
+    class.finish_task("ideal beside real");
 
-    // 7: forces against time, one impact enlarged, a value read: the wheel over it, and the pointer on it.
+    // 7: forces against time: one impact enlarged with the wheel and a value read with the pointer.
     class.harness.state_mut().player_mut().run_to(30e-3);
     class.frames(2);
     let plots = class.harness.state_mut().plots_mut();
@@ -566,36 +566,36 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     let [a, b] = [7.8e-3, 7.9e-3].map(|time| plots.place(Quantity::NormalForce, time, 0.0));
     let wide = b.expect("shown").x - a.expect("shown").x;
     assert!(wide > 4.0, "{wide} points for a tenth of a millisecond");
-    class.done("an impact enlarged");
+    class.finish_task("an impact enlarged");
 
-    // 8: a billionth apart.
+    // 8: a twin run a billionth apart.
     class.key(Key::B);
     class.click(Role::CheckBox, "Twin run");
     class.key(Key::Space);
     class.frames(30);
     assert!(class.app().player().twin().is_some_and(|twin| twin.distances().len() > 5));
-    class.done("a billionth apart");
+    class.finish_task("a billionth apart");
 
-    // 9: where chaos begins: the bench, and a sweep over a parameter.
-    class.harness.state_mut().set_host(Box::new(Patient));
+    // 9: the onset of chaos: the bench, and a sweep over a parameter.
+    class.harness.state_mut().set_host(Box::new(SilentHost));
     class.key(Key::B);
-    class.draw_near(Role::Button, "Start sweep");
+    class.scroll_to(Role::Button, "Start sweep");
     class.click(Role::Button, "Start sweep");
     assert!(class.app().bench().is_sweeping());
-    class.done("where chaos begins");
-    // Or step by step.
+    class.finish_task("where chaos begins");
+    // The same as a guided lesson.
     class.click(Role::Button, "Lessons");
     class.click(Role::Button, "Where chaos begins");
     class.frames(10);
     assert!(class.app().player().twin().is_some());
-    class.done("where chaos begins, as a lesson");
+    class.finish_task("where chaos begins, as a lesson");
 
-    // 10: to the class: link, picture, film.
-    to_the_class(&mut class, Lecture::click, None);
+    // 10: sharing with the class: link, picture, film.
+    share_with_class(&mut class, Lecture::click, None);
 }
 
-/// Link, picture and film by `press`, from the menu `all` or from those of their own.
-fn to_the_class(class: &mut Lecture, press: impl Fn(&mut Lecture, Role, &str), all: Option<&str>) {
+/// Shares link, picture and film with `press`, from the menu `all` or from their own menus.
+fn share_with_class(class: &mut Lecture, press: impl Fn(&mut Lecture, Role, &str), all: Option<&str>) {
     let calls = class.share_with_page();
     give_graphics(&mut class.harness);
     class.harness.state_mut().player_mut().run_to(10e-3);
@@ -605,12 +605,12 @@ fn to_the_class(class: &mut Lecture, press: impl Fn(&mut Lecture, Role, &str), a
     press(class, Role::Button, "Copy link");
     assert_eq!(calls.borrow().shared.len(), 1);
     assert!(class.gestures <= 3);
-    for (entry, then, name) in [("Picture…", None, "png"), ("Film…", Some("Make film"), "mp4")] {
+    for (entry, confirm, name) in [("Picture…", None, "png"), ("Film…", Some("Make film"), "mp4")] {
         class.gestures = 0;
         press(class, Role::Button, all.unwrap_or("Save"));
         press(class, Role::Button, entry);
-        if let Some(then) = then {
-            press(class, Role::Button, then);
+        if let Some(confirm) = confirm {
+            press(class, Role::Button, confirm);
         }
         assert!(class.gestures <= 3, "{name}: {}", class.gestures);
         let file = crate::page::next_file(&mut class.harness, &calls);
@@ -619,7 +619,7 @@ fn to_the_class(class: &mut Lecture, press: impl Fn(&mut Lecture, Role, &str), a
 }
 
 #[test]
-fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
+fn tasks_of_a_lecture_take_at_most_three_touch_gestures_on_a_phone() {
     let mut class = Lecture::on([390.0, 844.0]);
     // 1
     class.tap_ball();
@@ -628,7 +628,7 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     let microscope = class.app().microscope();
     assert!(microscope.is_open() && microscope.joint() == 0);
     assert!(class.app().player().paths().between(0, 0.0, 1.0).len() > 10);
-    class.done("the ball in its gap");
+    class.finish_task("the ball in its gap");
 
     // 2
     class.tap(Role::Button, "Next impact");
@@ -638,7 +638,7 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     assert!((shown(&class.harness) - 7.8e-3).abs() < 0.1e-3);
     class.tap_ball();
     assert!(class.app().microscope().is_open());
-    class.done("the first impact");
+    class.finish_task("the first impact");
 
     // 3
     class.tap(Role::Button, "Play");
@@ -646,14 +646,14 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     let clearance = class.app().player().running().machine.contact.clearance;
     assert!((0.5e-3..0.8e-3).contains(&clearance), "{clearance}");
     assert!(class.app().player().is_playing());
-    class.done("clearance live");
+    class.finish_task("clearance live");
 
     // 4
     class.swipe("Friction coefficient", -0.1);
     assert_eq!(class.app().player().running().machine.contact.friction, 0.0);
     class.tap(Role::Button, "Reset Friction coefficient");
     assert_eq!(class.app().player().running().machine.contact.friction, 0.15);
-    class.done("friction off and on");
+    class.finish_task("friction off and on");
 
     // 5
     class.tap(Role::Button, "Next impact");
@@ -669,7 +669,7 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     class.frames(30);
     let passed = shown(&class.harness) - first;
     assert!((passed / (30.0 * 1e-3 / 60.0) - 1.0).abs() < 0.2, "{passed}");
-    class.done("an impact slowly");
+    class.finish_task("an impact slowly");
     class.harness.state_mut().player_mut().run_to(30e-3);
     class.tap(Role::Button, "Previous impact");
     let last = shown(&class.harness);
@@ -677,7 +677,7 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     assert!(shown(&class.harness) < last && last < 30e-3);
     class.tap(Role::Button, "Next impact");
     assert_eq!(shown(&class.harness), last);
-    class.done("impact before, impact after");
+    class.finish_task("impact before, impact after");
 
     // 6
     class.tap(Role::Button, "View options");
@@ -687,8 +687,8 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     let player = class.app().player();
     assert!(player.is_playing());
     let error = player.ideal().and_then(|ideal| ideal.output_error(player.frame()));
-    assert!(error.expect("came there").norm() > 1e-6);
-    class.done("ideal beside real");
+    assert!(error.expect("reached this instant").norm() > 1e-6);
+    class.finish_task("ideal beside real");
 
     // 7
     class.harness.state_mut().player_mut().run_to(30e-3);
@@ -707,7 +707,7 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     assert!((there.x - at.x).abs() < 10.0, "{at} {there}");
     class.fingers(&[&[there]]);
     assert!((shown(&class.harness) - 7.8e-3).abs() < 0.1e-3);
-    class.done("an impact enlarged");
+    class.finish_task("an impact enlarged");
 
     // 8
     class.tap(Role::Button, "Bench");
@@ -716,7 +716,7 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     class.frames(30);
     let twin = class.app().player().twin();
     assert!(twin.is_some_and(|twin| twin.distances().len() > 5));
-    class.done("a billionth apart");
+    class.finish_task("a billionth apart");
 
     // 9
     class.tap(Role::Button, "Menu");
@@ -725,21 +725,21 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     class.tap(Role::Button, "Where chaos begins");
     class.frames(10);
     assert!(class.app().player().twin().is_some());
-    class.done("where chaos begins");
+    class.finish_task("where chaos begins");
 
     // 10
-    to_the_class(&mut class, Lecture::tap, Some("Menu"));
+    share_with_class(&mut class, Lecture::tap, Some("Menu"));
 }
 
 #[test]
-fn a_finger_that_stays_on_a_body_pulls_on_it() {
+fn a_long_press_on_a_body_pulls_it() {
     for size in [[1280.0, 800.0], [390.0, 844.0]] {
         let mut harness = sized("spcmm", size, egui::Theme::Light);
         let (at, camera) = (platform(&harness), camera(&harness));
-        // No finger is quite still.
-        let stays = (0..60).map(|k| at + vec2((k % 2) as f32, 0.0));
-        let goes = (1..5).map(|k| at + vec2(10.0 * k as f32, 0.0));
-        let path: Vec<Pos2> = stays.chain(goes).collect();
+        // A resting finger trembles.
+        let rests = (0..60).map(|k| at + vec2((k % 2) as f32, 0.0));
+        let moves = (1..5).map(|k| at + vec2(10.0 * k as f32, 0.0));
+        let path: Vec<Pos2> = rests.chain(moves).collect();
         fingers_down(&mut harness, &[&path]);
         let pull = harness.state().player().frame().pull.expect("pulls");
         assert!(pull.force.norm() > 1.0, "{size:?}: {pull:?}");
@@ -755,7 +755,7 @@ fn going_back_to_just_after_an_impact_shows_its_peak_again() {
     let marks = |harness: &Harness<'_, App>| harness.state().peak_marks();
     run_to(&mut harness, 40e-3);
     harness.run();
-    // The peak of the first impacts, 60 to 80 us after the touch.
+    // The peak of the first impacts, 60 to 80 us after first contact.
     harness.state_mut().player_mut().pacer.set_scale(1e-3);
     harness.state_mut().show_instant(8.2e-3);
     harness.run_steps(3);

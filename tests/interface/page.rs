@@ -1,5 +1,4 @@
-//! What a web page needs of the application and the desktop has as well: links, files, fingers, small screens, reports for
-//! screen readers.
+//! Features that the web page needs and the desktop shares: links, files, touch, small screens, announcements for screen readers.
 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, VecDeque};
@@ -23,7 +22,7 @@ use jointplay::machine::Drive;
 use jointplay::scene::{DEFAULT_SCENE, Scene, Value};
 use jointplay::simulate::{Channels, Frame, Quantity, Simulation};
 
-/// What a host was asked for.
+/// Records the requests made to a host.
 #[derive(Default)]
 pub struct Calls {
     pub shared: Vec<String>,
@@ -34,17 +33,17 @@ pub struct Calls {
 }
 
 impl Calls {
-    /// A host that notes what it is asked for.
+    /// A host that records its requests.
     pub fn host() -> (Box<dyn Host>, Rc<RefCell<Self>>) {
         let calls = Rc::new(RefCell::new(Self::default()));
-        (Box::new(Page(calls.clone())), calls)
+        (Box::new(PageHost(calls.clone())), calls)
     }
 }
 
-/// A page without a browser.
-struct Page(Rc<RefCell<Calls>>);
+/// A web page's host without a browser.
+struct PageHost(Rc<RefCell<Calls>>);
 
-impl Host for Page {
+impl Host for PageHost {
     fn address(&self) -> String {
         "https://example.org/lab/".to_owned()
     }
@@ -82,7 +81,7 @@ impl Host for Page {
     }
 }
 
-/// A file in the hand of the mouse.
+/// A file dropped with the mouse.
 #[derive(Debug)]
 struct Dropped(PathBuf, &'static [u8]);
 
@@ -100,7 +99,7 @@ pub fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<R
     paced(options, size, 1.0 / 60.0)
 }
 
-/// The same with frames `dt` s after each other.
+/// As [`open`], with `dt` seconds between frames.
 pub fn paced(options: AppOptions, size: [f32; 2], dt: f32) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
     let mut options = options;
     options.theme = egui::Theme::Light.into();
@@ -122,16 +121,16 @@ pub fn window(scene: &str, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell
     open(options, size)
 }
 
-/// The one label whose text contains `words`; the report for screen readers may say the same.
+/// Whether exactly one visible label contains `words`; the announcement for screen readers is not counted.
 pub fn label(harness: &Harness<'_, App>, words: &str) -> bool {
     let labels = harness.query_all_by_label_contains(words).filter(|node| node.accesskit_node().role() == Role::Label);
     labels.count() == 1
 }
 
 const LARGE: [f32; 2] = [1280.0, 800.0];
-const UPRIGHT: [f32; 2] = [390.0, 844.0];
-const LYING: [f32; 2] = [844.0, 390.0];
-/// A small phone of ten years ago, or a laptop at four times the size.
+const PORTRAIT: [f32; 2] = [390.0, 844.0];
+const LANDSCAPE: [f32; 2] = [844.0, 390.0];
+/// A small, ten-year-old phone, or a laptop zoomed to 400 %.
 const TINY: [f32; 2] = [320.0, 480.0];
 
 pub fn click(harness: &mut Harness<'_, App>, label: &str) {
@@ -143,7 +142,7 @@ fn hash(harness: &Harness<'_, App>) -> u64 {
     harness.state().player().simulation().state_hash()
 }
 
-/// Runs until the link's state is reached, or not.
+/// Runs until the link's state has been reproduced or has failed to.
 pub fn verdict(harness: &mut Harness<'_, App>) -> Verdict {
     for _ in 0..600 {
         if let Some(verdict) = harness.state().verdict() {
@@ -174,7 +173,7 @@ fn a_copied_link_opens_the_same_state_with_the_same_bits() {
     assert!(link.len() < 600, "{} characters", link.len());
 
     let options = AppOptions::from_link(&link).expect("a link");
-    assert_eq!(options.scene.machine.contact.clearance, 0.3e-3, "the change came on the way");
+    assert_eq!(options.scene.machine.contact.clearance, 0.3e-3, "the change is in the log");
     let (mut copy, _) = open(options, LARGE);
     assert_eq!(verdict(&mut copy), Verdict::Agrees(hash(&harness)));
     copy.run();
@@ -186,7 +185,7 @@ fn a_copied_link_opens_the_same_state_with_the_same_bits() {
     let words = format!("State reproduced: hash {:016x} agrees", hash(&harness));
     assert!(label(&copy, &words));
     assert!(copy.state().announcement().starts_with(&words));
-    // It goes on with the same bits, and its own link is the same.
+    // It continues with the same bits, and its own link is the same.
     assert_eq!(copy.state().share_state(), harness.state().share_state());
     for harness in [&mut harness, &mut copy] {
         harness.state_mut().player_mut().run_to(0.1);
@@ -207,16 +206,16 @@ fn a_long_replay_shows_its_progress_and_can_be_stopped() {
     let link = "?scene=pendulum&method=rk4&solver.step=1us&t=100s";
     let options = AppOptions::from_link(link).expect("a link");
     let (mut harness, _) = open(options, LARGE);
-    let first = harness.state().replaying().expect("on its way");
+    let before = harness.state().replaying().expect("in progress");
     harness.get_by_label_contains("Reproducing the state of the link… 0 %");
     harness.run_steps(3);
-    let then = harness.state().replaying().expect("on its way still");
-    assert!(then > first, "{first} {then}");
-    // Meanwhile nothing else moves the machine.
+    let after = harness.state().replaying().expect("still in progress");
+    assert!(after > before, "{before} {after}");
+    // During the replay nothing else may move the machine.
     harness.key_press(Key::Space);
     harness.key_press(Key::R);
     harness.step();
-    assert!(harness.state().replaying().is_some_and(|now| now > first));
+    assert!(harness.state().replaying().is_some_and(|now| now > before));
     assert!(harness.state().share_state().contains("t=100s"));
     click(&mut harness, "Stop here");
     assert!(harness.state().replaying().is_none());
@@ -229,7 +228,7 @@ fn a_long_replay_shows_its_progress_and_can_be_stopped() {
 }
 
 #[test]
-fn a_bad_link_is_explained_and_the_default_scene_waits_behind_it() {
+fn a_bad_link_is_explained_over_the_paused_default_scene() {
     for (link, words) in [
         ("?scene=pendulun&embed=controls", "did you mean `pendulum`?"),
         ("?t=2000000s", "allowed 0 to 1000000 s"),
@@ -316,7 +315,7 @@ fn camera(harness: &Harness<'_, App>) -> Option<CameraPose> {
 
 #[test]
 fn one_finger_orbits_and_two_pan_and_zoom() {
-    let (mut harness, _) = window("spcmm", UPRIGHT);
+    let (mut harness, _) = window("spcmm", PORTRAIT);
     let opened = camera(&harness).expect("a link carries the camera");
     assert!(opened.fitted.is_some(), "as the scene opens");
     let middle = harness.get_by_label("3D view").rect().center();
@@ -338,15 +337,15 @@ fn one_finger_orbits_and_two_pan_and_zoom() {
     harness.step();
     touch(&harness, 1, TouchPhase::End, middle + vec2(60.0, 0.0));
     harness.run_steps(3);
-    let again = camera(&harness).expect("turned");
-    assert!((again.yaw - turned.yaw).abs() > 0.1, "{turned:?} {again:?}");
-    assert_eq!(again.target, turned.target);
-    assert_eq!(again.distance, turned.distance);
+    let second = camera(&harness).expect("turned");
+    assert!((second.yaw - turned.yaw).abs() > 0.1, "{turned:?} {second:?}");
+    assert_eq!(second.target, turned.target);
+    assert_eq!(second.distance, turned.distance);
 
-    // Both fingers side by side: a shift.
-    let fingers = |harness: &Harness<'_, App>, phase, apart: f32, shift: f32| {
-        touch(harness, 1, phase, middle + vec2(shift - apart, 0.0));
-        touch(harness, 2, phase, middle + vec2(shift + apart, 0.0));
+    // Both fingers move in parallel: a pan.
+    let fingers = |harness: &Harness<'_, App>, phase, spread: f32, shift: f32| {
+        touch(harness, 1, phase, middle + vec2(shift - spread, 0.0));
+        touch(harness, 2, phase, middle + vec2(shift + spread, 0.0));
     };
     fingers(&harness, TouchPhase::Start, 40.0, 0.0);
     harness.step();
@@ -355,17 +354,17 @@ fn one_finger_orbits_and_two_pan_and_zoom() {
         harness.step();
     }
     let shifted = camera(&harness).expect("shifted");
-    assert_eq!((shifted.yaw, shifted.pitch), (again.yaw, again.pitch));
-    assert_ne!(shifted.target, again.target);
-    // Then apart: nearer.
+    assert_eq!((shifted.yaw, shifted.pitch), (second.yaw, second.pitch));
+    assert_ne!(shifted.target, second.target);
+    // Then apart: a zoom in.
     for step in 1..=4 {
         fingers(&harness, TouchPhase::Move, 40.0 + 10.0 * step as f32, 40.0);
         harness.step();
     }
     let nearer = camera(&harness).expect("nearer");
     assert!(nearer.distance < 0.8 * shifted.distance, "{shifted:?} {nearer:?}");
-    assert_eq!((nearer.yaw, nearer.pitch), (again.yaw, again.pitch));
-    // The finger that stays longer turns nothing.
+    assert_eq!((nearer.yaw, nearer.pitch), (second.yaw, second.pitch));
+    // The finger left on the screen does not orbit.
     touch(&harness, 2, TouchPhase::End, middle + vec2(120.0, 0.0));
     harness.step();
     touch(&harness, 1, TouchPhase::Move, middle + vec2(-90.0, 30.0));
@@ -373,17 +372,17 @@ fn one_finger_orbits_and_two_pan_and_zoom() {
     touch(&harness, 1, TouchPhase::End, middle + vec2(-90.0, 30.0));
     harness.run_steps(3);
     let after = camera(&harness).expect("a camera");
-    assert_eq!((after.yaw, after.pitch), (again.yaw, again.pitch));
+    assert_eq!((after.yaw, after.pitch), (second.yaw, second.pitch));
 }
 
 #[test]
 fn a_double_tap_follows_what_it_hits() {
     let (mut harness, _) = window("spcmm", LARGE);
     // The first touch makes the controls larger and the picture a little smaller.
-    let ground = harness.get_by_label("3D view").rect().left_bottom() + vec2(200.0, -40.0);
-    touch(&harness, 1, TouchPhase::Start, ground);
+    let background = harness.get_by_label("3D view").rect().left_bottom() + vec2(200.0, -40.0);
+    touch(&harness, 1, TouchPhase::Start, background);
     harness.step();
-    touch(&harness, 1, TouchPhase::End, ground);
+    touch(&harness, 1, TouchPhase::End, background);
     harness.run_steps(60);
     harness.key_press(Key::F);
     harness.run();
@@ -394,7 +393,7 @@ fn a_double_tap_follows_what_it_hits() {
     harness.get_by_label_contains("Angular speed");
     harness.remove_cursor();
     harness.run();
-    // A finger is no mouse: the second tap comes down a little beside the first.
+    // A finger is less precise than a mouse: the second tap lands slightly beside the first.
     for beside in [0.0, 7.0] {
         touch(&harness, 1, TouchPhase::Start, platform + vec2(beside, 0.0));
         harness.step();
@@ -402,7 +401,7 @@ fn a_double_tap_follows_what_it_hits() {
         harness.step();
     }
     harness.run_steps(3);
-    // The link follows it, too, from where the camera is.
+    // The link carries the followed body and the camera.
     harness.state_mut().plots_mut().chosen.push(Quantity::Energy);
     harness.state_mut().plots_mut().window = PlotWindow::Last(0.01);
     harness.state_mut().microscope_mut().set_open(true);
@@ -429,8 +428,8 @@ fn a_double_tap_follows_what_it_hits() {
 }
 
 #[test]
-fn small_screens_have_controls_for_fingers_and_a_sheet_that_folds() {
-    for size in [UPRIGHT, LYING] {
+fn small_screens_have_touch_sized_controls_and_a_folding_sheet() {
+    for size in [PORTRAIT, LANDSCAPE] {
         let (mut harness, _) = window("spcmm", size);
         harness.run();
         let view = harness.get_by_label("3D view").rect();
@@ -454,7 +453,7 @@ fn small_screens_have_controls_for_fingers_and_a_sheet_that_folds() {
             seen += 1;
         }
         assert_eq!(seen, 11);
-        // Nothing that can be hit lies over another thing.
+        // No two touch targets overlap.
         let rects: Vec<egui::Rect> = ["Reset", "Play", "Step", "Controls", "Plots"]
             .map(|name| harness.get_by_role_and_label(Role::Button, name).rect())
             .into();
@@ -492,7 +491,7 @@ fn dialogs_and_menus_stay_on_a_small_screen() {
             .map(|node| format!("{:?} {:?}", node.accesskit_node().label(), node.rect()))
             .collect()
     };
-    for size in [UPRIGHT, LYING, TINY] {
+    for size in [PORTRAIT, LANDSCAPE, TINY] {
         let (mut harness, _) = window("spcmm", size);
         harness.run();
         let step = harness.get_by_role_and_label(Role::Button, "Step").rect();
@@ -510,7 +509,7 @@ fn dialogs_and_menus_stay_on_a_small_screen() {
         harness.key_press(Key::Escape);
         harness.run();
 
-        // What is too far down in a menu is reached by the wheel.
+        // The wheel scrolls to entries below the visible part of a menu.
         click(&mut harness, "Menu");
         harness.run();
         let first = harness.get_by_label("Open…").rect();
@@ -535,7 +534,7 @@ fn dialogs_and_menus_stay_on_a_small_screen() {
 }
 
 #[test]
-fn a_file_held_over_the_window_and_a_large_one_are_told() {
+fn a_hovered_file_is_highlighted_and_a_large_one_is_refused() {
     let (mut harness, calls) = window("pendulum", LARGE);
     let picture = harness.render().expect("a picture");
     harness.input_mut().hovered_files.push(egui::HoveredFile::default());
@@ -558,7 +557,7 @@ fn a_link_in_an_open_window_brings_its_theme() {
     let ctx = harness.ctx.clone();
     for (link, theme) in [
         ("#scene=pendulum&theme=dark", egui::Theme::Dark),
-        // Says nothing: it stays.
+        // Without a theme, the current one stays.
         ("#scene=pendulum", egui::Theme::Dark),
         ("#scene=pendulum&theme=light", egui::Theme::Light),
     ] {
@@ -569,7 +568,7 @@ fn a_link_in_an_open_window_brings_its_theme() {
 }
 
 #[test]
-fn a_finger_makes_the_controls_of_a_large_window_large_as_well() {
+fn touch_enlarges_the_controls_of_a_large_window() {
     let (mut harness, _) = window("spcmm", LARGE);
     let height = |harness: &Harness<'_, App>| harness.get_by_label("Open…").rect().height();
     assert!(height(&harness) < 30.0);
@@ -623,23 +622,23 @@ fn scene_record_and_picture_are_saved() {
     assert!(texts.iter().any(|t| t.text.contains("contact.clearance = 0.45 mm")));
     let pixels: std::collections::HashSet<&[u8]> = rgba.chunks_exact(4).collect();
     assert!(pixels.len() > 500, "an empty picture has few colours: {}", pixels.len());
-    // Where the button was on the screen, there is the ground.
+    // The saved picture shows the background where the screen shows a button.
     let button = harness.get_by_role_and_label(Role::Button, "View options").rect();
     let at = (button.left_top() + vec2(6.0, 10.0)) - view.min;
     let pixel = |x: f32, y: f32| {
         let i = 4 * (y as usize * info.width as usize + x as usize);
         [0, 1, 2].map(|c| i32::from(rgba[i + c]))
     };
-    let (on, beside) = (pixel(at.x, at.y), pixel(at.x - 16.0, at.y));
-    let apart = (0..3).map(|c| (on[c] - beside[c]).abs()).max();
-    assert!(apart < Some(6), "{on:?} {beside:?}");
+    let (under, beside) = (pixel(at.x, at.y), pixel(at.x - 16.0, at.y));
+    let difference = (0..3).map(|c| (under[c] - beside[c]).abs()).max();
+    assert!(difference < Some(6), "{under:?} {beside:?}");
 }
 
 /// The next file that is saved.
 pub fn next_file(harness: &mut Harness<'_, App>, calls: &Rc<RefCell<Calls>>) -> SaveFile {
-    let begun = std::time::Instant::now();
+    let start = std::time::Instant::now();
     while calls.borrow().saved.is_empty() {
-        assert!(begun.elapsed().as_secs() < 30, "nothing comes");
+        assert!(start.elapsed().as_secs() < 30, "no file was saved");
         std::thread::sleep(std::time::Duration::from_millis(5));
         harness.step();
     }
@@ -654,8 +653,8 @@ pub fn decoded(file: &SaveFile) -> (png::Info<'static>, Vec<u8>) {
     (reader.info().clone(), rgba)
 }
 
-/// Mean difference of the colours of a picture of the same view at `times` the size, put together again, 0 to 255.
-fn apart(small: &(png::Info<'_>, Vec<u8>), large: &(png::Info<'_>, Vec<u8>), times: usize) -> f64 {
+/// Mean colour difference, 0 to 255, between a picture and one of the same view at `times` the size, averaged down.
+fn mean_difference(small: &(png::Info<'_>, Vec<u8>), large: &(png::Info<'_>, Vec<u8>), times: usize) -> f64 {
     let (width, height) = (small.0.width as usize, small.0.height as usize);
     assert_eq!((large.0.width as usize, large.0.height as usize), (times * width, times * height));
     let mut sum = 0.0;
@@ -670,8 +669,8 @@ fn apart(small: &(png::Info<'_>, Vec<u8>), large: &(png::Info<'_>, Vec<u8>), tim
     sum / (3 * width * height) as f64
 }
 
-/// Length of the ruler of the forces in the lower right corner, pixels: the longest dark line across.
-fn ruler((info, rgba): &(png::Info<'_>, Vec<u8>)) -> usize {
+/// Length in pixels of the force scale in the lower right corner: the longest dark horizontal line.
+fn ruler_length((info, rgba): &(png::Info<'_>, Vec<u8>)) -> usize {
     let (width, height) = (info.width as usize, info.height as usize);
     let dark = |x: usize, y: usize| {
         let at = 4 * (y * width + x);
@@ -689,7 +688,7 @@ fn ruler((info, rgba): &(png::Info<'_>, Vec<u8>)) -> usize {
 }
 
 #[test]
-fn a_picture_has_the_size_and_the_parts_that_were_chosen_and_holds_what_is_on_show() {
+fn a_saved_picture_has_the_chosen_size_and_parts_and_matches_the_screen() {
     let (mut harness, calls) = window("spcmm", [900.0, 640.0]);
     give_graphics(&mut harness);
     harness.state_mut().player_mut().run_to(7.85e-3);
@@ -707,27 +706,27 @@ fn a_picture_has_the_size_and_the_parts_that_were_chosen_and_holds_what_is_on_sh
     let window = picture(&mut harness, &["Whole window", "1×"]);
     assert_eq!((window.0.width, window.0.height), (900, 640));
     let screen = (window.0.clone(), shown.into_raw());
-    let off = apart(&screen, &window, 1);
-    assert!(off < 0.3, "the window itself: {off}");
-    // The same names, ruler and arrows, only sharper.
-    let once = picture(&mut harness, &["View only"]);
-    let twice = picture(&mut harness, &["2×"]);
-    let off = apart(&once, &twice, 2);
-    // Finer lines of the floor, and letters.
-    assert!(off < 4.5, "the view at twice the size: {off}");
-    let [short, long] = [ruler(&once), ruler(&twice)];
+    let difference = mean_difference(&screen, &window, 1);
+    assert!(difference < 0.3, "the window itself: {difference}");
+    // Twice the size gives the same labels, ruler and arrows, only sharper.
+    let single = picture(&mut harness, &["View only"]);
+    let double = picture(&mut harness, &["2×"]);
+    let difference = mean_difference(&single, &double, 2);
+    // The tolerance covers the finer floor lines and letters.
+    assert!(difference < 4.5, "the view at twice the size: {difference}");
+    let [short, long] = [ruler_length(&single), ruler_length(&double)];
     assert!(short > 40 && long.abs_diff(2 * short) <= 3, "ruler {short}, {long}");
-    // A little more than the view was: its buttons are left out, and the plots are below.
+    // The buttons are left out, and the plots are below the view.
     let plots = picture(&mut harness, &["View and plots", "1×"]);
-    assert_eq!(plots.0.width, once.0.width);
-    assert!(plots.0.height > once.0.height + 150);
+    assert_eq!(plots.0.width, single.0.width);
+    assert!(plots.0.height > single.0.height + 150);
     let colours = |(info, rgba): &(png::Info<'_>, Vec<u8>)| {
-        let below = &rgba[4 * (info.width * once.0.height) as usize..];
+        let below = &rgba[4 * (info.width * single.0.height) as usize..];
         let all: std::collections::HashSet<&[u8]> = below.chunks_exact(4).collect();
         all.len()
     };
     assert!(colours(&plots) > 100, "plots: {}", colours(&plots));
-    // What was drawn beside the window has changed nothing in it.
+    // Drawing off screen has not changed the window.
     assert_eq!(harness.get_by_label("3D view").rect(), view);
 
     click(&mut harness, "Save");
@@ -754,19 +753,19 @@ fn a_picture_has_the_size_and_the_parts_that_were_chosen_and_holds_what_is_on_sh
 }
 
 #[test]
-fn on_the_desktop_a_path_is_asked_for_and_nothing_is_overwritten() {
+fn the_desktop_asks_for_a_path_and_overwrites_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("mine.csv").display().to_string();
     let (mut harness, _) = window("pendulum", LARGE);
     harness.state_mut().set_host(Box::new(DesktopHost::default()));
-    for again in [false, true] {
+    for exists in [false, true] {
         click(&mut harness, "Save");
         click(&mut harness, "Data (CSV)…");
         type_over(&mut harness, "Path", &path);
         harness.key_press(Key::Enter);
         harness.run_steps(3);
         let refused = label(&harness, "it is already there");
-        assert_eq!(refused, again);
+        assert_eq!(refused, exists);
     }
     let mut names: Vec<_> = std::fs::read_dir(folder.path())
         .expect("the folder")
@@ -781,7 +780,7 @@ fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
     let (mut harness, calls) = window("spcmm", LARGE);
     click(&mut harness, "Open…");
     assert_eq!(calls.borrow().picked, 1);
-    assert!(harness.query_by_label("Path").is_none(), "the host asks");
+    assert!(harness.query_by_label("Path").is_none(), "the host has its own dialog");
     let file = |name: &str, content| vec![OpenedFile { name: name.to_owned(), content }];
     for (bad, words) in [
         (Ok(b"name = [".to_vec()), "mine.toml:1"),
@@ -794,8 +793,8 @@ fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
         assert_eq!(harness.state().player().running().name, "spcmm");
     }
     let text = Scene::load("pendulum", &[]).expect("built in").source.text;
-    let mine = text.replace("name = \"pendulum\"", "name = \"mine\"");
-    calls.borrow_mut().to_open.push_back(file("mine.toml", Ok(mine.into_bytes())));
+    let renamed = text.replace("name = \"pendulum\"", "name = \"mine\"");
+    calls.borrow_mut().to_open.push_back(file("mine.toml", Ok(renamed.into_bytes())));
     harness.run_steps(3);
     assert_eq!(harness.state().player().running().name, "mine");
     assert!(!label(&harness, "it is gone"));
@@ -815,7 +814,7 @@ const LIFTED: &str = "name = \"lifted\"\ninclude = [\"own.toml\"]\n[[body]]\nnam
     [[joint]]\nname = \"a\"\nkind = \"prismatic\"\nchild = \"a\"\naxis = [0, 0, 1]\ndrive = { law = \"table\", file = \"lift.csv\" }\n";
 
 #[test]
-fn a_scene_and_the_files_that_it_names_are_dropped_at_once() {
+fn a_scene_and_its_files_can_be_dropped_together() {
     let (mut harness, calls) = window("pendulum", LARGE);
     let all: [(&str, &'static [u8]); 4] = [
         ("lifted.toml", LIFTED.as_bytes()),
@@ -830,7 +829,7 @@ fn a_scene_and_the_files_that_it_names_are_dropped_at_once() {
         }
         harness.run_steps(3);
     };
-    // What is missing is named, with what to do.
+    // The message names the missing file and the remedy.
     drop(&["lifted.toml", "a.obj", "own.toml"], &mut harness);
     assert!(label(&harness, "joint.a.drive.file = \"lift.csv\""));
     assert!(label(&harness, "choose or drop that file and the scene's at once"));
@@ -849,13 +848,13 @@ fn a_scene_and_the_files_that_it_names_are_dropped_at_once() {
         panic!("{drive:?}");
     };
     assert_eq!(points[..], [[0.0, 0.0], [0.5, 3e-3], [1.0, 0.0]]);
-    // A reset reads them again, from what was dropped.
+    // A reset reads the dropped files again.
     harness.key_press(Key::R);
     harness.run_steps(3);
     assert_eq!(harness.state().player().running().source.beside, scene.source.beside);
     assert!(!label(&harness, "no folder"));
 
-    // Chosen in the host's own dialog, with another scene after it.
+    // The files can also be chosen in the host's own dialog.
     let mut files = all.map(|(name, bytes)| OpenedFile { name: name.to_owned(), content: Ok(bytes.to_vec()) });
     files[0].content = Ok(LIFTED.replace("lifted", "again").into_bytes());
     calls.borrow_mut().to_open.push_back(files.to_vec());
@@ -864,12 +863,12 @@ fn a_scene_and_the_files_that_it_names_are_dropped_at_once() {
 }
 
 #[test]
-fn keys_and_tab_work_before_anything_was_clicked() {
+fn keys_and_tab_work_before_the_first_click() {
     let (mut harness, _) = window("spcmm", LARGE);
     harness.key_press(Key::ArrowRight);
     harness.step();
     assert_eq!(harness.state().player().steps(), 1);
-    // First to the button that most come for, and from there to every control.
+    // Tab goes to the most used button first, and from there to every control.
     let controls = |harness: &Harness<'_, App>| {
         let all = harness.root().children_recursive();
         let usable = all.map(|node| node.accesskit_node()).filter(|node| !node.is_disabled());
@@ -899,17 +898,17 @@ fn events_are_announced_to_assistive_software() {
     harness.run_steps(3);
     let words = harness.state().announcement().to_owned();
     assert!(words.contains("Paused at ") && words.contains("S1 "), "{words}");
-    let told = calls.borrow().announced.clone();
-    assert_eq!(told.last(), Some(&words));
-    assert!(told.iter().any(|text| text.contains("Running at time scale 1:50")));
-    assert!(told.iter().any(|text| text.contains("Largest normal force since the last report")));
-    assert!((4..=6).contains(&told.len()), "{told:#?}");
+    let announcements = calls.borrow().announced.clone();
+    assert_eq!(announcements.last(), Some(&words));
+    assert!(announcements.iter().any(|text| text.contains("Running at time scale 1:50")));
+    assert!(announcements.iter().any(|text| text.contains("Largest normal force since the last report")));
+    assert!((4..=6).contains(&announcements.len()), "{announcements:#?}");
     let node = harness.get_by_role_and_label(Role::Status, &words);
     assert_eq!(node.accesskit_node().live(), Live::Polite);
 }
 
 #[test]
-fn the_about_box_names_version_state_and_adapter() {
+fn the_about_box_shows_version_state_and_adapter() {
     let (mut harness, _) = window("pendulum", LARGE);
     give_graphics(&mut harness);
     click(&mut harness, "About");
@@ -926,21 +925,21 @@ fn recorded_channels_have_the_columns_of_a_run() {
         Simulation::new(&scene.machine).expect("starts").sample(0.0, &mut frame);
         let table = Table::new(&scene, &frame);
         for channel in Channels::of(&scene.machine).list() {
-            // A run has friction as a vector, energies instead of their changes, no live change that does work, no hand that pulls,
+            // A run writes friction as a vector and energies instead of their changes; it has no live changes, no pulling hand
             // and no ghost.
-            let in_other_words = ["change_work_J", "kinetic_change_J", "elastic_change_J"];
-            let own = matches!(channel.quantity, Quantity::FrictionForce | Quantity::TipError)
-                || in_other_words.contains(&channel.column())
+            let replaced = ["change_work_J", "kinetic_change_J", "elastic_change_J"];
+            let window_only = matches!(channel.quantity, Quantity::FrictionForce | Quantity::TipError)
+                || replaced.contains(&channel.column())
                 || (channel.column() == "external_work_J" && scene.machine.elements.is_empty());
-            let there = table.names().iter().any(|name| name == channel.column());
-            assert_eq!(there, !own, "{name}: {}", channel.column());
+            let in_run = table.names().iter().any(|name| name == channel.column());
+            assert_eq!(in_run, !window_only, "{name}: {}", channel.column());
         }
     }
 }
 
 #[test]
 fn phones_show_what_is_stored() {
-    for (name, size) in [("phone_upright", UPRIGHT), ("phone_lying", LYING)] {
+    for (name, size) in [("phone_upright", PORTRAIT), ("phone_lying", LANDSCAPE)] {
         let mut harness = plain("spcmm", &[], size, egui::Theme::Light);
         let (page, _) = Calls::host();
         harness.state_mut().set_host(page);
@@ -958,8 +957,8 @@ fn focused(harness: &Harness<'_, App>) -> Option<String> {
 }
 
 #[test]
-fn a_menu_that_the_keyboard_opens_begins_at_its_first_entry_and_closes_behind_its_last() {
-    for (size, name, first) in [(LARGE, "Save", "Picture…"), (UPRIGHT, "Menu", "Open…")] {
+fn a_menu_opened_by_keyboard_focuses_its_first_entry_and_closes_after_its_last() {
+    for (size, name, first) in [(LARGE, "Save", "Picture…"), (PORTRAIT, "Menu", "Open…")] {
         let (mut harness, _) = window("spcmm", size);
         let menu = harness.get_by_role_and_label(Role::Button, name);
         menu.focus();
@@ -980,30 +979,30 @@ fn a_menu_that_the_keyboard_opens_begins_at_its_first_entry_and_closes_behind_it
     }
 }
 
-/// Types `text` into the dialog that is open and enters it.
-fn answer(harness: &mut Harness<'_, App>, text: &str) {
+/// Types `text` into the open dialog and presses Enter.
+fn enter_path(harness: &mut Harness<'_, App>, text: &str) {
     type_over(harness, "Path", text);
     harness.key_press(Key::Enter);
     harness.run_steps(4);
 }
 
 #[test]
-fn the_buttons_of_a_dialog_stay_when_it_has_an_error_to_show() {
+fn the_buttons_of_a_dialog_stay_in_place_while_it_shows_an_error() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("bad.toml");
     std::fs::write(&path, "[contact]\nclearance = 3\n".repeat(20)).expect("written");
-    for size in [LARGE, LYING, TINY] {
+    for size in [LARGE, LANDSCAPE, TINY] {
         let (mut harness, _) = window("spcmm", size);
         harness.state_mut().set_host(Box::new(DesktopHost::default()));
         harness.get_by_role_and_label(Role::ComboBox, "Scene").click();
         harness.run_steps(3);
         click(&mut harness, "Link…");
-        answer(&mut harness, &path.display().to_string());
+        enter_path(&mut harness, &path.display().to_string());
         harness.get_by_label_contains("bad.toml:");
         let [open, close] = ["Open", "Close"].map(|name| harness.get_by_role_and_label(Role::Button, name).rect());
         assert!(!open.intersects(close.shrink(1.0)), "{open:?} {close:?}");
         assert!(open.bottom() <= size[1] && (open.center().y - close.center().y).abs() < 1.0);
-        // It can be mended and entered with the mouse.
+        // The path can be corrected and confirmed with the mouse.
         let field = harness.get_by_role_and_label(Role::TextInput, "Path");
         field.focus();
         harness.step();
@@ -1019,8 +1018,8 @@ fn the_buttons_of_a_dialog_stay_when_it_has_an_error_to_show() {
     }
 }
 
-/// The text that was just put on the clipboard.
-fn on_clipboard(harness: &Harness<'_, App>) -> Option<String> {
+/// The text copied to the clipboard in this frame.
+fn clipboard_text(harness: &Harness<'_, App>) -> Option<String> {
     let commands = &harness.output().platform_output.commands;
     commands.iter().find_map(|command| match command {
         egui::OutputCommand::CopyText(text) => Some(text.clone()),
@@ -1028,12 +1027,12 @@ fn on_clipboard(harness: &Harness<'_, App>) -> Option<String> {
     })
 }
 
-/// What a click on `Copy link` puts on the clipboard; where it asks for an address, without one.
-fn copied(harness: &mut Harness<'_, App>) -> String {
+/// The text that a click on `Copy link` copies to the clipboard, without an address where the dialog asks for one.
+fn copy_link(harness: &mut Harness<'_, App>) -> String {
     harness.get_by_label("Copy link").click();
     for _ in 0..8 {
         harness.step();
-        if let Some(text) = on_clipboard(harness) {
+        if let Some(text) = clipboard_text(harness) {
             return text;
         }
         if let Some(copy) = harness.query_by_label("Copy") {
@@ -1044,28 +1043,28 @@ fn copied(harness: &mut Harness<'_, App>) -> String {
 }
 
 #[test]
-fn a_link_without_an_address_says_so_before_it_is_copied_and_takes_one() {
+fn a_link_without_an_address_warns_before_it_is_copied_and_accepts_one() {
     let (mut harness, _) = window("pendulum", LARGE);
     harness.state_mut().set_host(Box::new(DesktopHost::default()));
-    let says = |harness: &Harness<'_, App>, words: &str| assert!(label(harness, words), "{words}");
+    let assert_label = |harness: &Harness<'_, App>, words: &str| assert!(label(harness, words), "{words}");
     harness.get_by_label("Copy link").click();
     for _ in 0..3 {
         harness.step();
-        assert_eq!(on_clipboard(&harness), None);
+        assert_eq!(clipboard_text(&harness), None);
     }
-    says(&harness, "Without one the link begins with #");
-    says(&harness, "No QR code without an address");
+    assert_label(&harness, "Without one the link begins with #");
+    assert_label(&harness, "No QR code without an address");
     let keep = |harness: &mut Harness<'_, App>, name: &str| {
         if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
             harness.render().expect("drawn").save(std::path::Path::new(&keep).join(name)).expect("writable");
         }
     };
     keep(&mut harness, "link-without-address.png");
-    let code =
+    let has_code =
         |harness: &Harness<'_, App>| harness.query_by_role_and_label(Role::Image, "QR code of the link").is_some();
     let enabled = |harness: &Harness<'_, App>| !harness.get_by_label("Copy").accesskit_node().is_disabled();
-    assert!(!code(&harness) && enabled(&harness));
-    let place = harness.get_by_label("Copy").rect();
+    assert!(!has_code(&harness) && enabled(&harness));
+    let position = harness.get_by_label("Copy").rect();
     for (typed, words, can_be_copied) in [
         ("example.org", "not an address of a page", false),
         ("http://localhost:8000/", "other devices cannot reach http://localhost:8000/", true),
@@ -1073,48 +1072,48 @@ fn a_link_without_an_address_says_so_before_it_is_copied_and_takes_one() {
     ] {
         type_over(&mut harness, "Address of the page", typed);
         harness.run_steps(2);
-        says(&harness, words);
+        assert_label(&harness, words);
         assert_eq!(enabled(&harness), can_be_copied, "{typed}");
-        assert_eq!(harness.get_by_label("Copy").rect(), place, "{typed}");
+        assert_eq!(harness.get_by_label("Copy").rect(), position, "{typed}");
     }
-    assert!(code(&harness));
+    assert!(has_code(&harness));
     keep(&mut harness, "link-with-address.png");
     harness.get_by_label("Copy").click();
     harness.step();
-    let link = on_clipboard(&harness).expect("copied");
+    let link = clipboard_text(&harness).expect("copied");
     assert!(link.starts_with("https://example.org/lab/#scene=pendulum"), "{link}");
-    // It is remembered, also for the line for another page.
-    assert_eq!(copied(&mut harness), link);
+    // The address is remembered, and the embedding line uses it.
+    assert_eq!(copy_link(&mut harness), link);
     assert!(harness.state().embedding().expect("a line").contains("https://example.org/lab/#"));
     click(&mut harness, "Save");
     keep(&mut harness, "save-menu.png");
     click(&mut harness, "QR code");
-    assert!(code(&harness) && harness.query_by_label("Address of the page").is_none());
+    assert!(has_code(&harness) && harness.query_by_label("Address of the page").is_none());
 }
 
 #[test]
-fn a_link_of_the_window_opens_in_every_form_and_brings_the_camera() {
+fn a_link_from_the_window_opens_in_every_form_and_restores_the_camera() {
     let (mut harness, _) = window("spcmm", LARGE);
     harness.state_mut().player_mut().run_to(9e-3);
     harness.run();
-    let bare = copied_from(&mut harness, "");
+    let bare = copy_link_from(&mut harness, "");
     assert!(bare.starts_with("#scene=spcmm&"), "{bare}");
     let page = "https://example.org/lab/";
-    let whole = copied_from(&mut harness, page);
-    assert_eq!(whole, format!("{page}{bare}"));
+    let full = copy_link_from(&mut harness, page);
+    assert_eq!(full, format!("{page}{bare}"));
     let pairs = bare.trim_start_matches('#');
     let here = (hash(&harness), camera(&harness));
     assert!(here.1.is_some());
-    for link in [whole.clone(), bare.clone(), format!("?{pairs}"), pairs.to_owned(), format!("{page}?{pairs}")] {
+    for link in [full.clone(), bare.clone(), format!("?{pairs}"), pairs.to_owned(), format!("{page}?{pairs}")] {
         assert!(AppOptions::from_link(&link).is_ok(), "{link}");
         for pasted in [false, true] {
             let (mut other, _) = window("pendulum", LARGE);
             other.state_mut().set_host(Box::new(DesktopHost::default()));
             if !pasted {
                 click(&mut other, "Open…");
-                answer(&mut other, &link);
+                enter_path(&mut other, &link);
             } else if link == pairs {
-                // Without a sign of a link before it, text is left alone only where it has no pairs.
+                // Pasted text without a leading # or ? is ignored unless it contains key=value pairs.
                 other.event(Event::Paste("some words".to_owned()));
                 other.run_steps(2);
                 assert_eq!(other.state().player().running().name, "pendulum");
@@ -1127,8 +1126,8 @@ fn a_link_of_the_window_opens_in_every_form_and_brings_the_camera() {
             assert_eq!((hash(&other), camera(&other)), here, "{link}");
         }
     }
-    // On a screen of another shape everything is in sight again.
-    let (mut phone, _) = open(AppOptions::from_link(&whole).expect("a link"), UPRIGHT);
+    // On a screen of another aspect ratio the camera fits the scene again.
+    let (mut phone, _) = open(AppOptions::from_link(&full).expect("a link"), PORTRAIT);
     verdict(&mut phone);
     phone.run();
     let there = camera(&phone).expect("a camera");
@@ -1136,14 +1135,14 @@ fn a_link_of_the_window_opens_in_every_form_and_brings_the_camera() {
     assert_ne!(Some(there), here.1);
 }
 
-fn copied_from(harness: &mut Harness<'_, App>, page: &str) -> String {
+fn copy_link_from(harness: &mut Harness<'_, App>, page: &str) -> String {
     let host = DesktopHost::new(page.to_owned());
     harness.state_mut().set_host(Box::new(host));
-    copied(harness)
+    copy_link(harness)
 }
 
 #[test]
-fn a_first_visit_shows_a_lasting_motion_one_click_from_the_papers_machine() {
+fn a_first_visit_shows_a_sustained_motion_one_click_from_the_papers_machine() {
     for link in ["", "?", "?theme=light", "?renderer=webgl"] {
         let options = AppOptions::from_link(link).expect("a link");
         assert_eq!(options.scene.changes.len(), 2, "{link}");
@@ -1155,7 +1154,7 @@ fn a_first_visit_shows_a_lasting_motion_one_click_from_the_papers_machine() {
     }
     let (mut harness, _) = open(AppOptions::from_link("").expect("a link"), LARGE);
     assert!(label(&harness, "Driven at 6 Hz; in the paper at 0.5 Hz"));
-    // The change is one like any other: shown as such, and taken back.
+    // The change is listed like any other and can be undone.
     assert_eq!(harness.state().player().pending().changes[0].0, "spcmm.frequency");
     harness.run_steps(120);
     let turns = harness.state().player().pacer.shown() * 6.0;
@@ -1166,7 +1165,7 @@ fn a_first_visit_shows_a_lasting_motion_one_click_from_the_papers_machine() {
     assert!(player.pending().changes.is_empty() && player.is_playing());
     assert_eq!(player.pacer.scale(), 0.02);
     assert!(!label(&harness, "Driven at 6 Hz; in the paper at 0.5 Hz"));
-    // Dismissed, it is silent.
+    // Once dismissed, the note does not return.
     let (mut harness, _) = open(AppOptions::first(), LARGE);
     harness.get_by_label("Dismiss").click();
     harness.run_steps(3);
@@ -1175,7 +1174,7 @@ fn a_first_visit_shows_a_lasting_motion_one_click_from_the_papers_machine() {
 }
 
 #[test]
-fn another_scene_brings_its_own_pace_and_plots_and_the_same_one_keeps_them() {
+fn another_scene_brings_its_own_time_scale_and_plots_and_reopening_keeps_them() {
     let (mut harness, _) = window("spcmm", LARGE);
     let app = harness.state_mut();
     app.player_mut().pacer.set_scale(1e-3);
@@ -1185,7 +1184,7 @@ fn another_scene_brings_its_own_pace_and_plots_and_the_same_one_keeps_them() {
     assert_eq!(app.player().pacer.scale(), 0.125);
     assert_eq!(app.plots_mut().window, PlotWindow::Automatic);
     assert_eq!(app.plots_mut().chosen, [Quantity::NormalForce, Quantity::Acceleration]);
-    // A link without plots brings these, too.
+    // A link without plots selects the scene's own, too.
     assert_eq!(app.link().plots, None);
     app.plots_mut().window = PlotWindow::Everything;
     app.player_mut().pacer.set_scale(0.5);

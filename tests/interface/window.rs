@@ -1,4 +1,4 @@
-//! The window, driven by role and label as a person with a screen reader would.
+//! The window, operated by role and label as by a user with a screen reader.
 
 use crate::golden;
 use crate::hands::{compare_window, opened, plain, type_over};
@@ -37,7 +37,7 @@ fn clearance(harness: &Harness<'_, App>) -> f64 {
 }
 
 /// Largest normal force since the reset, N.
-fn hardest(harness: &Harness<'_, App>) -> f64 {
+fn peak_force(harness: &Harness<'_, App>) -> f64 {
     let statistics = harness.state().player().simulation().statistics();
     statistics.peak_normal.iter().copied().fold(0.0, f64::max)
 }
@@ -48,7 +48,7 @@ pub(crate) fn click(harness: &mut Harness<'_, App>, label: &str) {
     harness.step();
 }
 
-/// Replaces what stands in a text field and presses Enter.
+/// Replaces the content of a text field and presses Enter.
 fn type_into(harness: &mut Harness<'_, App>, label: &str, text: &str) {
     type_over(harness, label, text);
     harness.key_press(Key::Enter);
@@ -61,7 +61,7 @@ fn the_clearance_slider_changes_when_the_balls_hit() {
     // A free fall through 0.3 mm takes 7.8 ms, through 0.5 mm 10.1 ms.
     let mut harness = window("spcmm");
     harness.state_mut().player_mut().run_to(9.0e-3);
-    assert!(hardest(&harness) > 100.0, "at 0.3 mm all three joints have been hit by 9 ms");
+    assert!(peak_force(&harness) > 100.0, "at 0.3 mm all three joints have been hit by 9 ms");
 
     let slider = harness.get_by_role_and_label(Role::Slider, "Clearance");
     assert!((slider.accesskit_node().numeric_value().expect("a slider has a value") - 0.3).abs() < 1e-9);
@@ -72,9 +72,9 @@ fn the_clearance_slider_changes_when_the_balls_hit() {
     click(&mut harness, "Reset");
     assert_eq!(time(&harness), 0.0);
     harness.state_mut().player_mut().run_to(9.0e-3);
-    assert!(hardest(&harness) < 1.0, "at 0.5 mm nothing has been hit by 9 ms");
+    assert!(peak_force(&harness) < 1.0, "at 0.5 mm nothing has been hit by 9 ms");
     harness.state_mut().player_mut().run_to(12.0e-3);
-    assert!(hardest(&harness) > 100.0);
+    assert!(peak_force(&harness) > 100.0);
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn a_drag_on_the_friction_slider_moves_friction() {
 }
 
 #[test]
-fn a_typed_value_takes_any_unit_and_a_bad_one_stays_to_be_mended() {
+fn a_typed_value_takes_any_unit_and_a_bad_one_stays_for_correction() {
     let mut harness = window("spcmm");
     type_into(&mut harness, "Clearance", "500 um");
     assert!((clearance(&harness) - 0.5e-3).abs() < 1e-12);
@@ -114,12 +114,12 @@ fn a_typed_value_takes_any_unit_and_a_bad_one_stays_to_be_mended() {
     type_into(&mut harness, "Clearance", "0.4 kg");
     assert!((clearance(&harness) - 0.4e-3).abs() < 1e-12, "the running value stays");
     let field = harness.get_by_role_and_label(Role::TextInput, "Clearance");
-    assert_eq!(field.value().as_deref(), Some("0.4 kg"), "what was typed is not lost");
+    assert_eq!(field.value().as_deref(), Some("0.4 kg"), "the typed text is not lost");
     harness.get_by_label_contains("wrong unit");
 
     type_into(&mut harness, "Clearance", "0.2 mm");
     assert!((clearance(&harness) - 0.2e-3).abs() < 1e-12);
-    assert!(harness.query_by_label_contains("wrong unit").is_none(), "mended, the complaint goes");
+    assert!(harness.query_by_label_contains("wrong unit").is_none(), "the message goes once the value is corrected");
 
     click(&mut harness, "Reset Clearance");
     assert!((clearance(&harness) - 0.3e-3).abs() < 1e-12, "back to the scene's own value");
@@ -162,7 +162,7 @@ fn a_single_step_is_one_step_of_the_solver() {
 }
 
 #[test]
-fn reset_goes_back_to_the_same_bits() {
+fn a_reset_restores_the_same_bits() {
     let mut harness = window("spcmm");
     let start = harness.state().player().simulation().state_hash();
     harness.state_mut().player_mut().run_to(10.0e-3);
@@ -215,7 +215,7 @@ fn the_question_mark_lists_the_keys_and_escape_closes() {
     harness.key_press(Key::Questionmark);
     harness.run();
     harness.get_by_label("Play or pause");
-    // Under the list the machine is out of reach.
+    // While the list is open, keys do not reach the machine.
     harness.key_press(Key::Space);
     harness.step();
     assert!(!harness.state().player().is_playing());
@@ -225,18 +225,18 @@ fn the_question_mark_lists_the_keys_and_escape_closes() {
 }
 
 #[test]
-fn the_whole_list_of_keys_is_in_sight() {
+fn the_whole_list_of_keys_is_visible() {
     for size in [[1280.0, 800.0], [1920.0, 1080.0]] {
         let mut harness = sized("pendulum", size, egui::Theme::Light);
         harness.key_press(Key::Questionmark);
         harness.run();
         let dialog = egui::Rect::from_min_size(egui::Pos2::ZERO, size.into());
-        let end = harness.get_by_role_and_label(Role::Button, "Close").rect().top();
+        let bottom = harness.get_by_role_and_label(Role::Button, "Close").rect().top();
         for words in
             ["Play or pause", "Faster", "Force arrows on or off", "This list", "Open a link", "Move that slider"]
         {
             let row = harness.get_by_label(words).rect();
-            assert!(dialog.contains_rect(row) && row.bottom() <= end, "{size:?}: {words} at {row}");
+            assert!(dialog.contains_rect(row) && row.bottom() <= bottom, "{size:?}: {words} at {row}");
         }
     }
 }
@@ -260,7 +260,7 @@ fn switches_in_the_header_show_and_hide_the_panels() {
 }
 
 #[test]
-fn the_list_of_scenes_says_what_each_is() {
+fn the_list_of_scenes_describes_each_scene() {
     let mut harness = window("pendulum");
     harness.get_by_role_and_label(Role::ComboBox, "Scene").click();
     harness.run();
@@ -275,7 +275,7 @@ fn the_list_of_scenes_says_what_each_is() {
 }
 
 #[test]
-fn another_scene_opens_and_a_bad_one_leaves_the_running_one() {
+fn another_scene_opens_and_a_bad_one_leaves_the_running_scene() {
     let mut harness = window("spcmm");
     harness.get_by_role_and_label(Role::ComboBox, "Scene").click();
     harness.run();
@@ -323,7 +323,7 @@ fn a_value_that_waits_for_the_reset_says_so() {
 }
 
 #[test]
-fn a_parameter_of_the_file_is_a_slider_at_once_and_moves_the_machine_at_the_reset() {
+fn a_parameter_of_the_file_becomes_a_slider_and_applies_at_the_reset() {
     let text = include_str!("../../docs/scene-format.md");
     let blocks = text.split("```toml\n").skip(1);
     let example = blocks
@@ -338,7 +338,7 @@ fn a_parameter_of_the_file_is_a_slider_at_once_and_moves_the_machine_at_the_rese
         let player = harness.state().player();
         player.simulation().pending().machine.ball_joints[0].socket.point.x
     };
-    // In sight without opening a group, with its unit.
+    // It is visible without opening a group.
     assert!(harness.query_all_by_label("Crank radius").count() > 1);
     harness.state_mut().player_mut().run_to(1e-3);
     type_into(&mut harness, "Crank radius", "30 mm");
@@ -352,7 +352,7 @@ fn a_parameter_of_the_file_is_a_slider_at_once_and_moves_the_machine_at_the_rese
 }
 
 #[test]
-fn low_restitution_with_the_papers_law_is_commented_on() {
+fn low_restitution_with_the_papers_law_raises_a_comment() {
     let mut harness = window("spcmm");
     assert!(harness.query_by_label_contains("with lankarani-nikravesh gives").is_none());
     harness.get_by_role_and_label(Role::Slider, "Restitution").set_value_accesskit(0.3);
@@ -362,7 +362,7 @@ fn low_restitution_with_the_papers_law_is_commented_on() {
 }
 
 #[test]
-fn the_divergence_guard_says_what_happened_and_a_reset_helps() {
+fn the_divergence_guard_explains_the_stop_and_a_reset_recovers() {
     let mut harness = window("spcmm");
     let player = harness.state_mut().player_mut();
     player.set("solver.method", "rk4").expect("a method");
@@ -414,7 +414,7 @@ fn arrows_move_the_slider_that_was_dragged_and_step_again_after_a_click_elsewher
         assert!(sign * (now - before) > 0.0, "{key:?}: {before} to {now}");
         before = now;
     }
-    assert_eq!(steps(&harness), 0, "the machine stands");
+    assert_eq!(steps(&harness), 0, "the machine does not step");
     assert_eq!(harness.state().player().pacer.scale(), 0.02);
     // A slider has no use for the space bar.
     harness.key_press(Key::Space);
@@ -428,7 +428,7 @@ fn arrows_move_the_slider_that_was_dragged_and_step_again_after_a_click_elsewher
 }
 
 #[test]
-fn keys_leave_a_field_alone_that_is_being_typed_in() {
+fn shortcut_keys_are_ignored_while_a_field_is_edited() {
     let mut harness = window("spcmm");
     harness.get_by_role_and_label(Role::TextInput, "Clearance").focus();
     harness.step();
@@ -441,7 +441,7 @@ fn keys_leave_a_field_alone_that_is_being_typed_in() {
 #[test]
 fn every_control_has_a_name() {
     let mut harness = window("spcmm");
-    // All groups of parameters open.
+    // Opens all groups of parameters.
     for group in ["One joint", "Contact", "Gravity", "Solver"] {
         if let Some(header) = harness.query_by_role_and_label(Role::Button, group) {
             header.click();
@@ -545,7 +545,7 @@ fn look() {
 }
 
 #[test]
-fn a_settled_run_says_so_beside_the_picture_and_a_swinging_one_never() {
+fn a_settled_run_is_reported_beside_the_picture_and_a_swinging_one_never() {
     let mut harness = window("spcmm");
     let player = harness.state_mut().player_mut();
     player.pacer.set_scale(1.0);
@@ -554,19 +554,19 @@ fn a_settled_run_says_so_beside_the_picture_and_a_swinging_one_never() {
     harness.step();
     assert!(harness.query_by_label("At rest. Press R to restart").is_none());
 
-    // Stepping must not depend on how fast this machine is.
+    // Stepping must not depend on the speed of this computer.
     harness.state_mut().player_mut().run_to(0.5);
-    let places = |harness: &Harness<'_, App>| {
+    let control_rects = |harness: &Harness<'_, App>| {
         ["Step", "3D view", "Time scale preset"].map(|label| harness.get_by_label(label).rect())
     };
     harness.step();
     assert!(harness.query_by_label("At rest. Press R to restart").is_none());
-    let paused = places(&harness);
+    let paused = control_rects(&harness);
     harness.state_mut().player_mut().set_playing(true);
     harness.step();
     let words = harness.get_by_label("At rest. Press R to restart").rect();
     assert!(!words.intersects(harness.get_by_label("3D view").rect()));
-    assert_eq!(places(&harness), paused, "nothing gives way for it");
+    assert_eq!(control_rects(&harness), paused, "the layout does not shift for it");
 
     for (scene, times) in [("pendulum", [1.0, 2.0]), ("chain", [0.7, 1.0])] {
         let mut harness = window(scene);
@@ -580,36 +580,36 @@ fn a_settled_run_says_so_beside_the_picture_and_a_swinging_one_never() {
 }
 
 /// Pixels in the colour of normal forces, left of the legend in the 3D view.
-fn orange(harness: &mut Harness<'_, App>) -> usize {
+fn count_orange_pixels(harness: &mut Harness<'_, App>) -> usize {
     let view = harness.get_by_label("3D view").rect();
     let picture = harness.render().expect("drawn");
-    let mut found = 0;
+    let mut count = 0;
     for y in view.top() as u32..view.bottom() as u32 {
         for x in view.left() as u32..(view.right() - 200.0) as u32 {
             let [r, g, b, _] = picture.get_pixel(x, y).0.map(u32::from);
             // Less yellow than a rod, less red than the probe and the X axis.
             let hue = (25..52).contains(&(100 * g / r.max(1))) && 100 * b < 25 * r;
-            found += usize::from(r > 110 && hue);
+            count += usize::from(r > 110 && hue);
         }
     }
-    found
+    count
 }
 
 #[test]
-fn an_arrow_is_a_force_of_the_instant_on_show_and_a_peak_is_marked_apart() {
+fn arrows_show_forces_of_the_displayed_instant_and_peaks_are_marked_separately() {
     let mut harness = window("spcmm");
     harness.state_mut().player_mut().run_to(7.0e-3);
     harness.run();
-    assert_eq!(orange(&mut harness), 0, "nothing has touched yet");
+    assert_eq!(count_orange_pixels(&mut harness), 0, "nothing has touched yet");
     harness.state_mut().player_mut().run_to(9.0e-3);
     harness.run();
     let player = harness.state().player();
     assert!(player.frame().joints.iter().all(|joint| joint.normal_force.norm() == 0.0));
-    let marked = orange(&mut harness);
+    let marked = count_orange_pixels(&mut harness);
     assert!(marked > 100, "three joints were hit: {marked}");
-    // It stands for as long as nobody plays.
+    // The mark stays while the run is paused.
     harness.run_steps(120);
-    assert_eq!(orange(&mut harness), marked);
+    assert_eq!(count_orange_pixels(&mut harness), marked);
 
     harness.get_by_label("View options").click();
     harness.run();
@@ -617,11 +617,11 @@ fn an_arrow_is_a_force_of_the_instant_on_show_and_a_peak_is_marked_apart() {
     harness.run();
     harness.key_press(Key::Escape);
     harness.run();
-    assert_eq!(orange(&mut harness), 0, "no arrow without a force");
+    assert_eq!(count_orange_pixels(&mut harness), 0, "no arrow without a force");
 }
 
 #[test]
-fn the_wear_map_comes_with_its_scale_and_goes_with_the_reset() {
+fn the_wear_map_appears_with_its_scale_and_a_reset_clears_it() {
     let mut harness = window("spcmm");
     harness.state_mut().player_mut().run_to(9.0e-3);
     harness.run();
@@ -659,28 +659,28 @@ fn after_a_reset_or_a_step_back_no_future_force_is_displayed() {
     let mut harness = window("spcmm");
     harness.state_mut().player_mut().run_to(9.0e-3);
     harness.run();
-    assert!(orange(&mut harness) > 100);
+    assert!(count_orange_pixels(&mut harness) > 100);
     harness.key_press(Key::R);
     harness.run();
-    assert_eq!(orange(&mut harness), 0);
+    assert_eq!(count_orange_pixels(&mut harness), 0);
 
     harness.state_mut().player_mut().run_to(7.79e-3);
     harness.run();
     let mut steps = 0;
-    while hardest(&harness) < 400.0 {
+    while peak_force(&harness) < 400.0 {
         harness.key_press(Key::ArrowRight);
         harness.step();
         steps += 1;
         assert!(steps < 64);
     }
-    assert!(orange(&mut harness) > 100);
+    assert!(count_orange_pixels(&mut harness) > 100);
     for _ in 0..steps {
         harness.key_press(Key::ArrowLeft);
         harness.step();
     }
     harness.run();
-    assert!(hardest(&harness) < 1.0);
-    assert_eq!(orange(&mut harness), 0);
+    assert!(peak_force(&harness) < 1.0);
+    assert_eq!(count_orange_pixels(&mut harness), 0);
 }
 
 #[test]
@@ -706,21 +706,21 @@ fn the_tooltip_of_restitution_states_the_law_in_use() {
 }
 
 #[test]
-fn a_tooltip_of_a_control_leaves_the_picture_alone_and_gives_way_to_a_dialog() {
+fn a_tooltip_of_a_control_does_not_cover_the_picture_and_closes_for_a_dialog() {
     let mut harness = window("spcmm");
     let slider = harness.get_by_role_and_label(Role::Slider, "Clearance").rect();
     harness.hover_at(slider.center());
     harness.run_steps(60);
-    let range =
+    let tooltip_rect =
         |harness: &Harness<'_, App>| harness.query_by_label_contains("Key contact.clearance").map(|label| label.rect());
-    let tooltip = range(&harness).expect("a tooltip");
+    let tooltip = tooltip_rect(&harness).expect("a tooltip");
     let view = harness.get_by_label("3D view").rect();
     assert!(tooltip.right() < view.left(), "{tooltip:?} over {view:?}");
     assert!(tooltip.top() > slider.bottom(), "{tooltip:?} over {slider:?}");
     harness.key_press(Key::Questionmark);
     harness.run_steps(10);
     harness.get_by_label("Play or pause");
-    assert!(range(&harness).is_none(), "it stays open over the list of keys");
+    assert!(tooltip_rect(&harness).is_none(), "it stays open over the list of keys");
 }
 
 #[test]
@@ -788,7 +788,7 @@ fn any_channel_is_found_by_name_plotted_and_carried_by_links() {
     harness.run();
     harness.key_press(Key::Escape);
     harness.run();
-    // One for each unit.
+    // There is one plot for each unit.
     for title in ["rod1.pose, mm", "rod1.pose, rad", "*.reaction, N"] {
         harness.get_by_role_and_label(Role::Label, title);
     }
@@ -810,13 +810,13 @@ fn any_channel_is_found_by_name_plotted_and_carried_by_links() {
 }
 
 #[test]
-fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
+fn the_accuracy_of_the_running_scene_is_shown_beside_the_controls() {
     let mut harness = window("spcmm");
     assert!(harness.query_by_label("Energy residual").is_none(), "the solver comes last");
     harness.get_by_label("Accuracy").click();
     harness.run();
     harness.get_by_label("not measured yet");
-    // What runs has its name, chosen by it or not.
+    // Settings that match a preset show its name, even if it was not chosen.
     let preset = |harness: &Harness<'_, App>| {
         let choice = harness.get_by_role_and_label(Role::ComboBox, "Preset");
         choice.value().map(|name| name.to_string())
@@ -833,18 +833,18 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
     let impact = *player.simulation().impacts().next_back().expect("hit");
     assert!(impact.steps >= 10, "{impact:?}");
     let joint = &player.running().machine.ball_joints[impact.joint].name;
-    let own = impact.has_own_restitution();
-    let kind = match (own, impact.disturbed) {
+    let comparable = impact.has_own_restitution();
+    let kind = match (comparable, impact.disturbed) {
         (true, _) => "undisturbed",
         (false, true) => "disturbed",
         (false, false) => "soft",
     };
     harness.get_by_label(&format!("{joint}, {kind}"));
     harness.get_by_label(&impact.steps.to_string());
-    // Only what nothing disturbed can be compared with what was asked for.
+    // Only an undisturbed impact can be compared with the restitution in the scene.
     let compared = harness.query_by_label_contains(", asked 0.9").is_some();
-    assert_eq!(compared, own, "{impact:?}");
-    // A coarse step shows in the count, and real stepping is measured.
+    assert_eq!(compared, comparable, "{impact:?}");
+    // A coarse step shows in the count, and the speed of stepping is measured.
     let player = harness.state_mut().player_mut();
     player.set("solver.method", "rk4").expect("a method");
     player.set("solver.step", "20 us").expect("in range");
@@ -876,28 +876,28 @@ fn a_preset_is_measured_beside_the_running_scene() {
     harness.get_by_label("Accuracy").click();
     harness.run();
     harness.state_mut().set_host(Box::new(jointplay::app::DesktopHost::default()));
-    // As it comes, the scene was measured for the program.
+    // Measurements of the unchanged scene are stored in the program.
     assert!(harness.query_by_label("not measured").is_none());
     let player = harness.state_mut().player_mut();
     player.set("contact.clearance", "0.2 mm").expect("in range");
     player.set("solver.preset", "preview").expect("a preset");
     harness.run_steps(2);
-    let unknown = |harness: &Harness<'_, App>| harness.query_all_by_label("not measured").count();
-    assert_eq!(unknown(&harness), 2);
+    let unmeasured = |harness: &Harness<'_, App>| harness.query_all_by_label("not measured").count();
+    assert_eq!(unmeasured(&harness), 2);
     click(&mut harness, "Measure preset");
-    let begun = std::time::Instant::now();
-    while unknown(&harness) > 0 {
-        assert!(begun.elapsed().as_secs() < 600, "no answer");
+    let start = std::time::Instant::now();
+    while unmeasured(&harness) > 0 {
+        assert!(start.elapsed().as_secs() < 600, "no answer");
         std::thread::sleep(std::time::Duration::from_millis(50));
         harness.run_steps(1);
     }
     harness.get_by_label("Peak force error");
-    // What is measured belongs to these values.
+    // The measurement is valid for these values only.
     let player = harness.state_mut().player_mut();
     player.set("contact.clearance", "0.3 mm").expect("in range");
     player.set("contact.friction", "0.3").expect("in range");
     harness.run_steps(2);
-    assert_eq!(unknown(&harness), 2);
+    assert_eq!(unmeasured(&harness), 2);
 }
 
 /// Colours of the first three curves in the light theme.
@@ -910,15 +910,14 @@ pub(crate) fn picture(harness: &mut Harness<'_, App>) -> Picture {
 
 pub(crate) const WHITE: [u8; 3] = [255; 3];
 
-/// Pixels around the place of a value in the plot of the normal force, from `top` N down to a little above zero, and the
-/// row of the value.
+/// The pixel area around a value in the plot of the normal force, from `top` N down to just above zero, and the value's row.
 fn spike(harness: &mut Harness<'_, App>, time: f64, force: f64, top: f64) -> ([usize; 4], usize) {
     let plots = harness.state_mut().plots_mut();
-    let place = |force| {
-        let place = plots.place(Quantity::NormalForce, time, force);
-        place.expect("shown")
+    let position_of = |force| {
+        let position_of = plots.place(Quantity::NormalForce, time, force);
+        position_of.expect("shown")
     };
-    let (high, at, zero) = (place(top).y as usize, place(force), place(0.0).y as usize);
+    let (high, at, zero) = (position_of(top).y as usize, position_of(force), position_of(0.0).y as usize);
     let area = [at.x as usize - 3, high, at.x as usize + 4, zero - 4];
     (area, at.y as usize)
 }
@@ -932,15 +931,15 @@ fn plotted_peaks_are_those_of_the_run() {
         harness.run();
         let player = harness.state().player();
         let statistics = player.simulation().statistics().clone();
-        let most = statistics.peak_normal.iter().copied().fold(0.0, f64::max);
+        let peak = statistics.peak_normal.iter().copied().fold(0.0, f64::max);
         let drawn = picture(&mut harness);
         for (joint, colour) in CURVES.into_iter().enumerate() {
             let (time, force) = (statistics.peak_time[joint], statistics.peak_normal[joint]);
-            let (area, row) = spike(&mut harness, time, force, 1.04 * most);
+            let (area, row) = spike(&mut harness, time, force, 1.04 * peak);
             let highest = top(&drawn.covered(area, colour, WHITE)).expect("every joint is seen");
             assert!(highest.abs_diff(row) <= 1, "{size:?}: {force} N of joint {joint} in row {highest}, not {row}");
         }
-        // In the midst of an impact: the newest of it is the highest, and nothing is drawn beyond it.
+        // During an impact the newest value is the highest, and nothing is drawn beyond it.
         let player = harness.state_mut().player_mut();
         player.run_to(14.94e-3);
         let shown = player.pacer.shown();
@@ -959,7 +958,7 @@ fn plotted_peaks_are_those_of_the_run() {
 }
 
 #[test]
-fn a_doubt_beside_a_slider_is_not_contradicted_below() {
+fn a_warning_beside_a_slider_is_not_contradicted_below() {
     let mut harness = window("spcmm");
     harness.get_by_label("Accuracy").click();
     harness.run();
@@ -977,7 +976,7 @@ fn a_low_plot_keeps_its_numbers() {
     for height in [740.0, 470.0, 400.0, 320.0] {
         let mut harness = sized("spcmm", [1000.0, height], egui::Theme::Light);
         if height < 500.0 {
-            // In the sheet of a low window.
+            // A low window shows the plots in a sheet.
             harness.key_press(Key::P);
         }
         harness.state_mut().player_mut().run_to(9e-3);
@@ -988,14 +987,14 @@ fn a_low_plot_keeps_its_numbers() {
             panic!("{height}: no plot");
         };
         let drawn = picture(&mut harness);
-        // Numbers stand to the left of the plot: rows that have ink in them, in how many pieces.
-        let inked = |y: usize| {
+        // The axis labels are left of the plot: counts the runs of rows with dark pixels.
+        let has_ink = |y: usize| {
             let left = zero.x as usize;
             (left - 36..left - 3).any(|x| drawn.at(x, y).into_iter().all(|part| part < 150))
         };
-        let rows: Vec<bool> = (above.y as usize - 8..(zero.y as usize + 8).min(height as usize)).map(inked).collect();
-        let pieces = rows.windows(2).filter(|pair| !pair[0] && pair[1]).count();
-        assert!(pieces >= 2, "{height}: {pieces} numbers");
+        let rows: Vec<bool> = (above.y as usize - 8..(zero.y as usize + 8).min(height as usize)).map(has_ink).collect();
+        let labels = rows.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+        assert!(labels >= 2, "{height}: {labels} numbers");
     }
 }
 
@@ -1007,29 +1006,29 @@ fn the_clearance_of_the_past_stays_where_it_was() {
     player.set("contact.clearance", "0.6 mm").expect("in range");
     player.run_to(0.05);
     harness.run();
-    // The run before the change is drawn in greys, too.
+    // Hides the run before the change, which is drawn in greys, too.
     harness.get_by_label("— Clearance: 0.3 mm in Eccentricity").click();
     harness.run();
     let drawn = picture(&mut harness);
-    // Dashed in the colour of weak text: how much of it there is in a row, from one time to another.
-    let dashes = |harness: &mut Harness<'_, App>, from: f64, to: f64, clearance: f64| {
+    // Share of a row, between two times, that has the dash colour (that of weak text).
+    let dash_share = |harness: &mut Harness<'_, App>, from: f64, to: f64, clearance: f64| {
         let plots = harness.state_mut().plots_mut();
         let place = |time| plots.place(Quantity::Eccentricity, time, clearance);
         let (left, right) = (place(from).expect("shown"), place(to).expect("shown"));
         let row = left.y.floor() as usize;
         let area = [left.x as usize, row - 1, right.x as usize, row + 2];
-        let found = drawn.coloured(area, [0x57, 0x64, 0x70], 70).len() as f32;
-        found / (right.x - left.x)
+        let pixels = drawn.coloured(area, [0x57, 0x64, 0x70], 70).len() as f32;
+        pixels / (right.x - left.x)
     };
-    for (clearance, past, since) in [(0.3e-3, true, false), (0.6e-3, false, true)] {
-        let before = dashes(&mut harness, 1e-3, 0.018, clearance);
-        let after = dashes(&mut harness, 0.025, 0.049, clearance);
-        assert_eq!((before > 0.3, after > 0.3), (past, since), "{clearance}: {before} {after}");
+    for (clearance, old_line, new_line) in [(0.3e-3, true, false), (0.6e-3, false, true)] {
+        let before = dash_share(&mut harness, 1e-3, 0.018, clearance);
+        let after = dash_share(&mut harness, 0.025, 0.049, clearance);
+        assert_eq!((before > 0.3, after > 0.3), (old_line, new_line), "{clearance}: {before} {after}");
     }
 }
 
 #[test]
-fn units_are_printed_the_same_everywhere() {
+fn units_are_printed_consistently() {
     let mut harness = window("spcmm");
     for group in ["Solver", "Gravity", "Contact"] {
         harness.get_by_label(group).click();
@@ -1044,15 +1043,15 @@ fn units_are_printed_the_same_everywhere() {
         let node = node.accesskit_node();
         [node.label(), node.value()].map(|text| text.map(|text| text.to_string()))
     });
-    let plain: Vec<String> = texts
+    let inconsistent: Vec<String> = texts
         .flatten()
         .filter(|text| text.contains("^2") || text.split(|c: char| !c.is_alphabetic()).any(|w| w == "um" || w == "us"))
         .collect();
-    assert!(plain.is_empty(), "{plain:?}");
+    assert!(inconsistent.is_empty(), "{inconsistent:?}");
 }
 
-/// Role, name and place of every control, in their order; the button that plays or pauses is the same one.
-fn places(harness: &Harness<'_, App>) -> Vec<(Role, String, [f64; 4])> {
+/// Role, name and rectangle of every control in order; Play and Pause count as the same button.
+fn control_rects(harness: &Harness<'_, App>) -> Vec<(Role, String, [f64; 4])> {
     let all = harness.root().children_recursive();
     all.filter_map(|node| {
         let node = node.accesskit_node();
@@ -1080,11 +1079,11 @@ fn places(harness: &Harness<'_, App>) -> Vec<(Role, String, [f64; 4])> {
     .collect()
 }
 
-/// Runs and plays the scene on show and looks at every place on the way.
-fn nothing_moves(harness: &mut Harness<'_, App>, what: &str) {
+/// Runs and plays the current scene and checks that no control moves.
+fn check_layout_is_steady(harness: &mut Harness<'_, App>, what: &str) {
     harness.state_mut().player_mut().set_playing(false);
     harness.run_steps(4);
-    let before = places(harness);
+    let before = control_rects(harness);
     assert!(before.len() > 10, "{what}: {}", before.len());
     for time in [9e-3, 0.12] {
         let player = harness.state_mut().player_mut();
@@ -1092,7 +1091,7 @@ fn nothing_moves(harness: &mut Harness<'_, App>, what: &str) {
         player.pacer.set_scale(0.5);
         player.set_playing(true);
         harness.run_steps(2);
-        let now = places(harness);
+        let now = control_rects(harness);
         for (was, is) in before.iter().zip(&now) {
             assert_eq!(was, is, "{what} at {time} s");
         }
@@ -1104,7 +1103,7 @@ fn nothing_moves(harness: &mut Harness<'_, App>, what: &str) {
 #[test]
 fn nothing_moves_while_a_scene_plays() {
     let sizes = [[1280.0, 800.0], [900.0, 640.0], [390.0, 844.0], [844.0, 390.0], [320.0, 480.0]];
-    for (at, size) in sizes.into_iter().enumerate() {
+    for (index, size) in sizes.into_iter().enumerate() {
         let mut options = AppOptions::new(Scene::load("spcmm", &[]).expect("built in"));
         options.playing = false;
         let mut harness = Harness::builder()
@@ -1112,21 +1111,21 @@ fn nothing_moves_while_a_scene_plays() {
             .with_step_dt(1.0 / 60.0)
             .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
         harness.state_mut().player_mut().pacer.set_scale(0.5);
-        // How much is listed depends on the scene, and where it has room on the window: every scene in one size, one in all.
+        // The content depends on the scene, its position on the window size: every scene is checked in one size, one scene in all.
         for (i, scene) in jointplay::scene::BUILT_IN.into_iter().enumerate() {
-            if i % 5 == at || scene == "chain" {
+            if i % 5 == index || scene == "chain" {
                 harness.state_mut().open(scene).expect("built in");
-                nothing_moves(&mut harness, &format!("{scene} in {size:?}"));
+                check_layout_is_steady(&mut harness, &format!("{scene} in {size:?}"));
             }
         }
-        // The bench with a twin, and a run that raises doubts.
+        // The bench with a twin, and a run that raises warnings.
         harness.key_press(Key::B);
         harness.state_mut().open("spcmm").expect("built in");
         let player = harness.state_mut().player_mut();
         player.set("solver.method", "rk4").expect("a method");
         player.set("solver.step", "40 us").expect("in range");
         player.set_twin(true);
-        nothing_moves(&mut harness, &format!("doubts in {size:?}"));
+        check_layout_is_steady(&mut harness, &format!("doubts in {size:?}"));
         let doubts = harness.state().player().simulation().doubts();
         assert!(!doubts.is_empty());
     }

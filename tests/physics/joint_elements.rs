@@ -1,4 +1,4 @@
-//! Elements that act on a slide or a hinge against closed solutions, in every method and both formulations.
+//! Force elements on a slide or a hinge against closed-form solutions, in every method and both formulations.
 
 use crate::common::matrix::{FORMULATIONS, for_every};
 use crate::elements::at;
@@ -6,20 +6,20 @@ use jointplay::machine::{Machine, Vec3};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
-/// One body on a joint with the world: what a coordinate of it is worth, and how it is written.
+/// The joint that connects the single body with the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum On {
+enum JointKind {
     Slide,
     Hinge,
 }
-use On::{Hinge, Slide};
+use JointKind::{Hinge, Slide};
 
 pub fn started(text: &str, changes: &[(&str, &str)]) -> Simulation {
     Simulation::new(&crate::common::parse(text, changes).machine).unwrap()
 }
 
-impl On {
-    /// kg, or kg m^2 about the axis, which the centroid is 0.1 m away from.
+impl JointKind {
+    /// Mass, kg, or moment of inertia about the axis, kg m^2; the centroid is 0.1 m from the axis.
     fn inertia(self) -> f64 {
         match self {
             Slide => 0.5,
@@ -57,8 +57,8 @@ impl On {
         )
     }
 
-    /// Starts at a coordinate and its rate.
-    fn starts(self, start: [f64; 2], more: &str, changes: &[(&str, &str)]) -> Simulation {
+    /// A simulation from `start`, a coordinate and its rate.
+    fn start_at(self, start: [f64; 2], more: &str, changes: &[(&str, &str)]) -> Simulation {
         started(&self.text(start, more), changes)
     }
 
@@ -77,7 +77,7 @@ impl On {
         }
     }
 
-    /// What element `i` exerts on the body along the axis.
+    /// Force or torque of element `i` on the body along the axis.
     fn force(self, frame: &Frame, i: usize) -> f64 {
         match self {
             Slide => frame.elements[i].force.x,
@@ -95,28 +95,28 @@ impl On {
 }
 
 /// x and dx/dt at `t` of m x'' + c x' + k x = 0, underdamped, from `x` and `v`.
-fn swing([m, c, k]: [f64; 3], [x, v]: [f64; 2], t: f64) -> [f64; 2] {
+fn damped_oscillation([m, c, k]: [f64; 3], [x, v]: [f64; 2], t: f64) -> [f64; 2] {
     let d = c / (2.0 * m);
     let w = (k / m - d * d).sqrt();
     let (sin, cos) = (w * t).sin_cos();
     let (a, b) = (x, (v + d * x) / w);
-    let fall = (-d * t).exp();
-    [fall * (a * cos + b * sin), fall * ((b * w - d * a) * cos - (a * w + d * b) * sin)]
+    let decay = (-d * t).exp();
+    [decay * (a * cos + b * sin), decay * ((b * w - d * a) * cos - (a * w + d * b) * sin)]
 }
 
 #[test]
 fn a_joint_spring_has_its_natural_frequency_in_every_method_and_formulation() {
-    for_every([Slide, Hinge], |on, way| {
-        let (m, bound) = (on.inertia(), way.bound());
+    for_every([Slide, Hinge], |joint, way| {
+        let (m, bound) = (joint.inertia(), way.bound());
         let k = 400.0 * m;
-        let mut simulation = on.starts([0.13, 0.0], &on.spring(k, 0.0), &way.close());
+        let mut simulation = joint.start_at([0.13, 0.0], &joint.spring(k, 0.0), &way.close());
         let frame = at(&mut simulation, 0.2);
-        let [off, rate] = swing([m, 0.0, k], [0.03, 0.0], 0.2);
-        let label = format!("{on:?} {way}");
-        let wrong = (on.coordinate(&frame) - 0.1 - off).abs();
+        let [off, rate] = damped_oscillation([m, 0.0, k], [0.03, 0.0], 0.2);
+        let label = format!("{joint:?} {way}");
+        let wrong = (joint.coordinate(&frame) - 0.1 - off).abs();
         assert!(wrong < bound, "{label}: {wrong:e}");
-        assert!((on.rate(&frame) - rate).abs() < 20.0 * bound, "{label}");
-        let force = on.force(&frame, 0);
+        assert!((joint.rate(&frame) - rate).abs() < 20.0 * bound, "{label}");
+        let force = joint.force(&frame, 0);
         assert!((force + k * off).abs() < 2.0 * k * bound, "{label}: {force}");
         let elastic = frame.elastic - 0.5 * k * off * off;
         assert!(elastic.abs() < 0.1 * k * bound, "{label}: {elastic:e}");
@@ -126,27 +126,27 @@ fn a_joint_spring_has_its_natural_frequency_in_every_method_and_formulation() {
 }
 
 #[test]
-fn damping_and_preload_of_a_joint_spring_are_those_of_the_closed_solution() {
-    for on in [Slide, Hinge] {
-        let m = on.inertia();
+fn damping_and_preload_of_a_joint_spring_match_the_closed_form() {
+    for joint in [Slide, Hinge] {
+        let m = joint.inertia();
         let (k, c, preload) = (400.0 * m, 8.0 * m, 2.0 * m);
-        let spring = on.spring(k, c) + &format!("preload = \"{preload:e} {}\"\n", on.units()[2]);
+        let spring = joint.spring(k, c) + &format!("preload = \"{preload:e} {}\"\n", joint.units()[2]);
         for method in ["dopri5", "radau5", "automatic", "rk4"] {
             for formulation in FORMULATIONS {
                 let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
-                let mut simulation = on.starts([0.13, 0.0], &spring, &changes);
+                let mut simulation = joint.start_at([0.13, 0.0], &spring, &changes);
                 let frame = at(&mut simulation, 0.25);
-                // About the place where the force vanishes.
+                // The oscillation is about the zero-force position.
                 let rest = -preload / k;
-                let [off, rate] = swing([m, c, k], [0.03 - rest, 0.0], 0.25);
-                let label = format!("{on:?} {method} {formulation}");
-                let wrong = (on.coordinate(&frame) - 0.1 - rest - off).abs();
+                let [off, rate] = damped_oscillation([m, c, k], [0.03 - rest, 0.0], 0.25);
+                let label = format!("{joint:?} {method} {formulation}");
+                let wrong = (joint.coordinate(&frame) - 0.1 - rest - off).abs();
                 assert!(wrong < 1e-8, "{label}: {wrong:e}");
                 let energy = |x: f64, v: f64| 0.5 * (m * v * v + k * x * x);
                 let lost = energy(0.03 - rest, 0.0) - energy(off, rate);
                 let ledger = simulation.ledger().unwrap();
                 assert!((ledger.damping_loss / lost - 1.0).abs() < 1e-5, "{label}: {ledger:?}");
-                let off = on.coordinate(&frame) - 0.1;
+                let off = joint.coordinate(&frame) - 0.1;
                 let stored = off * (preload + 0.5 * k * off);
                 assert!((frame.elastic - stored).abs() < 1e-12, "{label}");
             }
@@ -161,16 +161,16 @@ fn the_error_of_a_joint_spring_falls_with_the_order_of_the_method() {
     let error = |method: &str, formulation: &str, key: &str, value: f64| {
         let value = format!("{value:e}{}", if key == "solver.step" { " s" } else { "" });
         let changes = [("solver.method", method), ("formulation", formulation), (key, &*value)];
-        let mut simulation = Hinge.starts([0.13, 0.0], &Hinge.spring(k, 4.0 * m), &changes);
+        let mut simulation = Hinge.start_at([0.13, 0.0], &Hinge.spring(k, 4.0 * m), &changes);
         let frame = at(&mut simulation, 0.2);
-        let [off, _] = swing([m, 4.0 * m, k], [0.03, 0.0], 0.2);
+        let [off, _] = damped_oscillation([m, 4.0 * m, k], [0.03, 0.0], 0.2);
         (Hinge.coordinate(&frame) - 0.1 - off).abs()
     };
     for formulation in FORMULATIONS {
         for (method, steps, order) in [("semi-implicit-euler", [1e-4, 5e-5], 1.0), ("rk4", [4e-3, 2e-3], 4.0)] {
             let [coarse, fine] = steps.map(|step| error(method, formulation, "solver.step", step));
-            let found = (coarse / fine).log2();
-            assert!((found - order).abs() < 0.2, "{method} {formulation}: {found}");
+            let observed = (coarse / fine).log2();
+            assert!((observed - order).abs() < 0.2, "{method} {formulation}: {observed}");
         }
         for method in ["dopri5", "radau5", "automatic"] {
             let [loose, tight] =
@@ -182,24 +182,24 @@ fn the_error_of_a_joint_spring_falls_with_the_order_of_the_method() {
 }
 
 #[test]
-fn stiff_elements_on_joints_do_not_hold_implicit_methods_back() {
-    for on in [Slide, Hinge] {
-        let m = on.inertia();
-        let stiff = on.spring(1.6e8 * m, 2e4 * m);
+fn stiff_elements_on_joints_do_not_slow_implicit_methods() {
+    for joint in [Slide, Hinge] {
+        let m = joint.inertia();
+        let stiff = joint.spring(1.6e8 * m, 2e4 * m);
         for formulation in FORMULATIONS {
             let evaluations = |method: &str| {
                 let changes = [("solver.method", method), ("solver.tolerance", "1e-6"), ("formulation", formulation)];
-                let mut simulation = on.starts([0.13, 0.0], &stiff, &changes);
+                let mut simulation = joint.start_at([0.13, 0.0], &stiff, &changes);
                 let frame = at(&mut simulation, 1.0);
-                let off = on.coordinate(&frame) - 0.1;
-                assert!(off.abs() < 1e-6, "{on:?} {method} {formulation}: {off:e}");
+                let off = joint.coordinate(&frame) - 0.1;
+                assert!(off.abs() < 1e-6, "{joint:?} {method} {formulation}: {off:e}");
                 simulation.statistics().evaluations
             };
             let explicit = evaluations("dopri5");
             for method in ["radau5", "automatic"] {
                 let implicit = evaluations(method);
-                println!("{on:?} {formulation} {method} {implicit}, dopri5 {explicit}");
-                assert!(4 * implicit < explicit, "{on:?} {method}: {implicit} {explicit}");
+                println!("{joint:?} {formulation} {method} {implicit}, dopri5 {explicit}");
+                assert!(4 * implicit < explicit, "{joint:?} {method}: {implicit} {explicit}");
             }
         }
     }
@@ -247,9 +247,9 @@ fn elements_on_joints_conserve_momentum_and_balance_their_energy() {
         let springs = springs.replace("DT", turning).replace("DS", sliding);
         let text = TUMBLING.to_owned() + &springs.replace('R', restitution);
         let mut ends = Vec::new();
-        let ways = [("tree", "dopri5"), ("lagrange", "radau5"), ("lagrange", "dopri5"), ("tree", "radau5")];
-        // What damps has no part in how they differ: there two are enough.
-        for (formulation, method) in ways.into_iter().skip(if damped { 2 } else { 0 }) {
+        let pairs = [("tree", "dopri5"), ("lagrange", "radau5"), ("lagrange", "dopri5"), ("tree", "radau5")];
+        // Damping adds no difference between the pairs: two are enough with it.
+        for (formulation, method) in pairs.into_iter().skip(if damped { 2 } else { 0 }) {
             let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
             let mut simulation = started(&text, &changes);
             let machine = simulation.machine().clone();
@@ -261,7 +261,7 @@ fn elements_on_joints_conserve_momentum_and_balance_their_energy() {
                 let slide = frame.elements[3].force;
                 stopped[0] |= elbow.norm() > 0.1;
                 stopped[1] |= slide.norm() > 1.0;
-                // No stop pulls: the stop's force on the rod is towards the middle.
+                // A stop only pushes: its force on the rod points towards the middle.
                 let offset = frame.elements[3].points[1] - frame.elements[3].points[0];
                 assert!(slide.dot(&offset) <= 0.0, "{slide} {offset}");
             }
@@ -294,8 +294,8 @@ fn elements_on_joints_conserve_momentum_and_balance_their_energy() {
 
 #[test]
 fn a_joint_spring_on_a_drive_loads_it() {
-    for (on, rate) in [(Slide, "50 mm/s"), (Hinge, "50 mrad/s")] {
-        let kind = if on == Slide { "prismatic" } else { "revolute" };
+    for (joint, rate) in [(Slide, "50 mm/s"), (Hinge, "50 mrad/s")] {
+        let kind = if joint == Slide { "prismatic" } else { "revolute" };
         let text = format!(
             "[gravity]\nx = 0\ny = 0\nz = 0\n\
              [[body]]\nname = \"driven\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
@@ -303,39 +303,38 @@ fn a_joint_spring_on_a_drive_loads_it() {
              [[joint]]\nname = \"j\"\nkind = \"{kind}\"\nchild = \"driven\"\naxis = [0, 0, 1]\n\
              drive = {{ law = \"constant\", position = \"0.1 {}\", velocity = \"{rate}\" }}\n\
              [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = {{ position = \"0 500 0 mm\" }}\n{}",
-            on.units()[0],
-            on.spring(300.0, 0.0)
+            joint.units()[0],
+            joint.spring(300.0, 0.0)
         );
         for formulation in FORMULATIONS {
             let mut simulation = started(&text, &[("formulation", formulation)]);
             let frame = at(&mut simulation, 0.2);
             let stored = 0.5 * 300.0 * 0.01 * 0.01;
-            assert!((frame.elastic / stored - 1.0).abs() < 1e-6, "{on:?} {formulation}");
+            assert!((frame.elastic / stored - 1.0).abs() < 1e-6, "{joint:?} {formulation}");
             let work = simulation.ledger().unwrap().drive_work;
-            assert!((work / stored - 1.0).abs() < 1e-5, "{on:?} {formulation}: {work}");
+            assert!((work / stored - 1.0).abs() < 1e-5, "{joint:?} {formulation}: {work}");
             let force = frame.actuators[0];
-            assert!((force - 300.0 * 0.01).abs() < 1e-5, "{on:?} {formulation}: {force}");
+            assert!((force - 300.0 * 0.01).abs() < 1e-5, "{joint:?} {formulation}: {force}");
         }
     }
 }
 
 #[test]
-fn a_hinge_is_taken_within_half_a_turn_of_the_position() {
+fn a_hinge_angle_is_measured_within_half_a_turn_of_the_springs_position() {
     for (start, position, expected) in
         [(350.0_f64, 0.0, -10.0_f64), (-190.0, 0.0, 170.0), (20.0, 700.0, 40.0), (725.0, 1.0, 4.0)]
     {
         let spring = format!(
             "[[joint_spring]]\nname = \"s\"\njoint = \"j\"\nposition = \"{position} deg\"\nstiffness = \"2 N m/rad\"\n"
         );
-        let mut simulation = Hinge.starts([start.to_radians(), 0.0], &spring, &[]);
+        let mut simulation = Hinge.start_at([start.to_radians(), 0.0], &spring, &[]);
         let torque = Hinge.force(&at(&mut simulation, 0.0), 0);
         let wrong = torque + 2.0 * expected.to_radians();
         assert!(wrong.abs() < 1e-12, "{start} {position}: {torque}");
     }
 }
 
-/// chi of the law F = K d^1.5 (1 + chi d' / v) for which an impact at v rebounds with `restitution`, and the other way round:
-/// both from chi (1 + e) = ln((1 + chi) / (1 - e chi)), by bisection.
+/// The value in `low..high` at which `above` turns true, by bisection.
 fn bisect(mut low: f64, mut high: f64, above: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
@@ -348,6 +347,8 @@ fn bisect(mut low: f64, mut high: f64, above: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
+/// Whether an impact at v under the law F = K d^1.5 (1 + chi d' / v) rebounds slower than with `restitution`:
+/// chi and restitution e satisfy chi (1 + e) = ln((1 + chi) / (1 - e chi)).
 fn rebound_beyond(chi: f64, restitution: f64) -> bool {
     chi * (1.0 + restitution) < ((1.0 + chi) / (1.0 - restitution * chi)).ln()
 }
@@ -355,13 +356,13 @@ fn rebound_beyond(chi: f64, restitution: f64) -> bool {
 #[test]
 fn a_stop_rebounds_by_its_law_at_any_speed() {
     let chi = bisect(1e-3, 1.0 / 0.6 - 1e-9, |chi| rebound_beyond(chi, 0.6));
-    for_every([Slide, Hinge], |on, way| {
-        let m = on.inertia();
-        let [position, speed, force, ..] = on.units();
+    for_every([Slide, Hinge], |joint, way| {
+        let m = joint.inertia();
+        let [position, speed, force, ..] = joint.units();
         let stop = format!(
             "[[stop]]\nname = \"s\"\njoint = \"j\"\nlower = \"-0.02 {position}\"\nupper = \"0.01 {position}\"\n\
              {} = \"{:e} {force}\"\ndepth = \"1e-3 {position}\"\nrestitution = 0.6\nspeed = \"0.2 {speed}\"\n",
-            on.force_key(),
+            joint.force_key(),
             1000.0 * m
         );
         let (step, bound) = match way.method {
@@ -371,18 +372,18 @@ fn a_stop_rebounds_by_its_law_at_any_speed() {
         };
         for (v, limit) in [(0.2_f64, 0.01), (-0.2, -0.02), (0.05, 0.01)] {
             let [method, _, tolerance, parts, formulation] = way.close();
-            let own = chi * v.abs() / 0.2;
+            let scaled_chi = chi * v.abs() / 0.2;
             let expected = match v.abs() == 0.2 {
                 true => 0.6,
-                false => bisect(0.0, (1.0 / own).min(1.0), |e| rebound_beyond(own, e)),
+                false => bisect(0.0, (1.0 / scaled_chi).min(1.0), |e| rebound_beyond(scaled_chi, e)),
             };
             let changes = [method, ("solver.step", step), tolerance, parts, formulation];
-            let mut simulation = on.starts([0.8 * limit, v], &stop, &changes);
+            let mut simulation = joint.start_at([0.8 * limit, v], &stop, &changes);
             let frame = at(&mut simulation, 0.08);
-            let label = format!("{on:?} {way} {v}");
-            let found = -on.rate(&frame) / v;
-            assert!((found - expected).abs() < bound, "{label}: {found} {expected}");
-            assert_eq!((frame.elastic, on.force(&frame, 0)), (0.0, 0.0), "{label}");
+            let label = format!("{joint:?} {way} {v}");
+            let rebound = -joint.rate(&frame) / v;
+            assert!((rebound - expected).abs() < bound, "{label}: {rebound} {expected}");
+            assert_eq!((frame.elastic, joint.force(&frame, 0)), (0.0, 0.0), "{label}");
             let lost = 0.5 * m * v * v * (1.0 - expected * expected);
             let ledger = simulation.ledger().unwrap();
             let off = ledger.damping_loss / lost - 1.0;
@@ -400,7 +401,7 @@ fn a_weight_settles_on_a_stop_at_the_hertz_penetration() {
     for method in ["radau5", "automatic", "dopri5"] {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-8")];
         let mut simulation = started(&text, &changes);
-        // The law has no damping without speed: the last micrometres ring for long.
+        // The law's damping vanishes with the speed, so the last micrometres ring for a long time.
         let frame = at(&mut simulation, 3.0);
         let depth = -5e-3 - Slide.coordinate(&frame);
         let weight: f64 = 0.5 * 9.81;
@@ -410,37 +411,37 @@ fn a_weight_settles_on_a_stop_at_the_hertz_penetration() {
 }
 
 #[test]
-fn a_motor_follows_its_target_like_a_spring_and_its_work_is_the_drives() {
-    for_every([Slide, Hinge], |on, way| {
-        let (m, bound, label) = (on.inertia(), way.bound(), format!("{on:?} {way}"));
+fn a_motor_follows_its_target_like_a_spring_and_its_work_counts_as_drive_work() {
+    for_every([Slide, Hinge], |joint, way| {
+        let (m, bound, label) = (joint.inertia(), way.bound(), format!("{joint:?} {way}"));
         let (k, d) = (400.0 * m, 12.0 * m);
-        let [position, speed, _, by_position, by_rate] = on.units();
+        let [position, speed, _, by_position, by_rate] = joint.units();
         let gains = format!(
             "[[motor]]\nname = \"m\"\njoint = \"j\"\nstiffness = \"{k:e} {by_position}\"\ndamping = \"{d:e} {by_rate}\"\n"
         );
-        let held = gains.clone()
+        let constant = gains.clone()
             + &format!(
                 "target = {{ law = \"constant\", position = \"0.1 {position}\", velocity = \"0.3 {speed}\" }}\n"
             );
-        let shaken = gains
+        let harmonic = gains
             + &format!(
                 "target = {{ law = \"harmonic\", amplitude = \"0.1 {position}\", frequency = \"4 Hz\", phase = \"30 deg\" }}\n"
             );
         let t = 0.2;
-        // The distance from a target in uniform motion swings freely.
-        let mut simulation = on.starts([0.0, 0.0], &held, &way.close());
+        // The error relative to a target in uniform motion oscillates freely.
+        let mut simulation = joint.start_at([0.0, 0.0], &constant, &way.close());
         let frame = at(&mut simulation, t);
-        let [off, rate] = swing([m, d, k], [-0.1, -0.3], t);
-        let wrong = (on.coordinate(&frame) - (0.1 + 0.3 * t) - off).abs();
+        let [off, rate] = damped_oscillation([m, d, k], [-0.1, -0.3], t);
+        let wrong = (joint.coordinate(&frame) - (0.1 + 0.3 * t) - off).abs();
         assert!(wrong < 2.0 * bound, "{label}: {wrong:e}");
-        let force = on.force(&frame, 0);
+        let force = joint.force(&frame, 0);
         assert!((force + k * off + d * rate).abs() < 60.0 * k * bound, "{label}");
-        let kinetic = 0.5 * m * on.rate(&frame).powi(2);
+        let kinetic = 0.5 * m * joint.rate(&frame).powi(2);
         let ledger = simulation.ledger().unwrap();
         assert!((ledger.drive_work - kinetic).abs() < 1e-4 * ledger.exchanged, "{label}: {ledger:?}");
         assert_eq!(ledger.damping_loss, 0.0);
         // m q'' + d q' + k q = Re (k + i w d) T e^(i w t), T = 0.1 e^(i phase) / i: forced and free.
-        let mut simulation = on.starts([0.0, 0.0], &shaken, &way.close());
+        let mut simulation = joint.start_at([0.0, 0.0], &harmonic, &way.close());
         let frame = at(&mut simulation, t);
         let w = std::f64::consts::TAU * 4.0;
         let (re, im) = (k - m * w * w, d * w);
@@ -448,53 +449,53 @@ fn a_motor_follows_its_target_like_a_spring_and_its_work_is_the_drives() {
         let phase = 30_f64.to_radians() + (im / k).atan() - im.atan2(re);
         let forced = |t: f64| [size * (w * t + phase).sin(), size * w * (w * t + phase).cos()];
         let [x, v] = forced(0.0);
-        let free = swing([m, d, k], [-x, -v], t)[0];
-        let wrong = (on.coordinate(&frame) - forced(t)[0] - free).abs();
+        let free = damped_oscillation([m, d, k], [-x, -v], t)[0];
+        let wrong = (joint.coordinate(&frame) - forced(t)[0] - free).abs();
         assert!(wrong < 4.0 * bound, "{label}: {wrong:e}");
     });
 }
 
 #[test]
 fn a_motor_does_not_exceed_its_limit() {
-    for on in [Slide, Hinge] {
-        let m = on.inertia();
-        let [position, speed, force, by_position, _] = on.units();
+    for joint in [Slide, Hinge] {
+        let m = joint.inertia();
+        let [position, speed, force, by_position, _] = joint.units();
         let (k, limit) = (100.0 * m, 20.0 * m);
         let motor = format!(
             "[[motor]]\nname = \"m\"\njoint = \"j\"\nstiffness = \"{k:e} {by_position}\"\nlimit = \"{limit:e} {force}\"\n\
              target = {{ law = \"constant\", position = \"1 {position}\", velocity = \"0 {speed}\" }}\n"
         );
-        // At full force until 0.2 from the target, then free to swing about it.
-        let leaves = (2.0 * 0.8 / 20.0_f64).sqrt();
+        // At full force until 0.2 from the target, then oscillating freely about it.
+        let release_time = (2.0 * 0.8 / 20.0_f64).sqrt();
         for method in ["dopri5", "radau5", "automatic"] {
             for formulation in FORMULATIONS {
                 let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
-                let label = format!("{on:?} {method} {formulation}");
-                let mut simulation = on.starts([0.0, 0.0], &motor, &changes);
-                let t = 0.99 * leaves;
+                let label = format!("{joint:?} {method} {formulation}");
+                let mut simulation = joint.start_at([0.0, 0.0], &motor, &changes);
+                let t = 0.99 * release_time;
                 let frame = at(&mut simulation, t);
-                assert!((on.force(&frame, 0) / limit - 1.0).abs() < 1e-12, "{label}");
-                assert!((on.coordinate(&frame) - 10.0 * t * t).abs() < 1e-8, "{label}");
-                let t = leaves + 0.05;
+                assert!((joint.force(&frame, 0) / limit - 1.0).abs() < 1e-12, "{label}");
+                assert!((joint.coordinate(&frame) - 10.0 * t * t).abs() < 1e-8, "{label}");
+                let t = release_time + 0.05;
                 let frame = at(&mut simulation, t);
-                let [off, _] = swing([m, 0.0, k], [-0.2, 20.0 * leaves], 0.05);
-                let wrong = (on.coordinate(&frame) - 1.0 - off).abs();
+                let [off, _] = damped_oscillation([m, 0.0, k], [-0.2, 20.0 * release_time], 0.05);
+                let wrong = (joint.coordinate(&frame) - 1.0 - off).abs();
                 assert!(wrong < 1e-7, "{label}: {wrong:e}");
             }
         }
         // A constant force alone.
-        let push = format!("[[motor]]\nname = \"m\"\njoint = \"j\"\n{} = \"{limit:e} {force}\"\n", on.force_key());
-        let mut simulation = on.starts([0.0, 0.0], &push, &[]);
+        let push = format!("[[motor]]\nname = \"m\"\njoint = \"j\"\n{} = \"{limit:e} {force}\"\n", joint.force_key());
+        let mut simulation = joint.start_at([0.0, 0.0], &push, &[]);
         let frame = at(&mut simulation, 0.3);
-        assert!((on.rate(&frame) - 6.0).abs() < 1e-9, "{on:?}");
+        assert!((joint.rate(&frame) - 6.0).abs() < 1e-9, "{joint:?}");
         let work = simulation.ledger().unwrap().drive_work;
-        assert!((work / (0.5 * m * 36.0) - 1.0).abs() < 1e-9, "{on:?}: {work}");
+        assert!((work / (0.5 * m * 36.0) - 1.0).abs() < 1e-9, "{joint:?}: {work}");
     }
 }
 
 #[test]
 fn a_motor_does_not_step_over_a_pulse_of_its_target() {
-    // Nothing moves before: an adaptive step would grow beyond the pulse, which is there and back.
+    // Nothing moves before the pulse, so an adaptive step would grow beyond its length.
     let m = Slide.inertia();
     let motor = format!(
         "[[motor]]\nname = \"m\"\njoint = \"j\"\nstiffness = \"{:e} N/m\"\ndamping = \"{:e} N s/m\"\n\
@@ -504,21 +505,21 @@ fn a_motor_does_not_step_over_a_pulse_of_its_target() {
     );
     let end = |method: &str| {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9")];
-        let mut simulation = Slide.starts([0.0, 0.0], &motor, &changes);
+        let mut simulation = Slide.start_at([0.0, 0.0], &motor, &changes);
         Slide.coordinate(&at(&mut simulation, 1.03))
     };
     let expected = end("rk4");
     assert!(expected.abs() > 1e-4, "{expected:e}");
     for method in ["dopri5", "radau5", "automatic"] {
-        let found = end(method);
-        assert!((found - expected).abs() < 1e-7, "{method}: {found:e} {expected:e}");
+        let position = end(method);
+        assert!((position - expected).abs() < 1e-7, "{method}: {position:e} {expected:e}");
     }
 }
 
 #[test]
-fn columns_and_pictures_follow_what_the_joint_is() {
-    let columns = |on: On| {
-        let text = on.text([0.13, 0.0], &on.spring(200.0, 0.0));
+fn columns_follow_the_kind_of_joint() {
+    let columns = |joint: JointKind| {
+        let text = joint.text([0.13, 0.0], &joint.spring(200.0, 0.0));
         let scene = Scene::parse(&text, None, &[]).unwrap();
         let frame = at(&mut Simulation::new(&scene.machine).unwrap(), 0.0);
         jointplay::simulate::run_columns(&scene.machine, &frame).0.join(",")
@@ -534,7 +535,7 @@ fn bad_elements_on_joints_are_refused_with_their_position() {
         + "[[body]]\nname = \"wheel\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
            [[joint]]\nname = \"crank\"\nkind = \"revolute\"\nchild = \"wheel\"\naxis = [0, 0, 1]\n\
            drive = { law = \"constant\", velocity = \"60 rpm\" }\n";
-    for (more, said) in [
+    for (more, fragments) in [
         ("[[joint_spring]]\nname = \"s\"\n", ["joint_spring.s.joint", "missing"]),
         ("[[joint_spring]]\nname = \"s\"\njoint = \"elbwo\"\n", ["did you mean `elbow`", "allowed "]),
         ("[[joint_spring]]\nname = \"s\"\njoint = \"free\"\n", ["a free joint is neither", "elbow, slide"]),
@@ -599,8 +600,8 @@ fn bad_elements_on_joints_are_refused_with_their_position() {
     ] {
         let error = Scene::parse(&format!("{text}{more}"), Some("mine.toml"), &[]);
         let message = error.expect_err(more).to_string();
-        for said in said {
-            assert!(message.contains(said), "{message}\nlacks {said}");
+        for fragment in fragments {
+            assert!(message.contains(fragment), "{message}\nlacks {fragment}");
         }
         assert!(message.starts_with("mine.toml:"), "{message}");
     }

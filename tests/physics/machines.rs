@@ -1,5 +1,5 @@
-//! The machines among the built-in scenes, each against what is known of it otherwise: inverse kinematics in closed form, loop
-//! equations, a linear model; and one of its joints loose under an independent solver.
+//! The machines among the built-in scenes, each against an independent reference: inverse kinematics in closed form, loop
+//! equations, a linear model; and with one joint loose against an independent solver.
 
 use super::independent::moves_the_same;
 use crate::common::{Changes, MACHINES, SCENES, frame_now, parse, run_until, scene, simulation};
@@ -9,23 +9,23 @@ use jointplay::simulate::{ContactMode, Frame, Simulation};
 use std::f64::consts::{PI, TAU};
 
 const IDEAL: (&str, &str) = ("contact.clearance", "0");
-/// Residual of the energy balance, of the energy exchanged.
-const PROMISE: f64 = 1e-4;
+/// Largest residual of the energy balance, relative to the energy exchanged.
+const ENERGY_TOLERANCE: f64 = 1e-4;
 
 #[test]
 fn the_list_of_built_in_scenes_is_complete() {
     assert_eq!([SCENES, MACHINES].concat(), BUILT_IN);
 }
 
-/// Pose of body `name`: position and axes.
+/// Pose of body `name`: position and rotation matrix.
 fn pose(machine: &Machine, frame: &Frame, name: &str) -> (Vec3, Mat3) {
     let at = machine.bodies.iter().position(|body| body.name == name);
     let body = &frame.bodies[at.expect("a body of this name")];
     (body.position, body.rotation)
 }
 
-/// Calls `check` with the frames of an ideal run of `name` at some instants up to `end`; `more` are further changes.
-fn ideally(name: &str, more: &Changes, end: f64, check: impl Fn(&Machine, &Frame)) {
+/// Calls `check` with frames of an ideal run of `name` at instants up to `end`; `more` are further changes.
+fn check_ideal_run(name: &str, more: &Changes, end: f64, check: impl Fn(&Machine, &Frame)) {
     let changes = [&[IDEAL], more].concat();
     let mut simulation = simulation(name, &changes);
     let machine = simulation.machine().clone();
@@ -42,44 +42,44 @@ fn ideally(name: &str, more: &Changes, end: f64, check: impl Fn(&Machine, &Frame
     }
 }
 
-/// The polar angle `t` on the side of `side` (1 or -1) at which a cos t + b sin t = c.
-fn on_circle(a: f64, b: f64, c: f64, side: f64) -> f64 {
+/// The angle t with a cos t + b sin t = c; `side` (1 or -1) selects the solution.
+fn solve_angle(a: f64, b: f64, c: f64, side: f64) -> f64 {
     b.atan2(a) + side * (c / a.hypot(b)).acos()
 }
 
-/// Unit vectors outward and along the tangent at `degrees`.
-fn around(degrees: f64) -> (Vec3, Vec3) {
+/// Radial and tangential unit vectors at a polar angle of `degrees`.
+fn polar_basis(degrees: f64) -> (Vec3, Vec3) {
     let (sin, cos) = degrees.to_radians().sin_cos();
     (Vec3::new(cos, sin, 0.0), Vec3::new(-sin, cos, 0.0))
 }
 
 #[test]
-fn cranks_of_the_hexapod_stand_where_inverse_kinematics_wants_them() {
-    // Twice its source's, m and degrees: radii of hinges and sockets with how far they are from the axis of their pair; crank, leg.
+fn cranks_of_the_hexapod_agree_with_inverse_kinematics() {
+    // Twice the source's dimensions, m and degrees: radii of hinges and sockets and their angles from the axis of their pair; crank, leg.
     let (base, base_off) = (0.15399, 22.9492);
     let (hub, hub_off) = (0.09961, 48.4099);
     let (crank, leg) = (0.030, 0.280_f64);
     for (swing, rate) in [(30.0_f64, 1.0), (45.0, 2.0)] {
         let (swing_text, rate_text) = (format!("{swing} deg"), format!("{rate} Hz"));
         let changes = [("parameter.swing", &*swing_text), ("parameter.rate", &*rate_text)];
-        ideally("hexapod", &changes, 1.0, |scene, frame| {
+        check_ideal_run("hexapod", &changes, 1.0, |scene, frame| {
             let (centre, axes) = pose(scene, frame, "platform");
             for number in 1..=6 {
-                // Even ones come before the axis of their pair, at 90, 210 and 330 degrees, odd ones behind the next.
+                // Pair axes are at 90, 210 and 330 degrees; even legs come before their axis, odd ones after it.
                 let side = if number % 2 == 1 { 1.0 } else { -1.0 };
                 let axis = 60.0 * f64::from(number - 1) - side * 30.0;
-                let held = centre + axes * around(axis + side * hub_off).0 * hub;
-                let hinge = around(axis + side * base_off).0 * base;
-                // A crank points along the tangent, towards the axis of its pair; its ball is a leg away from the one held.
-                let along = around(axis).1 * -side;
-                let from = held - hinge;
+                let socket = centre + axes * polar_basis(axis + side * hub_off).0 * hub;
+                let hinge = polar_basis(axis + side * base_off).0 * base;
+                // A crank points along the tangent, towards the axis of its pair; its ball is a leg's length from the socket.
+                let along = polar_basis(axis).1 * -side;
+                let from = socket - hinge;
                 let c = from.norm_squared() + crank * crank - leg * leg;
                 let (a, b) = (2.0 * crank * from.dot(&along), 2.0 * crank * from.z);
-                let angle = on_circle(a, b, c, 1.0);
+                let angle = solve_angle(a, b, c, 1.0);
                 let angle = (angle + PI).rem_euclid(TAU) - PI;
                 let phase = f64::from(number) * PI / 3.0;
                 let driven = swing.to_radians() * (TAU * rate * frame.time + phase).sin();
-                // At the crank's ball.
+                // Error at the crank's ball, m.
                 let off = crank * (angle - driven);
                 assert!(off.abs() < 1e-9, "{number}, {} s: {off:e} m", frame.time);
             }
@@ -88,32 +88,32 @@ fn cranks_of_the_hexapod_stand_where_inverse_kinematics_wants_them() {
 }
 
 #[test]
-fn arms_of_the_delta_stand_where_inverse_kinematics_wants_them() {
-    // As its source tables them: sides of the triangles of base and platform, arms, rods.
+fn arms_of_the_delta_agree_with_inverse_kinematics() {
+    // From the source's table: sides of the triangles of base and platform, arms, rods.
     let (base, platform, length, rod) = (0.567, 0.076, 0.524, 1.244_f64);
-    // From the platform's sockets outward to the motor's axis: radii of the inscribed and of the circumscribed circle.
+    // The motors' axes lie on the base's inscribed circle, the sockets on the platform's circumscribed circle.
     let (motor, socket) = (base / 12_f64.sqrt(), platform / 3_f64.sqrt());
     for (swing, lift) in [(0.25, 0.0), (0.5, 0.4)] {
         let (swing_text, lift_text) = (format!("{swing} rad"), format!("{lift} rad"));
         let changes = [("parameter.swing", &*swing_text), ("parameter.lift", &*lift_text)];
-        ideally("delta", &changes, 1.0 / 1.5, |scene, frame| {
+        check_ideal_run("delta", &changes, 1.0 / 1.5, |scene, frame| {
             let (centre, axes) = pose(scene, frame, "platform");
             let tilt = (axes - Mat3::identity()).amax();
             assert!(tilt < 1e-9, "the platform tilts by {tilt:e}");
             for arm in 0..3 {
-                let (outward, along) = around(120.0 * f64::from(arm));
-                // From the motor's axis to the sockets of the platform, in the arm's plane; and what of the rod lies in it.
+                let (outward, along) = polar_basis(120.0 * f64::from(arm));
+                // From the motor's axis to the platform's sockets, in the arm's plane, and the rod's projection onto it.
                 let (x, z) = (centre.dot(&outward) + socket - motor, centre.z);
                 let flat = rod.powi(2) - centre.dot(&along).powi(2);
                 let (a, b) = (2.0 * length * x, -2.0 * length * z);
                 let c = x * x + z * z + length * length - flat;
-                let angle = on_circle(a, b, c, -1.0);
+                let angle = solve_angle(a, b, c, -1.0);
                 let phase = f64::from(arm) * TAU / 3.0;
                 let driven = lift + swing * (TAU * 1.5 * frame.time + phase).sin();
                 let off = angle - driven;
                 assert!(off.abs() < 1e-8, "arm {arm}, {} s: {off:e} rad", frame.time);
             }
-            // A circle, says its description; within a fiftieth.
+            // The scene's description promises a circle; it is one within 2 %.
             let radius = centre.xy().norm();
             assert!(lift != 0.0 || (radius / 0.215 - 1.0).abs() < 0.02);
         });
@@ -121,17 +121,17 @@ fn arms_of_the_delta_stand_where_inverse_kinematics_wants_them() {
 }
 
 #[test]
-fn the_springs_of_the_delta_quieten_its_rods() {
-    // After the first knocks, of the start.
-    let knocks = |grip: &str| {
+fn the_springs_of_the_delta_reduce_impacts_of_its_rods() {
+    // Counts impacts after those of the start.
+    let impacts = |grip: &str| {
         let mut simulation = simulation("delta", &[("parameter.grip", grip)]);
         simulation.advance_to(0.1).unwrap();
         let before: u64 = simulation.statistics().impacts.iter().sum();
         simulation.advance_to(0.3).unwrap();
         simulation.statistics().impacts.iter().sum::<u64>() - before
     };
-    let (held, free) = (knocks("50 N"), knocks("0.001 N"));
-    assert!(2 * held < free, "{held} impacts with springs, {free} without");
+    let (gripped, free) = (impacts("50 N"), impacts("0.001 N"));
+    assert!(2 * gripped < free, "{gripped} impacts with springs, {free} without");
 }
 
 #[test]
@@ -141,15 +141,15 @@ fn the_rocker_of_the_four_bar_obeys_the_loop_equation() {
     for (crank, coupler) in [(0.050, 0.120), (0.060, 0.140)] {
         let (crank_text, coupler_text) = (format!("{crank} m"), format!("{coupler} m"));
         let changes = [("parameter.crank", &*crank_text), ("parameter.coupler", &*coupler_text)];
-        ideally("four-bar", &changes, TAU / 10.0, |scene, frame| {
+        check_ideal_run("four-bar", &changes, TAU / 10.0, |scene, frame| {
             let cos = (10.0 * frame.time).cos();
-            // The rocker hangs by its angle about Y, with its ball on the side to which X points.
+            // The rocker's angle is about Y from hanging straight down; its ball is on the +X side.
             let squares = ROCKER.powi(2) + HINGE.powi(2) + crank * crank - coupler * coupler;
-            let angle = on_circle(HINGE, -crank * cos, squares / (2.0 * ROCKER), -1.0);
+            let angle = solve_angle(HINGE, -crank * cos, squares / (2.0 * ROCKER), -1.0);
             let axes = pose(scene, frame, "rocker").1;
             let off = axes[(0, 2)].atan2(axes[(2, 2)]) - angle;
             assert!(off.abs() < 1e-9, "{} s: {off:e} rad", frame.time);
-            // What its source gives, to the hundredth of a degree, from the line of the hinges.
+            // The source gives this angle from the line of the hinges to a hundredth of a degree.
             if frame.time == 0.0 && crank == 0.050 {
                 assert!((180.0 + angle.to_degrees() - 112.77).abs() < 0.005);
             }
@@ -159,23 +159,23 @@ fn the_rocker_of_the_four_bar_obeys_the_loop_equation() {
 
 #[test]
 fn the_ram_of_the_press_follows_from_two_circles() {
-    // A quarter of the source's, m: both links, the connecting rod, and the crank's hinge from the upper link's.
+    // A quarter of the source's dimensions, m: both links, the connecting rod, the crank's hinge relative to the upper link's.
     const LINK: f64 = 0.830 / 4.0;
     const ROD: f64 = 0.920 / 4.0;
     const CRANK_HINGE: [f64; 2] = [0.730 / 4.0, -0.7375 / 4.0];
     for crank in [0.020, 0.046875, 0.050] {
         let text = format!("{crank} m");
         let changes = [("parameter.crank", &*text)];
-        ideally("press", &changes, 0.5, |scene, frame| {
+        check_ideal_run("press", &changes, 0.5, |scene, frame| {
             let (sin, cos) = (2.0 * TAU * frame.time).sin_cos();
-            // The crank's pin; the knee lies on circles about it and about the crown, on the left of the line between them.
+            // The knee lies on circles about the crank's pin and about the crown, left of the line between them.
             let pin = [CRANK_HINGE[0] - crank * cos, CRANK_HINGE[1] - crank * sin];
             let c = pin[0].powi(2) + pin[1].powi(2) + LINK.powi(2) - ROD.powi(2);
-            // From the vertical, to the right.
-            let swing = on_circle(-2.0 * LINK * pin[1], 2.0 * LINK * pin[0], c, -1.0);
+            // Angle from the vertical, positive to the right.
+            let swing = solve_angle(-2.0 * LINK * pin[1], 2.0 * LINK * pin[0], c, -1.0);
             let off = pose(scene, frame, "ram").0.z + 2.0 * LINK * swing.cos();
             assert!(off.abs() < 1e-9, "{} s: {off:e} m", frame.time);
-            // The hinge that closes the loop of both.
+            // The hinge that closes the loop.
             let (rod, link) = (pose(scene, frame, "connecting-rod"), pose(scene, frame, "upper-link"));
             let of_rod = rod.0 + rod.1 * Vec3::new(-ROD, 0.0, 0.0);
             let of_link = link.0 + link.1 * Vec3::new(0.0, 0.0, -LINK);
@@ -186,14 +186,14 @@ fn the_ram_of_the_press_follows_from_two_circles() {
     }
 }
 
-/// At the bottom the ram leans on both ends of the lower link: it stands higher by the play of wrist and knee than without play,
-/// and by what they yield.
+/// At the bottom the ram rests on both ends of the lower link: with play it is higher by the clearances of wrist and knee and their
+/// deformations.
 #[test]
 fn play_lifts_the_ram_of_the_press_at_the_bottom() {
     let bottom = |clearance: &str| {
         let changes = [("contact.clearance", clearance), ("parameter.speed", "20 rpm")];
         let mut simulation = simulation("press", &changes);
-        // Half a turn; slowly, so that nothing rattles there.
+        // Half a turn, slow enough that nothing rattles.
         run_until(&mut simulation, 1.5);
         let machine = simulation.machine().clone();
         pose(&machine, &frame_now(&mut simulation), "ram").0.z
@@ -206,21 +206,22 @@ fn play_lifts_the_ram_of_the_press_at_the_bottom() {
 const COIL: f64 = 167_062.0;
 const TYRE: f64 = 326_332.0;
 
-/// Masses, kg, with their centres; moments and products of inertia, kg m^2, with how far the part has turned.
-type Centres = [(f64, Vec3); 5];
-type Turning = [(Mat3, Mat3); 4];
+/// Masses, kg, with their centroids, m.
+type PointMasses = [(f64, Vec3); 5];
+/// Inertia tensors, kg m^2, with the rotations of their parts.
+type RotatingParts = [(Mat3, Mat3); 4];
 
 /// `point` turned by `angle` about the line through `on` along `axis`.
-fn turned(point: Vec3, on: Vec3, axis: Vec3, angle: f64) -> Vec3 {
-    on + turn(axis, angle) * (point - on)
+fn rotated_point(point: Vec3, on: Vec3, axis: Vec3, angle: f64) -> Vec3 {
+    on + rotation_matrix(axis, angle) * (point - on)
 }
 
-fn turn(axis: Vec3, angle: f64) -> Mat3 {
+fn rotation_matrix(axis: Vec3, angle: f64) -> Mat3 {
     *nalgebra::Rotation3::from_axis_angle(&nalgebra::Unit::new_normalize(axis), angle).matrix()
 }
 
-/// The least angle by which `point` turns about the line through `on` along `axis` until it is `distance` from `other`.
-fn until(distance: f64, other: Vec3, point: Vec3, on: Vec3, axis: Vec3) -> f64 {
+/// The smallest rotation of `point` about the line through `on` along `axis` that brings it to `distance` from `other`.
+fn angle_to_distance(distance: f64, other: Vec3, point: Vec3, on: Vec3, axis: Vec3) -> f64 {
     let (axis, arm) = (axis.normalize(), point - on);
     let along = axis * axis.dot(&arm);
     let (across, seat) = (arm - along, on + along - other);
@@ -228,7 +229,7 @@ fn until(distance: f64, other: Vec3, point: Vec3, on: Vec3, axis: Vec3) -> f64 {
     let (a, b) = (2.0 * seat.dot(&across), 2.0 * seat.dot(&axis.cross(&across)));
     [1.0, -1.0]
         .map(|side| {
-            let angle = on_circle(a, b, c, side);
+            let angle = solve_angle(a, b, c, side);
             (angle + PI).rem_euclid(TAU) - PI
         })
         .into_iter()
@@ -236,7 +237,7 @@ fn until(distance: f64, other: Vec3, point: Vec3, on: Vec3, axis: Vec3) -> f64 {
         .unwrap()
 }
 
-/// The suspension written down again, from its source: its energies for the height of the body and the angle of the lower arm.
+/// An independent model of the suspension from its source, with the height of the body and the angle of the lower arm as coordinates.
 struct Corner;
 
 impl Corner {
@@ -249,39 +250,39 @@ impl Corner {
     const OUTER: Vec3 = Vec3::new(-0.176, 0.821, -0.016);
     const WHEEL: Vec3 = Vec3::new(-0.040, 0.910, -0.026);
 
-    /// Centres of mass with their masses, and how far the parts that turn have turned.
-    fn parts(z: f64, theta: f64) -> (Centres, Turning) {
+    /// Centroids with masses, and inertias with rotations.
+    fn parts(z: f64, theta: f64) -> (PointMasses, RotatingParts) {
         let up = Vec3::new(0.0, 0.0, z);
-        // All of it below the body, which goes up at the end.
-        let lower_axes = turn(Vec3::x(), theta);
+        // All points are relative to the body; `up` adds its height at the end.
+        let lower_axes = rotation_matrix(Vec3::x(), theta);
         let lower = Self::LOWER_HINGE + lower_axes * (Self::LOWER_BALL - Self::LOWER_HINGE);
         let hinge = Vec3::new(0.220, -0.032, 0.049);
-        let apart = (Self::UPPER_BALL - Self::LOWER_BALL).norm();
-        let phi = until(apart, lower, Self::UPPER_BALL, Self::UPPER_HINGE, hinge);
-        let upper = turned(Self::UPPER_BALL, Self::UPPER_HINGE, hinge, phi);
-        // The upright: tilted with the line of its balls, then turned about it until the tie rod has its length.
+        let ball_distance = (Self::UPPER_BALL - Self::LOWER_BALL).norm();
+        let phi = angle_to_distance(ball_distance, lower, Self::UPPER_BALL, Self::UPPER_HINGE, hinge);
+        let upper = rotated_point(Self::UPPER_BALL, Self::UPPER_HINGE, hinge, phi);
+        // The upright is tilted with the line of its balls, then rotated about it until the tie rod has its length.
         let line = upper - lower;
         let before = Self::UPPER_BALL - Self::LOWER_BALL;
         let tilt = nalgebra::Rotation3::rotation_between(&before, &line).unwrap();
         let outer = lower + tilt * (Self::OUTER - Self::LOWER_BALL);
         let length = (Self::OUTER - Self::INNER).norm();
-        let steer = until(length, Self::INNER, outer, lower, line);
-        let axes = turn(line, steer) * tilt.matrix();
+        let steer_angle = angle_to_distance(length, Self::INNER, outer, lower, line);
+        let axes = rotation_matrix(line, steer_angle) * tilt.matrix();
         let of_upright = |point: Vec3| up + lower + axes * (point - Self::LOWER_BALL);
-        // The tie rod does not spin here; that would move nothing else.
-        let rod = turned(outer, lower, line, steer) - Self::INNER;
+        // The spin of the tie rod is left out; it moves nothing else.
+        let rod = rotated_point(outer, lower, line, steer_angle) - Self::INNER;
         let along = Self::OUTER - Self::INNER;
         let rod_axes = nalgebra::Rotation3::rotation_between(&along, &rod).unwrap();
-        let of_lower = |point: Vec3| turned(point, Self::LOWER_HINGE, Vec3::x(), theta);
-        let of_upper = |point: Vec3| turned(point, Self::UPPER_HINGE, hinge, phi);
-        // A flat part with this moment about any line in its plane, in which three points lie.
+        let of_lower = |point: Vec3| rotated_point(point, Self::LOWER_HINGE, Vec3::x(), theta);
+        let of_upper = |point: Vec3| rotated_point(point, Self::UPPER_HINGE, hinge, phi);
+        // A flat part in the plane of three points, with this moment about any line in the plane.
         let plate = |moment: f64, a: Vec3, b: Vec3, c: Vec3| {
             let normal = (b - a).cross(&(c - a)).normalize();
             (Mat3::identity() + normal * normal.transpose()) * moment
         };
         let of_lower_arm = plate(0.4, Self::LOWER_HINGE, Self::LOWER_HINGE + Vec3::x(), Self::LOWER_BALL);
         let of_upper_arm = plate(0.03, Self::UPPER_HINGE, Self::UPPER_HINGE + hinge, Self::UPPER_BALL);
-        // Upright; spindle, wheel and tyre 159 mm further out.
+        // Masses of the upright and, 159 mm further out, of spindle, wheel and tyre.
         let (knuckle, rolling) = (19.45, 14.705 + 18.8 + 37.6);
         let steiner = knuckle * rolling / (knuckle + rolling) * 0.159_f64.powi(2);
         let across = 0.04117 + 0.4634 + 3.84 + steiner;
@@ -300,23 +301,23 @@ impl Corner {
             ],
             [
                 (of_lower_arm, lower_axes),
-                (of_upper_arm, turn(hinge, phi)),
+                (of_upper_arm, rotation_matrix(hinge, phi)),
                 (Mat3::from_diagonal(&of_wheel), axes),
                 (of_rod, *rod_axes.matrix()),
             ],
         )
     }
 
-    /// Where the wheel's middle is.
+    /// The wheel's centre.
     fn wheel(z: f64, theta: f64) -> Vec3 {
-        let (masses, turning) = Self::parts(z, theta);
+        let (masses, rotating) = Self::parts(z, theta);
         let out = 0.159 * 19.45 / masses[3].0;
-        masses[3].1 + turning[2].1 * Vec3::new(0.0, out, 0.0)
+        masses[3].1 + rotating[2].1 * Vec3::new(0.0, out, 0.0)
     }
 
     /// Length of the coil spring.
     fn coil(theta: f64) -> f64 {
-        let seat = turned(Vec3::new(0.097, 0.543, -0.047), Self::LOWER_HINGE, Vec3::x(), theta);
+        let seat = rotated_point(Vec3::new(0.097, 0.543, -0.047), Self::LOWER_HINGE, Vec3::x(), theta);
         (seat - Vec3::new(0.104, 0.510, 0.197)).norm()
     }
 
@@ -326,7 +327,7 @@ impl Corner {
     }
 
     fn potential(z: f64, theta: f64) -> f64 {
-        // The tyre carries everything as designed; then virtual work says what the spring does.
+        // In the design pose the tyre carries the whole weight; the spring's preload follows by virtual work.
         let all: f64 = Self::parts(0.0, 0.0).0.iter().map(|(mass, _)| mass * 9.81).sum();
         let slope = |f: &dyn Fn(f64) -> f64| (f(1e-5) - f(-1e-5)) / 2e-5;
         let raised = slope(&|theta| Self::weight(0.0, theta) - all * Self::wheel(0.0, theta).z);
@@ -336,10 +337,10 @@ impl Corner {
         Self::weight(z, theta) + preload * change + 0.5 * COIL * change * change + 0.5 * TYRE * pressed * pressed
     }
 
-    /// Masses and stiffnesses of small motion about the rest: (11, 12, 22) of each.
+    /// Mass and stiffness matrices of small motion about rest: elements (11, 12, 22) of each.
     fn linear() -> ([f64; 3], [f64; 3]) {
         let h = 1e-5;
-        // The rates of all positions and angles for a unit rate of each coordinate.
+        // Mass-weighted velocities and angular velocities for a unit rate of one coordinate.
         let rates = |step: [f64; 2]| {
             let (after, before) = (Self::parts(step[0] * h, step[1] * h), Self::parts(-step[0] * h, -step[1] * h));
             let speeds = std::array::from_fn::<_, 5, _>(|n| {
@@ -347,8 +348,8 @@ impl Corner {
                 (after.0[n].1 - before.0[n].1) * (mass.sqrt() / (2.0 * h))
             });
             let spins = std::array::from_fn::<_, 4, _>(|n| {
-                let turn: Mat3 = (after.1[n].1 - before.1[n].1) / (2.0 * h);
-                Vec3::new(turn[(2, 1)], turn[(0, 2)], turn[(1, 0)])
+                let spin: Mat3 = (after.1[n].1 - before.1[n].1) / (2.0 * h);
+                Vec3::new(spin[(2, 1)], spin[(0, 2)], spin[(1, 0)])
             });
             (speeds, spins)
         };
@@ -384,10 +385,10 @@ impl Corner {
 }
 
 #[test]
-fn the_suspension_swings_as_its_linear_model() {
+fn the_suspension_oscillates_as_its_linear_model() {
     let (m, _) = Corner::linear();
     let modes = Corner::modes();
-    // Without dampers, on a flat road, and with a slightly smaller wheel: it is let go beside its rest.
+    // Without dampers, on a flat road; a slightly smaller wheel starts it off its rest position.
     let mut simulation = simulation(
         "suspension",
         &[
@@ -411,38 +412,38 @@ fn the_suspension_swings_as_its_linear_model() {
         })
         .collect();
     for (frequency, shape) in modes {
-        // What is left of a sum of modes by the product with one, as they are orthogonal with the masses for weights.
+        // Modes are orthogonal under the mass matrix: this projection leaves one of them.
         let weights = [m[0] * shape[0] + m[1] * shape[1], m[1] * shape[0] + m[2] * shape[1]];
         let mode = samples.iter().map(|x| weights[0] * x[0] + weights[1] * x[1]);
         let mode: Vec<f64> = mode.collect();
-        let (least, most) = mode.iter().fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
-        let middle = 0.5 * (least + most);
-        let ups: Vec<f64> = (1..mode.len())
-            .filter(|&n| mode[n - 1] < middle && mode[n] >= middle)
-            .map(|n| n as f64 - (mode[n] - middle) / (mode[n] - mode[n - 1]))
+        let (min, max) = mode.iter().fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
+        let centre = 0.5 * (min + max);
+        let crossings: Vec<f64> = (1..mode.len())
+            .filter(|&n| mode[n - 1] < centre && mode[n] >= centre)
+            .map(|n| n as f64 - (mode[n] - centre) / (mode[n] - mode[n - 1]))
             .collect();
-        let periods = ups.len() - 1;
-        let found = periods as f64 / (0.5e-3 * (ups[periods] - ups[0]));
-        println!("{found} Hz, linear model {frequency} Hz, {periods} periods");
+        let periods = crossings.len() - 1;
+        let measured = periods as f64 / (0.5e-3 * (crossings[periods] - crossings[0]));
+        println!("{measured} Hz, linear model {frequency} Hz, {periods} periods");
         assert!(periods >= 6);
-        assert!((found / frequency - 1.0).abs() < 5e-3, "{found} {frequency}");
+        assert!((measured / frequency - 1.0).abs() < 5e-3, "{measured} {frequency}");
     }
-    // What its help says.
+    // The frequencies in the scene's help text.
     assert!((modes[0].0 - 1.1).abs() < 0.1 && (modes[1].0 - 9.3).abs() < 0.5, "{modes:?}");
 }
 
 #[test]
-fn the_suspension_rests_as_drawn_and_play_lets_its_wheel_turn() {
-    let still = [IDEAL, ("parameter.bump", "0 mm")];
+fn the_suspension_rests_in_its_design_pose_and_play_allows_toe_change() {
+    let flat_road = [IDEAL, ("parameter.bump", "0 mm")];
     for sprung in ["400 kg", "538.9 kg", "800 kg"] {
-        let changes = [&still[..], &[("parameter.sprung", sprung)]].concat();
+        let changes = [&flat_road[..], &[("parameter.sprung", sprung)]].concat();
         let mut simulation = simulation("suspension", &changes);
         run_until(&mut simulation, 0.5);
         let moved = frame_now(&mut simulation).pose.position;
         assert!(moved.norm() < 1e-6, "{sprung}: {moved:?}");
     }
-    // Toe: the upright's angle about Z.
-    let toe = |changes: &Changes| {
+    // Range of the toe angle, the upright's angle about Z.
+    let toe_range = |changes: &Changes| {
         let mut simulation = simulation("suspension", changes);
         let (mut frame, mut least, mut most) = (Frame::default(), f64::MAX, f64::MIN);
         for n in 0..=200 {
@@ -455,13 +456,13 @@ fn the_suspension_rests_as_drawn_and_play_lets_its_wheel_turn() {
         }
         most - least
     };
-    let (ideal, loose) = (toe(&[IDEAL]), toe(&[]));
-    let worn = toe(&[("joint.outer.clearance", "1.5 mm")]);
+    let (ideal, loose) = (toe_range(&[IDEAL]), toe_range(&[]));
+    let worn = toe_range(&[("joint.outer.clearance", "1.5 mm")]);
     println!("toe moves by {ideal:e}, {loose:e}, {worn:e} rad");
     assert!(loose > 5.0 * ideal && worn > 1.2 * loose, "{ideal:e} {loose:e} {worn:e}");
 }
 
-/// The longer tie rod turns the front of the wheel inward, as its help says.
+/// A longer tie rod turns the front of the wheel inward, as the scene's help text says.
 #[test]
 fn the_tie_rod_sets_the_toe() {
     let toe = |length: &str| {
@@ -484,7 +485,7 @@ fn each_machine_with_one_loose_joint_moves_the_same_under_another_solver() {
         ("press", "wrist", 0.030),
     ] {
         let key = format!("joint.{joint}.clearance");
-        // The other solver remembers the speed at which a contact began, not the largest one since.
+        // The other solver uses the speed at the onset of contact, not the largest one since.
         let start = ("contact.approach_speed", "start");
         let changes = [IDEAL, (&*key, "0.1 mm"), start];
         let (contacts, off) = moves_the_same(name, &changes, end);
@@ -498,13 +499,13 @@ fn each_machine_balances_its_energy_in_both_formulations() {
     for name in MACHINES {
         for (form, end) in [("tree", 0.015), ("lagrange", 0.009)] {
             let changes = [("formulation", form)];
-            let mut ran = simulation(name, &changes);
-            run_until(&mut ran, end);
-            let ledger = ran.ledger().unwrap();
+            let mut simulation = simulation(name, &changes);
+            run_until(&mut simulation, end);
+            let ledger = simulation.ledger().unwrap();
             let residual = ledger.relative_residual().abs();
-            assert!(residual < PROMISE, "{name}, {form}: {residual:e} {ledger:?}");
+            assert!(residual < ENERGY_TOLERANCE, "{name}, {form}: {residual:e} {ledger:?}");
             assert!(ledger.exchanged > 0.0 && ledger.drive_work != 0.0, "{name}");
-            let impacts: u64 = ran.statistics().impacts.iter().sum();
+            let impacts: u64 = simulation.statistics().impacts.iter().sum();
             assert!(impacts > 0, "{name}, {form}");
         }
     }
@@ -521,7 +522,7 @@ fn the_machines_raise_no_doubt_with_their_default_settings() {
     }
 }
 
-/// At every corner of the ranges of its parameters a machine is put together, with play and without.
+/// A machine assembles at every corner of its parameter ranges.
 #[test]
 fn each_machine_assembles_at_the_ends_of_its_parameters() {
     for name in MACHINES {
@@ -550,17 +551,17 @@ fn each_machine_assembles_at_the_ends_of_its_parameters() {
     }
 }
 
-/// Up to 2 Hz it strays by about twice the play of a joint, 0.1 mm; above, where the legs are unloaded, by far more.
+/// Up to 2 Hz the tool point deviates by about twice the clearance of 0.1 mm; above, where legs are unloaded, by far more.
 #[test]
-fn the_tool_point_of_the_hexapod_strays_by_twice_the_play() {
-    // Looks no further once it is more than `enough`.
-    let strays = |rate: &str, enough: f64| {
+fn the_tool_point_of_the_hexapod_deviates_by_twice_the_clearance() {
+    // Stops early once the deviation exceeds `enough`.
+    let deviation = |rate: &str, enough: f64| {
         let loose = [("parameter.rate", rate), ("solver.tolerance", "1e-4"), ("contact.clearance", "0.1 mm")];
         let ideal = [("parameter.rate", rate), IDEAL];
         let mut runs = [simulation("hexapod", &loose), simulation("hexapod", &ideal)];
-        let (mut frame, mut most) = (Frame::default(), 0.0_f64);
+        let (mut frame, mut max_deviation) = (Frame::default(), 0.0_f64);
         for n in 0..=100 {
-            if most > enough {
+            if max_deviation > enough {
                 break;
             }
             let time = 0.5 + 0.005 * f64::from(n);
@@ -570,19 +571,19 @@ fn the_tool_point_of_the_hexapod_strays_by_twice_the_play() {
                 let (position, axes) = pose(run.machine(), &frame, "platform");
                 position + axes * Vec3::new(0.0, 0.0, -0.100)
             });
-            most = most.max((loose - ideal).norm());
+            max_deviation = max_deviation.max((loose - ideal).norm());
         }
-        most
+        max_deviation
     };
-    let (slow, fast) = (strays("2 Hz", 2.3e-4), strays("2.5 Hz", 4e-4));
+    let (slow, fast) = (deviation("2 Hz", 2.3e-4), deviation("2.5 Hz", 4e-4));
     assert!(slow > 1.9e-4 && slow < 2.3e-4, "{slow} m");
     assert!(fast > 4e-4, "{fast} m");
 }
 
-/// Slow, the rocker stands low by less than the play of both balls; fast, it leads and lags by the play of both.
+/// At low speed the rocker sags by less than the clearances of both balls; at high speed it leads and lags by both.
 #[test]
-fn the_rocker_of_the_four_bar_stands_low_or_leads_and_lags() {
-    let off = |speed: f64| {
+fn the_rocker_of_the_four_bar_sags_when_slow_and_leads_and_lags_when_fast() {
+    let deviation_range = |speed: f64| {
         let text = format!("{speed} rad/s");
         let mut runs = [&[][..], &[IDEAL]]
             .map(|more: &Changes| simulation("four-bar", &[&[("parameter.speed", &*text)], more].concat()));
@@ -600,7 +601,7 @@ fn the_rocker_of_the_four_bar_stands_low_or_leads_and_lags() {
         }
         (least, most)
     };
-    let (slow, fast) = (off(5.0), off(20.0));
+    let (slow, fast) = (deviation_range(5.0), deviation_range(20.0));
     assert!(slow.0 > 2e-5 && slow.1 > 1e-4 && slow.1 < 1.5e-4, "{slow:?}");
     assert!(fast.0 < -2e-4 && fast.1 > 2e-4, "{fast:?}");
 }

@@ -1,8 +1,8 @@
-//! Whatever is wrong with a scene, the error names the place, the key, the value, and what is allowed.
+//! Every error in a scene names its position, the key, the value and the allowed range.
 
 use jointplay::scene::{BUILT_IN, Scene, SceneError};
 
-/// A scene of one rod on one ball joint; the cases below break one line of it.
+/// A valid scene of one rod on one ball joint; each case below breaks one line of it.
 const GOOD: &str = r#"name = "test"
 start = "as-given"
 [contact]
@@ -29,8 +29,8 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
     Scene::parse(text, Some("my.toml"), &[])
 }
 
-/// Checks that `error` holds every fragment.
-fn holds(case: &str, error: &SceneError, fragments: &[&str]) {
+/// Checks that `error` contains every fragment.
+fn assert_contains(case: &str, error: &SceneError, fragments: &[&str]) {
     let text = error.to_string();
     for fragment in fragments {
         assert!(text.contains(fragment), "{case}\n  should say `{fragment}`, says:\n{text}");
@@ -45,7 +45,7 @@ fn the_unbroken_scene_is_read() {
 }
 
 #[test]
-fn a_law_and_a_role_that_are_none_are_named_before_their_keys() {
+fn an_unknown_law_or_role_is_reported_before_its_keys() {
     let text = jointplay::scene::built_in_text("slider-crank-driven").unwrap();
     for (right, wrong, words) in [
         (
@@ -57,13 +57,13 @@ fn a_law_and_a_role_that_are_none_are_named_before_their_keys() {
     ] {
         let broken = text.replacen(right, wrong, 1);
         assert_ne!(broken, text, "{right}");
-        holds(wrong, &parse(&broken).unwrap_err(), &words);
+        assert_contains(wrong, &parse(&broken).unwrap_err(), &words);
     }
 }
 
 #[test]
-fn every_broken_line_is_named_with_its_remedy() {
-    // (line as it should be, line as written, what the error must say)
+fn every_broken_line_is_reported_with_its_remedy() {
+    // (correct line, broken line, fragments of the error)
     let cases: &[(&str, &str, &[&str])] = &[
         (
             "friction = 0.15",
@@ -165,7 +165,7 @@ fn every_broken_line_is_named_with_its_remedy() {
             &["needs 3 values, has 2"],
         ),
         ("form = \"sphere\"", "form = \"shere\"", &["my.toml:10:20", "did you mean `sphere`"]),
-        // A wrong word decides which other keys are wrong: it is named, not these.
+        // An unknown form would make its other keys unknown, too: only the form is reported.
         (
             "form = \"sphere\"",
             "form = \"torus\", bore = \"1 mm\"",
@@ -264,7 +264,7 @@ fn every_broken_line_is_named_with_its_remedy() {
         assert!(GOOD.contains(good), "the case `{good}` breaks nothing");
         match parse(&GOOD.replacen(good, bad, 1)) {
             Ok(_) => panic!("`{bad}` was accepted"),
-            Err(error) => holds(bad, &error, fragments),
+            Err(error) => assert_contains(bad, &error, fragments),
         }
     }
 }
@@ -324,13 +324,13 @@ fn additions_that_contradict_the_scene_are_refused() {
     for (more, fragments) in cases {
         match parse(&format!("{GOOD}{more}")) {
             Ok(_) => panic!("`{more}` was accepted"),
-            Err(error) => holds(more, &error, fragments),
+            Err(error) => assert_contains(more, &error, fragments),
         }
     }
 }
 
 #[test]
-fn functions_of_a_closed_form_are_named_with_what_is_wrong() {
+fn errors_in_functions_of_a_closed_form_name_the_function() {
     let text = jointplay::scene::built_in_text("spcmm").unwrap();
     let cases: [(&str, &str, &[&str]); 9] = [
         (
@@ -357,7 +357,7 @@ fn functions_of_a_closed_form_are_named_with_what_is_wrong() {
     ];
     for (from, to, words) in cases {
         assert_eq!(text.matches(from).count(), 1, "{from}");
-        holds(to, &parse(&text.replace(from, to)).unwrap_err(), words);
+        assert_contains(to, &parse(&text.replace(from, to)).unwrap_err(), words);
     }
 }
 
@@ -395,18 +395,18 @@ fn changes_are_refused_with_key_value_and_range() {
         let change = [((*key).to_owned(), (*value).to_owned())];
         let error = Scene::load(scene, &change).expect_err("a bad change was accepted");
         assert_eq!(error.position, None, "{error}");
-        holds(&format!("{key}={value}"), &error, fragments);
+        assert_contains(&format!("{key}={value}"), &error, fragments);
         // The same change of a running scene leaves it as it was.
         let mut live = Scene::load(scene, &[]).unwrap();
         let before = format!("{live:?}");
         let error = live.set(key, value).expect_err("a bad change was accepted");
-        holds(&format!("live {key}={value}"), &error, fragments);
+        assert_contains(&format!("live {key}={value}"), &error, fragments);
         assert_eq!(format!("{live:?}"), before);
     }
 }
 
 #[test]
-fn a_file_that_is_no_scene_is_reported_as_such() {
+fn a_file_that_is_not_a_scene_is_reported_as_such() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let write = |name: &str, bytes: &[u8]| {
@@ -416,34 +416,34 @@ fn a_file_that_is_no_scene_is_reported_as_such() {
     let load = |name: &str| Scene::load(name, &[]).expect_err("this is no scene");
 
     let empty = write("empty.toml", b" \n");
-    holds("empty", &load(&empty), &[&empty, "the file is empty"]);
+    assert_contains("empty", &load(&empty), &[&empty, "the file is empty"]);
     let only_text = write("comment.toml", b"# nothing\n");
-    holds("no body", &load(&only_text), &["at least one [[body]]"]);
+    assert_contains("no body", &load(&only_text), &["at least one [[body]]"]);
     let junk = write("junk.toml", b"name = \"x\"\n\x7fELF\xff\xfe\x00");
-    holds("binary", &load(&junk), &["junk.toml:2:5", "not valid UTF-8"]);
+    assert_contains("binary", &load(&junk), &["junk.toml:2:5", "not valid UTF-8"]);
     let zeros = write("zeros.toml", &[0; 4096]);
-    holds("zeros", &load(&zeros), &["zeros.toml:1:", "not valid TOML"]);
+    assert_contains("zeros", &load(&zeros), &["zeros.toml:1:", "not valid TOML"]);
     let huge = write("huge.toml", &vec![b'#'; (4 << 20) + 1]);
-    holds("huge", &load(&huge), &["too large", "4 MiB"]);
+    assert_contains("huge", &load(&huge), &["too large", "4 MiB"]);
     let deep = write("deep.toml", format!("a = {}", "[".repeat(100_000)).as_bytes());
-    holds("deep", &load(&deep), &["deep.toml:1:", "not valid TOML"]);
+    assert_contains("deep", &load(&deep), &["deep.toml:1:", "not valid TOML"]);
 
     let directory = format!("{}/", folder.path().to_str().unwrap());
     let error = load(&directory);
     assert!(error.unreadable);
-    holds("directory", &error, &["is a directory"]);
+    assert_contains("directory", &error, &["is a directory"]);
     let error = load(&path("missing.toml"));
     assert!(error.unreadable);
-    holds("missing", &error, &["missing.toml", "cannot read"]);
+    assert_contains("missing", &error, &["missing.toml", "cannot read"]);
     let error = load("spcm");
     assert!(!error.unreadable);
-    holds("misspelt", &error, &["no built-in scene `spcm`", "did you mean `spcmm`", "pendulum"]);
-    holds(
+    assert_contains("misspelt", &error, &["no built-in scene `spcm`", "did you mean `spcmm`", "pendulum"]);
+    assert_contains(
         "misspelt benchmark",
         &load("squeezr"),
         &["did you mean `squeezer`", "built in: spcmm", "benchmarks: simple-pendulum"],
     );
-    holds("misspelt file", &load("slider-crnk.toml"), &["did you mean `slider-crank`", "benchmarks"]);
+    assert_contains("misspelt file", &load("slider-crnk.toml"), &["did you mean `slider-crank`", "benchmarks"]);
 }
 
 #[test]
@@ -453,11 +453,11 @@ fn a_damaged_file_never_panics_and_its_error_has_a_place() {
         let lines: Vec<&str> = text.lines().collect();
         let written = lines.iter().enumerate().filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
         for (turn, (at, line)) in written.enumerate() {
-            // The kinds of damage take turns.
+            // Rotates through the kinds of damage.
             let damaged = match turn % 3 {
                 0 => [&lines[..at], &lines[at + 1..]].concat().join("\n"),
                 1 => [&lines[..=at], &lines[at..]].concat().join("\n"),
-                // A number where a text was, a text where a number was.
+                // Removes quotes and braces.
                 _ => text.replacen(line, &line.replace(['"', '{'], ""), 1),
             };
             if let Err(error) = parse(&damaged) {
@@ -475,8 +475,8 @@ fn a_damaged_file_never_panics_and_its_error_has_a_place() {
 }
 
 #[test]
-fn a_drive_that_swings_backwards_in_time_is_refused() {
-    // A negative period once let a driven scene step backwards for ever.
+fn a_drive_with_a_negative_frequency_is_refused() {
+    // A negative period once made a driven scene step backwards forever.
     let drive = |frequency: &str| {
         let text = GOOD.replace("kind = \"free\"", "kind = \"prismatic\"\naxis = [1, 0, 0]");
         text.replace(
@@ -487,7 +487,7 @@ fn a_drive_that_swings_backwards_in_time_is_refused() {
     assert!(parse(&drive("1 Hz")).is_ok());
     for bad in ["-1 Hz", "0 Hz", "20 kHz"] {
         let error = parse(&drive(bad)).unwrap_err();
-        holds(bad, &error, &["my.toml:16:", "joint.free.drive.frequency", bad, "above 0 up to 10000 Hz"]);
+        assert_contains(bad, &error, &["my.toml:16:", "joint.free.drive.frequency", bad, "above 0 up to 10000 Hz"]);
     }
 }
 
@@ -522,25 +522,25 @@ fn a_scene_beyond_a_limit_is_refused_with_its_line() {
         (body(0) + &plate, "corners[100]: too many: 101 corners; allowed at most 100"),
     ];
     for (text, words) in cases {
-        holds(words, &parse(&text).expect_err(words), &[words]);
+        assert_contains(words, &parse(&text).expect_err(words), &[words]);
     }
     let chain = jointplay::scene::built_in_text("chain").unwrap();
     let changes = vec![("chain.links".to_owned(), "4096".to_owned())];
-    let beside = chain.to_owned() + &many(5905, &body) + &many(5905, &joint);
+    let enlarged = chain.to_owned() + &many(5905, &body) + &many(5905, &joint);
     let words = "too many: 10001 bodies with those of patterns and included files; allowed at most 10000";
-    let error = Scene::parse(&beside, None, &changes).expect_err(words);
-    holds("chain", &error, &[words]);
+    let error = Scene::parse(&enlarged, None, &changes).expect_err(words);
+    assert_contains("chain", &error, &[words]);
 
     let more = (1..=4096).map(|n| (format!("joint.J{n}.friction"), "0.1".to_owned()));
     let changes: Vec<_> = changes.into_iter().chain(more).collect();
     let error = Scene::parse(chain, None, &changes).expect_err("too many changes");
-    holds("changes", &error, &["joint.J4096.friction = 0.1", "allowed at most 4096"]);
+    assert_contains("changes", &error, &["joint.J4096.friction = 0.1", "allowed at most 4096"]);
 }
 
 #[test]
-fn thousands_of_joints_that_differ_do_not_make_thousands_of_warnings() {
+fn thousands_of_different_joints_do_not_raise_thousands_of_warnings() {
     for links in [30, 4000] {
-        // So small that each has its warning.
+        // Clearances so small that each raises a warning.
         let own = |n: usize| (format!("joint.J{n}.clearance"), format!("{n}e-9 m"));
         let mut changes = vec![("chain.links".to_owned(), links.to_string())];
         changes.extend((1..=links).map(own));
