@@ -1,4 +1,4 @@
-//! Robot descriptions as scenes: their mass, their motion, their names, and what is not taken.
+//! Robot descriptions as scenes: masses, motion, names, and parts that are not imported.
 
 use std::fs;
 use std::path::Path;
@@ -8,10 +8,10 @@ use jointplay::simulate::{Frame, Simulation};
 
 use crate::program::{folder, jointplay};
 
-/// Folder of the descriptions of this test.
+/// Folder of the descriptions for these tests.
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/commands/import");
 
-/// The scene of the description `text`, and what was said.
+/// The scene of the description `text`, and the messages.
 pub fn imported(text: &str) -> (Scene, String) {
     let folder = folder();
     fs::write(folder.path().join("robot"), text).unwrap();
@@ -19,8 +19,8 @@ pub fn imported(text: &str) -> (Scene, String) {
     (Scene::parse(&outcome.stdout, None, &[]).unwrap(), outcome.stderr)
 }
 
-/// The message for a description that is refused.
-pub fn refused(text: &str) -> String {
+/// The error message for the description `text`.
+pub fn import_error(text: &str) -> String {
     let folder = folder();
     fs::write(folder.path().join("robot"), text).unwrap();
     jointplay(folder.path(), "import robot").expect(2).stderr
@@ -30,14 +30,14 @@ pub fn mujoco(inside: &str) -> String {
     format!("<mujoco>\n<worldbody>\n{inside}\n</worldbody>\n</mujoco>")
 }
 
-pub fn start(scene: &Scene) -> Frame {
+pub fn initial_frame(scene: &Scene) -> Frame {
     let mut simulation = Simulation::new(&scene.machine).unwrap();
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     frame
 }
 
-/// Both descriptions of the arm as scenes beside their meshes, and what was said of them.
+/// Both descriptions of the arm as scenes with their meshes, and the messages.
 fn arms() -> [(Scene, String); 2] {
     ["arm.urdf", "arm.xml"].map(|name| {
         let outcome = jointplay(Path::new(FOLDER), &format!("import {name}")).expect(0);
@@ -60,7 +60,7 @@ fn the_same_arm_in_both_formats_gives_the_same_machine() {
     assert_eq!(names(&urdf), ["upper_arm", "forearm", "plunger"]);
     // The flange is a part of the forearm: 0.8 kg and 0.1 kg.
     assert!((urdf.machine.bodies[1].mass - 0.9).abs() < 1e-12);
-    let [one, other] = [&urdf, &mjcf].map(start);
+    let [one, other] = [&urdf, &mjcf].map(initial_frame);
     for (a, b) in one.bodies.iter().zip(&other.bodies) {
         assert!((a.position - b.position).norm() < 1e-12);
         assert!(a.angular_acceleration.norm() > 0.1);
@@ -83,18 +83,21 @@ fn the_same_arm_in_both_formats_gives_the_same_machine() {
 
 /// Angular acceleration of a hinged link from rest: m g l sin(theta) / I about the hinge.
 #[test]
-fn a_link_whose_inertia_is_turned_falls_as_its_closed_form() {
+fn a_link_with_rotated_inertia_falls_as_its_closed_form() {
     let text = r#"<robot name="one"><link name="base"/><link name="rod">
         <inertial><origin xyz="0.3 0 0" rpy="0 0 1.5707963267948966"/><mass value="2"/>
             <inertia ixx="0.05" ixy="0" ixz="0" iyy="0.012" iyz="0" izz="0.06"/></inertial></link>
         <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><origin rpy="0 0.4 0"/><axis xyz="0 1 0"/></joint>
         </robot>"#;
-    let (scene, said) = imported(text);
-    assert_eq!(said, "");
-    // About y the turned tensor has ixx.
+    let (scene, messages) = imported(text);
+    assert_eq!(messages, "");
+    // The rotated tensor has ixx about y.
     let expected = 2.0 * 9.81 * 0.3 * 0.4_f64.cos() / (0.05 + 2.0 * 0.09);
-    let found = start(&scene).bodies[0].angular_acceleration;
-    assert!((found.y / expected - 1.0).abs() < 1e-9 && found.x.abs() + found.z.abs() < 1e-9, "{found}");
+    let acceleration = initial_frame(&scene).bodies[0].angular_acceleration;
+    assert!(
+        (acceleration.y / expected - 1.0).abs() < 1e-9 && acceleration.x.abs() + acceleration.z.abs() < 1e-9,
+        "{acceleration}"
+    );
 }
 
 #[test]
@@ -121,22 +124,22 @@ fn geoms_give_a_body_its_mass() {
 
 #[test]
 fn all_notations_of_an_orientation_agree() {
-    let turned = |how: &str| {
+    let rotation = |notation: &str| {
         let text =
-            mujoco(&format!("<body {how}><joint type=\"free\"/><geom type=\"box\" size=\"0.1 0.2 0.3\"/></body>"));
+            mujoco(&format!("<body {notation}><joint type=\"free\"/><geom type=\"box\" size=\"0.1 0.2 0.3\"/></body>"));
         let text = text.replace("<worldbody>", "<compiler eulerseq=\"ZYX\"/><worldbody>");
-        start(&imported(&text).0).bodies[0].rotation
+        initial_frame(&imported(&text).0).bodies[0].rotation
     };
     // A quarter turn about x, then one about the fixed z axis.
-    let expected = turned("quat=\"0.5 0.5 0.5 0.5\"");
-    for how in ["axisangle=\"1 1 1 120\"", "xyaxes=\"0 1 0 0 0 1\"", "quat=\"-1 -1 -1 -1\""] {
-        assert!((turned(how) - expected).norm() < 1e-12, "{how}: {}", turned(how));
+    let expected = rotation("quat=\"0.5 0.5 0.5 0.5\"");
+    for notation in ["axisangle=\"1 1 1 120\"", "xyaxes=\"0 1 0 0 0 1\"", "quat=\"-1 -1 -1 -1\""] {
+        assert!((rotation(notation) - expected).norm() < 1e-12, "{notation}: {}", rotation(notation));
     }
-    // Capitals turn about fixed axes, one after the other.
-    let about_z_then_x = turned("euler=\"90 0 90\"");
-    let product = turned("axisangle=\"1 0 0 90\"") * turned("axisangle=\"0 0 1 90\"");
+    // Capital letters denote rotations about fixed axes, in sequence.
+    let about_z_then_x = rotation("euler=\"90 0 90\"");
+    let product = rotation("axisangle=\"1 0 0 90\"") * rotation("axisangle=\"0 0 1 90\"");
     assert!((about_z_then_x - product).norm() < 1e-12);
-    let up = turned("zaxis=\"1 0 0\"");
+    let up = rotation("zaxis=\"1 0 0\"");
     assert!((up.column(2) - jointplay::machine::Vec3::x()).norm() < 1e-12);
 }
 
@@ -162,7 +165,7 @@ fn a_connection_closes_a_loop() {
 
 #[test]
 fn only_omitted_parts_are_listed() {
-    let [(urdf, said), (mjcf, too)] = arms();
+    let [(urdf, messages), (mjcf, mjcf_messages)] = arms();
     for expected in [
         "mass of a link that does not move (line 9)",
         "<collision>: bodies do not touch each other (line 24)",
@@ -171,10 +174,10 @@ fn only_omitted_parts_are_listed() {
         "limits of a joint: a [[stop]] needs their stiffness, too (line 61, and 1 more)",
         "<transmission>",
     ] {
-        assert!(said.contains(&format!("not taken: {expected}")), "{expected}: {said}");
+        assert!(messages.contains(&format!("not taken: {expected}")), "{expected}: {messages}");
         assert!(urdf.source.text.contains(expected), "{expected}");
     }
-    assert_eq!(said.lines().count(), 6, "{said}");
+    assert_eq!(messages.lines().count(), 6, "{messages}");
     let expected = [
         "setting timestep of <option>",
         "<texture> of <asset>",
@@ -187,9 +190,9 @@ fn only_omitted_parts_are_listed() {
         "<actuator>",
     ];
     for expected in expected {
-        assert!(too.contains(&format!("not taken: {expected}")), "{expected}: {too}");
+        assert!(mjcf_messages.contains(&format!("not taken: {expected}")), "{expected}: {mjcf_messages}");
     }
-    assert_eq!(too.lines().count(), expected.len(), "{too}");
+    assert_eq!(mjcf_messages.lines().count(), expected.len(), "{mjcf_messages}");
     for scene in [&urdf, &mjcf] {
         let meshes = scene.source.text.matches("cover.stl").count();
         assert_eq!(meshes, 1);
@@ -253,18 +256,18 @@ fn a_description_that_changes_the_machine_if_ignored_is_refused_with_its_line() 
             "robot:2: include: put the contents of the file here",
         ),
     ] {
-        let said = refused(&text);
-        assert!(said.contains(expected), "{text}\n  should say `{expected}`, says: {said}");
+        let messages = import_error(&text);
+        assert!(messages.contains(expected), "{text}\n  should say `{expected}`, says: {messages}");
     }
     let missing = jointplay(folder().path(), "import nothing.urdf").expect(1).stderr;
     assert!(missing.contains("nothing.urdf: cannot read this file"), "{missing}");
 }
 
-/// Angular acceleration about z, rad/s^2, of the first body of a file without gravity, and its inertia about z.
-fn turning(settings: &str, inside: &str) -> (f64, f64) {
+/// Angular acceleration about z, rad/s^2, of the first body of a file without gravity, and its moment of inertia about z.
+fn angular_acceleration(settings: &str, inside: &str) -> (f64, f64) {
     let flag = "<option><flag gravity=\"disable\"/></option>";
     let (scene, _) = imported(&mujoco(inside).replace("<worldbody>", &format!("{settings}{flag}<worldbody>")));
-    (start(&scene).bodies[0].angular_acceleration.z, scene.machine.bodies[0].inertia.m33)
+    (initial_frame(&scene).bodies[0].angular_acceleration.z, scene.machine.bodies[0].inertia.m33)
 }
 
 #[test]
@@ -300,25 +303,30 @@ fn a_loop_closes_at_sites_and_on_parts_without_joints() {
     };
     // The x axis of the eye is -z of the rod.
     let point = jointplay::machine::Vec3::new(0.3, 0.0, -0.1);
-    let (scene, said) = imported(&text("site1=\"end\" site2=\"ground\""));
+    let (scene, messages) = imported(&text("site1=\"end\" site2=\"ground\""));
     let ball = &scene.machine.ball_joints[0];
-    assert_eq!(said.matches("<site>").count(), 0, "{said}");
-    let places = |ball: &jointplay::machine::BallJoint| [ball.socket.point, ball.ball.point];
-    assert!((places(ball)[0] - point).norm() < 1e-12, "{}", places(ball)[0]);
-    assert!((places(ball)[1] - jointplay::machine::Vec3::new(0.5, 0.0, 0.0)).norm() < 1e-12);
+    assert_eq!(messages.matches("<site>").count(), 0, "{messages}");
+    let points = |ball: &jointplay::machine::BallJoint| [ball.socket.point, ball.ball.point];
+    assert!((points(ball)[0] - point).norm() < 1e-12, "{}", points(ball)[0]);
+    assert!((points(ball)[1] - jointplay::machine::Vec3::new(0.5, 0.0, 0.0)).norm() < 1e-12);
     let (by_body, _) = imported(&text("body1=\"eye\" body2=\"base\" anchor=\"0.2 0 0\""));
-    let found = places(&by_body.machine.ball_joints[0]);
+    let points_by_body = points(&by_body.machine.ball_joints[0]);
     let (sine, cosine) = 10.0_f64.to_radians().sin_cos();
-    let there = jointplay::machine::Vec3::new(cosine * 0.3 + sine * 0.1, 0.0, -sine * 0.3 + cosine * 0.1);
-    assert!((found[0] - point).norm() < 1e-12 && (found[1] - there).norm() < 1e-12, "{} {}", found[0], found[1]);
+    let expected = jointplay::machine::Vec3::new(cosine * 0.3 + sine * 0.1, 0.0, -sine * 0.3 + cosine * 0.1);
+    assert!(
+        (points_by_body[0] - point).norm() < 1e-12 && (points_by_body[1] - expected).norm() < 1e-12,
+        "{} {}",
+        points_by_body[0],
+        points_by_body[1]
+    );
     for (connect, expected) in [
         ("site1=\"end\" site2=\"x\"", "connect c: site2 = \"x\": there is no such site"),
         ("site1=\"end\"", "connect c: the attribute `site2` is missing"),
         ("body1=\"x\" anchor=\"0 0 0\"", "connect c: body1 = \"x\": there is no such body"),
         ("anchor=\"0 0 0\"", "connect c: the attribute `body1` is missing"),
     ] {
-        let said = refused(&text(connect));
-        assert!(said.contains(expected), "{connect}: {said}");
+        let messages = import_error(&text(connect));
+        assert!(messages.contains(expected), "{connect}: {messages}");
     }
 }
 
@@ -326,14 +334,15 @@ fn a_loop_closes_at_sites_and_on_parts_without_joints() {
 fn springs_act_relative_to_the_pose_drawn_in_the_file() {
     let geom = "<geom type=\"box\" size=\"0.1 0.2 0.3\"/>";
     let hinge = "<joint stiffness=\"5\" springref=\"30\" ref=\"10\"/>";
-    let (found, inertia) = turning("", &format!("<body>{hinge}{geom}</body>"));
+    let (acceleration, inertia) = angular_acceleration("", &format!("<body>{hinge}{geom}</body>"));
     let expected = 5.0 * 20.0_f64.to_radians() / inertia;
-    assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
-    // A hinge that points against the slide of its body turns the other way.
+    assert!((acceleration / expected - 1.0).abs() < 1e-9, "{acceleration} {expected}");
+    // A hinge whose axis opposes its body's slide rotates in the opposite sense.
     let both =
         "<joint type=\"slide\" axis=\"0 0 1\"/><joint name=\"h\" axis=\"0 0 -1\" stiffness=\"5\" springref=\"0.3\"/>";
-    let (found, inertia) = turning("<compiler angle=\"radian\"/>", &format!("<body>{both}{geom}</body>"));
-    assert!((found * inertia / (-5.0 * 0.3) - 1.0).abs() < 1e-9, "{found}");
+    let (acceleration, inertia) =
+        angular_acceleration("<compiler angle=\"radian\"/>", &format!("<body>{both}{geom}</body>"));
+    assert!((acceleration * inertia / (-5.0 * 0.3) - 1.0).abs() < 1e-9, "{acceleration}");
 }
 
 #[test]
@@ -344,12 +353,15 @@ fn option_flags_are_listed_and_the_gravity_flag_is_applied() {
             &text.replace("<worldbody>", &format!("<option gravity=\"0 0 -5\"><flag {flags}/></option><worldbody>")),
         )
     };
-    let (still, said) = with("gravity=\"disable\" equality=\"disable\"");
-    assert_eq!(start(&still).bodies[0].angular_acceleration.norm(), 0.0);
-    assert!(said.contains("not taken: flag equality of <option> (line 2)") && !said.contains("flag gravity"), "{said}");
+    let (at_rest, messages) = with("gravity=\"disable\" equality=\"disable\"");
+    assert_eq!(initial_frame(&at_rest).bodies[0].angular_acceleration.norm(), 0.0);
+    assert!(
+        messages.contains("not taken: flag equality of <option> (line 2)") && !messages.contains("flag gravity"),
+        "{messages}"
+    );
     let (falling, _) = with("gravity=\"enable\"");
-    let found = start(&falling).bodies[0].angular_acceleration.y;
-    assert!((found - 5.0 / (1.0 + 0.4 * 0.01)).abs() < 1e-9, "{found}");
+    let acceleration = initial_frame(&falling).bodies[0].angular_acceleration.y;
+    assert!((acceleration - 5.0 / (1.0 + 0.4 * 0.01)).abs() < 1e-9, "{acceleration}");
 }
 
 #[test]
@@ -360,21 +372,21 @@ fn a_tiny_body_keeps_its_inertia() {
     let robot = r#"<robot><link name="base"/><link name="grain"><inertial><mass value="1e-9"/>
         <inertia ixx="3e-18" ixy="1e-18" ixz="0" iyy="4e-18" iyz="-5e-19" izz="5e-18"/></inertial></link>
         <joint name="j" type="continuous"><parent link="base"/><child link="grain"/></joint></robot>"#;
-    let found = imported(robot).0.machine.bodies[0].inertia;
-    for (part, expected) in [(found.m11, 3e-18), (found.m12, 1e-18), (found.m13, 0.0), (found.m23, -5e-19)] {
+    let tensor = imported(robot).0.machine.bodies[0].inertia;
+    for (part, expected) in [(tensor.m11, 3e-18), (tensor.m12, 1e-18), (tensor.m13, 0.0), (tensor.m23, -5e-19)] {
         assert!((part - expected).abs() < 1e-30, "{part} {expected}");
     }
 }
 
-/// MuJoCo takes z by the shortest turn to the direction from the second point to the first.
+/// MuJoCo rotates z by the shortest arc to the direction from the second point to the first.
 #[test]
-fn a_box_between_two_points_is_turned_as_in_mujoco() {
+fn a_box_between_two_points_is_oriented_as_in_mujoco() {
     let (scene, _) = imported(&mujoco(
         "<body><joint/><geom type=\"box\" size=\"0.01\" fromto=\"0 0 0 0.1 0.2 0.4\"/><geom size=\"9\" rgba=\"1 1 1 0\" mass=\"0\"/></body>",
     ));
     let file: toml::Value = toml::from_str(&scene.source.text).unwrap();
     let shapes = file["body"][0]["shapes"].as_array().unwrap();
-    assert_eq!(shapes.len(), 1, "what cannot be seen is not drawn");
+    assert_eq!(shapes.len(), 1, "an invisible geom is not drawn");
     let corner = |at: usize| {
         let text = shapes[0]["corners"][at].as_str().unwrap();
         let parts: Vec<f64> = text.split(' ').take(3).map(|part| part.parse().unwrap()).collect();
@@ -386,7 +398,7 @@ fn a_box_between_two_points_is_turned_as_in_mujoco() {
 }
 
 #[test]
-fn macros_and_settings_that_change_masses_are_refused_and_mirrored_meshes_are_named() {
+fn macros_and_mass_settings_are_refused_and_mirrored_meshes_are_reported() {
     let ball = "<body><joint/><geom size=\"0.1\"/></body>";
     let with = |setting: &str| mujoco(ball).replace("<worldbody>", &format!("<compiler {setting}/><worldbody>"));
     for (text, expected) in [
@@ -398,8 +410,8 @@ fn macros_and_settings_that_change_masses_are_refused_and_mirrored_meshes_are_na
             "robot:2: arm: a macro of xacro: expand the file first",
         ),
     ] {
-        let said = refused(&text);
-        assert!(said.contains(expected), "{text}\n  should say `{expected}`, says: {said}");
+        let messages = import_error(&text);
+        assert!(messages.contains(expected), "{text}\n  should say `{expected}`, says: {messages}");
     }
     assert_eq!(imported(&with("settotalmass=\"-1\" inertiagrouprange=\"0 5\"")).1.lines().count(), 1);
     let mesh = |scale: &str| {

@@ -1,6 +1,6 @@
 //! Joints of robot descriptions that a scene has no single joint for: chains of hinges and slides, and welds.
 
-use crate::import::{imported, mujoco, refused, start};
+use crate::import::{import_error, imported, initial_frame, mujoco};
 use jointplay::machine::{JointKind, Vec3};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
@@ -53,7 +53,7 @@ fn three_hinges_of_a_body_form_a_chain_that_moves_like_a_ball_joint() {
             assert!(off < 1e3 * bound, "{name} at {time} s: {off}");
         }
     }
-    assert!(start(&chain).bodies[3].acceleration.norm() > 0.1);
+    assert!(initial_frame(&chain).bodies[3].acceleration.norm() > 0.1);
     let springs = imported(&leg(HINGES)).0.source.text;
     for (joint, value) in [("hip_x", "stiffness = \"3 N m/rad\""), ("hip_y", "damping = \"2 N m s/rad\"")] {
         let section = &springs[springs.find(&format!("name = \"{joint}_spring\"")).unwrap()..];
@@ -78,7 +78,7 @@ fn hinges_and_slides_act_in_their_order() {
         let text = scene.source.text.replacen("[[joint]]\n", "[[joint]]\nstart = { position = \"90 deg\" }\n", 1);
         let at = text.rfind("[[joint]]\n").unwrap() + "[[joint]]\n".len();
         let text = format!("{}start = {{ position = \"{second}\" }}\n{}", &text[..at], &text[at..]);
-        start(&Scene::parse(&text, None, &[]).unwrap()).bodies[1]
+        initial_frame(&Scene::parse(&text, None, &[]).unwrap()).bodies[1]
     };
     // The slide turns with the hinge before it: 0.3 m along the turned x axis.
     let slid = moved(&format!("<joint axis=\"0 0 1\"/>{}", slide("1 0 0")), "0.3 m");
@@ -87,7 +87,7 @@ fn hinges_and_slides_act_in_their_order() {
     let turned = moved("<joint axis=\"0 0 1\" pos=\"1 0 0\"/><joint axis=\"1 0 0\" pos=\"0 0 2\"/>", "90 deg");
     // The second hinge takes the origin to (0, 2, 2) of its frame, the first (x, y, z) to (1 - y, x - 1, z).
     assert!((turned.position - Vec3::new(-1.0, -1.0, 2.0)).norm() < 1e-12, "{}", turned.position);
-    let said = refused(&mujoco(&format!("<body><joint/><joint type=\"free\"/>{ball}</body>")));
+    let said = import_error(&mujoco(&format!("<body><joint/><joint type=\"free\"/>{ball}</body>")));
     assert!(said.contains("a ball or free joint is the only joint of its body"), "{said}");
 }
 
@@ -109,11 +109,11 @@ fn links_without_mass_connect_the_joints_of_a_urdf() {
     };
     let (scene, _) = imported(&robot(mass, "continuous"));
     assert_eq!(scene.machine.bodies.iter().map(|body| body.mass).collect::<Vec<_>>(), [0.0, 0.0, 2.0]);
-    assert_eq!(start(&scene).bodies[2].acceleration.norm(), 0.0, "gravity is across");
+    assert_eq!(initial_frame(&scene).bodies[2].acceleration.norm(), 0.0, "gravity is across");
     for (text, link) in
         [(robot("", "continuous"), "robot:3: link car"), (robot(mass, "spherical"), "robot:2: link sled")]
     {
-        let said = refused(&text);
+        let said = import_error(&text);
         assert!(said.contains(&format!("{link}: a moving link needs an <inertial> with a mass above 0 kg")), "{said}");
     }
 }
@@ -130,7 +130,7 @@ fn a_welded_body_moves_as_part_of_the_other() {
             angle.to_degrees(),
             weight.replace("<geom", "<geom pos=\"0.1 0 0\"")
         )));
-        start(&whole).bodies[0].angular_acceleration.y
+        initial_frame(&whole).bodies[0].angular_acceleration.y
     };
     let apart = |at: &str, weld: &str| {
         mujoco(&format!(
@@ -157,7 +157,7 @@ fn a_welded_body_moves_as_part_of_the_other() {
         assert_eq!(scene.machine.closing_joints[0].kind, JointKind::Fixed);
         let simulation = Simulation::new(&scene.machine).unwrap();
         assert_eq!(simulation.mechanism().summary().degrees_of_freedom, 1, "{weld}");
-        let frame = start(&scene);
+        let frame = initial_frame(&scene);
         let rod = &frame.bodies[index(&scene, "rod")];
         let expected = expected(rod.rotation[(0, 2)].atan2(rod.rotation[(0, 0)]));
         let found = rod.angular_acceleration.y;
@@ -165,11 +165,11 @@ fn a_welded_body_moves_as_part_of_the_other() {
     }
     let (held, _) = imported(&apart(&drawn, "body1=\"weight\""));
     // Rounding of the weight that the weld carries.
-    assert!(start(&held).bodies[index(&held, "weight")].acceleration.norm() < 1e-9);
+    assert!(initial_frame(&held).bodies[index(&held, "weight")].acceleration.norm() < 1e-9);
     let (hung, _) = imported(&apart(&drawn, "body1=\"rod\" body2=\"weight\" torquescale=\"0\""));
     assert_eq!((hung.machine.closing_joints.len(), hung.machine.ball_joints.len()), (0, 1));
     let inactive = imported(&apart(&drawn, "body1=\"rod\" active=\"false\"")).1;
     assert!(inactive.contains("not taken: <weld> of <equality>"), "{inactive}");
-    let said = refused(&apart(&drawn, "body1=\"rod\" body2=\"rod\""));
+    let said = import_error(&apart(&drawn, "body1=\"rod\" body2=\"rod\""));
     assert!(said.contains("weld w: both ends are on one body"), "{said}");
 }

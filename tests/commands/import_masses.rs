@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::import::{imported, mujoco, refused};
+use crate::import::{import_error, imported, mujoco};
 use crate::program::{folder, jointplay};
 use jointplay::machine::Vec3;
 use jointplay::scene::Scene;
@@ -84,7 +84,7 @@ fn a_mesh_without_a_computable_mass_is_refused_with_its_line() {
     let gone = outcome(&with_mesh("", "").replace("m.obj", "gone.obj"), &open, 2).1;
     assert!(gone.contains("cannot read gone.obj") && gone.contains("give its body an <inertial>"), "{gone}");
     let shell = mujoco("<body><joint/><geom size=\"0.1\" shellinertia=\"true\"/></body>");
-    assert!(refused(&shell).contains("shellinertia = \"true\" is not read"));
+    assert!(import_error(&shell).contains("shellinertia = \"true\" is not read"));
 }
 
 fn link(mass: &str, [xx, yy, zz]: [&str; 3], more: &str) -> String {
@@ -120,7 +120,7 @@ fn impossible_inertias_are_refused_with_their_line() {
         (link("1", ["0", "0", "0"], ""), "robot:3: body.a.inertia = "),
         (link("1", ["1", "1", "1"], sphere), "robot:6: body.a.shapes[0].radius = "),
     ] {
-        let said = refused(&text);
+        let said = import_error(&text);
         assert!(said.contains(expected), "{text}\n  should say `{expected}`, says: {said}");
     }
     // A point mass is a part of a body like any other.
@@ -148,6 +148,6 @@ fn a_material_is_known_wherever_it_is_defined_and_a_document_type_is_accepted() 
     assert_eq!(scene.source.text.matches("colour = \"#ff0000\"").count(), 1, "{}", scene.source.text);
     let typed = |inside: &str| format!("<?xml version=\"1.0\"?>\n<!DOCTYPE robot{inside}>\n{text}");
     assert_eq!(imported(&typed("")).0.machine.bodies.len(), 1);
-    let said = refused(&typed(" [\n<!ENTITY a \"b\">]"));
+    let said = import_error(&typed(" [\n<!ENTITY a \"b\">]"));
     assert!(said.contains("robot:3: entities are not read: write their text in their places"), "{said}");
 }

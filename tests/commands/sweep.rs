@@ -1,4 +1,4 @@
-//! `sweep` and `merge` as scripts see them: the same bytes whatever the threads, interruptions and shards.
+//! `sweep` and `merge` as scripts use them: the same bytes for any number of threads, interruptions and shards.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -21,7 +21,7 @@ pub const PENDULUM: &str = "sweep pendulum --vary contact.clearance=0.2mm..0.4mm
 /// A sweep of four points that takes a fraction of a second.
 const SMALL: &str = "sweep spcmm --vary contact.clearance=0.2mm..0.5mm:4 --periods 3 --discard 1";
 
-/// The arrays of numbers in an archive, whole ones as floating-point ones, and its `meta`.
+/// The numeric arrays of an archive, integers converted to `f64`, and its `meta`.
 pub fn archive(path: &Path) -> (BTreeMap<String, ArrayD<f64>>, Json) {
     let mut reader = NpzReader::new(fs::File::open(path).unwrap()).unwrap();
     let mut arrays = BTreeMap::new();
@@ -59,7 +59,7 @@ fn a_map_has_the_shape_of_its_ranges_and_the_values_of_single_runs() {
     assert_eq!(meta["scene"], "spcmm");
     assert_eq!(meta["regimes"]["3"], "chaotic");
     assert!(arrays["status"].iter().all(|status| *status == 0.0));
-    // The point at friction 0.2, clearance 0.25 mm is the run of that scene.
+    // The point at friction 0.2, clearance 0.25 mm equals a single run of that scene.
     let run = jointplay(
         folder.path(),
         "run spcmm --set contact.friction=0.2 --set contact.clearance=0.25mm --duration 4s --every 2s --out run.json \
@@ -102,26 +102,26 @@ fn neither_threads_nor_shards_change_a_bit() {
     merge("s3.npz s1.npz s2.npz --out merged.npz").expect(0);
     assert!(read("one.npz") == read("merged.npz"));
 
-    // What is not all of one sweep is refused, and nothing is written.
+    // Anything but all shards of one sweep is refused, and nothing is written.
     let before = names(folder.path());
-    let lacking = merge("s1.npz s3.npz --out bad.npz").expect(2);
-    assert!(lacking.stderr.contains("shards not given: 2/3"), "{}", lacking.stderr);
-    let twice = merge("s1.npz s2.npz s1.npz s3.npz --out bad.npz").expect(2);
-    assert!(twice.stderr.contains("hold the same points"), "{}", twice.stderr);
-    let whole = merge("one.npz --out bad.npz").expect(2);
-    assert!(whole.stderr.contains("one.npz is not a shard"), "{}", whole.stderr);
+    let missing = merge("s1.npz s3.npz --out bad.npz").expect(2);
+    assert!(missing.stderr.contains("shards not given: 2/3"), "{}", missing.stderr);
+    let duplicate = merge("s1.npz s2.npz s1.npz s3.npz --out bad.npz").expect(2);
+    assert!(duplicate.stderr.contains("hold the same points"), "{}", duplicate.stderr);
+    let not_a_shard = merge("one.npz --out bad.npz").expect(2);
+    assert!(not_a_shard.stderr.contains("one.npz is not a shard"), "{}", not_a_shard.stderr);
     fs::write(folder.path().join("text.npz"), "no archive").unwrap();
-    let text = merge("s1.npz text.npz --out bad.npz").expect(1);
-    assert!(text.stderr.contains("text.npz"), "{}", text.stderr);
+    let not_an_archive = merge("s1.npz text.npz --out bad.npz").expect(1);
+    assert!(not_an_archive.stderr.contains("text.npz"), "{}", not_an_archive.stderr);
     merge("nowhere.npz --out bad.npz").expect(1);
     merge("s1.npz s2.npz s3.npz --out merged.npz").expect(1);
     merge("s1.npz s2.npz s3.npz --out merged.txt").expect(2);
-    let over = merge("s1.npz s2.npz s3.npz --out ./s2.npz --force").expect(2);
-    assert!(over.stderr.contains("one of the shards"), "{}", over.stderr);
+    let overwriting = merge("s1.npz s2.npz s3.npz --out ./s2.npz --force").expect(2);
+    assert!(overwriting.stderr.contains("one of the shards"), "{}", overwriting.stderr);
     fs::remove_file(folder.path().join("text.npz")).unwrap();
     assert_eq!(names(folder.path()), before);
 
-    // More shards than points: an empty one is a shard, too.
+    // With more shards than points, an empty shard is valid.
     let empty = run("--shard 5/5 --out e5.npz").stdout;
     assert!(empty.contains("Points            0") && empty.contains("Regimes           none"), "{empty}");
     for k in 1..5 {
@@ -140,9 +140,9 @@ fn neither_threads_nor_shards_change_a_bit() {
 }
 
 #[test]
-fn shards_of_different_files_beside_the_scene_are_not_merged() {
+fn shards_whose_included_files_differ_are_not_merged() {
     let folder = folder();
-    let own = |value: &str| {
+    let write_include = |value: &str| {
         let text = format!("[[parameter]]\nname = \"own\"\nvalue = \"{value}\"\n");
         fs::write(folder.path().join("own.toml"), text).unwrap();
     };
@@ -155,13 +155,13 @@ fn shards_of_different_files_beside_the_scene_are_not_merged() {
         jointplay(folder.path(), &line).expect(0);
     };
     let merge = || jointplay(folder.path(), "merge s1.npz s2.npz --out merged.npz");
-    own("1 mm");
+    write_include("1 mm");
     shard("1/2", "s1.npz");
-    own("2 mm");
+    write_include("2 mm");
     shard("2/2", "s2.npz");
     let mixed = merge().expect(2).stderr;
     assert!(mixed.contains("different sweeps: scene_files_crc32: ") && mixed.contains("own.toml"), "{mixed}");
-    own("1 mm");
+    write_include("1 mm");
     shard("2/2", "s2.npz");
     merge().expect(0);
 }
@@ -176,7 +176,7 @@ fn an_interrupted_sweep_resumes_and_a_damaged_partial_file_is_refused() {
             "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:{points} --periods 4 --discard 2 --threads 2 --out {out}"
         )
     };
-    // One that is over before it can be interrupted gets twice as much to do.
+    // Doubles the points until the sweep is long enough to be interrupted.
     let mut points = 12;
     loop {
         let mut child = command(folder.path(), &sweep(points, "a.npz"))
@@ -184,13 +184,13 @@ fn an_interrupted_sweep_resumes_and_a_damaged_partial_file_is_refused() {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        // Once some blocks are in.
+        // Waits until some blocks are written.
         let length = || fs::metadata(at("a.npz.partial")).map_or(0, |file| file.len());
-        let mut grown = Vec::new();
-        while grown.len() < 4 && child.try_wait().unwrap().is_none() {
+        let mut lengths = Vec::new();
+        while lengths.len() < 4 && child.try_wait().unwrap().is_none() {
             let now = length();
-            if now > 0 && grown.last() != Some(&now) {
-                grown.push(now);
+            if now > 0 && lengths.last() != Some(&now) {
+                lengths.push(now);
             }
             std::thread::sleep(std::time::Duration::from_millis(1));
         }
@@ -214,39 +214,39 @@ fn an_interrupted_sweep_resumes_and_a_damaged_partial_file_is_refused() {
     let line = |out: &str| sweep(points, out);
     let partial = fs::read(at("a.npz.partial")).unwrap();
 
-    // Damage of every kind, and settings of another sweep.
-    let refused = |bytes: &[u8], line: &str, code: i32, fragment: &str| {
+    // Every kind of damage, and settings of another sweep, are refused.
+    let check_refused = |bytes: &[u8], line: &str, code: i32, fragment: &str| {
         fs::write(at("a.npz.partial"), bytes).unwrap();
         let outcome = jointplay(folder.path(), line).expect(code);
         assert!(outcome.stderr.contains("a.npz.partial"), "{}", outcome.stderr);
         assert!(outcome.stderr.contains(fragment), "{}", outcome.stderr);
         assert_eq!(names(folder.path()), ["a.npz.partial"]);
-        assert!(fs::read(at("a.npz.partial")).unwrap() == bytes, "left as it was");
+        assert!(fs::read(at("a.npz.partial")).unwrap() == bytes, "the file is unchanged");
     };
-    let flipped = |place: usize| {
+    let flipped = |offset: usize| {
         let mut bytes = partial.clone();
-        bytes[place] ^= 0x10;
+        bytes[offset] ^= 0x10;
         bytes
     };
     let n = partial.len();
-    refused(&partial[..5], &line("a.npz"), 1, "cut short");
-    refused(&flipped(n - 100), &line("a.npz"), 1, "checksum");
-    refused(&flipped(n - 2), &line("a.npz"), 1, "checksum");
-    refused(&flipped(100), &line("a.npz"), 1, "checksum");
-    refused(&flipped(0), &line("a.npz"), 1, "not a partial sweep");
-    refused(&flipped(7), &line("a.npz"), 1, "another version");
-    refused(&[&partial[..], &partial[n - 8..]].concat(), &line("a.npz"), 1, "damaged");
+    check_refused(&partial[..5], &line("a.npz"), 1, "cut short");
+    check_refused(&flipped(n - 100), &line("a.npz"), 1, "checksum");
+    check_refused(&flipped(n - 2), &line("a.npz"), 1, "checksum");
+    check_refused(&flipped(100), &line("a.npz"), 1, "checksum");
+    check_refused(&flipped(0), &line("a.npz"), 1, "not a partial sweep");
+    check_refused(&flipped(7), &line("a.npz"), 1, "another version");
+    check_refused(&[&partial[..], &partial[n - 8..]].concat(), &line("a.npz"), 1, "damaged");
     let other = line("a.npz").replace("--periods 4", "--periods 5");
-    refused(&partial, &other, 2, "periods: 4 there, 5 now");
+    check_refused(&partial, &other, 2, "periods: 4 there, 5 now");
 
-    // What a crash cut off the last block costs that block alone.
+    // A block truncated by a crash is lost, but no other.
     fs::write(at("a.npz.partial"), &partial[..n - 1]).unwrap();
     let resumed = jointplay(folder.path(), &line("a.npz")).expect(0);
     assert!(resumed.stderr.contains("resuming where"), "{}", resumed.stderr);
     jointplay(folder.path(), &line("b.npz")).expect(0);
     assert!(fs::read(at("a.npz")).unwrap() == fs::read(at("b.npz")).unwrap());
     assert_eq!(names(folder.path()), ["a.npz", "b.npz"]);
-    // A finished sweep is not computed again by mistake.
+    // A finished sweep is not overwritten without --force.
     let again = jointplay(folder.path(), &line("a.npz")).expect(1);
     assert!(again.stderr.contains("--force"), "{}", again.stderr);
 }
@@ -260,10 +260,10 @@ fn a_sweep_killed_at_any_instant_resumes_to_the_same_bytes() {
     let over_time = "pendulum --vary contact.clearance=0.2mm..0.3mm:12 --duration 0.3s --keep S1.*:max --out a.csv";
     for (line, out) in [(over_periods, "a.npz"), (over_time, "a.csv")] {
         let line = format!("sweep {line} --threads 2");
-        let started = std::time::Instant::now();
+        let start = std::time::Instant::now();
         jointplay(folder.path(), &line).expect(0);
-        let length = started.elapsed();
-        let whole = fs::read(folder.path().join(out)).unwrap();
+        let length = start.elapsed();
+        let expected = fs::read(folder.path().join(out)).unwrap();
         crate::common::at_random_instants(length, 4, |instant| {
             let folder = self::folder();
             let mut child = command(folder.path(), &line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
@@ -274,7 +274,7 @@ fn a_sweep_killed_at_any_instant_resumes_to_the_same_bytes() {
                 jointplay(folder.path(), &line).expect(0);
                 assert!(names(folder.path()).iter().all(|name| !name.ends_with(".partial")));
             }
-            assert!(fs::read(folder.path().join(out)).unwrap() == whole);
+            assert!(fs::read(folder.path().join(out)).unwrap() == expected);
         });
     }
 }
@@ -300,7 +300,7 @@ fn a_diverging_point_is_recorded_and_the_others_are_computed() {
 #[test]
 fn each_kind_of_warning_within_the_ranges_is_printed_once() {
     let folder = folder();
-    // Singular poses lie in the middle of this range and at neither end.
+    // Singular poses are in the middle of this range, not at its ends.
     let line = "sweep spcmm --vary contact.clearance=0.01mm..0.2mm:2 --vary spcmm.slider_plane=20mm..300mm:15 --periods 1 \
                 --discard 0 --shard 30/30 --no-exponent --out a.npz";
     let outcome = jointplay(folder.path(), line).expect(0);
@@ -315,7 +315,7 @@ fn each_kind_of_warning_within_the_ranges_is_printed_once() {
 }
 
 #[test]
-fn bad_input_is_refused_before_anything_runs() {
+fn invalid_input_is_refused_before_anything_runs() {
     let folder = folder();
     let plan = "--periods 3 --discard 1 --out a.npz";
     for (line, code, fragment) in [
@@ -382,7 +382,7 @@ fn bad_input_is_refused_before_anything_runs() {
     }
 }
 
-fn small(start: Start, points: usize) -> Sweep {
+fn small_sweep(start: Start, points: usize) -> Sweep {
     let scene = Scene::load("spcmm", &[]).unwrap();
     let text = format!("contact.clearance=0.2mm..0.3mm:{points}");
     let axis = Axis::parse(&scene, &text).unwrap();
@@ -401,22 +401,22 @@ fn records(sweep: &Sweep, b: usize, steps: u32) -> Vec<u64> {
 
 #[test]
 fn blocks_are_independent_of_order_and_of_each_other() {
-    let sweep = small(Start::Cold, 3);
+    let sweep = small_sweep(Start::Cold, 3);
     let forwards: Vec<_> = (0..3).map(|b| records(&sweep, b, 1000)).collect();
     let backwards: Vec<_> = (0..3).rev().map(|b| records(&sweep, b, 77)).collect();
     assert!(forwards.iter().eq(backwards.iter().rev()));
     // A point is the same in a finer sweep that contains it.
-    let finer = small(Start::Cold, 5);
+    let finer = small_sweep(Start::Cold, 5);
     assert!(forwards[1] == records(&finer, 2, 1000));
 }
 
 #[test]
 fn following_continues_the_neighbour_within_fixed_blocks() {
     let points = FOLLOW_BLOCK + 2;
-    let up = small(Start::FollowUp, points);
-    let down = small(Start::FollowDown, points);
+    let up = small_sweep(Start::FollowUp, points);
+    let down = small_sweep(Start::FollowDown, points);
     assert_eq!(up.design().blocks(), 2);
-    let cold = small(Start::Cold, points);
+    let cold = small_sweep(Start::Cold, points);
     let column = |sweep: &Sweep, name: &str| {
         let columns = sweep.layout().columns();
         sweep.layout().offset(columns.iter().position(|c| c.name == name).unwrap())
@@ -425,18 +425,18 @@ fn following_continues_the_neighbour_within_fixed_blocks() {
     let value = |sweep: &Sweep, records: &[u64], point: usize, name: &str| {
         f64::from_bits(records[point * length + column(sweep, name)])
     };
-    // The second block has two points: the first of them in the direction of following starts cold.
+    // The second block has two points; its first one in the direction of following starts cold.
     let (first, second) = (records(&cold, FOLLOW_BLOCK, 999), records(&cold, FOLLOW_BLOCK + 1, 999));
     let (up_block, down_block) = (records(&up, 1, 999), records(&down, 1, 999));
     assert!(up_block[..length] == first);
     assert!(down_block[length..] == second);
     for (sweep, block, followed, single) in [(&up, &up_block, 1, &second), (&down, &down_block, 0, &first)] {
-        // No first fall through the gaps again, hence no hard impact; the same settled section at the end.
+        // Following skips the first fall through the gaps, so there is no hard impact; the settled section is the same.
         let peak = value(sweep, block, followed, "S1_peak_N");
         assert!(peak < 0.2 * value(&cold, single, 0, "S1_peak_N"), "{peak}");
         let beta = value(sweep, block, followed, "section_beta_rad");
         let cold_beta = value(&cold, single, 0, "section_beta_rad");
-        // After two periods the creeping of the balls has lost all but e^-9 of a difference of at most 1e-3 rad.
+        // Over two periods the creep of the balls decays a difference of at most 1e-3 rad by e^-9.
         assert!((beta - cold_beta).abs() < 1e-6, "{beta} {cold_beta}");
         assert_eq!(value(sweep, block, followed, "status"), 0.0);
     }

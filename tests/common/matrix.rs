@@ -10,18 +10,18 @@ pub const FORMULATIONS: [&str; 2] = ["tree", "lagrange"];
 
 /// A method in a formulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Way {
+pub struct Variant {
     pub method: &'static str,
     pub formulation: &'static str,
 }
 
-impl fmt::Display for Way {
+impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}, {}", self.method, self.formulation)
     }
 }
 
-impl Way {
+impl Variant {
     /// The changes that select it.
     pub fn changes(self) -> [(&'static str, &'static str); 2] {
         [("solver.method", self.method), ("formulation", self.formulation)]
@@ -54,25 +54,25 @@ impl Way {
 }
 
 /// Every method in both formulations.
-pub fn every_way() -> impl Iterator<Item = Way> {
-    METHODS.into_iter().flat_map(|method| FORMULATIONS.map(|formulation| Way { method, formulation }))
+pub fn every_variant() -> impl Iterator<Item = Variant> {
+    METHODS.into_iter().flat_map(|method| FORMULATIONS.map(|formulation| Variant { method, formulation }))
 }
 
 /// Calls `check` with every case and every method, alternating the formulation. Every case meets both formulations, and so does
 /// every method except those of first order, which meet only the first case.
-pub fn for_every<C: Copy>(cases: impl IntoIterator<Item = C>, mut check: impl FnMut(C, Way)) {
+pub fn for_every<C: Copy>(cases: impl IntoIterator<Item = C>, mut check: impl FnMut(C, Variant)) {
     for (turn, case) in cases.into_iter().enumerate() {
         for (place, method) in METHODS.into_iter().enumerate() {
-            let way = Way { method, formulation: FORMULATIONS[(turn + place) % 2] };
-            if turn == 0 || !way.is_expensive() {
-                check(case, way);
+            let variant = Variant { method, formulation: FORMULATIONS[(turn + place) % 2] };
+            if turn == 0 || !variant.is_expensive() {
+                check(case, variant);
             }
         }
     }
 }
 
 /// Calls `check` with every case, on as many threads as there are cores; `cases` should begin with the most expensive.
-pub fn side_by_side<C: Sync>(cases: &[C], check: impl Fn(&C) + Sync) {
+pub fn in_parallel<C: Sync>(cases: &[C], check: impl Fn(&C) + Sync) {
     let next = AtomicUsize::new(0);
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {

@@ -45,10 +45,10 @@ pub fn scene(name: &str, changes: &Changes) -> Scene {
 }
 
 /// Pairs of method and formulation that together cover every kind of Jacobian and error control.
-pub const FOUR_WAYS: [(&str, &str); 4] =
+pub const FOUR_VARIANTS: [(&str, &str); 4] =
     [("dopri5", "tree"), ("radau5", "lagrange"), ("automatic", "tree"), ("discrete-gradient", "lagrange")];
 /// Those of [`FOUR_WAYS`] that control the error.
-pub const THREE_WAYS: [(&str, &str); 3] = [("dopri5", "tree"), ("radau5", "lagrange"), ("automatic", "tree")];
+pub const THREE_VARIANTS: [(&str, &str); 3] = [("dopri5", "tree"), ("radau5", "lagrange"), ("automatic", "tree")];
 
 /// A scene from its text with changes.
 pub fn parse(text: &str, changes: &Changes) -> Scene {
@@ -122,7 +122,7 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
 
 /// A clock for the interface that advances by `MICROSECONDS` at each reading, so that the work done in a frame does not depend on
 /// the computer.
-pub fn looks<const MICROSECONDS: u32>() -> f64 {
+pub fn ticking_clock<const MICROSECONDS: u32>() -> f64 {
     thread_local! {
         static LOOKS: std::cell::Cell<u32> = const { std::cell::Cell::new(0) };
     }

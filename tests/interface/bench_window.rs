@@ -63,12 +63,12 @@ impl BackgroundTask for ThrottledTask {
 }
 
 /// Installs a throttled host; returns the number of points that it may still deliver.
-pub fn hold(harness: &mut Harness<'_, App>) -> Rc<Cell<usize>> {
-    hold_shared(harness, 1)
+pub fn throttle(harness: &mut Harness<'_, App>) -> Rc<Cell<usize>> {
+    throttle_shared(harness, 1)
 }
 
 /// As [`throttle`], for a host that shares sweeps among `workers`.
-pub fn hold_shared(harness: &mut Harness<'_, App>, workers: usize) -> Rc<Cell<usize>> {
+pub fn throttle_shared(harness: &mut Harness<'_, App>, workers: usize) -> Rc<Cell<usize>> {
     let points = Rc::new(Cell::new(0));
     let host = ThrottledHost(points.clone(), workers);
     harness.state_mut().set_host(Box::new(host));
@@ -77,7 +77,7 @@ pub fn hold_shared(harness: &mut Harness<'_, App>, workers: usize) -> Rc<Cell<us
 
 /// The window on `scene` with some changes, paused at t = 0, with the bench open.
 pub fn sized(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
-    let mut harness = opened(scene, changes, size, theme, crate::common::looks::<100>);
+    let mut harness = opened(scene, changes, size, theme, crate::common::ticking_clock::<100>);
     harness.state_mut().set_host(Box::new(DesktopHost::default()));
     harness.run();
     harness.key_press(Key::B);
@@ -132,7 +132,7 @@ fn come(app: &App) -> usize {
 #[test]
 fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
     let mut harness = window("spcmm", &[FAST]);
-    let points = hold(&mut harness);
+    let points = throttle(&mut harness);
     sweep(&mut harness, "0.2 mm", "0.4", 3.0);
     assert!(harness.state().bench().is_sweeping());
     points.set(3);
@@ -203,7 +203,7 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
 #[test]
 fn several_workers_share_a_sweep_and_a_bad_range_is_reported_once() {
     let mut harness = window("spcmm", &[FAST]);
-    let points = hold_shared(&mut harness, 4);
+    let points = throttle_shared(&mut harness, 4);
     sweep(&mut harness, "0.2 mm", "0.4", 5.0);
     points.set(2);
     harness.run_steps(3);
@@ -226,7 +226,7 @@ fn several_workers_share_a_sweep_and_a_bad_range_is_reported_once() {
 fn the_diagram_comes_into_sight_when_a_sweep_starts() {
     for size in [[1280.0, 800.0], [420.0, 800.0], [844.0, 390.0]] {
         let mut harness = sized("spcmm", &[FAST], size, egui::Theme::Light);
-        hold(&mut harness);
+        throttle(&mut harness);
         for (label, number) in [("Values", 3.0), ("Periods", 4.0), ("Discard", 1.0)] {
             set_number(&mut harness, label, number);
         }
@@ -298,7 +298,7 @@ fn a_sweep_of_another_scene_is_labelled_and_a_click_asks_before_replacing_the_cu
 #[test]
 fn a_running_sweep_can_be_cancelled_over_a_scene_without_a_drive() {
     let mut harness = window("spcmm", &[FAST]);
-    let points = hold(&mut harness);
+    let points = throttle(&mut harness);
     sweep(&mut harness, "0.1 mm", "0.9 mm", 5.0);
     harness.state_mut().open("pendulum").expect("built in");
     harness.run_steps(2);
@@ -315,7 +315,7 @@ fn a_running_sweep_can_be_cancelled_over_a_scene_without_a_drive() {
 fn a_cancelled_sweep_keeps_its_points() {
     let mut harness = window("spcmm", &[FAST]);
     let start = harness.get_by_label("Start sweep").rect();
-    let points = hold(&mut harness);
+    let points = throttle(&mut harness);
     points.set(2);
     sweep(&mut harness, "0.1 mm", "0.9 mm", 5.0);
     harness.run_steps(10);
@@ -591,7 +591,7 @@ fn count_differing(a: &[[u8; 4]], b: &[[u8; 4]]) -> usize {
 #[test]
 fn a_map_of_the_tip_error_is_drawn_while_its_panel_is_open() {
     let mut harness = window("four-bar", &[]);
-    hold(&mut harness);
+    throttle(&mut harness);
     let before_map = view(&mut harness);
     let toggle = |harness: &mut Harness<'_, App>| {
         harness.get_by_label("Tip error over the workspace").click();
@@ -624,7 +624,7 @@ fn a_map_of_the_tip_error_is_drawn_while_its_panel_is_open() {
 #[test]
 fn a_bad_axis_of_a_map_is_explained() {
     let mut harness = window("four-bar", &[]);
-    hold(&mut harness);
+    throttle(&mut harness);
     harness.get_by_label("Tip error over the workspace").click();
     harness.run();
     for (over, words) in [

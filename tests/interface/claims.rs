@@ -1,6 +1,6 @@
-//! Every lesson is walked to its end in each of the ways in which it is shown. What it says of the machine and of the window at
-//! an instant is so when it says it. What it says of a whole run is measured by the lesson itself: `jointplay lessons` and the
-//! unit tests check that.
+//! Walks every lesson to its end in each display mode and checks the statements that its text makes about the machine and the
+//! window at an instant. Statements about a whole run are measured by the lesson itself; `jointplay lessons` and the unit tests
+//! check those.
 
 use eframe::egui::{Key, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
@@ -8,9 +8,9 @@ use jointplay::app::{App, BUILT_IN_LESSONS};
 use jointplay::simulate::{ContactMode, Simulation};
 
 use crate::impacts::peaks_of_run;
-use crate::lessons::{PHONE, WIDE, play, present, press, says, taught};
+use crate::lessons::{PHONE, WIDE, open_lesson, play, present, press, shows_text};
 
-/// How a lesson is shown.
+/// Display mode of a lesson.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Mode {
     Window,
@@ -19,17 +19,17 @@ enum Mode {
     Phone,
 }
 
-/// When a sentence is true.
+/// When a claim holds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum When {
-    /// Where the step begins.
+    /// At the start of the step.
     Begins,
-    /// Where it ends.
+    /// At its end.
     Ends,
 }
 use When::{Begins, Ends};
 
-/// Lesson, step counted from 1, when, the words of the sentence as they stand on the page, and whether it is so.
+/// Lesson, step counted from 1, when the claim holds, its words as on the page, and its check.
 type Claim = (&'static str, usize, When, &'static str, fn(&mut Shown) -> bool);
 
 /// The window at an instant of a lesson.
@@ -73,7 +73,7 @@ impl Shown {
         self.joints().all(|joint| self.touches(joint) && self.joint(joint).penetration_rate.abs() < 1e-3)
     }
 
-    /// Whether the ball of `joint` comes to its wall at most `within` s from now, by a run of its own.
+    /// Whether the ball of `joint` hits its wall within `within` s from now, by a separate run.
     fn strikes(&self, joint: usize, within: f64) -> bool {
         let now = self.time();
         let peaks = peaks_of_run(self.app(), now + within + 5e-3);
@@ -81,12 +81,12 @@ impl Shown {
     }
 
     /// Whether the first impact of S1 is over.
-    fn first_is_over(&self) -> bool {
+    fn first_impact_is_over(&self) -> bool {
         let mut over = self.app().player().impact_record().until(self.time());
         self.is_free(0) && over.any(|(_, own, _)| own.joint == 0)
     }
 
-    /// Whether these plots are on show; on a phone, behind their tab.
+    /// Whether these plots are shown; on a phone, in their tab.
     fn plots(&mut self, titles: &[&str]) -> bool {
         let tab = |harness: &mut Harness<'static, App>, name: &str| {
             harness.get_by_role_and_label(Role::Button, name).click();
@@ -95,7 +95,7 @@ impl Shown {
         if self.mode == Mode::Phone {
             tab(&mut self.harness, "Plots");
         }
-        let found = titles.iter().all(|title| says(&self.harness, title));
+        let found = titles.iter().all(|title| shows_text(&self.harness, title));
         if self.mode == Mode::Phone {
             tab(&mut self.harness, "Lesson");
         }
@@ -107,9 +107,9 @@ impl Shown {
         microscope.is_open() && microscope.joint() == joint
     }
 
-    /// Goes where the button does, and back; what `look` sees there.
-    fn after(&mut self, keys: &[Key], look: impl Fn(&Self) -> bool) -> bool {
-        let link = self.time();
+    /// Presses `keys`, evaluates `look` at the instant reached, and returns to the current instant.
+    fn after_keys(&mut self, keys: &[Key], look: impl Fn(&Self) -> bool) -> bool {
+        let start = self.time();
         for key in keys {
             self.harness.key_press(*key);
             self.harness.step();
@@ -119,10 +119,10 @@ impl Shown {
             self.harness.run_steps(2);
         }
         let found = look(self);
-        self.harness.state_mut().show_instant(link);
+        self.harness.state_mut().show_instant(start);
         self.harness.run_steps(2);
         if self.app().course().is_some_and(|course| course.is_reached()) {
-            // It went past the end of the step, which begins anew.
+            // The seek went past the end of the step, so restarts the step.
             press(&mut self.harness, Key::PageDown);
             press(&mut self.harness, Key::PageUp);
         }
@@ -130,8 +130,8 @@ impl Shown {
     }
 }
 
-/// Whether the ball presses on its wall with the force that the badge names, the largest of the impact.
-fn stands_at_peak(shown: &Shown, number: u64, joint: usize) -> bool {
+/// Whether the instant is the peak of impact `number` of `joint`, and the badge names it.
+fn is_at_peak(shown: &Shown, number: u64, joint: usize) -> bool {
     let record = shown.app().player().impact_record();
     let at = record.in_progress(Some(joint), shown.time());
     let force = shown.joint(joint).normal_force.norm();
@@ -178,7 +178,7 @@ const CLAIMS: &[Claim] = &[
         s.joints().all(|joint| s.joint(joint).eccentricity.norm() < 1e-9)
     }),
     ("first-impact", 1, Begins, "runs it to the peak of the first impact", |s| {
-        s.after(&[Key::Period], |s| stands_at_peak(s, 1, 0))
+        s.after_keys(&[Key::Period], |s| is_at_peak(s, 1, 0))
     }),
     ("first-impact", 1, Ends, "the first impact of S1 begins at", |s| s.touches(0) && s.plots(&["Normal force, N"])),
     ("first-impact", 2, Begins, "The slides move all the while", |s| {
@@ -188,8 +188,8 @@ const CLAIMS: &[Claim] = &[
         s.all_free() && s.strikes(0, 0.11e-3)
     }),
     ("first-impact", 2, Ends, "The joints carry nothing", |s| s.plots(&["Normal force, N", "Acceleration, m/s²"])),
-    ("first-impact", 4, Ends, "At 11 ms", |s| s.first_is_over()),
-    ("first-impact", 6, Ends, "the same to the last digit", |s| s.first_is_over()),
+    ("first-impact", 4, Ends, "At 11 ms", |s| s.first_impact_is_over()),
+    ("first-impact", 6, Ends, "the same to the last digit", |s| s.first_impact_is_over()),
     ("first-impact", 7, Ends, "the first impact ends a free fall through the clearance", |s| {
         s.joints().any(|joint| s.touches(joint))
     }),
@@ -222,7 +222,7 @@ const CLAIMS: &[Claim] = &[
         s.all_rest() && s.joints().all(|joint| s.joint(joint).slip_speed > 0.0)
     }),
     ("friction", 1, Begins, "watch the second arrow at the ball", |s| {
-        s.joint(0).friction_force.norm() > 0.1 && says(&s.harness, "Friction")
+        s.joint(0).friction_force.norm() > 0.1 && shows_text(&s.harness, "Friction")
     }),
     ("friction", 2, Begins, "The balls are about to strike", |s| {
         s.all_free() && s.joints().all(|joint| s.strikes(joint, 0.2e-3))
@@ -242,21 +242,21 @@ const CLAIMS: &[Claim] = &[
     }),
     ("friction", 6, Ends, "then the balls rest on their walls", |s| s.all_rest()),
     ("slow-motion", 1, Begins, "At a time scale of 1:1000", |s| {
-        s.app().player().pacer.scale() == 1e-3 && says(&s.harness, "1:1000")
+        s.app().player().pacer.scale() == 1e-3 && shows_text(&s.harness, "1:1000")
     }),
     ("slow-motion", 1, Begins, "The machine is paused just before it", |s| s.is_free(1) && s.strikes(1, 0.05e-3)),
     ("slow-motion", 1, Ends, "Press Play to watch the whole impact", |s| s.is_free(1)),
     ("slow-motion", 2, Begins, "Once more from just before the contact", |s| s.is_free(1) && s.strikes(1, 0.05e-3)),
     ("slow-motion", 3, Ends, "on the way in and", |s| s.is_free(1) && s.plots(&["Normal force, N", "Indentation, µm"])),
     ("slow-motion", 4, Begins, "runs the machine to the peak of the next impact", |s| {
-        s.after(&[Key::Period], |s| s.time() > 15e-3 && s.touches(1))
+        s.after_keys(&[Key::Period], |s| s.time() > 15e-3 && s.touches(1))
     }),
     ("slow-motion", 4, Begins, "now a little faster", |s| s.app().player().pacer.scale() == 2e-3),
     ("slow-motion", 4, Ends, "S1 strikes at 10.5 ms", |s| s.touches(0)),
     ("slow-motion", 5, Begins, "back to the peak of the first impact, and forward again", |s| {
         let before = s.app().player().simulation().state_hash();
-        s.after(&[Key::Comma, Key::Comma], |s| stands_at_peak(s, 2, 1))
-            && s.after(&[Key::Comma, Key::Comma, Key::Period], |s| stands_at_peak(s, 4, 1))
+        s.after_keys(&[Key::Comma, Key::Comma], |s| is_at_peak(s, 2, 1))
+            && s.after_keys(&[Key::Comma, Key::Comma, Key::Period], |s| is_at_peak(s, 4, 1))
             && s.app().player().simulation().state_hash() == before
     }),
     ("slow-motion", 6, Begins, "It is about to strike again", |s| {
@@ -298,7 +298,7 @@ const CLAIMS: &[Claim] = &[
             run.take_impacts(&mut impacts);
         }
         impacts.retain(|impact| impact.joint == 1);
-        // At its end one is under way.
+        // Leaves out the impact in progress at the end.
         let last = impacts.iter().map(|impact| impact.end).fold(0.0, f64::max);
         seen.retain(|(time, _)| *time < last);
         let between = |time: f64| impacts.iter().all(|impact| time <= impact.start || time >= impact.end);
@@ -313,12 +313,12 @@ const CLAIMS: &[Claim] = &[
         s.joints().all(|joint| s.joint(joint).state == ContactMode::Ideal)
     }),
     ("twin", 1, Begins, "The violet ghost is a twin", |s| s.app().player().twin().is_some()),
-    ("twin", 2, Begins, "The bench plots the distance of the twin against time", |s| bench(s)),
+    ("twin", 2, Begins, "The bench plots the distance of the twin against time", |s| plots_twin_distance(s)),
     ("twin", 2, Begins, "So far no ball touches its wall", |s| s.all_free()),
     ("twin", 2, Ends, "Falling together, the two machines stay together", |s| s.all_free()),
     ("twin", 5, Ends, "The drives take both to the same place", |s| s.all_rest()),
     ("chaos", 1, Begins, "The joint at the slider has a clearance of 0.3 mm", |s| s.joint(1).clearance == 0.3e-3),
-    ("chaos", 1, Begins, "The violet twin", |s| s.app().player().twin().is_some() && bench(s)),
+    ("chaos", 1, Begins, "The violet twin", |s| s.app().player().twin().is_some() && plots_twin_distance(s)),
     ("chaos", 2, Begins, "Here the clearance is 0", |s| s.joint(0).state == ContactMode::Ideal),
     ("chaos", 3, Ends, "The ball rests on its wall", |s| s.touches(1)),
     ("to-the-class", 1, Begins, "The machine is paused at 9 ms, after the first impacts", |s| {
@@ -330,8 +330,8 @@ const CLAIMS: &[Claim] = &[
     }),
 ];
 
-/// Whether the distance of the twin is plotted; on a phone, behind its tab.
-fn bench(shown: &mut Shown) -> bool {
+/// Whether the twin's distance is plotted; on a phone, in its tab.
+fn plots_twin_distance(shown: &mut Shown) -> bool {
     let tab = |harness: &mut Harness<'static, App>, name: &str| {
         harness.get_by_role_and_label(Role::Button, name).click();
         harness.run_steps(3);
@@ -339,19 +339,19 @@ fn bench(shown: &mut Shown) -> bool {
     if shown.mode == Mode::Phone {
         tab(&mut shown.harness, "Bench");
     }
-    let found = says(&shown.harness, "Distance to twin");
+    let found = shows_text(&shown.harness, "Distance to twin");
     if shown.mode == Mode::Phone {
         tab(&mut shown.harness, "Lesson");
     }
     found
 }
 
-/// Walks every lesson to its end by Page Down and Play in `mode`; all claims that do not hold.
-fn walk(mode: Mode) -> Vec<String> {
-    let mut wrong = Vec::new();
+/// Walks every lesson to its end by Page Down and Play in `mode`; returns all claims that do not hold.
+fn failed_claims(mode: Mode) -> Vec<String> {
+    let mut failures = Vec::new();
     for (name, _) in BUILT_IN_LESSONS {
         let size = if mode == Mode::Phone { PHONE } else { WIDE };
-        let mut harness = taught(name, 0, size);
+        let mut harness = open_lesson(name, 0, size);
         if mode == Mode::Presentation {
             present(&mut harness, size);
         }
@@ -360,21 +360,21 @@ fn walk(mode: Mode) -> Vec<String> {
         for step in 1..=steps {
             let mut check = |shown: &mut Shown, now: When| {
                 check_panel(shown, &format!("{mode:?}, {name}, step {step}"), now);
-                keep_picture(shown, &format!("{name}_{step}_{now:?}"));
+                save_picture(shown, &format!("{name}_{step}_{now:?}"));
                 for (_, _, _, words, holds) in
                     CLAIMS.iter().filter(|claim| (claim.0, claim.1, claim.2) == (name, step, now))
                 {
                     let at = format!("{mode:?}, {name}, step {step}, {now:?}: {words}");
-                    if !says(&shown.harness, words) {
-                        wrong.push(format!("{at}: not on the page"));
+                    if !shows_text(&shown.harness, words) {
+                        failures.push(format!("{at}: not on the page"));
                     }
                     if !holds(shown) {
-                        wrong.push(at);
+                        failures.push(at);
                     }
                 }
             };
             assert_eq!(shown.app().course().expect("a lesson").step() + 1, step, "{mode:?}, {name}");
-            assert!(says(&shown.harness, &format!("{step} of {steps}")), "{mode:?}, {name}, step {step}");
+            assert!(shows_text(&shown.harness, &format!("{step} of {steps}")), "{mode:?}, {name}, step {step}");
             check(&mut shown, Begins);
             if play(&mut shown.harness) {
                 shown.harness.run_steps(8);
@@ -382,31 +382,31 @@ fn walk(mode: Mode) -> Vec<String> {
             }
             press(&mut shown.harness, Key::PageDown);
         }
-        // There is nothing behind the last one.
+        // Page Down has no effect at the last step.
         assert_eq!(shown.app().course().expect("a lesson").step() + 1, steps);
         shown.harness.get_by_label("Leave the lesson").click();
         shown.harness.run_steps(2);
         assert!(shown.app().course().is_none());
     }
-    wrong
+    failures
 }
 
-/// The panel shows the answer at the end of the step and not before, and in the window all that the step points at is there.
+/// Checks that the panel shows the answer only at the end of the step and that all highlighted parts of the window exist.
 fn check_panel(shown: &Shown, at: &str, now: When) {
     let course = shown.app().course().expect("a lesson");
-    assert!(!says(&shown.harness, "The machine has been changed"), "{at}");
+    assert!(!shows_text(&shown.harness, "The machine has been changed"), "{at}");
     if now == Begins {
         let points_out = shown.mode != Mode::Window || shown.app().shows_highlights(&shown.harness.ctx);
-        assert!(points_out, "{at}: something pointed at is not there");
-        assert!(!says(&shown.harness, "Answer:"), "{at}: the answer shows too early");
+        assert!(points_out, "{at}: a highlighted part is missing");
+        assert!(!shows_text(&shown.harness, "Answer:"), "{at}: the answer shows too early");
     } else if course.lesson().steps[course.step()].question.is_some() {
         let answer = course.answer().unwrap_or_else(|| panic!("{at}: no answer"));
-        assert!(says(&shown.harness, &format!("Answer: {answer}")), "{at}: {answer}");
+        assert!(shows_text(&shown.harness, &format!("Answer: {answer}")), "{at}: {answer}");
     }
 }
 
-/// Keeps the picture where `KEEP_PICTURES` says.
-fn keep_picture(shown: &mut Shown, name: &str) {
+/// Saves a picture to the folder `KEEP_PICTURES`, if set.
+fn save_picture(shown: &mut Shown, name: &str) {
     if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
         shown.harness.run_steps(8);
         let image = shown.harness.render().expect("drawn");
@@ -416,27 +416,27 @@ fn keep_picture(shown: &mut Shown, name: &str) {
 }
 
 #[test]
-fn what_the_lessons_say_is_so_in_the_window() {
-    let wrong = walk(Mode::Window);
+fn claims_of_the_lessons_hold_in_the_window() {
+    let wrong = failed_claims(Mode::Window);
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
-fn what_the_lessons_say_is_so_in_a_presentation() {
-    let wrong = walk(Mode::Presentation);
+fn claims_of_the_lessons_hold_in_a_presentation() {
+    let wrong = failed_claims(Mode::Presentation);
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
-fn what_the_lessons_say_is_so_on_the_page_in_a_small_window() {
-    let wrong = walk(Mode::Phone);
+fn claims_of_the_lessons_hold_on_the_page_in_a_small_window() {
+    let wrong = failed_claims(Mode::Phone);
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
-fn the_error_of_a_machine_that_is_turned_over_turns_too() {
+fn the_tip_error_reverses_with_gravity() {
     // Lesson `ideal`, step 5.
-    let along = |gravity: &str| {
+    let tip_error = |gravity: &str| {
         let change = [("gravity.x".to_owned(), gravity.to_owned())];
         let scene = jointplay::scene::Scene::load("spcmm", &change).expect("in range");
         let mut run = Simulation::new(&scene.machine).expect("starts");
@@ -445,6 +445,6 @@ fn the_error_of_a_machine_that_is_turned_over_turns_too() {
         run.sample(0.4, &mut frame);
         frame.probe_error.expect("a probe").x
     };
-    let (up, down) = (along("-9.81 m/s^2"), along("9.81 m/s^2"));
+    let (up, down) = (tip_error("-9.81 m/s^2"), tip_error("9.81 m/s^2"));
     assert!(down > 0.2e-3 && up < -0.2e-3, "{up} {down}");
 }

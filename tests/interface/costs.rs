@@ -11,7 +11,7 @@ use jointplay::analysis::study::{Alone, NAMED, RunSpan, StudyRuns, Uncertainty, 
 use jointplay::app::{App, Event};
 use jointplay::scene::Value;
 
-use crate::bench_window::{FAST, click, hold, hold_shared, named_controls, set_number, sized, wait};
+use crate::bench_window::{FAST, click, named_controls, set_number, sized, throttle, throttle_shared, wait};
 use crate::golden::PLAIN;
 use crate::hands::compare_window;
 
@@ -79,7 +79,7 @@ fn bars(harness: &Harness<'_, App>) -> [Vec<Rect>; 2] {
 #[test]
 fn the_tornado_fills_with_the_numbers_of_the_study_and_its_bars_end_there() {
     let mut harness = large();
-    let points = hold_shared(&mut harness, 2);
+    let points = throttle_shared(&mut harness, 2);
     click(&mut harness, Role::Button, "Start runs");
     harness.run_steps(2);
     harness.get_by_label("Of the current setting; 0 of 7 runs");
@@ -211,7 +211,7 @@ fn a_click_on_an_end_moves_the_slider_of_its_joint_and_is_undone() {
 #[test]
 fn closing_it_cancels_and_forgets() {
     let mut harness = large();
-    let points = hold(&mut harness);
+    let points = throttle(&mut harness);
     for close in ["What play costs", "Bench", "tab"] {
         click(&mut harness, Role::Button, "Start runs");
         harness.run_steps(2);

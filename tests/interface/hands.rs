@@ -69,7 +69,7 @@ pub fn paced(
 
 /// The window on `scene` with some changes and [`PLAIN`] steps, for comparison with stored texts.
 pub fn plain(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
-    opened(scene, &[changes, &PLAIN].concat(), size, theme, crate::common::looks::<10>)
+    opened(scene, &[changes, &PLAIN].concat(), size, theme, crate::common::ticking_clock::<10>)
 }
 
 /// Folder of the stored texts and pictures of windows.

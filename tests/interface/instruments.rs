@@ -17,7 +17,7 @@ const PHONE: [f32; 2] = [390.0, 844.0];
 
 /// The window on `scene` with some changes at t = 0, paused.
 fn window(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
-    opened(scene, changes, size, theme, crate::common::looks::<10>)
+    opened(scene, changes, size, theme, crate::common::ticking_clock::<10>)
 }
 
 fn spcmm() -> Harness<'static, App> {

@@ -16,31 +16,31 @@ use crate::window::sized;
 pub const WIDE: [f32; 2] = [1280.0, 720.0];
 pub const PHONE: [f32; 2] = [390.0, 844.0];
 
-/// Time between two frames, s, as long as one may be that is caught up with: a lesson is long.
+/// Time between two frames, s: the longest that playback catches up with, since lessons are long.
 const DT: f32 = 0.25;
 
-/// Most frames that a step may take to its end.
+/// Largest number of frames that a step may take.
 const FRAMES: usize = 4000;
 
-/// The window in a lesson, set for step `step`, counted from 0.
-pub fn taught(name: &str, step: usize, size: [f32; 2]) -> Harness<'static, App> {
+/// The window in a lesson at step `step`, counted from 0.
+pub fn open_lesson(name: &str, step: usize, size: [f32; 2]) -> Harness<'static, App> {
     let lesson = Lesson::built_in(name).unwrap_or_else(|error| panic!("{error}"));
-    in_lesson(lesson, step, size)
+    open_window(lesson, step, size)
 }
 
-fn in_lesson(lesson: Arc<Lesson>, step: usize, size: [f32; 2]) -> Harness<'static, App> {
+fn open_window(lesson: Arc<Lesson>, step: usize, size: [f32; 2]) -> Harness<'static, App> {
     let (mut harness, _) = page::paced(AppOptions::for_lesson(lesson, step), size, DT);
     settle(&mut harness);
     harness
 }
 
-/// A built-in lesson whose runs take [`PLAIN`] steps: each begins with a state that names an instant, and has its settings there.
+/// A built-in lesson whose runs take [`PLAIN`] steps. Every run begins with a state that names an instant, where the settings are added.
 fn plain(name: &str) -> Arc<Lesson> {
     let [method, step] = PLAIN.map(|(key, value)| format!("{key}={}", value.replace(' ', "")));
-    let begins = format!("state = \"{method}&{step}&");
-    let (_, text) = BUILT_IN_LESSONS.iter().find(|(own, _)| *own == name).expect("a lesson");
+    let prefix = format!("state = \"{method}&{step}&");
+    let (_, text) = BUILT_IN_LESSONS.iter().find(|(id, _)| *id == name).expect("a lesson");
     let lines = text.lines().map(|line| match line.strip_prefix("state = \"") {
-        Some(state) if state.starts_with("t=") || state.contains("&t=") => format!("{begins}{state}\n"),
+        Some(state) if state.starts_with("t=") || state.contains("&t=") => format!("{prefix}{state}\n"),
         _ => format!("{line}\n"),
     });
     let lesson = Lesson::parse(name, &lines.collect::<String>(), None).unwrap_or_else(|error| panic!("{error}"));
@@ -50,17 +50,17 @@ fn plain(name: &str) -> Arc<Lesson> {
     Arc::new(lesson)
 }
 
-/// Until the machine is set for the step.
+/// Runs frames until the machine is set up for the step.
 fn settle(harness: &mut Harness<'_, App>) {
     for _ in 0..FRAMES {
         harness.step();
         if harness.state().course().is_none_or(|course| !course.is_busy()) {
-            // The camera glides, rings appear.
+            // Camera motion and highlights take a few more frames.
             harness.run_steps(3);
             return;
         }
     }
-    panic!("the machine is never set");
+    panic!("the machine is never set up");
 }
 
 fn step(harness: &Harness<'_, App>) -> usize {
@@ -72,9 +72,9 @@ pub fn press(harness: &mut Harness<'_, App>, key: Key) {
     settle(harness);
 }
 
-/// Plays to the end of the step, if it has one, and says whether.
+/// Plays to the end of the step; returns whether it has one.
 pub fn play(harness: &mut Harness<'_, App>) -> bool {
-    let Some(until) = harness.state().course().expect("a lesson").until() else {
+    let Some(end) = harness.state().course().expect("a lesson").until() else {
         return false;
     };
     press(harness, Key::Space);
@@ -83,22 +83,22 @@ pub fn play(harness: &mut Harness<'_, App>) -> bool {
             harness.run_steps(2);
             let player = harness.state().player();
             assert!(!player.is_playing());
-            assert_eq!(player.pacer.shown(), until);
+            assert_eq!(player.pacer.shown(), end);
             return true;
         }
         harness.step();
     }
-    panic!("{until} s is never reached");
+    panic!("{end} s is never reached");
 }
 
-/// The labels on show that say so.
-pub fn says(harness: &Harness<'_, App>, words: &str) -> bool {
+/// Whether a label on show contains `words`.
+pub fn shows_text(harness: &Harness<'_, App>, words: &str) -> bool {
     harness.query_all_by_label_contains(words).next().is_some()
 }
 
 #[test]
-fn the_answer_is_what_the_run_on_show_gave() {
-    let mut harness = taught("rattle", 0, WIDE);
+fn the_answer_comes_from_the_displayed_run() {
+    let mut harness = open_lesson("rattle", 0, WIDE);
     press(&mut harness, Key::PageDown);
     let wrong = "Not at all: S1 holds them";
     harness.get_by_role_and_label(Role::RadioButton, wrong).click();
@@ -110,7 +110,7 @@ fn the_answer_is_what_the_run_on_show_gave() {
     assert!(touches.iter().all(|time| (time / touches[0] - 1.0).abs() < 0.02), "{touches:?}");
     let name = "At nearly the same time".to_owned();
     harness.get_by_label(&format!("Not as predicted. Answer: {name}"));
-    // Back, the class tries again.
+    // After going back, the question can be answered again.
     press(&mut harness, Key::PageUp);
     press(&mut harness, Key::PageDown);
     harness.get_by_role_and_label(Role::RadioButton, &name).click();
@@ -118,49 +118,49 @@ fn the_answer_is_what_the_run_on_show_gave() {
     play(&mut harness);
     harness.get_by_label(&format!("As predicted: {name}"));
 
-    // The peaks of the run on show.
-    let mut harness = taught("rattle", 4, WIDE);
+    // The text shows the peaks of the displayed run.
+    let mut harness = open_lesson("rattle", 4, WIDE);
     assert!(play(&mut harness));
     let impacts = harness.state().player().simulation().impacts();
     let of_second = impacts.filter(|impact| impact.joint == 1);
     let peaks: Vec<f64> = of_second.map(|impact| impact.peak).collect();
     assert!(peaks[1] > 1.05 * peaks[0], "{peaks:?}");
     harness.get_by_label("Answer: Harder than the first");
-    assert!(says(&harness, &format!("{:.0} N", peaks[1])), "{peaks:?}");
+    assert!(shows_text(&harness, &format!("{:.0} N", peaks[1])), "{peaks:?}");
 }
 
 #[test]
-fn a_lecturer_may_play_with_any_control_and_next_sets_the_machine() {
-    let mut harness = taught("rattle", 1, WIDE);
+fn controls_may_be_changed_during_a_step_and_next_sets_the_machine() {
+    let mut harness = open_lesson("rattle", 1, WIDE);
     let set = |harness: &mut Harness<'_, App>| {
         let player = harness.state_mut().player_mut();
         player.set("contact.friction", "0.4").expect("in range");
     };
     set(&mut harness);
     harness.run_steps(2);
-    assert!(says(&harness, "The machine has been changed"));
+    assert!(shows_text(&harness, "The machine has been changed"));
     harness.get_by_label("Restart this step").click();
     settle(&mut harness);
-    assert!(!says(&harness, "The machine has been changed"));
+    assert!(!shows_text(&harness, "The machine has been changed"));
     assert_eq!(harness.state().player().running().machine.contact.friction, 0.15);
     set(&mut harness);
     press(&mut harness, Key::PageDown);
     assert_eq!(step(&harness), 2);
     assert_eq!(harness.state().player().running().machine.contact.friction, 0.15);
     settle(&mut harness);
-    // Where the step before ends: just after the first impact of S1, which the view follows.
-    let mut alone = Simulation::new(&harness.state().player().running().machine).expect("starts");
-    alone.advance_to(20e-3).expect("runs");
-    let of_s1 = alone.impacts().filter(|impact| impact.joint == 0);
+    // The step starts at the end of the previous one, just after the onset of S1's first impact.
+    let mut reference = Simulation::new(&harness.state().player().running().machine).expect("starts");
+    reference.advance_to(20e-3).expect("runs");
+    let of_s1 = reference.impacts().filter(|impact| impact.joint == 0);
     let [first, second] = of_s1.map(|impact| impact.start).take(2).collect::<Vec<_>>()[..] else {
         panic!("two impacts of S1");
     };
     let shown = harness.state().player().pacer.shown();
     assert!((shown - first - 0.03e-3).abs() < 1e-9, "{shown}, {first}");
-    // As the text says: it touches, and its force rises.
+    // As the text says, it touches and its force rises.
     let s1 = &harness.state().player().frame().joints[0];
     assert!(s1.penetration > 0.0 && s1.normal_force.norm() > 1.0);
-    // What a remote sends besides does what it always does: to the peak of this impact, and of the next one.
+    // A presenter remote's other keys work as usual: they seek to the peak of this impact and of the next one.
     let peaks = crate::impacts::peaks_of_run(harness.state(), 20e-3);
     let of_s1: Vec<f64> = peaks.iter().filter(|(impact, _)| impact.joint == 0).map(|(_, peak)| *peak).collect();
     for peak in [of_s1[0], of_s1[1]] {
@@ -181,14 +181,14 @@ fn a_lecturer_may_play_with_any_control_and_next_sets_the_machine() {
 
 #[test]
 fn a_lesson_changes_no_bit_of_the_run() {
-    let mut harness = taught("rattle", 4, WIDE);
+    let mut harness = open_lesson("rattle", 4, WIDE);
     play(&mut harness);
     let player = harness.state().player();
-    let mut alone = Simulation::new(&player.running().machine).expect("starts");
-    while alone.statistics().steps < player.steps() {
-        alone.step().expect("runs");
+    let mut reference = Simulation::new(&player.running().machine).expect("starts");
+    while reference.statistics().steps < player.steps() {
+        reference.step().expect("runs");
     }
-    assert_eq!(player.simulation().state_hash(), alone.state_hash());
+    assert_eq!(player.simulation().state_hash(), reference.state_hash());
 }
 
 #[test]
@@ -210,7 +210,7 @@ fn a_link_opens_the_lesson_at_its_step() {
     }
     assert_eq!(step(&harness), 1);
     assert_eq!(harness.state().verdict(), Some(&Verdict::Agrees(before)));
-    assert!(!says(&harness, "The machine has been changed"));
+    assert!(!shows_text(&harness, "The machine has been changed"));
     let (mut harness, _) = page::open(AppOptions::from_link("?lesson=rattle&step=5").expect("a link"), WIDE);
     settle(&mut harness);
     assert_eq!(step(&harness), 4);
@@ -225,7 +225,7 @@ fn a_link_opens_the_lesson_at_its_step() {
 }
 
 #[test]
-fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
+fn the_menu_lists_the_lessons_and_touch_steps_through_one_on_a_phone() {
     let mut harness = sized("spcmm", WIDE, eframe::egui::Theme::Light);
     harness.get_by_label("Lessons").click();
     harness.run_steps(3);
@@ -243,7 +243,7 @@ fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
         fingers(harness, &[&[at]]);
         settle(harness);
     };
-    let mut harness = taught("rattle", 0, PHONE);
+    let mut harness = open_lesson("rattle", 0, PHONE);
     let next = harness.get_by_role_and_label(Role::Button, "Next").rect();
     tap(&mut harness, Role::Button, "Next");
     assert_eq!(step(&harness), 1);
@@ -256,10 +256,10 @@ fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
         }
     }
     harness.run_steps(2);
-    assert!(says(&harness, "Answer: At nearly the same time"));
+    assert!(shows_text(&harness, "Answer: At nearly the same time"));
     tap(&mut harness, Role::Button, "Back");
     assert_eq!(step(&harness), 0);
-    // The sheet folds away, and comes back.
+    // The sheet can be folded and unfolded.
     tap(&mut harness, Role::Button, "Lesson");
     assert!(harness.query_by_role_and_label(Role::Button, "Next").is_none());
     tap(&mut harness, Role::Button, "Lesson");
@@ -268,10 +268,10 @@ fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
 }
 
 #[test]
-fn the_window_comes_back_as_it_was_when_a_lesson_ends() {
+fn the_window_is_restored_when_a_lesson_ends() {
     for (name, _) in BUILT_IN_LESSONS {
         let mut harness = sized("pendulum", WIDE, eframe::egui::Theme::Light);
-        // Without plots, with the bench, in the middle of a run that was changed.
+        // Hides the plots, shows the bench, and stops in the middle of a changed run.
         press(&mut harness, Key::P);
         press(&mut harness, Key::B);
         press(&mut harness, Key::Num5);
@@ -284,11 +284,11 @@ fn the_window_comes_back_as_it_was_when_a_lesson_ends() {
         };
         assert_eq!(panels(&harness), [true, false, true]);
         let before = harness.state().share_state();
-        let kept = |harness: &Harness<'_, App>| {
-            let names: Vec<String> = harness.state().comparison().kept().iter().map(|kept| kept.name()).collect();
+        let kept_runs = |harness: &Harness<'_, App>| {
+            let names: Vec<String> = harness.state().comparison().kept().iter().map(|run| run.name()).collect();
             (names, harness.state().undo_words(false))
         };
-        let kept_before = kept(&harness);
+        let kept_before = kept_runs(&harness);
         assert_eq!(kept_before.0, ["Clearance: 0.3 mm"]);
         assert!(kept_before.1.is_some());
         let title = &Lesson::built_in(name).expect("a lesson").title;
@@ -304,13 +304,13 @@ fn the_window_comes_back_as_it_was_when_a_lesson_ends() {
         harness.get_by_label("Leave the lesson").click();
         harness.run_steps(60);
         assert_eq!(harness.state().share_state(), before, "{name}");
-        assert_eq!(kept(&harness), kept_before, "{name}");
+        assert_eq!(kept_runs(&harness), kept_before, "{name}");
         assert_eq!(panels(&harness), [true, false, true], "{name}");
     }
 }
 
 #[test]
-fn a_scene_that_was_opened_during_a_lesson_stays_when_that_ends() {
+fn a_scene_opened_during_a_lesson_stays_after_the_lesson() {
     let mut harness = sized("pendulum", WIDE, eframe::egui::Theme::Light);
     harness.get_by_label("Lessons").click();
     harness.run_steps(3);
@@ -325,7 +325,7 @@ fn a_scene_that_was_opened_during_a_lesson_stays_when_that_ends() {
     harness.get_by_label("Accuracy");
 }
 
-/// Presses F5, and gives the window the points that are left at its new zoom.
+/// Presses F5 and resizes the window for its new zoom.
 pub fn present(harness: &mut Harness<'_, App>, screen: [f32; 2]) {
     harness.key_press(Key::F5);
     harness.step();
@@ -337,7 +337,7 @@ pub fn present(harness: &mut Harness<'_, App>, screen: [f32; 2]) {
 
 #[test]
 fn a_presented_lesson_is_legible_from_the_last_row() {
-    let mut harness = taught("rattle", 1, WIDE);
+    let mut harness = open_lesson("rattle", 1, WIDE);
     present(&mut harness, WIDE);
     assert!(harness.state().is_presenting());
     let zoom = harness.ctx.zoom_factor();
@@ -346,7 +346,7 @@ fn a_presented_lesson_is_legible_from_the_last_row() {
         let share = styles[&style].size * zoom / WIDE[1];
         assert!(share >= 1.0 / 40.0 - 1e-6, "{style:?}: {share}");
     }
-    // Its lines are as high as that, too.
+    // The line height has the same minimum.
     let line = harness.get_by_label("Step 2 of 6").rect().height();
     assert!(line * zoom / WIDE[1] >= 1.0 / 40.0, "{line}");
     press(&mut harness, Key::PageDown);
@@ -355,11 +355,11 @@ fn a_presented_lesson_is_legible_from_the_last_row() {
     harness.key_press(Key::F5);
     harness.run_steps(2);
     assert!(!harness.state().is_presenting());
-    assert_eq!(step(&harness), 2, "the lesson goes on");
+    assert_eq!(step(&harness), 2, "the lesson continues");
 }
 
-/// Which step of a lesson is drawn, counted from 0.
-const DRAWN: [(&str, usize); 10] = [
+/// The lessons' stored steps, counted from 0.
+const STORED_STEPS: [(&str, usize); 10] = [
     ("rattle", 1),
     ("first-impact", 3),
     ("clearance", 2),
@@ -374,8 +374,8 @@ const DRAWN: [(&str, usize); 10] = [
 
 #[test]
 fn lessons_show_what_is_stored() {
-    for (index, (name, step)) in DRAWN.into_iter().enumerate() {
-        let mut harness = in_lesson(plain(name), step, WIDE);
+    for (index, (name, step)) in STORED_STEPS.into_iter().enumerate() {
+        let mut harness = open_window(plain(name), step, WIDE);
         if index % 2 == 0 {
             present(&mut harness, WIDE);
         }
@@ -383,54 +383,54 @@ fn lessons_show_what_is_stored() {
         harness.run_steps(60);
         compare_window(&mut harness, &format!("lesson_{name}"));
     }
-    let mut harness = in_lesson(plain("rattle"), 1, PHONE);
+    let mut harness = open_window(plain("rattle"), 1, PHONE);
     play(&mut harness);
     harness.run_steps(60);
     compare_window(&mut harness, "lesson_rattle_phone");
 }
 
 #[test]
-fn a_presented_lesson_has_the_plots_that_it_speaks_of() {
+fn a_presented_lesson_shows_the_plots_that_it_mentions() {
     for (name, plot) in [("ideal", "Tip error"), ("rattle", "Normal force")] {
-        let mut harness = taught(name, 0, WIDE);
+        let mut harness = open_lesson(name, 0, WIDE);
         harness.key_press(Key::F5);
         harness.step();
         harness.set_size(eframe::egui::Vec2::from(WIDE) / harness.ctx.zoom_factor());
         harness.run_steps(5);
         assert!(harness.state().is_presenting());
-        assert!(says(&harness, plot), "{name}: no {plot}");
+        assert!(shows_text(&harness, plot), "{name}: no {plot}");
     }
 }
 
 #[test]
-fn in_a_presented_lesson_the_microscope_shows_circle_and_section_whole_and_the_caption_leaves_the_ball_free() {
+fn a_presented_lesson_shows_the_whole_microscope_and_its_caption_clears_the_ball() {
     for size in [WIDE, [1920.0, 1080.0]] {
-        let mut harness = taught("rattle", 5, size);
+        let mut harness = open_lesson("rattle", 5, size);
         press(&mut harness, Key::F5);
         harness.set_size(vec2(size[0], size[1]) / harness.ctx.zoom_factor());
         harness.run_steps(5);
         let app = harness.state();
         let circle = app.microscope().circle().expect("open");
-        let place = |words: &str| harness.get_by_label_contains(words).rect();
-        let (view, lesson) = (place("3D view"), place("Every impact and every slide"));
-        let (sphere, section) = (place("under the microscope."), place("Section of the contact"));
+        let rect_of = |words: &str| harness.get_by_label_contains(words).rect();
+        let (view, lesson) = (rect_of("3D view"), rect_of("Every impact and every slide"));
+        let (sphere, section) = (rect_of("under the microscope."), rect_of("Section of the contact"));
         assert!(view.right() <= sphere.left() && sphere.right() <= lesson.left(), "{view:?} {sphere:?} {lesson:?}");
         assert!(section.bottom() <= view.bottom() + 1.0, "{section:?} {view:?}");
-        // The words beside the circle.
-        let mut beside = 0;
+        // No label overlaps the circle.
+        let mut labels = 0;
         for part in &harness.output().shapes {
             let Shape::Text(text) = &part.shape else { continue };
             let rect = text.visual_bounding_rect();
             if sphere.contains_rect(rect) && !rect.contains(circle.centre) {
-                beside += 1;
+                labels += 1;
                 let off = rect.distance_to_pos(circle.centre);
                 assert!(off > circle.radius, "{:?} {rect:?} {circle:?}", text.galley.text());
             }
         }
-        assert!(beside > 5, "{beside}");
+        assert!(labels > 5, "{labels}");
         let ball = app.player().frame().joints[0].ball_centre;
         let ball = app.place_in_view(&ball).expect("in sight");
-        let caption = place(&app.last_impact().expect("an impact"));
+        let caption = rect_of(&app.last_impact().expect("an impact"));
         assert!(caption.distance_to_pos(ball) > 10.0, "{caption:?} {ball:?}");
     }
 }

@@ -5,7 +5,7 @@ use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::App;
 use jointplay::view::Quality;
 
-use crate::common::looks;
+use crate::common::ticking_clock;
 use crate::hands::paced;
 use crate::window::click;
 
@@ -31,7 +31,7 @@ fn parted(harness: &mut Harness<'_, App>, to: f32) -> [Pixels; 2] {
 fn while_it_moves_slowly_the_picture_has_fewer_pixels_and_at_rest_all_of_them() {
     // The same frames, ten a second, with what a window does about them and without.
     let [mut follows, mut plain] = [true, false].map(|follows| {
-        let mut harness = paced("spcmm", &[], SIZE, Theme::Light, looks::<10>, 0.1);
+        let mut harness = paced("spcmm", &[], SIZE, Theme::Light, ticking_clock::<10>, 0.1);
         if follows {
             harness.state_mut().follow_frame_rate();
         }
@@ -96,7 +96,7 @@ fn beside_the_speed_reached_stands_what_limits_it() {
     let fixed = [("solver.method", "rk4"), ("solver.step", "10 us")];
     let window = |clock, dt| paced("spcmm", &fixed, [1280.0, 800.0], Theme::Light, clock, dt);
     // Each takes 4 ms: three a frame.
-    let mut harness = window(looks::<4000>, 1.0 / 60.0);
+    let mut harness = window(ticking_clock::<4000>, 1.0 / 60.0);
     assert_eq!(limit(&mut harness, 3), None, "paused");
     harness.state_mut().player_mut().pacer.set_scale(1e-4);
     click(&mut harness, "Play");
@@ -107,7 +107,7 @@ fn beside_the_speed_reached_stands_what_limits_it() {
     assert_eq!(limit(&mut harness, 3), None, "paused");
 
     // Each takes 20 us, which alone would reach half of real time, but they have a quarter of each frame of a second.
-    let mut harness = window(looks::<20>, 1.0);
+    let mut harness = window(ticking_clock::<20>, 1.0);
     harness.state_mut().player_mut().pacer.set_scale(1.0);
     harness.state_mut().player_mut().set_playing(true);
     let found = limit(&mut harness, 5);

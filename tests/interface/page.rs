@@ -103,7 +103,7 @@ pub fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<R
 pub fn paced(options: AppOptions, size: [f32; 2], dt: f32) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
     let mut options = options;
     options.theme = egui::Theme::Light.into();
-    options.clock = crate::common::looks::<10>;
+    options.clock = crate::common::ticking_clock::<10>;
     let (page, calls) = Calls::host();
     let mut harness = builder(size, egui::Theme::Light).with_step_dt(dt).build_eframe(move |cc| {
         let mut app = App::new(cc, options).expect("the scene starts");

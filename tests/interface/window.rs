@@ -21,7 +21,7 @@ pub(crate) fn window(scene: &str) -> Harness<'static, App> {
 }
 
 pub(crate) fn sized(scene: &str, size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
-    opened(scene, &[], size, theme, crate::common::looks::<10>)
+    opened(scene, &[], size, theme, crate::common::ticking_clock::<10>)
 }
 
 fn time(harness: &Harness<'_, App>) -> f64 {

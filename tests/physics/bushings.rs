@@ -1,8 +1,8 @@
 //! Bushings against closed solutions: deflections, natural frequencies, momentum and energy.
 
 use crate::common::matrix::{FORMULATIONS, for_every};
-use crate::elements::at;
-use crate::joint_elements::{momenta, started};
+use crate::elements::frame_at;
+use crate::joint_elements::{momenta, start_simulation};
 use jointplay::machine::{Quat, Vec3};
 use jointplay::scene::Scene;
 
@@ -28,14 +28,14 @@ fn turned(rotation: &nalgebra::Matrix3<f64>) -> Vec3 {
 
 #[test]
 fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
-    for_every(0..3, |axis, way| {
-        let (bound, label) = (way.bound(), format!("{way}, axis {axis}"));
+    for_every(0..3, |axis, variant| {
+        let (bound, label) = (variant.bound(), format!("{variant}, axis {axis}"));
         let mut place = [100.0, 200.0, 300.0];
         place[axis] += 20.0;
         let start = format!("position = \"{} {} {} mm\"", place[0], place[1], place[2]);
-        let mut simulation = started(&one(&start, ""), &way.close());
+        let mut simulation = start_simulation(&one(&start, ""), &variant.close());
         let t = 0.15;
-        let frame = at(&mut simulation, t);
+        let frame = frame_at(&mut simulation, t);
         let omega = (STIFFNESS[axis] / 0.5).sqrt();
         let off = 0.02 * (omega * t).cos();
         let expected = Vec3::new(0.1, 0.2, 0.3) + Vec3::ith(axis, off);
@@ -48,8 +48,8 @@ fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
         let mut about = [0, 0, 0];
         about[axis] = 1;
         let start = format!("position = \"100 200 300 mm\", rotation = {{ axis = {about:?}, angle = \"1 rad\" }}");
-        let mut simulation = started(&one(&start, ""), &way.close());
-        let frame = at(&mut simulation, t);
+        let mut simulation = start_simulation(&one(&start, ""), &variant.close());
+        let frame = frame_at(&mut simulation, t);
         let omega = (TURNING[axis] / INERTIA[axis]).sqrt();
         let angle = (omega * t).cos();
         let wrong = (turned(&frame.bodies[0].rotation) - Vec3::ith(axis, angle)).norm();
@@ -83,8 +83,8 @@ fn under_a_load_a_bushing_gives_way_along_and_about_its_own_axes() {
                 );
                 let changes = [("solver.method", method), ("solver.tolerance", "1e-8"), ("formulation", formulation)];
                 let text = one(start, bushing) + &load;
-                let mut simulation = started(&text, &changes);
-                let frame = at(&mut simulation, 3.0);
+                let mut simulation = start_simulation(&text, &changes);
+                let frame = frame_at(&mut simulation, 3.0);
                 let label = format!("{method} {formulation} {axis}");
                 let moved = frame.bodies[0].position - Vec3::new(0.1, 0.2, 0.3);
                 let expected = direction * (4.0 / STIFFNESS[axis]);
@@ -129,17 +129,17 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
         // What damps has no part in how they differ: there two are enough.
         for (method, formulation) in ways.into_iter().skip(if more.is_empty() { 0 } else { 3 }) {
             let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
-            let mut simulation = started(&format!("{pair}{more}"), &changes);
+            let mut simulation = start_simulation(&format!("{pair}{more}"), &changes);
             let machine = simulation.machine().clone();
-            let before = at(&mut simulation, 0.0);
+            let before = frame_at(&mut simulation, 0.0);
             let mut furthest: f64 = 0.0;
             for sample in 1..=20 {
-                let frame = at(&mut simulation, 0.05 * f64::from(sample));
+                let frame = frame_at(&mut simulation, 0.05 * f64::from(sample));
                 let relative = frame.bodies[0].rotation.transpose() * frame.bodies[1].rotation;
                 furthest = furthest.max(turned(&relative).norm());
             }
             assert!(furthest > 0.7 && furthest < 3.0, "{furthest}");
-            let frame = at(&mut simulation, 1.0);
+            let frame = frame_at(&mut simulation, 1.0);
             let label = format!("{method} {formulation} {}", more.len());
             for (then, now) in momenta(&before, &machine).iter().zip(&momenta(&frame, &machine)) {
                 let off = (now - then).norm() / then.norm();
@@ -170,7 +170,7 @@ fn a_body_on_a_bushing_does_not_fly_freely() {
                    turning_stiffness = \"0 0 0.4 N m/rad\"\n";
     let scene = Scene::parse(&format!("{text}\n{bushing}"), None, &[]).unwrap();
     let mut simulation = jointplay::simulate::Simulation::new(&scene.machine).unwrap();
-    at(&mut simulation, 0.05);
+    frame_at(&mut simulation, 0.05);
     let residual = simulation.ledger().unwrap().relative_residual();
     assert!(residual.abs() < 1e-4, "{residual:e}");
 }
@@ -217,8 +217,8 @@ fn bushings_of_a_pattern_turn_with_its_copies() {
     assert_ne!(backwards, RING);
     let out = 0.1 + 0.02 * ((500.0_f64 / 0.5).sqrt() * 0.1).cos();
     for text in [RING, &backwards] {
-        let mut simulation = started(text, &[("solver.tolerance", "1e-10")]);
-        let frame = at(&mut simulation, 0.1);
+        let mut simulation = start_simulation(text, &[("solver.tolerance", "1e-10")]);
+        let frame = frame_at(&mut simulation, 0.1);
         for (copy, body) in frame.bodies.iter().enumerate() {
             let angle = std::f64::consts::TAU / 3.0 * copy as f64;
             let expected = Vec3::new(angle.cos(), angle.sin(), 0.0) * out;

@@ -1,14 +1,14 @@
-//! Force elements and drives on single coordinates of joints of two degrees, and force elements on joints that close loops, against
-//! closed solutions, in every method and both formulations.
+//! Force elements and drives on single coordinates of joints with two degrees of freedom, and force elements on joints that close
+//! loops, against closed-form solutions, in every method and both formulations.
 
 use crate::common::matrix::{FORMULATIONS, for_every};
-use crate::elements::at;
-use crate::joint_elements::{momenta, started};
-use crate::two_degrees::differ;
+use crate::elements::frame_at;
+use crate::joint_elements::{momenta, start_simulation};
+use crate::two_degrees::angle_difference;
 use jointplay::simulate::{Frame, Simulation};
 
 const MASS: f64 = 0.5;
-/// About any axis through the centroid, where the joint is: the angles of a universal joint then do not act on each other.
+/// Equal about every axis through the centroid, where the joint is, so that the angles of a universal joint are decoupled.
 const INERTIA: f64 = 4e-3;
 
 /// One coordinate of a joint between a body and the world.
@@ -16,7 +16,7 @@ const INERTIA: f64 = 4e-3;
 struct Case {
     kind: &'static str,
     coordinate: &'static str,
-    /// Its place among those of the joint.
+    /// Its index among the joint's coordinates.
     part: usize,
     closes_loop: bool,
 }
@@ -32,10 +32,10 @@ const OF_TWO: [Case; 4] = [
     case("universal", "child_angle", 1),
 ];
 
-/// Those, and all whose joint closes a loop.
+/// [`OF_TWO`], and all kinds of joint that close a loop.
 fn cases() -> impl Iterator<Item = Case> {
-    let of_one = [case("prismatic", "position", 0), case("revolute", "angle", 0)];
-    let closing = OF_TWO.into_iter().chain(of_one).map(|case| Case { closes_loop: true, ..case });
+    let single = [case("prismatic", "position", 0), case("revolute", "angle", 0)];
+    let closing = OF_TWO.into_iter().chain(single).map(|case| Case { closes_loop: true, ..case });
     OF_TWO.into_iter().chain(closing)
 }
 
@@ -64,7 +64,7 @@ impl Case {
         }
     }
 
-    /// A body on the joint, from a coordinate and its rate; the other coordinate, if any, starts at 0 with its own rate.
+    /// A body on the joint that starts at a coordinate and its rate; the other coordinate, if any, starts at 0 with a rate of 3.
     fn text(self, [q, rate]: [f64; 2], more: &str) -> String {
         let [length, speed, ..] = self.units();
         let second = match self.kind {
@@ -107,7 +107,7 @@ impl Case {
         )
     }
 
-    /// An element of `section` on it.
+    /// An element of `section` on the coordinate.
     fn element(self, section: &str, more: &str) -> String {
         let name = self.coordinate;
         let coordinate = match self.kind {
@@ -117,15 +117,15 @@ impl Case {
         format!("[[{section}]]\nname = \"e\"\njoint = \"j\"\n{coordinate}{more}")
     }
 
-    fn starts(self, start: [f64; 2], more: &str, changes: &[(&str, &str)]) -> Simulation {
-        started(&self.text(start, more), changes)
+    fn start_at(self, start: [f64; 2], more: &str, changes: &[(&str, &str)]) -> Simulation {
+        start_simulation(&self.text(start, more), changes)
     }
 
     fn coordinate(self, frame: &Frame) -> [f64; 2] {
         frame.coordinates[self.part]
     }
 
-    /// What the element exerts on the body along the axis.
+    /// Force or torque of the element on the body along the axis.
     fn force(self, frame: &Frame) -> f64 {
         let report = &frame.elements[0];
         let rotation = frame.bodies[0].rotation;
@@ -139,14 +139,14 @@ impl Case {
 
 #[test]
 fn a_spring_on_one_coordinate_has_its_natural_frequency_in_every_method_and_formulation() {
-    for_every(cases(), |case, way| {
-        let (m, bound) = (case.inertia(), way.bound());
+    for_every(cases(), |case, variant| {
+        let (m, bound) = (case.inertia(), variant.bound());
         let k = 400.0 * m;
         let [.., unit, _] = case.units();
         let spring = case.element("joint_spring", &format!("stiffness = \"{k:e} {unit}\"\n"));
-        let mut simulation = case.starts([0.03, 0.0], &spring, &way.close());
-        let frame = at(&mut simulation, 0.1);
-        let label = format!("{case:?} {way}");
+        let mut simulation = case.start_at([0.03, 0.0], &spring, &variant.close());
+        let frame = frame_at(&mut simulation, 0.1);
+        let label = format!("{case:?} {variant}");
         let [q, rate] = case.coordinate(&frame);
         let (sin, cos) = (20.0 * 0.1_f64).sin_cos();
         let wrong = (q - 0.03 * cos).abs();
@@ -154,11 +154,11 @@ fn a_spring_on_one_coordinate_has_its_natural_frequency_in_every_method_and_form
         assert!((rate + 0.6 * sin).abs() < 20.0 * bound, "{label}: {rate}");
         let force = case.force(&frame) + k * q;
         assert!(force.abs() < 1e-9 * k, "{label}: {force:e}");
-        // The other coordinate goes on as it began.
+        // The other coordinate continues at its initial rate.
         if !case.closes_loop {
             let [q, rate] = frame.coordinates[1 - case.part];
-            let (off, still) = (differ(q, 0.3), (rate - 3.0).abs());
-            assert!(off < 20.0 * bound && still < 20.0 * bound, "{label}: {off:e} {still:e}");
+            let (off, rate_error) = (angle_difference(q, 0.3), (rate - 3.0).abs());
+            assert!(off < 20.0 * bound && rate_error < 20.0 * bound, "{label}: {off:e} {rate_error:e}");
         }
         let residual = simulation.ledger().unwrap().relative_residual();
         assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
@@ -166,7 +166,7 @@ fn a_spring_on_one_coordinate_has_its_natural_frequency_in_every_method_and_form
 }
 
 #[test]
-fn a_motor_on_one_coordinate_drives_that_alone_and_its_work_is_the_drives() {
+fn a_motor_on_one_coordinate_drives_only_it_and_its_work_counts_as_drive_work() {
     for case in cases() {
         let m = case.inertia();
         let [_, _, unit, ..] = case.units();
@@ -174,8 +174,8 @@ fn a_motor_on_one_coordinate_drives_that_alone_and_its_work_is_the_drives() {
         let motor = case.element("motor", &format!("{key} = \"{:e} {unit}\"\n", 5.0 * m));
         for formulation in FORMULATIONS {
             let changes = [("formulation", formulation), ("solver.tolerance", "1e-10")];
-            let mut simulation = case.starts([0.0, -0.4], &motor, &changes);
-            let frame = at(&mut simulation, 0.3);
+            let mut simulation = case.start_at([0.0, -0.4], &motor, &changes);
+            let frame = frame_at(&mut simulation, 0.3);
             let label = format!("{case:?} {formulation}");
             let [q, rate] = case.coordinate(&frame);
             let expected = -0.4 * 0.3 + 0.5 * 5.0 * 0.09;
@@ -189,7 +189,7 @@ fn a_motor_on_one_coordinate_drives_that_alone_and_its_work_is_the_drives() {
 }
 
 #[test]
-fn a_stop_turns_one_coordinate_back() {
+fn a_stop_reverses_one_coordinate() {
     for case in cases() {
         let m = case.inertia();
         let [length, _, force, ..] = case.units();
@@ -199,17 +199,17 @@ fn a_stop_turns_one_coordinate_back() {
         let stop = case.element("stop", &stop);
         for formulation in FORMULATIONS {
             let changes = [("formulation", formulation), ("solver.tolerance", "1e-10")];
-            let mut simulation = case.starts([0.0, 0.5], &stop, &changes);
+            let mut simulation = case.start_at([0.0, 0.5], &stop, &changes);
             let deepest = (10..=18).map(|n| {
-                let frame = at(&mut simulation, 0.01 * f64::from(n));
+                let frame = frame_at(&mut simulation, 0.01 * f64::from(n));
                 (case.coordinate(&frame)[0], case.force(&frame))
             });
             let deepest = deepest.fold((0.0, 0.0), |a: (f64, f64), b| (a.0.max(b.0), a.1.min(b.1)));
             let label = format!("{case:?} {formulation}");
             // Hertz: m v^2 / 2 = 0.4 K d^2.5 with K = 200 m / 0.001^1.5.
-            let most = (0.125 / (0.4 * 200.0) * 1e-3_f64.powf(1.5)).powf(0.4);
-            assert!(deepest.0 - 0.05 < most + 1e-9 && deepest.1 <= 0.0, "{label}: {deepest:?}");
-            let [q, rate] = case.coordinate(&at(&mut simulation, 0.25));
+            let max_depth = (0.125 / (0.4 * 200.0) * 1e-3_f64.powf(1.5)).powf(0.4);
+            assert!(deepest.0 - 0.05 < max_depth + 1e-9 && deepest.1 <= 0.0, "{label}: {deepest:?}");
+            let [q, rate] = case.coordinate(&frame_at(&mut simulation, 0.25));
             assert!((rate + 0.5).abs() < 1e-6, "{label}: {rate}");
             assert!(q < 0.05, "{label}: {q}");
         }
@@ -218,7 +218,7 @@ fn a_stop_turns_one_coordinate_back() {
 
 const DRIVEN: &str = "law = \"harmonic\", mean = \"0.1 UNIT\", amplitude = \"0.2 UNIT\", frequency = \"1.5 Hz\"";
 
-/// The law of that at 0.13 s.
+/// Position, velocity and acceleration of the law [`DRIVEN`] at 0.13 s.
 fn driven() -> [f64; 3] {
     let w = 3.0 * std::f64::consts::PI;
     let (sin, cos) = (w * 0.13).sin_cos();
@@ -226,9 +226,9 @@ fn driven() -> [f64; 3] {
 }
 
 #[test]
-fn a_drive_of_one_coordinate_leaves_the_other_free_and_needs_what_inertia_wants() {
-    for_every(OF_TWO, |case, way| {
-        let ([length, ..], bound) = (case.units(), way.bound());
+fn a_drive_of_one_coordinate_leaves_the_other_free_and_exerts_the_inertia_force() {
+    for_every(OF_TWO, |case, variant| {
+        let ([length, ..], bound) = (case.units(), variant.bound());
         let text = case.text([0.0, 0.0], "");
         let start = text.find("start = ").expect("start values");
         let (before, after) = text.split_at(start);
@@ -238,16 +238,19 @@ fn a_drive_of_one_coordinate_leaves_the_other_free_and_needs_what_inertia_wants(
         let law = DRIVEN.replace("UNIT", length);
         let drive = format!("start = {{ {rate} = \"3 {unit}\" }}\ndrive = {{ {} = {{ {law} }} }}\n", case.coordinate);
         let text = before.to_owned() + &drive + after.split_once('\n').expect("a line").1;
-        let mut simulation = started(&text, &way.close());
-        let frame = at(&mut simulation, 0.13);
-        let label = format!("{case:?} {way}");
+        let mut simulation = start_simulation(&text, &variant.close());
+        let frame = frame_at(&mut simulation, 0.13);
+        let label = format!("{case:?} {variant}");
         let [q, rate, acceleration] = driven();
         let [own, speed] = case.coordinate(&frame);
         assert!((own - q).abs() < bound && (speed - rate).abs() < 20.0 * bound, "{label}: {own} {speed}");
         let [other, speed] = frame.coordinates[1 - case.part];
-        assert!(differ(other, 0.39) < 20.0 * bound && (speed - 3.0).abs() < 20.0 * bound, "{label}: {other} {speed}");
-        let needed = case.inertia() * acceleration;
-        let off = (frame.actuators[0] - needed).abs() / needed.abs();
+        assert!(
+            angle_difference(other, 0.39) < 20.0 * bound && (speed - 3.0).abs() < 20.0 * bound,
+            "{label}: {other} {speed}"
+        );
+        let inertia_force = case.inertia() * acceleration;
+        let off = (frame.actuators[0] - inertia_force).abs() / inertia_force.abs();
         assert!(frame.actuators.len() == 1 && off < 1e4 * bound, "{label}: {off:e}");
         let ledger = simulation.ledger().unwrap();
         let residual = ledger.relative_residual();
@@ -260,7 +263,7 @@ fn a_drive_of_one_coordinate_leaves_the_other_free_and_needs_what_inertia_wants(
 }
 
 #[test]
-fn both_coordinates_driven_leave_nothing_to_solve_and_carry_what_hangs_on_them() {
+fn a_joint_with_both_coordinates_driven_carries_an_attached_pendulum() {
     for [first, second] in [[OF_TWO[0], OF_TWO[1]], [OF_TWO[2], OF_TWO[3]]] {
         let text = first.text([0.0, 0.0], "");
         let start = text.find("start = ").expect("start values");
@@ -269,7 +272,7 @@ fn both_coordinates_driven_leave_nothing_to_solve_and_carry_what_hangs_on_them()
             let law = format!("law = \"constant\", velocity = \"{rate} {speed}\"");
             format!("{} = {{ {law} }}", case.coordinate)
         };
-        // A pendulum whose hinge they carry along the body's x axis.
+        // A pendulum on a hinge along the body's x axis.
         let more = "[[body]]\nname = \"bob\"\nmass = \"0.2 kg\"\ninertia = \"1e-4 2e-4 3e-4 kg m^2\"\n\
                     [[joint]]\nname = \"h\"\nkind = \"revolute\"\nparent = \"mass\"\nchild = \"bob\"\naxis = [1, 0, 0]\n\
                     parent_point = \"40 0 0 mm\"\nchild_point = \"0 20 60 mm\"\nstart = { velocity = \"1 rad/s\" }\n";
@@ -278,10 +281,10 @@ fn both_coordinates_driven_leave_nothing_to_solve_and_carry_what_hangs_on_them()
         let mut ends = Vec::new();
         for formulation in FORMULATIONS {
             let changes = [("formulation", formulation), ("solver.tolerance", "1e-11")];
-            let mut simulation = started(&text, &changes);
+            let mut simulation = start_simulation(&text, &changes);
             let summary = simulation.mechanism().summary();
             assert_eq!((summary.drives, summary.driven_bodies, summary.degrees_of_freedom), (2, 1, 1));
-            let frame = at(&mut simulation, 0.2);
+            let frame = frame_at(&mut simulation, 0.2);
             let label = format!("{} {formulation}", first.kind);
             let [own, other] = [0, 1].map(|part| frame.coordinates[part]);
             assert!((own[0] - 0.14).abs() < 1e-9 && (own[1] - 0.7).abs() < 1e-9, "{label}: {own:?}");
@@ -291,7 +294,7 @@ fn both_coordinates_driven_leave_nothing_to_solve_and_carry_what_hangs_on_them()
             ends.push(frame);
         }
         let [tree, lagrange] = &ends[..] else {
-            panic!("two forms");
+            panic!("two formulations");
         };
         let [a, b] = [tree, lagrange].map(|frame| frame.coordinates[2]);
         assert!((a[0] - b[0]).abs() < 1e-8 && (a[1] - b[1]).abs() < 1e-7, "{a:?} {b:?}");
@@ -306,8 +309,8 @@ fn both_coordinates_driven_leave_nothing_to_solve_and_carry_what_hangs_on_them()
             "cylindrical" => &["j_actuator_N", "j_angle_actuator_Nm"],
             _ => &["j_angle_actuator_Nm", "j_child_angle_actuator_Nm"],
         };
-        let found: Vec<&String> = columns.iter().filter(|column| column.contains("actuator")).collect();
-        assert_eq!(found, own, "{kind}");
+        let actuator_columns: Vec<&String> = columns.iter().filter(|column| column.contains("actuator")).collect();
+        assert_eq!(actuator_columns, own, "{kind}");
     }
 }
 
@@ -337,10 +340,10 @@ fn elements_on_one_of_two_coordinates_conserve_momentum_and_balance_their_energy
         [("tree", "dopri5"), ("lagrange", "dopri5"), ("tree", "radau5"), ("lagrange", "radau5")]
     {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
-        let mut simulation = started(TUMBLING, &changes);
+        let mut simulation = start_simulation(TUMBLING, &changes);
         let machine = simulation.machine().clone();
-        let before = at(&mut simulation, 0.0);
-        let frame = at(&mut simulation, 0.3);
+        let before = frame_at(&mut simulation, 0.0);
+        let frame = frame_at(&mut simulation, 0.3);
         let label = format!("{formulation} {method}");
         let (then, now) = (momenta(&before, &machine), momenta(&frame, &machine));
         for (then, now) in then.iter().zip(&now) {
@@ -354,15 +357,15 @@ fn elements_on_one_of_two_coordinates_conserve_momentum_and_balance_their_energy
     let (first, others) = ends.split_first().expect("four runs");
     for other in others {
         for (a, b) in first.coordinates.iter().zip(&other.coordinates) {
-            assert!(differ(a[0], b[0]) < 1e-5 && (a[1] - b[1]).abs() < 1e-3, "{a:?} {b:?}");
+            assert!(angle_difference(a[0], b[0]) < 1e-5 && (a[1] - b[1]).abs() < 1e-3, "{a:?} {b:?}");
         }
     }
 }
 
-/// A door of a driven four-bar is shut by a spring on the hinge that closes its loop: the drive feels it.
+/// A spring on the closing hinge of a driven four-bar loads its drive.
 #[test]
 fn a_spring_on_a_closing_hinge_loads_the_drive_of_its_loop() {
-    // A parallelogram: the closing hinge between coupler and rocker turns as the crank does, the other way round.
+    // In a parallelogram the closing hinge between coupler and rocker turns opposite to the crank.
     let body = |name: &str, inertia: f64| {
         format!("[[body]]\nname = \"{name}\"\nmass = \"0.1 kg\"\ninertia = \"1e-5 {inertia:e} {inertia:e} kg m^2\"\n")
     };
@@ -389,15 +392,15 @@ fn a_spring_on_a_closing_hinge_loads_the_drive_of_its_loop() {
     let spring = "[[joint_spring]]\nname = \"s\"\njoint = \"B\"\nposition = \"0.4 rad\"\nstiffness = \"2 N m/rad\"\n";
     for formulation in FORMULATIONS {
         let torque = |text: &str| {
-            let mut simulation = started(text, &[("formulation", formulation)]);
-            let frame = at(&mut simulation, 0.1);
+            let mut simulation = start_simulation(text, &[("formulation", formulation)]);
+            let frame = frame_at(&mut simulation, 0.1);
             (frame.actuators[0], frame.coordinates.last().copied().expect("one")[0])
         };
         let (loaded, angle) = torque(&(text.clone() + spring));
         // Rocker against coupler: the coupler does not turn.
         assert!((angle - 1.02).abs() < 1e-8, "{formulation}: {angle}");
-        let work = 2.0 * (1.02 - 0.4);
-        let more = loaded - torque(&text).0;
-        assert!((more - work).abs() < 1e-6, "{formulation}: {more} {work}");
+        let spring_torque = 2.0 * (1.02 - 0.4);
+        let difference = loaded - torque(&text).0;
+        assert!((difference - spring_torque).abs() < 1e-6, "{formulation}: {difference} {spring_torque}");
     }
 }

@@ -1,7 +1,7 @@
 //! Force elements against closed solutions, in every method and both formulations.
 
-use crate::common::matrix::every_way;
-use crate::common::{THREE_WAYS, parse};
+use crate::common::matrix::every_variant;
+use crate::common::{THREE_VARIANTS, parse};
 use jointplay::machine::Vec3;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
@@ -21,7 +21,7 @@ fn floating(more: &str, changes: &[(&str, &str)]) -> Simulation {
 }
 
 /// The frame at `time`, s.
-pub fn at(simulation: &mut Simulation, time: f64) -> Frame {
+pub fn frame_at(simulation: &mut Simulation, time: f64) -> Frame {
     while simulation.time() < time {
         simulation.step_until(time).unwrap();
     }
@@ -37,20 +37,20 @@ const SPRING: &str = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto 
 #[test]
 fn a_mass_on_a_spring_has_its_natural_frequency_in_every_method_and_formulation() {
     let omega = (200.0 / MASS).sqrt();
-    for way in every_way() {
-        let bound = way.bound();
-        let mut simulation = floating(SPRING, &way.close());
+    for variant in every_variant() {
+        let bound = variant.bound();
+        let mut simulation = floating(SPRING, &variant.close());
         let time = 0.2;
-        let frame = at(&mut simulation, time);
+        let frame = frame_at(&mut simulation, time);
         let expected = 0.1 + 0.03 * (omega * time).cos();
         let off = (frame.bodies[0].position - Vec3::new(expected, 0.0, 0.0)).norm();
-        assert!(off < bound, "{way}: {off:e}");
+        assert!(off < bound, "{variant}: {off:e}");
         let tension = 200.0 * (expected - 0.1);
         assert!((frame.elements[0].force.x + tension).abs() < 2e3 * bound);
         assert!((frame.elastic - 0.5 * 200.0 * (expected - 0.1f64).powi(2)).abs() < 20.0 * bound);
         let ledger = simulation.ledger().unwrap();
         assert!(ledger.exchanged > 0.1, "{ledger:?}");
-        assert!(ledger.relative_residual().abs() < 1e-4, "{way}");
+        assert!(ledger.relative_residual().abs() < 1e-4, "{variant}");
     }
 }
 
@@ -67,7 +67,7 @@ fn a_damper_dissipates_as_the_closed_solution() {
                 &[("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)],
             );
             let time = 0.25;
-            let frame = at(&mut simulation, time);
+            let frame = frame_at(&mut simulation, time);
             let (sin, cos) = (w * time).sin_cos();
             let fall = (-d * time).exp();
             let expected = 0.1 + 0.03 * fall * (cos + d / w * sin);
@@ -89,7 +89,7 @@ fn a_stiff_damped_spring_does_not_hold_an_implicit_method_back() {
                  length = \"100 mm\"\nstiffness = \"80 kN/mm\"\ndamping = \"10 kN s/m\"\n";
     let evaluations = |method: &str| {
         let mut simulation = floating(stiff, &[("solver.method", method), ("solver.tolerance", "1e-6")]);
-        let frame = at(&mut simulation, 0.2);
+        let frame = frame_at(&mut simulation, 0.2);
         let length = frame.bodies[0].position.norm();
         assert!((length - 0.1).abs() < 1e-6, "{method}: {length}");
         simulation.statistics().evaluations
@@ -108,7 +108,7 @@ fn a_preload_pulls_at_the_rest_length_and_enters_the_energy() {
                    length = \"130 mm\"\npreload = \"6 N\"\n";
     let mut simulation = floating(preload, &[("solver.tolerance", "1e-10")]);
     // A constant pull: x = x0 - F t^2 / 2 m.
-    let frame = at(&mut simulation, 0.05);
+    let frame = frame_at(&mut simulation, 0.05);
     let expected = 0.13 - 0.5 * 6.0 / MASS * 0.05 * 0.05;
     assert!((frame.bodies[0].position.x - expected).abs() < 1e-10);
     assert!((frame.elastic - 6.0 * (expected - 0.13)).abs() < 1e-9);
@@ -133,7 +133,7 @@ fn loads_move_a_body_as_newton_and_euler_say() {
                 ("formulation", formulation),
             ];
             let mut simulation = floating(&push("world"), &changes);
-            let body = at(&mut simulation, time).bodies[0];
+            let body = frame_at(&mut simulation, time).bodies[0];
             let moved = body.position - Vec3::new(0.13, 0.5 * 3.0 / MASS * time * time, 0.0);
             assert!(moved.norm() < 1e-9, "{method} {formulation}: {moved}");
             assert!((body.angular_velocity.z - spin_up * time).abs() < 1e-8);
@@ -142,7 +142,7 @@ fn loads_move_a_body_as_newton_and_euler_say() {
             assert!((work / kinetic - 1.0).abs() < 1e-6, "{work} {kinetic}");
             // In body axes the force turns by spin_up t^2 / 2: its impulse is Fresnel's integral.
             let mut turning = floating(&push("body"), &changes);
-            let velocity = at(&mut turning, time).bodies[0].velocity;
+            let velocity = frame_at(&mut turning, time).bodies[0].velocity;
             let (mut x, mut y) = (0.0, 0.0);
             let n = 20_000;
             for i in 0..n {
@@ -164,8 +164,8 @@ fn elements_are_fixed_to_links_of_a_chain() {
     // Strong beside gravity: long before a ball has crossed its play the link moves as if it were alone.
     let scene = with("[[load]]\nname = \"push\"\non = { body = \"link3\" }\nforce = \"0 40 0 N\"\n");
     let mut simulation = Simulation::new(&scene.unwrap().machine).unwrap();
-    let before = at(&mut simulation, 0.0).bodies[2].position;
-    let frame = at(&mut simulation, 1e-3);
+    let before = frame_at(&mut simulation, 0.0).bodies[2].position;
+    let frame = frame_at(&mut simulation, 1e-3);
     assert!(frame.joints.iter().all(|joint| joint.normal_force.norm() == 0.0));
     let moved = frame.bodies[2].position - before;
     let expected = Vec3::new(0.0, 40.0 / 0.384, -9.81) * 0.5e-6;
@@ -188,7 +188,7 @@ fn a_harmonic_load_drives_as_the_closed_solution() {
     let mut simulation = floating(load, &[("solver.tolerance", "1e-10")]);
     let omega = std::f64::consts::TAU * 5.0;
     let time = 0.37;
-    let frame = at(&mut simulation, time);
+    let frame = frame_at(&mut simulation, time);
     // m x'' = F cos w t from rest.
     let expected = 0.13 + 2.0 / (MASS * omega * omega) * (1.0 - (omega * time).cos());
     assert!((frame.bodies[0].position.x - expected).abs() < 1e-9);
@@ -208,7 +208,7 @@ fn a_spring_on_a_driven_slide_gives_its_work_to_the_drive() {
     for formulation in ["tree", "lagrange"] {
         let changes = [("formulation".to_owned(), formulation.to_owned())];
         let mut simulation = Simulation::new(&Scene::parse(text, None, &changes).unwrap().machine).unwrap();
-        let frame = at(&mut simulation, 0.2);
+        let frame = frame_at(&mut simulation, 0.2);
         let stored = 0.5 * 300.0 * 0.01 * 0.01;
         assert!((frame.elastic - stored).abs() < 1e-6 * stored, "{formulation}");
         let ledger = simulation.ledger().unwrap();
@@ -220,7 +220,7 @@ fn a_spring_on_a_driven_slide_gives_its_work_to_the_drive() {
 #[test]
 fn a_scene_without_elements_pays_nothing_for_them() {
     let mut simulation = crate::common::simulation("spcmm", &[]);
-    let frame = at(&mut simulation, 1e-3);
+    let frame = frame_at(&mut simulation, 1e-3);
     assert!(frame.elements.is_empty());
     let ledger = simulation.ledger().unwrap();
     assert_eq!((ledger.damping_loss, ledger.external_work), (0.0, 0.0));
@@ -233,7 +233,7 @@ fn a_bush_that_starts_concentric_is_stiff_from_the_first_step() {
                 [[load]]\nname = \"f\"\non = { body = \"mass\" }\nforce = \"0 8 0 N\"\n";
     let changes = [("solver.method", "radau5"), ("solver.tolerance", "1e-9")];
     let mut simulation = floating(bush, &changes);
-    let frame = at(&mut simulation, 0.1);
+    let frame = frame_at(&mut simulation, 0.1);
     let off = (frame.bodies[0].position - Vec3::new(0.13, 8.0 / 80e6, 0.0)).norm();
     assert!(off < 1e-10, "{off:e}");
     assert!((frame.elements[0].force + Vec3::new(0.0, 8.0, 0.0)).norm() < 1e-2);
@@ -246,7 +246,7 @@ fn where_nothing_moves_by_itself_a_quick_load_is_still_followed() {
         + "\n[[load]]\nname = \"shake\"\non = { body = \"platform\" }\nforce = \"0 20 0 N\"\nfrequency = \"200 Hz\"\n";
     let scene = crate::common::parse(&text, &[("contact.clearance", "0")]);
     let mut simulation = Simulation::new(&scene.machine).unwrap();
-    at(&mut simulation, 0.3);
+    frame_at(&mut simulation, 0.3);
     let ledger = *simulation.ledger().unwrap();
     assert!(ledger.external_work.abs() > 1e-5, "{ledger:?}");
     assert!(ledger.relative_residual().abs() < 1e-6, "{ledger:?}");
@@ -320,7 +320,7 @@ length = \"100 mm\"
 stiffness = \"2 kN/m\"
 side = \"push\"
 ";
-    for (method, formulation) in THREE_WAYS {
+    for (method, formulation) in THREE_VARIANTS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
         let mut simulation = Simulation::new(&parse(text, &changes).machine).unwrap();
         // Where it leaves the spring: half k 0.04^2 - m g 0.04 = half m v^2.
@@ -328,7 +328,7 @@ side = \"push\"
         let top = 0.1 + speed * speed / (2.0 * 9.81);
         let mut highest = 0.0_f64;
         for n in 1..=1500 {
-            let frame = at(&mut simulation, f64::from(n) * 1e-3);
+            let frame = frame_at(&mut simulation, f64::from(n) * 1e-3);
             let height = frame.bodies[0].position.z;
             highest = highest.max(height);
             let force = frame.elements[0].force.z;

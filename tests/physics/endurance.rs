@@ -4,8 +4,8 @@
 use std::fmt::Write;
 use std::sync::Mutex;
 
-use crate::common::invariants::{fault, finite};
-use crate::common::matrix::side_by_side;
+use crate::common::invariants::{finite, violation};
+use crate::common::matrix::in_parallel;
 use crate::common::{frame_now, scene};
 use jointplay::machine::Mat3;
 use jointplay::scene::LiveScene;
@@ -51,7 +51,7 @@ fn frame_on(simulation: &mut Simulation, target: f64, frame: &mut Frame) {
     assert!(finite(frame), "t = {target}");
     let now = frame_now(simulation);
     let machine = simulation.machine().clone();
-    assert_eq!(fault(&now, &machine, "tree"), None, "t = {target}");
+    assert_eq!(violation(&now, &machine, "tree"), None, "t = {target}");
 }
 
 /// `frames` frames of a sixtieth of a second at `pace` simulated seconds a second.
@@ -138,7 +138,7 @@ fn seconds_with_a_change_in_every_frame() {
 fn full_a_minute_of_changes_with_every_frame() {
     let slow = RANDOM.map(|(name, preset, seed)| (name, preset, seed, SLOW_MOTION));
     let runs = [&[("spcmm", "real-time", 7, 1.0)], &slow[..]].concat();
-    side_by_side(&runs, |(name, preset, seed, pace)| random_changes(name, preset, *seed, 3600, *pace));
+    in_parallel(&runs, |(name, preset, seed, pace)| random_changes(name, preset, *seed, 3600, *pace));
 }
 
 #[test]
@@ -248,7 +248,7 @@ fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
         // At the step's end: inside it the interpolated state may lie in the wall by as much as the tolerance allows.
         let end = frame_now(&mut simulation);
         let running = simulation.running();
-        assert_eq!(fault(&end, &running.machine, "tree"), None);
+        assert_eq!(violation(&end, &running.machine, "tree"), None);
         kinetic = kinetic.max(frame.kinetic);
         for (joint, of_scene) in frame.joints.iter().zip(&running.machine.ball_joints) {
             if of_scene.contact.clearance == 0.0 {
@@ -310,7 +310,7 @@ fn a_hundred_settled_seconds_do_not_drift() {
 #[test]
 #[ignore = "full: four seconds"]
 fn full_a_thousand_settled_seconds_drift_nowhere() {
-    side_by_side(&short_list(), |of| drifts_nowhere(of, 1000.0));
+    in_parallel(&short_list(), |of| drifts_nowhere(of, 1000.0));
 }
 
 #[test]
@@ -328,7 +328,7 @@ fn write_a_thousand_seconds_of_every_kind() {
     let list = long_list();
     let runs: Vec<_> = list.iter().flat_map(|of| (0..FAST.len()).map(move |preset| (of, preset))).enumerate().collect();
     let done = Mutex::new(Vec::new());
-    side_by_side(&runs, |&(place, (of, preset))| {
+    in_parallel(&runs, |&(place, (of, preset))| {
         let drift = long_run(of, preset, 1000.0);
         done.lock().unwrap().push((place, drift));
     });

@@ -1,6 +1,6 @@
 //! Files that a scene includes with names, values and places, several times.
 
-use crate::elements::at;
+use crate::elements::frame_at;
 use jointplay::machine::Vec3;
 use jointplay::scene::{Scene, SceneError, Texts};
 use jointplay::simulate::Simulation;
@@ -160,7 +160,7 @@ fn including_a_file_twice_equals_writing_it_twice() {
         machine.solver.tolerance = 1e-10;
         Simulation::new(&machine).unwrap()
     });
-    let [a, b] = both.each_mut().map(|simulation| at(simulation, 0.3));
+    let [a, b] = both.each_mut().map(|simulation| frame_at(simulation, 0.3));
     for (a, b) in a.bodies.iter().zip(&b.bodies) {
         assert!((a.position - b.position).norm() < 1e-9 && (a.rotation - b.rotation).amax() < 1e-8);
     }

@@ -153,7 +153,7 @@ fn off(simulation: &Simulation, theirs: &Run) -> f64 {
 
 /// How many contacts a scene with ideal joints has until `end` under an implicit solver, and how far it then is from the
 /// program's, m or rad.
-pub fn moves_the_same(name: &str, changes: &Changes, end: f64) -> (usize, f64) {
+pub fn compare_with_other_solver(name: &str, changes: &Changes, end: f64) -> (usize, f64) {
     let theirs = theirs(name, changes, "borrowed", "Bdf", end);
     let mut simulation = Simulation::new(&scene(name, &[changes, &[TIGHT]].concat()).machine).unwrap();
     run_until(&mut simulation, end);
@@ -164,7 +164,7 @@ pub fn moves_the_same(name: &str, changes: &Changes, end: f64) -> (usize, f64) {
 
 #[test]
 fn a_mechanism_with_an_ideal_joint_moves_the_same_under_an_implicit_solver() {
-    let (contacts, off) = moves_the_same("spcmm", &[("joint.S1.clearance", "0")], 0.012);
+    let (contacts, off) = compare_with_other_solver("spcmm", &[("joint.S1.clearance", "0")], 0.012);
     assert!(contacts >= 2);
     assert!(off < 1e-9, "{off}");
 }

@@ -1,7 +1,7 @@
 //! Force elements on a slide or a hinge against closed-form solutions, in every method and both formulations.
 
 use crate::common::matrix::{FORMULATIONS, for_every};
-use crate::elements::at;
+use crate::elements::frame_at;
 use jointplay::machine::{Machine, Vec3};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
@@ -14,7 +14,7 @@ enum JointKind {
 }
 use JointKind::{Hinge, Slide};
 
-pub fn started(text: &str, changes: &[(&str, &str)]) -> Simulation {
+pub fn start_simulation(text: &str, changes: &[(&str, &str)]) -> Simulation {
     Simulation::new(&crate::common::parse(text, changes).machine).unwrap()
 }
 
@@ -59,7 +59,7 @@ impl JointKind {
 
     /// A simulation from `start`, a coordinate and its rate.
     fn start_at(self, start: [f64; 2], more: &str, changes: &[(&str, &str)]) -> Simulation {
-        started(&self.text(start, more), changes)
+        start_simulation(&self.text(start, more), changes)
     }
 
     fn coordinate(self, frame: &Frame) -> f64 {
@@ -106,13 +106,13 @@ fn damped_oscillation([m, c, k]: [f64; 3], [x, v]: [f64; 2], t: f64) -> [f64; 2]
 
 #[test]
 fn a_joint_spring_has_its_natural_frequency_in_every_method_and_formulation() {
-    for_every([Slide, Hinge], |joint, way| {
-        let (m, bound) = (joint.inertia(), way.bound());
+    for_every([Slide, Hinge], |joint, variant| {
+        let (m, bound) = (joint.inertia(), variant.bound());
         let k = 400.0 * m;
-        let mut simulation = joint.start_at([0.13, 0.0], &joint.spring(k, 0.0), &way.close());
-        let frame = at(&mut simulation, 0.2);
+        let mut simulation = joint.start_at([0.13, 0.0], &joint.spring(k, 0.0), &variant.close());
+        let frame = frame_at(&mut simulation, 0.2);
         let [off, rate] = damped_oscillation([m, 0.0, k], [0.03, 0.0], 0.2);
-        let label = format!("{joint:?} {way}");
+        let label = format!("{joint:?} {variant}");
         let wrong = (joint.coordinate(&frame) - 0.1 - off).abs();
         assert!(wrong < bound, "{label}: {wrong:e}");
         assert!((joint.rate(&frame) - rate).abs() < 20.0 * bound, "{label}");
@@ -135,7 +135,7 @@ fn damping_and_preload_of_a_joint_spring_match_the_closed_form() {
             for formulation in FORMULATIONS {
                 let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
                 let mut simulation = joint.start_at([0.13, 0.0], &spring, &changes);
-                let frame = at(&mut simulation, 0.25);
+                let frame = frame_at(&mut simulation, 0.25);
                 // The oscillation is about the zero-force position.
                 let rest = -preload / k;
                 let [off, rate] = damped_oscillation([m, c, k], [0.03 - rest, 0.0], 0.25);
@@ -162,7 +162,7 @@ fn the_error_of_a_joint_spring_falls_with_the_order_of_the_method() {
         let value = format!("{value:e}{}", if key == "solver.step" { " s" } else { "" });
         let changes = [("solver.method", method), ("formulation", formulation), (key, &*value)];
         let mut simulation = Hinge.start_at([0.13, 0.0], &Hinge.spring(k, 4.0 * m), &changes);
-        let frame = at(&mut simulation, 0.2);
+        let frame = frame_at(&mut simulation, 0.2);
         let [off, _] = damped_oscillation([m, 4.0 * m, k], [0.03, 0.0], 0.2);
         (Hinge.coordinate(&frame) - 0.1 - off).abs()
     };
@@ -190,7 +190,7 @@ fn stiff_elements_on_joints_do_not_slow_implicit_methods() {
             let evaluations = |method: &str| {
                 let changes = [("solver.method", method), ("solver.tolerance", "1e-6"), ("formulation", formulation)];
                 let mut simulation = joint.start_at([0.13, 0.0], &stiff, &changes);
-                let frame = at(&mut simulation, 1.0);
+                let frame = frame_at(&mut simulation, 1.0);
                 let off = joint.coordinate(&frame) - 0.1;
                 assert!(off.abs() < 1e-6, "{joint:?} {method} {formulation}: {off:e}");
                 simulation.statistics().evaluations
@@ -251,12 +251,12 @@ fn elements_on_joints_conserve_momentum_and_balance_their_energy() {
         // Damping adds no difference between the pairs: two are enough with it.
         for (formulation, method) in pairs.into_iter().skip(if damped { 2 } else { 0 }) {
             let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
-            let mut simulation = started(&text, &changes);
+            let mut simulation = start_simulation(&text, &changes);
             let machine = simulation.machine().clone();
-            let before = at(&mut simulation, 0.0);
+            let before = frame_at(&mut simulation, 0.0);
             let mut stopped = [false; 2];
             for sample in 1..=30 {
-                let frame = at(&mut simulation, f64::from(sample) * 0.01);
+                let frame = frame_at(&mut simulation, f64::from(sample) * 0.01);
                 let elbow = frame.elements[2].torque.expect("a torque");
                 let slide = frame.elements[3].force;
                 stopped[0] |= elbow.norm() > 0.1;
@@ -265,7 +265,7 @@ fn elements_on_joints_conserve_momentum_and_balance_their_energy() {
                 let offset = frame.elements[3].points[1] - frame.elements[3].points[0];
                 assert!(slide.dot(&offset) <= 0.0, "{slide} {offset}");
             }
-            let frame = at(&mut simulation, 0.3);
+            let frame = frame_at(&mut simulation, 0.3);
             let label = format!("{formulation} {method} damped {damped}");
             assert!(damped || (stopped[0] && stopped[1]), "{label}: untouched");
             let (then, now) = (momenta(&before, &machine), momenta(&frame, &machine));
@@ -307,8 +307,8 @@ fn a_joint_spring_on_a_drive_loads_it() {
             joint.spring(300.0, 0.0)
         );
         for formulation in FORMULATIONS {
-            let mut simulation = started(&text, &[("formulation", formulation)]);
-            let frame = at(&mut simulation, 0.2);
+            let mut simulation = start_simulation(&text, &[("formulation", formulation)]);
+            let frame = frame_at(&mut simulation, 0.2);
             let stored = 0.5 * 300.0 * 0.01 * 0.01;
             assert!((frame.elastic / stored - 1.0).abs() < 1e-6, "{joint:?} {formulation}");
             let work = simulation.ledger().unwrap().drive_work;
@@ -328,7 +328,7 @@ fn a_hinge_angle_is_measured_within_half_a_turn_of_the_springs_position() {
             "[[joint_spring]]\nname = \"s\"\njoint = \"j\"\nposition = \"{position} deg\"\nstiffness = \"2 N m/rad\"\n"
         );
         let mut simulation = Hinge.start_at([start.to_radians(), 0.0], &spring, &[]);
-        let torque = Hinge.force(&at(&mut simulation, 0.0), 0);
+        let torque = Hinge.force(&frame_at(&mut simulation, 0.0), 0);
         let wrong = torque + 2.0 * expected.to_radians();
         assert!(wrong.abs() < 1e-12, "{start} {position}: {torque}");
     }
@@ -356,7 +356,7 @@ fn rebound_beyond(chi: f64, restitution: f64) -> bool {
 #[test]
 fn a_stop_rebounds_by_its_law_at_any_speed() {
     let chi = bisect(1e-3, 1.0 / 0.6 - 1e-9, |chi| rebound_beyond(chi, 0.6));
-    for_every([Slide, Hinge], |joint, way| {
+    for_every([Slide, Hinge], |joint, variant| {
         let m = joint.inertia();
         let [position, speed, force, ..] = joint.units();
         let stop = format!(
@@ -365,13 +365,13 @@ fn a_stop_rebounds_by_its_law_at_any_speed() {
             joint.force_key(),
             1000.0 * m
         );
-        let (step, bound) = match way.method {
+        let (step, bound) = match variant.method {
             "semi-implicit-euler" => ("1 us", 1e-3),
             "discrete-gradient" => ("10 us", 2e-5),
             _ => ("10 us", 2e-6),
         };
         for (v, limit) in [(0.2_f64, 0.01), (-0.2, -0.02), (0.05, 0.01)] {
-            let [method, _, tolerance, parts, formulation] = way.close();
+            let [method, _, tolerance, parts, formulation] = variant.close();
             let scaled_chi = chi * v.abs() / 0.2;
             let expected = match v.abs() == 0.2 {
                 true => 0.6,
@@ -379,8 +379,8 @@ fn a_stop_rebounds_by_its_law_at_any_speed() {
             };
             let changes = [method, ("solver.step", step), tolerance, parts, formulation];
             let mut simulation = joint.start_at([0.8 * limit, v], &stop, &changes);
-            let frame = at(&mut simulation, 0.08);
-            let label = format!("{joint:?} {way} {v}");
+            let frame = frame_at(&mut simulation, 0.08);
+            let label = format!("{joint:?} {variant} {v}");
             let rebound = -joint.rate(&frame) / v;
             assert!((rebound - expected).abs() < bound, "{label}: {rebound} {expected}");
             assert_eq!((frame.elastic, joint.force(&frame, 0)), (0.0, 0.0), "{label}");
@@ -400,9 +400,9 @@ fn a_weight_settles_on_a_stop_at_the_hertz_penetration() {
     let text = Slide.text([0.0, 0.0], stop).replace("x = 0\n", "x = \"-9.81 m/s^2\"\n");
     for method in ["radau5", "automatic", "dopri5"] {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-8")];
-        let mut simulation = started(&text, &changes);
+        let mut simulation = start_simulation(&text, &changes);
         // The law's damping vanishes with the speed, so the last micrometres ring for a long time.
-        let frame = at(&mut simulation, 3.0);
+        let frame = frame_at(&mut simulation, 3.0);
         let depth = -5e-3 - Slide.coordinate(&frame);
         let weight: f64 = 0.5 * 9.81;
         let expected = 1e-3 * (weight / 100.0).powf(2.0 / 3.0);
@@ -412,8 +412,8 @@ fn a_weight_settles_on_a_stop_at_the_hertz_penetration() {
 
 #[test]
 fn a_motor_follows_its_target_like_a_spring_and_its_work_counts_as_drive_work() {
-    for_every([Slide, Hinge], |joint, way| {
-        let (m, bound, label) = (joint.inertia(), way.bound(), format!("{joint:?} {way}"));
+    for_every([Slide, Hinge], |joint, variant| {
+        let (m, bound, label) = (joint.inertia(), variant.bound(), format!("{joint:?} {variant}"));
         let (k, d) = (400.0 * m, 12.0 * m);
         let [position, speed, _, by_position, by_rate] = joint.units();
         let gains = format!(
@@ -429,8 +429,8 @@ fn a_motor_follows_its_target_like_a_spring_and_its_work_counts_as_drive_work() 
             );
         let t = 0.2;
         // The error relative to a target in uniform motion oscillates freely.
-        let mut simulation = joint.start_at([0.0, 0.0], &constant, &way.close());
-        let frame = at(&mut simulation, t);
+        let mut simulation = joint.start_at([0.0, 0.0], &constant, &variant.close());
+        let frame = frame_at(&mut simulation, t);
         let [off, rate] = damped_oscillation([m, d, k], [-0.1, -0.3], t);
         let wrong = (joint.coordinate(&frame) - (0.1 + 0.3 * t) - off).abs();
         assert!(wrong < 2.0 * bound, "{label}: {wrong:e}");
@@ -441,8 +441,8 @@ fn a_motor_follows_its_target_like_a_spring_and_its_work_counts_as_drive_work() 
         assert!((ledger.drive_work - kinetic).abs() < 1e-4 * ledger.exchanged, "{label}: {ledger:?}");
         assert_eq!(ledger.damping_loss, 0.0);
         // m q'' + d q' + k q = Re (k + i w d) T e^(i w t), T = 0.1 e^(i phase) / i: forced and free.
-        let mut simulation = joint.start_at([0.0, 0.0], &harmonic, &way.close());
-        let frame = at(&mut simulation, t);
+        let mut simulation = joint.start_at([0.0, 0.0], &harmonic, &variant.close());
+        let frame = frame_at(&mut simulation, t);
         let w = std::f64::consts::TAU * 4.0;
         let (re, im) = (k - m * w * w, d * w);
         let size = 0.1 * (k * k + im * im).sqrt() / (re * re + im * im).sqrt();
@@ -473,11 +473,11 @@ fn a_motor_does_not_exceed_its_limit() {
                 let label = format!("{joint:?} {method} {formulation}");
                 let mut simulation = joint.start_at([0.0, 0.0], &motor, &changes);
                 let t = 0.99 * release_time;
-                let frame = at(&mut simulation, t);
+                let frame = frame_at(&mut simulation, t);
                 assert!((joint.force(&frame, 0) / limit - 1.0).abs() < 1e-12, "{label}");
                 assert!((joint.coordinate(&frame) - 10.0 * t * t).abs() < 1e-8, "{label}");
                 let t = release_time + 0.05;
-                let frame = at(&mut simulation, t);
+                let frame = frame_at(&mut simulation, t);
                 let [off, _] = damped_oscillation([m, 0.0, k], [-0.2, 20.0 * release_time], 0.05);
                 let wrong = (joint.coordinate(&frame) - 1.0 - off).abs();
                 assert!(wrong < 1e-7, "{label}: {wrong:e}");
@@ -486,7 +486,7 @@ fn a_motor_does_not_exceed_its_limit() {
         // A constant force alone.
         let push = format!("[[motor]]\nname = \"m\"\njoint = \"j\"\n{} = \"{limit:e} {force}\"\n", joint.force_key());
         let mut simulation = joint.start_at([0.0, 0.0], &push, &[]);
-        let frame = at(&mut simulation, 0.3);
+        let frame = frame_at(&mut simulation, 0.3);
         assert!((joint.rate(&frame) - 6.0).abs() < 1e-9, "{joint:?}");
         let work = simulation.ledger().unwrap().drive_work;
         assert!((work / (0.5 * m * 36.0) - 1.0).abs() < 1e-9, "{joint:?}: {work}");
@@ -506,7 +506,7 @@ fn a_motor_does_not_step_over_a_pulse_of_its_target() {
     let end = |method: &str| {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9")];
         let mut simulation = Slide.start_at([0.0, 0.0], &motor, &changes);
-        Slide.coordinate(&at(&mut simulation, 1.03))
+        Slide.coordinate(&frame_at(&mut simulation, 1.03))
     };
     let expected = end("rk4");
     assert!(expected.abs() > 1e-4, "{expected:e}");
@@ -521,7 +521,7 @@ fn columns_follow_the_kind_of_joint() {
     let columns = |joint: JointKind| {
         let text = joint.text([0.13, 0.0], &joint.spring(200.0, 0.0));
         let scene = Scene::parse(&text, None, &[]).unwrap();
-        let frame = at(&mut Simulation::new(&scene.machine).unwrap(), 0.0);
+        let frame = frame_at(&mut Simulation::new(&scene.machine).unwrap(), 0.0);
         jointplay::simulate::run_columns(&scene.machine, &frame).0.join(",")
     };
     let (slide, hinge) = (columns(Slide), columns(Hinge));

@@ -1,4 +1,4 @@
-//! Sections, exponents and regimes of systems whose answers are known, through the same code as those of mechanisms.
+//! Sections, exponents and regimes of systems with known answers, by the same code as for mechanisms.
 
 use jointplay::analysis::exponent::Exponent;
 use jointplay::analysis::orbit::Orbit;
@@ -73,7 +73,7 @@ impl<F: Fn(f64, f64, f64) -> f64> System for Force<F> {
     }
 }
 
-/// Tolerance of a step.
+/// Error tolerance of a step.
 const TOLERANCE: f64 = 1e-9;
 
 struct Oscillator<F> {
@@ -83,7 +83,7 @@ struct Oscillator<F> {
     t: f64,
     h: f64,
     y: [f64; 2],
-    /// Observe the position on the circle, as (cos, sin), instead of on the line.
+    /// Whether the position is an angle, observed as (sin, cos).
     angle: bool,
 }
 
@@ -146,7 +146,7 @@ impl<F: Fn(f64, f64, f64) -> f64 + Clone> Orbit for Oscillator<F> {
     }
 }
 
-fn watch<O: Orbit>(
+fn analyse<O: Orbit>(
     orbit: O,
     interval: f64,
     sections: usize,
@@ -159,21 +159,21 @@ where
 {
     let width = orbit.observables();
     let schedule = Schedule { first: interval, interval, sections, discard };
-    let mut watch = SectionRun::new(orbit, schedule, Some(separation));
-    while !watch.is_done() {
-        watch.step().unwrap();
+    let mut run = SectionRun::new(orbit, schedule, Some(separation));
+    while !run.is_done() {
+        run.step().unwrap();
     }
-    assert_eq!(watch.sections().len(), (sections - discard) * width);
-    let exponent = watch.exponent().and_then(|benettin| benettin.result());
-    classify(watch.sections(), &vec![resolution; width], interval, exponent)
+    assert_eq!(run.sections().len(), (sections - discard) * width);
+    let exponent = run.exponent().and_then(|benettin| benettin.result());
+    classify(run.sections(), &vec![resolution; width], interval, exponent)
 }
 
 fn exponent(evidence: &Evidence) -> &Exponent {
     evidence.exponent.as_ref().unwrap()
 }
 
-/// Evidence without the long row of running estimates.
-fn brief(evidence: &Evidence) -> String {
+/// Evidence without the long list of running estimates.
+fn short_evidence(evidence: &Evidence) -> String {
     let mut evidence = evidence.clone();
     if let Some(exponent) = &mut evidence.exponent {
         exponent.running.clear();
@@ -183,7 +183,7 @@ fn brief(evidence: &Evidence) -> String {
 
 fn map(f: impl Fn(f64) -> f64 + Clone, sections: usize) -> (Regime, Evidence) {
     let map = Map { f, n: 0.0, x: [0.3] };
-    watch(map, 1.0, sections, sections / 2, 1e-9, 1e-6)
+    analyse(map, 1.0, sections, sections / 2, 1e-9, 1e-6)
 }
 
 fn logistic(r: f64, sections: usize) -> (Regime, Evidence) {
@@ -193,7 +193,7 @@ fn logistic(r: f64, sections: usize) -> (Regime, Evidence) {
 /// Feigenbaum's cascade: period 2 from 3, 4 from 1 + sqrt 6, 8 from 3.544090, 16 from 3.564407; the window of period 3
 /// from 1 + sqrt 8, doubled at 3.841499.
 #[test]
-fn the_logistic_map_doubles_its_period_where_it_is_known_to() {
+fn the_logistic_map_doubles_its_period_at_the_known_parameters() {
     for (r, period) in [
         (2.9, 1),
         (3.01, 2),
@@ -207,15 +207,15 @@ fn the_logistic_map_doubles_its_period_where_it_is_known_to() {
         (3.845, 6),
     ] {
         let (regime, evidence) = logistic(r, 3000);
-        assert_eq!(regime, Regime::Periodic(period), "r = {r}: {}", brief(&evidence));
+        assert_eq!(regime, Regime::Periodic(period), "r = {r}: {}", short_evidence(&evidence));
         assert_eq!(evidence.distinct, period, "r = {r}");
         assert!(exponent(&evidence).value < 0.0, "r = {r}");
     }
 }
 
-/// At r = 3.5643 the cycle of period 8 loses a seven-hundredth of its neighbours' distance an iteration.
+/// At r = 3.5643 the distance to the cycle of period 8 decays by only one part in seven hundred per iteration.
 #[test]
-fn a_cycle_near_its_doubling_is_not_settled_and_no_torus() {
+fn a_cycle_near_its_doubling_is_reported_as_not_settled() {
     let (regime, evidence) = logistic(3.5643, 3000);
     assert_eq!(regime, Regime::NotSettled);
     assert!(exponent(&evidence).value.abs() < evidence.exponent_bound);
@@ -226,7 +226,7 @@ fn the_logistic_map_at_four_has_the_exponent_ln_two() {
     let (regime, evidence) = logistic(4.0, 6000);
     assert_eq!(regime, Regime::Chaotic);
     let e = exponent(&evidence);
-    // Three thousand iterations: the standard error says how far to trust it.
+    // The tolerance matches the standard error of three thousand iterations.
     assert!((e.value - 2f64.ln()).abs() < 0.01, "{}", e.value);
     assert!(e.standard_error < 0.01, "{}", e.standard_error);
     assert!(evidence.zero_one > 0.9, "{}", evidence.zero_one);
@@ -242,31 +242,31 @@ fn a_fixed_point_has_the_exponent_of_its_slope() {
         assert_eq!(regime, Regime::Periodic(1));
         let known = f64::ln(f64::abs(2.0 - r));
         let value = exponent(&evidence).value;
-        // The twin comes no nearer than the rounding of its separation of 1e-9.
+        // Rounding of the separation of 1e-9 limits the accuracy.
         assert!((value - known).abs() < 1e-4, "r = {r}: {value} {known}");
     }
-    // The superstable one: the twin falls onto the orbit.
+    // The superstable fixed point: the twin collapses onto the orbit.
     let (regime, evidence) = logistic(2.0, 400);
     assert_eq!(regime, Regime::Periodic(1));
     assert!(exponent(&evidence).value < -5.0);
 }
 
-/// Arnold's circle map with the golden mean turns for ever without repeating; in its tongue at 1/2 it locks.
+/// Arnold's circle map with the golden mean is quasi-periodic; in its tongue at 1/2 it locks.
 #[test]
 fn the_circle_map_is_quasi_periodic_outside_its_tongues() {
     let golden = 0.618_033_988_749_894_9;
-    let turn = |omega: f64, k: f64| {
+    let run_map = |omega: f64, k: f64| {
         let map = move |x: f64| x + omega - k / std::f64::consts::TAU * (std::f64::consts::TAU * x).sin();
         let orbit = Circle(Map { f: map, n: 0.0, x: [0.2] });
-        watch(orbit, 1.0, 400, 200, 1e-9, 1e-6)
+        analyse(orbit, 1.0, 400, 200, 1e-9, 1e-6)
     };
-    let (regime, evidence) = turn(golden, 0.5);
-    assert_eq!(regime, Regime::QuasiPeriodic, "{}", brief(&evidence));
+    let (regime, evidence) = run_map(golden, 0.5);
+    assert_eq!(regime, Regime::QuasiPeriodic, "{}", short_evidence(&evidence));
     assert!(exponent(&evidence).value.abs() < evidence.exponent_bound);
     assert!(evidence.zero_one < 0.2);
     assert_eq!(evidence.distinct, evidence.sections);
-    assert_eq!(turn(0.5, 0.9).0, Regime::Periodic(2));
-    assert_eq!(turn(0.05, 0.9).0, Regime::Periodic(1));
+    assert_eq!(run_map(0.5, 0.9).0, Regime::Periodic(2));
+    assert_eq!(run_map(0.05, 0.9).0, Regime::Periodic(1));
 }
 
 /// A lifted circle map observed on the circle.
@@ -306,7 +306,7 @@ impl<F: Fn(f64) -> f64 + Clone> Orbit for Circle<F> {
 /// periodic at g = 0.9, has doubled at 1.07, is chaotic at 1.15, turns over once a period at 1.35, has doubled at 1.45 and
 /// doubled again at 1.47, and is chaotic at 1.50.
 #[test]
-fn the_driven_pendulum_is_periodic_and_chaotic_where_it_is_known_to_be() {
+fn the_driven_pendulum_is_periodic_and_chaotic_at_the_known_parameters() {
     let drive = 2.0 / 3.0;
     for (g, expected) in
         [(0.9, Some(1)), (1.07, Some(2)), (1.15, None), (1.35, Some(1)), (1.45, Some(2)), (1.47, Some(4)), (1.5, None)]
@@ -314,17 +314,17 @@ fn the_driven_pendulum_is_periodic_and_chaotic_where_it_is_known_to_be() {
         let force = move |t: f64, x: f64, v: f64| -0.5 * v - x.sin() + g * (drive * t).cos();
         let orbit = Oscillator::new(force, [0.2, 0.0], true);
         let period = std::f64::consts::TAU / drive;
-        let (regime, evidence) = watch(orbit, period, 300, 150, 1e-6, 1e-5);
+        let (regime, evidence) = analyse(orbit, period, 300, 150, 1e-6, 1e-5);
         let e = exponent(&evidence);
         match expected {
             Some(n) => {
-                assert_eq!(regime, Regime::Periodic(n), "g = {g}: {}", brief(&evidence));
+                assert_eq!(regime, Regime::Periodic(n), "g = {g}: {}", short_evidence(&evidence));
                 assert!(e.value + 2.0 * e.standard_error < 0.0, "g = {g}: {}", e.value);
-                // Volume shrinks at the rate 1/q, so no motion can lose its neighbours faster than that in both directions.
+                // Phase volume shrinks at the rate 1/q = 0.5, which bounds the largest exponent from below.
                 assert!(e.value > -0.5, "g = {g}: {}", e.value);
             }
             None => {
-                assert_eq!(regime, Regime::Chaotic, "g = {g}: {}", brief(&evidence));
+                assert_eq!(regime, Regime::Chaotic, "g = {g}: {}", short_evidence(&evidence));
                 assert!(evidence.zero_one > 0.8, "g = {g}: {}", evidence.zero_one);
             }
         }
@@ -334,7 +334,7 @@ fn the_driven_pendulum_is_periodic_and_chaotic_where_it_is_known_to_be() {
 /// Published largest exponents: the damped driven pendulum x'' = -0.05 x' - sin x + 0.6 sin(0.7 t) has 0.1400, Ueda's
 /// oscillator x'' = -0.05 x' - x^3 + 7.5 sin t has 0.1034 (Sprott, Chaos and Time-Series Analysis, 2003, appendix A.5).
 #[test]
-fn exponents_of_driven_oscillators_are_the_published_ones() {
+fn exponents_of_driven_oscillators_match_published_values() {
     let pendulum = |t: f64, x: f64, v: f64| -0.05 * v - x.sin() + 0.6 * (0.7 * t).sin();
     let ueda = |t: f64, x: f64, v: f64| -0.05 * v - x * x * x + 7.5 * t.sin();
     let known = [
@@ -343,17 +343,17 @@ fn exponents_of_driven_oscillators_are_the_published_ones() {
     ];
     for (orbit, drive, published) in known {
         let period = std::f64::consts::TAU / drive;
-        let (regime, evidence) = watch(orbit, period, 2200, 200, 1e-6, 1e-5);
+        let (regime, evidence) = analyse(orbit, period, 2200, 200, 1e-6, 1e-5);
         let e = exponent(&evidence);
         assert_eq!(regime, Regime::Chaotic);
         let miss = (e.value - published).abs();
-        // Three standard errors, and these are to be small against the exponent.
+        // Within three standard errors, which must be small against the exponent.
         assert!(miss < 3.0 * e.standard_error, "{} +- {}: {published}", e.value, e.standard_error);
         assert!(e.standard_error < 0.05 * published, "{}", e.standard_error);
     }
 }
 
-/// Parts of this orbit fail in known ways: the watch keeps what it has.
+/// An orbit that fails at a known time keeps the sections taken before.
 #[test]
 fn a_motion_that_stops_keeps_its_sections() {
     struct Wall(f64);
@@ -387,20 +387,20 @@ fn a_motion_that_stops_keeps_its_sections() {
         }
     }
     let schedule = Schedule { first: 1.0, interval: 1.0, sections: 10, discard: 2 };
-    let mut watch = SectionRun::new(Wall(0.0), schedule, None);
+    let mut run = SectionRun::new(Wall(0.0), schedule, None);
     let stop = loop {
-        if let Err(stop) = watch.step() {
+        if let Err(stop) = run.step() {
             break stop;
         }
     };
     assert_eq!(stop, "wall");
-    assert_eq!(watch.sections(), [3.0, 4.0]);
-    assert!(watch.exponent().is_none());
+    assert_eq!(run.sections(), [3.0, 4.0]);
+    assert!(run.exponent().is_none());
 }
 
-/// A step of the error of the method that is watched: the fixed-step methods go through the same code.
+/// The adaptive oscillator agrees with a fixed-step integration of the same equation.
 #[test]
-fn the_same_section_comes_from_another_stepper() {
+fn another_stepper_reaches_the_same_section() {
     let force = |t: f64, x: f64, v: f64| -0.5 * v - x.sin() + 0.9 * (2.0 / 3.0 * t).cos();
     let period = 3.0 * std::f64::consts::PI;
     let mut adaptive = Oscillator::new(force, [0.2, 0.0], true);

@@ -1,4 +1,4 @@
-//! Parameters changed while the simulation runs: no burst, no jump, nothing changed by what is refused.
+//! Parameters changed while the simulation runs: no burst of energy, no jump, and no effect of refused changes.
 
 use crate::common::{frame_now, live, simulation};
 use jointplay::scene::LiveScene;
@@ -11,9 +11,9 @@ fn settled() -> LiveScene {
     simulation
 }
 
-/// What happened from now to `end`.
+/// Extremes of a run over a time span.
 #[derive(Debug, Default)]
-struct Watched {
+struct Extremes {
     /// Largest normal force of any joint, N.
     force: f64,
     /// Largest kinetic energy beyond that of the ideal mechanism, J.
@@ -27,9 +27,9 @@ struct Watched {
     impacts: u64,
 }
 
-fn watch(simulation: &mut Simulation, end: f64) -> Watched {
+fn watch(simulation: &mut Simulation, end: f64) -> Extremes {
     let mut ideal = crate::common::simulation("spcmm", &[("contact.clearance", "0")]);
-    let mut seen = Watched::default();
+    let mut extremes = Extremes::default();
     let (mut frame, mut reference) = (Frame::default(), Frame::default());
     let mut peaks = Vec::new();
     simulation.take_peaks(&mut peaks);
@@ -38,29 +38,29 @@ fn watch(simulation: &mut Simulation, end: f64) -> Watched {
     while simulation.time() < end {
         simulation.step().unwrap();
         let now = simulation.time();
-        // Also the step in which a clearance arrives can be looked into.
+        // A step in which a clearance arrives can be sampled inside, too.
         let inside = 0.5 * (simulation.step_start() + now);
         simulation.sample(inside, &mut frame);
         assert!(simulation.step_start() < now && frame.time == inside);
         simulation.sample(now, &mut frame);
         ideal.advance_to(now).unwrap();
         ideal.sample(now, &mut reference);
-        seen.excess = seen.excess.max(frame.kinetic - reference.kinetic);
-        seen.ideal = seen.ideal.max(reference.kinetic);
+        extremes.excess = extremes.excess.max(frame.kinetic - reference.kinetic);
+        extremes.ideal = extremes.ideal.max(reference.kinetic);
         for (a, b) in before.joints.iter().zip(&frame.joints) {
-            // Where rounding of two clearances does not matter against the time between them.
+            // Skips times so close that rounding dominates the difference.
             if now - before.time > 1e-9 {
                 let speed = (b.clearance - a.clearance).abs() / (now - before.time);
-                seen.speed = seen.speed.max(speed);
+                extremes.speed = extremes.speed.max(speed);
             }
-            seen.penetration = seen.penetration.max(b.penetration);
+            extremes.penetration = extremes.penetration.max(b.penetration);
         }
         simulation.take_peaks(&mut peaks);
-        seen.force = peaks.iter().map(|p| p.normal).fold(seen.force, f64::max);
+        extremes.force = peaks.iter().map(|p| p.normal).fold(extremes.force, f64::max);
         std::mem::swap(&mut before, &mut frame);
     }
-    seen.impacts = simulation.statistics().impacts.iter().sum::<u64>() - impacts;
-    seen
+    extremes.impacts = simulation.statistics().impacts.iter().sum::<u64>() - impacts;
+    extremes
 }
 
 fn clearances(simulation: &mut Simulation) -> Vec<f64> {
@@ -68,13 +68,13 @@ fn clearances(simulation: &mut Simulation) -> Vec<f64> {
 }
 
 #[test]
-fn a_clearance_that_closes_on_a_ball_moves_at_a_bounded_rate_and_arrives() {
-    let usual = watch(&mut settled(), 0.5);
-    println!("unchanged: {usual:?}");
+fn a_shrinking_clearance_moves_the_wall_at_a_bounded_rate_to_its_target() {
+    let unchanged = watch(&mut settled(), 0.5);
+    println!("unchanged: {unchanged:?}");
     let mut simulation = settled();
     let start = simulation.time();
     assert_eq!(simulation.set("contact.clearance", "0.1 mm"), Ok(Effect::Now));
-    // Nothing has moved at the instant itself.
+    // At the instant of the change nothing has moved.
     assert_eq!(clearances(&mut simulation), [0.3e-3; 3]);
     let travel = 0.2e-3 / CLEARANCE_SPEED;
     let closing = watch(&mut simulation, start + 0.5 * travel);
@@ -85,15 +85,15 @@ fn a_clearance_that_closes_on_a_ball_moves_at_a_bounded_rate_and_arrives() {
     let arriving = watch(&mut simulation, start + travel + 0.05);
     assert_eq!(clearances(&mut simulation), [0.1e-3; 3]);
     let after = watch(&mut simulation, start + travel + 0.2);
-    for (name, seen) in [("closing", &closing), ("arriving", &arriving), ("after", &after)] {
-        println!("{name}: {seen:?}");
-        assert!(seen.speed < CLEARANCE_SPEED * 1.001, "{name}: {}", seen.speed);
+    for (name, extremes) in [("closing", &closing), ("arriving", &arriving), ("after", &after)] {
+        println!("{name}: {extremes:?}");
+        assert!(extremes.speed < CLEARANCE_SPEED * 1.001, "{name}: {}", extremes.speed);
         // The walls push the balls at 2 mm/s: three times the settled force (7.9 N) and 2 % more kinetic energy were
         // measured. A jump would have put the balls 0.2 mm into the wall: 250 kN and 20 J in each joint.
-        assert!(seen.force < 5.0 * usual.force, "{name}: {} N", seen.force);
-        assert!(seen.excess < 0.05 * seen.ideal, "{name}: {} J", seen.excess);
+        assert!(extremes.force < 5.0 * unchanged.force, "{name}: {} N", extremes.force);
+        assert!(extremes.excess < 0.05 * extremes.ideal, "{name}: {} J", extremes.excess);
     }
-    // Balls are on the new wall.
+    // The balls rest on the new wall.
     for joint in frame_now(&mut simulation).joints {
         let distance = joint.eccentricity.norm();
         assert!((distance - 0.1e-3).abs() < 1e-6, "{distance}");
@@ -106,25 +106,25 @@ fn a_changing_clearance_can_be_changed_again() {
     simulation.set("contact.clearance", "0.1 mm").unwrap();
     let start = simulation.time();
     simulation.advance_to(start + 0.02).unwrap();
-    // On, from where it is, to another end; other changes leave it under way.
+    // A new target continues from the current value; other changes do not interrupt the motion.
     simulation.set("contact.friction", "0.3").unwrap();
     simulation.set("contact.clearance", "0.2 mm").unwrap();
-    let here = clearances(&mut simulation);
-    let due = 0.3e-3 - 2e-3 * (simulation.time() - start);
-    assert!(due > 0.2e-3, "it is under way");
-    assert!(here.iter().all(|c| (c - due).abs() < 1e-15), "{here:?}");
+    let current = clearances(&mut simulation);
+    let expected = 0.3e-3 - 2e-3 * (simulation.time() - start);
+    assert!(expected > 0.2e-3, "it is still moving");
+    assert!(current.iter().all(|c| (c - expected).abs() < 1e-15), "{current:?}");
     let end = simulation.time() + 0.06;
     simulation.advance_to(end).unwrap();
     assert_eq!(clearances(&mut simulation), [0.2e-3; 3]);
-    // And back open, half way.
+    // Opening halfway through closing takes effect at once.
     simulation.set("contact.clearance", "0.1 mm").unwrap();
     let end = simulation.time() + 0.02;
     simulation.advance_to(end).unwrap();
     simulation.set("contact.clearance", "0.3 mm").unwrap();
     assert_eq!(clearances(&mut simulation), [0.3e-3; 3]);
-    let seen = watch(&mut simulation, 0.6);
-    println!("{seen:?}");
-    assert_eq!(seen.speed, 0.0);
+    let extremes = watch(&mut simulation, 0.6);
+    println!("{extremes:?}");
+    assert_eq!(extremes.speed, 0.0);
 }
 
 #[test]
@@ -136,19 +136,19 @@ fn a_growing_clearance_does_not_drop_the_balls() {
     let after = frame_now(&mut simulation);
     assert_eq!(after.kinetic, before.kinetic);
     assert!(after.joints.iter().all(|j| j.normal_force.norm() == 0.0));
-    let seen = watch(&mut simulation, 0.5);
-    println!("{seen:?}");
+    let extremes = watch(&mut simulation, 0.5);
+    println!("{extremes:?}");
     // A fall through 0.1 mm: sqrt(2 g 0.1 mm) = 44 mm/s, less than the first fall through 0.3 mm (871 N).
-    assert!(seen.force > 20.0 && seen.force < 871.0, "{seen:?}");
-    assert!(seen.impacts >= 3);
-    // Settled again.
+    assert!(extremes.force > 20.0 && extremes.force < 871.0, "{extremes:?}");
+    assert!(extremes.impacts >= 3);
+    // The balls have settled again.
     let distance = |joint: &jointplay::simulate::JointReport| joint.eccentricity.norm();
     assert!(frame_now(&mut simulation).joints.iter().all(|j| (distance(j) - 0.4e-3).abs() < 5e-6));
 }
 
 #[test]
 fn changes_act_from_the_next_step_on() {
-    // (key, value): each parts the run from the one left alone.
+    // (key, value): each change makes the run differ from an unchanged one.
     for (key, value) in [
         ("contact.friction", "0.4"),
         ("contact.restitution", "0"),
@@ -164,18 +164,18 @@ fn changes_act_from_the_next_step_on() {
         ("solver.tolerance", "1e-9"),
         ("solver.preset", "preview"),
     ] {
-        let mut plain = live("spcmm", &[]);
-        plain.advance_to(0.012).unwrap();
-        let mut changed = LiveScene::new(plain.pending()).unwrap();
-        changed.restore(&plain.snapshot());
-        let hash = plain.state_hash();
+        let mut unchanged = live("spcmm", &[]);
+        unchanged.advance_to(0.012).unwrap();
+        let mut changed = LiveScene::new(unchanged.pending()).unwrap();
+        changed.restore(&unchanged.snapshot());
+        let hash = unchanged.state_hash();
         assert_eq!(changed.set(key, value), Ok(Effect::Now), "{key}");
-        // The instant itself is the same.
+        // At the instant of the change the state is the same.
         assert_eq!(changed.state_hash(), hash, "{key}");
-        plain.advance_to(0.016).unwrap();
+        unchanged.advance_to(0.016).unwrap();
         changed.advance_to(0.016).unwrap();
-        assert_ne!(changed.state_hash(), plain.state_hash(), "{key} did nothing");
-        let ratio = frame_now(&mut changed).kinetic / frame_now(&mut plain).kinetic;
+        assert_ne!(changed.state_hash(), unchanged.state_hash(), "{key} did nothing");
+        let ratio = frame_now(&mut changed).kinetic / frame_now(&mut unchanged).kinetic;
         assert!(ratio > 0.2 && ratio < 5.0, "{key}: {ratio}");
     }
 }
@@ -196,14 +196,14 @@ fn the_step_of_a_fixed_method_changes_at_once() {
 
 #[test]
 fn restitution_zero_leaves_less_motion_than_one() {
-    let kinetic_excess = |restitution: &str| {
+    let after_change = |restitution: &str| {
         let mut simulation = live("spcmm", &[("contact.friction", "0")]);
         simulation.advance_to(0.012).unwrap();
         simulation.set("contact.restitution", restitution).unwrap();
         simulation.advance_to(0.1).unwrap();
         watch(&mut simulation, 0.15)
     };
-    let (calm, lively) = (kinetic_excess("0"), kinetic_excess("1"));
+    let (calm, lively) = (after_change("0"), after_change("1"));
     println!("{calm:?} {lively:?}");
     assert!(calm.force < 0.5 * lively.force);
 }
@@ -218,7 +218,7 @@ fn clearance_to_and_from_zero_waits_for_the_reset() {
     assert_eq!(simulation.running().machine.ball_joints[0].contact.clearance, 0.3e-3);
     assert_eq!(simulation.pending().machine.ball_joints[0].contact.clearance, 0.0);
     simulation.advance_to(0.025).unwrap();
-    // Other changes still act now while that one waits.
+    // Other changes act at once while that one waits.
     assert_eq!(simulation.set("contact.friction", "0.4"), Ok(Effect::Now));
     assert_eq!(simulation.conditions().joints[0].friction, 0.4);
     assert_eq!(simulation.set("joint.S2.clearance", "0.4 mm"), Ok(Effect::Now));
@@ -234,7 +234,7 @@ fn clearance_to_and_from_zero_waits_for_the_reset() {
     assert!(frame_now(&mut simulation).joints[0].eccentricity.norm() < 1e-12);
     simulation.reset().unwrap();
     assert_eq!(clearances(&mut simulation), [0.2e-3, 0.4e-3, 0.3e-3]);
-    // Taken back before the reset, nothing is left waiting.
+    // A change undone before the reset leaves nothing pending.
     assert_eq!(simulation.set("joint.S1.clearance", "0"), Ok(Effect::AtReset));
     assert_eq!(simulation.set("joint.S1.clearance", "0.25 mm"), Ok(Effect::Now));
     assert_eq!(clearances(&mut simulation)[0], 0.25e-3);
@@ -248,14 +248,14 @@ fn drives_and_equations_wait_for_the_reset() {
         ("spcmm.slider_plane", "30 mm"),
         ("formulation", "lagrange"),
     ] {
-        let mut plain = simulation("spcmm", &[]);
+        let mut unchanged = simulation("spcmm", &[]);
         let mut changed = live("spcmm", &[]);
-        plain.advance_to(0.009).unwrap();
+        unchanged.advance_to(0.009).unwrap();
         changed.advance_to(0.009).unwrap();
         assert_eq!(changed.set(key, value), Ok(Effect::AtReset), "{key}");
-        plain.advance_to(0.012).unwrap();
+        unchanged.advance_to(0.012).unwrap();
         changed.advance_to(0.012).unwrap();
-        assert_eq!(changed.state_hash(), plain.state_hash(), "{key}");
+        assert_eq!(changed.state_hash(), unchanged.state_hash(), "{key}");
         changed.reset().unwrap();
         let fresh = simulation("spcmm", &[(key, value)]);
         assert_eq!(changed.state_hash(), fresh.state_hash(), "{key}");
@@ -306,10 +306,10 @@ fn refused_values_change_nothing() {
     }
     assert!(simulation.pending().changes.is_empty());
     simulation.advance_to(0.015).unwrap();
-    let mut plain = LiveScene::new(&crate::common::scene("spcmm", &[])).unwrap();
-    plain.restore(&snapshot);
-    plain.advance_to(0.015).unwrap();
-    assert_eq!(simulation.state_hash(), plain.state_hash());
+    let mut unchanged = LiveScene::new(&crate::common::scene("spcmm", &[])).unwrap();
+    unchanged.restore(&snapshot);
+    unchanged.advance_to(0.015).unwrap();
+    assert_eq!(simulation.state_hash(), unchanged.state_hash());
 }
 
 /// Numerical Recipes' 64-bit linear congruential generator, upper bits.
@@ -323,7 +323,7 @@ impl Dice {
 }
 
 #[test]
-fn two_hundred_changes_in_half_a_second_leave_a_sane_state() {
+fn two_hundred_changes_in_half_a_second_leave_a_bounded_state() {
     const CHOICES: [(&str, &[&str]); 12] = [
         ("contact.clearance", &["0.02 mm", "0.1 mm", "0.3 mm", "0.7 mm"]),
         ("joint.S1.clearance", &["0.05 mm", "0.3 mm", "0.5 mm"]),
@@ -369,7 +369,7 @@ fn two_hundred_changes_in_half_a_second_leave_a_sane_state() {
     for seed in [1, 7] {
         let (force, kinetic) = run(seed);
         println!("seed {seed}: largest force {force:.0} N, kinetic energy {kinetic:.2e} J");
-        // Falls of 1.4 mm at twice the weight, with gravity turning over meanwhile: some tenths of a metre a second of
+        // Falls of 1.4 mm at twice the weight under a reversing gravity reach some tenths of a metre per second with
         // 1.6 kg. A single jump of 0.2 mm into a wall would bring 20 J and 250 kN.
         assert!(kinetic < 0.3, "{kinetic}");
         assert!(force < 2e4, "{force}");
@@ -378,7 +378,7 @@ fn two_hundred_changes_in_half_a_second_leave_a_sane_state() {
 
 #[test]
 fn a_force_jump_at_a_change_creates_no_spurious_peak() {
-    // Gravity turned up pulls the reactions of the ideal joints up at once; a parabola through both sides of that
+    // A rise of gravity raises the reactions of the ideal joints at once; a parabola through both sides of that
     // jump would overshoot it by an eighth.
     let mut simulation = live("spcmm", &[("contact.clearance", "0")]);
     simulation.advance_to(0.1).unwrap();
@@ -404,7 +404,7 @@ fn a_force_jump_at_a_change_creates_no_spurious_peak() {
 }
 
 #[test]
-fn a_parameter_of_the_scene_acts_at_once_where_only_contacts_and_gravity_follow_it() {
+fn a_parameter_of_the_scene_acts_at_once_if_only_contacts_and_gravity_depend_on_it() {
     let scene = |mass: &str| {
         format!(
             "[[parameter]]\nname = \"gap\"\nvalue = \"0.1 mm\"\n[[parameter]]\nname = \"weight\"\nvalue = 9.81\n\
@@ -423,11 +423,11 @@ fn a_parameter_of_the_scene_acts_at_once_where_only_contacts_and_gravity_follow_
     };
     let set = crate::common::parse(&scene("0.384 kg"), &[("parameter.gap", "0.2 mm")]);
     assert_eq!(clearance(&set), 0.4e-3);
-    // The bits of the same change without a parameter.
+    // The result has the bits of the same changes made directly.
     let mut by_parameter = run("0.384 kg");
     let mut by_key = run("0.384 kg");
-    for (own, key, value) in [("0.2 mm", "contact.clearance", "0.4 mm"), ("0.15 mm", "contact.clearance", "0.3 mm")] {
-        assert_eq!(by_parameter.set("parameter.gap", own), Ok(Effect::Now));
+    for (gap, key, value) in [("0.2 mm", "contact.clearance", "0.4 mm"), ("0.15 mm", "contact.clearance", "0.3 mm")] {
+        assert_eq!(by_parameter.set("parameter.gap", gap), Ok(Effect::Now));
         assert_eq!(by_key.set(key, value), Ok(Effect::Now));
         for simulation in [&mut by_parameter, &mut by_key] {
             let end = simulation.time() + 5e-3;
@@ -439,7 +439,7 @@ fn a_parameter_of_the_scene_acts_at_once_where_only_contacts_and_gravity_follow_
     assert_eq!(by_parameter.set("parameter.weight", "1.62"), Ok(Effect::Now));
     assert_eq!(by_parameter.running().machine.gravity.z, -1.62);
     by_parameter.advance_to(20e-3).unwrap();
-    // What else follows it waits, and the contact with it.
+    // If anything else depends on it, the whole change waits, contact included.
     let mut waiting = run("0.384 kg * (1 + gap / 1 m)");
     let hash = waiting.state_hash();
     assert_eq!(waiting.set("parameter.gap", "0.2 mm"), Ok(Effect::AtReset));
@@ -449,6 +449,6 @@ fn a_parameter_of_the_scene_acts_at_once_where_only_contacts_and_gravity_follow_
     assert_eq!(waiting.set("body.rod.mass", "0.4 kg"), Ok(Effect::AtReset));
     waiting.reset().unwrap();
     assert_eq!(clearance(waiting.running()), 0.4e-3);
-    // And an ideal joint is another machine.
+    // A joint that becomes ideal changes the machine and also waits.
     assert_eq!(by_parameter.set("parameter.gap", "0 mm"), Ok(Effect::AtReset));
 }

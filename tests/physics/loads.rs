@@ -2,8 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::common::{THREE_WAYS, parse};
-use crate::elements::at;
+use crate::common::{THREE_VARIANTS, parse};
+use crate::elements::frame_at;
 use jointplay::machine::Vec3;
 use jointplay::mechanism::periods_of;
 use jointplay::scene::{Scene, SceneError, Texts};
@@ -47,11 +47,11 @@ fn a_law_a_formula_and_a_table_of_a_sine_move_a_mass_as_the_sine_does() {
         format!("{{ law = \"table\", points = [{points}], repeat = true }}"),
         "{ law = \"table\", file = \"pull.csv\", repeat = true }".to_owned(),
     ];
-    for (method, formulation) in THREE_WAYS {
+    for (method, formulation) in THREE_VARIANTS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-11"), ("formulation", formulation)];
         let mut sine =
             Simulation::new(&parse(&shaken("frequency = \"2 Hz\"\nphase = \"30 deg\""), &changes).machine).unwrap();
-        let expected = at(&mut sine, 1.3);
+        let expected = frame_at(&mut sine, 1.3);
         let work = sine.ledger().unwrap().external_work;
         assert!(expected.bodies[0].position.x.abs() > 1e-3 && work > 1e-3);
         for (place, law) in laws.iter().enumerate() {
@@ -61,7 +61,7 @@ fn a_law_a_formula_and_a_table_of_a_sine_move_a_mass_as_the_sine_does() {
             let period = periods_of(&scene.machine).fold(f64::INFINITY, f64::min);
             assert_eq!((period - 0.5).abs() < 1e-12, !law.contains("formula"), "{law}: {period}");
             let mut simulation = Simulation::new(&scene.machine).unwrap();
-            let frame = at(&mut simulation, 1.3);
+            let frame = frame_at(&mut simulation, 1.3);
             let off = (frame.bodies[0].position - expected.bodies[0].position).norm();
             let label = format!("{method} {formulation} law {place}");
             assert!(off < 1e-9, "{label}: {off:e}");
@@ -83,10 +83,10 @@ fn a_short_pulse_of_a_load_is_not_stepped_over() {
         [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = { position = [0, 0, 0] }\n\
         [[load]]\nname = \"knock\"\non = { body = \"mass\" }\nforce = \"30 0 40 N\"\n\
         factor = { law = \"pulse\", height = 2, start = \"0.5 s\", duration = \"1 ms\" }\n";
-    for (method, formulation) in THREE_WAYS {
+    for (method, formulation) in THREE_VARIANTS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
         let mut simulation = Simulation::new(&parse(text, &changes).machine).unwrap();
-        let frame = at(&mut simulation, 0.7);
+        let frame = frame_at(&mut simulation, 0.7);
         let speed = Vec3::new(60.0, 0.0, 80.0) * 1e-3 * 4.0 / (3.0 * PI) / MASS;
         let off = (frame.bodies[0].velocity - speed).norm();
         assert!(off < 1e-8, "{method} {formulation}: {off:e}");
@@ -107,7 +107,7 @@ fn a_torque_that_is_switched_on_smoothly_turns_with_its_body() {
     let mut simulation = Simulation::new(&parse(text, &[("solver.tolerance", "1e-10")]).machine).unwrap();
     // The ramp is odd about its middle.
     for (time, momentum) in [(0.1, 1e-4), (0.3, 1e-4), (0.4, 0.0)] {
-        let frame = at(&mut simulation, time);
+        let frame = frame_at(&mut simulation, time);
         let off = (frame.bodies[0].angular_velocity.z - momentum / 2e-4).abs();
         assert!(off < 1e-7, "{time}: {off:e}");
     }

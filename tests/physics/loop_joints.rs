@@ -2,11 +2,11 @@
 //! redundant constraints, and loops that cannot close.
 
 use crate::common::matrix::FORMULATIONS;
-use crate::common::matrix::every_way;
+use crate::common::matrix::every_variant;
 use crate::common::{frame_now, parse, run_until};
-use crate::elements::at;
-use crate::joint_elements::started;
-use crate::two_degrees::differ;
+use crate::elements::frame_at;
+use crate::joint_elements::start_simulation;
+use crate::two_degrees::angle_difference;
 use jointplay::machine::{Mat3, Quat, Vec3};
 use jointplay::simulate::{BodyMotion, Frame, Simulation};
 
@@ -101,9 +101,9 @@ fn a_body_on_a_closing_joint_moves_as_with_the_joint_in_the_tree() {
                 "[[joint]]\nname = \"j\"\nkind = \"{}\"\nparent = \"arm\"\nchild = \"rod\"\n{}{}",
                 pair.kind, pair.keys, pair.start
             );
-            let mut simulation = started(&two_bodies(driven, &tree_joint), &[]);
+            let mut simulation = start_simulation(&two_bodies(driven, &tree_joint), &[]);
             let rod = frame_now(&mut simulation).bodies[1];
-            let end = at(&mut simulation, 0.25);
+            let end = frame_at(&mut simulation, 0.25);
             let free = format!(
                 "[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"rod\"\nstart = {{ position = {}, rotation = {}, velocity = {}, \
                  angular_velocity = {} }}\n[[joint]]\nname = \"j\"\nkind = \"{}\"\nparent = \"arm\"\nchild = \"rod\"\ncloses_loop = true\n{}",
@@ -117,13 +117,13 @@ fn a_body_on_a_closing_joint_moves_as_with_the_joint_in_the_tree() {
             for formulation in FORMULATIONS {
                 let label = format!("{} {formulation}, driven: {driven}", pair.kind);
                 let change = [("formulation", formulation)];
-                let mut simulation = started(&two_bodies(driven, &free), &change);
+                let mut simulation = start_simulation(&two_bodies(driven, &free), &change);
                 let summary = simulation.mechanism().summary();
                 let free = pair.freedoms + usize::from(!driven);
                 assert_eq!(summary.degrees_of_freedom, free, "{label}");
                 assert_eq!((summary.closing_joints, summary.dependent_rows), (1, 0), "{label}");
                 assert_eq!(simulation.indeterminate_forces(), Default::default(), "{label}");
-                let frame = at(&mut simulation, 0.25);
+                let frame = frame_at(&mut simulation, 0.25);
                 for (a, b) in frame.bodies.iter().zip(&end.bodies) {
                     let off = (a.position - b.position).norm();
                     assert!(off < 2e-7, "{label}: {off:e}");
@@ -134,7 +134,7 @@ fn a_body_on_a_closing_joint_moves_as_with_the_joint_in_the_tree() {
                 }
                 assert_eq!(frame.coordinates.len(), end.coordinates.len());
                 for (a, b) in frame.coordinates.iter().zip(&end.coordinates) {
-                    assert!(differ(a[0], b[0]) < 2e-6 && (a[1] - b[1]).abs() < 2e-5, "{label}: {a:?} {b:?}");
+                    assert!(angle_difference(a[0], b[0]) < 2e-6 && (a[1] - b[1]).abs() < 2e-5, "{label}: {a:?} {b:?}");
                 }
                 for (a, b) in frame.actuators.iter().zip(&end.actuators) {
                     assert!((a - b).abs() < 1e-5, "{label}: {a} {b}");
@@ -245,16 +245,16 @@ fn loop_residual(frame: &Frame) -> f64 {
 #[test]
 fn a_planar_four_bar_closed_by_a_hinge_moves_as_one_closed_by_a_ball_joint() {
     let with_ball = Bar { closed_by: BALL, ..PLAIN };
-    let mut ball = started(&four_bar(&with_ball), &[]);
-    let end = at(&mut ball, 0.3);
+    let mut ball = start_simulation(&four_bar(&with_ball), &[]);
+    let end = frame_at(&mut ball, 0.3);
     let mut reactions = Vec::new();
     for formulation in FORMULATIONS {
-        let mut simulation = started(&four_bar(&PLAIN), &[("formulation", formulation)]);
+        let mut simulation = start_simulation(&four_bar(&PLAIN), &[("formulation", formulation)]);
         let summary = simulation.mechanism().summary();
         // Two rows close a loop in the plane.
         assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (3, 1));
         assert_eq!(simulation.indeterminate_forces().reactions, [0]);
-        let frame = at(&mut simulation, 0.3);
+        let frame = frame_at(&mut simulation, 0.3);
         let bound = if formulation == "tree" { 1e-9 } else { 1e-6 };
         assert!(loop_residual(&frame) < bound, "{formulation}: {:e}", loop_residual(&frame));
         for (a, b) in frame.bodies.iter().zip(&end.bodies) {
@@ -268,7 +268,7 @@ fn a_planar_four_bar_closed_by_a_hinge_moves_as_one_closed_by_a_ball_joint() {
         let [crank, coupler, rocker, closing] = frame.coordinates[..] else {
             panic!("{:?}", frame.coordinates);
         };
-        assert!(differ(closing[0], rocker[0] - crank[0] - coupler[0]) < bound);
+        assert!(angle_difference(closing[0], rocker[0] - crank[0] - coupler[0]) < bound);
         let rate = rocker[1] - crank[1] - coupler[1];
         assert!((closing[1] - rate).abs() < 100.0 * bound, "{formulation}: {closing:?} {rate}");
     }
@@ -296,17 +296,17 @@ pub fn four_bar_with_a_bob() -> String {
 
 #[test]
 fn every_method_keeps_a_loop_closed() {
-    for way in every_way() {
-        let step = if way.method.ends_with("euler") { "2 us" } else { "5 us" };
-        let [method, formulation] = way.changes();
+    for variant in every_variant() {
+        let step = if variant.method.ends_with("euler") { "2 us" } else { "5 us" };
+        let [method, formulation] = variant.changes();
         let changes = [method, ("solver.step", step), ("solver.tolerance", "1e-7"), formulation];
-        let mut simulation = started(&four_bar_with_a_bob(), &changes);
+        let mut simulation = start_simulation(&four_bar_with_a_bob(), &changes);
         run_until(&mut simulation, 12e-3);
         let frame = frame_now(&mut simulation);
-        let bound = if way.formulation == "tree" { 1e-9 } else { 1e-5 };
-        assert!(loop_residual(&frame) < bound, "{way}: {:e}", loop_residual(&frame));
+        let bound = if variant.formulation == "tree" { 1e-9 } else { 1e-5 };
+        assert!(loop_residual(&frame) < bound, "{variant}: {:e}", loop_residual(&frame));
         let impacts: u64 = simulation.statistics().impacts.iter().sum();
-        assert!(impacts > 0, "{way}");
+        assert!(impacts > 0, "{variant}");
     }
 }
 
@@ -344,10 +344,10 @@ fn a_scotch_yoke_follows_its_closed_form() {
         let bound = if formulation == "tree" { 1e-9 } else { 1e-6 };
         let change = [("formulation", formulation)];
         let free = "start = { position = \"0.5 rad\", velocity = \"9 rad/s\" }";
-        let mut simulation = started(&scotch_yoke(free), &change);
+        let mut simulation = start_simulation(&scotch_yoke(free), &change);
         let summary = simulation.mechanism().summary();
         assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (3, 1));
-        let frame = at(&mut simulation, 0.5);
+        let frame = frame_at(&mut simulation, 0.5);
         let [[angle, rate], _, [x, speed], [slot, _]] = frame.coordinates[..] else {
             panic!("{:?}", frame.coordinates);
         };
@@ -358,8 +358,8 @@ fn a_scotch_yoke_follows_its_closed_form() {
         assert!((rate - expected).abs() < 1e-6, "{formulation}: {rate} {expected}");
         // At a constant rate the torque follows from the changing inertia.
         let drive = "drive = { law = \"constant\", position = \"0.5 rad\", velocity = \"9 rad/s\" }";
-        let mut simulation = started(&scotch_yoke(drive), &change);
-        let frame = at(&mut simulation, 0.3);
+        let mut simulation = start_simulation(&scotch_yoke(drive), &change);
+        let frame = frame_at(&mut simulation, 0.3);
         let angle: f64 = 0.5 + 9.0 * 0.3;
         let torque = 1.5 * YOKE * YOKE * 81.0 * angle.sin() * angle.cos();
         let off = frame.actuators[0] - torque;
@@ -387,18 +387,18 @@ fn a_universal_joint_turns_a_shaft_at_its_known_ratio() {
             plain_vector_text(Vec3::new(bend.cos(), bend.sin(), 0.0)),
         );
         for formulation in FORMULATIONS {
-            let mut simulation = started(&text, &[("formulation", formulation)]);
+            let mut simulation = start_simulation(&text, &[("formulation", formulation)]);
             let summary = simulation.mechanism().summary();
             assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (dependent, 0), "{bearing}");
             let (near, fast) = if formulation == "tree" { (1e-9, 1e-8) } else { (1e-5, 1e-3) };
             for k in 1..=20 {
                 let t = 0.04 * f64::from(k);
-                let frame = at(&mut simulation, t);
+                let frame = frame_at(&mut simulation, t);
                 let (sin, cos) = (10.0 * t).sin_cos();
                 let angle = sin.atan2(cos * bend.cos());
                 let ratio = bend.cos() / (1.0 - (bend.sin() * cos).powi(2));
                 let [own, rate] = frame.coordinates[frame.coordinates.len() - 1];
-                assert!(differ(own, angle) < near, "{bearing} {formulation} {t}: {own} {angle}");
+                assert!(angle_difference(own, angle) < near, "{bearing} {formulation} {t}: {own} {angle}");
                 assert!((rate - 10.0 * ratio).abs() < 10.0 * fast, "{bearing} {formulation} {t}: {rate}");
                 // The torque only accelerates the second shaft.
                 let slope =
@@ -471,18 +471,18 @@ fn a_bennett_linkage_follows_its_closed_form() {
         .concat();
         for formulation in FORMULATIONS {
             let label = format!("{formulation}, driven: {driven}");
-            let mut simulation = started(&text, &[("formulation", formulation)]);
+            let mut simulation = start_simulation(&text, &[("formulation", formulation)]);
             let summary = simulation.mechanism().summary();
             let free = usize::from(!driven);
             assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (3, free), "{label}");
             let bound = if formulation == "tree" { 1e-9 } else { 1e-5 };
             for k in 1..=8 {
-                let frame = at(&mut simulation, 0.1 * f64::from(k));
+                let frame = frame_at(&mut simulation, 0.1 * f64::from(k));
                 let [[q1, _], [q2, _], [q3, _], [q4, _]] = frame.coordinates[..] else {
                     panic!("{label}: {:?}", frame.coordinates);
                 };
                 for (own, expected) in [(q2, second(q1)), (q3, -q1), (q4, second(q1))] {
-                    assert!(differ(own, expected) < bound, "{label}: {own} {expected}");
+                    assert!(angle_difference(own, expected) < bound, "{label}: {own} {expected}");
                 }
             }
             let residual = simulation.ledger().unwrap().relative_residual();
@@ -554,7 +554,7 @@ fn an_rccc_loop_keeps_angles_and_distances_of_its_axes() {
     ]
     .concat();
     for formulation in FORMULATIONS {
-        let mut simulation = started(&text, &[("formulation", formulation)]);
+        let mut simulation = start_simulation(&text, &[("formulation", formulation)]);
         let summary = simulation.mechanism().summary();
         assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (0, 0));
         let (joint, gap) = simulation.mechanism().assembly().widest.unwrap();
@@ -563,7 +563,7 @@ fn an_rccc_loop_keeps_angles_and_distances_of_its_axes() {
         let mut max_slide = 0.0_f64;
         for k in 0..=10 {
             let t = 0.1 * f64::from(k);
-            let frame = at(&mut simulation, t);
+            let frame = frame_at(&mut simulation, t);
             let [_, _, _, [slid, _], [turned, _], ..] = frame.coordinates[..] else {
                 panic!("{:?}", frame.coordinates);
             };
@@ -653,7 +653,7 @@ fn loops_of_a_pattern_close_in_every_instance() {
              [[pattern.joint]]\nname = \"weld\"\nkind = \"fixed\"\nparent = \"{parent}\"\nchild = \"{child}\"\n{points}\ncloses_loop = true\n"
         );
         for formulation in FORMULATIONS {
-            let mut simulation = started(&text, &[("formulation", formulation)]);
+            let mut simulation = start_simulation(&text, &[("formulation", formulation)]);
             assert_eq!(simulation.mechanism().summary().degrees_of_freedom, 6);
             run_until(&mut simulation, 0.02);
             let frame = frame_now(&mut simulation);

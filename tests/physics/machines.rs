@@ -1,7 +1,7 @@
 //! The machines among the built-in scenes, each against an independent reference: inverse kinematics in closed form, loop
 //! equations, a linear model; and with one joint loose against an independent solver.
 
-use super::independent::moves_the_same;
+use super::independent::compare_with_other_solver;
 use crate::common::{Changes, MACHINES, SCENES, frame_now, parse, run_until, scene, simulation};
 use jointplay::machine::{Machine, Mat3, Vec3};
 use jointplay::scene::{BUILT_IN, Value};
@@ -488,7 +488,7 @@ fn each_machine_with_one_loose_joint_moves_the_same_under_another_solver() {
         // The other solver uses the speed at the onset of contact, not the largest one since.
         let start = ("contact.approach_speed", "start");
         let changes = [IDEAL, (&*key, "0.1 mm"), start];
-        let (contacts, off) = moves_the_same(name, &changes, end);
+        let (contacts, off) = compare_with_other_solver(name, &changes, end);
         assert!(contacts >= 1, "{name}");
         assert!(off < 1e-9, "{name}: {off:e}");
     }

@@ -1,9 +1,9 @@
 //! Bodies without mass between joints: joints of several degrees in series, against joints of one piece and closed forms.
 
 use crate::common::frame_now;
-use crate::common::matrix::every_way;
-use crate::elements::at;
-use crate::joint_elements::started;
+use crate::common::matrix::every_variant;
+use crate::elements::frame_at;
+use crate::joint_elements::start_simulation;
 use crate::two_degrees::{G, train};
 use jointplay::machine::{MachineFault, Vec3};
 use jointplay::mechanism::MechanismError;
@@ -59,9 +59,9 @@ fn slide_and_hinge_are_a_cylindrical_and_two_hinges_a_universal_joint() {
     let scene = Scene::parse(&text, None, &[]).unwrap();
     let index = |name: &str| scene.machine.bodies.iter().position(|body| body.name == name).unwrap();
     let pairs = [(0, index("base")), (1, index("ring")), (2, index("rod"))];
-    for way in every_way().filter(|way| way.formulation == "tree") {
-        let mut whole = started(&train(-G), &way.close());
-        let mut series = started(&text, &way.close());
+    for variant in every_variant().filter(|variant| variant.formulation == "tree") {
+        let mut whole = start_simulation(&train(-G), &variant.close());
+        let mut series = start_simulation(&text, &variant.close());
         let (summary, other) = (whole.mechanism().summary(), series.mechanism().summary());
         assert_eq!((summary.degrees_of_freedom, summary.velocity_coordinates), (10, other.velocity_coordinates));
         // At the start all but rounding, later what the method allows.
@@ -69,9 +69,15 @@ fn slide_and_hinge_are_a_cylindrical_and_two_hinges_a_universal_joint() {
         for (a, b) in pairs {
             let (own, other) = (frame_now(&mut whole), frame_now(&mut series));
             let off = (own.bodies[a].acceleration - other.bodies[b].acceleration).norm();
-            assert!(off < 1e-9, "{way}: {off:e}");
+            assert!(off < 1e-9, "{variant}: {off:e}");
         }
-        agree(&at(&mut whole, 0.2), &at(&mut series, 0.2), &pairs, 10.0 * way.bound(), &way.to_string());
+        agree(
+            &frame_at(&mut whole, 0.2),
+            &frame_at(&mut series, 0.2),
+            &pairs,
+            10.0 * variant.bound(),
+            &variant.to_string(),
+        );
     }
 }
 
@@ -105,12 +111,12 @@ fn three_hinges_in_one_point_are_a_ball_joint_until_two_of_their_axes_coincide()
         2.0 + 30.0 * sine,
         30.0 * cosine
     );
-    let mut whole = started(&top(&ball, ""), &[]);
-    let mut series = started(&hinges("0.5 rad"), &[]);
+    let mut whole = start_simulation(&top(&ball, ""), &[]);
+    let mut series = start_simulation(&hinges("0.5 rad"), &[]);
     let mut energy = None;
     for step in 0..=10 {
         let t = 0.03 * f64::from(step);
-        let (one, other) = (at(&mut whole, t), at(&mut series, t));
+        let (one, other) = (frame_at(&mut whole, t), frame_at(&mut series, t));
         agree(&one, &other, &[(0, 2)], 1e-7, &format!("{t} s"));
         let now = other.kinetic + other.potential;
         let lost = now - *energy.get_or_insert(now);
@@ -152,9 +158,9 @@ fn two_slides_and_a_hinge_move_a_plate_in_its_plane() {
             "position = 0, velocity = \"5 rad/s\""
         ),
     );
-    let mut simulation = started(&text, &[]);
+    let mut simulation = start_simulation(&text, &[]);
     let t = 0.7;
-    let frame = at(&mut simulation, t);
+    let frame = frame_at(&mut simulation, t);
     let plate = &frame.bodies[2];
     let centre = plate.position + plate.rotation * Vec3::new(0.1, 0.0, 0.0);
     // The centroid starts at (0.1, 0.02, 0) with (0.3, 5 x 0.1, 0).

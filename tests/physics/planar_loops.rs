@@ -1,9 +1,9 @@
-//! Loops that hold a direction more than once: the motion is that of the independent rows, the reactions are the least.
+//! Loops with redundant constraints: independent rows determine the motion, and the reactions have minimum norm.
 //!
-//! A planar four-bar of hinges closed by a ball joint is compared with its own geometry and one-coordinate dynamics,
-//! written down here a second time.
+//! A planar four-bar of hinges closed by a ball joint is compared with an independent model of its geometry and one-coordinate
+//! dynamics.
 
-use crate::common::matrix::every_way;
+use crate::common::matrix::every_variant;
 use crate::common::{frame_now, parse, run_until};
 use jointplay::machine::{Quat, Vec3};
 use jointplay::scene::Scene;
@@ -11,7 +11,7 @@ use jointplay::simulate::{Frame, Simulation};
 
 const G: f64 = 9.81;
 
-/// Crank from O, coupler, rocker from D = (ground, 0), m; mass, and moment of inertia about the centroid in the middle.
+/// Lengths of the crank from O, the coupler and the rocker from D = (ground, 0), m; the crank's initial angle, rad, and rate, rad/s.
 #[derive(Clone, Copy)]
 pub struct FourBar {
     lengths: [f64; 3],
@@ -20,6 +20,7 @@ pub struct FourBar {
     rate: f64,
 }
 
+/// Masses, kg, and moments of inertia about the centroids, kg m^2, which are in the middle of the links.
 const MASS: [f64; 3] = [0.3, 0.5, 0.4];
 const INERTIA: [f64; 3] = [4e-4, 3e-3, 2e-3];
 
@@ -47,25 +48,26 @@ impl FourBar {
         [crank, coupler, rocker]
     }
 
-    /// First and second derivatives of the angles by the crank's: closure differentiated once, then five points.
-    fn slopes(&self, crank: f64) -> [f64; 3] {
+    /// First derivatives of the angles by the crank's, from the differentiated closure equations.
+    fn derivatives(&self, crank: f64) -> [f64; 3] {
         let [a, b, c] = self.lengths;
         let [_, coupler, rocker] = self.angles(crank);
         let s = (coupler - rocker).sin();
         [1.0, a * (rocker - crank).sin() / (b * s), a * (coupler - crank).sin() / (c * s)]
     }
 
-    fn bends(&self, crank: f64) -> [f64; 3] {
+    /// Second derivatives of the angles by the crank's, by five-point differences.
+    fn second_derivatives(&self, crank: f64) -> [f64; 3] {
         let h = 1e-3;
-        let at = |k: f64| self.slopes(crank + k * h);
+        let at = |k: f64| self.derivatives(crank + k * h);
         let (l2, l1, r1, r2) = (at(-2.0), at(-1.0), at(1.0), at(2.0));
         std::array::from_fn(|i| (l2[i] - 8.0 * l1[i] + 8.0 * r1[i] - r2[i]) / (12.0 * h))
     }
 
-    /// Inertia that the crank's rate feels, and the potential energy.
+    /// Inertia reduced to the crank, and the potential energy.
     fn reduced(&self, crank: f64) -> (f64, f64) {
         let [a, b, c] = self.lengths;
-        let (q, s) = (self.angles(crank), self.slopes(crank));
+        let (q, s) = (self.angles(crank), self.derivatives(crank));
         // Centroid of the coupler: half way along it from the crank's end.
         let centre = [-a * q[0].sin() - 0.5 * b * s[1] * q[1].sin(), a * q[0].cos() + 0.5 * b * s[1] * q[1].cos()];
         let inertia = INERTIA[0]
@@ -85,15 +87,15 @@ impl FourBar {
         (i0 * self.rate * self.rate + 2.0 * (v0 - v)) / i
     }
 
-    /// Time from the start to an angle that the crank reaches without turning back, by Gauss's rule in pieces.
+    /// Time from the start to an angle that the crank reaches without reversing, by composite Gauss quadrature.
     fn time_to(&self, crank: f64) -> f64 {
         let pieces = 400;
         let width = (crank - self.angle) / f64::from(pieces);
         let node = (0.6_f64).sqrt();
         let piece = |k: u32| {
             let middle = self.angle + (f64::from(k) + 0.5) * width;
-            let slow = |x: f64| 1.0 / self.rate_squared(middle + 0.5 * width * x).sqrt();
-            width / 18.0 * (5.0 * slow(-node) + 8.0 * slow(0.0) + 5.0 * slow(node))
+            let inverse_rate = |x: f64| 1.0 / self.rate_squared(middle + 0.5 * width * x).sqrt();
+            width / 18.0 * (5.0 * inverse_rate(-node) + 8.0 * inverse_rate(0.0) + 5.0 * inverse_rate(node))
         };
         (0..pieces).map(piece).sum()
     }
@@ -101,18 +103,18 @@ impl FourBar {
     /// Force on the rocker's end in the plane, N, from moments of the rocker about D and of the coupler about A.
     fn reaction(&self, crank: f64) -> Plane {
         let [a, b, c] = self.lengths;
-        let (q, s, bend) = (self.angles(crank), self.slopes(crank), self.bends(crank));
+        let (q, s, bend) = (self.angles(crank), self.derivatives(crank), self.second_derivatives(crank));
         let square = self.rate_squared(crank);
         let h = 1e-3;
         let at = |k: f64| self.rate_squared(crank + k * h);
         let slope = (at(-2.0) - 8.0 * at(-1.0) + 8.0 * at(1.0) - at(2.0)) / (12.0 * h);
         let acceleration: [f64; 3] = std::array::from_fn(|i| bend[i] * square + s[i] * 0.5 * slope);
-        let turning = |length: f64, i: usize| {
+        let point_acceleration = |length: f64, i: usize| {
             let arm = along(length, q[i]);
             let w2 = s[i] * s[i] * square;
             [-acceleration[i] * arm[1] - w2 * arm[0], acceleration[i] * arm[0] - w2 * arm[1]]
         };
-        let (end_a, half_b) = (turning(a, 0), turning(0.5 * b, 1));
+        let (end_a, half_b) = (point_acceleration(a, 0), point_acceleration(0.5 * b, 1));
         let needed = [end_a[0] + half_b[0], end_a[1] + half_b[1] + G].map(|x| MASS[1] * x);
         let coupler = INERTIA[1] * acceleration[1] + cross(along(0.5 * b, q[1]), needed);
         let rocker =
@@ -123,15 +125,15 @@ impl FourBar {
         [-(coupler * v[0] + rocker * u[0]) / determinant, -(coupler * v[1] + rocker * u[1]) / determinant]
     }
 
-    /// The scene: the plane is the world's x and z, turned by `turn`; hinge axes are its -y, so that angles count from x to z.
-    pub fn scene(&self, turn: Quat, with: Extras, changes: &[(&str, &str)]) -> Scene {
+    /// The scene: the plane is the world's xz plane rotated by `turn`; hinge axes are its -y, so that angles count from x to z.
+    pub fn scene(&self, turn: Quat, extras: Extras, changes: &[(&str, &str)]) -> Scene {
         let [a, b, c] = self.lengths;
-        let (q, s) = (self.angles(self.angle), self.slopes(self.angle));
-        let (q, s) = (with.pose.unwrap_or(q), with.rates.unwrap_or(s));
+        let (q, s) = (self.angles(self.angle), self.derivatives(self.angle));
+        let (q, s) = (extras.pose.unwrap_or(q), extras.rates.unwrap_or(s));
         let numbers = |v: Vec3, unit: &str| format!("\"{:e} {:e} {:e} {unit}\"", v.x, v.y, v.z);
         let start = |i: usize, position: f64, rate: f64| {
             let law = format!("position = \"{position:e} rad\", velocity = \"{rate:e} rad/s\"");
-            if with.driven.contains(&i) {
+            if extras.driven.contains(&i) {
                 format!("drive = {{ law = \"constant\", {law} }}")
             } else {
                 format!("start = {{ {law} }}")
@@ -160,7 +162,7 @@ impl FourBar {
         let g = turn * Vec3::new(0.0, 0.0, -G);
         let rate = self.rate;
         let text = [
-            format!("start = \"{}\"\n", with.start),
+            format!("start = \"{}\"\n", extras.start),
             format!("[gravity]\nx = \"{:e} m/s^2\"\ny = \"{:e} m/s^2\"\nz = \"{:e} m/s^2\"\n", g.x, g.y, g.z),
             "[solver]\ntolerance = 1e-9\n".to_owned(),
             body(0, "crank") + &body(1, "coupler") + &body(2, "rocker"),
@@ -170,24 +172,24 @@ impl FourBar {
                  parent_point = \"{a:e} 0 0 m\"\naxis = [0, -1, 0]\n{}\n",
                 start(1, q[1] - q[0], rate * (s[1] - 1.0))
             ),
-            ground("D", "rocker", Vec3::new(self.ground, with.offset, 0.0), start(2, q[2], rate * s[2])),
+            ground("D", "rocker", Vec3::new(self.ground, extras.offset, 0.0), start(2, q[2], rate * s[2])),
             format!(
                 "[[ball_joint]]\nname = \"B\"\nsocket = {{ body = \"coupler\", at = \"{b:e} 0 0 m\" }}\n\
                  ball = {{ body = \"rocker\", at = \"{c:e} 0 0 m\" }}\nclearance = \"{}\"\n",
-                with.clearance
+                extras.clearance
             ),
         ];
         parse(&text.concat(), changes)
     }
 }
 
-/// What a scene may have besides.
+/// Variations of the scene.
 #[derive(Clone, Copy)]
 pub struct Extras {
     pub start: &'static str,
     pub clearance: &'static str,
     pub driven: &'static [usize],
-    /// Of the rocker's hinge out of the plane, m.
+    /// Offset of the rocker's hinge out of the plane, m.
     pub offset: f64,
     pub pose: Option<[f64; 3]>,
     pub rates: Option<[f64; 3]>,
@@ -200,14 +202,14 @@ fn tilted() -> Quat {
     Quat::from_euler_angles(0.4, -0.7, 1.1)
 }
 
-/// Direction of a body's x axis in the plane, from 0 to a full turn.
+/// Direction of a body's x axis in the plane, -pi to pi.
 fn angle_of(frame: &Frame, turn: Quat, body: usize) -> f64 {
     let x = turn.inverse() * (frame.bodies[body].rotation * Vec3::x());
     assert!(x.y.abs() < 1e-7, "out of the plane by {:e}", x.y);
     x.z.atan2(x.x)
 }
 
-fn differ(a: f64, b: f64) -> f64 {
+fn angle_difference(a: f64, b: f64) -> f64 {
     let d = a - b;
     d.sin().atan2(d.cos()).abs()
 }
@@ -243,10 +245,10 @@ fn a_four_bar_closed_by_an_ideal_ball_joint_obeys_geometry_and_energy() {
             last = crank;
             let expected = bar.angles(crank);
             for (body, angle) in expected.iter().enumerate() {
-                let off = differ(angle_of(&frame, turn, body), *angle);
-                // In `lagrange` only stabilised.
-                let most = if form == "tree" { 1e-11 } else { 1e-7 };
-                assert!(off < most, "{form}, body {body}: {off:e}");
+                let off = angle_difference(angle_of(&frame, turn, body), *angle);
+                // `lagrange` only stabilises the constraints.
+                let limit = if form == "tree" { 1e-11 } else { 1e-7 };
+                assert!(off < limit, "{form}, body {body}: {off:e}");
             }
             let w = frame.bodies[0].angular_velocity.norm();
             let rate = bar.rate_squared(crank).sqrt();
@@ -259,7 +261,7 @@ fn a_four_bar_closed_by_an_ideal_ball_joint_obeys_geometry_and_energy() {
             let off = (force - Vec3::new(x, 0.0, z)).norm();
             assert!(off < 1e-5 * x.hypot(z).max(1.0), "{form}: {force} {x} {z}");
         }
-        assert!(turned > 1.0, "the crank moves on: {turned}");
+        assert!(turned > 1.0, "the crank turns: {turned}");
     }
 }
 
@@ -273,25 +275,25 @@ fn every_method_steps_a_planar_loop_ideal_driven_and_with_play() {
             run_until(&mut simulation, 0.02);
             frame_now(&mut simulation)
         };
-        for way in every_way() {
+        for variant in every_variant() {
             let mut simulation =
-                Simulation::new(&GRASHOF.scene(Quat::identity(), with, &way.changes()).machine).unwrap();
+                Simulation::new(&GRASHOF.scene(Quat::identity(), with, &variant.changes()).machine).unwrap();
             run_until(&mut simulation, 0.02);
             let frame = frame_now(&mut simulation);
             let impacts = simulation.statistics().impacts[0];
             assert_eq!(impacts > 0, clearance != "0");
             for (a, b) in frame.bodies.iter().zip(&reference.bodies) {
                 let off = (a.position - b.position).norm();
-                // First-order methods at 10 us; after impacts everything differs a little.
-                let most = if clearance == "0" { 2e-6 } else { 3e-4 };
-                assert!(off < most, "{clearance}, {driven:?}, {way}: {off:e}");
+                // Bounds for first-order methods at 10 us; impacts amplify the differences.
+                let limit = if clearance == "0" { 2e-6 } else { 3e-4 };
+                assert!(off < limit, "{clearance}, {driven:?}, {variant}: {off:e}");
             }
         }
     }
 }
 
 #[test]
-fn a_parallelogram_passes_its_flat_poses_and_does_not_start_in_one() {
+fn a_parallelogram_passes_through_flat_poses_but_does_not_start_in_one() {
     let bar = FourBar { lengths: [0.1, 0.24, 0.1], ground: 0.24, angle: 1.0, rate: 20.0 };
     let run = |form, method, tolerance, driven: &'static [usize]| {
         let changes = [
@@ -312,23 +314,23 @@ fn a_parallelogram_passes_its_flat_poses_and_does_not_start_in_one() {
             assert_eq!(stopped, None, "{case}");
             let frame = frame_now(&mut simulation);
             let [crank, coupler, rocker] = [0, 1, 2].map(|b| angle_of(&frame, tilted(), b));
-            assert!(differ(crank, rocker) < 1e-9, "{case}: {crank} {rocker}");
-            assert!(differ(coupler, 0.0) < 1e-9, "{case}: {coupler}");
+            assert!(angle_difference(crank, rocker) < 1e-9, "{case}: {crank} {rocker}");
+            assert!(angle_difference(coupler, 0.0) < 1e-9, "{case}: {coupler}");
             let residual = simulation.ledger().unwrap().relative_residual();
             assert!(residual.abs() < 1e-4, "{case}: {residual}");
         }
     }
-    // Constraints that are only stabilised drift where they hold weakly; whatever comes of it is said and finite.
+    // Stabilised constraints drift near singular poses; the drift is reported and all values stay finite.
     let (mut simulation, stopped) = run("lagrange", "automatic", "1e-6", &[]);
     let frame = frame_now(&mut simulation);
     assert!(frame.bodies.iter().all(|b| b.acceleration.norm().is_finite()));
-    let drifted = simulation.statistics().constraint_drift;
-    assert!(drifted < 1e-3 && (stopped.is_some() || drifted > 0.0));
+    let drift = simulation.statistics().constraint_drift;
+    assert!(drift < 1e-3 && (stopped.is_some() || drift > 0.0));
     let flat = FourBar { angle: 0.0, ..bar };
     let with = Extras { pose: Some([0.0; 3]), rates: Some([1.0, 0.0, 1.0]), ..PLAIN };
     let error = start_error(&flat.scene(Quat::identity(), with, &[]));
     assert!(error.contains("singular pose: at B"), "{error}");
-    // With play there is nothing that could branch.
+    // With clearance there is no bifurcation.
     let loose = Extras { clearance: "0.3 mm", ..with };
     for start in ["as-given", "ideal"] {
         let loose = Extras { start, ..loose };
@@ -340,8 +342,8 @@ fn a_parallelogram_passes_its_flat_poses_and_does_not_start_in_one() {
 #[test]
 fn unclosable_loops_are_refused_with_joint_and_direction() {
     for start in ["as-given", "ideal"] {
-        let aside = Extras { start, offset: 5e-3, ..PLAIN };
-        let error = start_error(&GRASHOF.scene(Quat::identity(), aside, &[]));
+        let out_of_plane = Extras { start, offset: 5e-3, ..PLAIN };
+        let error = start_error(&GRASHOF.scene(Quat::identity(), out_of_plane, &[]));
         let words = if start == "ideal" {
             "ball joint B: ball and socket centres are 5 mm apart as given and cannot be closed: remaining gaps: B by \
              5 mm along y (no joint"
@@ -351,8 +353,8 @@ fn unclosable_loops_are_refused_with_joint_and_direction() {
         assert!(error.contains(words), "{error}");
     }
     let short = FourBar { lengths: [0.1, 0.05, 0.05], ..GRASHOF };
-    let apart = Extras { start: "ideal", pose: Some([1.0, 0.2, 2.5]), rates: Some([1.0, 0.0, 0.0]), ..PLAIN };
-    let error = start_error(&short.scene(Quat::identity(), apart, &[]));
+    let too_short = Extras { start: "ideal", pose: Some([1.0, 0.2, 2.5]), rates: Some([1.0, 0.0, 0.0]), ..PLAIN };
+    let error = start_error(&short.scene(Quat::identity(), too_short, &[]));
     assert!(error.contains("cannot be closed: the parts do not reach"), "{error}");
 }
 
@@ -363,26 +365,26 @@ fn two_drives_of_a_parallelogram_share_the_load_or_are_refused() {
         let both = Extras { driven: &[0, 2], ..PLAIN };
         let scene = bar.scene(Quat::identity(), both, &[("formulation", form)]);
         let mut simulation = Simulation::new(&scene.machine).unwrap();
-        let loose = simulation.indeterminate_forces();
-        assert_eq!((loose.reactions, loose.actuators), (vec![0], vec![0, 1]));
+        let indeterminate = simulation.indeterminate_forces();
+        assert_eq!((indeterminate.reactions, indeterminate.actuators), (vec![0], vec![0, 1]));
         run_until(&mut simulation, 0.1);
         let frame = frame_now(&mut simulation);
-        // One motor alone would need the same work from it.
-        let alone = Extras { driven: &[0], ..PLAIN };
-        let mut single = Simulation::new(&bar.scene(Quat::identity(), alone, &[]).machine).unwrap();
+        // A single motor needs the same torque as both together.
+        let one_drive = Extras { driven: &[0], ..PLAIN };
+        let mut single = Simulation::new(&bar.scene(Quat::identity(), one_drive, &[]).machine).unwrap();
         assert_eq!(single.indeterminate_forces().actuators, [0; 0]);
         run_until(&mut single, 0.1);
-        let work = frame_now(&mut single).actuators[0];
+        let torque = frame_now(&mut single).actuators[0];
         let sum: f64 = frame.actuators.iter().sum();
-        assert!((sum - work).abs() < 1e-6, "{form}: {sum} {work}");
-        let against = Extras { rates: Some([1.0, 0.0, 1.5]), ..both };
-        let scene = bar.scene(Quat::identity(), against, &[("formulation", form)]);
+        assert!((sum - torque).abs() < 1e-6, "{form}: {sum} {torque}");
+        let conflicting = Extras { rates: Some([1.0, 0.0, 1.5]), ..both };
+        let scene = bar.scene(Quat::identity(), conflicting, &[("formulation", form)]);
         let error = start_error(&scene);
         assert!(error.contains("ball joint B: at the speeds of the drives it opens"), "{error}");
     }
 }
 
-/// A door hung by two ideal ball joints swings as one on a hinge, and each joint takes half of what only both hold.
+/// A door hung by two ideal ball joints swings as on a hinge; the joints share the redundant axial force equally.
 #[test]
 fn two_ball_joints_make_a_hinge() {
     let door = "[gravity]\nz = \"-9.81 m/s^2\"\n[solver]\ntolerance = 1e-9\n[contact]\nclearance = 0\n\
@@ -433,13 +435,13 @@ fn two_ball_joints_make_a_hinge() {
 #[test]
 fn displacements_by_the_assembly_are_reported() {
     let degrees = std::f64::consts::PI / 180.0;
-    let close = GRASHOF.angles(GRASHOF.angle);
-    let guess = [close[0], close[1] + 8.0 * degrees, close[2]];
+    let closed = GRASHOF.angles(GRASHOF.angle);
+    let guess = [closed[0], closed[1] + 8.0 * degrees, closed[2]];
     let with = Extras { start: "ideal", driven: &[0], pose: Some(guess), ..PLAIN };
     let simulation = Simulation::new(&GRASHOF.scene(tilted(), with, &[]).machine).unwrap();
     let assembly = simulation.mechanism().assembly();
     let (joint, gap) = assembly.widest.unwrap();
-    // Chord of 8 degrees at the end of the coupler.
+    // Chord of 8 degrees at the coupler's end.
     let chord = 2.0 * GRASHOF.lengths[1] * (4.0 * degrees).sin();
     assert!(joint == 0 && (gap - chord).abs() < 1e-12, "{gap} {chord}");
     assert_eq!(assembly.bodies[0].moved, 0.0);
@@ -448,14 +450,14 @@ fn displacements_by_the_assembly_are_reported() {
     assert!(assembly.bodies[2].turned < 1e-9 && !assembly.other_mode);
 }
 
-/// The side on which coupler and rocker lie tells the mode.
+/// The sign of the angle between coupler and rocker determines the mode.
 #[test]
 fn an_assembly_mode_other_than_the_guessed_one_is_reported() {
-    let (mut told, mut kept) = (0, 0);
+    let (mut switched, mut retained) = (0, 0);
     for k in 0..20 {
         for l in 0..20 {
             if (k + 20 - l) % 10 == 0 {
-                continue; // In line: neither mode.
+                continue; // Collinear: neither mode.
             }
             let guess = [k, l].map(|k| f64::from(k) * std::f64::consts::TAU / 20.0 + 0.05);
             let with =
@@ -468,9 +470,9 @@ fn an_assembly_mode_other_than_the_guessed_one_is_reported() {
             let [coupler, rocker] = [1, 2].map(|body| angle_of(&frame, Quat::identity(), body));
             let other = ((guess[0] - guess[1]).sin() > 0.0) != ((coupler - rocker).sin() > 0.0);
             assert_eq!(simulation.mechanism().assembly().other_mode, other, "{guess:?}");
-            told += u32::from(other);
-            kept += u32::from(!other);
+            switched += u32::from(other);
+            retained += u32::from(!other);
         }
     }
-    assert!(told > 10 && kept > 100, "{told} {kept}");
+    assert!(switched > 10 && retained > 100, "{switched} {retained}");
 }

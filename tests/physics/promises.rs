@@ -5,9 +5,9 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::common::invariants::{fault, finite};
-use crate::common::matrix::{FORMULATIONS, Way, every_way, for_every};
-use crate::common::{FOUR_WAYS, MACHINES, METHODS, SCENES, frame_now, parse, run_until, scene};
+use crate::common::invariants::{finite, violation};
+use crate::common::matrix::{FORMULATIONS, Variant, every_variant, for_every};
+use crate::common::{FOUR_VARIANTS, MACHINES, METHODS, SCENES, frame_now, parse, run_until, scene};
 use crate::planar_loops::{Extras, GRASHOF, PLAIN};
 use crate::{loop_joints, two_degrees};
 use jointplay::machine::Quat;
@@ -68,7 +68,7 @@ fn go_on(simulation: &mut Simulation) -> (u64, String) {
 }
 
 /// Steps once, looks into the step and at its end, and takes all that can be taken.
-fn watched_step(simulation: &mut Simulation, way: Way) {
+fn watched_step(simulation: &mut Simulation, variant: Variant) {
     let mut frame = Frame { reactions: Some(Vec::new()), ..Frame::default() };
     simulation.step().unwrap();
     let (from, to) = (simulation.step_start(), simulation.time());
@@ -76,13 +76,13 @@ fn watched_step(simulation: &mut Simulation, way: Way) {
         simulation.sample(from + part * (to - from), &mut frame);
         assert!(finite(&frame), "t = {}", frame.time);
     }
-    assert_eq!(fault(&frame, simulation.machine(), way.formulation), None);
+    assert_eq!(violation(&frame, simulation.machine(), variant.formulation), None);
     simulation.take_peaks(&mut Vec::new());
     simulation.take_impacts(&mut Vec::new());
 }
 
 /// Puts a run of `scene` through all of it; the hash at its end.
-fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
+fn keeps_its_promises(scene: &Scene, variant: Variant) -> u64 {
     let mut plain = LiveScene::new(scene).unwrap();
     let start = plain.state_hash();
     let steps = into_contact(&mut plain);
@@ -96,16 +96,16 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
 
     // Watched all the way, with a map of its wear, after a reset in mid run.
     let mut watched = LiveScene::new(scene).unwrap();
-    (0..BEFORE).for_each(|_| watched_step(&mut watched, way));
+    (0..BEFORE).for_each(|_| watched_step(&mut watched, variant));
     watched.reset().unwrap();
     assert_eq!((watched.time(), watched.state_hash()), (0.0, start));
     assert_eq!(watched.ledger(), Some(&Ledger::default()));
     watched.track_wear();
-    (0..steps).for_each(|_| watched_step(&mut watched, way));
+    (0..steps).for_each(|_| watched_step(&mut watched, variant));
     assert!(look(&mut watched) == here, "watched");
     change(&mut watched);
     let kept = watched.snapshot();
-    (0..AFTER).for_each(|_| watched_step(&mut watched, way));
+    (0..AFTER).for_each(|_| watched_step(&mut watched, variant));
     assert!(look(&mut watched) == first, "watched");
     watched.commit_wear();
     let wear = watched.wear().unwrap().clone();
@@ -148,17 +148,17 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
 }
 
 /// A scene in a way, with its name.
-fn case(name: &str, scene: &Scene, way: Way) -> u64 {
-    println!("{name}, {way}");
-    keeps_its_promises(scene, way)
+fn case(name: &str, scene: &Scene, variant: Variant) -> u64 {
+    println!("{name}, {variant}");
+    keeps_its_promises(scene, variant)
 }
 
 #[test]
 fn every_built_in_scene_keeps_the_promises_with_every_method_and_formulation() {
     for name in SCENES {
         let mut hashes = BTreeSet::new();
-        for way in every_way() {
-            hashes.insert(case(name, &scene(name, &way.changes()), way));
+        for variant in every_variant() {
+            hashes.insert(case(name, &scene(name, &variant.changes()), variant));
         }
         // The hash sees the difference between methods; the automatic ones may be explicit all the way.
         assert!(hashes.len() >= METHODS.len(), "{name}: {}", hashes.len());
@@ -167,34 +167,34 @@ fn every_built_in_scene_keeps_the_promises_with_every_method_and_formulation() {
 
 #[test]
 fn scenes_without_play_keep_the_promises() {
-    for_every(SCENES, |name, way| {
-        let [method, formulation] = way.changes();
+    for_every(SCENES, |name, variant| {
+        let [method, formulation] = variant.changes();
         let mut changes = vec![method, formulation, ("contact.clearance", "0")];
         if name == "chain" {
             changes.push(("chain.links", "3"));
         }
-        case(name, &scene(name, &changes), way);
+        case(name, &scene(name, &changes), variant);
     });
 }
 
 /// The ways that between them have every kind of Jacobian and error control.
-fn four_ways() -> [Way; 4] {
-    FOUR_WAYS.map(|(method, formulation)| Way { method, formulation })
+fn four_ways() -> [Variant; 4] {
+    FOUR_VARIANTS.map(|(method, formulation)| Variant { method, formulation })
 }
 
 #[test]
 fn machines_and_loops_keep_the_promises() {
-    for (name, way) in MACHINES.into_iter().zip(four_ways().into_iter().cycle()) {
-        case(name, &scene(name, &way.changes()), way);
+    for (name, variant) in MACHINES.into_iter().zip(four_ways().into_iter().cycle()) {
+        case(name, &scene(name, &variant.changes()), variant);
     }
-    for way in every_way() {
-        case("train", &parse(&two_degrees::train(-two_degrees::G), &way.changes()), way);
-        case("four-bar with a bob", &parse(&loop_joints::four_bar_with_a_bob(), &way.changes()), way);
+    for variant in every_variant() {
+        case("train", &parse(&two_degrees::train(-two_degrees::G), &variant.changes()), variant);
+        case("four-bar with a bob", &parse(&loop_joints::four_bar_with_a_bob(), &variant.changes()), variant);
     }
     let ideal = Extras { start: "ideal", ..PLAIN };
     for with in [ideal, Extras { driven: &[0], ..ideal }, Extras { clearance: "0.3 mm", ..ideal }] {
-        for way in four_ways() {
-            case("planar four-bar", &GRASHOF.scene(Quat::identity(), with, &way.changes()), way);
+        for variant in four_ways() {
+            case("planar four-bar", &GRASHOF.scene(Quat::identity(), with, &variant.changes()), variant);
         }
     }
 }
@@ -211,9 +211,9 @@ fn scenes_of_the_corpus_keep_the_promises() {
         name.starts_with("good-") && name != "good-tiny-and-huge.toml"
     };
     let good = paths.iter().filter(good);
-    for (path, way) in good.zip(four_ways().into_iter().cycle()) {
+    for (path, variant) in good.zip(four_ways().into_iter().cycle()) {
         let text = std::fs::read_to_string(path).unwrap();
-        case(&path.display().to_string(), &parse(&text, &way.changes()), way);
+        case(&path.display().to_string(), &parse(&text, &variant.changes()), variant);
     }
 }
 
@@ -234,19 +234,19 @@ fn eccentric() -> [(&'static str, String); 2] {
 #[test]
 fn a_state_is_restored_where_no_start_would_be_accepted() {
     for (joint, text) in eccentric() {
-        for way in four_ways() {
-            let scene = parse(&text, &way.changes());
+        for variant in four_ways() {
+            let scene = parse(&text, &variant.changes());
             let mut simulation = LiveScene::new(&scene).unwrap();
             simulation.advance_to(1e-3).unwrap();
             simulation.set(&format!("joint.{joint}.clearance"), "0.05 mm").unwrap();
-            assert!(LiveScene::new(simulation.running()).is_err(), "{joint}, {way}");
+            assert!(LiveScene::new(simulation.running()).is_err(), "{joint}, {variant}");
             simulation.advance_to(4e-3).unwrap();
             let snapshot = simulation.snapshot();
             let first = go_on(&mut simulation);
             let mut other = Simulation::new(&scene.machine).unwrap();
             for target in [&mut simulation, &mut other] {
                 target.restore(&snapshot);
-                assert!(go_on(target) == first, "{joint}, {way}");
+                assert!(go_on(target) == first, "{joint}, {variant}");
             }
         }
     }

@@ -26,9 +26,9 @@ fn error(farthest: &Farthest) -> Vec3 {
 /// How much longer each rod of [`TWO`] is with the tip displaced by `e`, over its play.
 fn stretch(e: &Vec3) -> [f64; 2] {
     TWO.map(|rod| {
-        let (length, _) = rod.way(TIP);
-        let (now, _) = rod.way([TIP[0] + e.x, TIP[1] + e.z]);
-        (now - length) / rod.both()
+        let (length, _) = rod.length_and_direction(TIP);
+        let (now, _) = rod.length_and_direction([TIP[0] + e.x, TIP[1] + e.z]);
+        (now - length) / rod.total_play()
     })
 }
 
@@ -112,8 +112,9 @@ fn parallel_rods_err_as_the_tightest_allows() {
         assert!((farthest.support / expected - 1.0).abs() < 1e-9, "{u:?}: {} {expected}", farthest.support);
         let e = error(&farthest);
         for rod in &rods {
-            let ((length, _), (now, _)) = (rod.way(TIP), rod.way([TIP[0] + e.x, TIP[1] + e.z]));
-            let stretch = (now - length) / rod.both();
+            let ((length, _), (now, _)) =
+                (rod.length_and_direction(TIP), rod.length_and_direction([TIP[0] + e.x, TIP[1] + e.z]));
+            let stretch = (now - length) / rod.total_play();
             assert!(stretch.abs() < 1.0 + 1e-6, "{u:?}: {stretch}");
             idle += usize::from(stretch.abs() < 0.99);
         }
@@ -162,10 +163,10 @@ fn a_slider_errs_by_the_play_along_its_rod() {
         );
         let tilt = (slider(rod) - crank * cosine) / rod;
         assert_eq!(held.freedoms().bounded, [Vec3::x()]);
-        for way in [1.0, -1.0] {
-            let farthest = held.farthest(&(Vec3::x() * way));
+        for length_and_direction in [1.0, -1.0] {
+            let farthest = held.farthest(&(Vec3::x() * length_and_direction));
             assert!((farthest.support * tilt / play - 1.0).abs() < 1e-9, "{angle}: {}", farthest.support);
-            let expected = Vec3::x() * (slider(rod + way * play) - slider(rod));
+            let expected = Vec3::x() * (slider(rod + length_and_direction * play) - slider(rod));
             assert!((error(&farthest) - expected).norm() < 1e-11, "{angle}: {farthest:?} {expected:?}");
         }
     }
@@ -257,7 +258,7 @@ fn unreachable_drive_positions_report_how_far_they_get() {
     let tip = [moved.ideal_tip().x, moved.ideal_tip().z];
     let rods = [Rod { from: [TWO[0].from[0] + 0.1, TWO[0].from[1]], ..TWO[0] }, TWO[1]];
     for (rod, own) in rods.iter().zip(TWO) {
-        assert!((rod.way(tip).0 - own.way(TIP).0).abs() < 1e-12);
+        assert!((rod.length_and_direction(tip).0 - own.length_and_direction(TIP).0).abs() < 1e-12);
     }
     for u in around(8) {
         let farthest = moved.farthest(&u);

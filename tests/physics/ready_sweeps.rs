@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use crate::common::matrix::side_by_side;
+use crate::common::matrix::in_parallel;
 use crate::common::simulation;
 use jointplay::analysis::ready::{READY, ReadySweep};
 use jointplay::analysis::sweep_task::{Share, SweptPoint};
@@ -55,7 +55,7 @@ fn full_the_road_to_chaos_begins_with_knocks() {
     let ready = named("Road to chaos");
     let speeds: Vec<usize> = (21..=45).collect();
     assert_eq!((ready.from, ready.to, ready.values), ("21 rad/s", "45 rad/s", speeds.len()));
-    side_by_side(&speeds, |&speed| {
+    in_parallel(&speeds, |&speed| {
         let value = format!("{speed} rad/s");
         let point = &points(ready, Some(&format!("{value}..{value}:1")), false)[0];
         let regime = match speed {

@@ -5,13 +5,13 @@ use jointplay::machine::{BallJoint, StartRule};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
-fn started(name: &str, changes: &[(&str, &str)]) -> Simulation {
+fn start_simulation(name: &str, changes: &[(&str, &str)]) -> Simulation {
     Simulation::new(&scene(name, changes).machine).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 /// Reactions of the ball joints of the scene without play, N.
 fn reactions(name: &str) -> Vec<f64> {
-    let mut ideal = started(name, &[("contact.clearance", "0"), ("start", "ideal")]);
+    let mut ideal = start_simulation(name, &[("contact.clearance", "0"), ("start", "ideal")]);
     let frame = frame_now(&mut ideal);
     frame.joints.iter().map(|joint| joint.normal_force.norm()).collect()
 }
@@ -23,7 +23,7 @@ fn every_contact_begins_with_the_force_of_the_ideal_joint() {
     for name in SCENES {
         for formulation in ["tree", "lagrange"] {
             let changes = [("start", "settled"), ("contact.friction", "0"), ("formulation", formulation)];
-            let mut simulation = started(name, &changes);
+            let mut simulation = start_simulation(name, &changes);
             let frame: Frame = frame_now(&mut simulation);
             let loose = |joint: &&BallJoint| joint.contact.clearance > 0.0;
             let loose = simulation.machine().ball_joints.iter().filter(loose).count();
@@ -45,7 +45,7 @@ fn a_settled_start_does_not_drop() {
     for name in SCENES {
         let most = |start: &str| {
             let changes = [("start", start), ("contact.friction", "0")];
-            let mut simulation = started(name, &changes);
+            let mut simulation = start_simulation(name, &changes);
             simulation.advance_to(0.02).expect("runs");
             let peaks = (0..simulation.machine().ball_joints.len()).map(|j| {
                 let (force, _) = simulation.peak(j);
@@ -80,12 +80,12 @@ fn a_hanging_pendulum_hangs_from_the_wall() {
 
 #[test]
 fn ideal_and_unloaded_joints_stay_closed() {
-    let mut simulation = started("slider-crank", &[("start", "settled"), ("joint.B.clearance", "0")]);
+    let mut simulation = start_simulation("slider-crank", &[("start", "settled"), ("joint.B.clearance", "0")]);
     let frame = frame_now(&mut simulation);
     assert!(frame.joints[0].eccentricity.norm() < 1e-9);
     assert!(frame.joints[1].penetration > 0.0);
     // Nothing presses a pendulum that floats.
-    let mut floating = started("pendulum", &[("start", "settled"), ("gravity.z", "0")]);
+    let mut floating = start_simulation("pendulum", &[("start", "settled"), ("gravity.z", "0")]);
     let frame = frame_now(&mut floating);
     assert!(frame.joints[0].eccentricity.norm() < 1e-12 && frame.joints[0].normal_force.norm() == 0.0);
 }

@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::common::matrix::for_every;
-use crate::common::{THREE_WAYS, parse};
-use crate::elements::at;
+use crate::common::{THREE_VARIANTS, parse};
+use crate::elements::frame_at;
 use jointplay::machine::{Elastic, ElementKind};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
@@ -112,21 +112,21 @@ fn passes() -> (f64, f64) {
 fn a_hardening_spring_swings_as_duffing_says_in_every_method_and_formulation() {
     let (passes, speed) = passes();
     let omega = (A / MASS).sqrt();
-    for_every([On::Body, On::Slide, On::Hinge], |on, way| {
-        let bound = way.bound();
-        let mut simulation = on.starts(&POINTS, "", &way.close());
-        let label = format!("{on:?} {way}");
+    for_every([On::Body, On::Slide, On::Hinge], |on, variant| {
+        let bound = variant.bound();
+        let mut simulation = on.starts(&POINTS, "", &variant.close());
+        let label = format!("{on:?} {variant}");
         // A quarter along the cubic, a half along the straight end, and back into the cubic.
-        let frame = at(&mut simulation, passes);
+        let frame = frame_at(&mut simulation, passes);
         let [x, v] = on.state(&frame);
         assert!(x.abs() < bound && (v + speed).abs() < 20.0 * bound, "{label}: {x:e} {v}");
         let stored = on.scale() * 0.5 * MASS * speed * speed;
         assert!(frame.elastic.abs() < 20.0 * bound * on.scale(), "{label}");
-        let frame = at(&mut simulation, passes + 0.5 * PI / omega);
+        let frame = frame_at(&mut simulation, passes + 0.5 * PI / omega);
         let [x, _] = on.state(&frame);
         assert!((x + speed / omega).abs() < 2.0 * bound, "{label}: {x:e}");
         assert!((frame.elastic / stored - 1.0).abs() < 100.0 * bound, "{label}");
-        let frame = at(&mut simulation, passes + PI / omega);
+        let frame = frame_at(&mut simulation, passes + PI / omega);
         let [x, v] = on.state(&frame);
         assert!(x.abs() < 4.0 * bound && (v - speed).abs() < 40.0 * bound, "{label}: {x:e}");
         let residual = simulation.ledger().unwrap().relative_residual();
@@ -141,7 +141,7 @@ fn the_error_falls_with_the_order_of_the_method_along_a_curve() {
         let step = format!("{:e} s", passes / steps);
         let changes = [("solver.method", method), ("solver.step", &*step)];
         let mut simulation = On::Body.starts(&POINTS, "", &changes);
-        On::Body.state(&at(&mut simulation, passes))[0].abs()
+        On::Body.state(&frame_at(&mut simulation, passes))[0].abs()
     };
     for (method, steps, order) in [("semi-implicit-euler", [1e3, 2e3], 1.0), ("rk4", [20.0, 40.0], 4.0)] {
         let [coarse, fine] = steps.map(|steps| error(method, steps));
@@ -171,9 +171,9 @@ fn points_on_a_line_are_the_spring_of_that_line() {
                 let scene = parse(text, &[("solver.tolerance", "1e-10")]);
                 Simulation::new(&scene.machine).unwrap()
             });
-            let offset = at(&mut a, 0.0).elastic - at(&mut b, 0.0).elastic;
+            let offset = frame_at(&mut a, 0.0).elastic - frame_at(&mut b, 0.0).elastic;
             for n in 1..20 {
-                let [a, b] = [&mut a, &mut b].map(|s| at(s, 0.02 * f64::from(n)));
+                let [a, b] = [&mut a, &mut b].map(|s| frame_at(s, 0.02 * f64::from(n)));
                 assert!((a.bodies[0].position - b.bodies[0].position).norm() < 1e-9);
                 assert!((a.elements[0].force - b.elements[0].force).norm() < 1e-6);
                 // Where it does not act, the two may count from different lengths.
@@ -191,14 +191,14 @@ fn a_one_sided_buffer_returns_its_energy() {
         [[joint]]\nname = \"guide\"\nkind = \"prismatic\"\nchild = \"mass\"\naxis = [0, 0, 1]\nstart = { position = \"60 mm\" }\n\
         [[spring]]\nname = \"pad\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"100 mm\"\nside = \"push\"\n\
         characteristic = [[\"-50 mm\", \"-200 N\"], [\"-30 mm\", \"-40 N\"], [\"-10 mm\", \"-5 N\"], [0, 0], [\"10 mm\", \"4 N\"]]\n";
-    for (method, formulation) in THREE_WAYS {
+    for (method, formulation) in THREE_VARIANTS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
         let mut simulation = Simulation::new(&parse(text, &changes).machine).unwrap();
         let mut highest = 0.0_f64;
-        let energy = at(&mut simulation, 0.0);
+        let energy = frame_at(&mut simulation, 0.0);
         let whole = energy.elastic + 0.5 * 9.81 * 0.06;
         for n in 1..=1500 {
-            let frame = at(&mut simulation, f64::from(n) * 1e-3);
+            let frame = frame_at(&mut simulation, f64::from(n) * 1e-3);
             let height = frame.bodies[0].position.z;
             highest = highest.max(height);
             let force = frame.elements[0].force.z;
@@ -228,7 +228,7 @@ fn a_characteristic_may_lie_in_a_file_beside_the_scene() {
     assert_eq!(spring.elastic, Elastic::Curve(POINTS.to_vec()));
     let mut simulation = Simulation::new(&scene.machine).unwrap();
     let (passes, _) = passes();
-    assert!(On::Body.state(&at(&mut simulation, passes))[0].abs() < 1e-4);
+    assert!(On::Body.state(&frame_at(&mut simulation, passes))[0].abs() < 1e-4);
 }
 
 #[test]

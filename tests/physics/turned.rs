@@ -1,7 +1,7 @@
 //! A scene that is turned and shifted as a whole, together with its gravity, moves as before.
 
 use crate::common::parse;
-use crate::elements::at;
+use crate::elements::frame_at;
 use jointplay::machine::{Quat, Vec3};
 use jointplay::scene::{Scene, Texts, built_in_text};
 use jointplay::simulate::Simulation;
@@ -32,7 +32,7 @@ fn move_alike(name: &str, [plain, turned]: [Scene; 2], time: f64) {
         let simulation = Simulation::new(&scene.machine);
         simulation.unwrap_or_else(|error| panic!("{name}: {error}"))
     });
-    let [a, b] = both.each_mut().map(|simulation| at(simulation, time));
+    let [a, b] = both.each_mut().map(|simulation| frame_at(simulation, time));
     let (turn, shift) = (turn(), Vec3::from(SHIFT));
     let mut moved: f64 = 0.0;
     for (a, b) in a.bodies.iter().zip(&b.bodies) {
@@ -136,7 +136,7 @@ fn a_machine_and_its_closed_form_move_equally_in_any_pose() {
     let both = [plain.clone(), turned(&plain)].map(|text| parse(&text, &FINE));
     let probe = both[0].machine.output.probe.unwrap();
     let mut tips = both.each_ref().map(|scene| {
-        let frame = at(&mut Simulation::new(&scene.machine).unwrap(), 0.02);
+        let frame = frame_at(&mut Simulation::new(&scene.machine).unwrap(), 0.02);
         let body = &frame.bodies[scene.machine.output.body];
         body.position + body.rotation * probe - frame.probe_error.unwrap()
     });

@@ -1,9 +1,9 @@
 //! Joints of two degrees, cylindrical and universal: closed forms, conservation laws and both formulations.
 
-use crate::common::matrix::{FORMULATIONS, every_way};
+use crate::common::matrix::{FORMULATIONS, every_variant};
 use crate::common::{frame_now, slope};
-use crate::elements::at;
-use crate::joint_elements::started;
+use crate::elements::frame_at;
+use crate::joint_elements::start_simulation;
 use jointplay::machine::{Quat, Vec3};
 use jointplay::simulate::Frame;
 
@@ -14,7 +14,7 @@ fn turn(axis: Vec3, angle: f64) -> Quat {
 }
 
 /// How far two angles differ, modulo a turn.
-pub fn differ(a: f64, b: f64) -> f64 {
+pub fn angle_difference(a: f64, b: f64) -> f64 {
     (0.5 * (a - b)).sin().abs() * 2.0
 }
 
@@ -24,23 +24,23 @@ fn a_cylindrical_joint_slides_and_turns_independently() {
                 [[body]]\nname = \"ring\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 2e-4 3e-4 kg m^2\"\n\
                 [[joint]]\nname = \"c\"\nkind = \"cylindrical\"\nchild = \"ring\"\naxis = [0, 0, 2]\n\
                 start = { position = \"20 mm\", angle = \"30 deg\", velocity = \"0.4 m/s\", angular_velocity = \"7 rad/s\" }\n";
-    for way in every_way() {
-        let bound = way.bound();
-        let mut simulation = started(text, &way.close());
+    for variant in every_variant() {
+        let bound = variant.bound();
+        let mut simulation = start_simulation(text, &variant.close());
         let t = 0.1;
-        let frame = at(&mut simulation, t);
+        let frame = frame_at(&mut simulation, t);
         let z = 0.02 + 0.4 * t - 0.5 * G * t * t;
         let angle = 30_f64.to_radians() + 7.0 * t;
         let body = &frame.bodies[0];
         let off = (body.position - Vec3::new(0.0, 0.0, z)).norm();
-        assert!(off < bound, "{way}: {off:e}");
+        assert!(off < bound, "{variant}: {off:e}");
         let turned = body.rotation[(1, 0)].atan2(body.rotation[(0, 0)]);
-        assert!(differ(turned, angle) < bound, "{way}: {turned} {angle}");
+        assert!(angle_difference(turned, angle) < bound, "{variant}: {turned} {angle}");
         let [[slid, speed], [turned, spin]] = frame.coordinates[..] else {
-            panic!("{way}: {:?}", frame.coordinates);
+            panic!("{variant}: {:?}", frame.coordinates);
         };
         assert!((slid - z).abs() < bound && (speed - 0.4 + G * t).abs() < 20.0 * bound);
-        assert!(differ(turned, angle) < bound && (spin - 7.0).abs() < bound);
+        assert!(angle_difference(turned, angle) < bound && (spin - 7.0).abs() < bound);
     }
 }
 
@@ -96,7 +96,7 @@ fn momenta(frame: &Frame) -> [Vec3; 2] {
 #[test]
 fn a_chain_of_both_joints_starts_at_its_coordinates() {
     for formulation in FORMULATIONS {
-        let mut simulation = started(&train(0.0), &[("formulation", formulation)]);
+        let mut simulation = start_simulation(&train(0.0), &[("formulation", formulation)]);
         let summary = simulation.mechanism().summary();
         assert_eq!((summary.bodies, summary.degrees_of_freedom), (3, 10));
         let frame = frame_now(&mut simulation);
@@ -135,9 +135,9 @@ fn a_free_chain_conserves_momenta_and_energy_in_both_formulations() {
     let mut ends = Vec::new();
     for formulation in FORMULATIONS {
         let changes = [("formulation", formulation), ("solver.tolerance", "1e-11")];
-        let mut simulation = started(&train(0.0), &changes);
+        let mut simulation = start_simulation(&train(0.0), &changes);
         let before = frame_now(&mut simulation);
-        let after = at(&mut simulation, 0.4);
+        let after = frame_at(&mut simulation, 0.4);
         for (a, b) in momenta(&before).iter().zip(momenta(&after)) {
             assert!((a - b).norm() < 1e-8 * a.norm(), "{formulation}: {a} {b}");
         }
@@ -154,7 +154,7 @@ fn a_free_chain_conserves_momenta_and_energy_in_both_formulations() {
         assert!((a.angular_velocity - b.angular_velocity).norm() < 1e-5);
     }
     for (a, b) in tree.coordinates.iter().zip(&lagrange.coordinates) {
-        assert!(differ(a[0], b[0]) < 1e-6 && (a[1] - b[1]).abs() < 1e-5, "{a:?} {b:?}");
+        assert!(angle_difference(a[0], b[0]) < 1e-6 && (a[1] - b[1]).abs() < 1e-5, "{a:?} {b:?}");
     }
 }
 
@@ -162,8 +162,8 @@ fn a_free_chain_conserves_momenta_and_energy_in_both_formulations() {
 fn the_error_falls_with_the_order_of_the_method() {
     let end = |method: &str, step: &str, tolerance: &str| {
         let changes = [("solver.method", method), ("solver.step", step), ("solver.tolerance", tolerance)];
-        let mut simulation = started(&train(-G), &changes);
-        at(&mut simulation, 0.2)
+        let mut simulation = start_simulation(&train(-G), &changes);
+        frame_at(&mut simulation, 0.2)
     };
     let exact = end("dopri5", "10 us", "1e-13");
     let points = [8.0, 4.0, 2.0].map(|ms| {

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use crate::common::matrix::for_every;
-use crate::common::{THREE_WAYS, parse};
-use crate::elements::at;
+use crate::common::{THREE_VARIANTS, parse};
+use crate::elements::frame_at;
 use jointplay::machine::Vec3;
 use jointplay::scene::{LiveScene, Scene};
 use jointplay::simulate::Frame;
@@ -27,7 +27,7 @@ fn wheel(height: f64, tyre: &str) -> String {
     )
 }
 
-fn started(text: &str, changes: &[(&str, &str)]) -> LiveScene {
+fn start_simulation(text: &str, changes: &[(&str, &str)]) -> LiveScene {
     LiveScene::new(&parse(text, changes)).unwrap()
 }
 
@@ -51,19 +51,19 @@ fn ridden(damping: f64, [a, w]: [f64; 2], t: f64) -> f64 {
 #[test]
 fn a_wheel_rides_a_wavy_road_as_the_linear_solution_says() {
     let (waves, time) = ([1e-3, TAU * 6.0], 0.3);
-    for_every([0.0, 400.0], |damping, way| {
+    for_every([0.0, 400.0], |damping, variant| {
         let text = wheel(
             REST,
             &format!(
                 "damping = \"{damping} N s/m\"\nground = {{ law = \"harmonic\", amplitude = \"1 mm\", frequency = \"6 Hz\" }}"
             ),
         );
-        let mut simulation = started(&text, &way.close());
-        let frame = at(&mut simulation, time);
-        let label = format!("{way}, damping {damping}");
+        let mut simulation = start_simulation(&text, &variant.close());
+        let frame = frame_at(&mut simulation, time);
+        let label = format!("{variant}, damping {damping}");
         let expected = ridden(damping, waves, time);
         let off = frame.bodies[0].position.z - REST - expected;
-        assert!(off.abs() < way.bound(), "{label}: {off:e} of {expected:e}");
+        assert!(off.abs() < variant.bound(), "{label}: {off:e} of {expected:e}");
         let ground = waves[0] * (waves[1] * time).sin();
         let depth = ground + RADIUS - frame.bodies[0].position.z;
         let stored = 0.5 * STIFFNESS * depth * depth;
@@ -80,12 +80,12 @@ fn a_wheel_rides_a_wavy_road_as_the_linear_solution_says() {
 #[test]
 fn a_wheel_that_falls_on_a_hard_tyre_flies_again() {
     let text = wheel(0.5, "");
-    for (method, formulation) in THREE_WAYS {
+    for (method, formulation) in THREE_VARIANTS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
-        let mut simulation = started(&text, &changes);
+        let mut simulation = start_simulation(&text, &changes);
         let mut highest = 0.0_f64;
         for n in 1..=1500 {
-            let frame = at(&mut simulation, f64::from(n) * 1e-3);
+            let frame = frame_at(&mut simulation, f64::from(n) * 1e-3);
             let height = frame.bodies[0].position.z;
             let force = frame.elements[0].force.z;
             let expected = STIFFNESS * (RADIUS - height).max(0.0);
@@ -108,10 +108,10 @@ fn no_bump_is_stepped_over() {
     let impulse = STIFFNESS * 2e-3 * 0.5e-3 * 4.0 / (3.0 * std::f64::consts::PI);
     let speed = impulse / MASS;
     for method in ["dopri5", "radau5", "automatic"] {
-        let mut simulation = started(&text, &[("solver.method", method), ("solver.tolerance", "1e-8")]);
-        let before = at(&mut simulation, 0.99);
+        let mut simulation = start_simulation(&text, &[("solver.method", method), ("solver.tolerance", "1e-8")]);
+        let before = frame_at(&mut simulation, 0.99);
         assert!((before.bodies[0].position.z - REST).abs() < 1e-9, "{method}");
-        let swing = at(&mut simulation, 1.00025 + 0.25 * TAU / (STIFFNESS / MASS).sqrt());
+        let swing = frame_at(&mut simulation, 1.00025 + 0.25 * TAU / (STIFFNESS / MASS).sqrt());
         let expected = speed / (STIFFNESS / MASS).sqrt();
         let found = swing.bodies[0].position.z - REST;
         assert!((found / expected - 1.0).abs() < 1e-3, "{method}: {found} {expected}");
@@ -134,10 +134,10 @@ fn a_tyre_is_a_one_sided_spring_on_a_driven_road() {
              stiffness = \"{STIFFNESS:e} N/m\"\ndamping = \"300 N s/m\"\nside = \"push\"\n"
         );
     let changes = [("solver.tolerance", "1e-10")];
-    let (mut a, mut b) = (started(&text, &changes), started(&road, &changes));
+    let (mut a, mut b) = (start_simulation(&text, &changes), start_simulation(&road, &changes));
     let mut lifted = false;
     for n in 1..60 {
-        let [a, b] = [&mut a, &mut b].map(|s| at(s, 0.01 * f64::from(n)));
+        let [a, b] = [&mut a, &mut b].map(|s| frame_at(s, 0.01 * f64::from(n)));
         lifted |= a.elements[0].force.z == 0.0;
         assert!((a.bodies[0].position - b.bodies[0].position).norm() < 1e-7);
         assert!((a.elements[0].force - b.elements[0].force).norm() < 1e-2);
@@ -151,7 +151,7 @@ fn a_tyre_is_a_one_sided_spring_on_a_driven_road() {
 fn up_is_against_the_gravity_of_the_file_or_given() {
     let push = |text: &str, changes: &[(&str, &str)]| -> Vec3 {
         let mut frame = Frame::default();
-        started(text, changes).sample(0.0, &mut frame);
+        start_simulation(text, changes).sample(0.0, &mut frame);
         frame.elements[0].force
     };
     let text = wheel(REST, "");
@@ -159,9 +159,9 @@ fn up_is_against_the_gravity_of_the_file_or_given() {
     assert!((push(&text, &[]) - weight).norm() < 1e-9);
     // A changed gravity moves no ground.
     assert!((push(&text, &[("gravity.z", "0"), ("gravity.x", "3 m/s^2")]) - weight).norm() < 1e-9);
-    let mut simulation = started(&text, &[]);
+    let mut simulation = start_simulation(&text, &[]);
     simulation.set("gravity.z", "5 m/s^2").unwrap();
-    assert!((at(&mut simulation, 0.0).elements[0].force - weight).norm() < 1e-9);
+    assert!((frame_at(&mut simulation, 0.0).elements[0].force - weight).norm() < 1e-9);
     let given = wheel(REST, "up = [0, 0.6, 0.8]\nground = { law = \"constant\", position = \"-50 mm\", velocity = 0 }");
     let height = RADIUS - 0.05 - 0.8 * REST;
     let expected = Vec3::new(0.0, 0.6, 0.8) * (STIFFNESS * height.max(0.0));

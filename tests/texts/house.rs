@@ -1,9 +1,9 @@
-//! The arrows of the house point down: a module uses only what stands on lower floors.
+//! Dependencies point downwards: a module uses only modules on lower floors.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Floors from the ground up; modules of one floor know nothing of each other.
+/// Floors from the ground up; modules of one floor do not use each other.
 const FLOORS: [&[&str]; 12] = [
     &["words", "jet", "suggest", "units"],
     &["contact", "expression", "files", "integrate"],
@@ -24,7 +24,7 @@ const EXACT: [&str; 9] =
 /// Modules of the lowest crate.
 const PHYSICS: [&str; 10] =
     ["words", "jet", "suggest", "units", "contact", "expression", "integrate", "machine", "mechanism", "simulate"];
-/// Crates of one floor, whose root is the module.
+/// Crates that are a single module.
 const CRATES: [&str; 2] = ["scene", "analysis"];
 
 fn floor(module: &str) -> Option<usize> {
@@ -44,7 +44,7 @@ fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// (module, file name for messages, code without comments and texts) of every file but the `lib.rs` of crates of several floors.
+/// (module, file name for messages, code without comments and strings) of every file except the `lib.rs` of crates with several modules.
 fn files() -> Vec<(String, String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = Vec::new();
@@ -80,7 +80,7 @@ fn files() -> Vec<(String, String, String)> {
     files
 }
 
-/// Rust source with comments and the insides of texts blanked; lines stay where they are.
+/// Rust source with comments and string contents blanked; line numbers are preserved.
 fn code(text: &str) -> String {
     let c: Vec<char> = text.chars().collect();
     let (mut out, mut i) = (String::new(), 0);
@@ -137,7 +137,7 @@ fn code(text: &str) -> String {
     out
 }
 
-/// Words of `code` with the place at which each starts.
+/// Words of `code` with their offsets.
 fn words(code: &str) -> impl Iterator<Item = (usize, &str)> {
     code.split(|c: char| !(c.is_alphanumeric() || c == '_'))
         .filter(|word| !word.is_empty())
@@ -148,8 +148,8 @@ fn line_of(code: &str, at: usize) -> usize {
     code[..at].matches('\n').count() + 1
 }
 
-/// The paths of the tree that `code` begins with, `{…}` lists and `*` included, and what follows it.
-fn tree<'c>(mut code: &'c str, start: &[&'c str], found: &mut Vec<Vec<&'c str>>) -> &'c str {
+/// Appends the paths of the use tree at the start of `code`, including `{…}` lists and `*`; returns the code after it.
+fn parse_use_tree<'c>(mut code: &'c str, start: &[&'c str], paths: &mut Vec<Vec<&'c str>>) -> &'c str {
     let mut path = start.to_vec();
     loop {
         code = code.trim_start();
@@ -159,7 +159,7 @@ fn tree<'c>(mut code: &'c str, start: &[&'c str], found: &mut Vec<Vec<&'c str>>)
                 if let Some(rest) = list.strip_prefix('}') {
                     return rest;
                 }
-                let rest = tree(list, &path, found);
+                let rest = parse_use_tree(list, &path, paths);
                 // Skips `as name`.
                 let rest = rest.trim_start_matches(|c| !matches!(c, ',' | '}'));
                 list = rest.strip_prefix(',').unwrap_or(rest);
@@ -171,28 +171,28 @@ fn tree<'c>(mut code: &'c str, start: &[&'c str], found: &mut Vec<Vec<&'c str>>)
         match code[end..].strip_prefix("::") {
             Some(rest) if end > 0 => code = rest,
             _ => {
-                found.push(path);
+                paths.push(path);
                 return &code[end..];
             }
         }
     }
 }
 
-/// Every path that begins with one of the words `starts`, with its place.
+/// Every path that begins with one of the words `starts`, with its offset.
 fn paths<'c>(code: &'c str, starts: &[&str]) -> Vec<(usize, Vec<&'c str>)> {
     let mut all = Vec::new();
     for (at, word) in words(code) {
         let begins = !code[..at].ends_with("::") && code[at + word.len()..].starts_with("::");
         if begins && starts.contains(&word) {
             let mut found = Vec::new();
-            tree(&code[at..], &[], &mut found);
+            parse_use_tree(&code[at..], &[], &mut found);
             all.extend(found.into_iter().map(|path| (at, path)));
         }
     }
     all
 }
 
-/// Modules that stand first after `crate::` (or `jointplay::` in the entries).
+/// Modules named first after `crate::` (or `jointplay::` in the entries).
 fn uses(code: &str) -> Vec<(usize, &str)> {
     let paths = paths(code, &["crate", "jointplay"]).into_iter();
     paths.filter_map(|(at, path)| Some((at, *path.get(1)?))).collect()
@@ -206,16 +206,16 @@ fn modules_use_only_lower_floors() {
         let own = floor(module).unwrap_or_else(|| panic!("{file}: module {module} has no floor"));
         for (at, used) in uses(code) {
             let Some(other) = floor(used).filter(|_| *used != *"scene" || !PHYSICS.contains(&module.as_str())) else {
-                // An item of the crate's root: no module. Or scenes, which only tests of the physics have: the compiler sees to that.
+                // An item of the crate's root is no module. Only tests of the physics use scenes; the compiler enforces that.
                 continue;
             };
             arrows += 1;
             assert!(used == module || other < own, "src/{file}:{}: {module} uses {used}", line_of(code, at));
         }
-        // `super` above the module's own folder would be a way around; a module of tests at the end is one deeper.
+        // `super` must not climb above the module's own folder; the module of tests at the end is one deeper.
         let depth = file.matches('/').count() - usize::from(file.ends_with("mod.rs"));
-        let (plain, tests) = code.split_once("#[cfg(test)]").unwrap_or((code, ""));
-        for (part, deeper) in [(plain, 1), (tests, 2)] {
+        let (production, tests) = code.split_once("#[cfg(test)]").unwrap_or((code, ""));
+        for (part, deeper) in [(production, 1), (tests, 2)] {
             let climb = "super::".repeat(depth + deeper);
             assert!(!part.contains(&climb), "src/{file}: climbs out by {climb}");
         }
@@ -223,7 +223,7 @@ fn modules_use_only_lower_floors() {
     assert!(arrows > 20, "only {arrows} arrows found: does the search still work?");
 }
 
-/// What a module's code says, without its tests at the end.
+/// A module's code without its tests.
 struct Module<'c> {
     file: &'c str,
     code: &'c str,
@@ -240,7 +240,7 @@ impl<'c> Module<'c> {
         let pairs = all.windows(2).filter(|pair| KINDS.contains(&pair[0]));
         let mut imports = Vec::new();
         for (at, word) in words(code).filter(|(_, word)| *word == "use") {
-            tree(&code[at + word.len()..], &[], &mut imports);
+            parse_use_tree(&code[at + word.len()..], &[], &mut imports);
         }
         Self { file, code, items: pairs.map(|pair| pair[1]).collect(), imports }
     }
@@ -271,8 +271,8 @@ impl<'c> Modules<'c> {
         &path[..(1..=path.len()).rev().find(known).unwrap_or(0)]
     }
 
-    /// The module in which the item at a path from the root stands, through re-exports.
-    fn home(&self, path: &[&'c str], depth: usize) -> Option<Vec<&'c str>> {
+    /// The module that defines the item at a path from the root, through re-exports.
+    fn defining_module(&self, path: &[&'c str], depth: usize) -> Option<Vec<&'c str>> {
         let at = self.module(path);
         let (module, Some(name)) = (self.0.get(at)?, path.get(at.len())) else {
             return Some(at.to_vec());
@@ -286,11 +286,11 @@ impl<'c> Modules<'c> {
                 target.push(name);
             }
             let named = depth > 0 && target.last() == Some(name);
-            named.then(|| self.home(&target, depth - 1)).flatten()
+            named.then(|| self.defining_module(&target, depth - 1)).flatten()
         })
     }
 
-    /// Modules whose items `module` names, each with the place where it does.
+    /// Modules whose items `module` names, with the offset of each use.
     fn uses(&self, module: &[&'c str]) -> Vec<(usize, Vec<&'c str>)> {
         let code = self.0[module].code;
         let mut used = Vec::new();
@@ -299,8 +299,8 @@ impl<'c> Modules<'c> {
                 continue;
             };
             if target.pop_if(|last| *last == "*").is_none() {
-                let home = self.home(&target, 4);
-                used.push((at, home.unwrap_or_else(|| self.module(&target).to_vec())));
+                let defining_module = self.defining_module(&target, 4);
+                used.push((at, defining_module.unwrap_or_else(|| self.module(&target).to_vec())));
                 continue;
             }
             for (at, word) in words(code) {
@@ -309,7 +309,7 @@ impl<'c> Modules<'c> {
                 let free = !code[..at].ends_with(['.', ':']) && !after.starts_with(": ");
                 if name && free {
                     let item = [&target[..], &[word]].concat();
-                    used.extend(self.home(&item, 4).map(|home| (at, home)));
+                    used.extend(self.defining_module(&item, 4).map(|defining_module| (at, defining_module)));
                 }
             }
         }
@@ -322,11 +322,11 @@ fn siblings_use_each_other_in_one_direction() {
     let files = files();
     let mut modules = Modules(BTreeMap::new());
     for (_, file, code) in &files {
-        let (plain, _) = code.split_once("#[cfg(test)]\nmod tests {").unwrap_or((code, ""));
+        let (production, _) = code.split_once("#[cfg(test)]\nmod tests {").unwrap_or((code, ""));
         let path = file.trim_end_matches(".rs").trim_end_matches("/mod");
-        modules.0.insert(path.split('/').collect(), Module::of(file, plain));
+        modules.0.insert(path.split('/').collect(), Module::of(file, production));
     }
-    // (folder, user, used) with a place; what a folder shares with its parent does not count.
+    // (folder, user, used) and a source position; both modules are below their common folder.
     let mut arrows = BTreeMap::new();
     for (user, module) in &modules.0 {
         for (at, used) in modules.uses(user) {
@@ -339,7 +339,7 @@ fn siblings_use_each_other_in_one_direction() {
         }
     }
     assert!(arrows.len() > 300, "only {} arrows found: does the search still work?", arrows.len());
-    // What nothing follows or nothing precedes is in no circle.
+    // A module without users or without uses is in no cycle.
     loop {
         let before = arrows.len();
         let users: BTreeSet<_> = arrows.keys().map(|&(of, a, _)| (of, a)).collect();
@@ -350,12 +350,12 @@ fn siblings_use_each_other_in_one_direction() {
         }
     }
     let places: Vec<String> = arrows.into_values().collect();
-    assert!(places.is_empty(), "in circles:\n{}", places.join("\n"));
+    assert!(places.is_empty(), "cycles:\n{}", places.join("\n"));
 }
 
 #[test]
 fn files_are_written_through_one_module() {
-    // Reading is free; tests of a module may do as they like.
+    // Reading is allowed everywhere; tests may also write.
     const WRITING: [&str; 12] = [
         "fs::write",
         "fs::rename",
@@ -371,14 +371,14 @@ fn files_are_written_through_one_module() {
         "NamedTempFile",
     ];
     for (module, file, code) in files() {
-        let (plain, _) = code.split_once("#[cfg(test)]\nmod tests").unwrap_or((&code, ""));
-        // Pictures that are drawn to be looked at.
+        let (production, _) = code.split_once("#[cfg(test)]\nmod tests").unwrap_or((&code, ""));
+        // `render/look.rs` draws pictures for inspection.
         if module == "files" || file == "render/look.rs" || file.ends_with("/tests.rs") {
             continue;
         }
         for call in WRITING {
-            let at = plain.find(call);
-            assert!(at.is_none(), "src/{file}:{}: {call}", line_of(plain, at.unwrap_or(0)));
+            let at = production.find(call);
+            assert!(at.is_none(), "src/{file}:{}: {call}", line_of(production, at.unwrap_or(0)));
         }
     }
 }
@@ -403,7 +403,7 @@ fn physics_knows_no_screen_clock_or_platform_dependent_function() {
         "f32",
         "rayon",
     ];
-    // Elementary functions of std: their bits differ between platforms; `libm` has the same ones everywhere.
+    // Elementary functions of std differ between platforms in the last bits; those of `libm` do not.
     const ELEMENTARY: [&str; 25] = [
         "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sin_cos", "sinh", "cosh", "tanh", "asinh", "acosh",
         "atanh", "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "cbrt", "hypot",
@@ -416,19 +416,20 @@ fn physics_knows_no_screen_clock_or_platform_dependent_function() {
         seen += 1;
         assert!(!code.contains("std::time"), "src/{file}: std::time");
         for (at, word) in words(&code) {
-            let place = || format!("src/{file}:{}: {word}", line_of(&code, at));
-            // What was recorded for the plots is kept short; nothing is computed from it.
+            let position = || format!("src/{file}:{}: {word}", line_of(&code, at));
+            // The record for the plots is in single precision; nothing is computed from it.
             let recorded = file == "simulate/history.rs";
-            // Files of meshes hold such numbers; what is computed from them is f64.
-            let short = word == "f32" && (recorded || file == "machine/mesh.rs" || file.starts_with("scene/mesh/"));
-            assert!(!FORBIDDEN.contains(&word) || short, "{}", place());
+            // Mesh files hold single-precision numbers; computations use f64.
+            let single_precision =
+                word == "f32" && (recorded || file == "machine/mesh.rs" || file.starts_with("scene/mesh/"));
+            assert!(!FORBIDDEN.contains(&word) || single_precision, "{}", position());
             let called = code[at + word.len()..].starts_with('(');
             let before = &code[..at];
             let method = before.ends_with('.') || before.ends_with("f64::");
             if ELEMENTARY.contains(&word) && called && method {
                 // A jet's own functions go through libm.
                 let own = ["jet", "mechanism"].contains(&module.as_str()) && word == "sin_cos";
-                assert!(own, "{}", place());
+                assert!(own, "{}", position());
             }
         }
     }
@@ -436,11 +437,11 @@ fn physics_knows_no_screen_clock_or_platform_dependent_function() {
 }
 
 #[test]
-fn the_search_sees_through_comments_and_texts() {
+fn the_search_ignores_comments_and_strings() {
     let text = "use crate::{scene::{A, app}, contact}; // crate::app\nlet s = \"crate::render\"; 'a' r#\"crate::cli\"# x.sin()";
     let code = code(text);
-    let found: Vec<&str> = uses(&code).into_iter().map(|(_, word)| word).collect();
-    assert_eq!(found, ["scene", "scene", "contact"]);
+    let modules: Vec<&str> = uses(&code).into_iter().map(|(_, word)| word).collect();
+    assert_eq!(modules, ["scene", "scene", "contact"]);
     assert!(code.contains("x.sin()") && !code.contains("render"));
     assert_eq!(line_of(&code, code.find("x.sin").unwrap()), 2);
 }

@@ -4,7 +4,7 @@ use jointplay::simulate::{Frame, Pacer, Simulation};
 
 use super::rows::Row;
 use crate::common::frame_now;
-use crate::common::invariants::{fault, finite};
+use crate::common::invariants::{finite, violation};
 
 /// What is asked for: simulated seconds a second, in frames of so many seconds, of a machine that does so many evaluations
 /// of the equations a second. Work is counted, not timed, so that a busy machine fails nothing.
@@ -90,7 +90,7 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
         Err(error) => return Outcome::Refused(error.to_string()),
     };
     let mut frame = frame_now(&mut simulation);
-    if let Some(what) = fault(&frame, &scene.machine, form) {
+    if let Some(what) = violation(&frame, &scene.machine, form) {
         return Outcome::Wrong(format!("{what}, at the start"));
     }
     let mut balance = Balance::new(&frame);
@@ -108,7 +108,7 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
             if let Err(stopped) = simulation.step_until(row.duration) {
                 let hash = simulation.state_hash();
                 frame = frame_now(&mut simulation);
-                if let Some(what) = fault(&frame, &scene.machine, form) {
+                if let Some(what) = violation(&frame, &scene.machine, form) {
                     return Outcome::Wrong(format!("stopped ({}) too late: {what}", stopped.fault));
                 }
                 if stopped.time != simulation.time() || simulation.state_hash() != hash {
@@ -130,7 +130,7 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
                     return Outcome::Wrong(format!("not finite inside a step, t = {middle:e} s"));
                 }
                 frame = frame_now(&mut simulation);
-                if let Some(what) = fault(&frame, &scene.machine, form) {
+                if let Some(what) = violation(&frame, &scene.machine, form) {
                     return Outcome::Wrong(what);
                 }
                 balance.watch(&frame);
