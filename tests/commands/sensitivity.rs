@@ -1,4 +1,4 @@
-//! `sensitivity`: known answers, and what a user may get wrong.
+//! `sensitivity`: known answers and user errors.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -15,14 +15,14 @@ use serde_json::Value as Json;
 use crate::program::{folder, jointplay};
 
 const LINKS: usize = 3;
-/// The scene of [`hung`], and runs in which nothing moves.
+/// A study of the scene of [`write_hung_chain`], with runs in which nothing moves.
 const HUNG: &str = "sensitivity ./hung.toml --duration 1ms --quiet --over joint.*.clearance=0.05mm..0.15mm";
-/// Height of the middle of the last link without play, m.
+/// Height of the middle of the last link without clearances, m.
 const LENGTH: f64 = 0.1 * LINKS as f64 - 0.05;
 
-/// Links of 100 mm, pulled straight upwards from a fixed socket by their weight in reversed gravity: the height of the last follows from that
-/// of the links and all clearances.
-fn hung(folder: &Path) {
+/// Writes a scene of links of 100 mm that reversed gravity pulls straight up from a fixed socket: the height of the last one is the
+/// sum of link lengths and clearances.
+fn write_hung_chain(folder: &Path) {
     let mut text = String::from(
         "start = \"equilibrium\"\n[gravity]\nz = \"9.81 m/s^2\"\n[contact]\nclearance = \"0.1 mm\"\n\
          [output]\nbody = \"link3\"\n",
@@ -48,23 +48,25 @@ fn results(path: &Path) -> Json {
 #[test]
 fn joints_in_a_straight_chain_share_the_variance_equally() {
     let folder = folder();
-    hung(folder.path());
-    let said = jointplay(folder.path(), &format!("{HUNG} --output link3.pose.z:end --rows 128 --out out")).expect(0);
-    assert!(said.stdout.contains("joint.J2.clearance"), "{}", said.stdout);
+    write_hung_chain(folder.path());
+    let run = jointplay(folder.path(), &format!("{HUNG} --output link3.pose.z:end --rows 128 --out out")).expect(0);
+    assert!(run.stdout.contains("joint.J2.clearance"), "{}", run.stdout);
     let found = results(&folder.path().join("out"));
     let output = &found["outputs"][0];
     let nominal = output["value"].as_f64().unwrap();
-    // The balls press into their walls by less than a micrometre.
+    // The balls penetrate their walls by less than a micrometre.
     assert!((nominal - LENGTH - 0.3e-3).abs() < 1e-6, "{nominal}");
     let parameters = output["parameters"].as_array().unwrap();
     assert_eq!(parameters.len(), LINKS);
-    for own in parameters {
-        let end = |key: &str| own[key].as_f64().unwrap() - nominal;
-        assert!((end("alone_low") + 0.05e-3).abs() < 1e-7 && (end("alone_high") - 0.05e-3).abs() < 1e-7, "{own}");
+    for parameter in parameters {
+        let end = |key: &str| parameter[key].as_f64().unwrap() - nominal;
+        assert!((end("alone_low") + 0.05e-3).abs() < 1e-7 && (end("alone_high") - 0.05e-3).abs() < 1e-7, "{parameter}");
         for key in ["first_order", "total"] {
-            let value = own[key]["value"].as_f64().unwrap();
+            let value = parameter[key]["value"].as_f64().unwrap();
             assert!((value - 1.0 / LINKS as f64).abs() < 0.02, "{key} {value}");
-            assert!(own[key]["low"].as_f64().unwrap() < value && value < own[key]["high"].as_f64().unwrap());
+            assert!(
+                parameter[key]["low"].as_f64().unwrap() < value && value < parameter[key]["high"].as_f64().unwrap()
+            );
         }
     }
     // Three uniform clearances, each of variance (0.1 mm)^2 / 12.
@@ -81,23 +83,23 @@ fn joints_in_a_straight_chain_share_the_variance_equally() {
 #[test]
 fn suggested_changes_for_a_target_reach_it() {
     let folder = folder();
-    hung(folder.path());
-    let ask = |excess: &str, out: &str| {
+    write_hung_chain(folder.path());
+    let suggestions = |excess: &str, out: &str| {
         let target = LENGTH + excess.parse::<f64>().unwrap();
         let line = format!("{HUNG} --output link3.pose.z:end --rows 0 --target {target:.6}m --out {out}");
         jointplay(folder.path(), &line).expect(0);
         results(&folder.path().join(out))["target"].clone()
     };
-    // 0.3 mm less 23 um: any joint alone, by four of the eight steps of 6.25 um.
-    let single = ask("277e-6", "one");
-    let ways = single["single"].as_array().unwrap();
-    assert_eq!(ways.len(), LINKS, "{single}");
-    for way in ways {
-        assert!((way["change"]["value"].as_f64().unwrap() - 0.075e-3).abs() < 1e-12, "{way}");
-        assert!(way["output"].as_f64().unwrap() <= LENGTH + 277e-6);
+    // To remove 23 um of 0.3 mm, any single joint suffices, with four of the eight steps of 6.25 um.
+    let single = suggestions("277e-6", "one");
+    let options = single["single"].as_array().unwrap();
+    assert_eq!(options.len(), LINKS, "{single}");
+    for option in options {
+        assert!((option["change"]["value"].as_f64().unwrap() - 0.075e-3).abs() < 1e-12, "{option}");
+        assert!(option["output"].as_f64().unwrap() <= LENGTH + 277e-6);
     }
-    // Less 70 um: one joint to its end, another by 25 um at the most.
-    let together = ask("230e-6", "two");
+    // To remove 70 um, one joint goes to its lower end and another is reduced by 25 um.
+    let together = suggestions("230e-6", "two");
     assert!(together["single"].as_array().unwrap().is_empty());
     let changes = together["together"]["changes"].as_array().unwrap();
     let mut values: Vec<f64> = changes.iter().map(|change| change["value"].as_f64().unwrap()).collect();
@@ -106,13 +108,13 @@ fn suggested_changes_for_a_target_reach_it() {
         (values[0] - 0.05e-3).abs() < 1e-12 && (values[1] - 0.075e-3).abs() < 1e-12 && values.len() == 2,
         "{values:?}"
     );
-    assert!(ask("100e-6", "three")["together"].is_null());
+    assert!(suggestions("100e-6", "three")["together"].is_null());
 }
 
 #[test]
-fn threads_change_no_byte() {
+fn the_number_of_threads_changes_no_byte() {
     let folder = folder();
-    hung(folder.path());
+    write_hung_chain(folder.path());
     for (threads, out) in [(1, "a"), (2, "b")] {
         let line = format!("{HUNG} --output link3.pose.z:end,peak-force --rows 8 --threads {threads} --out {out}");
         jointplay(folder.path(), &line).expect(0);
@@ -147,12 +149,12 @@ fn the_window_computes_the_same_bits_as_the_command() {
         assert!(!matches!(message, Message::Failed(_)), "{message:?}");
         if let Message::Run(run) = message {
             runs += 1;
-            for (own, value) in found["outputs"].as_array().unwrap().iter().zip(run.outputs) {
+            for (output, value) in found["outputs"].as_array().unwrap().iter().zip(run.outputs) {
                 let of_command = match run.index {
-                    0 => &own["value"],
-                    end => &own["parameters"][(end - 1) / 2][["alone_low", "alone_high"][(end - 1) % 2]],
+                    0 => &output["value"],
+                    end => &output["parameters"][(end - 1) / 2][["alone_low", "alone_high"][(end - 1) % 2]],
                 };
-                assert_eq!(of_command.as_f64(), value, "{} of run {}", own["name"], run.index);
+                assert_eq!(of_command.as_f64(), value, "{} of run {}", output["name"], run.index);
                 assert!(value.is_some());
             }
         }
@@ -164,25 +166,25 @@ fn the_window_computes_the_same_bits_as_the_command() {
 #[test]
 fn a_screening_drops_parameters_without_influence() {
     let folder = folder();
-    hung(folder.path());
+    write_hung_chain(folder.path());
     let line = format!(
         "{HUNG} --over contact.restitution=0.5..0.9 --over gravity.x=0m/s^2..0.001m/s^2 --output link3.pose.z:end --rows 8 --screen 4 --out out"
     );
-    let said = jointplay(folder.path(), &line).expect(0);
+    let run = jointplay(folder.path(), &line).expect(0);
     let found = results(&folder.path().join("out"));
     let parameters = found["outputs"][0]["parameters"].as_array().unwrap();
-    let kept = |key: &str| {
-        let own = parameters.iter().find(|own| own["key"] == key).unwrap();
-        !own["total"].is_null()
+    let is_kept = |key: &str| {
+        let parameter = parameters.iter().find(|parameter| parameter["key"] == key).unwrap();
+        !parameter["total"].is_null()
     };
-    assert!(kept("joint.J1.clearance") && kept("joint.J3.clearance"), "{}", said.stdout);
-    assert!(!kept("contact.restitution") && !kept("gravity.x"), "{}", said.stdout);
+    assert!(is_kept("joint.J1.clearance") && is_kept("joint.J3.clearance"), "{}", run.stdout);
+    assert!(!is_kept("contact.restitution") && !is_kept("gravity.x"), "{}", run.stdout);
 }
 
 #[test]
 fn invalid_studies_are_refused_before_any_run() {
     let folder = folder();
-    hung(folder.path());
+    write_hung_chain(folder.path());
     let bad = [
         ("--over joint.*.clearence=1um..2um", "(did you mean `joint.*.clearance`?)"),
         ("--over body.link1.mas", "(did you mean `body.link1.mass`?)"),
@@ -211,16 +213,16 @@ fn invalid_studies_are_refused_before_any_run() {
         ("--over joint.J1.clearance --output peak-force --duration 1ms --from 2ms", "before the end"),
     ];
     for (rest, message) in bad {
-        let said = jointplay(folder.path(), &format!("sensitivity ./hung.toml --out out {rest}")).expect(2);
-        assert!(said.stderr.contains(message), "{rest}: {}", said.stderr);
+        let run = jointplay(folder.path(), &format!("sensitivity ./hung.toml --out out {rest}")).expect(2);
+        assert!(run.stderr.contains(message), "{rest}: {}", run.stderr);
         assert!(!folder.path().join("out").exists(), "{rest}");
     }
-    // A fit at the diameter of the ball: half the clearance between hole and shaft.
+    // A fit at the ball's diameter: the joint clearance is half that between hole and shaft.
     let line = "sensitivity ./hung.toml --quiet --over joint.J1.clearance=H7/g6 --duration 1ms --rows 0 --output peak-force --out fit";
     jointplay(folder.path(), line).expect(0);
-    let own = &results(&folder.path().join("fit"))["outputs"][0]["parameters"][0];
-    let [low, high] = ["low", "high"].map(|key| own[key].as_f64().unwrap());
-    // Of 20 mm: H7 0 to 21 um, g6 -20 to -7 um (ISO 286-2, tables 2 and 4).
+    let parameter = &results(&folder.path().join("fit"))["outputs"][0]["parameters"][0];
+    let [low, high] = ["low", "high"].map(|key| parameter[key].as_f64().unwrap());
+    // At 20 mm: H7 is 0 to 21 um, g6 is -20 to -7 um (ISO 286-2, tables 2 and 4).
     assert!((low - 3.5e-6).abs() < 1e-9 && (high - 20.5e-6).abs() < 1e-9, "{low} {high}");
 }
 
@@ -228,12 +230,12 @@ fn invalid_studies_are_refused_before_any_run() {
 fn assumed_ranges_are_stated() {
     let folder = folder();
     let options = "four-bar --over contact.restitution --over contact.friction=0.1..0.2 --duration 1ms --quiet";
-    let said = "Range not given   contact.restitution: 0.45 to 1, half to one and a half of its value, within what is allowed\n";
+    let expected = "Range not given   contact.restitution: 0.45 to 1, half to one and a half of its value, within what is allowed\n";
     for (command, name) in [("sensitivity", "--rows 0"), ("tolerance", "--runs 8 --limit peak-force=1000N")] {
         let line = format!("{command} {options} {name} --out {command}");
         let run = jointplay(folder.path(), &line).expect(0);
         assert_eq!(run.stdout.matches("Range not given").count(), 1, "{}", run.stdout);
-        assert!(run.stdout.contains(said), "{}", run.stdout);
+        assert!(run.stdout.contains(expected), "{}", run.stdout);
         for file in [format!("{command}.json"), "manifest.json".to_owned()] {
             let text = fs::read_to_string(folder.path().join(command).join(&file)).unwrap();
             let json: Json = serde_json::from_str(&text).unwrap();
@@ -243,7 +245,7 @@ fn assumed_ranges_are_stated() {
     }
 }
 
-/// Where a mass rests on a spring: -m g / k, from a number of the file and a parameter of the scene's own.
+/// A mass rests on a spring at -m g / k; the mass is a number of the file, the stiffness a parameter of the scene.
 #[test]
 fn numbers_of_the_scene_file_can_vary_like_parameters() {
     let folder = folder();
@@ -271,7 +273,7 @@ stiffness = "k"
 damping = "1000 N s/m"
 "#;
     fs::write(folder.path().join("car.toml"), text).unwrap();
-    // The deviation of the stiffness is below its smallest value.
+    // The standard deviation of the stiffness is smaller than its allowed minimum.
     let line = "sensitivity ./car.toml --quiet --over body.*.mass=normal(400kg,10kg) --over parameter.k=normal(20N/mm,0.5N/mm) \
                 --output heave.position:mean --duration 1ms --rows 0 --out out";
     jointplay(folder.path(), line).expect(0);

@@ -1,4 +1,4 @@
-//! `run --save-state` and `--from-state`: a run that goes on in another process is the run without a break.
+//! `run --save-state` and `--from-state`: a run resumed in another process equals the uninterrupted run.
 
 use std::fs;
 use std::path::Path;
@@ -15,8 +15,8 @@ fn rows(folder: &Path, name: &str) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// Runs `scene` to 10 ms and on to 20 ms, and in one go, and compares rows and summaries.
-fn check(scene: &str, options: &str) {
+/// Runs `scene` to 10 ms, resumes to 20 ms, and compares rows and summaries with an uninterrupted run.
+fn check_resumed(scene: &str, options: &str) {
     let folder = folder();
     let run = |more: &str| {
         let line = format!("run {scene} {options} --quiet --summary json --every 0.25ms {more}");
@@ -31,25 +31,29 @@ fn check(scene: &str, options: &str) {
     assert_eq!((all.len(), later.len()), (82, 42), "{what}");
     assert_eq!(all[0], later[0], "{what}");
     assert_eq!(all[41..], later[1..], "{what}");
-    // Everything in the summary is that of the whole run: steps, peaks, energies, doubts, state hash.
-    let without = ["wall_s", "ratio", "slower_than_asked", "from_time_s", "rows", "out", "impacts_out", "restitution"];
-    let kept = |summary: &Json| {
-        let mut kept = summary.as_object().unwrap().clone();
-        kept.retain(|key, _| !without.contains(&key.as_str()));
-        kept
+    // The summary is that of the whole run: steps, peaks, energies, doubts, state hash.
+    let excluded = ["wall_s", "ratio", "slower_than_asked", "from_time_s", "rows", "out", "impacts_out", "restitution"];
+    let without_excluded = |summary: &Json| {
+        let mut without_excluded = summary.as_object().unwrap().clone();
+        without_excluded.retain(|key, _| !excluded.contains(&key.as_str()));
+        without_excluded
     };
-    assert_eq!(kept(&whole), kept(&second), "{what}");
+    assert_eq!(without_excluded(&whole), without_excluded(&second), "{what}");
     assert_eq!(second["from_time_s"], 0.01);
-    // No impact is lost or told twice.
-    let ends = |name: &str| {
+    // No impact is lost or reported twice.
+    let impact_count = |name: &str| {
         let text = fs::read_to_string(folder.path().join(name)).unwrap();
         let json: Json = serde_json::from_str(&text).unwrap();
         json["columns"]["end_s"].as_array().unwrap().len()
     };
-    assert_eq!(ends("a-impacts.json") + ends("b-impacts.json"), ends("whole-impacts.json"), "{what}");
+    assert_eq!(
+        impact_count("a-impacts.json") + impact_count("b-impacts.json"),
+        impact_count("whole-impacts.json"),
+        "{what}"
+    );
 }
 
-/// Every method in every scene goes on from a state as text in `tests/physics/promises.rs`; here in processes.
+/// `tests/physics/promises.rs` resumes every method in every scene within a process; this test resumes in another process.
 #[test]
 fn built_in_scenes_resume_with_the_same_bits() {
     for (scene, method) in [
@@ -59,20 +63,20 @@ fn built_in_scenes_resume_with_the_same_bits() {
         ("slider-crank-driven", "discrete-gradient"),
         ("chain", "radau5"),
     ] {
-        check(scene, &format!("--set solver.method={method}"));
+        check_resumed(scene, &format!("--set solver.method={method}"));
     }
-    check("spcmm", "--set solver.method=dopri5 --set formulation=lagrange");
-    check("spcmm", "--set contact.clearance=0");
-    check("spcmm", "--set joint.S2.clearance=0 --set contact.friction=0.3");
-    check("pendulum", "--set contact.approach_speed=largest --set solver.tolerance=1e-7");
+    check_resumed("spcmm", "--set solver.method=dopri5 --set formulation=lagrange");
+    check_resumed("spcmm", "--set contact.clearance=0");
+    check_resumed("spcmm", "--set joint.S2.clearance=0 --set contact.friction=0.3");
+    check_resumed("pendulum", "--set contact.approach_speed=largest --set solver.tolerance=1e-7");
 }
 
 #[test]
 fn machines_resume_with_the_same_bits() {
-    // Longer steps are too long for the light rods of the delta.
+    // The light rods of the delta need short steps.
     let fixed = "--set solver.method=semi-implicit-euler --set solver.step=1us";
     for (name, options) in MACHINES.into_iter().zip(["--set solver.tolerance=1e-4", fixed].into_iter().cycle()) {
-        check(name, options);
+        check_resumed(name, options);
     }
 }
 
@@ -82,15 +86,15 @@ fn the_ideal_reference_motion_of_a_probe_resumes_too() {
     for (name, body) in [("pendulum", "rod"), ("slider-crank", "slider")] {
         let text = jointplay::scene::built_in_text(name).unwrap();
         let output = format!("body = \"{body}\"\n");
-        let with = text.replacen(&output, &format!("{output}probe = \"0 0 -10 mm\"\n"), 1);
-        assert_ne!(with, text);
+        let with_probe = text.replacen(&output, &format!("{output}probe = \"0 0 -10 mm\"\n"), 1);
+        assert_ne!(with_probe, text);
         let path = folder.path().join(format!("{name}.toml"));
-        fs::write(&path, with).unwrap();
+        fs::write(&path, with_probe).unwrap();
         let header =
             jointplay(folder.path(), &format!("run {} --duration 0s --every 1s --out {name}.csv", path.display()));
         header.expect(0);
         assert!(rows(folder.path(), &format!("{name}.csv"))[0].contains("probe_error_x_m"));
-        check(&path.display().to_string(), "");
+        check_resumed(&path.display().to_string(), "");
     }
 }
 
@@ -109,7 +113,7 @@ fn repeatedly_resumed_runs_and_wear_maps_equal_an_uninterrupted_run() {
     assert_eq!(whole["state_hash"], last["state_hash"]);
     assert_eq!(whole["energy_J"], last["energy_J"]);
     assert_eq!(rows(folder.path(), "whole.csv"), rows(folder.path(), "last.csv"));
-    // From the start, and with a map that begins late.
+    // A state saved at the start, and a wear map that begins late.
     run("--duration 0s --save-state s0");
     let line = "run spcmm --duration 40ms --from-state s0 --wear late.csv --summary json";
     let late = jointplay(folder.path(), line).expect(0);
@@ -144,7 +148,7 @@ fn a_state_of_another_scene_is_refused_with_the_reason() {
     let save = "run pendulum --duration 3ms --set contact.friction=0.2 --save-state s --quiet";
     jointplay(folder.path(), save).expect(0);
     let good = fs::read_to_string(&path).unwrap();
-    let refused = |line: &str, code: i32, words: &[&str]| {
+    let check_refused = |line: &str, code: i32, words: &[&str]| {
         let run = jointplay(folder.path(), &format!("run {line} --from-state s")).expect(code);
         assert_eq!(run.stdout, "");
         assert_eq!(run.stderr.lines().count(), 1, "{}", run.stderr);
@@ -153,33 +157,33 @@ fn a_state_of_another_scene_is_refused_with_the_reason() {
         }
     };
     let same = "pendulum --duration 6ms --set contact.friction=0.2";
-    refused("spcmm --duration 6ms", 2, &["`pendulum`", "`spcmm`"]);
-    refused("pendulum --duration 6ms", 2, &["--set contact.friction=0.2", "no --set"]);
+    check_refused("spcmm --duration 6ms", 2, &["`pendulum`", "`spcmm`"]);
+    check_refused("pendulum --duration 6ms", 2, &["--set contact.friction=0.2", "no --set"]);
     let other = "pendulum --duration 6ms --set contact.friction=0.2 --set solver.method=rk4";
-    refused(other, 2, &["--set solver.method=rk4"]);
+    check_refused(other, 2, &["--set solver.method=rk4"]);
     let short = "pendulum --duration 1ms --set contact.friction=0.2";
-    refused(short, 2, &["--duration", "0.003 s"]);
-    refused(&format!("{same} --save-state s"), 2, &["same file"]);
+    check_refused(short, 2, &["--duration", "0.003 s"]);
+    check_refused(&format!("{same} --save-state s"), 2, &["same file"]);
     jointplay(folder.path(), &format!("{save} --force")).expect(0);
     assert_eq!(fs::read_to_string(&path).unwrap(), good, "the same bytes");
     jointplay(folder.path(), save).expect(1);
 
-    // Cut off anywhere, or with any digit changed.
+    // Truncated anywhere, or with any digit changed.
     for n in (0..good.len()).step_by(good.len() / 40) {
         fs::write(&path, &good[..n]).unwrap();
-        refused(same, 2, &["not a state"]);
+        check_refused(same, 2, &["not a state"]);
     }
     let digits: Vec<usize> = good.match_indices(|c: char| c.is_ascii_digit()).map(|m| m.0).collect();
     for at in digits.iter().step_by(digits.len() / 40) {
         let mut bytes = good.clone().into_bytes();
         bytes[*at] = if bytes[*at] == b'7' { b'8' } else { b'7' };
-        // A seventeenth digit may say the same number.
+        // Another seventeenth digit may denote the same number.
         let parsed = |text: &[u8]| serde_json::from_slice::<Json>(text).ok();
         if parsed(&bytes) == parsed(good.as_bytes()) {
             continue;
         }
         fs::write(&path, &bytes).unwrap();
-        refused(same, 2, &["--from-state s: "]);
+        check_refused(same, 2, &["--from-state s: "]);
     }
     for (text, words) in [
         (good.replace("\"state_format\":5", "\"state_format\":6"), "format 5"),
@@ -188,9 +192,9 @@ fn a_state_of_another_scene_is_refused_with_the_reason() {
         ("\u{0}\u{1b}[31m".to_owned(), "not a state"),
     ] {
         fs::write(&path, text).unwrap();
-        refused(same, 2, &[words]);
+        check_refused(same, 2, &[words]);
     }
-    // Right in itself, and not a state of this scene.
+    // Well-formed, but not a state of this scene.
     let mut json: Json = serde_json::from_str(&good).unwrap();
     for (pointer, value, words) in [
         ("/state/now/y", serde_json::json!([1.0]), "these values do not describe a state of this scene"),
@@ -210,11 +214,11 @@ fn a_state_of_another_scene_is_refused_with_the_reason() {
         let checksum = format!("{:08x}", crc32fast::hash(text.as_bytes()));
         content.insert("crc32".to_owned(), checksum.into());
         fs::write(&path, json.to_string()).unwrap();
-        refused(same, 2, &[words]);
+        check_refused(same, 2, &[words]);
         json = serde_json::from_str(&good).unwrap();
     }
     fs::remove_file(&path).unwrap();
-    refused(same, 1, &["cannot read s"]);
+    check_refused(same, 1, &["cannot read s"]);
 }
 
 #[test]
@@ -251,22 +255,22 @@ fn a_run_resumes_only_with_the_files_that_its_scene_named() {
     write("leg.toml", &load("0.8 kg"));
     let other = run("--duration 6ms --from-state s").expect(2);
     assert!(other.stderr.contains("whose file leg.toml has changed"), "{}", other.stderr);
-    // A state without the texts of files is one of another scene, too.
+    // A state without the texts of files is refused as well.
     let state = fs::read_to_string(folder.path().join("s")).unwrap();
     let mut state: Json = serde_json::from_str(&state).unwrap();
     let content = state.as_object_mut().unwrap();
     content.shift_remove("crc32");
-    let told = content["meta"].as_object_mut().unwrap();
-    told.shift_remove("scene_files").unwrap();
+    let meta_of_state = content["meta"].as_object_mut().unwrap();
+    meta_of_state.shift_remove("scene_files").unwrap();
     let text = serde_json::to_string(content).unwrap();
     let checksum = format!("{:08x}", crc32fast::hash(text.as_bytes()));
     content.insert("crc32".to_owned(), checksum.into());
     write("s", &state.to_string());
     write("leg.toml", &load("0.4 kg"));
-    let lacking = run("--duration 6ms --from-state s").expect(2);
-    assert!(lacking.stderr.contains("whose file leg.toml has changed"), "{}", lacking.stderr);
+    let without_files = run("--duration 6ms --from-state s").expect(2);
+    assert!(without_files.stderr.contains("whose file leg.toml has changed"), "{}", without_files.stderr);
 
-    // What names no file says nothing about files.
+    // A scene that names no files has no entry about files.
     let line = "run pendulum --duration 3ms --save-state s --every 1ms --out a.json --force --quiet";
     jointplay(folder.path(), line).expect(0);
     for meta in [meta("s"), meta("a.json")] {
@@ -275,7 +279,7 @@ fn a_run_resumes_only_with_the_files_that_its_scene_named() {
     }
 }
 
-/// A mesh is no text: its bytes are kept with the state, and must be the same for the run to go on.
+/// The state contains a checksum of binary mesh files, which must match when the run resumes.
 #[test]
 fn a_state_is_refused_if_a_mesh_of_its_scene_has_changed() {
     let folder = folder();

@@ -1,4 +1,4 @@
-//! What play costs: the tornado beside the picture, and the sliders that it moves.
+//! The panel "What play costs": the tornado beside the picture, and the sliders that it moves.
 
 use std::rc::Rc;
 
@@ -15,12 +15,12 @@ use crate::bench_window::{FAST, click, named_controls, set_number, sized, thrott
 use crate::golden::PLAIN;
 use crate::hands::compare_window;
 
-/// Colours of the bars to the lower and to the upper ends in a light window.
+/// Colours of the bars towards the lower and upper ends in a light window.
 const COLOURS: [Color32; 2] = [Color32::from_rgb(0x00, 0x72, 0xB2), Color32::from_rgb(0xD5, 0x5E, 0x00)];
 const SPAN: RunSpan = RunSpan { duration: 0.3, from: 0.1 };
 const RUNS: usize = 7;
 
-/// The window on the paper's scene with the panel open, and settings of short runs.
+/// The window on the paper's scene with the panel open and settings for short runs.
 fn window(size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
     let mut harness = sized("spcmm", &[&[FAST], &PLAIN[..]].concat(), size, theme);
     click(&mut harness, Role::Button, "What play costs");
@@ -42,9 +42,9 @@ fn compute(harness: &mut Harness<'_, App>) {
     harness.run();
 }
 
-/// The button of an end by the beginning of its label: `Clearance of S1 0.15 mm:`.
-fn end<'h>(harness: &'h Harness<'_, App>, end: &'h str) -> egui_kittest::Node<'h> {
-    harness.get_by_label_contains(end)
+/// The button of a bar's end, found by the beginning of its label: `Clearance of S1 0.15 mm:`.
+fn bar_end<'h>(harness: &'h Harness<'_, App>, label: &'h str) -> egui_kittest::Node<'h> {
+    harness.get_by_label_contains(label)
 }
 
 fn clearance(harness: &Harness<'_, App>, joint: &str) -> f64 {
@@ -54,7 +54,7 @@ fn clearance(harness: &Harness<'_, App>, joint: &str) -> f64 {
     }
 }
 
-/// Rectangles of each colour of [`COLOURS`], as drawn.
+/// Drawn rectangles of each colour of [`COLOURS`].
 fn bars(harness: &Harness<'_, App>) -> [Vec<Rect>; 2] {
     fn add(shape: &Shape, bars: &mut [Vec<Rect>; 2]) {
         match shape {
@@ -77,46 +77,46 @@ fn bars(harness: &Harness<'_, App>) -> [Vec<Rect>; 2] {
 }
 
 #[test]
-fn the_tornado_fills_with_the_numbers_of_the_study_and_its_bars_end_there() {
+fn the_tornado_shows_the_results_of_the_study() {
     let mut harness = large();
     let points = throttle_shared(&mut harness, 2);
     click(&mut harness, Role::Button, "Start runs");
     harness.run_steps(2);
     harness.get_by_label("Of the current setting; 0 of 7 runs");
-    let places = |harness: &Harness<'_, App>| {
+    let label_rects = |harness: &Harness<'_, App>| {
         ["S1", "S2", "S3"].map(|joint| {
             let label = format!("Clearance of {joint} 0.15 mm");
             harness.get_by_label_contains(&label).rect()
         })
     };
-    let first = places(&harness);
+    let first = label_rects(&harness);
     assert!(first[0].bottom() < first[1].top() && first[1].bottom() < first[2].top());
     for finished in 1..RUNS {
         points.set(1);
         harness.run_steps(2);
         harness.get_by_label(&format!("Of the current setting; {finished} of 7 runs"));
-        assert_eq!(places(&harness), first, "nothing moves while it computes");
+        assert_eq!(label_rects(&harness), first, "nothing moves while it computes");
         assert!(harness.state().bench().is_computing_costs());
     }
     let bar = harness.get_by_label("Computed so far");
     assert!(bar.accesskit_node().numeric_value().expect("a number") > 80.0);
-    // It does not move under the pointer, either.
+    // Rows are not re-sorted under the pointer.
     harness.hover_at(first[1].center());
     points.set(1);
     harness.run_steps(3);
     assert!(!harness.state().bench().is_computing_costs());
-    assert_eq!(places(&harness), first);
+    assert_eq!(label_rects(&harness), first);
     harness.hover_at(egui::pos2(700.0, 300.0));
     harness.run();
 
-    // The bits of the study of the command line.
+    // The results have the bits of the command line's study.
     let scene = harness.state().player().pending();
     let varied = inputs(scene, &[Uncertainty::parse("--over", "joint.*.clearance")]).expect("joints");
     let names: Vec<&str> = NAMED.iter().map(|named| named.name).collect();
-    let kept = outputs(scene, &names.join(",")).expect("outputs");
-    let alone = Alone::new(&varied);
+    let study_outputs = outputs(scene, &names.join(",")).expect("outputs");
+    let one_at_a_time = Alone::new(&varied);
     let keys: Vec<String> = varied.iter().map(|input| input.key.clone()).collect();
-    let study = StudyRuns::new(scene, &keys, &kept, SPAN, &alone.rows()).expect("runs");
+    let study = StudyRuns::new(scene, &keys, &study_outputs, SPAN, &one_at_a_time.rows()).expect("runs");
     let run = |index| {
         let mut block = study.sweep().begin(index);
         while !block.is_done() {
@@ -125,15 +125,15 @@ fn the_tornado_fills_with_the_numbers_of_the_study_and_its_bars_end_there() {
         study.outputs_of(&block.records())
     };
     let expected: Vec<Vec<f64>> = (0..RUNS).map(run).collect();
-    let found = harness.state().bench().cost_study().expect("a study");
+    let panel_study = harness.state().bench().cost_study().expect("a study");
     for output in 0..NAMED.len() {
-        assert_eq!(found.base(output), Some(expected[0][output]));
+        assert_eq!(panel_study.base(output), Some(expected[0][output]));
         for (index, run) in expected.iter().enumerate().skip(1) {
-            assert_eq!(found.end(output, (index - 1) / 2, (index - 1) % 2), Some(Some(run[output])));
+            assert_eq!(panel_study.end(output, (index - 1) / 2, (index - 1) % 2), Some(Some(run[output])));
         }
     }
 
-    // Sorted by the largest tip error, with bars from the line to each end.
+    // Rows are sorted by the spread of the largest tip error; bars run from the base line to each end.
     let tip: Vec<f64> = expected.iter().map(|run| run[0]).collect();
     let spread = |input: usize| {
         let all = [tip[0], tip[1 + 2 * input], tip[2 + 2 * input]];
@@ -141,25 +141,25 @@ fn the_tornado_fills_with_the_numbers_of_the_study_and_its_bars_end_there() {
     };
     let mut order = [0, 1, 2];
     order.sort_by(|a, b| spread(*b).total_cmp(&spread(*a)));
-    let sorted = places(&harness);
+    let sorted = label_rects(&harness);
     assert!(order.windows(2).all(|pair| sorted[pair[0]].bottom() < sorted[pair[1]].top()), "{order:?} {sorted:?}");
     let bars = bars(&harness);
     let all = || bars.iter().flatten();
     let (left, right) =
         (all().map(|bar| bar.left()).fold(f32::MAX, f32::min), all().map(|bar| bar.right()).fold(f32::MIN, f32::max));
-    let (least, most) = tip.iter().fold((f64::MAX, f64::MIN), |(a, b), &value| (a.min(value), b.max(value)));
-    let across = |value: f64| left + ((value - least) / (most - least)) as f32 * (right - left);
+    let (min, max) = tip.iter().fold((f64::MAX, f64::MIN), |(a, b), &value| (a.min(value), b.max(value)));
+    let x_of = |value: f64| left + ((value - min) / (max - min)) as f32 * (right - left);
     assert!(right - left > 80.0, "{left} {right}");
     for (end, bars) in bars.iter().enumerate() {
         assert_eq!(bars.len(), 3);
         for (row, bar) in bars.iter().enumerate() {
-            let (base, there) = (across(tip[0]), across(tip[1 + 2 * order[row] + end]));
-            let (from, to) = (base.min(there), base.max(there));
+            let (base, tip_end) = (x_of(tip[0]), x_of(tip[1 + 2 * order[row] + end]));
+            let (from, to) = (base.min(tip_end), base.max(tip_end));
             assert!((bar.left() - from).abs() < 0.1 && (bar.right() - to).abs() < 0.1, "{bar} {from} {to}");
         }
     }
 
-    // Another output of the same runs.
+    // Another output can be shown from the same runs.
     harness.get_by_role_and_label(Role::ComboBox, "Effect on").click();
     harness.run();
     harness.get_by_role_and_label(Role::Button, "Peak normal force").click();
@@ -168,7 +168,7 @@ fn the_tornado_fills_with_the_numbers_of_the_study_and_its_bars_end_there() {
     harness.get_by_label(&words);
 }
 
-/// As shown: four digits.
+/// A value as shown, with four digits.
 fn value(si: f64, unit: &str) -> String {
     jointplay::units::format_quantity_digits(si, unit, 4)
 }
@@ -181,14 +181,14 @@ fn a_click_on_an_end_moves_the_slider_of_its_joint_and_is_undone() {
     harness.key_press(Key::C);
     harness.run();
     assert!(harness.query_by_label("Accuracy").is_none(), "the controls are closed");
-    end(&harness, "Clearance of S2 0.45 mm:").click();
+    bar_end(&harness, "Clearance of S2 0.45 mm:").click();
     harness.run();
     assert_eq!(clearance(&harness, "S2"), 1.5 * original);
     let log = harness.state().player().log();
     let sets =
         |entry: &jointplay::app::Entry| matches!(&entry.event, Event::Set { key, .. } if key == "joint.S2.clearance");
     assert!(log.entries.iter().any(sets), "{log:?}");
-    // The slider has the focus, in sight.
+    // The slider is visible and has the focus.
     let slider = harness.get_by_role_and_label(Role::Slider, "Clearance of S2");
     assert!(slider.accesskit_node().is_focused());
     assert!(Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1280.0, 800.0)).contains_rect(slider.rect()));
@@ -200,8 +200,8 @@ fn a_click_on_an_end_moves_the_slider_of_its_joint_and_is_undone() {
     assert_eq!(clearance(&harness, "S2"), original);
     harness.get_by_label("Of the current setting; 7 of 7 runs");
     assert_eq!(bars(&harness).map(|own| own.len()), [3, 3]);
-    // By keyboard.
-    end(&harness, "Clearance of S3 0.15 mm:").focus();
+    // The keyboard works as well.
+    bar_end(&harness, "Clearance of S3 0.15 mm:").focus();
     harness.step();
     harness.key_press(Key::Enter);
     harness.run();
@@ -209,7 +209,7 @@ fn a_click_on_an_end_moves_the_slider_of_its_joint_and_is_undone() {
 }
 
 #[test]
-fn closing_it_cancels_and_forgets() {
+fn closing_the_panel_cancels_the_study_and_discards_results() {
     let mut harness = large();
     let points = throttle(&mut harness);
     for close in ["What play costs", "Bench", "tab"] {
@@ -235,7 +235,7 @@ fn closing_it_cancels_and_forgets() {
 }
 
 #[test]
-fn what_varies_and_by_how_much_is_chosen() {
+fn varied_parameters_and_ranges_can_be_chosen() {
     let mut harness = large();
     for name in ["Clearance", "Restitution"] {
         click(&mut harness, Role::CheckBox, name);
@@ -248,15 +248,15 @@ fn what_varies_and_by_how_much_is_chosen() {
     let study = harness.state().bench().cost_study().expect("a study");
     let all = |ends| ["S1", "S2", "S3"].map(|joint| (format!("joint.{joint}.restitution"), ends));
     assert_eq!(study.task.over, all([0.2, 0.7]));
-    end(&harness, "Restitution of S1 0.7:");
-    // The choice of the output, and two ends of each joint.
+    bar_end(&harness, "Restitution of S1 0.7:");
+    // The results add the choice of output and two bar ends per joint.
     assert_eq!(named_controls(&harness), before + 7);
-    // A part ends where the parameter does.
+    // A percentage is clipped to the parameter's range.
     click(&mut harness, Role::Button, "Percent");
     compute(&mut harness);
     let study = harness.state().bench().cost_study().expect("a study");
     assert_eq!(study.task.over, all([0.45, 1.0]));
-    // A reversed range, and nothing at all.
+    // A reversed range and an empty selection are refused.
     click(&mut harness, Role::Button, "Range");
     set_number(&mut harness, "Restitution to", 0.1);
     click(&mut harness, Role::Button, "Start runs");
@@ -268,13 +268,13 @@ fn what_varies_and_by_how_much_is_chosen() {
 }
 
 #[test]
-fn on_a_phone_a_slider_takes_its_place_and_gives_it_back() {
+fn on_a_phone_the_slider_replaces_the_panel_until_it_is_reopened() {
     let mut harness = window([390.0, 844.0], egui::Theme::Light);
     compute(&mut harness);
-    let own = end(&harness, "Clearance of S1 0.45 mm:");
+    let own = bar_end(&harness, "Clearance of S1 0.45 mm:");
     own.scroll_to_me();
     harness.run();
-    end(&harness, "Clearance of S1 0.45 mm:").click();
+    bar_end(&harness, "Clearance of S1 0.45 mm:").click();
     harness.run();
     let slider = harness.get_by_role_and_label(Role::Slider, "Clearance of S1");
     assert!(slider.accesskit_node().is_focused());
@@ -284,7 +284,7 @@ fn on_a_phone_a_slider_takes_its_place_and_gives_it_back() {
     click(&mut harness, Role::Button, "Bench");
     harness.run();
     harness.get_by_label_contains("Of an earlier setting.");
-    end(&harness, "Clearance of S1 0.45 mm:");
+    bar_end(&harness, "Clearance of S1 0.45 mm:");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Films: what comes out again when they are decoded, and those that the program and the window make.
+//! Films: decoded frames, and films made by the program and by the window.
 
 use rusty_h264_decoder::Decoder;
 use shiguredo_mp4::bitstream::h264::{LengthSize, length_prefixed_to_annexb};
@@ -22,21 +22,21 @@ fn picture([width, height]: [u32; 2], k: u32, colour: [u8; 3]) -> Vec<u8> {
         for x in 0..width {
             let (dx, dy) = (f64::from(x) - 30.0 - 3.0 * f64::from(k), f64::from(y) - 30.0);
             let inside = dx * dx + dy * dy < 400.0;
-            let ground = [200 + (x / 8) as u8, 200, 210];
-            rgba.extend(if inside { colour } else { ground });
+            let background = [200 + (x / 8) as u8, 200, 210];
+            rgba.extend(if inside { colour } else { background });
             rgba.push(255);
         }
     }
     rgba
 }
 
-/// The frames of an MP4: time s, whether it stands for itself, and red, green, blue by BT.709.
+/// The frames of an MP4: time (s), whether it is a key frame, and red, green, blue by BT.709.
 fn decode(file: &[u8], [width, height]: [usize; 2]) -> Vec<(f64, bool, Vec<u8>)> {
     let mut demuxer = Mp4FileDemuxer::new();
-    while let Some(wanted) = demuxer.required_input() {
-        let from = wanted.position as usize;
-        let size = wanted.size.unwrap_or(file.len() - from);
-        demuxer.handle_input(Input { position: wanted.position, data: &file[from..from + size] });
+    while let Some(input) = demuxer.required_input() {
+        let from = input.position as usize;
+        let size = input.size.unwrap_or(file.len() - from);
+        demuxer.handle_input(Input { position: input.position, data: &file[from..from + size] });
     }
     let mut decoder = Decoder::new();
     let mut frames = Vec::new();
@@ -59,7 +59,7 @@ fn decode(file: &[u8], [width, height]: [usize; 2]) -> Vec<(f64, bool, Vec<u8>)>
                 let at = y / 2 * (width / 2) + x / 2;
                 let part = |plane: &[u8]| (f64::from(plane[at]) - 128.0) * 255.0 / 224.0;
                 let (blue, red) = (part(&yuv.u), part(&yuv.v));
-                // The inverse of BT.709-6, as its Table 3 gives it to five digits.
+                // The inverse of BT.709-6, Table 3, to five digits.
                 let colour = [luma + 1.5748 * red, luma - 0.18732 * blue - 0.46812 * red, luma + 1.8556 * blue];
                 rgb.extend(colour.map(|part| part.round().clamp(0.0, 255.0) as u8));
             }
@@ -70,7 +70,7 @@ fn decode(file: &[u8], [width, height]: [usize; 2]) -> Vec<(f64, bool, Vec<u8>)>
     frames
 }
 
-/// Mean square difference of two pictures, as a ratio to full scale in dB.
+/// Peak signal-to-noise ratio of two pictures, dB.
 fn signal_to_noise(of: &[u8], rgb: &[u8]) -> f64 {
     let square = |(a, b): (&u8, &u8)| (f64::from(*a) - f64::from(*b)).powi(2);
     let sum: f64 = of.iter().zip(rgb).map(square).sum();
@@ -79,7 +79,7 @@ fn signal_to_noise(of: &[u8], rgb: &[u8]) -> f64 {
 
 #[test]
 fn an_mp4_has_the_frames_at_their_times_in_their_colours() {
-    // Not a multiple of 16: the decoder has to cut the frame.
+    // Not a multiple of 16: the decoder must crop the frame.
     let size = [200, 90];
     for (rate, colour) in [(30.0, [200, 40, 30]), (29.97, [20, 60, 190])] {
         let mut film = Film::new(Format::Mp4, size, rate).unwrap();
@@ -94,18 +94,18 @@ fn an_mp4_has_the_frames_at_their_times_in_their_colours() {
         for (k, ((time, key, rgb), picture)) in frames.iter().zip(&pictures).enumerate() {
             assert!((time - k as f64 / rate).abs() < 1e-9, "{time}");
             assert_eq!(*key, k % 60 == 0, "{k}");
-            let wanted: Vec<u8> = picture.chunks_exact(4).flat_map(|pixel| pixel[..3].to_vec()).collect();
-            // The edge of the disc loses half its resolution of colour.
-            let ratio = signal_to_noise(&wanted, rgb);
+            let expected: Vec<u8> = picture.chunks_exact(4).flat_map(|pixel| pixel[..3].to_vec()).collect();
+            // Chroma subsampling blurs the edge of the disc.
+            let ratio = signal_to_noise(&expected, rgb);
             assert!(ratio > 30.0, "{k}: {ratio}");
-            // Away from edges colours are those of the picture.
+            // Away from edges the colours are preserved.
             for (x, y) in [(30 + 3 * k, 30), (4, 80)] {
                 let at = y * 200 + x;
                 if x >= 200 {
                     continue;
                 }
                 for part in 0..3 {
-                    let difference = i32::from(wanted[3 * at + part]) - i32::from(rgb[3 * at + part]);
+                    let difference = i32::from(expected[3 * at + part]) - i32::from(rgb[3 * at + part]);
                     assert!(difference.abs() <= 6, "{k} {x} {y}: {difference}");
                 }
             }
@@ -114,7 +114,7 @@ fn an_mp4_has_the_frames_at_their_times_in_their_colours() {
 }
 
 #[test]
-fn a_gif_keeps_its_pace_and_draws_what_changed() {
+fn a_gif_keeps_its_frame_rate_and_draws_only_changes() {
     let size = [120, 64];
     let mut film = Film::new(Format::Gif, size, 30.0).unwrap();
     let pictures: Vec<Vec<u8>> = (0..30).map(|k| picture(size, k, [200, 40, 30])).collect();
@@ -149,13 +149,13 @@ fn a_gif_keeps_its_pace_and_draws_what_changed() {
 }
 
 #[test]
-fn films_that_no_player_shows_are_refused() {
-    let refused = |format, size, rate| Film::new(format, size, rate).err().unwrap().to_string();
-    assert!(refused(Format::Mp4, [201, 90], 30.0).contains("must be even"));
-    assert!(refused(Format::Mp4, [16_384, 16_384], 30.0).contains("8192x4320"));
-    assert!(refused(Format::Mp4, [1280, 720], 0.0).contains("frames a second"));
-    assert!(refused(Format::Gif, [200, 90], 60.0).contains("50 frames"));
-    assert!(refused(Format::Gif, [70_000, 90], 20.0).contains("65535"));
+fn films_beyond_the_limits_of_players_are_refused() {
+    let error = |format, size, rate| Film::new(format, size, rate).err().unwrap().to_string();
+    assert!(error(Format::Mp4, [201, 90], 30.0).contains("must be even"));
+    assert!(error(Format::Mp4, [16_384, 16_384], 30.0).contains("8192x4320"));
+    assert!(error(Format::Mp4, [1280, 720], 0.0).contains("frames a second"));
+    assert!(error(Format::Gif, [200, 90], 60.0).contains("50 frames"));
+    assert!(error(Format::Gif, [70_000, 90], 20.0).contains("65535"));
     let film = Film::new(Format::Mp4, [16, 16], 30.0).unwrap();
     assert_eq!(film.finish(), Err(FilmError::Empty));
 }
@@ -175,7 +175,7 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn the_frames_of_a_film_are_those_of_render_to_the_byte() {
+fn frames_of_a_film_equal_those_of_render() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let line = "render spcmm --duration 8ms --fps 10 --slow 100 --size 320x180 --quiet --hide trail";
@@ -187,24 +187,24 @@ fn the_frames_of_a_film_are_those_of_render_to_the_byte() {
         assert!(output.status.success(), "{name}");
         let film = read(folder, name);
         assert_eq!(&film[4..4 + magic.len()], magic);
-        let account = read(folder, &format!("{name}.meta.json"));
-        let account: serde_json::Value = serde_json::from_slice(&account).expect("JSON");
+        let metadata = read(folder, &format!("{name}.meta.json"));
+        let metadata: serde_json::Value = serde_json::from_slice(&metadata).expect("JSON");
         let checksum = format!("{:08x}", crc32fast::hash(&film));
-        assert_eq!(account["film_crc32"], checksum.as_str());
-        let frames = account["frames"].as_array().expect("a list");
+        assert_eq!(metadata["film_crc32"], checksum.as_str());
+        let frames = metadata["frames"].as_array().expect("a list");
         assert_eq!(frames.len(), 9);
-        let again = read(folder, "frames/manifest.json");
-        let again: serde_json::Value = serde_json::from_slice(&again).expect("JSON");
+        let manifest = read(folder, "frames/manifest.json");
+        let manifest: serde_json::Value = serde_json::from_slice(&manifest).expect("JSON");
         for (k, frame) in frames.iter().enumerate() {
             let (_, pixels) = decoded(&file(&format!("frames/frame_{k:05}.png")));
             let checksum = format!("{:08x}", crc32fast::hash(&pixels));
             assert_eq!(frame["pixels_crc32"], checksum.as_str(), "{name} {k}");
             for key in ["time_s", "state_hash"] {
-                assert_eq!(frame[key], again["frames"][k][key], "{name} {k}");
+                assert_eq!(frame[key], manifest["frames"][k][key], "{name} {k}");
             }
         }
     }
-    // What is there already stays, and nothing is left of what cannot be made.
+    // Existing files are not overwritten, and a failed film leaves no file.
     let before = std::fs::read_dir(folder).expect("a folder").count();
     for (options, words) in [
         ("--film a.mp4", "already exists"),
@@ -217,14 +217,14 @@ fn the_frames_of_a_film_are_those_of_render_to_the_byte() {
         let fps = if options.contains("--fps") || rest == "--fps 10" { "" } else { "--fps 10" };
         let output = jointplay(folder, &format!("{line} {rest} {fps} {options}"));
         assert!(!output.status.success(), "{options}");
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(told.contains(words), "{options}: {told}");
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(message.contains(words), "{options}: {message}");
     }
     assert_eq!(std::fs::read_dir(folder).expect("a folder").count(), before);
 }
 
 #[test]
-fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
+fn the_window_makes_a_film_of_the_timeline_and_returns_to_its_instant() {
     let (mut harness, calls) = window("pendulum", [900.0, 640.0]);
     give_graphics(&mut harness);
     harness.state_mut().player_mut().pacer.set_scale(0.02);
@@ -236,7 +236,7 @@ fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
     };
     let before = state(&harness);
 
-    // Given up, it leaves nothing.
+    // A cancelled film leaves no file.
     click(&mut harness, "Save");
     click(&mut harness, "Film…");
     let words = label(&harness, "46 frames, 1.5 s of film");
@@ -244,7 +244,7 @@ fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
     click(&mut harness, "Make film");
     harness.run_steps(5);
     assert!(harness.state().filming().is_some());
-    // Meanwhile nothing else moves the machine.
+    // During filming nothing else may move the machine.
     harness.key_press(eframe::egui::Key::Space);
     harness.step();
     assert!(!harness.state().player().is_playing());
@@ -270,7 +270,7 @@ fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
     let frames = decode(&file.bytes, [640, 360]);
     assert_eq!(frames.len(), 10);
 
-    // Each frame is the picture of its instant.
+    // Each frame equals the picture of its instant.
     click(&mut harness, "Save");
     click(&mut harness, "Own size");
     for (name, edge) in [("Width of the picture", 640.0), ("Height of the picture", 360.0)] {
@@ -287,7 +287,7 @@ fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
         let (_, rgba) = decoded(&next_file(&mut harness, &calls));
         let picture: Vec<u8> = rgba.chunks_exact(4).flat_map(|pixel| pixel[..3].to_vec()).collect();
         let ratio = |k: usize| signal_to_noise(&picture, &frames[k].2);
-        // But for the trail and the fading marks of impacts, which only a film has.
+        // The tolerance covers the trail and the fading impact marks, which only a film has.
         assert!(ratio(k) > 25.0, "{k}: {}", ratio(k));
         let other = if k == 9 { 0 } else { 9 };
         assert!(ratio(k) > ratio(other) + 1.0, "{k}: {} {}", ratio(k), ratio(other));

@@ -1,4 +1,4 @@
-//! A scene file that is saved while the window shows it.
+//! A scene file saved in an editor while the window shows it.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -17,17 +17,17 @@ use jointplay::scene::{Scene, built_in_text};
 
 use crate::hands::builder;
 
-/// What a host was asked for, and what it has to tell.
+/// Requests to the host, and files it will report as saved.
 #[derive(Default)]
 struct Calls {
     watched: Vec<Option<String>>,
     saved: VecDeque<OpenedFile>,
 }
 
-/// A desktop without files.
-struct Desk(Rc<RefCell<Calls>>);
+/// A desktop host without a file system.
+struct MemoryHost(Rc<RefCell<Calls>>);
 
-impl Host for Desk {
+impl Host for MemoryHost {
     fn read_dropped(&mut self, _files: Vec<Arc<dyn egui::DroppedFile + Send + Sync>>) {}
 
     fn opened(&mut self) -> Option<Vec<OpenedFile>> {
@@ -49,27 +49,27 @@ fn text() -> String {
     built_in_text("pendulum").expect("built in").to_owned()
 }
 
-fn still() -> f64 {
+fn stopped_clock() -> f64 {
     0.0
 }
 
-/// A second passes between two looks.
-fn slow() -> f64 {
-    static LOOKS: AtomicU64 = AtomicU64::new(0);
-    LOOKS.fetch_add(1, Ordering::Relaxed) as f64
+/// A clock that advances by a second at each reading.
+fn slow_clock() -> f64 {
+    static READINGS: AtomicU64 = AtomicU64::new(0);
+    READINGS.fetch_add(1, Ordering::Relaxed) as f64
 }
 
 /// The window on the file [`NAME`] with `changes`, paused at t = 0.
 fn window(changes: &[(&str, &str)], clock: Clock) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
-    let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
-    let changes: Vec<_> = changes.iter().map(own).collect();
+    let pair = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+    let changes: Vec<_> = changes.iter().map(pair).collect();
     let scene = Scene::parse(&text(), Some(NAME), &changes).expect("a scene");
     let calls = Rc::new(RefCell::new(Calls::default()));
-    let desk = Box::new(Desk(calls.clone()));
-    (shown(scene, clock, desk), calls)
+    let desk = Box::new(MemoryHost(calls.clone()));
+    (open_window(scene, clock, desk), calls)
 }
 
-fn shown(scene: Scene, clock: Clock, host: Box<dyn Host>) -> Harness<'static, App> {
+fn open_window(scene: Scene, clock: Clock, host: Box<dyn Host>) -> Harness<'static, App> {
     let mut options = AppOptions::new(scene);
     options.playing = false;
     options.theme = egui::Theme::Light.into();
@@ -88,8 +88,8 @@ fn save(harness: &mut Harness<'_, App>, calls: &RefCell<Calls>, name: &str, text
     harness.run_steps(2);
 }
 
-/// Whether the window says `words`, to those who see it and to those who do not.
-fn says(harness: &Harness<'_, App>, words: &str) -> bool {
+/// Whether the announcement contains `words`.
+fn announces(harness: &Harness<'_, App>, words: &str) -> bool {
     harness.state().announcement().contains(words)
 }
 
@@ -106,11 +106,11 @@ fn rougher() -> String {
 
 #[test]
 fn a_saved_file_is_shown_at_the_same_instant_by_the_same_camera() {
-    let (mut harness, calls) = window(&[], still);
+    let (mut harness, calls) = window(&[], stopped_clock);
     assert_eq!(calls.borrow().watched, [Some(NAME.to_owned())]);
-    // What the file already holds is no news.
+    // Saving an unchanged file causes no reload.
     save(&mut harness, &calls, NAME, &text());
-    assert!(!says(&harness, "Reloaded"));
+    assert!(!announces(&harness, "Reloaded"));
     harness.state_mut().run_to(12.5e-3);
     harness.key_press(egui::Key::Num2);
     harness.run();
@@ -124,29 +124,29 @@ fn a_saved_file_is_shown_at_the_same_instant_by_the_same_camera() {
     assert!(!player.is_playing());
     assert_eq!(player.pending().source.file.as_deref(), Some(NAME));
     assert_eq!(harness.state().link().camera, before);
-    assert!(says(&harness, "Reloaded at 12.500 ms"), "{}", harness.state().announcement());
-    // The run is that of the new file from its start.
+    assert!(announces(&harness, "Reloaded at 12.500 ms"), "{}", harness.state().announcement());
+    // The run equals one of the new file from its start.
     let scene = Scene::parse(&rougher(), Some(NAME), &[]).expect("a scene");
     let mut simulation = jointplay::simulate::Simulation::new(&scene.machine).expect("starts");
     simulation.advance_to(12.5e-3).expect("runs");
     assert_eq!(player.simulation().state_hash(), simulation.state_hash());
-    // Still watched, without asking again.
+    // The file stays watched without another request.
     assert_eq!(calls.borrow().watched.len(), 1);
 }
 
 #[test]
-fn an_instant_that_takes_long_to_reach_is_not_waited_for() {
-    let (mut harness, calls) = window(&[], slow);
+fn a_reload_restarts_if_the_instant_takes_too_long_to_reach() {
+    let (mut harness, calls) = window(&[], slow_clock);
     harness.state_mut().run_to(12.5e-3);
     save(&mut harness, &calls, NAME, &rougher());
     assert_eq!(friction(&harness), 0.25);
     assert_eq!(harness.state().player().pacer.shown(), 0.0);
-    assert!(says(&harness, "Reloaded from the start"));
+    assert!(announces(&harness, "Reloaded from the start"));
 }
 
 #[test]
 fn an_error_in_the_file_is_shown_with_its_line_beside_the_running_scene() {
-    let (mut harness, calls) = window(&[], still);
+    let (mut harness, calls) = window(&[], stopped_clock);
     harness.state_mut().run_to(12.5e-3);
     let wrong = text().replace("friction = 0.15", "friction = -0.15");
     let line = wrong.lines().position(|line| line.starts_with("friction = -"));
@@ -158,7 +158,7 @@ fn an_error_in_the_file_is_shown_with_its_line_beside_the_running_scene() {
         assert_eq!(friction(&harness), 0.15);
         assert_eq!(harness.state().player().pacer.shown(), 12.5e-3);
     }
-    // Back to what runs: the message goes, the run stays as it is.
+    // Restoring the running text removes the message and does not affect the run.
     let steps = harness.state().player().steps();
     save(&mut harness, &calls, NAME, &text());
     assert_eq!(harness.query_all_by_label_contains(NAME).count(), 0);
@@ -172,62 +172,62 @@ fn an_error_in_the_file_is_shown_with_its_line_beside_the_running_scene() {
 }
 
 #[test]
-fn changes_made_here_stay_unless_the_file_says_something_else() {
+fn changes_in_the_window_stay_unless_the_file_changes_the_same_key() {
     let changes = [("contact.friction", "0.4"), ("contact.restitution", "0.7")];
-    let (mut harness, calls) = window(&changes, still);
+    let (mut harness, calls) = window(&changes, stopped_clock);
     save(&mut harness, &calls, NAME, &rougher());
     let contact = harness.state().player().pending().machine.contact;
     assert_eq!((contact.friction, contact.restitution), (0.25, 0.7));
-    assert!(says(&harness, "Reloaded from the start, keeping 1 change"));
+    assert!(announces(&harness, "Reloaded from the start, keeping 1 change"));
 }
 
 #[test]
 fn only_the_file_of_the_shown_scene_is_watched() {
-    let (mut harness, calls) = window(&[], still);
+    let (mut harness, calls) = window(&[], stopped_clock);
     harness.state_mut().open("spcmm").expect("a scene");
     harness.run_steps(2);
     save(&mut harness, &calls, NAME, &rougher());
     assert_eq!(harness.state().player().pending().name, "spcmm");
     let link = {
         let scene = Scene::parse(&rougher(), Some(NAME), &[]).expect("a scene");
-        let other = shown(scene, still, Box::new(DesktopHost::default()));
+        let other = open_window(scene, stopped_clock, Box::new(DesktopHost::default()));
         other.state().share_state()
     };
     let ctx = harness.ctx.clone();
     harness.state_mut().open_link(&ctx, &link).expect("a link");
     harness.run_steps(2);
-    // The scene has the file's name, but a link makes the program read no file.
+    // The scene has the file's name, but a link never makes the program read a file.
     let scene = harness.state().player().pending();
     assert_eq!(scene.source.file.as_deref(), Some("mine.toml"));
     assert_eq!(calls.borrow().watched, [Some(NAME.to_owned()), None, None]);
 }
 
-/// Lets the window look at the disk until `done`.
+/// Runs frames until the window has noticed a change on disk and `done` holds.
 fn wait(harness: &mut Harness<'_, App>, done: impl Fn(&Harness<'_, App>) -> bool) {
-    let started = std::time::Instant::now();
+    let start = std::time::Instant::now();
     while !done(harness) {
-        assert!(started.elapsed().as_secs() < 30);
+        assert!(start.elapsed().as_secs() < 30);
         std::thread::sleep(std::time::Duration::from_millis(50));
         harness.run_steps(1);
     }
 }
 
-/// A file that a scene includes: a parameter of its own.
-fn own(name: &str, value: &str) -> String {
+/// Text of an included file: one parameter.
+fn parameter_text(name: &str, value: &str) -> String {
     format!("[[parameter]]\nname = \"{name}\"\nvalue = \"{value}\"\n")
 }
 
 #[test]
-fn files_beside_the_scene_are_read_again_with_it_and_watched() {
+fn included_files_are_watched_and_reloaded() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     let write = |name: &str, text: &str| std::fs::write(path(name), text).expect("writes");
     let including = |names: &str, text: &str| format!("include = [{names}]\n{text}");
-    write("own.toml", &own("reach", "1 mm"));
+    write("own.toml", &parameter_text("reach", "1 mm"));
     write("mine.toml", &including("\"own.toml\"", &text()));
     let changes = [("contact.restitution".to_owned(), "0.7".to_owned())];
     let scene = Scene::load(path("mine.toml"), &changes).expect("a scene");
-    let mut harness = shown(scene, still, Box::new(DesktopHost::default()));
+    let mut harness = open_window(scene, stopped_clock, Box::new(DesktopHost::default()));
     let get = |harness: &Harness<'_, App>, key: &str| {
         let scene = harness.state().player().pending();
         scene.get(key).map(|value| format!("{value:?}")).ok()
@@ -236,22 +236,22 @@ fn files_beside_the_scene_are_read_again_with_it_and_watched() {
     assert!(before.is_some());
     let notice = "Reloaded from the start, keeping 1 change";
 
-    // The included file alone.
-    write("own.toml", &own("reach", "25 mm"));
+    // A change of the included file only.
+    write("own.toml", &parameter_text("reach", "25 mm"));
     wait(&mut harness, |harness| get(harness, "parameter.reach") != before);
-    assert!(says(&harness, notice), "{}", harness.state().announcement());
-    // The scene's own, which includes another one now, with an error in it.
+    assert!(announces(&harness, notice), "{}", harness.state().announcement());
+    // A change of the scene file, which now includes another file with an error.
     write("other.toml", "[[parameter]]\nname = 1\n");
     let both = including("\"own.toml\", \"other.toml\"", &rougher());
     write("mine.toml", &both);
-    wait(&mut harness, |harness| says(harness, "other.toml:2"));
+    wait(&mut harness, |harness| announces(harness, "other.toml:2"));
     assert_eq!(friction(&harness), 0.15);
-    write("other.toml", &own("width", "3 mm"));
+    write("other.toml", &parameter_text("width", "3 mm"));
     wait(&mut harness, |harness| friction(harness) == 0.25);
-    assert!(says(&harness, notice), "{}", harness.state().announcement());
+    assert!(announces(&harness, notice), "{}", harness.state().announcement());
     let width = get(&harness, "parameter.width");
     assert!(width.is_some());
-    write("other.toml", &own("width", "3.5 mm"));
+    write("other.toml", &parameter_text("width", "3.5 mm"));
     wait(&mut harness, |harness| get(harness, "parameter.width") != width);
 }
 
@@ -270,14 +270,14 @@ impl egui::DroppedFile for Dropped {
 }
 
 #[test]
-fn a_dropped_scene_finds_its_files_and_that_of_a_link_does_not() {
+fn a_dropped_scene_finds_its_files_and_a_link_does_not() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("mine.toml");
     let text = format!("include = [\"own.toml\"]\n{}", rougher());
-    std::fs::write(folder.path().join("own.toml"), own("reach", "1 mm")).expect("writes");
+    std::fs::write(folder.path().join("own.toml"), parameter_text("reach", "1 mm")).expect("writes");
     std::fs::write(&path, &text).expect("writes");
     let scene = Scene::parse(&self::text(), None, &[]).expect("a scene");
-    let mut harness = shown(scene, still, Box::new(DesktopHost::default()));
+    let mut harness = open_window(scene, stopped_clock, Box::new(DesktopHost::default()));
     let file = Arc::new(Dropped(path.clone()));
     harness.input_mut().dropped_files.push(file);
     harness.run_steps(3);
@@ -300,10 +300,10 @@ fn a_file_on_the_disk_is_noticed() {
     let path: PathBuf = folder.path().join("mine.toml");
     std::fs::write(&path, text()).expect("writes");
     let scene = Scene::load(&path, &[]).expect("a scene");
-    let mut harness = shown(scene, still, Box::new(DesktopHost::default()));
+    let mut harness = open_window(scene, stopped_clock, Box::new(DesktopHost::default()));
     std::fs::write(&path, rougher()).expect("writes");
     wait(&mut harness, |harness| friction(harness) == 0.25);
-    assert!(says(&harness, "Reloaded"));
+    assert!(announces(&harness, "Reloaded"));
     let labels = harness.query_all_by_label_contains("Reloaded");
     assert!(labels.filter(|node| node.accesskit_node().role() == Role::Status).count() > 0);
 }

@@ -1,4 +1,4 @@
-//! Force elements against closed solutions, in every method and both formulations.
+//! Force elements against closed-form solutions, in every method and both formulations.
 
 use crate::common::matrix::every_variant;
 use crate::common::{THREE_VARIANTS, parse};
@@ -8,7 +8,7 @@ use jointplay::simulate::{Frame, Simulation};
 
 const MASS: f64 = 0.5;
 
-/// One body of `MASS` that starts at (0.13, 0, 0) m at rest, no gravity, with `more` in its file.
+/// A free body of `MASS` at rest at (0.13, 0, 0) m without gravity; `more` is appended to the scene.
 fn floating(more: &str, changes: &[(&str, &str)]) -> Simulation {
     let text = format!(
         "[gravity]\nx = 0\ny = 0\nz = 0\n\
@@ -55,7 +55,7 @@ fn a_mass_on_a_spring_has_its_natural_frequency_in_every_method_and_formulation(
 }
 
 #[test]
-fn a_damper_dissipates_as_the_closed_solution() {
+fn a_damper_dissipates_as_the_closed_form() {
     // Underdamped: x = 0.1 + e^(-d t) (A cos w t + B sin w t) with d = c / 2m, w^2 = k/m - d^2, started at rest.
     let (k, c): (f64, f64) = (200.0, 4.0);
     let d = c / (2.0 * MASS);
@@ -69,22 +69,22 @@ fn a_damper_dissipates_as_the_closed_solution() {
             let time = 0.25;
             let frame = frame_at(&mut simulation, time);
             let (sin, cos) = (w * time).sin_cos();
-            let fall = (-d * time).exp();
-            let expected = 0.1 + 0.03 * fall * (cos + d / w * sin);
+            let decay = (-d * time).exp();
+            let expected = 0.1 + 0.03 * decay * (cos + d / w * sin);
             let off = (frame.bodies[0].position.x - expected).abs();
             assert!(off < 1e-8, "{method} {formulation}: {off:e}");
-            let speed = -0.03 * fall * (w + d * d / w) * sin;
-            let left = 0.5 * MASS * speed * speed + 0.5 * k * (expected - 0.1).powi(2);
+            let speed = -0.03 * decay * (w + d * d / w) * sin;
+            let remaining = 0.5 * MASS * speed * speed + 0.5 * k * (expected - 0.1).powi(2);
             let lost = simulation.ledger().unwrap().damping_loss;
-            let expected = 0.5 * k * 0.03 * 0.03 - left;
+            let expected = 0.5 * k * 0.03 * 0.03 - remaining;
             assert!((lost / expected - 1.0).abs() < 1e-5, "{method} {formulation}: {lost} {expected}");
         }
     }
 }
 
 #[test]
-fn a_stiff_damped_spring_does_not_hold_an_implicit_method_back() {
-    // 2 kHz and nearly critically damped: after 0.2 s nothing moves, and an explicit method still steps by microseconds.
+fn a_stiff_damped_spring_does_not_slow_an_implicit_method() {
+    // 2 kHz and nearly critically damped: after 0.2 s nothing moves, but an explicit method still takes microsecond steps.
     let stiff = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\n\
                  length = \"100 mm\"\nstiffness = \"80 kN/mm\"\ndamping = \"10 kN s/m\"\n";
     let evaluations = |method: &str| {
@@ -117,7 +117,7 @@ fn a_preload_pulls_at_the_rest_length_and_enters_the_energy() {
 }
 
 #[test]
-fn loads_move_a_body_as_newton_and_euler_say() {
+fn loads_accelerate_a_body_as_in_the_newton_euler_equations() {
     let push = |axes: &str| {
         format!(
             "[[load]]\nname = \"f\"\non = {{ body = \"mass\" }}\nforce = \"0 3 0 N\"\ntorque = \"0 0 0.02 N m\"\naxes = \"{axes}\"\n"
@@ -140,9 +140,9 @@ fn loads_move_a_body_as_newton_and_euler_say() {
             let kinetic = 0.5 * MASS * body.velocity.norm_squared() + 0.5 * 4e-4 * (spin_up * time).powi(2);
             let work = simulation.ledger().unwrap().external_work;
             assert!((work / kinetic - 1.0).abs() < 1e-6, "{work} {kinetic}");
-            // In body axes the force turns by spin_up t^2 / 2: its impulse is Fresnel's integral.
-            let mut turning = floating(&push("body"), &changes);
-            let velocity = frame_at(&mut turning, time).bodies[0].velocity;
+            // In body axes the force rotates by spin_up t^2 / 2: its impulse is a Fresnel integral.
+            let mut rotating = floating(&push("body"), &changes);
+            let velocity = frame_at(&mut rotating, time).bodies[0].velocity;
             let (mut x, mut y) = (0.0, 0.0);
             let n = 20_000;
             for i in 0..n {
@@ -161,7 +161,7 @@ fn loads_move_a_body_as_newton_and_euler_say() {
 fn elements_are_fixed_to_links_of_a_chain() {
     let text = jointplay::scene::built_in_text("chain").unwrap();
     let with = |element: &str| Scene::parse(&format!("{text}\n{element}"), None, &[]);
-    // Strong beside gravity: long before a ball has crossed its play the link moves as if it were alone.
+    // The load is strong, so the link moves freely before its balls cross their clearances.
     let scene = with("[[load]]\nname = \"push\"\non = { body = \"link3\" }\nforce = \"0 40 0 N\"\n");
     let mut simulation = Simulation::new(&scene.unwrap().machine).unwrap();
     let before = frame_at(&mut simulation, 0.0).bodies[2].position;
@@ -171,19 +171,19 @@ fn elements_are_fixed_to_links_of_a_chain() {
     let expected = Vec3::new(0.0, 40.0 / 0.384, -9.81) * 0.5e-6;
     assert!((moved - expected).norm() < 1e-12, "{moved} {expected}");
 
-    for (name, body, said) in [
+    for (name, body, fragment) in [
         ("J2", "link3", "already a joint or force element"),
         ("free2", "link3", "already a joint or force element"),
         ("push", "link9", "link8"),
     ] {
         let load = format!("[[load]]\nname = \"{name}\"\non = {{ body = \"{body}\" }}\nforce = \"1 0 0 N\"\n");
         let error = with(&load).unwrap_err().to_string();
-        assert!(error.contains(said), "{error}");
+        assert!(error.contains(fragment), "{error}");
     }
 }
 
 #[test]
-fn a_harmonic_load_drives_as_the_closed_solution() {
+fn a_harmonic_load_moves_a_body_as_in_closed_form() {
     let load = "[[load]]\nname = \"f\"\non = { body = \"mass\" }\nforce = \"2 0 0 N\"\nfrequency = \"5 Hz\"\nphase = \"90 deg\"\n";
     let mut simulation = floating(load, &[("solver.tolerance", "1e-10")]);
     let omega = std::f64::consts::TAU * 5.0;
@@ -196,8 +196,8 @@ fn a_harmonic_load_drives_as_the_closed_solution() {
 }
 
 #[test]
-fn a_spring_on_a_driven_slide_gives_its_work_to_the_drive() {
-    // A slide moves one end of a spring whose other end is the world: all that the drive gives is stored.
+fn a_spring_on_a_driven_slide_stores_the_work_of_the_drive() {
+    // A driven slide stretches a spring fixed to the world: all the drive's work is stored.
     let text = "[gravity]\nx = 0\ny = 0\nz = 0\n\
         [[body]]\nname = \"slide\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
         [[body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
@@ -218,7 +218,7 @@ fn a_spring_on_a_driven_slide_gives_its_work_to_the_drive() {
 }
 
 #[test]
-fn a_scene_without_elements_pays_nothing_for_them() {
+fn a_scene_without_elements_has_no_element_terms() {
     let mut simulation = crate::common::simulation("spcmm", &[]);
     let frame = frame_at(&mut simulation, 1e-3);
     assert!(frame.elements.is_empty());
@@ -240,8 +240,8 @@ fn a_bush_that_starts_concentric_is_stiff_from_the_first_step() {
 }
 
 #[test]
-fn where_nothing_moves_by_itself_a_quick_load_is_still_followed() {
-    // Every joint ideal: the machine goes with its drive alone, of half a hertz.
+fn a_fast_load_is_resolved_even_without_degrees_of_freedom() {
+    // With ideal joints the motion is prescribed by drives of half a hertz.
     let text = crate::common::scene("spcmm", &[]).source.text.clone()
         + "\n[[load]]\nname = \"shake\"\non = { body = \"platform\" }\nforce = \"0 20 0 N\"\nfrequency = \"200 Hz\"\n";
     let scene = crate::common::parse(&text, &[("contact.clearance", "0")]);
@@ -260,7 +260,7 @@ fn bad_elements_are_refused_with_their_position() {
         );
         Scene::parse(&text, Some("mine.toml"), &[]).unwrap_err().to_string()
     };
-    for (more, said) in [
+    for (more, fragments) in [
         ("[[spring]]\nname = \"s\"\n", ["spring.s.from", "missing"]),
         (
             "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"world\" }\nlength = \"1 m\"\n",
@@ -286,16 +286,16 @@ fn bad_elements_are_refused_with_their_position() {
         ("[[load]]\nname = \"f\"\non = { body = \"mass\" }\naxes = \"bodies\"\n", ["axes", "world, body"]),
     ] {
         let message = error(more);
-        for said in said {
-            assert!(message.contains(said), "{message}\nlacks {said}");
+        for fragment in fragments {
+            assert!(message.contains(fragment), "{message}\nlacks {fragment}");
         }
         assert!(message.starts_with("mine.toml:"), "{message}");
     }
 }
 
 #[test]
-fn a_one_sided_spring_lets_go_and_catches_again() {
-    // Thrown off a spring that only pushes, a mass falls back on it as fast as it left; over the top it is in free flight.
+fn a_one_sided_spring_releases_and_catches_the_mass() {
+    // A spring that only pushes throws a mass off; it falls back as fast as it left and is in free flight in between.
     let text = "
 [gravity]
 z = \"-9.81 m/s^2\"
@@ -339,13 +339,13 @@ side = \"push\"
         let ledger = simulation.ledger().unwrap();
         assert!(ledger.relative_residual().abs() < 1e-6, "{method} {ledger:?}");
     }
-    // Preloaded and damped: energy balances though the spring goes slack.
+    // Preloaded and damped, the energy balances although the spring goes slack.
     let damped =
         text.replace("stiffness = \"2 kN/m\"", "stiffness = \"2 kN/m\"\ndamping = \"5 N s/m\"\npreload = \"-10 N\"");
     let mut simulation = Simulation::new(&parse(&damped, &[("solver.tolerance", "1e-9")]).machine).unwrap();
     simulation.advance_to(1.0).unwrap();
     let ledger = simulation.ledger().unwrap();
-    // What is left in the spring as it lets go is lost in its damper, while the mass is in free flight and steps are long.
+    // The damper dissipates the spring's remaining energy at release, where steps are long because the mass is in free flight.
     let residual = ledger.relative_residual().abs();
     assert!(ledger.damping_loss > 0.1 && residual < 1e-3, "{residual:e} {ledger:?}");
 }

@@ -1,5 +1,5 @@
-//! Long runs, and parameters that change with every frame: some seconds of each; a thousand simulated seconds and a minute of frames
-//! in `./test full`.
+//! Long runs, and runs with a parameter change in every frame: short versions of both here, a thousand simulated seconds and a
+//! minute of frames in `./test full`.
 
 use std::fmt::Write;
 use std::sync::Mutex;
@@ -11,7 +11,7 @@ use jointplay::machine::Mat3;
 use jointplay::scene::LiveScene;
 use jointplay::simulate::{Frame, Simulation};
 
-/// Numbers from a seed (xorshift64*), so that every run of a test is the same.
+/// Pseudo-random numbers from a seed (xorshift64*), so that every run of a test is the same.
 struct Numbers(u64);
 
 impl Numbers {
@@ -44,8 +44,8 @@ fn change(numbers: &mut Numbers, simulation: &Simulation) -> (String, String) {
     }
 }
 
-/// Steps one frame further and looks.
-fn frame_on(simulation: &mut Simulation, target: f64, frame: &mut Frame) {
+/// Advances by one frame and checks the invariants.
+fn advance_frame(simulation: &mut Simulation, target: f64, frame: &mut Frame) {
     simulation.advance_to(target).unwrap();
     simulation.sample(target, frame);
     assert!(finite(frame), "t = {target}");
@@ -54,7 +54,7 @@ fn frame_on(simulation: &mut Simulation, target: f64, frame: &mut Frame) {
     assert_eq!(violation(&now, &machine, "tree"), None, "t = {target}");
 }
 
-/// `frames` frames of a sixtieth of a second at `pace` simulated seconds a second.
+/// Runs `frames` frames at 60 frames per second and `pace` simulated seconds per second, with a random change in each.
 fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64) {
     let mut numbers = Numbers(seed);
     let changes = [("solver.preset", preset)];
@@ -66,7 +66,7 @@ fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64)
         let (key, value) = change(&mut numbers, &simulation);
         simulation.set(&key, &value).unwrap();
         match numbers.below(120) {
-            // A pause: frames are drawn, time stands still.
+            // A pause: frames are drawn, but time does not advance.
             0 => {
                 let hash = simulation.state_hash();
                 for _ in 0..5 {
@@ -74,33 +74,33 @@ fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64)
                 }
                 assert_eq!(simulation.state_hash(), hash);
             }
-            // Forward, back, and forward again the same way, also in a simulation that came from elsewhere.
+            // Runs a random path twice from a snapshot, and once in another simulation.
             1 => {
                 let snapshot = simulation.snapshot();
-                let mut way = Vec::new();
-                let play = |simulation: &mut LiveScene, way: &[(String, String)]| {
-                    for (n, (key, value)) in way.iter().enumerate() {
+                let mut path = Vec::new();
+                let replay = |simulation: &mut LiveScene, path: &[(String, String)]| {
+                    for (n, (key, value)) in path.iter().enumerate() {
                         simulation.set(key, value).unwrap();
                         simulation.advance_to(shown + (n + 1) as f64 * pace / 60.0).unwrap();
                     }
                     simulation.state_hash()
                 };
                 for _ in 0..5 {
-                    way.push(change(&mut numbers, &simulation));
+                    path.push(change(&mut numbers, &simulation));
                 }
-                let first = play(&mut simulation, &way);
+                let first = replay(&mut simulation, &path);
                 simulation.restore(&snapshot);
-                assert_eq!(play(&mut simulation, &way), first, "seed {seed}, t = {shown}");
+                assert_eq!(replay(&mut simulation, &path), first, "seed {seed}, t = {shown}");
                 let mut other = LiveScene::new(&scene(name, &[])).unwrap();
                 other.restore(&snapshot);
-                assert_eq!(play(&mut other, &way), first, "elsewhere, seed {seed}, t = {shown}");
+                assert_eq!(replay(&mut other, &path), first, "elsewhere, seed {seed}, t = {shown}");
                 simulation.restore(&snapshot);
                 restored += 1;
             }
             _ => {}
         }
         shown += pace / 60.0;
-        frame_on(&mut simulation, shown, &mut frame);
+        advance_frame(&mut simulation, shown, &mut frame);
         n += 1;
     }
     let statistics = simulation.statistics();
@@ -153,45 +153,45 @@ fn minutes_of_changes_with_every_frame_in_real_time() {
     }
 }
 
-/// The same where few balls are loose.
+/// Default bounds of the energy residual with `preview` and `real-time`, for few loose joints.
 const RESIDUAL: [f64; 2] = [2e-3, 1e-4];
 
-/// What a long run showed at the same phase of every period, against the third period.
+/// Largest deviations of a long run, at the same phase of every period, from the third period.
 #[derive(Debug, Default)]
 struct Drift {
     /// Simulated time, s.
     time: f64,
     steps: u64,
-    /// Contacts begun after the third period.
+    /// Contacts that began after the third period.
     contacts: u64,
     /// Largest distance between ball and socket of an ideal joint, m.
     open: f64,
-    /// Largest departure of an orientation from a rotation.
+    /// Largest deviation of an orientation from a rotation matrix.
     skew: f64,
-    /// Energy that came or went, of the largest kinetic energy.
+    /// Change of energy, relative to the largest kinetic energy.
     energy: f64,
-    /// Change of a normal force, of the largest.
+    /// Change of a normal force, relative to the largest.
     force: f64,
-    /// Residual of the energy balance at the end, of the energy exchanged.
+    /// Residual of the energy balance at the end, relative to the energy exchanged.
     residual: f64,
 }
 
-/// A long run: scene, changes, period (s), and what may come and go in it.
-struct Long {
+/// A long run: scene, changes, period (s) and bounds.
+struct LongRun {
     scene: &'static str,
     what: &'static str,
     changes: &'static crate::common::Changes<'static>,
     period: f64,
-    /// Largest change of energy, and a tenth of that of a force, with `preview` and with `real-time`; none where contacts do not settle.
+    /// Bound on the change of energy, and a tenth of that on a force, with `preview` and `real-time`; none where contacts do not settle.
     limits: [Option<f64>; 2],
-    /// Largest residual of the energy balance with `preview` and with `real-time`, of the energy exchanged.
+    /// Bound on the energy residual with `preview` and `real-time`, relative to the energy exchanged.
     residual: [f64; 2],
 }
 
 const SPCMM_PERIOD: f64 = 2.0;
 const CRANK_PERIOD: f64 = std::f64::consts::PI / 3.0;
 const IDEAL: (&str, &str) = ("contact.clearance", "0");
-/// Of a function of time alone.
+/// For motion that is a function of time alone.
 const ROUNDING: [Option<f64>; 2] = [Some(1e-9); 2];
 const SETTLED: [Option<f64>; 2] = [Some(0.02), Some(1e-3)];
 
@@ -201,12 +201,12 @@ fn long(
     changes: &'static crate::common::Changes<'static>,
     period: f64,
     limits: [Option<f64>; 2],
-) -> Long {
-    Long { scene, what, changes, period, limits, residual: RESIDUAL }
+) -> LongRun {
+    LongRun { scene, what, changes, period, limits, residual: RESIDUAL }
 }
 
-/// Cheap enough for every run of the tests, with the preset that is asked for settled motion.
-fn short_list() -> [Long; 3] {
+/// Runs that are cheap enough for every test run.
+fn short_list() -> [LongRun; 3] {
     [
         long("spcmm", "default", &[], SPCMM_PERIOD, SETTLED),
         long("spcmm", "ideal", &[IDEAL], SPCMM_PERIOD, ROUNDING),
@@ -214,14 +214,14 @@ fn short_list() -> [Long; 3] {
     ]
 }
 
-fn long_list() -> Vec<Long> {
+fn long_list() -> Vec<LongRun> {
     let one_ideal = &[("joint.S1.clearance", "0")];
     let mut list = Vec::from(short_list());
     list.push(long("spcmm", "one joint ideal", one_ideal, SPCMM_PERIOD, SETTLED));
     list.push(long("slider-crank-driven", "default", &[], CRANK_PERIOD, [None; 2]));
     list.push(long("pendulum", "default", &[], 1.0, [None; 2]));
     list.push(long("slider-crank", "free, ideal", &[IDEAL], 1.0, [None; 2]));
-    let many = |scene, what, changes| Long { residual: [1e-4; 2], ..long(scene, what, changes, 1.0, [None; 2]) };
+    let many = |scene, what, changes| LongRun { residual: [1e-4; 2], ..long(scene, what, changes, 1.0, [None; 2]) };
     list.push(many("hexapod", "default", &[]));
     list.push(many("delta", "default", &[]));
     list.push(many("chain", "16 links", &[("chain.links", "16")]));
@@ -230,8 +230,8 @@ fn long_list() -> Vec<Long> {
 
 const FAST: [&str; 2] = ["preview", "real-time"];
 
-/// Runs at least `duration`, looks twice a period, and compares the ends of the periods.
-fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
+/// Runs for at least `duration`, samples twice per period, and compares the ends of the periods.
+fn long_run(of: &LongRun, preset: usize, duration: f64) -> Drift {
     let changes = [of.changes, &[("solver.preset", FAST[preset])]].concat();
     let mut simulation = LiveScene::new(&scene(of.scene, &changes)).unwrap();
     let mut drift = Drift::default();
@@ -245,7 +245,7 @@ fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
         simulation.advance_to(now).unwrap();
         simulation.sample(now, &mut frame);
         assert!(finite(&frame));
-        // At the step's end: inside it the interpolated state may lie in the wall by as much as the tolerance allows.
+        // Checked at the step's end: inside it the interpolated state may penetrate the wall within the tolerance.
         let end = frame_now(&mut simulation);
         let running = simulation.running();
         assert_eq!(violation(&end, &running.machine, "tree"), None);
@@ -270,14 +270,14 @@ fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
         drift.energy = drift.energy.max(gain.abs() / kinetic);
         let force = |frame: &Frame, j: usize| frame.joints[j].normal_force.norm();
         let joints = 0..frame.joints.len();
-        let most = joints.clone().map(|j| force(first, j)).fold(0.0, f64::max);
+        let max_force = joints.clone().map(|j| force(first, j)).fold(0.0, f64::max);
         for j in joints {
-            let change = (force(&frame, j) - force(first, j)).abs() / most;
+            let change = (force(&frame, j) - force(first, j)).abs() / max_force;
             drift.force = drift.force.max(change);
         }
     }
-    let begun = first.map_or(0, |(_, begun)| begun);
-    drift.contacts = contacts(&simulation) - begun;
+    let earlier_contacts = first.map_or(0, |(_, earlier_contacts)| earlier_contacts);
+    drift.contacts = contacts(&simulation) - earlier_contacts;
     drift.steps = simulation.statistics().steps;
     drift.time = simulation.time();
     drift.residual = simulation.ledger().unwrap().relative_residual().abs();
@@ -285,7 +285,7 @@ fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
     drift
 }
 
-fn holds(of: &Long, preset: usize, drift: &Drift) {
+fn check_limits(of: &LongRun, preset: usize, drift: &Drift) {
     let what = format!("{} {}, {}", of.scene, of.what, FAST[preset]);
     assert!(drift.open < 1e-12, "{what}: open by {:e} m", drift.open);
     assert!(drift.skew < 1e-12, "{what}: orientation off by {:e}", drift.skew);
@@ -296,21 +296,21 @@ fn holds(of: &Long, preset: usize, drift: &Drift) {
     }
 }
 
-fn drifts_nowhere(of: &Long, duration: f64) {
+fn check_no_drift(of: &LongRun, duration: f64) {
     let drift = long_run(of, 1, duration);
-    holds(of, 1, &drift);
+    check_limits(of, 1, &drift);
     assert_eq!(drift.contacts, 0, "{} {}: settled", of.scene, of.what);
 }
 
 #[test]
 fn a_hundred_settled_seconds_do_not_drift() {
-    short_list().iter().for_each(|of| drifts_nowhere(of, 100.0));
+    short_list().iter().for_each(|of| check_no_drift(of, 100.0));
 }
 
 #[test]
 #[ignore = "full: four seconds"]
-fn full_a_thousand_settled_seconds_drift_nowhere() {
-    in_parallel(&short_list(), |of| drifts_nowhere(of, 1000.0));
+fn full_a_thousand_settled_seconds_do_not_drift() {
+    in_parallel(&short_list(), |of| check_no_drift(of, 1000.0));
 }
 
 #[test]
@@ -328,12 +328,12 @@ fn write_a_thousand_seconds_of_every_kind() {
     let list = long_list();
     let runs: Vec<_> = list.iter().flat_map(|of| (0..FAST.len()).map(move |preset| (of, preset))).enumerate().collect();
     let done = Mutex::new(Vec::new());
-    in_parallel(&runs, |&(place, (of, preset))| {
+    in_parallel(&runs, |&(index, (of, preset))| {
         let drift = long_run(of, preset, 1000.0);
-        done.lock().unwrap().push((place, drift));
+        done.lock().unwrap().push((index, drift));
     });
     let mut done = done.into_inner().unwrap();
-    done.sort_by_key(|(place, _)| *place);
+    done.sort_by_key(|(index, _)| *index);
     for ((_, (of, preset)), (_, d)) in runs.into_iter().zip(done) {
         let force = match of.scene {
             "chain" | "pendulum" | "slider-crank" => "-".to_owned(),
@@ -344,7 +344,7 @@ fn write_a_thousand_seconds_of_every_kind() {
             "| {}, {} | {} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {force} |",
             of.scene, of.what, FAST[preset], d.steps, d.contacts, d.open, d.skew, d.energy, d.residual
         );
-        holds(of, preset, &d);
+        check_limits(of, preset, &d);
     }
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/extremes.md");
     let kept = std::fs::read_to_string(&path).unwrap();

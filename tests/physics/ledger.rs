@@ -1,13 +1,13 @@
-//! The energy ledger: every joule is accounted for. That keeping it changes nothing, `promises.rs` checks.
+//! The energy ledger: every joule is accounted for. `promises.rs` checks that keeping the ledger does not change a run.
 
 use crate::common::{Changes, METHODS, SCENES, live, run_until, simulation};
 use jointplay::simulate::{Frame, Ledger, Simulation};
 
-/// What the ledger promises of the preset `accurate`, of the energy exchanged.
-const PROMISE: f64 = 1e-4;
+/// Bound on the residual with the preset `accurate`, relative to the energy exchanged.
+const RESIDUAL_BOUND: f64 = 1e-4;
 
-/// Steps on for `time`; the last step is cut.
-fn go_on(simulation: &mut Simulation, time: f64) {
+/// Advances by `time`, truncating the last step.
+fn run_for(simulation: &mut Simulation, time: f64) {
     let end = simulation.time() + time;
     run_until(simulation, end);
 }
@@ -17,7 +17,7 @@ fn ledger(simulation: &Simulation) -> Ledger {
 }
 
 /// The ledger of a built-in scene after `duration`.
-fn after(name: &str, changes: &Changes, duration: f64) -> Ledger {
+fn ledger_after(name: &str, changes: &Changes, duration: f64) -> Ledger {
     let mut simulation = simulation(name, changes);
     run_until(&mut simulation, duration);
     let ledger = ledger(&simulation);
@@ -26,8 +26,8 @@ fn after(name: &str, changes: &Changes, duration: f64) -> Ledger {
     ledger
 }
 
-/// That the ledger balances to `bound`, and that it would not without any of the terms that `has` names.
-fn balances(case: &str, ledger: &Ledger, bound: f64, has: &[&str]) {
+/// Checks that the ledger balances to `bound`, and that it would not without any of the terms in `required`.
+fn check_balance(case: &str, ledger: &Ledger, bound: f64, required: &[&str]) {
     let residual = ledger.relative_residual().abs();
     assert!(residual < bound, "{case}: {residual:e}, {ledger:?}");
     assert!(ledger.exchanged > 0.0, "{case}");
@@ -42,7 +42,7 @@ fn balances(case: &str, ledger: &Ledger, bound: f64, has: &[&str]) {
         ("change", ledger.change_work),
     ];
     for (name, value) in terms {
-        if has.contains(&name) {
+        if required.contains(&name) {
             let without = (ledger.residual().abs() - value.abs()).abs() / ledger.exchanged;
             assert!(without > 2.0 * bound, "{case}: {name} is only {value:e} J");
         }
@@ -52,19 +52,19 @@ fn balances(case: &str, ledger: &Ledger, bound: f64, has: &[&str]) {
 #[test]
 fn the_default_scene_balances_over_a_second() {
     let accurate = ("solver.preset", "accurate");
-    let ledger = after("spcmm", &[accurate], 1.0);
+    let ledger = ledger_after("spcmm", &[accurate], 1.0);
     let terms = ["drive", "gravity", "restitution", "friction"];
-    balances("spcmm", &ledger, PROMISE, &terms);
-    // Stored in the contacts by the weight that they carry.
+    check_balance("spcmm", &ledger, RESIDUAL_BOUND, &terms);
+    // The contacts store energy under the weight they carry.
     assert!(ledger.elastic_change > 1e-7);
-    // During the impacts the stored energy weighs, too.
+    // During impacts the stored energy is significant.
     let mut simulation = simulation("spcmm", &[accurate]);
     let mut largest: f64 = 0.0;
     while simulation.time() < 0.02 {
         simulation.step().unwrap();
         let ledger = *simulation.ledger().unwrap();
         largest = largest.max(ledger.elastic_change);
-        assert!(ledger.relative_residual().abs() < PROMISE);
+        assert!(ledger.relative_residual().abs() < RESIDUAL_BOUND);
     }
     assert!(largest > 1e-3 * simulation.ledger().unwrap().exchanged);
 }
@@ -77,8 +77,8 @@ fn every_built_in_scene_balances() {
             "spcmm" => &["gravity", "friction"],
             _ => &["gravity", "kinetic", "friction"],
         };
-        let ledger = after(name, &[], 0.3);
-        balances(name, &ledger, PROMISE, terms);
+        let ledger = ledger_after(name, &[], 0.3);
+        check_balance(name, &ledger, RESIDUAL_BOUND, terms);
         assert!(ledger.restitution_loss > 0.0);
         assert_eq!((ledger.clearance_work, ledger.change_work), (0.0, 0.0));
         let driven = ["spcmm", "slider-crank-driven"].contains(&name);
@@ -107,7 +107,7 @@ fn every_law_friction_and_formulation_balances() {
         ("spcmm", &[law("hertz")], &["friction"]),
         ("spcmm", &[law("gonthier"), weak], lossy),
         ("spcmm", &[law("flores"), weak], lossy),
-        // The cut of the force at 0 takes part in its loss.
+        // Clamping the force at 0 contributes to its loss.
         ("spcmm", &[law("hunt-crossley"), dead], lossy),
         ("spcmm", &[lagrange], lossy),
         ("slider-crank-driven", &[lagrange], &["drive"]),
@@ -117,8 +117,8 @@ fn every_law_friction_and_formulation_balances() {
     ];
     for (name, changes, terms) in cases {
         let duration = if changes.contains(&lagrange) { 0.05 } else { 0.2 };
-        let ledger = after(name, changes, duration);
-        balances(&format!("{name} {changes:?}"), &ledger, PROMISE, terms);
+        let ledger = ledger_after(name, changes, duration);
+        check_balance(&format!("{name} {changes:?}"), &ledger, RESIDUAL_BOUND, terms);
         if changes.contains(&law("hertz")) {
             assert!(ledger.restitution_loss.abs() < 1e-12);
         }
@@ -133,23 +133,23 @@ fn ideal_and_partly_ideal_mechanisms_balance() {
     let ideal = ("contact.clearance", "0");
     let fast = ("spcmm.frequency", "4 Hz");
     let lagrange = ("formulation", "lagrange");
-    // Pure kinematics is integrated from the ends of its steps: a sixth-order quadrature of some fifty a period.
+    // Pure kinematics is integrated by a sixth-order quadrature over about fifty steps per period.
     let cases: [(&str, &Changes, f64); 9] = [
         ("spcmm", &[ideal], 1e-8),
         ("spcmm", &[ideal, fast], 1e-6),
-        ("spcmm", &[ideal, lagrange], PROMISE),
-        ("spcmm", &[("joint.S2.clearance", "0")], PROMISE),
-        ("spcmm", &[("joint.S1.clearance", "0"), ("joint.S3.clearance", "0")], PROMISE),
-        ("slider-crank", &[ideal], PROMISE),
-        ("slider-crank", &[ideal, lagrange], PROMISE),
-        ("slider-crank-driven", &[("joint.C.clearance", "0")], PROMISE),
-        ("pendulum", &[ideal], PROMISE),
+        ("spcmm", &[ideal, lagrange], RESIDUAL_BOUND),
+        ("spcmm", &[("joint.S2.clearance", "0")], RESIDUAL_BOUND),
+        ("spcmm", &[("joint.S1.clearance", "0"), ("joint.S3.clearance", "0")], RESIDUAL_BOUND),
+        ("slider-crank", &[ideal], RESIDUAL_BOUND),
+        ("slider-crank", &[ideal, lagrange], RESIDUAL_BOUND),
+        ("slider-crank-driven", &[("joint.C.clearance", "0")], RESIDUAL_BOUND),
+        ("pendulum", &[ideal], RESIDUAL_BOUND),
     ];
     for (name, changes, bound) in cases {
-        // A third of a drive's period: the works do not come back to zero.
-        let ledger = after(name, changes, 0.31);
+        // A fraction of a drive's period, so that the works do not sum to zero.
+        let ledger = ledger_after(name, changes, 0.31);
         let terms: &[&str] = if name == "spcmm" { &["drive", "gravity"] } else { &["gravity", "kinetic"] };
-        balances(&format!("{name} {changes:?}"), &ledger, bound, terms);
+        check_balance(&format!("{name} {changes:?}"), &ledger, bound, terms);
     }
 }
 
@@ -157,14 +157,14 @@ fn ideal_and_partly_ideal_mechanisms_balance() {
 fn every_method_keeps_a_ledger() {
     for name in ["spcmm", "pendulum"] {
         for method in METHODS {
-            // At 10 us a fixed step resolves an impact to a per cent, its energy to some parts in a thousand.
+            // A fixed step of 10 us resolves the force of an impact to a per cent, its energy to some parts in a thousand.
             let bound = match method {
                 "semi-implicit-euler" => 5e-3,
                 "rk4" => 5e-4,
-                _ => PROMISE,
+                _ => RESIDUAL_BOUND,
             };
-            let ledger = after(name, &[("solver.method", method)], 0.1);
-            balances(&format!("{name}, {method}"), &ledger, bound, &["gravity"]);
+            let ledger = ledger_after(name, &[("solver.method", method)], 0.1);
+            check_balance(&format!("{name}, {method}"), &ledger, bound, &["gravity"]);
         }
     }
 }
@@ -173,60 +173,60 @@ fn every_method_keeps_a_ledger() {
 fn the_residual_is_the_error_of_the_integration() {
     let residual = |method: &str, step: &str| {
         let changes = [("solver.method", method), ("solver.step", step)];
-        after("pendulum", &changes, 0.02).relative_residual().abs()
+        ledger_after("pendulum", &changes, 0.02).relative_residual().abs()
     };
     let (coarse, fine) = (residual("rk4", "8 us"), residual("rk4", "1 us"));
     assert!(fine < 0.1 * coarse, "{coarse:e} {fine:e}");
-    let at = |tolerance: &str| {
+    let residual_at = |tolerance: &str| {
         let changes = [("solver.tolerance", tolerance), ("solver.method", "dopri5")];
-        after("spcmm", &changes, 0.03).relative_residual().abs()
+        ledger_after("spcmm", &changes, 0.03).relative_residual().abs()
     };
-    let (loose, tight) = (at("1e-4"), at("1e-9"));
+    let (loose, tight) = (residual_at("1e-4"), residual_at("1e-9"));
     assert!(tight < 1e-2 * loose && tight < 1e-6, "{loose:e} {tight:e}");
 }
 
 #[test]
 fn live_changes_are_entered_in_the_ledger() {
     for method in ["automatic", "rk4"] {
-        // Fixed steps that keep up with the hard impacts at the end.
+        // The fixed step resolves the hard impacts at the end.
         let changes = [("solver.method", method), ("solver.step", "2 us")];
         let mut simulation = live("spcmm", &changes);
-        let bound = if method == "rk4" { 5e-4 } else { PROMISE };
+        let bound = if method == "rk4" { 5e-4 } else { RESIDUAL_BOUND };
         simulation.advance_to(0.4).unwrap();
-        // Settled: the balls stand against their walls, which close now.
+        // The balls have settled on their walls, which now move inwards.
         simulation.set("contact.clearance", "0.29 mm").unwrap();
-        go_on(&mut simulation, 2e-3);
-        let under_way = ledger(&simulation);
-        assert!(under_way.clearance_work != 0.0);
-        go_on(&mut simulation, 18e-3);
-        let arrived = ledger(&simulation);
+        run_for(&mut simulation, 2e-3);
+        let during_ramp = ledger(&simulation);
+        assert!(during_ramp.clearance_work != 0.0);
+        run_for(&mut simulation, 18e-3);
+        let after_ramp = ledger(&simulation);
         let case = format!("{method}, after a ramp");
-        balances(&case, &arrived, PROMISE, &["clearance"]);
-        // A softer contact under the same penetration holds less; a stiffer one more.
+        check_balance(&case, &after_ramp, RESIDUAL_BOUND, &["clearance"]);
+        // At the same penetration a softer contact stores less energy, a stiffer one more.
         simulation.set("contact.youngs_modulus", "50 GPa").unwrap();
         let softer = ledger(&simulation);
         assert!(softer.change_work < 0.0);
-        assert!((softer.residual() - arrived.residual()).abs() < 1e-15);
+        assert!((softer.residual() - after_ramp.residual()).abs() < 1e-15);
         simulation.set("contact.youngs_modulus", "400 GPa").unwrap();
         simulation.set("gravity.x", "-9.81 m/s^2").unwrap();
-        // Creeping is too stiff for a fixed step in the hard impacts that follow, and its ledger would say so.
+        // Creep is too stiff for a fixed step in the hard impacts that follow and would unbalance the ledger.
         simulation.set("contact.friction", "0").unwrap();
         let stiffer = ledger(&simulation);
         let jump = stiffer.elastic_change - softer.elastic_change;
         assert!((stiffer.change_work - softer.change_work - jump).abs() < 1e-15);
-        assert!((stiffer.residual() - arrived.residual()).abs() < 1e-15);
-        go_on(&mut simulation, 30e-3);
-        // A wider play lets go.
+        assert!((stiffer.residual() - after_ramp.residual()).abs() < 1e-15);
+        run_for(&mut simulation, 30e-3);
+        // A larger clearance releases the balls.
         simulation.set("contact.clearance", "0.6 mm").unwrap();
-        go_on(&mut simulation, 30e-3);
+        run_for(&mut simulation, 30e-3);
         let case = format!("{method}, after all changes");
-        balances(&case, &ledger(&simulation), bound, &["restitution"]);
+        check_balance(&case, &ledger(&simulation), bound, &["restitution"]);
     }
 }
 
 #[test]
 fn softening_a_loaded_contact_is_entered_in_the_ledger() {
-    // Soft enough that the stored energy is no trifle.
+    // Soft enough that the stored energy is significant.
     let mut simulation = live("pendulum", &[("contact.youngs_modulus", "1 GPa")]);
     simulation.advance_to(0.3).unwrap();
     let before = ledger(&simulation);
@@ -234,18 +234,18 @@ fn softening_a_loaded_contact_is_entered_in_the_ledger() {
     simulation.advance_to(0.32).unwrap();
     let after = ledger(&simulation);
     println!("{before:?}\n{after:?}");
-    balances("stiffened", &after, PROMISE, &["change"]);
+    check_balance("stiffened", &after, RESIDUAL_BOUND, &["change"]);
 }
 
 #[test]
 fn the_ledger_restarts_at_a_reset_and_its_switch_waits_for_one() {
     let mut simulation = live("pendulum", &[]);
     simulation.advance_to(0.05).unwrap();
-    let here = ledger(&simulation);
+    let first_run = ledger(&simulation);
     simulation.reset().unwrap();
     assert_eq!(ledger(&simulation), Ledger::default());
     simulation.advance_to(0.05).unwrap();
-    assert_eq!(ledger(&simulation), here);
+    assert_eq!(ledger(&simulation), first_run);
     simulation.set("solver.energy_ledger", "off").unwrap();
     simulation.step().unwrap();
     assert!(simulation.ledger().is_some());
@@ -262,7 +262,7 @@ fn frames_inside_a_step_balance_too() {
         ("spcmm", vec![("solver.method", "dopri5")], 0.02),
         ("pendulum", vec![("solver.method", "rk4")], 0.02),
     ] {
-        let bound = if changes == [("solver.method", "rk4")] { 1e-3 } else { PROMISE };
+        let bound = if changes == [("solver.method", "rk4")] { 1e-3 } else { RESIDUAL_BOUND };
         let mut simulation = simulation(name, &changes);
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
@@ -274,7 +274,7 @@ fn frames_inside_a_step_balance_too() {
             for part in [0.0, 0.1, 0.4, 0.8, 1.0] {
                 simulation.sample(from + part * (to - from), &mut frame);
                 let ledger = frame.ledger.unwrap();
-                // What the row says of the energies is what its ledger says.
+                // The energies of the row agree with its ledger.
                 let off =
                     ledger.kinetic_change + ledger.elastic_change - (frame.kinetic - kinetic + frame.elastic - elastic);
                 assert!(off.abs() < 1e-12, "{name}: {off:e}");

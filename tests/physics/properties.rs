@@ -1,5 +1,5 @@
-//! Any values of the one parameter table: in their ranges a scene starts or says why not, outside of them every key says what
-//! is allowed. `PROPTEST_CASES` asks for more cases than every run of the tests makes, `PROPTEST_RNG_SEED` for others.
+//! Random values of the parameter table: within their ranges a scene starts or explains why not, outside them the error states the
+//! allowed range. `PROPTEST_CASES` sets the number of cases, `PROPTEST_RNG_SEED` selects others.
 
 use std::sync::LazyLock;
 
@@ -11,27 +11,27 @@ use jointplay::simulate::{Doubt, Frame};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseError};
 
-/// Steps that every start is followed by, and evaluations after which they have cost enough.
+/// Steps after every start, and evaluations after which a case ends early.
 const STEPS: u32 = 8;
-const MOST_EVALUATIONS: u64 = 3000;
-/// More links start just the same, and cost time.
-const MOST_LINKS: u64 = 12;
+const MAX_EVALUATIONS: u64 = 3000;
+/// More links behave the same at the start and cost time.
+const MAX_LINKS: u64 = 12;
 
-/// The same cases every time, unless the environment asks for others.
+/// A fixed set of cases, unless the environment selects others.
 pub fn config(cases: u32) -> ProptestConfig {
-    let asked = |name| std::env::var_os(name).is_some();
-    let usual = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
-    if asked("PROPTEST_CASES") || asked("PROPTEST_RNG_SEED") {
-        return usual;
+    let is_set = |name| std::env::var_os(name).is_some();
+    let default = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
+    if is_set("PROPTEST_CASES") || is_set("PROPTEST_RNG_SEED") {
+        return default;
     }
-    ProptestConfig { cases, rng_seed: RngSeed::Fixed(1), ..usual }
+    ProptestConfig { cases, rng_seed: RngSeed::Fixed(1), ..default }
 }
 
-/// Values in a row's range, its ends among them; wide ranges evenly in their decades.
+/// Values in a row's range, including its ends; wide ranges are sampled logarithmically.
 fn values(parameter: &'static Parameter) -> BoxedStrategy<Value> {
     match parameter.kind {
         Kind::Number { min, max, .. } => {
-            // Where the range begins at 0 or below, small values have decades of their own.
+            // Ranges that begin at 0 or below are sampled logarithmically from 1e-9.
             let least = if min > 0.0 { min } else { 1e-9 };
             let decades = (least.ln()..max.ln()).prop_map(move |x| x.exp().clamp(min, max));
             let negative = decades.clone().prop_map(move |x| (-x).max(min));
@@ -46,7 +46,7 @@ fn values(parameter: &'static Parameter) -> BoxedStrategy<Value> {
             .prop_map(Value::Number)
             .boxed()
         }
-        Kind::Count { min, max } => (min..=max.min(MOST_LINKS)).prop_map(Value::Count).boxed(),
+        Kind::Count { min, max } => (min..=max.min(MAX_LINKS)).prop_map(Value::Count).boxed(),
         Kind::Choice(words) => proptest::sample::select(words).prop_map(Value::Choice).boxed(),
     }
 }
@@ -57,7 +57,7 @@ fn built_in(name: &str) -> &'static Scene {
     ALL.iter().find(|scene| scene.name == name).expect("built in")
 }
 
-/// One that has this row.
+/// A built-in scene that has this row.
 fn with_row(row: &Parameter) -> Scene {
     built_in(if row.scope == Scope::Own { "chain" } else { "spcmm" }).clone()
 }
@@ -68,9 +68,9 @@ fn rows() -> impl Strategy<Value = &'static Parameter> {
     proptest::sample::select(rows)
 }
 
-/// A row of the table that `scene` has, as a key: of all joints, or of one of them.
+/// A row of the table as a key of `scene`: for all joints, or for one of them.
 fn key(scene: &Scene, parameter: &Parameter, joint: usize) -> String {
-    // Twice in three of all.
+    // Two thirds of the keys are for all joints.
     let joints = &scene.machine.ball_joints;
     match parameter.key.strip_prefix("contact.") {
         Some(part) if joint.is_multiple_of(3) => {
@@ -80,7 +80,7 @@ fn key(scene: &Scene, parameter: &Parameter, joint: usize) -> String {
     }
 }
 
-/// One of `scenes`, and changes in its keys' ranges.
+/// One of `scenes`, and changes within the ranges of its keys.
 fn changed_scenes(scenes: &'static [&'static str]) -> impl Strategy<Value = (&'static str, Vec<(String, String)>)> {
     let of_scene = |name: &'static str| {
         let scene = built_in(name);
@@ -101,15 +101,15 @@ fn fail(what: impl Into<String>) -> TestCaseError {
     TestCaseError::fail(what.into())
 }
 
-/// An error in words for a person, about one of `changes`.
-fn is_clear(words: &str, changes: &[(String, String)]) -> Result<(), TestCaseError> {
+/// Checks that an error message is readable and names the key of one of `changes`.
+fn check_message(words: &str, changes: &[(String, String)]) -> Result<(), TestCaseError> {
     prop_assert!(!words.contains("NaN") && words.len() < 2000, "{words}");
     let part = |key: &str| key.rsplit('.').next().unwrap_or_default().to_owned();
-    prop_assert!(changes.iter().any(|(key, _)| words.contains(&part(key))), "names no key: {words}");
+    prop_assert!(changes.iter().any(|(key, _)| words.contains(&part(key))), "no key in: {words}");
     Ok(())
 }
 
-/// A scene with some joints ideal, some loose, with any method and formulation: what a run of it says of itself must agree.
+/// A scene with ideal and loose joints, any method and formulation, for which the results of a run must be consistent.
 #[derive(Clone, Debug)]
 struct Mixed {
     scene: &'static str,
@@ -148,8 +148,8 @@ fn mixed() -> impl Strategy<Value = Mixed> {
         })
 }
 
-/// How far a peak found from the ends of steps may be below the largest of many rows, and above: at a loose tolerance the cubic through
-/// both ends of a step and the method's own interpolant differ.
+/// How far a peak from the ends of steps may be below and above the largest of many rows: at a loose tolerance the cubic through both
+/// ends of a step and the method's own interpolant differ.
 const BELOW: f64 = 0.02;
 const ABOVE: f64 = 0.06;
 
@@ -163,7 +163,7 @@ proptest! {
     fn summary_rows_and_impacts_agree(mixed in mixed()) {
         let scene = match Scene::load(mixed.scene, &mixed.changes) {
             Ok(scene) => scene,
-            Err(error) => return is_clear(&error.to_string(), &mixed.changes),
+            Err(error) => return check_message(&error.to_string(), &mixed.changes),
         };
         let (Ok(mut plain), Ok(mut sampled)) = (LiveScene::new(&scene), LiveScene::new(&scene)) else {
             return Ok(());
@@ -186,15 +186,15 @@ proptest! {
         prop_assert_eq!(plain.state_hash(), sampled.state_hash());
         let statistics = plain.statistics();
         let unresolved = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { .. } | Doubt::Machine(MachineDoubt::Step { .. }));
-        // What happens within a step that is longer than an impact is a matter of interpolation, and marked.
+// Within a step longer than an impact the force depends on the interpolation; such runs raise a doubt.
         let resolved = !plain.doubts().iter().any(unresolved);
         for (j, joint) in scene.machine.ball_joints.iter().enumerate() {
             let (row, name) = (rows[j], &joint.name);
-            // What a run prints after its rows, and what a sweep, which has none, prints.
-            let (printed, found) = (sampled.peak(j).0, statistics.peak_normal[j]);
+// Peaks as printed by a run, which has rows, and by a sweep, which has none.
+            let (printed, from_steps) = (sampled.peak(j).0, statistics.peak_normal[j]);
             prop_assert!(printed >= row, "{}: {} below the rows' {}", name, printed, row);
-            let agrees = found >= row * (1.0 - BELOW) - 1.0 && found <= row * (1.0 + ABOVE) + 1.0;
-            prop_assert!(!resolved || agrees, "{}: {}, rows {}", name, found, row);
+            let agrees = from_steps >= row * (1.0 - BELOW) - 1.0 && from_steps <= row * (1.0 + ABOVE) + 1.0;
+            prop_assert!(!resolved || agrees, "{}: {}, rows {}", name, from_steps, row);
             prop_assert!((0.0..=plain.time()).contains(&statistics.peak_time[j]));
             let own = || impacts.iter().filter(move |impact| impact.joint == j);
             prop_assert!(own().count() as u64 <= statistics.impacts[j], "{}", name);
@@ -202,7 +202,7 @@ proptest! {
             let chi = jointplay::contact::damping_factor(joint.contact.normal_law, joint.contact.restitution);
             let largest = joint.contact.approach_speed == jointplay::contact::ApproachSpeed::Largest;
             for impact in own() {
-                prop_assert!(impact.peak <= found * (1.0 + 1e-12), "{:?} beyond {}", impact, found);
+                prop_assert!(impact.peak <= from_steps * (1.0 + 1e-12), "{:?} beyond {}", impact, from_steps);
                 prop_assert!(impact.start < impact.end && impact.end <= plain.time(), "{:?}", impact);
                 prop_assert!(impact.damping <= statistics.damping[j], "{:?}", impact);
                 prop_assert!(!largest || impact.damping <= chi * (1.0 + 2e-6), "{:?}", impact);
@@ -220,12 +220,12 @@ proptest! {
     fn any_values_in_range_start_or_are_refused_and_stay_finite((name, changes) in changed_scenes(&BUILT_IN)) {
         let scene = match Scene::load(name, &changes) {
             Ok(scene) => scene,
-            Err(error) => return is_clear(&error.to_string(), &changes),
+            Err(error) => return check_message(&error.to_string(), &changes),
         };
         for (key, text) in &changes {
             let last = changes.iter().rfind(|(other, _)| other == key);
-            let beaten = key.starts_with("contact.") || key.starts_with("solver.");
-            if !beaten && last.is_some_and(|(_, other)| other == text) {
+let may_be_overridden = key.starts_with("contact.") || key.starts_with("solver.");
+            if !may_be_overridden && last.is_some_and(|(_, other)| other == text) {
                 let row = scene.parameter(key).map_err(|error| fail(error.to_string()))?;
                 let value = scene.get(key).map_err(|error| fail(error.to_string()))?;
                 prop_assert_eq!(row.read(text), Ok(value), "{} = {}", key, text);
@@ -234,7 +234,7 @@ proptest! {
         prop_assert!(scene.machine.warnings().iter().all(|warning| warning.to_string().ends_with('.')));
         let mut simulation = match LiveScene::new(&scene) {
             Ok(simulation) => simulation,
-            Err(error) => return is_clear(&scene.locate(&error).to_string(), &changes),
+            Err(error) => return check_message(&scene.locate(&error).to_string(), &changes),
         };
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
@@ -253,7 +253,7 @@ proptest! {
                 simulation.sample(time, &mut frame);
                 prop_assert!(finite(&frame), "not finite at t = {time:e}");
             }
-            if simulation.time() == before || simulation.statistics().evaluations > MOST_EVALUATIONS {
+            if simulation.time() == before || simulation.statistics().evaluations > MAX_EVALUATIONS {
                 break;
             }
         }
@@ -264,14 +264,14 @@ proptest! {
     #[test]
     fn any_live_changes_are_accepted_or_refused_and_stay_finite((name, changes) in changed_scenes(&SCENES)) {
         let mut simulation = LiveScene::new(built_in(name)).unwrap();
-        // Somewhere in the first impacts.
+// During the first impacts.
         simulation.advance_to(8e-3).map_err(|stopped| fail(stopped.to_string()))?;
         let mut frame = Frame::default();
         for (key, value) in &changes {
             let hash = simulation.state_hash();
             if let Err(error) = simulation.set(key, value) {
-                is_clear(&error.to_string(), &changes)?;
-                prop_assert_eq!(simulation.state_hash(), hash, "changed by what it refused");
+                check_message(&error.to_string(), &changes)?;
+                prop_assert_eq!(simulation.state_hash(), hash, "changed by a refused value");
             }
             for _ in 0..2 {
                 let stopped = simulation.step().is_err();
@@ -284,14 +284,14 @@ proptest! {
                 }
             }
         }
-        // What waited for a reset takes effect, or says why not; what ran goes on.
+// Pending changes take effect at the reset, or the reset is refused and the run continues.
         let time = simulation.time();
         let scene = simulation.pending().clone();
         match simulation.reset() {
             Ok(()) => prop_assert_eq!(simulation.time(), 0.0),
             Err(error) => {
                 prop_assert_eq!(simulation.time(), time);
-                is_clear(&scene.locate(&error).to_string(), &changes)?;
+                check_message(&scene.locate(&error).to_string(), &changes)?;
             }
         }
     }
@@ -307,7 +307,7 @@ proptest! {
         match scene.set_value(row.key, &value) {
             Ok(_) => {
                 prop_assert_eq!(scene.get(row.key).unwrap(), value);
-                // What was recorded makes the same scene from its text.
+// The recorded changes reproduce the scene.
                 let again = Scene::load(&scene.name, &scene.changes).unwrap();
                 prop_assert_eq!(again.get(row.key).unwrap(), scene.get(row.key).unwrap());
             }

@@ -1,4 +1,4 @@
-//! Springs with a characteristic through points against closed solutions, in every method and both formulations.
+//! Springs with a characteristic through points against closed-form solutions, in every method and both formulations.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -13,8 +13,8 @@ const MASS: f64 = 0.5;
 /// Moment of inertia of the hinged body about its hinge.
 const INERTIA: f64 = 4e-4 + MASS * 0.01;
 
-/// Of a piece T(s) = A s + B s^3 between 0 and `WIDTH`: the natural spline through (0, 0), (WIDTH, F1), (2 WIDTH, F2) with
-/// m1 = 3 (F2 - 2 F1) / 2 WIDTH^2 has A = F1 / WIDTH - m1 WIDTH / 6 and B = m1 / 6 WIDTH. Below 0 it is straight.
+/// The natural spline through (0, 0), (WIDTH, F1), (2 WIDTH, F2) is T(s) = A s + B s^3 between 0 and `WIDTH`, with
+/// A = F1 / WIDTH - m1 WIDTH / 6, B = m1 / 6 WIDTH and m1 = 3 (F2 - 2 F1) / 2 WIDTH^2. Below 0 it is straight.
 const WIDTH: f64 = 0.1;
 const F1: f64 = 10.0;
 const F2: f64 = 40.0;
@@ -22,21 +22,21 @@ const M1: f64 = 1.5 * (F2 - 2.0 * F1) / (WIDTH * WIDTH);
 const A: f64 = F1 / WIDTH - M1 * WIDTH / 6.0;
 const B: f64 = M1 / (6.0 * WIDTH);
 
-/// What carries the spring.
+/// Where the spring acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum On {
+enum Mounting {
     /// A spring between the world and a free body.
     Body,
     Slide,
     Hinge,
 }
 
-impl On {
+impl Mounting {
     fn inertia(self) -> f64 {
         if self == Self::Hinge { INERTIA } else { MASS }
     }
 
-    /// Scales the forces, so that all move alike.
+    /// Scale of the forces that makes the motion the same for every mounting.
     fn scale(self) -> f64 {
         self.inertia() / MASS
     }
@@ -71,11 +71,11 @@ impl On {
         )
     }
 
-    fn starts(self, points: &[[f64; 2]], more: &str, changes: &[(&str, &str)]) -> Simulation {
+    fn start(self, points: &[[f64; 2]], more: &str, changes: &[(&str, &str)]) -> Simulation {
         Simulation::new(&parse(&self.text(points, more), changes).machine).unwrap()
     }
 
-    /// Coordinate from where the spring is unstretched, and its rate.
+    /// Elongation of the spring, and its rate.
     fn state(self, frame: &Frame) -> [f64; 2] {
         let body = &frame.bodies[0];
         match self {
@@ -99,8 +99,8 @@ fn elliptic(m: f64) -> f64 {
     FRAC_PI_2 / a
 }
 
-/// When a mass let go at `WIDTH` passes 0, and its speed there.
-fn passes() -> (f64, f64) {
+/// Time at which a mass released at `WIDTH` passes 0, and its speed there.
+fn zero_crossing() -> (f64, f64) {
     let cubic = B * WIDTH * WIDTH;
     let omega = ((A + cubic) / MASS).sqrt();
     let time = elliptic(cubic / (2.0 * (A + cubic))) / omega;
@@ -109,25 +109,25 @@ fn passes() -> (f64, f64) {
 }
 
 #[test]
-fn a_hardening_spring_swings_as_duffing_says_in_every_method_and_formulation() {
-    let (passes, speed) = passes();
+fn a_hardening_spring_oscillates_as_duffings_in_every_method_and_formulation() {
+    let (zero_crossing, speed) = zero_crossing();
     let omega = (A / MASS).sqrt();
-    for_every([On::Body, On::Slide, On::Hinge], |on, variant| {
+    for_every([Mounting::Body, Mounting::Slide, Mounting::Hinge], |mounting, variant| {
         let bound = variant.bound();
-        let mut simulation = on.starts(&POINTS, "", &variant.close());
-        let label = format!("{on:?} {variant}");
-        // A quarter along the cubic, a half along the straight end, and back into the cubic.
-        let frame = frame_at(&mut simulation, passes);
-        let [x, v] = on.state(&frame);
+        let mut simulation = mounting.start(&POINTS, "", &variant.close());
+        let label = format!("{mounting:?} {variant}");
+        // A quarter period along the cubic, half a period along the straight end, and back to the cubic.
+        let frame = frame_at(&mut simulation, zero_crossing);
+        let [x, v] = mounting.state(&frame);
         assert!(x.abs() < bound && (v + speed).abs() < 20.0 * bound, "{label}: {x:e} {v}");
-        let stored = on.scale() * 0.5 * MASS * speed * speed;
-        assert!(frame.elastic.abs() < 20.0 * bound * on.scale(), "{label}");
-        let frame = frame_at(&mut simulation, passes + 0.5 * PI / omega);
-        let [x, _] = on.state(&frame);
+        let stored = mounting.scale() * 0.5 * MASS * speed * speed;
+        assert!(frame.elastic.abs() < 20.0 * bound * mounting.scale(), "{label}");
+        let frame = frame_at(&mut simulation, zero_crossing + 0.5 * PI / omega);
+        let [x, _] = mounting.state(&frame);
         assert!((x + speed / omega).abs() < 2.0 * bound, "{label}: {x:e}");
         assert!((frame.elastic / stored - 1.0).abs() < 100.0 * bound, "{label}");
-        let frame = frame_at(&mut simulation, passes + PI / omega);
-        let [x, v] = on.state(&frame);
+        let frame = frame_at(&mut simulation, zero_crossing + PI / omega);
+        let [x, v] = mounting.state(&frame);
         assert!(x.abs() < 4.0 * bound && (v - speed).abs() < 40.0 * bound, "{label}: {x:e}");
         let residual = simulation.ledger().unwrap().relative_residual();
         assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
@@ -136,34 +136,34 @@ fn a_hardening_spring_swings_as_duffing_says_in_every_method_and_formulation() {
 
 #[test]
 fn the_error_falls_with_the_order_of_the_method_along_a_curve() {
-    let (passes, _) = passes();
+    let (zero_crossing, _) = zero_crossing();
     let error = |method: &str, steps: f64| {
-        let step = format!("{:e} s", passes / steps);
+        let step = format!("{:e} s", zero_crossing / steps);
         let changes = [("solver.method", method), ("solver.step", &*step)];
-        let mut simulation = On::Body.starts(&POINTS, "", &changes);
-        On::Body.state(&frame_at(&mut simulation, passes))[0].abs()
+        let mut simulation = Mounting::Body.start(&POINTS, "", &changes);
+        Mounting::Body.state(&frame_at(&mut simulation, zero_crossing))[0].abs()
     };
     for (method, steps, order) in [("semi-implicit-euler", [1e3, 2e3], 1.0), ("rk4", [20.0, 40.0], 4.0)] {
         let [coarse, fine] = steps.map(|steps| error(method, steps));
-        let found = (coarse / fine).log2();
-        println!("{method}: {coarse:e}, {fine:e}, order {found}");
-        assert!((found - order).abs() < 0.2, "{method}: {found}");
+        let observed = (coarse / fine).log2();
+        println!("{method}: {coarse:e}, {fine:e}, order {observed}");
+        assert!((observed - order).abs() < 0.2, "{method}: {observed}");
     }
 }
 
 #[test]
 fn points_on_a_line_are_the_spring_of_that_line() {
     let line = [[-0.05, -1.0], [0.0, 3.0], [0.1, 11.0], [0.15, 15.0]];
-    for (on, keys) in [
-        (On::Body, "stiffness = \"80 N/m\"\npreload = \"3 N\""),
-        (On::Slide, "stiffness = \"80 N/m\"\npreload = \"3 N\""),
+    for (mounting, keys) in [
+        (Mounting::Body, "stiffness = \"80 N/m\"\npreload = \"3 N\""),
+        (Mounting::Slide, "stiffness = \"80 N/m\"\npreload = \"3 N\""),
     ] {
         for side in ["", "side = \"push\"", "side = \"pull\""] {
-            if on == On::Slide && !side.is_empty() {
+            if mounting == Mounting::Slide && !side.is_empty() {
                 continue;
             }
             let more = format!("damping = \"2 N s/m\"\n{side}\n");
-            let text = on.text(&line, &more);
+            let text = mounting.text(&line, &more);
             let from = text.find("characteristic").unwrap();
             let to = from + text[from..].find('\n').unwrap();
             let plain = format!("{}{keys}{}", &text[..from], &text[to..]);
@@ -176,8 +176,8 @@ fn points_on_a_line_are_the_spring_of_that_line() {
                 let [a, b] = [&mut a, &mut b].map(|s| frame_at(s, 0.02 * f64::from(n)));
                 assert!((a.bodies[0].position - b.bodies[0].position).norm() < 1e-9);
                 assert!((a.elements[0].force - b.elements[0].force).norm() < 1e-6);
-                // Where it does not act, the two may count from different lengths.
-                assert!((a.elastic - b.elastic - offset).abs() < 1e-7, "{on:?} {side}");
+                // The zero of the elastic energy may differ where the spring does not act.
+                assert!((a.elastic - b.elastic - offset).abs() < 1e-7, "{mounting:?} {side}");
             }
         }
     }
@@ -185,7 +185,7 @@ fn points_on_a_line_are_the_spring_of_that_line() {
 
 #[test]
 fn a_one_sided_buffer_returns_its_energy() {
-    // Thrown off a buffer that hardens, a mass falls back on it; over the top it flies freely.
+    // A hardening buffer throws a mass off, which falls back after free flight.
     let text = "[gravity]\nz = \"-9.81 m/s^2\"\n\
         [[body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
         [[joint]]\nname = \"guide\"\nkind = \"prismatic\"\nchild = \"mass\"\naxis = [0, 0, 1]\nstart = { position = \"60 mm\" }\n\
@@ -196,16 +196,16 @@ fn a_one_sided_buffer_returns_its_energy() {
         let mut simulation = Simulation::new(&parse(text, &changes).machine).unwrap();
         let mut highest = 0.0_f64;
         let energy = frame_at(&mut simulation, 0.0);
-        let whole = energy.elastic + 0.5 * 9.81 * 0.06;
+        let total_energy = energy.elastic + 0.5 * 9.81 * 0.06;
         for n in 1..=1500 {
             let frame = frame_at(&mut simulation, f64::from(n) * 1e-3);
             let height = frame.bodies[0].position.z;
             highest = highest.max(height);
             let force = frame.elements[0].force.z;
             assert!(force >= 0.0 && (force == 0.0) == (height >= 0.1), "{force} at {height}");
-            assert!((frame.kinetic + frame.potential - whole).abs() < 1e-6, "{method}");
+            assert!((frame.kinetic + frame.potential - total_energy).abs() < 1e-6, "{method}");
         }
-        let top = whole / (0.5 * 9.81);
+        let top = total_energy / (0.5 * 9.81);
         assert!(top > 0.2 && (highest - top).abs() < 1e-4, "{method}: {highest} {top}");
         let ledger = simulation.ledger().unwrap();
         assert!(ledger.relative_residual().abs() < 1e-6, "{method} {ledger:?}");
@@ -213,10 +213,10 @@ fn a_one_sided_buffer_returns_its_energy() {
 }
 
 #[test]
-fn a_characteristic_may_lie_in_a_file_beside_the_scene() {
+fn a_characteristic_can_be_read_from_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let scene = folder.path().join("scene.toml");
-    let text = On::Body.text(&POINTS, "");
+    let text = Mounting::Body.text(&POINTS, "");
     let from = text.find("characteristic").unwrap();
     std::fs::write(&scene, format!("{}file = \"coil.csv\"\n", &text[..from])).unwrap();
     let coil = folder.path().join("coil.csv");
@@ -227,17 +227,17 @@ fn a_characteristic_may_lie_in_a_file_beside_the_scene() {
     };
     assert_eq!(spring.elastic, Elastic::Curve(POINTS.to_vec()));
     let mut simulation = Simulation::new(&scene.machine).unwrap();
-    let (passes, _) = passes();
-    assert!(On::Body.state(&frame_at(&mut simulation, passes))[0].abs() < 1e-4);
+    let (zero_crossing, _) = zero_crossing();
+    assert!(Mounting::Body.state(&frame_at(&mut simulation, zero_crossing))[0].abs() < 1e-4);
 }
 
 #[test]
-fn errors_in_a_characteristic_are_named() {
+fn errors_in_a_characteristic_are_located() {
     let start = "[[body]]\nname = \"mass\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
         [[joint]]\nname = \"h\"\nkind = \"revolute\"\naxis = [0, 0, 1]\nchild = \"mass\"\n";
     let spring = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"1 m\"\n";
     let turning = "[[joint_spring]]\nname = \"t\"\njoint = \"h\"\n";
-    for (element, more, said) in [
+    for (element, more, fragments) in [
         (
             spring,
             "characteristic = [[0, 0], [\"1 mm\", \"1 N\"]]\nstiffness = \"1 N/m\"",
@@ -284,8 +284,8 @@ fn errors_in_a_characteristic_are_named() {
     ] {
         let text = format!("{start}{element}{more}\n");
         let error = Scene::parse(&text, Some("mine.toml"), &[]).expect_err(more).to_string();
-        for said in said {
-            assert!(error.contains(said), "{error}\nlacks {said}");
+        for fragment in fragments {
+            assert!(error.contains(fragment), "{error}\nlacks {fragment}");
         }
         assert!(error.starts_with("mine.toml:"), "{error}");
     }

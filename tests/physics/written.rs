@@ -1,5 +1,5 @@
-//! Any values of the rows of the scene format: a scene is read as it is written and starts, or is refused with the key that is
-//! wrong; what may be written in several ways means the same in all of them.
+//! Random values of the keys of the scene format: a scene is read as written and starts, or is refused with the wrong key; equivalent
+//! notations give the same scene.
 
 use crate::common::invariants::finite;
 use crate::properties::config;
@@ -12,7 +12,7 @@ use jointplay::units::{Dimension, si_unit};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
-/// Steps that every start is followed by.
+/// Steps after every start.
 const STEPS: u32 = 4;
 
 /// The table of the format with this name.
@@ -26,7 +26,7 @@ fn quoted(value: f64, dimension: Dimension) -> String {
     format!("\"{value:e} {}\"", si_unit(dimension))
 }
 
-/// Numbers in a range, evenly in their decades from 1e-4 to 1e4, either sign, the ends if they are near.
+/// Numbers of either sign in a range, sampled logarithmically from 1e-4 to 1e4 and clamped to the range.
 fn within((least, most): (f64, f64)) -> BoxedStrategy<f64> {
     let sized = (-4.0..4.0_f64).prop_map(|decade| 10_f64.powf(decade));
     let signed = (sized, any::<bool>()).prop_map(|(size, below)| if below { -size } else { size });
@@ -38,11 +38,11 @@ fn within((least, most): (f64, f64)) -> BoxedStrategy<f64> {
     signed.prop_map(move |x| x.clamp(inside.0, inside.1)).boxed()
 }
 
-/// A value of a key as a file writes it; `hinge`: whether it belongs to one.
+/// A value of a key as in a file; `hinge` tells whether its joint is a hinge.
 fn value(key: &'static FileKey, hinge: bool) -> BoxedStrategy<String> {
     let dimension = key.dimension(hinge).unwrap_or(Dimension::None);
-    let like = match key.on_hinge {
-        Some((_, like)) if hinge => like,
+    let example = match key.on_hinge {
+        Some((_, example)) if hinge => example,
         _ => key.example,
     };
     match key.value_type {
@@ -67,11 +67,11 @@ fn value(key: &'static FileKey, hinge: bool) -> BoxedStrategy<String> {
                 .prop_map(|keys| format!("{{ {} }}", keys.join(", ")))
                 .boxed()
         }
-        _ => Just(like.to_owned()).boxed(),
+        _ => Just(example.to_owned()).boxed(),
     }
 }
 
-/// Keys of a table with values, without those in `skip`: all that must be given, and most others.
+/// Keys of a table with values, without those in `skip`: all required ones and most others.
 fn filled(
     table: &'static FileTable,
     word: Option<&'static str>,
@@ -88,7 +88,7 @@ fn filled(
         let written = values.prop_map(|value| format!("{} = {value}", key.name));
         all.push(match key.default {
             DefaultRule::Required => written.prop_map(Some).boxed(),
-            // What goes instead of it is a file.
+            // The alternative to the file is chosen.
             DefaultRule::RequiredUnless(_) if matches!(key.value_type, ValueType::File) => Just(None).boxed(),
             DefaultRule::RequiredUnless(_) => written.prop_map(Some).boxed(),
             _ => proptest::option::weighted(0.7, written).boxed(),
@@ -108,19 +108,19 @@ fn machine(hinge: bool, more: &str) -> String {
     )
 }
 
-/// What is wrong is said at its place, in words for a person.
-fn is_clear(error: &SceneError, text: &str) -> Result<(), TestCaseError> {
+/// Checks that an error has a key, a position and a readable message.
+fn check_error(error: &SceneError, text: &str) -> Result<(), TestCaseError> {
     let words = error.to_string();
     prop_assert!(error.key.is_some() && error.position.is_some(), "{words}\n{text}");
     prop_assert!(!words.contains("NaN") && words.len() < 2000, "{words}");
     Ok(())
 }
 
-/// A scene that is read starts and runs with numbers, or says why not.
-fn runs(text: &str) -> Result<(), TestCaseError> {
+/// Checks that a scene starts and runs with finite numbers, or is refused with a clear error.
+fn check_run(text: &str) -> Result<(), TestCaseError> {
     let scene = match Scene::parse(text, None, &[]) {
         Ok(scene) => scene,
-        Err(error) => return is_clear(&error, text),
+        Err(error) => return check_error(&error, text),
     };
     let saved = scene.to_toml();
     prop_assert_eq!(saved.as_deref(), Ok(text));
@@ -145,8 +145,8 @@ fn runs(text: &str) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Everything of a scene but its text and the numbers in it.
-fn built(text: &str, files: &Texts) -> String {
+/// Everything of a scene except its source.
+fn without_source(text: &str, files: &Texts) -> String {
     let mut scene = Scene::parse_with(text, None, files, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
     scene.source = Default::default();
     format!("{scene:?}")
@@ -159,10 +159,10 @@ fn elements() -> impl Strategy<Value = String> {
         let table = tables[place];
         let points = table.keys.iter().filter(|key| key.table().is_some_and(|of| of.name == "point"));
         let points: Vec<&str> = points.map(|key| key.name).collect();
-        // Of a number with another key on a hinge, the right one.
+        // Leaves out the key for the other kind of joint.
         let other = if hinge { "force" } else { "torque" };
         let on_joint = table.key("joint", None).is_some();
-        // A load varies by a frequency or by a factor.
+        // A load has either a frequency or a factor.
         let law: &[&str] = if swings { &["factor"] } else { &["frequency", "phase"] };
         let skip: Vec<&str> = [&["name"], law, &points].concat();
         let skip: Vec<&str> = skip.into_iter().chain(on_joint.then_some(other)).collect();
@@ -186,7 +186,7 @@ fn drives() -> impl Strategy<Value = String> {
     })
 }
 
-/// A sum, difference, product or quotient of lengths and numbers that is a length, as text and as computed here, m.
+/// A random expression of lengths and numbers that is a length: its text, and its value in m.
 fn lengths() -> impl Strategy<Value = (String, f64)> {
     let leaf = (1..999_u32, any::<bool>()).prop_map(|(x, mm)| match mm {
         true => (format!("{x} mm"), f64::from(x) * 1e-3),
@@ -204,7 +204,7 @@ fn lengths() -> impl Strategy<Value = (String, f64)> {
     })
 }
 
-/// Forms that a file gives by numbers.
+/// Forms without a mesh file.
 const FORMS: [&str; 6] = ["capsule", "cylinder", "cone", "box", "sphere", "plate"];
 
 const ARM: &str = "[[parameter]]\nname = \"arm\"\nvalue = \"120 mm\"\n";
@@ -213,13 +213,13 @@ proptest! {
     #![proptest_config(config(96))]
 
     #[test]
-    fn any_force_element_is_read_and_runs_or_its_key_is_named(text in elements()) {
-        runs(&text)?;
+    fn any_force_element_runs_or_is_refused_by_key(text in elements()) {
+        check_run(&text)?;
     }
 
     #[test]
-    fn any_drive_is_read_and_runs_or_its_key_is_named(text in drives()) {
-        runs(&text)?;
+    fn any_drive_runs_or_is_refused_by_key(text in drives()) {
+        check_run(&text)?;
     }
 
     #[test]
@@ -231,7 +231,7 @@ proptest! {
                 prop_assert!((read - value).abs() <= 1e-12 * value.abs().max(1e3), "{text}: {read} {value}");
             }
             Err(error) => {
-                is_clear(&error, &scene)?;
+                check_error(&error, &scene)?;
                 prop_assert!(value.abs() > 1e6, "{error}");
             }
         }
@@ -242,12 +242,12 @@ proptest! {
     }
 
     #[test]
-    fn a_number_is_the_same_plain_as_an_expression_and_as_a_parameter(value in within((-1e4, 1e4))) {
+    fn a_number_reads_the_same_as_an_expression_and_as_a_parameter(value in within((-1e4, 1e4))) {
         let plain = format!("{value:e} m");
         let own = format!("[[parameter]]\nname = \"own\"\nvalue = \"{plain}\"\n");
         let scene = |text: &str| {
             let more = format!("start = {{ position = \"{text}\" }}\nparent_point = [0, \"{text}\", 0]\n");
-            built(&format!("{own}{}", machine(false, &more)), &Texts::new())
+            without_source(&format!("{own}{}", machine(false, &more)), &Texts::new())
         };
         let expected = scene(&plain);
         for other in ["own".to_owned(), format!("2 * ({plain}) / 2"), "own * 4 / 4".to_owned()] {
@@ -256,7 +256,7 @@ proptest! {
     }
 
     #[test]
-    fn copies_of_a_pattern_lie_where_they_should(
+    fn instances_of_a_pattern_have_the_expected_poses(
         count in 1..6_u32,
         at in proptest::array::uniform3(-1.0..1.0_f64),
         centre in proptest::array::uniform3(-1.0..1.0_f64),
@@ -290,8 +290,8 @@ proptest! {
     }
 
     #[test]
-    fn including_equals_writing_into_the_scene(element in elements(), cut in 0..5_usize) {
-        // Included after all of its own: the order of a list that stands in both is the same then.
+    fn an_included_part_equals_the_same_text_in_the_scene(element in elements(), cut in 0..5_usize) {
+// The included part comes last, so that lists keep their order.
         let parts: Vec<&str> = element.split_inclusive("\n\n").collect();
         let (here, there) = parts.split_at(cut.min(parts.len()));
         let (here, there) = (here.concat(), there.concat());
@@ -299,7 +299,7 @@ proptest! {
         if Scene::parse(&element, None, &[]).is_ok() {
             let whole = format!("name = \"x\"\n{element}");
             let split = format!("name = \"x\"\ninclude = [\"part.toml\"]\n{here}");
-            prop_assert_eq!(built(&whole, &Texts::new()), built(&split, &files));
+            prop_assert_eq!(without_source(&whole, &Texts::new()), without_source(&split, &files));
         }
     }
 

@@ -1,4 +1,4 @@
-//! Laws of drives in scene files: what is wrong is named, and files beside a scene are read once.
+//! Laws of drives in scene files: errors are located, and referenced files are read once.
 
 use std::fs;
 use std::path::Path;
@@ -25,7 +25,7 @@ fn points(scene: &Scene) -> &[[f64; 2]] {
     }
 }
 
-fn holds(case: &str, error: &SceneError, fragments: &[&str]) {
+fn assert_contains(case: &str, error: &SceneError, fragments: &[&str]) {
     let text = error.to_string();
     for fragment in fragments {
         assert!(text.contains(fragment), "{case}\n  should say `{fragment}`, says:\n{text}");
@@ -59,15 +59,15 @@ fn every_law_is_read_on_slides_and_hinges() {
             assert_eq!(scene.to_toml().as_ref(), Ok(&scene.source.text));
         }
     }
-    // All but the one that needs functions.
+    // All but the law that needs functions.
     assert_eq!(DRIVE_LAWS.len(), 8);
 }
 
 #[test]
 fn numbers_of_a_law_are_keys_and_may_be_expressions() {
-    let own = "[[parameter]]\nname = \"bump\"\nvalue = \"4 mm\"\n";
+    let parameter = "[[parameter]]\nname = \"bump\"\nvalue = \"4 mm\"\n";
     let drive = "law = \"pulse\", height = \"bump / 2\", start = \"1 s\", duration = \"10 ms\"";
-    let text = format!("{own}{}", text("prismatic", drive));
+    let text = format!("{parameter}{}", text("prismatic", drive));
     let mut scene = Scene::parse(&text, None, &[]).unwrap();
     let height = |scene: &Scene| match scene.machine.joints[0].drive {
         Some(Drive::Pulse { height, .. }) => height,
@@ -81,12 +81,12 @@ fn numbers_of_a_law_are_keys_and_may_be_expressions() {
     let saved = Scene::parse(&scene.to_toml().unwrap(), None, &[]).unwrap();
     assert_eq!(height(&saved), 1e-3);
     let error = scene.set("joint.P.drive.duration", "0 s").unwrap_err();
-    holds("no duration", &error, &["joint.P.drive.duration", "allowed 0.001 ms to 1e9 ms; units s, ms"]);
+    assert_contains("no duration", &error, &["joint.P.drive.duration", "allowed 0.001 ms to 1e9 ms; units s, ms"]);
 }
 
-/// Position that a formula prescribes at `t`, s: that of a scene with `own` parameters.
-fn formula(own: &str, kind: &str, drive: &str, t: f64) -> f64 {
-    let text = format!("{own}{}", text(kind, drive));
+/// Position that a formula prescribes at `t`, s, in a scene with the parameters `own`.
+fn formula(parameters: &str, kind: &str, drive: &str, t: f64) -> f64 {
+    let text = format!("{parameters}{}", text(kind, drive));
     let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
     position(&scene, t)
 }
@@ -98,7 +98,7 @@ fn position(scene: &Scene, t: f64) -> f64 {
     }
 }
 
-const OWN: &str = "[[parameter]]\nname = \"stroke\"\nvalue = \"20 mm\"\n\
+const PARAMETERS: &str = "[[parameter]]\nname = \"stroke\"\nvalue = \"20 mm\"\n\
                    [[parameter]]\nname = \"rate\"\nvalue = \"3 Hz\"\n\
                    [[parameter]]\nname = \"lift\"\nvalue = \"30 deg\"\n\
                    [[parameter]]\nname = \"part\"\nvalue = 0.5\n";
@@ -112,7 +112,7 @@ fn a_formula_may_be_one_of_the_scenes_parameters() {
             "formula = \"stroke * sin(2*pi*rate*t + lift)\"",
             0.02 * libm::sin(2.0 * std::f64::consts::PI * 3.0 * t + 30f64.to_radians()),
         ),
-        // Pure numbers are numbers like any other.
+        // Dimensionless parameters are plain numbers.
         ("prismatic", "formula = \"10 * part * t\", unit = \"mm\"", 5e-3 * t),
         (
             "revolute",
@@ -121,13 +121,13 @@ fn a_formula_may_be_one_of_the_scenes_parameters() {
         ),
         ("prismatic", "formula = \"3 mm + 2 m/s^2 * t^2\"", 3e-3 + 2.0 * t * t),
         ("prismatic", "formula = \"stroke\"", 0.02),
-        // What is constant is computed beforehand: its derivative is not infinite but 0.
+        // Constants are folded: the derivative of asin(1) is 0, not infinite.
         ("revolute", "formula = \"asin(2 * part) * rate * t\"", 1.5 * std::f64::consts::PI * t),
     ] {
-        let found = formula(OWN, kind, &format!("law = \"formula\", {drive}"), t);
+        let found = formula(PARAMETERS, kind, &format!("law = \"formula\", {drive}"), t);
         assert!((found - expected).abs() < 1e-14, "{drive}: {found} {expected}");
     }
-    let text = format!("{OWN}{}", text("prismatic", "law = \"formula\", formula = \"stroke * t / 1 s\""));
+    let text = format!("{PARAMETERS}{}", text("prismatic", "law = \"formula\", formula = \"stroke * t / 1 s\""));
     let mut scene = Scene::parse(&text, None, &[]).unwrap();
     assert_eq!(position(&scene, 1.0), 0.02);
     scene.set("parameter.stroke", "5 mm").unwrap();
@@ -149,14 +149,14 @@ fn a_formula_may_be_one_of_the_scenes_parameters() {
         ("formula = \"max(stroke, 2 mm)\"", &["`max` has no second derivative"]),
         ("formula = \"stroke / (rate * t)\"", &["is not a finite number"]),
     ] {
-        let text = format!("{OWN}{}", self::text("prismatic", &format!("law = \"formula\", {drive}")));
+        let text = format!("{PARAMETERS}{}", self::text("prismatic", &format!("law = \"formula\", {drive}")));
         let error = Scene::parse(&text, Some("my.toml"), &[]).expect_err(drive);
-        holds(drive, &error, fragments);
+        assert_contains(drive, &error, fragments);
     }
 }
 
 #[test]
-fn errors_in_a_drive_law_are_named() {
+fn errors_in_a_drive_law_are_located() {
     let cases: &[(&str, &[&str])] = &[
         (
             "law = \"ramps\", to = 1",
@@ -238,14 +238,14 @@ fn errors_in_a_drive_law_are_named() {
     for (drive, fragments) in cases {
         match parse("prismatic", drive) {
             Ok(_) => panic!("`{drive}` was accepted"),
-            Err(error) => holds(drive, &error, fragments),
+            Err(error) => assert_contains(drive, &error, fragments),
         }
     }
     let many = vec!["{ amplitude = 0, frequency = \"1 Hz\" }"; 101].join(", ");
     let error = parse("prismatic", &format!("law = \"harmonics\", terms = [{many}]")).unwrap_err();
-    holds("101 terms", &error, &["too many: 101 terms; allowed at most 100"]);
+    assert_contains("101 terms", &error, &["too many: 101 terms; allowed at most 100"]);
     let error = parse("revolute", "law = \"ramp\", duration = \"1 s\"").unwrap_err();
-    holds("a hinge", &error, &["to = \"10 deg\""]);
+    assert_contains("a hinge", &error, &["to = \"10 deg\""]);
 }
 
 fn in_folder(folder: &Path, csv: &[u8], name: &str) -> Result<Scene, SceneError> {
@@ -256,24 +256,24 @@ fn in_folder(folder: &Path, csv: &[u8], name: &str) -> Result<Scene, SceneError>
 }
 
 #[test]
-fn a_file_beside_the_scene_is_read_once() {
+fn a_referenced_file_is_read_once() {
     let folder = tempfile::tempdir().unwrap();
-    let given = [[0.0, 0.0], [0.01, 1e-3], [0.02, 0.0]];
+    let expected = [[0.0, 0.0], [0.01, 1e-3], [0.02, 0.0]];
     for csv in [
         "time_s,position_m\n0,0\n0.01,1e-3\n0.02,0\n",
         "\u{feff}t [ms]; z [mm]\r\n# measured\r\n0; 0\r\n\r\n10; 1\r\n20; 0\r\n",
         "t_ms\tbump height (um)\n0\t0\n10\t1000\n20\t0",
     ] {
         let mut scene = in_folder(folder.path(), csv.as_bytes(), "bump.csv").unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(points(&scene), given, "{csv}");
-        // What is read again does not look at the disk.
+        assert_eq!(points(&scene), expected, "{csv}");
+        // Changes do not read the file again.
         fs::write(folder.path().join("bump.csv"), "gone").unwrap();
         scene.set("formulation", "lagrange").unwrap();
         let saved = scene.to_toml().unwrap();
         assert!(saved.contains("lagrange") && saved.contains("bump.csv"));
         scene.undo_change("formulation").unwrap();
         scene.set("body.a.mass", "2 kg").unwrap();
-        assert_eq!(points(&scene), given);
+        assert_eq!(points(&scene), expected);
         assert_eq!(&*scene.source.beside["bump.csv"], csv);
     }
     fs::create_dir(folder.path().join("data")).unwrap();
@@ -283,7 +283,7 @@ fn a_file_beside_the_scene_is_read_once() {
 }
 
 #[test]
-fn errors_in_a_referenced_file_are_named_with_that_file() {
+fn errors_in_a_referenced_file_name_that_file() {
     let folder = tempfile::tempdir().unwrap();
     let cases: &[(&[u8], &[&str])] = &[
         (b"", &["joint.P.drive.file = \"bump.csv\"", "has 0 points"]),
@@ -302,7 +302,7 @@ fn errors_in_a_referenced_file_are_named_with_that_file() {
         let case = String::from_utf8_lossy(csv);
         match in_folder(folder.path(), csv, "bump.csv") {
             Ok(_) => panic!("`{case}` was accepted"),
-            Err(error) => holds(&case, &error, fragments),
+            Err(error) => assert_contains(&case, &error, fragments),
         }
     }
     for (name, why) in [
@@ -313,18 +313,18 @@ fn errors_in_a_referenced_file_are_named_with_that_file() {
         (".", "is not a file beside the scene"),
     ] {
         let error = in_folder(folder.path(), b"", name).unwrap_err();
-        holds(name, &error, &["scene.toml:10:", "joint.P.drive.file", why]);
+        assert_contains(name, &error, &["scene.toml:10:", "joint.P.drive.file", why]);
     }
     fs::create_dir(folder.path().join("data")).unwrap();
     let error = in_folder(folder.path(), b"", "data").unwrap_err();
-    holds("a folder", &error, &["this is a directory"]);
+    assert_contains("a folder", &error, &["this is a directory"]);
     let large = vec![b'#'; MAX_FILE_SIZE as usize + 1];
     let error = in_folder(folder.path(), &large, "bump.csv").unwrap_err();
-    holds("a large file", &error, &["too large; allowed at most 4 MiB"]);
+    assert_contains("a large file", &error, &["too large; allowed at most 4 MiB"]);
     let mut many = String::from("t_s,x_m\n");
     for n in 0..=10_000 {
         many += &format!("{n},0\n");
     }
     let error = in_folder(folder.path(), many.as_bytes(), "bump.csv").unwrap_err();
-    holds("many points", &error, &["bump.csv:10002:1", "too many points; allowed at most 10000"]);
+    assert_contains("many points", &error, &["bump.csv:10002:1", "too many points; allowed at most 10000"]);
 }

@@ -1,5 +1,5 @@
-//! The rows of the scene format: each is read as it says, nothing else is read, and the JSON schema made from them takes and
-//! refuses what the reader does.
+//! The tables of the scene format: each key is read as described, no other key is accepted, and the JSON schema made from the tables
+//! accepts and refuses the same files as the reader.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -14,7 +14,7 @@ use serde_json::Value as Json;
 use crate::scene_corpus::{Numbers, mutate};
 use toml_edit::{DocumentMut, Item, Value};
 
-/// A scene with a file beside it for each key that names one.
+/// A scene with a file for each key that names one.
 const WITH_FILES: &str = r##"include = [
     "leg.toml",
     { file = "arm.toml", name = "left", values = { weight = "2 kg" }, position = "0 0 1 m", rotation = { axis = [1, 0, 0], angle = "9 deg" } },
@@ -62,7 +62,7 @@ position = "0 0 1 mm"
 rotation = { axis = [1, 0, 0], angle = "90 deg" }
 "##;
 
-fn beside() -> Texts {
+fn files_of_scene() -> Texts {
     let leg = "[[parameter]]\nname = \"weight\"\nvalue = \"1 kg\"\n[[body]]\nname = \"leg\"\nmass = \"weight\"\ninertia = \"1 1 1 kg m^2\"\n";
     let corner = "solid corner\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 9 0 0\nvertex 0 9 0\nendloop\nendfacet\nendsolid corner\n";
     let files = [
@@ -77,10 +77,10 @@ fn beside() -> Texts {
 }
 
 fn parse(text: &str) -> Result<Scene, SceneError> {
-    Scene::parse_with(text, None, &beside(), &[])
+    Scene::parse_with(text, None, &files_of_scene(), &[])
 }
 
-/// Name and text of every file of the corpus that begins with `kind`.
+/// Name and text of every file of the corpus whose name begins with `kind`.
 fn corpus(kind: &str) -> Vec<(String, String)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
     let entries = std::fs::read_dir(folder).unwrap();
@@ -91,7 +91,7 @@ fn corpus(kind: &str) -> Vec<(String, String)> {
     own.map(|path| (name(path), std::fs::read_to_string(path).unwrap())).collect()
 }
 
-/// Scenes that are read, and have every key together.
+/// Valid scenes that together use every key.
 fn scenes() -> Vec<(String, String)> {
     let built_in = BUILT_IN.map(|name| (name.to_owned(), built_in_text(name).unwrap().to_owned()));
     let files = [("with files".to_owned(), WITH_FILES.to_owned())];
@@ -99,32 +99,31 @@ fn scenes() -> Vec<(String, String)> {
     all.collect()
 }
 
-/// Where a value stands in a file: keys and places in lists.
+/// A step on the path to a value in a file: a key or a list index.
 #[derive(Clone, Debug)]
 enum Step {
     Key(String),
-    Place(usize),
+    Index(usize),
 }
 
-/// What stands at a place of a file.
+/// The item at a path in a file.
 fn at<'a>(root: &'a mut Item, path: &[Step]) -> &'a mut Item {
     path.iter().fold(root, |item, step| match step {
-        Step::Key(key) => item.get_mut(key.as_str()).expect("is there"),
-        Step::Place(place) => item.get_mut(*place).expect("is there"),
+        Step::Key(key) => item.get_mut(key.as_str()).expect("exists"),
+        Step::Index(place) => item.get_mut(*place).expect("exists"),
     })
 }
 
-/// The word that tells which variant of a table one is.
+/// The word that selects a variant of a table.
 type Word = Option<&'static str>;
 
-/// Every key of `item`, a table as `rows` says, with its place, its row and the variant of its table; and every table with its place
-/// and variant.
-struct Found {
+/// Every key of a file with its path, its row and the variant of its table; and every table with its path and variant.
+struct Contents {
     keys: Vec<(Vec<Step>, &'static FileKey, Word)>,
     tables: Vec<(Vec<Step>, &'static FileTable, Word)>,
 }
 
-impl Found {
+impl Contents {
     fn of(text: &str) -> Self {
         let document: DocumentMut = text.parse().unwrap();
         let mut found = Self { keys: Vec::new(), tables: Vec::new() };
@@ -134,11 +133,11 @@ impl Found {
 
     fn walk(&mut self, item: &Item, rows: &'static FileTable, path: Vec<Step>) {
         let table = item.as_table_like().expect("a table");
-        let there = |word: &&&str| match rows.variants {
+        let is_present = |word: &&&str| match rows.variants {
             Some(Variants::Word(by, _)) => table.get(by).and_then(Item::as_str) == Some(**word),
             _ => table.contains_key(word),
         };
-        let word = rows.words().iter().find(there).copied();
+        let word = rows.words().iter().find(is_present).copied();
         self.tables.push((path.clone(), rows, word));
         for (name, inner) in table.iter() {
             let row = rows.key(name, word).unwrap_or_else(|| panic!("{name}"));
@@ -150,8 +149,8 @@ impl Found {
                     let count = inner.as_array().map(|list| list.len());
                     let count = count.or_else(|| Some(inner.as_array_of_tables()?.len()));
                     for place in 0..count.expect("a list") {
-                        let path = [&path[..], &[Step::Place(place)]].concat();
-                        // A name of a file has no keys.
+                        let path = [&path[..], &[Step::Index(place)]].concat();
+                        // A file name has no keys.
                         if !inner[place].is_str() {
                             self.walk(&inner[place], rows, path);
                         }
@@ -163,7 +162,7 @@ impl Found {
     }
 }
 
-/// `text` with another value at a place, or a new key in the table there.
+/// `text` with another value at a path, or with a new key in the table there.
 fn changed(text: &str, path: &[Step], key: Option<&str>) -> String {
     let document: DocumentMut = text.parse().unwrap();
     let mut root = document.into_item();
@@ -179,48 +178,48 @@ fn changed(text: &str, path: &[Step], key: Option<&str>) -> String {
     DocumentMut::from(table).to_string()
 }
 
-/// Of the keys and tables of all scenes, which come with their names and texts, each where it first stands at such a place in such
-/// a variant: elsewhere the same code reads it.
-fn each_once() -> Vec<(String, String, Found)> {
+/// All scenes by name and text, with each key and table listed only where it first occurs at its path and variant: the same code
+/// reads it elsewhere.
+fn first_occurrences() -> Vec<(String, String, Contents)> {
     let (mut keys, mut tables) = (BTreeSet::new(), BTreeSet::new());
-    let places = |path: &[Step]| -> Vec<String> {
+    let keys_of_path = |path: &[Step]| -> Vec<String> {
         let key = |step: &Step| match step {
             Step::Key(key) => Some(key.clone()),
-            Step::Place(_) => None,
+            Step::Index(_) => None,
         };
         path.iter().filter_map(key).collect()
     };
     let own = |(name, text): (String, String)| {
-        let mut found = Found::of(text.trim_start_matches('\u{feff}'));
-        found.keys.retain(|(path, row, word)| keys.insert((places(path), std::ptr::from_ref(*row), *word)));
-        found.tables.retain(|(path, rows, word)| tables.insert((places(path), std::ptr::from_ref(*rows), *word)));
+        let mut found = Contents::of(text.trim_start_matches('\u{feff}'));
+        found.keys.retain(|(path, row, word)| keys.insert((keys_of_path(path), std::ptr::from_ref(*row), *word)));
+        found.tables.retain(|(path, rows, word)| tables.insert((keys_of_path(path), std::ptr::from_ref(*rows), *word)));
         (name, text, found)
     };
     scenes().into_iter().map(own).collect()
 }
 
-/// Last part of the key of an error, without places in lists.
-fn last(error: &SceneError) -> String {
+/// Last part of an error's key, without list indices.
+fn last_key(error: &SceneError) -> String {
     let key = error.key.as_deref().unwrap_or_default();
-    let last = key.rsplit('.').next().unwrap_or_default();
-    last.split('[').next().unwrap_or_default().to_owned()
+    let last_key = key.rsplit('.').next().unwrap_or_default();
+    last_key.split('[').next().unwrap_or_default().to_owned()
 }
 
 #[test]
-fn every_row_is_read_and_nothing_else_is() {
+fn every_key_of_the_format_is_read_and_no_other() {
     let mut read = BTreeSet::new();
-    for (name, text, found) in each_once() {
+    for (name, text, found) in first_occurrences() {
         parse(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
         for (path, row, _) in found.keys {
-            // No key takes a date: one that is not read would let it pass.
+            // No key accepts a date, so only a key that is never read would let it pass.
             let wrong = changed(&text, &path, None);
             let error = parse(&wrong).expect_err(&format!("{name}: {path:?} is not read"));
-            assert_eq!(last(&error), row.name, "{name}: {path:?}: {error}");
+            assert_eq!(last_key(&error), row.name, "{name}: {path:?}: {error}");
             read.insert(std::ptr::from_ref(row));
         }
         for (path, rows, _) in found.tables {
             let error = parse(&changed(&text, &path, Some("hue"))).unwrap_err();
-            assert_eq!(last(&error), "hue", "{name}: {path:?}: {error}");
+            assert_eq!(last_key(&error), "hue", "{name}: {path:?}: {error}");
             assert!(error.message.contains("unknown key"), "{}: {error}", rows.name);
         }
     }
@@ -253,7 +252,7 @@ fn rows_of_the_format_table_describe_their_values() {
     }
 }
 
-/// The schema, as a validator that knows nothing of this program reads it.
+/// The schema in an independent validator.
 struct Schema {
     schemas: Schemas,
     index: SchemaIndex,
@@ -277,7 +276,7 @@ impl Schema {
     }
 }
 
-/// Files of the corpus whose form is wrong; what is wrong with others, a schema cannot know.
+/// Bad files of the corpus whose error a schema can detect.
 const WRONG_FORM: [&str; 19] = [
     "axis-of-zero",
     "bad-name",
@@ -301,7 +300,7 @@ const WRONG_FORM: [&str; 19] = [
 ];
 
 #[test]
-fn the_schema_takes_every_scene_and_refuses_bad_ones() {
+fn the_schema_accepts_every_scene_and_refuses_bad_ones() {
     let schema = Schema::new();
     let page = include_str!("../../docs/scene-format.md");
     let blocks = page.split("```toml\n").skip(1);
@@ -322,9 +321,9 @@ fn the_schema_takes_every_scene_and_refuses_bad_ones() {
 const MUTATIONS: u64 = 60;
 
 #[test]
-fn the_schema_takes_whatever_the_reader_takes() {
+fn the_schema_accepts_whatever_the_reader_accepts() {
     let schema = Schema::new();
-    let mut taken = 0;
+    let mut accepted = 0;
     for (name, text) in scenes() {
         for seed in 1..=MUTATIONS {
             let mutated = mutate(text.as_bytes(), &mut Numbers(seed));
@@ -332,23 +331,23 @@ fn the_schema_takes_whatever_the_reader_takes() {
                 continue;
             };
             if parse(&mutated).is_ok() {
-                taken += 1;
+                accepted += 1;
                 let text = mutated.trim_start_matches('\u{feff}');
                 let checked = schema.check(text);
                 checked.unwrap_or_else(|error| panic!("{name}, mutation {seed}: {error}\n{text}"));
             }
         }
     }
-    assert!(taken > 50, "{taken} mutations are scenes");
+    assert!(accepted > 50, "{accepted} mutations are scenes");
 }
 
 #[test]
-fn the_schema_refuses_a_wrong_value_of_every_key_and_any_other_key() {
+fn the_schema_refuses_wrong_values_and_unknown_keys() {
     let schema = Schema::new();
-    for (name, text, found) in each_once() {
+    for (name, text, found) in first_occurrences() {
         let text = text.trim_start_matches('\u{feff}');
         for (path, ..) in &found.keys {
-            // Neither a number, a text, a list nor a table of such keys.
+            // Not a valid value of any kind.
             let wrong = changed(text, path, None).replace("1979-05-27", "{ colour = { red = 1 } }");
             assert!(schema.check(&wrong).is_err(), "{name}: {path:?}");
         }
