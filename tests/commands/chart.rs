@@ -1,4 +1,4 @@
-//! Charts: the same description gives the same picture, whatever is in it.
+//! Charts: the same description gives the same picture, for any content.
 
 use jointplay::chart::{Axis, Chart, Label, Level, Map, Marker, PALETTE, Scale, Series, Sheet};
 
@@ -72,7 +72,7 @@ fn svg_and_picture_depend_only_on_the_description() {
     assert_eq!((edge(16), edge(20)), (1350, 630));
 }
 
-/// The page of a PDF: its size as written, and its drawing.
+/// The page of a PDF: its media box, and its drawing operators.
 fn page(pdf: &[u8]) -> (String, String) {
     let find = |from: usize, word: &str| {
         let at = pdf[from..].windows(word.len()).position(|part| part == word.as_bytes());
@@ -87,7 +87,7 @@ fn page(pdf: &[u8]) -> (String, String) {
 }
 
 #[test]
-fn a_pdf_has_the_page_and_every_line_mark_and_letter_of_the_svg() {
+fn a_pdf_has_every_line_marker_and_letter_of_the_svg() {
     let sheet = sheet((900, 420));
     let pdf = sheet.pdf().unwrap();
     assert_eq!(pdf, sheet.pdf().unwrap());
@@ -98,13 +98,13 @@ fn a_pdf_has_the_page_and_every_line_mark_and_letter_of_the_svg() {
     let points =
         |element: &str| element.split_once("points=\"").map_or(2, |(_, list)| list.split_whitespace().count() - 1);
     let elements: Vec<&str> = svg.split('<').collect();
-    // A line of one point is none.
+    // A line with a single point is not drawn.
     let lines = elements.iter().filter(|element| element.contains("stroke=\"#") && points(element) > 1).count();
     assert_eq!(operations(&drawing, "S"), lines);
     let filled = elements.iter().filter(|element| element.contains("fill=\"#")).count();
-    // A text in two fonts is several outlines.
+    // A text in two fonts has several outlines.
     assert!(operations(&drawing, "f") >= filled && filled > 400, "{} {filled}", operations(&drawing, "f"));
-    // Nothing is beside the page, and each colour is there.
+    // Nothing is outside the page, and every colour is used.
     let (mut words, mut colours) = (Vec::new(), Vec::new());
     for word in drawing.split_whitespace() {
         match word.parse::<f64>() {
@@ -128,7 +128,7 @@ fn a_pdf_has_the_page_and_every_line_mark_and_letter_of_the_svg() {
         let near = |other: &Vec<f64>| other.iter().zip(parts).all(|(a, b)| (a - b).abs() < 1e-3);
         assert!(colours.iter().any(near), "{r} {g} {b}");
     }
-    // Another text is another outline; a glyph that no font has would be empty.
+    // Each letter has its own outline; a missing glyph would be empty.
     let with = |title: &str| page(&Sheet { title: title.to_owned(), ..sheet.clone() }.pdf().unwrap()).1;
     let (nothing, plain) = (with(""), with("o"));
     for letter in ["²", "µ", "·", "Δ", "ε", "°", "⁻", "−"] {
@@ -186,10 +186,10 @@ fn a_map_has_a_cell_for_each_value_and_a_scale() {
     for word in ["kN", "even", "odd", "Clearance (mm)"] {
         assert!(svg.contains(word), "{word}");
     }
-    // Lowest and highest value have the ends of the scale's colours, what is not known is grey, and every kind its own.
-    for (colour, least) in [("#440154", 1), ("#FEE825", 1), ("#E1E1E1", 1), ("#0072B2", 6), ("#D55E00", 6)] {
-        let found = svg.to_uppercase().matches(&colour.to_uppercase()).count();
-        assert!(found >= least, "{colour}: {found}");
+    // The lowest and highest values have the end colours of the scale, unknown values are grey, and each kind has its own colour.
+    for (colour, min_count) in [("#440154", 1), ("#FEE825", 1), ("#E1E1E1", 1), ("#0072B2", 6), ("#D55E00", 6)] {
+        let count = svg.to_uppercase().matches(&colour.to_uppercase()).count();
+        assert!(count >= min_count, "{colour}: {count}");
     }
     assert!(sheet.png(1.0).is_ok());
 }
@@ -216,13 +216,13 @@ fn a_hundred_thousand_points_produce_a_small_file() {
         .unwrap()
     };
     assert!(sheet(true).len() < 200_000, "{}", sheet(true).len());
-    // One dot a pixel at most.
+    // At most one dot per pixel.
     let dots = sheet(false).matches("<circle").count();
     assert!((1000..20_000).contains(&dots), "{dots}");
 }
 
-/// Pixels of `series` , columns and rows, where they are blue, in a picture with two pixels to each of the description.
-fn blue(series: Series) -> Vec<(u32, u32)> {
+/// Blue pixels (column, row) of a chart of `series`, drawn at twice its size.
+fn blue_pixels(series: Series) -> Vec<(u32, u32)> {
     let axis = Axis { range: Some((0.0, 10.0)), ..Axis::default() };
     let sheet = Sheet {
         charts: vec![Chart { x: axis.clone(), y: axis, series: vec![series], ..Chart::default() }],
@@ -241,9 +241,9 @@ fn blue(series: Series) -> Vec<(u32, u32)> {
 #[test]
 fn a_bar_has_the_length_of_its_values_and_the_given_thickness() {
     let extent = |from: f64, to: f64, width: f64| {
-        let found = blue(Series::bar("", (from, to), 5.0, width, PALETTE[1]));
+        let pixels = blue_pixels(Series::bar("", (from, to), 5.0, width, PALETTE[1]));
         let span = |of: fn(&(u32, u32)) -> u32| {
-            let (low, high) = (found.iter().map(of).min().unwrap(), found.iter().map(of).max().unwrap());
+            let (low, high) = (pixels.iter().map(of).min().unwrap(), pixels.iter().map(of).max().unwrap());
             assert!(low < high);
             high + 1 - low
         };
@@ -258,7 +258,7 @@ fn a_bar_has_the_length_of_its_values_and_the_given_thickness() {
 #[test]
 fn a_line_does_not_overshoot_its_peak() {
     // The highest coloured row of a line through `points`.
-    let top = |points: &[(f64, f64)]| blue(Series::line("", points.to_vec(), PALETTE[1]))[0].1;
+    let top = |points: &[(f64, f64)]| blue_pixels(Series::line("", points.to_vec(), PALETTE[1]))[0].1;
     let level = top(&[(1.0, 8.0), (9.0, 8.0)]);
     for half in [0.2, 0.5, 0.8, 1.2, 2.0] {
         let peak = top(&[(5.0 - half, 3.0), (5.0, 8.0), (5.0 + half, 3.0)]);

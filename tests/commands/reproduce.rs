@@ -1,4 +1,4 @@
-//! `reproduce`: everything is there, the page says what the data say, and threads change nothing.
+//! `reproduce`: the report is complete, its page agrees with its data, and threads change nothing.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -29,14 +29,14 @@ pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     out
 }
 
-/// As the page writes a number that needs no power of ten.
-fn shown(value: f64) -> String {
+/// A number as written on the page without a power of ten.
+fn page_number(value: f64) -> String {
     let text = significant(value, 4);
     assert!(!text.contains('e'), "{text}");
     text
 }
 
-/// Cells of every row of every table of the page, tags removed.
+/// Cells of all table rows of the page without tags.
 fn rows(page: &str) -> Vec<Vec<String>> {
     let plain = |cell: &str| {
         let mut text = String::new();
@@ -60,9 +60,9 @@ fn rows(page: &str) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// The quick report, in `report/` of the folder, made once and left as it is: begun, interrupted once some blocks are in, damaged and
-/// mended, and gone on with by other threads.
-fn quick() -> &'static (tempfile::TempDir, Outcome) {
+/// The quick report in `report/` of a folder, made once and shared by the tests: it was interrupted after some blocks, damaged,
+/// repaired, and resumed with another number of threads.
+fn quick_report() -> &'static (tempfile::TempDir, Outcome) {
     static REPORT: OnceLock<(tempfile::TempDir, Outcome)> = OnceLock::new();
     REPORT.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
@@ -76,26 +76,26 @@ fn quick() -> &'static (tempfile::TempDir, Outcome) {
 #[cfg(unix)]
 #[test]
 #[ignore = "half a minute for the report, part of `./test full`"]
-fn full_ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
-    let (folder, run) = quick();
+fn full_ctrl_c_leaves_no_incomplete_report_and_the_same_command_resumes() {
+    let (folder, run) = quick_report();
     assert!(run.stderr.contains("resuming where report.partial stopped"), "{}", run.stderr);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing but the report is left");
 }
 
 #[test]
 #[ignore = "half a minute for the report, part of `./test full`"]
-fn full_a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
-    let (folder, run) = quick();
+fn full_a_quick_report_is_complete_and_its_page_agrees_with_its_data() {
+    let (folder, run) = quick_report();
     assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
     assert!(run.stdout.contains("Statements") && run.stdout.contains("report/index.html"));
     let all = files(&folder.path().join("report"));
     let page = String::from_utf8(all["index.html"].clone()).unwrap();
 
-    // The manifest names every file but itself, and every figure of the paper is there twice and in the page.
+    // The manifest lists every other file; every figure of the paper exists in two formats and on the page.
     let manifest: serde_json::Value = serde_json::from_slice(&all["manifest.json"]).unwrap();
     let named: Vec<&str> = manifest["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
-    let there: Vec<&str> = all.keys().map(String::as_str).filter(|name| *name != "manifest.json").collect();
-    assert_eq!(named, there);
+    let present: Vec<&str> = all.keys().map(String::as_str).filter(|name| *name != "manifest.json").collect();
+    assert_eq!(named, present);
     for figure in 5..=23 {
         let name = format!("figure-{figure:02}");
         for ending in ["svg", "png"] {
@@ -105,10 +105,10 @@ fn full_a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
     }
     assert_eq!(page.matches("<svg ").count(), all.keys().filter(|n| n.ends_with(".svg")).count());
 
-    // One file: nothing comes from anywhere, and nothing is missing that a link names.
+    // The page is self-contained, and all its links resolve.
     for outside in ["http://", "https://", "<script", "src=", "@import", "<link"] {
-        let found = page.replace("http://www.w3.org/2000/svg", "");
-        assert!(!found.contains(outside), "{outside}");
+        let without_namespace = page.replace("http://www.w3.org/2000/svg", "");
+        assert!(!without_namespace.contains(outside), "{outside}");
     }
     for link in page.split("href=\"").skip(1).map(|rest| rest.split('"').next().unwrap()) {
         let exists = match link.strip_prefix('#') {
@@ -120,7 +120,7 @@ fn full_a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
     assert!(page.len() < 5_000_000, "{}", page.len());
     assert!(!page.contains("NaN"), "a number is missing");
 
-    // Every number that the paper prints has its row, with the numbers of the data.
+    // Every number printed in the paper has a row that agrees with the data.
     let text = String::from_utf8(all["data/numbers.csv"].clone()).unwrap();
     let table = rows(&page);
     let lines: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
@@ -134,10 +134,10 @@ fn full_a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
         let what = format!("{} ({})", line[3].replace("beta", "β"), line[4]);
         let row = table.iter().find(|row| row.len() == 9 && row[0] == line[0] && row[1] == run && row[2] == what);
         let row = row.unwrap_or_else(|| panic!("no row for {line:?}"));
-        assert_eq!(row[3], shown(published.value));
-        assert_eq!(row[4], shown(full));
+        assert_eq!(row[3], page_number(published.value));
+        assert_eq!(row[4], page_number(full));
         if !line[7].is_empty() {
-            assert_eq!(row[6], shown(number(7)));
+            assert_eq!(row[6], page_number(number(7)));
             assert!(number(7) <= full * (1.0 + 1e-9), "samples exceed continuous time: {line:?}");
         }
         let word = if (0.9..=1.1).contains(&number(8)) {
@@ -149,21 +149,21 @@ fn full_a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
         };
         assert_eq!((row[8].as_str(), line[10]), (word, word));
     }
-    // The first peaks of the nominal run are those of the reference solution (`tests/physics/reference.rs`).
+    // The first peak of the nominal run agrees with the reference solution (`tests/physics/reference.rs`).
     let velocity = lines.iter().find(|line| line[0] == "6a").unwrap();
     assert!((velocity[7].parse::<f64>().unwrap() / 0.147 - 1.0).abs() < 0.01, "{velocity:?}");
 
-    // Statements: each in the page with its verdict, some of either kind.
+    // Every statement is on the page with its verdict; there are some of either kind.
     let statements = String::from_utf8(all["data/statements.csv"].clone()).unwrap();
     let confirmed = statements.lines().filter(|l| l.contains(",confirmed,")).count();
-    let not = statements.lines().filter(|l| l.contains(",not confirmed,")).count();
-    assert_eq!(confirmed + not, statements.lines().count() - 1);
-    assert!(confirmed > 10 && not > 5, "{confirmed} {not}");
+    let refuted = statements.lines().filter(|l| l.contains(",not confirmed,")).count();
+    assert_eq!(confirmed + refuted, statements.lines().count() - 1);
+    assert!(confirmed > 10 && refuted > 5, "{confirmed} {refuted}");
     assert_eq!(page.matches("<span class=\"ok\">confirmed</span>").count(), confirmed);
-    assert_eq!(page.matches("<span class=\"off\">not confirmed</span>").count(), not);
-    assert!(page.contains(&format!("<b>{confirmed} of {}</b>", confirmed + not)));
+    assert_eq!(page.matches("<span class=\"off\">not confirmed</span>").count(), refuted);
+    assert!(page.contains(&format!("<b>{confirmed} of {}</b>", confirmed + refuted)));
 
-    // A quick report says that it is one; numbers and names are set as in print.
+    // The page states that it is a quick report; numbers and names are typeset.
     assert!(page.contains("This is a quick report"), "no notice");
     assert!(!page.contains("beta"), "β has one name on the page");
     let power = |c: &[char]| c[0].is_ascii_digit() && c[1] == 'e' && (c[2] == '-' || c[2].is_ascii_digit());
@@ -174,7 +174,7 @@ fn full_a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
         }
     }
 
-    // It is not written over, and --force replaces it only as what it is.
+    // A report is not overwritten without --force, and --force does not replace other folders.
     let again = jointplay(folder.path(), "reproduce --out report --quick --quiet");
     assert_eq!(again.code, Some(1), "{}", again.stderr);
     assert!(again.stderr.contains("--force"), "{}", again.stderr);
@@ -188,10 +188,10 @@ fn full_a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
 }
 
 #[test]
-fn bad_input_is_refused_before_anything_runs() {
+fn invalid_input_is_refused_before_anything_runs() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("file"), "x").unwrap();
-    for (line, code, says) in [
+    for (line, code, fragment) in [
         ("reproduce --out file", 1, "it is a file"),
         ("reproduce --out no/such/report", 1, "cannot write"),
         ("reproduce", 2, "--out"),
@@ -200,29 +200,29 @@ fn bad_input_is_refused_before_anything_runs() {
     ] {
         let outcome = jointplay(folder.path(), line);
         assert_eq!(outcome.code, Some(code), "{line}: {}", outcome.stderr);
-        assert!(outcome.stderr.contains(says), "{line}: {}", outcome.stderr);
+        assert!(outcome.stderr.contains(fragment), "{line}: {}", outcome.stderr);
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left");
 }
 
-/// Ctrl-C leaves nothing half written in `folder`; damage, and what was begun otherwise, is refused by name and left alone.
+/// Interrupts a report in `folder`: it leaves only a partial file, which is refused if damaged or begun with other settings.
 #[cfg(unix)]
 fn interrupt(folder: &Path) {
     let entries = || files(folder);
     let line = "reproduce --out report/ --quick --threads 1";
     let mut child = command(folder, line).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // Once some blocks are in.
+    // Waits until some blocks are written.
     let length = || -> usize {
         let part = |name: &str| fs::read(folder.join("report.partial").join(name)).map_or(0, |b| b.len());
         part("runs_by_clearance.partial") + part("runs_by_friction.partial")
     };
-    let mut grown = Vec::new();
-    while grown.len() < 5 {
+    let mut lengths = Vec::new();
+    while lengths.len() < 5 {
         let now = length();
-        if grown.last() != Some(&now) {
-            grown.push(now);
+        if lengths.last() != Some(&now) {
+            lengths.push(now);
         }
-        assert!(child.try_wait().unwrap().is_none(), "over before it began");
+        assert!(child.try_wait().unwrap().is_none(), "finished before the interrupt");
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
@@ -236,18 +236,18 @@ fn interrupt(folder: &Path) {
     assert!(left.keys().all(|name| name.starts_with("report.partial/")), "{:?}", left.keys());
 
     let first = folder.join("report.partial/runs_by_clearance.partial");
-    let whole = fs::read(&first).unwrap();
-    let mut damage = whole.clone();
-    damage[whole.len() / 2] ^= 1;
+    let intact = fs::read(&first).unwrap();
+    let mut damage = intact.clone();
+    damage[intact.len() / 2] ^= 1;
     fs::write(&first, &damage).unwrap();
     let damaged = jointplay(folder, "reproduce --out report --quick");
     assert_eq!(damaged.code, Some(1), "{}", damaged.stderr);
     assert!(damaged.stderr.contains("report.partial/runs_by_clearance.partial is damaged"), "{}", damaged.stderr);
-    fs::write(&first, &whole).unwrap();
+    fs::write(&first, &intact).unwrap();
     let other = jointplay(folder, "reproduce --out report");
     assert_eq!(other.code, Some(2), "{}", other.stderr);
     assert!(other.stderr.contains("begun with other settings"), "{}", other.stderr);
-    assert!(entries() == left, "left as it was");
+    assert!(entries() == left, "the partial report is unchanged");
 }
 
 #[cfg(unix)]
@@ -256,7 +256,7 @@ fn interrupt(folder: &Path) {
 fn full_neither_interruptions_nor_threads_change_a_byte_of_the_report() {
     let folder = tempfile::tempdir().unwrap();
     jointplay(folder.path(), "reproduce --out report --quick --quiet --threads 1").expect(0);
-    let (one, other) = (files(&folder.path().join("report")), files(&quick().0.path().join("report")));
+    let (one, other) = (files(&folder.path().join("report")), files(&quick_report().0.path().join("report")));
     assert!(one.keys().eq(other.keys()));
     for (name, content) in &one {
         assert!(*content == other[name], "{name} differs");

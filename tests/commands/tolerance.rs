@@ -1,4 +1,4 @@
-//! Lots of machines with limits: yields, percentiles, what drives the rejects, and the cheapest fits.
+//! Lots of machines with limits: yields, percentiles, drivers of rejects, and the cheapest fits.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,13 +8,13 @@ use serde_json::Value as Json;
 
 use crate::program::{folder, jointplay, names};
 
-/// Short runs of the four-bar, whose two balls knock within them.
+/// Short runs of the four-bar in which both balls have impacts.
 const FOUR_BAR: &str = "tolerance four-bar --set solver.preset=real-time --duration 20ms --quiet --out t";
 const TOLERANCES: &str = "# Both joints\nparameter,distribution\n\njoint.*.clearance,\"uniform(0.05 mm, 0.2mm)\"\n\
                           contact.friction,\"normal(0.1, 0.01, 0.05..0.15)\"\n";
 const LIMITS: &str = "--limit peak-force=140N --limit impacts=7..12";
 
-/// Rows of `runs.csv`: the stage, then values by the names of the columns.
+/// Rows of `runs.csv`: the stage, and values by column name.
 fn runs(folder: &Path) -> Vec<(String, BTreeMap<String, f64>)> {
     let text = fs::read_to_string(folder.join("t/runs.csv")).unwrap();
     let mut lines = text.lines();
@@ -27,7 +27,7 @@ fn runs(folder: &Path) -> Vec<(String, BTreeMap<String, f64>)> {
     lines.map(row).collect()
 }
 
-fn close(value: &Json, expected: f64) {
+fn assert_close(value: &Json, expected: f64) {
     let value = value.as_f64().unwrap();
     assert!((value - expected).abs() <= 1e-10 * expected.abs(), "{value} for {expected}");
 }
@@ -47,29 +47,34 @@ fn a_yield_counts_the_runs_that_hold_all_limits() {
     assert_eq!(runs.len(), 64);
     let force = |run: &(String, BTreeMap<String, f64>)| run.1["peak-force (N)"];
     let impacts = |run: &(String, BTreeMap<String, f64>)| run.1["impacts"];
-    let is_held = |run: &&(String, BTreeMap<String, f64>)| force(run) <= 140.0;
-    let is_accepted = |run: &&(String, BTreeMap<String, f64>)| is_held(run) && (7.0..=12.0).contains(&impacts(run));
-    let (held, accepted) = (runs.iter().filter(is_held).count(), runs.iter().filter(is_accepted).count());
-    assert!(accepted < held && held < 64, "the limits split the lot: {accepted}, {held}");
+    let is_within_force_limit = |run: &&(String, BTreeMap<String, f64>)| force(run) <= 140.0;
+    let is_accepted =
+        |run: &&(String, BTreeMap<String, f64>)| is_within_force_limit(run) && (7.0..=12.0).contains(&impacts(run));
+    let (within_force_limit, accepted) =
+        (runs.iter().filter(is_within_force_limit).count(), runs.iter().filter(is_accepted).count());
+    assert!(
+        accepted < within_force_limit && within_force_limit < 64,
+        "the limits split the lot: {accepted}, {within_force_limit}"
+    );
     assert_eq!((&results["units"], &results["accepted"]), (&Json::from(64), &Json::from(accepted)));
-    close(&results["yield"]["value"], accepted as f64 / 64.0);
+    assert_close(&results["yield"]["value"], accepted as f64 / 64.0);
     let of_force = &results["outputs"][0];
-    close(&of_force["yield"]["value"], held as f64 / 64.0);
+    assert_close(&of_force["yield"]["value"], within_force_limit as f64 / 64.0);
 
     // Statistics over the rows.
     let mut forces: Vec<f64> = runs.iter().map(force).collect();
     forces.sort_by(f64::total_cmp);
     let mean = forces.iter().sum::<f64>() / 64.0;
     let deviation = (forces.iter().map(|force| (force - mean).powi(2)).sum::<f64>() / 63.0).sqrt();
-    close(&of_force["mean"], mean);
-    close(&of_force["deviation"], deviation);
-    close(&of_force["cpk"]["value"], (140.0 - mean) / (3.0 * deviation));
-    close(&of_force["percentile_50"]["value"], 0.5 * (forces[31] + forces[32]));
-    close(&of_force["percentile_95"]["value"], 0.15 * forces[59] + 0.85 * forces[60]);
+    assert_close(&of_force["mean"], mean);
+    assert_close(&of_force["deviation"], deviation);
+    assert_close(&of_force["cpk"]["value"], (140.0 - mean) / (3.0 * deviation));
+    assert_close(&of_force["percentile_50"]["value"], 0.5 * (forces[31] + forces[32]));
+    assert_close(&of_force["percentile_95"]["value"], 0.15 * forces[59] + 0.85 * forces[60]);
     // The largest of 64 is above the 99 % percentile with a probability of 1 - 0.99^64 = 47 %.
     assert_eq!(of_force["percentile_99"]["high"], Json::Null);
 
-    // Values within their distributions, and drivers in order of the distance, recomputed for the first.
+    // Values are within their distributions, and drivers are sorted by distance, which is recomputed for the first.
     for (_, values) in &runs {
         let clearances = ["joint.A.clearance (m)", "joint.B.clearance (m)"].map(|key| values[key]);
         assert!(clearances.iter().all(|clearance| (50e-6..=200e-6).contains(clearance)));
@@ -87,16 +92,16 @@ fn a_yield_counts_the_runs_that_hold_all_limits() {
     };
     let distance =
         runs.iter().map(|run| (below(run.1[&key], true) - below(run.1[&key], false)).abs()).fold(0.0, f64::max);
-    close(&drivers[0]["distance"], distance);
+    assert_close(&drivers[0]["distance"], distance);
 
-    // The same bytes from two threads and for people as for programs.
+    // Two threads give the same bytes; the text summary agrees with the JSON.
     let files = ["runs.csv", "tolerance.csv", "tolerance.json", "tolerance.png", "tolerance.svg"];
     let read = || files.map(|name| fs::read(folder.path().join("t").join(name)).unwrap());
     let first = read();
-    let said = jointplay(folder.path(), &format!("{line} --threads 2 --force")).expect(0).stdout;
+    let text = jointplay(folder.path(), &format!("{line} --threads 2 --force")).expect(0).stdout;
     assert!(read() == first);
-    assert!(said.contains(&format!("Lot               64 units, {} rejected", 64 - accepted)), "{said}");
-    assert!(said.contains("peak-force at most 140 N: ") && said.contains("impacts from 7 to 12: "), "{said}");
+    assert!(text.contains(&format!("Lot               64 units, {} rejected", 64 - accepted)), "{text}");
+    assert!(text.contains("peak-force at most 140 N: ") && text.contains("impacts from 7 to 12: "), "{text}");
 }
 
 #[test]
@@ -109,12 +114,12 @@ fn sampling_methods_and_seeds_change_the_lot_and_options_override_the_file() {
         jointplay(folder.path(), &format!("{line} --over joint.A.clearance=0.1mm..0.11mm {rest}")).expect(0);
         let clearances = |key: &str| runs(folder.path()).iter().map(|run| run.1[key]).collect::<Vec<_>>();
         assert!(clearances("joint.A.clearance (m)").iter().all(|clearance| (1e-4..=1.1e-4).contains(clearance)));
-        let mut own = clearances("joint.B.clearance (m)");
-        // Of 16 units a lot other than a random one has one in each sixteenth.
-        own.sort_by(f64::total_cmp);
-        let stratified = own.iter().enumerate().all(|(i, b)| (((b - 50e-6) / 150e-6 * 16.0) as usize) == i);
+        let mut values = clearances("joint.B.clearance (m)");
+        // Unless sampled randomly, 16 units have one value in each sixteenth of the range.
+        values.sort_by(f64::total_cmp);
+        let stratified = values.iter().enumerate().all(|(i, b)| (((b - 50e-6) / 150e-6 * 16.0) as usize) == i);
         assert_eq!(stratified, !rest.contains("random"), "{rest}");
-        lots.push(own);
+        lots.push(values);
     }
     assert!(lots.iter().enumerate().all(|(i, lot)| lots[..i].iter().all(|other| other != lot)));
 }
@@ -134,7 +139,7 @@ fn the_cheapest_fits_equal_those_of_an_exhaustive_search() {
     fs::write(folder.path().join("costs.csv"), text).unwrap();
     let line =
         format!("{FOUR_BAR} --limit peak-force=125 --runs 32 --summary json --force --tolerances tolerances.csv");
-    // All four choices, each on the same units.
+    // Evaluates all four choices on the same units.
     let mut yields = BTreeMap::new();
     for a in 0..2 {
         for b in 0..2 {
@@ -150,41 +155,41 @@ fn the_cheapest_fits_equal_those_of_an_exhaustive_search() {
         let results = jointplay(folder.path(), &search).expect(0).json();
         let found = &results["fits"];
         let cost = |(a, b): &(usize, usize)| costs[0][*a] + costs[1][*b];
-        let holding = yields.iter().filter(|(_, own)| **own >= required).map(|(choice, _)| choice);
-        let best = holding.min_by(|x, y| cost(x).total_cmp(&cost(y))).unwrap();
+        let feasible = yields.iter().filter(|(_, own)| **own >= required).map(|(choice, _)| choice);
+        let best = feasible.min_by(|x, y| cost(x).total_cmp(&cost(y))).unwrap();
         assert_eq!(found["best"]["cost"], cost(best), "{yields:?} for {required}");
         let chosen = [best.0, best.1].map(|at| fits[at]);
         assert_eq!([0, 1].map(|at| found["best"]["fits"][at]["fit"].as_str().unwrap()), chosen);
-        close(&found["best"]["yield"]["value"], yields[best]);
+        assert_close(&found["best"]["yield"]["value"], yields[best]);
         assert_eq!(found["is_proven"], true);
         let runs = runs(folder.path());
         let evaluations = found["evaluations"].as_u64().unwrap() as usize;
         assert!((1..=4).contains(&evaluations));
         assert_eq!(runs.len(), 32 * (evaluations + 2));
-        // The check has units of its own.
+        // The check uses separate units.
         let of_check: Vec<_> = runs.iter().filter(|run| run.0 == "fits-check").collect();
         let accepted = of_check.iter().filter(|run| run.1["peak-force (N)"] <= 125.0).count();
-        close(&found["check"]["yield"]["value"], accepted as f64 / 32.0);
+        assert_close(&found["check"]["yield"]["value"], accepted as f64 / 32.0);
         assert!(of_check.iter().all(|run| runs.iter().filter(|other| other.1 == run.1).count() == 1));
     }
     let none = jointplay(folder.path(), &format!("{line} --cost costs.csv --limit impacts=1000.. --yield 100%"));
     assert_eq!(none.expect(0).json()["fits"]["best"], Json::Null);
 
-    // One evaluation, of the tightest fits, proves nothing.
-    let cut = format!(
+    // A single evaluation, of the tightest fits, does not prove optimality.
+    let limited = format!(
         "{FOUR_BAR} --limit peak-force=125 --runs 8 --force --tolerances tolerances.csv --cost costs.csv --yield 1%"
     );
-    let said = jointplay(folder.path(), &format!("{cut} --evaluations 1")).expect(0).stdout;
+    let text = jointplay(folder.path(), &format!("{limited} --evaluations 1")).expect(0).stdout;
     assert!(
-        said.contains("cost 10, not proven the cheapest: --evaluations 1 ended the search; 1 choice tried"),
-        "{said}"
+        text.contains("cost 10, not proven the cheapest: --evaluations 1 ended the search; 1 choice tried"),
+        "{text}"
     );
     let normal =
         "parameter,fit,cost\njoint.A.clearance,\"normal(0.1mm, 5um)\",1\njoint.A.clearance,\"normal(0.1mm, 2um)\",2\n";
     fs::write(folder.path().join("costs.csv"), normal).unwrap();
-    let said = jointplay(folder.path(), &cut).expect(0).stdout;
-    assert!(said.contains("The order of the candidates of joint.A.clearance is not checked"), "{said}");
-    assert!(said.contains("cost 1, proven the cheapest") && said.contains("in another lot: "), "{said}");
+    let text = jointplay(folder.path(), &limited).expect(0).stdout;
+    assert!(text.contains("The order of the candidates of joint.A.clearance is not checked"), "{text}");
+    assert!(text.contains("cost 1, proven the cheapest") && text.contains("in another lot: "), "{text}");
 }
 
 #[test]
@@ -192,21 +197,21 @@ fn units_that_cannot_start_are_rejects() {
     let folder = folder();
     let line = "tolerance spcmm --set solver.preset=real-time --duration 2ms --over spcmm.slider_plane=-100mm..60mm --quiet \
                 --limit tip-error=50um --runs 16 --out t";
-    let said = jointplay(folder.path(), line).expect(0).stdout;
+    let text = jointplay(folder.path(), line).expect(0).stdout;
     let results: Json = serde_json::from_slice(&fs::read(folder.path().join("t/tolerance.json")).unwrap()).unwrap();
     let runs = runs(folder.path());
-    let known: Vec<f64> = runs.iter().map(|run| run.1["tip-error (m)"]).filter(|error| error.is_finite()).collect();
+    let finite: Vec<f64> = runs.iter().map(|run| run.1["tip-error (m)"]).filter(|error| error.is_finite()).collect();
     // The sliders reach the platform only from some planes.
-    assert!((1..16).contains(&known.len()), "{known:?}");
-    let held = known.iter().filter(|error| **error <= 50e-6).count();
-    assert_eq!((&results["units"], &results["accepted"]), (&Json::from(16), &Json::from(held)));
-    assert_eq!(results["without_result"], 16 - known.len());
-    close(&results["outputs"][0]["mean"], known.iter().sum::<f64>() / known.len() as f64);
-    assert!(said.contains(&format!("{} without a result", 16 - known.len())), "{said}");
+    assert!((1..16).contains(&finite.len()), "{finite:?}");
+    let accepted = finite.iter().filter(|error| **error <= 50e-6).count();
+    assert_eq!((&results["units"], &results["accepted"]), (&Json::from(16), &Json::from(accepted)));
+    assert_eq!(results["without_result"], 16 - finite.len());
+    assert_close(&results["outputs"][0]["mean"], finite.iter().sum::<f64>() / finite.len() as f64);
+    assert!(text.contains(&format!("{} without a result", 16 - finite.len())), "{text}");
 }
 
 #[test]
-fn errors_are_named_with_their_line() {
+fn errors_are_reported_with_their_line() {
     let folder = folder();
     let line = format!("{FOUR_BAR} --runs 2 --limit peak-force=140");
     let tolerances = "parameter,distribution\n";
@@ -231,8 +236,8 @@ fn errors_are_named_with_their_line() {
     ] {
         fs::write(folder.path().join("bad.csv"), text).unwrap();
         let over = if option == "cost" { "--over joint.A.clearance=0.1mm..0.2mm" } else { "" };
-        let said = jointplay(folder.path(), &format!("{line} {over} --{option} bad.csv")).expect(2).stderr;
-        assert!(said.contains(fragment), "{text}: {said}");
+        let message = jointplay(folder.path(), &format!("{line} {over} --{option} bad.csv")).expect(2).stderr;
+        assert!(message.contains(fragment), "{text}: {message}");
         assert_eq!(names(folder.path()), ["bad.csv"], "{text}");
     }
     let over = "--over contact.friction=0.1..0.2";
@@ -246,7 +251,7 @@ fn errors_are_named_with_their_line() {
         (&format!("--limit peak-forc=1 {over}"), 2, "--limit peak-forc: "),
         (&format!("--limit peak-force=1 --yield 99 {over}"), 2, "99% or 0.99"),
     ] {
-        let said = jointplay(folder.path(), &format!("{FOUR_BAR} --runs 2 {rest}")).expect(code).stderr;
-        assert!(said.contains(fragment), "{rest}: {said}");
+        let message = jointplay(folder.path(), &format!("{FOUR_BAR} --runs 2 {rest}")).expect(code).stderr;
+        assert!(message.contains(fragment), "{rest}: {message}");
     }
 }

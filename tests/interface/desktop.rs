@@ -1,4 +1,4 @@
-//! What only the desktop has: a window for the class, dialogs of the system, and a memory from one start to the next.
+//! Features of the desktop only: the window for the class, system dialogs, and settings remembered between starts.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -14,34 +14,34 @@ use jointplay::scene::{DEFAULT_SCENE, built_in_text};
 use crate::hands::type_over;
 use crate::window::{click, shown, window};
 
-/// Size of the screen for the class, points at zoom 1.
+/// Size of the audience's screen, points at zoom 1.
 const SCREEN: egui::Vec2 = vec2(1280.0, 720.0);
 
-/// The second window, as the tests show it.
+/// The second window as recorded by the tests.
 #[derive(Default)]
-struct Second {
-    /// Texts with the size of their type as a share of the window's height.
+struct AudienceWindow {
+    /// Texts with their font size as a fraction of the window's height.
     texts: Vec<(String, f32)>,
     events: Vec<egui::Event>,
     close: bool,
     shown: usize,
 }
 
-impl Second {
+impl AudienceWindow {
     fn has(&self, part: &str) -> bool {
         self.texts.iter().any(|(text, _)| text.contains(part))
     }
 }
 
 thread_local! {
-    static SECOND: RefCell<Second> = RefCell::default();
+    static AUDIENCE: RefCell<AudienceWindow> = RefCell::default();
 }
 
-/// Shows second windows as a platform does.
-fn show_second(ctx: &Context, window: ImmediateViewport<'_>) {
+/// Shows a second viewport as a platform does.
+fn show_audience(ctx: &Context, window: ImmediateViewport<'_>) {
     let ImmediateViewport { ids, mut viewport_ui_cb, .. } = window;
     let zoom = ctx.zoom_factor();
-    let (events, close) = SECOND.with_borrow_mut(|second| (std::mem::take(&mut second.events), second.close));
+    let (events, close) = AUDIENCE.with_borrow_mut(|audience| (std::mem::take(&mut audience.events), audience.close));
     let info = egui::ViewportInfo {
         events: close.then_some(ViewportEvent::Close).into_iter().collect(),
         ..Default::default()
@@ -54,13 +54,13 @@ fn show_second(ctx: &Context, window: ImmediateViewport<'_>) {
         ..Default::default()
     };
     let mut output = ctx.run_ui(input, |ui| viewport_ui_cb(ui));
-    // No texture is made of it.
+    // No textures are uploaded.
     output.textures_delta.clear();
     let mut texts = Vec::new();
     for part in &output.shapes {
         add_texts(&part.shape, zoom / SCREEN.y, &mut texts);
     }
-    SECOND.with_borrow_mut(|second| (second.texts, second.shown) = (texts, second.shown + 1));
+    AUDIENCE.with_borrow_mut(|audience| (audience.texts, audience.shown) = (texts, audience.shown + 1));
 }
 
 fn add_texts(shape: &Shape, share: f32, out: &mut Vec<(String, f32)>) {
@@ -75,77 +75,77 @@ fn add_texts(shape: &Shape, share: f32, out: &mut Vec<(String, f32)>) {
 }
 
 #[test]
-fn the_window_for_the_class_shows_the_same_instant_in_large_type_and_gives_everything_back() {
+fn the_window_for_the_class_shows_the_same_instant_in_large_type_and_closes_without_a_trace() {
     let mut harness = window("spcmm");
     harness.ctx.set_embed_viewports(false);
-    Context::set_immediate_viewport_renderer(show_second);
+    Context::set_immediate_viewport_renderer(show_audience);
     harness.state_mut().player_mut().run_to(30e-3);
     harness.run();
-    let look = |harness: &Harness<'_, App>| {
+    let visible_state = |harness: &Harness<'_, App>| {
         let pose = harness.state().camera_pose().expect("a picture");
         (shown(harness), harness.state().link().format(), harness.ctx.zoom_factor(), [pose.yaw, pose.distance])
     };
-    let before = look(&harness);
+    let before = visible_state(&harness);
     click(&mut harness, "Open");
     click(&mut harness, "Window for the class");
     assert!(harness.state().has_audience());
     harness.run();
     let last = harness.state().last_impact().expect("an impact");
-    SECOND.with_borrow(|second| {
+    AUDIENCE.with_borrow(|audience| {
         for part in ["t = 30.0000 ms", &*last, "S1", "Force on the ball, N", "clearance drawn ×20"] {
-            assert!(second.has(part), "{part}: {:?}", second.texts);
+            assert!(audience.has(part), "{part}: {:?}", audience.texts);
         }
-        assert!(!second.has("Normal force"), "no plot is chosen");
-        for (text, share) in &second.texts {
+        assert!(!audience.has("Normal force"), "no plot is chosen");
+        for (text, share) in &audience.texts {
             assert!(*share >= 1.0 / 40.0 - 1e-6, "{text}: {share}");
         }
     });
-    // The controls stay, as they were.
+    // The controls stay unchanged.
     for label in ["Play", "Save", "View options"] {
         harness.get_by_label(label);
     }
-    assert_eq!(look(&harness), before);
+    assert_eq!(visible_state(&harness), before);
 
-    // P in it turns to the next plot, and a key of the run moves both.
+    // P in the audience's window shows the next plot; keys of the run affect both windows.
     let press = |key| {
         let modifiers = egui::Modifiers::NONE;
         let event = |pressed| egui::Event::Key { key, physical_key: None, pressed, repeat: false, modifiers };
-        SECOND.with_borrow_mut(|second| second.events.extend([true, false].map(event)));
+        AUDIENCE.with_borrow_mut(|audience| audience.events.extend([true, false].map(event)));
     };
     for (title, other) in [("Normal force, N", "Eccentricity, mm"), ("Eccentricity, mm", "Normal force, N")] {
         press(Key::P);
         harness.run_steps(3);
-        SECOND.with_borrow(|second| {
-            assert!(second.has(title) && !second.has(other), "{:?}", second.texts);
-            assert!(second.texts.iter().all(|(_, share)| *share >= 1.0 / 40.0 - 1e-6), "{:?}", second.texts);
+        AUDIENCE.with_borrow(|audience| {
+            assert!(audience.has(title) && !audience.has(other), "{:?}", audience.texts);
+            assert!(audience.texts.iter().all(|(_, share)| *share >= 1.0 / 40.0 - 1e-6), "{:?}", audience.texts);
         });
     }
     press(Key::P);
     harness.run_steps(3);
-    SECOND.with_borrow(|second| assert!(!second.has("Eccentricity")));
+    AUDIENCE.with_borrow(|audience| assert!(!audience.has("Eccentricity")));
     press(Key::Comma);
     harness.run_steps(3);
     assert!(shown(&harness) < 30e-3);
     harness.state_mut().show_instant(30e-3);
 
-    SECOND.with_borrow_mut(|second| second.close = true);
+    AUDIENCE.with_borrow_mut(|audience| audience.close = true);
     harness.run();
     assert!(!harness.state().has_audience());
-    let frames = SECOND.with_borrow(|second| second.shown);
+    let frames = AUDIENCE.with_borrow(|audience| audience.shown);
     harness.run_steps(3);
-    assert_eq!(SECOND.with_borrow(|second| second.shown), frames, "it is gone");
-    assert_eq!(look(&harness), before);
+    assert_eq!(AUDIENCE.with_borrow(|audience| audience.shown), frames, "it is gone");
+    assert_eq!(visible_state(&harness), before);
 }
 
 #[test]
-fn where_a_platform_has_one_window_there_is_no_second_and_without_a_memory_no_menu() {
+fn a_single_window_platform_has_no_second_window_and_without_stored_settings_no_menu() {
     let harness = window("spcmm");
     harness.get_by_label("Open…");
     assert!(harness.query_by_label("Open").is_none());
 }
 
-/// The window with its memory in `path`.
-fn remembering(path: &std::path::Path) -> Harness<'static, App> {
+/// The window with its settings stored in `path`.
+fn with_store(path: &std::path::Path) -> Harness<'static, App> {
     let mut harness = window("pendulum");
     let ctx = harness.ctx.clone();
     ctx.set_theme(ThemePreference::System);
@@ -159,14 +159,14 @@ fn stored(path: &std::path::Path) -> StoredSettings {
 }
 
 #[test]
-fn theme_type_size_and_scenes_are_remembered_and_start_as_new_forgets_them() {
+fn theme_zoom_and_scenes_are_remembered_until_a_fresh_start() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("window.json");
     let file = |name: &str| folder.path().join(name);
     for (name, scene) in [("one.toml", "chain"), ("two.toml", "spcmm")] {
         std::fs::write(file(name), built_in_text(scene).expect("built in")).expect("writable");
     }
-    let mut harness = remembering(&path);
+    let mut harness = with_store(&path);
     assert_eq!(stored(&path).scene.as_deref(), Some("pendulum"));
     for name in ["one.toml", "two.toml"] {
         harness.state_mut().open(&file(name).display().to_string()).expect("a scene");
@@ -182,7 +182,7 @@ fn theme_type_size_and_scenes_are_remembered_and_start_as_new_forgets_them() {
     assert_eq!(stored(&path).theme.as_deref(), Some("dark"));
     drop(harness);
 
-    let mut harness = remembering(&path);
+    let mut harness = with_store(&path);
     assert_eq!(harness.ctx.zoom_factor(), 1.25);
     assert!(harness.ctx.options(|options| options.theme_preference == ThemePreference::Dark));
     // A presentation has a zoom of its own.
@@ -215,19 +215,19 @@ fn theme_type_size_and_scenes_are_remembered_and_start_as_new_forgets_them() {
     assert_eq!((now.scene, now.recent.len(), now.size), (None, 0, None));
 }
 
-/// A desktop whose dialogs a test answers.
-struct Desktop(Rc<RefCell<Dialogs>>);
+/// A desktop host whose dialogs are answered by a test.
+struct ScriptedDesktop(Rc<RefCell<Dialogs>>);
 
 #[derive(Default)]
 struct Dialogs {
-    /// Whether there are any.
+    /// Whether the system has file dialogs.
     available: bool,
     suggested: Vec<String>,
     answer: Option<Option<String>>,
     saved: Vec<SaveFile>,
 }
 
-impl Host for Desktop {
+impl Host for ScriptedDesktop {
     fn asks_for_path(&self) -> bool {
         true
     }
@@ -255,10 +255,10 @@ impl Host for Desktop {
 }
 
 #[test]
-fn files_go_where_the_dialog_says_and_where_there_is_none_where_the_text_field_says() {
+fn files_are_saved_to_the_path_from_the_dialog_or_else_from_the_text_field() {
     let mut harness = window("pendulum");
     let dialogs = Rc::new(RefCell::new(Dialogs { available: true, ..Dialogs::default() }));
-    harness.state_mut().set_host(Box::new(Desktop(dialogs.clone())));
+    harness.state_mut().set_host(Box::new(ScriptedDesktop(dialogs.clone())));
     let names = || -> Vec<String> { dialogs.borrow().saved.iter().map(|file| file.name.clone()).collect() };
     for answer in [None, Some("/data/mine.csv".to_owned())] {
         harness.state_mut().save_record();

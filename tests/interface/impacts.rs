@@ -1,4 +1,4 @@
-//! The list of impacts, its file, the badge at an impact, and the file of the plots: all numbers are those of the run's own records.
+//! The list of impacts, its file, the badge at an impact, and the saved plots: all numbers agree with the run's records.
 
 use eframe::egui::{self, Key};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
@@ -9,12 +9,12 @@ use jointplay::simulate::{Impact, Peak, Simulation};
 use crate::page::open;
 use crate::window::{click, shown, sized};
 
-/// The impacts of a run of the same scene until `time`, s, in the order in which they began.
-fn of_run(app: &App, time: f64) -> Vec<Impact> {
+/// The impacts of a separate run of the same scene until `time`, s, in the order of their starts.
+fn impacts_of_run(app: &App, time: f64) -> Vec<Impact> {
     peaks_of_run(app, time).into_iter().map(|(impact, _)| impact).collect()
 }
 
-/// The same, with the instant at which the force of each was largest, s.
+/// The same impacts, each with the instant of its largest force, s.
 pub fn peaks_of_run(app: &App, time: f64) -> Vec<(Impact, f64)> {
     let mut simulation = Simulation::new(&app.player().running().machine).expect("starts");
     let (mut impacts, mut latest, mut peaks) = (Vec::new(), Vec::new(), Vec::<(usize, Peak)>::new());
@@ -43,22 +43,22 @@ fn numbers(text: &str) -> Vec<f64> {
     text.split(|c| !digit(c)).filter_map(|word| word.parse().ok()).collect()
 }
 
-fn near(found: f64, expected: f64) -> bool {
-    (found / expected - 1.0).abs() < 6e-3
+fn is_close(actual: f64, expected: f64) -> bool {
+    (actual / expected - 1.0).abs() < 6e-3
 }
 
 #[test]
-fn the_list_has_the_impacts_of_the_run_and_a_row_goes_to_its_peak() {
+fn the_list_shows_the_impacts_of_the_run_and_a_click_seeks_to_the_peak() {
     let mut harness = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
     harness.state_mut().player_mut().run_to(40e-3);
     harness.run();
-    let impacts = of_run(harness.state(), 40e-3);
+    let impacts = impacts_of_run(harness.state(), 40e-3);
     assert!(impacts.len() > 9, "{}", impacts.len());
     let before = harness.state().player().simulation().state_hash();
     harness.key_press(Key::I);
     harness.run();
     assert!(harness.state().has_impact_list());
-    // The latest comes first.
+    // The latest impact is listed first.
     let names = ["S1", "S2", "S3"];
     for (at, impact) in impacts.iter().enumerate().rev().take(3) {
         let number = at + 1;
@@ -77,7 +77,7 @@ fn the_list_has_the_impacts_of_the_run_and_a_row_goes_to_its_peak() {
             impact.law,
         ];
         assert_eq!(found.len(), expected.len(), "{words}");
-        assert!(found.iter().zip(expected).all(|(a, b)| near(*a, b)), "{words}: {expected:?}");
+        assert!(found.iter().zip(expected).all(|(a, b)| is_close(*a, b)), "{words}: {expected:?}");
         assert_eq!(words.contains("disturbed"), impact.disturbed, "{words}");
     }
     assert_eq!(harness.state().player().simulation().state_hash(), before);
@@ -85,13 +85,13 @@ fn the_list_has_the_impacts_of_the_run_and_a_row_goes_to_its_peak() {
     harness.get_by_label_contains(&format!("Impact {}, ", impacts.len())).click();
     harness.run();
     assert_eq!(shown(&harness), peak);
-    // It is under way now.
+    // The displayed instant is within this impact.
     let badge = harness.state().impact_badge().expect("a badge");
     assert!(badge.starts_with(&format!("Impact {}, ", impacts.len())), "{badge}");
 }
 
 #[test]
-fn the_list_lies_above_the_transport_in_windows_of_every_size() {
+fn the_list_stays_above_the_transport_in_windows_of_every_size() {
     for (size, presents) in [
         ([1280.0, 800.0], false),
         ([1280.0, 720.0], true),
@@ -118,7 +118,7 @@ fn the_list_lies_above_the_transport_in_windows_of_every_size() {
         let bar = harness.get_by_label("Transport bar").rect();
         let before = list(&harness);
         assert!(before.bottom() <= bar.top() && before.top() >= 0.0, "{size:?}: {before:?}, {bar:?}");
-        // Nor can it be drawn there.
+        // It cannot be dragged over the bar either.
         let title = before.center_top() + egui::vec2(0.0, 20.0);
         harness.drag_at(title);
         harness.step();
@@ -132,7 +132,7 @@ fn the_list_lies_above_the_transport_in_windows_of_every_size() {
 }
 
 #[test]
-fn the_badge_at_an_impact_says_what_the_run_recorded() {
+fn the_badge_at_an_impact_shows_the_recorded_values() {
     for presenting in [false, true] {
         let mut harness = sized("spcmm", [1280.0, 720.0], egui::Theme::Light);
         if presenting {
@@ -149,10 +149,10 @@ fn the_badge_at_an_impact_says_what_the_run_recorded() {
         let badge = harness.state().impact_badge().expect("stands at an impact");
         harness.get_by_label(&badge);
         let (impact, peak) = peaks_of_run(harness.state(), 9e-3)[0];
-        // The force is there: as an arrow, in the plot and in words.
+        // The displayed frame has the impact's peak force.
         assert_eq!(shown(&harness), peak);
         let force = harness.state().player().frame().joints[0].normal_force.norm();
-        assert!(near(force, impact.peak), "{force} N, {} N", impact.peak);
+        assert!(is_close(force, impact.peak), "{force} N, {} N", impact.peak);
         assert!(badge.starts_with("Impact 1, S1: 7.80"), "{badge}");
         let found = numbers(badge.split_once(": ").expect("numbers").1);
         let expected = [
@@ -163,7 +163,7 @@ fn the_badge_at_an_impact_says_what_the_run_recorded() {
             impact.separation_speed * 1e3,
         ];
         assert_eq!(found.len(), 5, "{badge}");
-        assert!(found.iter().zip(expected).all(|(a, b)| near(*a, b)), "{badge}: {expected:?}");
+        assert!(found.iter().zip(expected).all(|(a, b)| is_close(*a, b)), "{badge}: {expected:?}");
         harness.key_press(Key::Space);
         harness.step();
         assert_eq!(harness.state().impact_badge(), None, "not while time passes");
@@ -171,12 +171,12 @@ fn the_badge_at_an_impact_says_what_the_run_recorded() {
 }
 
 #[test]
-fn the_file_has_the_columns_and_values_of_the_command_line_s() {
+fn the_file_has_the_columns_and_values_of_the_command_line() {
     let scene = Scene::load("spcmm", &[]).expect("built in");
     let options = AppOptions { playing: false, ..AppOptions::new(scene) };
     let (mut harness, calls) = open(options, [1280.0, 800.0]);
     harness.state_mut().player_mut().run_to(30e-3);
-    // What was gone back from counts no more than once.
+    // Going back and forth does not duplicate impacts.
     harness.state_mut().player_mut().go_to(10e-3);
     harness.state_mut().player_mut().go_to(30e-3);
     harness.run();
@@ -190,7 +190,7 @@ fn the_file_has_the_columns_and_values_of_the_command_line_s() {
     assert_eq!(header[..3], ["joint", "start_s", "end_s"]);
     let rows: Vec<Vec<f64>> =
         lines.map(|line| line.split(',').map(|value| value.parse().expect("a number")).collect()).collect();
-    let expected = of_run(harness.state(), shown(&harness));
+    let expected = impacts_of_run(harness.state(), shown(&harness));
     assert_eq!(rows.len(), expected.len());
     for (row, impact) in rows.iter().zip(&expected) {
         let own = jointplay::analysis::impact_row::row(impact);
@@ -199,7 +199,7 @@ fn the_file_has_the_columns_and_values_of_the_command_line_s() {
 }
 
 #[test]
-fn the_plots_on_show_are_saved_as_page_drawing_and_picture() {
+fn the_displayed_plots_are_saved_as_svg_pdf_and_png() {
     let scene = Scene::load("spcmm", &[]).expect("built in");
     let options = AppOptions { playing: false, ..AppOptions::new(scene) };
     let (mut harness, calls) = open(options, [1280.0, 800.0]);
@@ -217,7 +217,7 @@ fn the_plots_on_show_are_saved_as_page_drawing_and_picture() {
     for word in ["Normal force", "Eccentricity", "S1", "S3", "clearance", "state hash"] {
         assert!(text.contains(word), "{word}");
     }
-    // A line of the drawing for each curve.
+    // The drawing has a line for each curve.
     assert!(text.matches("<polyline").count() >= 6, "{}", text.matches("<polyline").count());
     let holds = |bytes: &[u8], words: &str| bytes.windows(words.len()).any(|part| part == words.as_bytes());
     assert!(pdf.name.ends_with("-plots.pdf") && pdf.mime == "application/pdf");
@@ -233,7 +233,7 @@ fn the_plots_on_show_are_saved_as_page_drawing_and_picture() {
 }
 
 #[test]
-fn played_backwards_the_picture_marks_the_peaks_that_came_before() {
+fn playing_backwards_marks_the_peaks_before_the_displayed_instant() {
     let mut harness = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
     harness.state_mut().player_mut().run_to(30e-3);
     harness.state_mut().player_mut().pacer.set_scale(0.005);
@@ -247,7 +247,7 @@ fn played_backwards_the_picture_marks_the_peaks_that_came_before() {
         for (joint, force, age) in harness.state().peak_marks() {
             let own = |(impact, peak): &&(Impact, f64)| impact.joint == joint && (peak - (now - age)).abs() < 1e-9;
             let (impact, peak) = peaks.iter().find(own).unwrap_or_else(|| panic!("none at {} s", now - age));
-            assert!(*peak <= now && near(f64::from(force), impact.peak), "{force} N at {now} s");
+            assert!(*peak <= now && is_close(f64::from(force), impact.peak), "{force} N at {now} s");
             marked.insert((joint, impact.start.to_bits()));
         }
         harness.step();

@@ -28,32 +28,33 @@ fn choose(harness: &mut Harness<'_, App>, combo: &str, entry: &str) {
     let combo = harness.get_by_role_and_label(Role::ComboBox, combo);
     combo.click();
     harness.run();
-    // What is open lies before all else.
+    // The open list is drawn last.
     let entries = harness.get_all_by_label(entry);
     entries.last().expect("an entry").click();
     harness.run();
 }
 
-/// Whether some label has `words` in it.
-fn said(harness: &Harness<'_, App>, words: &str) -> bool {
+/// Whether some label contains `words`.
+fn shows_text(harness: &Harness<'_, App>, words: &str) -> bool {
     let mut all = harness.query_all_by_label_contains(words);
     all.next().is_some()
 }
 
-/// Where the view looks, m.
+/// The camera's target, m.
 fn target(harness: &Harness<'_, App>) -> [f32; 3] {
     let link = Link::parse(&harness.state().share_state()).expect("a link");
     link.camera.expect("has a camera").target
 }
 
-fn from_the_middle(harness: &Harness<'_, App>, joint: usize) -> f64 {
+/// Distance of the camera's target from the socket of `joint`, m.
+fn distance_to_target(harness: &Harness<'_, App>, joint: usize) -> f64 {
     let centre = harness.state().player().frame().joints[joint].socket_centre;
     let off = [0, 1, 2].map(|i| f64::from(target(harness)[i]) - centre[i]);
     off.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 #[test]
-fn the_ball_s_centre_is_drawn_where_eccentricity_over_scale_says() {
+fn the_ball_centre_is_drawn_at_the_scaled_eccentricity() {
     let mut harness = spcmm();
     harness.key_press(Key::L);
     harness.run();
@@ -61,7 +62,7 @@ fn the_ball_s_centre_is_drawn_where_eccentricity_over_scale_says() {
     choose(&mut harness, "Ball joint in focus", "S2");
     assert_eq!(harness.state().microscope().joint(), 1);
     harness.remove_cursor();
-    // In free fall: the dot is in the colour of text, and so is nothing else in the circle.
+    // In free fall the dot is the only thing in the circle with the text colour.
     for time in [4e-3, 7e-3, 9.6e-3] {
         harness.state_mut().player_mut().run_to(time);
         harness.run();
@@ -79,8 +80,8 @@ fn the_ball_s_centre_is_drawn_where_eccentricity_over_scale_says() {
         let dot = picture.coloured(area, [0x1E, 0x2A, 0x36], 24);
         assert!(dot.len() > 20, "{time}: {} at {expected}", dot.len());
         let mean = |of: fn(&(usize, usize)) -> usize| dot.iter().map(of).sum::<usize>() as f32 / dot.len() as f32 + 0.5;
-        let found = Pos2::new(mean(|p| p.0), mean(|p| p.1));
-        assert!(found.distance(expected) < 1.0, "{found} {expected}");
+        let dot_centre = Pos2::new(mean(|p| p.0), mean(|p| p.1));
+        assert!(dot_centre.distance(expected) < 1.0, "{dot_centre} {expected}");
         assert!(expected.distance(circle.centre) < circle.radius + 1.0);
     }
     let path = harness.state().player().paths();
@@ -92,7 +93,7 @@ fn the_joint_in_focus_stays_in_the_middle_and_a_click_opens_its_microscope() {
     let mut harness = spcmm();
     harness.key_press(Key::Num6);
     harness.run();
-    assert!(from_the_middle(&harness, 1) < 1e-6);
+    assert!(distance_to_target(&harness, 1) < 1e-6);
     assert!(!harness.state().microscope().is_open());
     let before = harness.state().player().frame().joints[1].socket_centre;
     harness.state_mut().player_mut().pacer.set_scale(0.5);
@@ -102,14 +103,14 @@ fn the_joint_in_focus_stays_in_the_middle_and_a_click_opens_its_microscope() {
     harness.run();
     let after = harness.state().player().frame().joints[1].socket_centre;
     assert!((after - before).norm() > 1e-3, "its slider moves");
-    assert!(from_the_middle(&harness, 1) < 1e-5);
-    // While the view is still on its way, too.
+    assert!(distance_to_target(&harness, 1) < 1e-5);
+    // The same while the view is still moving.
     harness.key_press(Key::Num5);
     harness.state_mut().player_mut().set_playing(true);
     harness.run_steps(60);
     harness.state_mut().player_mut().set_playing(false);
     harness.run();
-    assert!(from_the_middle(&harness, 0) < 1e-5);
+    assert!(distance_to_target(&harness, 0) < 1e-5);
 
     let middle = harness.get_by_label("3D view").rect().center();
     harness.hover_at(middle);
@@ -123,7 +124,7 @@ fn the_joint_in_focus_stays_in_the_middle_and_a_click_opens_its_microscope() {
     harness.key_press(Key::Escape);
     harness.run();
     assert!(!harness.state().microscope().is_open());
-    // With a message on show Esc takes that first.
+    // Esc closes a message before the microscope.
     harness.key_press(Key::L);
     let opened = harness.state_mut().open_bytes("bad.toml", vec![0xFF]);
     let problem = opened.expect_err("no text");
@@ -138,7 +139,7 @@ fn the_joint_in_focus_stays_in_the_middle_and_a_click_opens_its_microscope() {
 }
 
 #[test]
-fn what_is_told_of_an_impact_is_what_the_run_recorded() {
+fn the_microscope_shows_the_recorded_values_of_an_impact() {
     let mut harness = spcmm();
     harness.key_press(Key::L);
     harness.state_mut().player_mut().run_to(9.5e-3);
@@ -146,8 +147,8 @@ fn what_is_told_of_an_impact_is_what_the_run_recorded() {
     let player = harness.state().player();
     let impact = player.simulation().impacts().find(|impact| impact.joint == 0);
     let impact = *impact.expect("S1 was hit");
-    let given = format!("{:.4}", impact.achieved());
-    harness.get_by_label(given.trim_end_matches('0'));
+    let restitution = format!("{:.4}", impact.achieved());
+    harness.get_by_label(restitution.trim_end_matches('0'));
     harness.get_by_label("Restitution asked");
     harness.get_by_label("0.9");
     harness.get_by_label("The ball touches nothing");
@@ -159,7 +160,7 @@ fn what_is_told_of_an_impact_is_what_the_run_recorded() {
         }
     }
     harness.run();
-    assert!(said(&harness, "In contact, "));
+    assert!(shows_text(&harness, "In contact, "));
     let closed = [("contact.clearance", "0")];
     let mut harness = window("spcmm", &closed, WIDE, egui::Theme::Light);
     harness.key_press(Key::L);
@@ -169,7 +170,7 @@ fn what_is_told_of_an_impact_is_what_the_run_recorded() {
 }
 
 #[test]
-fn instruments_cost_the_run_no_bit() {
+fn instruments_change_no_bit_of_the_run() {
     let run = |instruments: bool| {
         let mut harness = window("slider-crank", &[], WIDE, egui::Theme::Light);
         if instruments {
@@ -188,7 +189,7 @@ fn instruments_cost_the_run_no_bit() {
         let error = player.ideal().map(|ideal| ideal.output_error(player.frame()));
         assert_eq!(error.is_some(), instruments);
         if let Some(error) = error {
-            assert!(error.expect("came there").norm() > 1e-7);
+            assert!(error.expect("reached this instant").norm() > 1e-7);
         }
         (player.simulation().state_hash(), player.steps())
     };
@@ -196,9 +197,9 @@ fn instruments_cost_the_run_no_bit() {
 }
 
 #[test]
-fn an_ideal_ghost_that_cannot_be_says_so() {
+fn an_impossible_ideal_ghost_is_explained() {
     let text = jointplay::scene::built_in_text("pendulum").expect("built in");
-    // A rod between two sockets that are farther apart than its balls, by less than the play.
+    // A rod whose two sockets are farther apart than its balls by less than the clearance.
     let second = "[[ball_joint]]\nname = \"S2\"\nopening = [0, -1, 0]\n\
         socket = { body = \"world\", at = \"0 0 -200.2 mm\" }\nball = { body = \"rod\", at = \"0 0 -100 mm\" }\n";
     let text = text.replace("-30 deg", "0 deg") + second;
@@ -210,14 +211,14 @@ fn an_ideal_ghost_that_cannot_be_says_so() {
     harness.run();
     harness.key_press(Key::G);
     harness.run();
-    assert!(said(&harness, "No ideal ghost: with ideal joints, ball joint S"));
+    assert!(shows_text(&harness, "No ideal ghost: with ideal joints, ball joint S"));
     harness.key_press(Key::Escape);
     harness.key_press(Key::G);
     harness.run();
     harness.key_press(Key::G);
     harness.run();
     assert!(harness.state().player().ideal().is_some());
-    // Another scene keeps it.
+    // The ghost stays on in another scene.
     harness.state_mut().open("pendulum").expect("opens");
     harness.run();
     assert!(harness.state().player().ideal().is_some());
@@ -239,7 +240,7 @@ fn every_control_of_the_microscope_has_a_name() {
             let named = node.label().is_some_and(|label| !label.trim().is_empty());
             assert!(!is_control || named, "{:?}", node.role());
         }
-        // Beside the picture, of which it covers nothing.
+        // The microscope is beside the picture and covers nothing of it.
         let view = harness.get_by_label("3D view").rect();
         let shown = harness.get_by_label_contains("under the microscope. ");
         let close = harness.get_by_role_and_label(Role::Button, "Close");
@@ -248,11 +249,11 @@ fn every_control_of_the_microscope_has_a_name() {
             assert!(part.right() <= size[0] && view.y_range().contains(part.top()));
         }
     }
-    // Where both have no room it waits.
+    // In a window too small for both it is hidden.
     let mut harness = window("spcmm", &[], [400.0, 300.0], egui::Theme::Light);
     harness.key_press(Key::L);
     harness.run();
-    let microscope = |harness: &Harness<'_, App>| said(harness, "under the microscope. ");
+    let microscope = |harness: &Harness<'_, App>| shows_text(harness, "under the microscope. ");
     assert!(!microscope(&harness), "beside the open sheet");
     click(&mut harness, "Panels");
     click(&mut harness, "Controls");

@@ -1,4 +1,4 @@
-//! Presentation: what the last row sees.
+//! Presentation mode: legible from the last row.
 
 use eframe::egui::{self, Key, PointerButton, Shape, TextStyle, accesskit::Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable as _};
@@ -10,8 +10,8 @@ use crate::window::{click, shown, sized};
 
 const SCREEN: egui::Vec2 = vec2(1280.0, 720.0);
 
-/// Presses F5, and gives the window the points that are left at its new zoom: a real one has the same pixels as before.
-fn f5(harness: &mut Harness<'_, App>, screen: egui::Vec2) {
+/// Presses F5 and resizes the window for its new zoom, since a real one keeps its number of pixels.
+fn toggle_presentation(harness: &mut Harness<'_, App>, screen: egui::Vec2) {
     harness.key_press(Key::F5);
     harness.step();
     harness.set_size(screen / harness.ctx.zoom_factor());
@@ -19,7 +19,7 @@ fn f5(harness: &mut Harness<'_, App>, screen: egui::Vec2) {
 }
 
 #[test]
-fn f5_leaves_the_picture_with_type_for_the_last_row_and_changes_nothing_of_the_run() {
+fn f5_shows_the_picture_with_large_type_and_does_not_affect_the_run() {
     for screen in [SCREEN, vec2(1920.0, 1080.0), vec2(800.0, 450.0)] {
         let mut harness = sized("spcmm", screen.into(), egui::Theme::Light);
         harness.state_mut().player_mut().run_to(30e-3);
@@ -29,9 +29,9 @@ fn f5_leaves_the_picture_with_type_for_the_last_row_and_changes_nothing_of_the_r
             (player.pacer.shown(), player.simulation().state_hash())
         };
         let before = state(&harness);
-        f5(&mut harness, screen);
+        toggle_presentation(&mut harness, screen);
         assert!(harness.state().is_presenting());
-        // The panels are away, time and transport are there.
+        // The panels are hidden; time and transport remain.
         for gone in ["Controls", "Save", "View options", "Clearance"] {
             assert!(harness.query_by_label(gone).is_none(), "{gone}");
         }
@@ -43,7 +43,7 @@ fn f5_leaves_the_picture_with_type_for_the_last_row_and_changes_nothing_of_the_r
             assert!(share >= 1.0 / 40.0 - 1e-6, "{screen:?} {style:?}: {share}");
         }
 
-        // The caption is of the last impact that has ended at the instant shown.
+        // The caption describes the last impact that has ended by the displayed instant.
         let mut simulation = Simulation::new(&harness.state().player().running().machine).expect("starts");
         let mut impacts = Vec::new();
         while simulation.time() < 30e-3 {
@@ -61,11 +61,11 @@ fn f5_leaves_the_picture_with_type_for_the_last_row_and_changes_nothing_of_the_r
             let digits: String = text.chars().take_while(|c| !c.is_whitespace()).collect();
             digits.replace('\u{2212}', "-").parse().expect("a number")
         };
-        let (force, lasted) = (parts.next().expect("a force"), parts.next().expect("a time"));
-        assert!(force.ends_with(" N") && lasted.ends_with(" ms"), "{words}");
+        let (force, duration) = (parts.next().expect("a force"), parts.next().expect("a time"));
+        assert!(force.ends_with(" N") && duration.ends_with(" ms"), "{words}");
         assert!((number(force) / last.peak - 1.0).abs() < 5.1e-3, "{words}");
         let milliseconds = (last.end - last.start) * 1e3;
-        assert!((number(lasted) / milliseconds - 1.0).abs() < 0.051, "{words}");
+        assert!((number(duration) / milliseconds - 1.0).abs() < 0.051, "{words}");
 
         harness.key_press(Key::Escape);
         harness.step();
@@ -78,30 +78,30 @@ fn f5_leaves_the_picture_with_type_for_the_last_row_and_changes_nothing_of_the_r
     }
 }
 
-/// The smallest type of the texts on the screen, as a share of its height.
-fn smallest(harness: &Harness<'_, App>) -> f32 {
-    fn sizes(shape: &Shape, least: &mut f32) {
+/// The smallest font size on the screen, as a fraction of its height.
+fn smallest_font(harness: &Harness<'_, App>) -> f32 {
+    fn sizes(shape: &Shape, min: &mut f32) {
         match shape {
-            Shape::Vec(shapes) => shapes.iter().for_each(|shape| sizes(shape, least)),
+            Shape::Vec(shapes) => shapes.iter().for_each(|shape| sizes(shape, min)),
             Shape::Text(text) => {
                 let sections = text.galley.job.sections.iter();
-                *least = sections.fold(*least, |least, section| least.min(section.format.font_id.size));
+                *min = sections.fold(*min, |min, section| min.min(section.format.font_id.size));
             }
             _ => {}
         }
     }
-    let mut least = f32::INFINITY;
-    harness.output().shapes.iter().for_each(|part| sizes(&part.shape, &mut least));
-    least / harness.ctx.content_rect().height()
+    let mut min = f32::INFINITY;
+    harness.output().shapes.iter().for_each(|part| sizes(&part.shape, &mut min));
+    min / harness.ctx.content_rect().height()
 }
 
 #[test]
-fn a_presentation_goes_through_time_by_a_drag_and_from_impact_to_impact_and_shows_one_plot_at_a_time() {
+fn a_presentation_scrubs_steps_between_impacts_and_shows_one_plot_at_a_time() {
     for screen in [SCREEN, vec2(1920.0, 1080.0)] {
         let mut harness = sized("spcmm", screen.into(), egui::Theme::Light);
         harness.state_mut().player_mut().run_to(40e-3);
         harness.run();
-        f5(&mut harness, screen);
+        toggle_presentation(&mut harness, screen);
         let strip = harness.get_by_role_and_label(Role::Slider, "Timeline, s").rect();
         let at = |share: f32| egui::pos2(strip.left() + share * strip.width(), strip.center().y);
         harness.drag_at(at(0.9));
@@ -123,33 +123,33 @@ fn a_presentation_goes_through_time_by_a_drag_and_from_impact_to_impact_and_show
         assert!(shown(&harness) > before);
 
         let titles = ["Normal force, N", "Eccentricity, mm"];
-        let on_show = |harness: &Harness<'_, App>| titles.map(|title| harness.query_by_label(title).is_some());
-        assert_eq!(on_show(&harness), [false, false]);
+        let shown_plots = |harness: &Harness<'_, App>| titles.map(|title| harness.query_by_label(title).is_some());
+        assert_eq!(shown_plots(&harness), [false, false]);
         for expected in [[true, false], [false, true], [false, false]] {
             harness.key_press(Key::P);
             harness.run();
-            assert_eq!(on_show(&harness), expected);
-            let share = smallest(&harness);
+            assert_eq!(shown_plots(&harness), expected);
+            let share = smallest_font(&harness);
             assert!(share >= 1.0 / 40.0 - 1e-6, "{share}");
         }
         click(&mut harness, "Plot");
-        assert_eq!(on_show(&harness), [true, false], "the button does it, too");
-        // The plots of the window are as they were.
+        assert_eq!(shown_plots(&harness), [true, false], "the button works, too");
+        // The window's own plots are restored.
         harness.key_press(Key::F5);
         harness.step();
         harness.set_size(screen);
         harness.run();
-        assert_eq!(on_show(&harness), [true, true]);
+        assert_eq!(shown_plots(&harness), [true, true]);
     }
 }
 
 #[test]
-fn the_type_follows_the_screen() {
+fn the_font_size_follows_the_screen() {
     let mut harness = sized("pendulum", SCREEN.into(), egui::Theme::Light);
-    f5(&mut harness, SCREEN);
+    toggle_presentation(&mut harness, SCREEN);
     let zoom = harness.ctx.zoom_factor();
     assert!((zoom - 720.0 / 40.0 / 11.0).abs() < 1e-3, "{zoom}");
-    // The full screen is larger than the window was.
+    // The full screen is larger than the window.
     harness.set_size(vec2(1920.0, 1080.0) / zoom);
     harness.step();
     harness.step();
@@ -158,15 +158,15 @@ fn the_type_follows_the_screen() {
 }
 
 #[test]
-fn a_double_click_on_the_bar_does_it_too() {
+fn a_double_click_on_the_bar_toggles_presentation_too() {
     for size in [[1280.0, 800.0], [390.0, 844.0], [844.0, 390.0]] {
         let mut harness = sized("pendulum", size, egui::Theme::Light);
-        // Where the bar holds nothing.
-        let place = |label: &str| harness.get_by_label(label).rect();
+        // An empty part of the bar.
+        let rect_of = |label: &str| harness.get_by_label(label).rect();
         let at = match size {
-            [844.0, _] => place("Controls").left_center() - vec2(14.0, 0.0),
-            [390.0, _] => egui::pos2(370.0, place("Bench").center().y),
-            _ => egui::pos2(size[0] - 24.0, place("Play").center().y),
+            [844.0, _] => rect_of("Controls").left_center() - vec2(14.0, 0.0),
+            [390.0, _] => egui::pos2(370.0, rect_of("Bench").center().y),
+            _ => egui::pos2(size[0] - 24.0, rect_of("Play").center().y),
         };
         for _ in 0..2 {
             for pressed in [true, false] {
@@ -193,7 +193,7 @@ fn a_presentation_shows_what_is_stored() {
         let mut harness = plain(scene, &[], SCREEN.into(), theme);
         harness.state_mut().player_mut().run_to(30e-3);
         harness.run();
-        f5(&mut harness, SCREEN);
+        toggle_presentation(&mut harness, SCREEN);
         let zoom = harness.ctx.zoom_factor();
         harness.set_pixels_per_point(zoom);
         harness.run();
@@ -202,13 +202,13 @@ fn a_presentation_shows_what_is_stored() {
 }
 
 #[test]
-fn esc_leaves_what_lies_innermost_and_only_then_microscope_and_presentation() {
+fn esc_closes_the_innermost_part_first_then_microscope_and_presentation() {
     let mut harness = sized("spcmm", SCREEN.into(), egui::Theme::Light);
     let esc = |harness: &mut Harness<'_, App>| {
         harness.key_press(Key::Escape);
         harness.run();
     };
-    let shows = |harness: &Harness<'_, App>| harness.state().microscope().is_open();
+    let is_open = |harness: &Harness<'_, App>| harness.state().microscope().is_open();
     harness.state_mut().microscope_mut().set_open(true);
     harness.run();
     // A text field.
@@ -216,11 +216,11 @@ fn esc_leaves_what_lies_innermost_and_only_then_microscope_and_presentation() {
     harness.run();
     assert!(harness.ctx.text_edit_focused());
     esc(&mut harness);
-    assert!(!harness.ctx.text_edit_focused() && shows(&harness));
+    assert!(!harness.ctx.text_edit_focused() && is_open(&harness));
     // A menu.
     click(&mut harness, "Choose plots");
     esc(&mut harness);
-    assert!(harness.query_by_label("Search channels").is_none() && shows(&harness));
+    assert!(harness.query_by_label("Search channels").is_none() && is_open(&harness));
     // A list in a dialog, then the dialog.
     click(&mut harness, "Save");
     click(&mut harness, "Film…");
@@ -229,17 +229,17 @@ fn esc_leaves_what_lies_innermost_and_only_then_microscope_and_presentation() {
     esc(&mut harness);
     assert!(harness.query_by_label("Make film").is_some());
     esc(&mut harness);
-    assert!(harness.query_by_label("Make film").is_none() && shows(&harness));
+    assert!(harness.query_by_label("Make film").is_none() && is_open(&harness));
     // A message.
     let ctx = harness.ctx.clone();
     harness.state_mut().open_link(&ctx, "#scene=nowhere").expect_err("no such scene");
     harness.run();
     esc(&mut harness);
-    assert!(harness.query_by_label("Dismiss").is_none() && shows(&harness));
+    assert!(harness.query_by_label("Dismiss").is_none() && is_open(&harness));
     esc(&mut harness);
-    assert!(!shows(&harness));
+    assert!(!is_open(&harness));
     // The list of time scales in a presentation.
-    f5(&mut harness, SCREEN);
+    toggle_presentation(&mut harness, SCREEN);
     harness.get_by_role_and_label(Role::ComboBox, "Time scale preset").click();
     harness.run();
     esc(&mut harness);
@@ -250,20 +250,20 @@ fn esc_leaves_what_lies_innermost_and_only_then_microscope_and_presentation() {
 
 #[test]
 fn nothing_beside_the_clock_moves_as_its_digits_change() {
-    for presents in [false, true] {
+    for is_presenting in [false, true] {
         let mut harness = sized("spcmm", SCREEN.into(), egui::Theme::Light);
-        if presents {
-            f5(&mut harness, SCREEN);
+        if is_presenting {
+            toggle_presentation(&mut harness, SCREEN);
         }
-        let places = |harness: &Harness<'_, App>| {
+        let rects = |harness: &Harness<'_, App>| {
             ["Reset", "Play", "Step", "Next impact", "Timeline, s", "Time scale preset"]
                 .map(|name| harness.get_by_label(name).rect())
         };
-        let before = places(&harness);
+        let before = rects(&harness);
         for time in [0.9e-6, 3.3e-6, 0.9999e-3, 1e-3, 9.9999e-3, 10.0001e-3, 111.1111e-3] {
             harness.state_mut().player_mut().run_to(time);
             harness.run();
-            assert_eq!(places(&harness), before, "{time}");
+            assert_eq!(rects(&harness), before, "{time}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Fingers on a small screen: what they scroll and what they move, and that nothing lies over another thing.
+//! Touch on a small screen: scrolling, dragging, and controls that do not overlap.
 
 use eframe::egui::{self, Pos2, Rect, accesskit::Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable as _};
@@ -7,9 +7,9 @@ use jointplay::app::{App, AppOptions};
 use crate::hands::fingers;
 use crate::page::{click, label, open, window};
 
-const UPRIGHT: [f32; 2] = [390.0, 844.0];
-const LYING: [f32; 2] = [844.0, 390.0];
-/// A window that somebody has put beside three others.
+const PORTRAIT: [f32; 2] = [390.0, 844.0];
+const LANDSCAPE: [f32; 2] = [844.0, 390.0];
+/// A window tiled beside three others.
 const SMALL: [f32; 2] = [400.0, 300.0];
 
 fn rect(harness: &Harness<'_, App>, role: Role, name: &str) -> Rect {
@@ -20,41 +20,41 @@ fn clearance(harness: &Harness<'_, App>) -> f64 {
     harness.state().player().pending().machine.contact.clearance
 }
 
-/// The way of a finger from `from` by `way`, in steps as short as a screen reports them; it rests at the end, so that nothing glides
-/// on.
-fn path(from: Pos2, way: egui::Vec2) -> Vec<Pos2> {
+/// The path of a finger from `from` by `offset`, in steps as small as a screen reports; it rests at the end to avoid kinetic
+/// scrolling.
+fn path(from: Pos2, offset: egui::Vec2) -> Vec<Pos2> {
     let parts = (0..=12).chain([12; 12]);
-    parts.map(|k| from + way * (k as f32 / 12.0)).collect()
+    parts.map(|k| from + offset * (k as f32 / 12.0)).collect()
 }
 
 #[test]
 fn a_finger_on_a_slider_scrolls_up_and_down_and_moves_it_sideways() {
-    let (mut harness, _) = window("spcmm", UPRIGHT);
+    let (mut harness, _) = window("spcmm", PORTRAIT);
     harness.run();
     let before = clearance(&harness);
     let track = rect(&harness, Role::Slider, "Clearance");
-    // Not where the handle is: there nothing would move at first either.
+    // Away from the handle, where a touch would not move it at once.
     let at = track.left_center() + vec2(0.7 * track.width(), 0.0);
     fingers(&mut harness, &[&path(at, vec2(3.0, -90.0))]);
     harness.run();
-    assert_eq!(clearance(&harness), before, "the swipe moves the slider");
+    assert_eq!(clearance(&harness), before, "the swipe must not move the slider");
     let moved = track.top() - rect(&harness, Role::Slider, "Clearance").top();
     assert!(moved > 60.0, "scrolled by {moved}");
 
-    // Back, sideways later on: what the finger does stays decided.
-    let there = rect(&harness, Role::Slider, "Friction coefficient").center();
+    // Back down, then sideways: the gesture remains a scroll.
+    let start = rect(&harness, Role::Slider, "Friction coefficient").center();
     let friction = harness.state().player().pending().machine.contact.friction;
-    let mut way = path(there, vec2(0.0, 90.0));
-    way.extend(path(there + vec2(0.0, 90.0), vec2(80.0, 60.0)));
-    fingers(&mut harness, &[&way]);
+    let mut gesture = path(start, vec2(0.0, 90.0));
+    gesture.extend(path(start + vec2(0.0, 90.0), vec2(80.0, 60.0)));
+    fingers(&mut harness, &[&gesture]);
     harness.run();
     assert_eq!(harness.state().player().pending().machine.contact.friction, friction);
     assert_eq!(rect(&harness, Role::Slider, "Clearance").top(), track.top());
 
-    // A tap is no drag.
+    // A tap is not a drag.
     fingers(&mut harness, &[&[at, at]]);
     harness.run();
-    assert_eq!(clearance(&harness), before, "a tap moves the slider");
+    assert_eq!(clearance(&harness), before, "a tap must not move the slider");
 
     let from = track.left_center() + vec2(0.3 * track.width(), 0.0);
     fingers(&mut harness, &[&path(from, vec2(0.4 * track.width(), 20.0))]);
@@ -71,7 +71,7 @@ fn a_finger_on_a_slider_scrolls_up_and_down_and_moves_it_sideways() {
     assert!(clearance(&harness) < 0.4e-3, "{}", clearance(&harness));
 }
 
-/// Controls that do not scroll, by what they are called.
+/// Roles and names of controls that do not scroll.
 const FIXED: [(Role, &str); 12] = [
     (Role::ComboBox, "Scene"),
     (Role::Button, "Menu"),
@@ -88,8 +88,8 @@ const FIXED: [(Role, &str); 12] = [
 ];
 
 #[test]
-fn nothing_covers_anything_however_small_the_window_is() {
-    for size in [SMALL, [320.0, 480.0], [480.0, 320.0], UPRIGHT, LYING] {
+fn controls_do_not_overlap_in_windows_of_any_size() {
+    for size in [SMALL, [320.0, 480.0], [480.0, 320.0], PORTRAIT, LANDSCAPE] {
         let (mut harness, _) = window("spcmm", size);
         harness.run();
         for fold in [false, true] {
@@ -105,13 +105,13 @@ fn nothing_covers_anything_however_small_the_window_is() {
                 })
                 .collect();
             assert!(shown.len() >= 9, "{size:?}: {shown:?}");
-            let whole = Rect::from_min_size(Pos2::ZERO, size.into());
+            let screen = Rect::from_min_size(Pos2::ZERO, size.into());
             for (i, (name, rect)) in shown.iter().enumerate() {
-                assert!(whole.contains_rect(rect.shrink(0.5)), "{size:?}: {name} sticks out: {rect:?}");
-                for (other, there) in &shown[i + 1..] {
+                assert!(screen.contains_rect(rect.shrink(0.5)), "{size:?}: {name} sticks out: {rect:?}");
+                for (other, other_rect) in &shown[i + 1..] {
                     assert!(
-                        !rect.shrink(1.0).intersects(there.shrink(1.0)),
-                        "{size:?}: {name} and {other}: {rect:?} {there:?}"
+                        !rect.shrink(1.0).intersects(other_rect.shrink(1.0)),
+                        "{size:?}: {name} and {other}: {rect:?} {other_rect:?}"
                     );
                 }
             }
@@ -121,30 +121,30 @@ fn nothing_covers_anything_however_small_the_window_is() {
 
 #[test]
 fn a_phone_shows_the_machine_play_and_all_three_sliders() {
-    for (size, picture) in [([390.0, 664.0], 150.0), (LYING, 180.0)] {
+    for (size, picture) in [([390.0, 664.0], 150.0), (LANDSCAPE, 180.0)] {
         let (mut harness, _) = window("spcmm", size);
         harness.run();
         let sliders = ["Clearance", "Friction coefficient", "Restitution"];
         let tracks = sliders.map(|name| rect(&harness, Role::Slider, name));
         let entries = sliders.map(|name| rect(&harness, Role::TextInput, name));
         let play = rect(&harness, Role::Button, "Play");
-        let whole = Rect::from_min_size(Pos2::ZERO, size.into());
+        let screen = Rect::from_min_size(Pos2::ZERO, size.into());
         // The sheet ends at the edge of the window, or where the transport begins.
-        let low =
+        let sheet_bottom =
             if play.top() > tracks[0].bottom() { rect(&harness, Role::Slider, "Timeline, s").top() } else { size[1] };
         for row in tracks.iter().chain(&entries) {
-            assert!(whole.contains_rect(*row) && row.bottom() <= low - 2.0, "{size:?}: {row:?}");
-            assert!(row.height() >= 24.0, "a finger hits it: {row:?}");
+            assert!(screen.contains_rect(*row) && row.bottom() <= sheet_bottom - 2.0, "{size:?}: {row:?}");
+            assert!(row.height() >= 24.0, "large enough for a finger: {row:?}");
         }
         assert!(tracks[1].top() - tracks[0].top() < 80.0, "two rows close together: {tracks:?}");
-        assert!(whole.contains_rect(play), "{size:?}: {play:?}");
+        assert!(screen.contains_rect(play), "{size:?}: {play:?}");
         let view = harness.get_by_label("3D view").rect();
         assert!(view.height() >= picture && view.width() >= 320.0, "{size:?}: {view:?}");
     }
 }
 
 #[test]
-fn all_answers_of_a_question_are_in_sight_or_a_button_leads_to_them() {
+fn all_answers_of_a_question_are_visible_or_behind_a_button() {
     let options = || AppOptions::from_link("?lesson=first-impact&step=2").expect("a link");
     let last = "It stays where it is";
     let (mut harness, _) = open(options(), [390.0, 664.0]);
@@ -152,7 +152,7 @@ fn all_answers_of_a_question_are_in_sight_or_a_button_leads_to_them() {
     let answer = rect(&harness, Role::RadioButton, last);
     assert!(answer.bottom() <= rect(&harness, Role::Button, "Next").top(), "{answer:?}");
 
-    let (mut harness, _) = open(options(), LYING);
+    let (mut harness, _) = open(options(), LANDSCAPE);
     harness.run_steps(30);
     let hidden = |harness: &Harness<'_, App>| {
         let next = rect(harness, Role::Button, "Next").top();
@@ -167,18 +167,18 @@ fn all_answers_of_a_question_are_in_sight_or_a_button_leads_to_them() {
         }
     }
     assert!(!hidden(&harness));
-    assert!(harness.query_by_role_and_label(Role::Button, "More").is_none(), "at its end");
+    assert!(harness.query_by_role_and_label(Role::Button, "More").is_none(), "at the end");
 }
 
 #[test]
-fn the_buttons_over_the_picture_leave_the_time_alone_however_wide_it_is() {
+fn the_buttons_over_the_picture_never_cover_the_time() {
     for width in [760.0, 800.0, 820.0, 850.0, 880.0, 920.0, 1000.0] {
         let (mut harness, _) = window("spcmm", [width, 1180.0]);
         harness.run();
         let view = harness.get_by_label("3D view").rect();
         let first = harness.query_by_role_and_label(Role::Button, "Isometric");
         let first = first.map_or_else(|| rect(&harness, Role::Button, "View options"), |button| button.rect());
-        // "t = 43.5000 ms" in large letters, with its plate.
+        // Width of "t = 43.5000 ms" in large letters with its background.
         assert!(first.left() - view.left() > 164.0, "{width}: {first:?} in {view:?}");
     }
 }
@@ -200,21 +200,21 @@ fn in_a_small_window_the_panels_are_behind_one_button() {
 }
 
 #[test]
-fn a_phone_held_upright_shows_the_speed_that_is_reached() {
-    let (mut harness, _) = window("spcmm", UPRIGHT);
+fn a_phone_in_portrait_shows_the_achieved_speed() {
+    let (mut harness, _) = window("spcmm", PORTRAIT);
     click(&mut harness, "Play");
     harness.run_steps(90);
     assert!(label(&harness, "reached 1:"));
     let words = harness.get_by_label_contains("reached 1:").rect();
     let bench = rect(&harness, Role::Button, "Bench");
-    assert!(words.left() >= bench.right() && words.right() <= UPRIGHT[0], "{words:?}");
+    assert!(words.left() >= bench.right() && words.right() <= PORTRAIT[0], "{words:?}");
     assert!((words.center().y - bench.center().y).abs() < 4.0);
 }
 
 #[test]
-fn a_menu_that_is_cut_shows_that_it_scrolls() {
-    /// Rows with a bar along the right edge of the menu.
-    fn bar(harness: &mut Harness<'_, App>) -> usize {
+fn a_truncated_menu_shows_a_scroll_bar() {
+    /// Number of pixel rows with a scroll bar at the menu's right edge.
+    fn bar_rows(harness: &mut Harness<'_, App>) -> usize {
         let first = rect(harness, Role::Button, "Open…");
         let all = harness.query_all_by_role(Role::Button);
         let entries = all.map(|node| node.rect());
@@ -223,43 +223,43 @@ fn a_menu_that_is_cut_shows_that_it_scrolls() {
         let picture = harness.render().expect("a picture");
         let fill = harness.ctx.global_style().visuals.window_fill;
         let rows = first.top() as u32..(harness.ctx.content_rect().height() - 40.0) as u32;
-        // No text is that long.
+        // No entry's text reaches this far.
         rows.filter(|&y| {
             let pixel = picture.get_pixel(right as u32 + 5, y);
-            let apart = (0..3).map(|k| pixel[k].abs_diff(fill.to_array()[k]));
-            apart.max().is_some_and(|most| most > 40)
+            let difference = (0..3).map(|k| pixel[k].abs_diff(fill.to_array()[k]));
+            difference.max().is_some_and(|most| most > 40)
         })
         .count()
     }
-    for (size, cut) in [(LYING, true), ([390.0, 1600.0], false)] {
+    for (size, truncated) in [(LANDSCAPE, true), ([390.0, 1600.0], false)] {
         let (mut harness, _) = window("spcmm", size);
         harness.run();
         click(&mut harness, "Menu");
         harness.remove_cursor();
         harness.run();
         let about = harness.get_by_label("About").rect();
-        assert_eq!(about.bottom() > size[1], cut, "{size:?}: {about:?}");
-        let seen = bar(&mut harness);
-        assert_eq!(seen > 60, cut, "{size:?}: {seen} rows");
+        assert_eq!(about.bottom() > size[1], truncated, "{size:?}: {about:?}");
+        let rows = bar_rows(&mut harness);
+        assert_eq!(rows > 60, truncated, "{size:?}: {rows} rows");
     }
 }
 
 #[test]
 fn a_menu_that_is_longer_than_the_screen_scrolls_under_a_finger() {
-    let (mut harness, _) = window("spcmm", LYING);
+    let (mut harness, _) = window("spcmm", LANDSCAPE);
     harness.run();
     click(&mut harness, "Menu");
     harness.run();
     let about = rect(&harness, Role::Button, "About");
-    assert!(about.top() > LYING[1], "{about:?}");
+    assert!(about.top() > LANDSCAPE[1], "{about:?}");
     let at = rect(&harness, Role::Button, "Picture…").center();
     for _ in 0..12 {
         fingers(&mut harness, &[&path(at, vec2(0.0, -120.0))]);
     }
     harness.run();
     let about = rect(&harness, Role::Button, "About");
-    assert!(about.bottom() <= LYING[1], "{about:?}");
-    // And a tap hits what it shows.
+    assert!(about.bottom() <= LANDSCAPE[1], "{about:?}");
+    // A tap selects the visible entry.
     fingers(&mut harness, &[&[about.center()]]);
     harness.run();
     assert!(label(&harness, "State hash"));

@@ -1,22 +1,22 @@
-//! What cannot go on stops, says where, when and what to try, and leaves the last good state.
+//! A run that cannot continue stops with place, time and advice, and keeps its last good state.
 
 use crate::common::{frame_now, live, parse, run_until, scene, simulation};
 use jointplay::scene::{LiveScene, built_in_text};
 use jointplay::simulate::{Simulation, StopAdvice, StopFault, Stopped};
 use jointplay::units::format_quantity_digits;
 
-/// Steps until the guard speaks.
+/// Steps until the guard stops the run.
 fn run_to_stop(simulation: &mut Simulation) -> Stopped {
     while simulation.time() < 10.0 {
         if let Err(stopped) = simulation.step() {
             return stopped;
         }
     }
-    panic!("went on to 10 s");
+    panic!("no stop within 10 s");
 }
 
-/// The state is the last good one, it can be shown, and another try leaves it as it is.
-fn still_good(simulation: &mut Simulation, stopped: &Stopped) {
+/// Checks that the state is the last good one, can be sampled, and is not changed by further steps.
+fn check_last_good_state(simulation: &mut Simulation, stopped: &Stopped) {
     assert_eq!(simulation.time(), stopped.time);
     let hash = simulation.state_hash();
     assert!(simulation.state_vector().iter().all(|x| x.is_finite()));
@@ -30,7 +30,7 @@ fn still_good(simulation: &mut Simulation, stopped: &Stopped) {
         let again = simulation.step().unwrap_err();
         assert_eq!(again.time, stopped.time);
         assert_eq!(simulation.state_hash(), hash);
-        // A step that is cut short by a row of output may succeed where the whole one cannot, but never leaves a bad state.
+        // A step truncated by output fails as well and leaves the state unchanged.
         let end = simulation.time() + simulation.machine().solver.step.max(0.005);
         assert!(simulation.step_until(end).is_err());
         assert_eq!(simulation.state_hash(), hash);
@@ -59,7 +59,7 @@ fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
             );
             assert!(stopped.advice.to_string().contains("solver.step"), "{text}");
             assert!(stopped.advice.to_string().contains("solver.method = automatic"), "{text}");
-            still_good(&mut simulation, &stopped);
+            check_last_good_state(&mut simulation, &stopped);
             // The advice helps from a reset.
             simulation.set("solver.method", "automatic").unwrap();
             simulation.reset().unwrap();
@@ -95,7 +95,7 @@ fn ideal_ball_joints_that_do_not_close_are_named() {
     let error = start_error(&ideal);
     println!("{error}");
     assert!(error.contains("ball joint C") && error.contains("5 mm apart as given"), "{error}");
-    // With play it is outside its socket all the same.
+    // With clearance the ball is outside its socket, too.
     let error = start_error(&parse(&moved, &[]));
     println!("{error}");
     assert!(error.contains("ball joint C") && error.contains("clearance"), "{error}");
@@ -111,7 +111,7 @@ fn a_trajectory_that_the_rods_cannot_reach_names_slider_and_time() {
         assert!(error.contains(": rod too short at t = "), "{error}");
         assert!(error.contains(" s: root") && error.contains(" = -") && error.contains("must be above 0"), "{error}");
     }
-    // A live change of it waits, and a reset that cannot start leaves the run as it is.
+    // A live change waits for the reset; a reset that cannot start leaves the run unchanged.
     let mut simulation = live("spcmm", &[]);
     simulation.advance_to(0.01).unwrap();
     let hash = simulation.state_hash();
@@ -122,16 +122,16 @@ fn a_trajectory_that_the_rods_cannot_reach_names_slider_and_time() {
 }
 
 #[test]
-fn ideal_joints_that_repeat_one_another_share_the_load() {
+fn redundant_ideal_joints_share_the_load() {
     let text = built_in_text("pendulum").unwrap();
-    // A second ball joint at the same place: three rows that say what three others say.
-    let twice = format!(
+    // A second ball joint at the same point adds three redundant rows.
+    let doubled = format!(
         "{text}\n[[ball_joint]]\nname = \"S2\"\nsocket = {{ body = \"world\", at = [0, 0, 0] }}\n\
          ball = {{ body = \"rod\", at = \"0 0 100 mm\" }}\nopening = [0, -1, 0]\n"
     );
     for form in ["tree", "lagrange"] {
         let changes = [("contact.clearance", "0"), ("formulation", form)];
-        let mut double = Simulation::new(&parse(&twice, &changes).machine).unwrap();
+        let mut double = Simulation::new(&parse(&doubled, &changes).machine).unwrap();
         let mut single = Simulation::new(&parse(text, &changes).machine).unwrap();
         run_until(&mut double, 0.1);
         run_until(&mut single, 0.1);
@@ -142,13 +142,13 @@ fn ideal_joints_that_repeat_one_another_share_the_load() {
             assert!(half.norm() < 1e-5, "{form}: {half}");
         }
         let one = [changes[0], ("joint.S2.clearance", "0.3 mm"), changes[1]];
-        LiveScene::new(&parse(&twice, &one)).unwrap();
+        LiveScene::new(&parse(&doubled, &one)).unwrap();
     }
 }
 
 #[test]
 fn a_start_in_a_singular_pose_is_refused() {
-    // The slider plane level with the hinges: the rods cannot hold the platform.
+    // With the slider plane level with the hinges the rods cannot support the platform.
     for plane in ["175 mm", "174.9999999 mm", "175.000000001 mm"] {
         for clearance in ["0", "0.3 mm"] {
             let changes = [("spcmm.slider_plane", plane), ("contact.clearance", clearance)];
@@ -162,19 +162,19 @@ fn a_start_in_a_singular_pose_is_refused() {
 #[test]
 fn an_excessive_drive_stops_the_adaptive_method_too() {
     let text = built_in_text("slider-crank-driven").unwrap();
-    let wild = text.replace("velocity = \"6 rad/s\"", "velocity = \"300000 rad/s\"");
-    assert_ne!(wild, text);
-    let mut simulation = LiveScene::new(&parse(&wild, &[])).unwrap();
+    let too_fast = text.replace("velocity = \"6 rad/s\"", "velocity = \"300000 rad/s\"");
+    assert_ne!(too_fast, text);
+    let mut simulation = LiveScene::new(&parse(&too_fast, &[])).unwrap();
     let stopped = run_to_stop(&mut simulation);
     println!("{stopped}");
     let text = stopped.to_string();
     assert!(text.contains("body crank") || text.contains("ball joint C"), "{text}");
     assert!(stopped.advice.to_string().contains("slower drives"), "{text}");
-    still_good(&mut simulation, &stopped);
+    check_last_good_state(&mut simulation, &stopped);
 }
 
 #[test]
-fn loops_that_pass_a_singular_pose_are_reported() {
+fn passing_a_singular_pose_of_the_loops_is_reported() {
     // Inside the range of slider planes in which the Jacobian changes its sign.
     let changes = [("contact.clearance", "0"), ("spcmm.slider_plane", "165 mm")];
     let mut simulation = simulation("spcmm", &changes);
@@ -183,7 +183,7 @@ fn loops_that_pass_a_singular_pose_are_reported() {
     assert!(stopped.fault.to_string().contains("loops"), "{stopped}");
     assert!(stopped.advice.to_string().contains("clearance"), "{stopped}");
     assert!((stopped.time - 0.074).abs() < 2e-3);
-    // Deeper in the range a step may jump over the pose onto another branch: its sign gives it away.
+    // Deeper in the range a step may jump across the pose to another branch, which the sign of the Jacobian reveals.
     let deeper = [("contact.clearance", "0"), ("spcmm.slider_plane", "170 mm")];
     let stopped = run_to_stop(&mut self::simulation("spcmm", &deeper));
     assert!(stopped.fault.to_string().contains("singular pose"), "{stopped}");
@@ -205,7 +205,7 @@ fn the_lagrange_formulation_stops_before_a_singular_pose_too() {
     println!("{stopped}");
     assert!(stopped.fault.to_string().contains("singular pose"), "{stopped}");
     assert!(stopped.advice.to_string().contains("clearance"), "{stopped}");
-    // Where the tree form stops, and not by creeping closer until no number is left.
+    // It stops where `tree` does, rather than by ever smaller steps.
     assert!((stopped.time - 1.066e-3).abs() < 2e-6, "{stopped}");
     assert!(simulation.statistics().steps < 1000);
     assert!(simulation.ledger().unwrap().drive_work.is_finite());
@@ -213,10 +213,10 @@ fn the_lagrange_formulation_stops_before_a_singular_pose_too() {
     assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
 }
 
-/// Two four-bars whose links all lie in line ten times in as many seconds: neither form leaves its branch there, which would cost
-/// it up to half its energy.
+/// Two four-bars whose links are collinear ten times in ten seconds: neither formulation leaves its branch there, which would cost
+/// up to half the energy.
 #[test]
-fn flat_poses_are_passed_on_the_branch_in_both_forms() {
+fn flat_poses_are_passed_on_the_same_branch_in_both_formulations() {
     for (formulation, tolerance) in [("tree", "1e-6"), ("lagrange", "1e-4"), ("lagrange", "1e-6")] {
         let changes = [("formulation", formulation), ("solver.tolerance", tolerance)];
         let mut simulation = simulation("n-four-bar", &changes);
@@ -224,15 +224,15 @@ fn flat_poses_are_passed_on_the_branch_in_both_forms() {
         let ledger = simulation.ledger().unwrap();
         assert!(ledger.relative_residual().abs() < 1e-6, "{formulation} {tolerance}: {ledger:?}");
         let angle = frame_now(&mut simulation).coordinates[0][0];
-        // The lagrange form knows it within half a turn.
+        // `lagrange` measures the angle only modulo a turn.
         let off = (angle - 31.750597187).rem_euclid(std::f64::consts::TAU);
         assert!(off.min(std::f64::consts::TAU - off) < 1e-3, "{formulation} {tolerance}: {angle}");
     }
 }
 
-/// A crank that drives a four-bar linkage through a dead centre: no step passes it, whatever the tolerance, and no softer machine.
+/// A crank drives a four-bar towards a dead centre, which no step can pass at any tolerance.
 #[test]
-fn a_dead_centre_is_named_where_it_stops_the_run() {
+fn a_dead_centre_stops_the_run_and_is_reported() {
     let text = r#"
         start = "ideal"
         [[joint]]

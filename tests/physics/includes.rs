@@ -1,4 +1,4 @@
-//! Files that a scene includes with names, values and places, several times.
+//! Files that a scene includes several times with names, values and poses.
 
 use crate::elements::frame_at;
 use jointplay::machine::Vec3;
@@ -101,18 +101,18 @@ start = { velocity = "1 rad/s" }
 "#;
 
 fn read(top: &str, leg: &str, changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
-    let beside = Texts::from([("leg.toml".to_owned(), leg.into()), ("other.toml".to_owned(), leg.into())]);
+    let files = Texts::from([("leg.toml".to_owned(), leg.into()), ("other.toml".to_owned(), leg.into())]);
     let changes: Vec<(String, String)> = changes.iter().map(|(key, value)| ((*key).into(), (*value).into())).collect();
-    Scene::parse_with(&format!("name = \"top\"\n{top}{CHASSIS}"), Some("top.toml"), &beside, &changes)
+    Scene::parse_with(&format!("name = \"top\"\n{top}{CHASSIS}"), Some("top.toml"), &files, &changes)
 }
 
-const TWO: &str = "include = [\n\
+const TWO_LEGS: &str = "include = [\n\
     { file = \"leg.toml\", name = \"left\" },\n\
     { file = \"leg.toml\", name = \"right\", values = { length = \"2 * 150 mm\" }, position = \"0 -20 0 mm\", \
       rotation = { axis = [0, 0, 1], angle = \"180 deg\" } },\n]\n";
 
-/// The leg as text of the scene itself: names after `prefix`, its own length, turned by half a turn and shifted if `turned`.
-fn written(prefix: &str, length: &str, turned: bool) -> String {
+/// The leg written directly into the scene: names begin with `prefix`; if `turned`, it is rotated by half a turn and shifted.
+fn written_out(prefix: &str, length: &str, turned: bool) -> String {
     let mut text = LEG.to_owned();
     for name in ["length", "half"] {
         // Parameters have no dots and no hyphens in their names.
@@ -129,7 +129,7 @@ fn written(prefix: &str, length: &str, turned: bool) -> String {
         text = text.replace(&format!("\"{name}\""), &format!("\"{prefix}-{name}\""));
     }
     if turned {
-        // Half a turn about z: a point (x, y, z) comes to (-x, -y, z), and so do axes.
+        // Half a turn about z maps points and axes (x, y, z) to (-x, -y, z).
         text = text.replace(
             "axis = [0, 1, 0]\nparent_point = \"50 0 0 mm\"",
             "axis = [0, -1, 0]\nparent_point = \"-50 -20 0 mm\"\nrotation = { axis = [0, 0, 1], angle = \"180 deg\" }",
@@ -143,9 +143,9 @@ fn written(prefix: &str, length: &str, turned: bool) -> String {
 
 #[test]
 fn including_a_file_twice_equals_writing_it_twice() {
-    let included = read(TWO, LEG, &[]).unwrap();
-    let text = CHASSIS.to_owned() + &written("left", "200 mm", false) + &written("right", "300 mm", true);
-    let whole = Scene::parse(&text, None, &[]).unwrap();
+    let included = read(TWO_LEGS, LEG, &[]).unwrap();
+    let text = CHASSIS.to_owned() + &written_out("left", "200 mm", false) + &written_out("right", "300 mm", true);
+    let direct = Scene::parse(&text, None, &[]).unwrap();
     let names = |scene: &Scene| -> Vec<String> {
         let machine = &scene.machine;
         let bodies = machine.bodies.iter().map(|body| body.name.clone());
@@ -153,9 +153,9 @@ fn including_a_file_twice_equals_writing_it_twice() {
         bodies.chain(joints).chain(machine.elements.iter().map(|element| element.name.clone())).collect()
     };
     let dots: Vec<String> = names(&included).iter().map(|name| name.replace('.', "-")).collect();
-    assert_eq!(dots, names(&whole).iter().map(|name| name.replace("toe-", "toe")).collect::<Vec<_>>());
+    assert_eq!(dots, names(&direct).iter().map(|name| name.replace("toe-", "toe")).collect::<Vec<_>>());
     assert!(names(&included).contains(&"left.toe2".to_owned()));
-    let mut both = [included, whole].map(|scene| {
+    let mut both = [included, direct].map(|scene| {
         let mut machine = scene.machine;
         machine.solver.tolerance = 1e-10;
         Simulation::new(&machine).unwrap()
@@ -168,9 +168,9 @@ fn including_a_file_twice_equals_writing_it_twice() {
 }
 
 #[test]
-fn parameters_of_an_included_file_are_its_own_and_the_scene_may_set_them() {
-    let scene = read(TWO, LEG, &[]).unwrap();
-    // To the gram: the mass of a thigh is a product.
+fn parameters_of_an_included_file_are_separate_and_can_be_set_by_the_scene() {
+    let scene = read(TWO_LEGS, LEG, &[]).unwrap();
+    // Rounded to grams, since the thigh's mass is computed.
     let mass = |scene: &Scene, name: &str| {
         let body = scene.machine.bodies.iter().find(|body| body.name == name).unwrap();
         (body.mass * 1e3).round() / 1e3
@@ -178,13 +178,13 @@ fn parameters_of_an_included_file_are_its_own_and_the_scene_may_set_them() {
     assert_eq!((mass(&scene, "left.thigh"), mass(&scene, "right.thigh"), mass(&scene, "left.toe2")), (1.0, 1.5, 0.02));
     let keys: Vec<&str> = scene.source.own.iter().map(|row| row.key).collect();
     assert_eq!(keys, ["parameter.weight", "parameter.left.length", "parameter.right.length"]);
-    // A parameter of the scene is that of both, unless the file has one of this name.
-    let heavy = read(TWO, LEG, &[("parameter.weight", "2 kg"), ("parameter.left.length", "100 mm")]).unwrap();
+    // Both legs see a parameter of the scene, unless the file defines one of the same name.
+    let heavy = read(TWO_LEGS, LEG, &[("parameter.weight", "2 kg"), ("parameter.left.length", "100 mm")]).unwrap();
     assert_eq!((mass(&heavy, "left.thigh"), mass(&heavy, "right.thigh")), (1.0, 3.0));
     let own = format!("[[parameter]]\nname = \"weight\"\nvalue = \"4 kg\"\n{LEG}");
-    let both = read(TWO, &own, &[("parameter.weight", "2 kg")]).unwrap();
+    let both = read(TWO_LEGS, &own, &[("parameter.weight", "2 kg")]).unwrap();
     assert_eq!(mass(&both, "left.thigh"), 4.0);
-    // What the scene gives can be saved in it; a number of the included file cannot.
+    // Values given in the scene can be saved; numbers of the included file cannot.
     let mut changed = scene.clone();
     changed.set("parameter.right.length", "400 mm").unwrap();
     assert_eq!(mass(&changed, "right.thigh"), 2.0);
@@ -201,22 +201,22 @@ fn parameters_of_an_included_file_are_its_own_and_the_scene_may_set_them() {
 fn parts_of_an_included_file_are_reached_by_their_full_names() {
     let more = "[output]\nbody = \"right.toe1\"\n[[load]]\nname = \"pull\"\non = { body = \"left.thigh\" }\nforce = \"1 0 0 N\"\n\
                 [[stop]]\nname = \"stop\"\njoint = \"left.hip\"\nlower = \"-30 deg\"\ntorque = \"1 N m\"\ndepth = \"1 deg\"\n";
-    let scene = read(&format!("{TWO}{more}"), LEG, &[]).unwrap();
+    let scene = read(&format!("{TWO_LEGS}{more}"), LEG, &[]).unwrap();
     let machine = &scene.machine;
     assert_eq!(machine.bodies[machine.output.body].name, "right.toe1");
     let error =
-        read(&format!("{TWO}{more}").as_str().replace("left.hip", "left.hop"), LEG, &[]).unwrap_err().to_string();
+        read(&format!("{TWO_LEGS}{more}").as_str().replace("left.hip", "left.hop"), LEG, &[]).unwrap_err().to_string();
     assert!(error.contains("did you mean `left.hip`"), "{error}");
-    // The short way to write a file without a name: names stay.
+    // Without a name for the file, its parts keep their names.
     let scene = read("include = [{ file = \"leg.toml\" }]\n", LEG, &[]).unwrap();
     assert!(scene.machine.bodies.iter().any(|body| body.name == "toe2"));
     assert_eq!(scene.machine, read("include = [\"leg.toml\"]\n", LEG, &[]).unwrap().machine);
 }
 
 #[test]
-fn bad_includes_are_refused_with_their_position() {
+fn invalid_includes_are_refused_with_their_position() {
     let one = |more: &str| format!("[[include]]\nfile = \"leg.toml\"\n{more}\n");
-    for (top, leg, said) in [
+    for (top, leg, fragments) in [
         (
             one("name = \"body\""),
             LEG.to_owned(),
@@ -270,8 +270,8 @@ fn bad_includes_are_refused_with_their_position() {
         ),
     ] {
         let message = read(&top, &leg, &[]).unwrap_err().to_string();
-        for said in said {
-            assert!(message.contains(said), "{message}\nlacks {said}");
+        for fragment in fragments {
+            assert!(message.contains(fragment), "{message}\nlacks {fragment}");
         }
     }
 }

@@ -1,6 +1,5 @@
-//! What every run promises, whatever the scene, the method and the formulation, gone through once: the same calls give the same
-//! bits, whoever looks, keeps books or maps wear changes none, no frame shows what none may, and a state that is kept in memory or
-//! in a file goes on as if nothing had happened.
+//! Promises of every run, for any scene, method and formulation: the same calls give the same bits; sampling, the ledger and wear
+//! maps change none of them; every frame satisfies the invariants; and a run resumes from a snapshot or a file as if uninterrupted.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -14,14 +13,14 @@ use jointplay::machine::Quat;
 use jointplay::scene::{LiveScene, Scene, built_in_text};
 use jointplay::simulate::{Frame, Ledger, Model, Simulation};
 
-/// Steps before the instant at which a run without contacts is kept, and after it.
+/// Steps before and after the snapshot of a run without contacts.
 const BEFORE: u32 = 10;
 const AFTER: u32 = 120;
-/// Steps within which every scene with play has had two impacts.
-const SOON: u32 = 20_000;
+/// Steps within which every scene with clearances has two impacts.
+const MAX_STEPS: u32 = 20_000;
 
-/// Steps into the second contact of any joint, or some steps where there are none; their number.
-fn into_contact(simulation: &mut Simulation) -> u32 {
+/// Steps into the second contact of any joint, or [`BEFORE`] steps without contacts; returns the number of steps.
+fn step_into_contact(simulation: &mut Simulation) -> u32 {
     if simulation.mechanism().summary().contacts == 0 {
         (0..BEFORE).for_each(|_| simulation.step().unwrap());
         return BEFORE;
@@ -30,7 +29,7 @@ fn into_contact(simulation: &mut Simulation) -> u32 {
     while simulation.statistics().impacts.iter().sum::<u64>() < 2 {
         simulation.step().unwrap();
         steps += 1;
-        assert!(steps < SOON, "no impact");
+        assert!(steps < MAX_STEPS, "no impact");
     }
     simulation.step().unwrap();
     let joints = 0..simulation.machine().ball_joints.len();
@@ -38,22 +37,22 @@ fn into_contact(simulation: &mut Simulation) -> u32 {
     steps + 1
 }
 
-/// What a user does there: one change acts at once, a clearance takes its time, and another formulation waits for a reset.
-fn change(simulation: &mut LiveScene) {
+/// Changes three parameters: one acts at once, a clearance moves gradually, and the formulation waits for a reset.
+fn change_parameters(simulation: &mut LiveScene) {
     simulation.set("contact.friction", "0.1").unwrap();
     let machine = simulation.machine().clone();
     let loose = machine.ball_joints.iter().find(|joint| joint.contact.clearance > 0.0);
     if let Some(joint) = loose {
         let key = format!("joint.{}.clearance", joint.name);
-        let less = format!("{:e} m", 0.9 * joint.contact.clearance);
-        simulation.set(&key, &less).unwrap();
+        let smaller = format!("{:e} m", 0.9 * joint.contact.clearance);
+        simulation.set(&key, &smaller).unwrap();
     }
     let other = FORMULATIONS.into_iter().find(|word| *word != machine.formulation.word()).expect("two");
     simulation.set("formulation", other).unwrap();
 }
 
-/// Everything at the latest state, and the frame in the middle of the last step, as text: every bit that is no NaN's.
-fn look(simulation: &mut Simulation) -> (u64, String) {
+/// The state hash, and as text the latest frame, the frame in the middle of the last step, statistics and ledger.
+fn observe(simulation: &mut Simulation) -> (u64, String) {
     let mut middle = Frame::default();
     let time = 0.5 * (simulation.step_start() + simulation.time());
     simulation.sample(time, &mut middle);
@@ -62,12 +61,12 @@ fn look(simulation: &mut Simulation) -> (u64, String) {
     (simulation.state_hash(), text)
 }
 
-fn go_on(simulation: &mut Simulation) -> (u64, String) {
+fn continue_run(simulation: &mut Simulation) -> (u64, String) {
     (0..AFTER).for_each(|_| simulation.step().unwrap());
-    look(simulation)
+    observe(simulation)
 }
 
-/// Steps once, looks into the step and at its end, and takes all that can be taken.
+/// Steps once, samples the step, checks the invariants, and takes peaks and impacts.
 fn watched_step(simulation: &mut Simulation, variant: Variant) {
     let mut frame = Frame { reactions: Some(Vec::new()), ..Frame::default() };
     simulation.step().unwrap();
@@ -81,20 +80,20 @@ fn watched_step(simulation: &mut Simulation, variant: Variant) {
     simulation.take_impacts(&mut Vec::new());
 }
 
-/// Puts a run of `scene` through all of it; the hash at its end.
-fn keeps_its_promises(scene: &Scene, variant: Variant) -> u64 {
+/// Checks all promises for `scene`; returns the hash at the end.
+fn check_promises(scene: &Scene, variant: Variant) -> u64 {
     let mut plain = LiveScene::new(scene).unwrap();
     let start = plain.state_hash();
-    let steps = into_contact(&mut plain);
-    let here = look(&mut plain);
+    let steps = step_into_contact(&mut plain);
+    let at_snapshot = observe(&mut plain);
     let saved = serde_json::to_string(&plain.state()).unwrap();
-    change(&mut plain);
-    let (mut peaks, mut again) = (Vec::new(), Vec::new());
+    change_parameters(&mut plain);
+    let (mut peaks, mut later_peaks) = (Vec::new(), Vec::new());
     let snapshot = plain.snapshot();
     plain.take_peaks(&mut peaks);
-    let first = go_on(&mut plain);
+    let first = continue_run(&mut plain);
 
-    // Watched all the way, with a map of its wear, after a reset in mid run.
+    // Sampled in every step, with a wear map, after a reset during the run.
     let mut watched = LiveScene::new(scene).unwrap();
     (0..BEFORE).for_each(|_| watched_step(&mut watched, variant));
     watched.reset().unwrap();
@@ -102,55 +101,58 @@ fn keeps_its_promises(scene: &Scene, variant: Variant) -> u64 {
     assert_eq!(watched.ledger(), Some(&Ledger::default()));
     watched.track_wear();
     (0..steps).for_each(|_| watched_step(&mut watched, variant));
-    assert!(look(&mut watched) == here, "watched");
-    change(&mut watched);
-    let kept = watched.snapshot();
+    assert!(observe(&mut watched) == at_snapshot, "watched");
+    change_parameters(&mut watched);
+    let watched_snapshot = watched.snapshot();
     (0..AFTER).for_each(|_| watched_step(&mut watched, variant));
-    assert!(look(&mut watched) == first, "watched");
+    assert!(observe(&mut watched) == first, "watched");
     watched.commit_wear();
     let wear = watched.wear().unwrap().clone();
-    watched.restore(&kept);
-    assert!(go_on(&mut watched) == first, "watched, again");
+    watched.restore(&watched_snapshot);
+    assert!(continue_run(&mut watched) == first, "watched, restored");
     watched.commit_wear();
     assert!(*watched.wear().unwrap() == wear, "the same wear");
 
-    // Without books.
-    let mut silent = scene.clone();
-    silent.set("solver.energy_ledger", "off").unwrap();
-    let mut silent = LiveScene::new(&silent).unwrap();
-    (0..steps).for_each(|_| silent.step().unwrap());
-    change(&mut silent);
-    (0..AFTER).for_each(|_| silent.step().unwrap());
-    assert_eq!((silent.state_hash(), silent.ledger()), (first.0, None), "without a ledger");
-    assert_eq!((silent.state_vector(), silent.statistics()), (plain.state_vector(), plain.statistics()));
+    // Without a ledger.
+    let mut without_ledger = scene.clone();
+    without_ledger.set("solver.energy_ledger", "off").unwrap();
+    let mut without_ledger = LiveScene::new(&without_ledger).unwrap();
+    (0..steps).for_each(|_| without_ledger.step().unwrap());
+    change_parameters(&mut without_ledger);
+    (0..AFTER).for_each(|_| without_ledger.step().unwrap());
+    assert_eq!((without_ledger.state_hash(), without_ledger.ledger()), (first.0, None), "without a ledger");
+    assert_eq!(
+        (without_ledger.state_vector(), without_ledger.statistics()),
+        (plain.state_vector(), plain.statistics())
+    );
 
-    // Restored into itself, a copy of that, and restored into one of other settings that never saw the run.
-    let stranger = LiveScene::new(&crate::common::scene("spcmm", &[])).unwrap();
+    // Restored into itself, copied, and restored into an unrelated simulation with other settings.
+    let unrelated = LiveScene::new(&crate::common::scene("spcmm", &[])).unwrap();
     let now = {
         plain.restore(&snapshot);
-        look(&mut plain)
+        observe(&mut plain)
     };
-    assert!(go_on(&mut plain.clone()) == first, "copied");
-    for mut other in [plain, stranger] {
+    assert!(continue_run(&mut plain.clone()) == first, "copied");
+    for mut other in [plain, unrelated] {
         other.restore(&snapshot);
-        other.take_peaks(&mut again);
-        assert_eq!(again, peaks);
-        assert!(look(&mut other) == now, "restored");
-        assert!(go_on(&mut other) == first, "restored");
+        other.take_peaks(&mut later_peaks);
+        assert_eq!(later_peaks, peaks);
+        assert!(observe(&mut other) == now, "restored");
+        assert!(continue_run(&mut other) == first, "restored");
     }
-    // From a file.
-    let mut later = LiveScene::new(scene).unwrap();
-    later.resume(&serde_json::from_str(&saved).unwrap()).unwrap();
-    assert_eq!(later.state_hash(), here.0, "read again");
-    change(&mut later);
-    assert!(go_on(&mut later) == first, "read again");
+    // Resumed from a file.
+    let mut resumed = LiveScene::new(scene).unwrap();
+    resumed.resume(&serde_json::from_str(&saved).unwrap()).unwrap();
+    assert_eq!(resumed.state_hash(), at_snapshot.0, "resumed");
+    change_parameters(&mut resumed);
+    assert!(continue_run(&mut resumed) == first, "resumed");
     first.0
 }
 
-/// A scene in a way, with its name.
-fn case(name: &str, scene: &Scene, variant: Variant) -> u64 {
+/// Prints the case and checks its promises.
+fn check_case(name: &str, scene: &Scene, variant: Variant) -> u64 {
     println!("{name}, {variant}");
-    keeps_its_promises(scene, variant)
+    check_promises(scene, variant)
 }
 
 #[test]
@@ -158,67 +160,67 @@ fn every_built_in_scene_keeps_the_promises_with_every_method_and_formulation() {
     for name in SCENES {
         let mut hashes = BTreeSet::new();
         for variant in every_variant() {
-            hashes.insert(case(name, &scene(name, &variant.changes()), variant));
+            hashes.insert(check_case(name, &scene(name, &variant.changes()), variant));
         }
-        // The hash sees the difference between methods; the automatic ones may be explicit all the way.
+        // Methods give different hashes, except that `automatic` may equal the explicit method throughout.
         assert!(hashes.len() >= METHODS.len(), "{name}: {}", hashes.len());
     }
 }
 
 #[test]
-fn scenes_without_play_keep_the_promises() {
+fn ideal_scenes_keep_the_promises() {
     for_every(SCENES, |name, variant| {
         let [method, formulation] = variant.changes();
         let mut changes = vec![method, formulation, ("contact.clearance", "0")];
         if name == "chain" {
             changes.push(("chain.links", "3"));
         }
-        case(name, &scene(name, &changes), variant);
+        check_case(name, &scene(name, &changes), variant);
     });
 }
 
-/// The ways that between them have every kind of Jacobian and error control.
-fn four_ways() -> [Variant; 4] {
+/// Variants that together cover every kind of Jacobian and error control.
+fn four_variants() -> [Variant; 4] {
     FOUR_VARIANTS.map(|(method, formulation)| Variant { method, formulation })
 }
 
 #[test]
 fn machines_and_loops_keep_the_promises() {
-    for (name, variant) in MACHINES.into_iter().zip(four_ways().into_iter().cycle()) {
-        case(name, &scene(name, &variant.changes()), variant);
+    for (name, variant) in MACHINES.into_iter().zip(four_variants().into_iter().cycle()) {
+        check_case(name, &scene(name, &variant.changes()), variant);
     }
     for variant in every_variant() {
-        case("train", &parse(&two_degrees::train(-two_degrees::G), &variant.changes()), variant);
-        case("four-bar with a bob", &parse(&loop_joints::four_bar_with_a_bob(), &variant.changes()), variant);
+        check_case("train", &parse(&two_degrees::train(-two_degrees::G), &variant.changes()), variant);
+        check_case("four-bar with a bob", &parse(&loop_joints::four_bar_with_a_bob(), &variant.changes()), variant);
     }
     let ideal = Extras { start: "ideal", ..PLAIN };
     for with in [ideal, Extras { driven: &[0], ..ideal }, Extras { clearance: "0.3 mm", ..ideal }] {
-        for variant in four_ways() {
-            case("planar four-bar", &GRASHOF.scene(Quat::identity(), with, &variant.changes()), variant);
+        for variant in four_variants() {
+            check_case("planar four-bar", &GRASHOF.scene(Quat::identity(), with, &variant.changes()), variant);
         }
     }
 }
 
-/// Scenes that between them have every key of the format.
+/// The corpus covers every key of the format.
 #[test]
 fn scenes_of_the_corpus_keep_the_promises() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
     let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
-    // A rod of 1e-300 kg comes to no second impact.
+    // A rod of 1e-300 kg has no second impact.
     let good = |path: &&PathBuf| {
         let name = path.file_name().unwrap().to_string_lossy();
         name.starts_with("good-") && name != "good-tiny-and-huge.toml"
     };
     let good = paths.iter().filter(good);
-    for (path, variant) in good.zip(four_ways().into_iter().cycle()) {
+    for (path, variant) in good.zip(four_variants().into_iter().cycle()) {
         let text = std::fs::read_to_string(path).unwrap();
-        case(&path.display().to_string(), &parse(&text, &variant.changes()), variant);
+        check_case(&path.display().to_string(), &parse(&text, &variant.changes()), variant);
     }
 }
 
 /// A slider-crank with an ideal joint and a pendulum whose loose balls start off the centres of their sockets.
-fn eccentric() -> [(&'static str, String); 2] {
+fn eccentric_scenes() -> [(&'static str, String); 2] {
     let text = |name: &str, from: &str, to: &str| {
         let text = built_in_text(name).unwrap();
         assert!(text.contains(from));
@@ -232,9 +234,9 @@ fn eccentric() -> [(&'static str, String); 2] {
 }
 
 #[test]
-fn a_state_is_restored_where_no_start_would_be_accepted() {
-    for (joint, text) in eccentric() {
-        for variant in four_ways() {
+fn a_state_is_restored_even_where_a_start_would_be_refused() {
+    for (joint, text) in eccentric_scenes() {
+        for variant in four_variants() {
             let scene = parse(&text, &variant.changes());
             let mut simulation = LiveScene::new(&scene).unwrap();
             simulation.advance_to(1e-3).unwrap();
@@ -242,11 +244,11 @@ fn a_state_is_restored_where_no_start_would_be_accepted() {
             assert!(LiveScene::new(simulation.running()).is_err(), "{joint}, {variant}");
             simulation.advance_to(4e-3).unwrap();
             let snapshot = simulation.snapshot();
-            let first = go_on(&mut simulation);
+            let first = continue_run(&mut simulation);
             let mut other = Simulation::new(&scene.machine).unwrap();
             for target in [&mut simulation, &mut other] {
                 target.restore(&snapshot);
-                assert!(go_on(target) == first, "{joint}, {variant}");
+                assert!(continue_run(target) == first, "{joint}, {variant}");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Errors of the tip that are reachable with every ball anywhere in its play, and at rest: known answers.
+//! Tip errors with every ball anywhere in its clearance, and at rest, against known answers.
 
 use crate::common::truss::{Guide, Rod, TIP, TWO, support, truss};
 use crate::common::{parse, run_until, scene};
@@ -7,12 +7,12 @@ use jointplay::mechanism::{Farthest, HeldError, HeldMachine};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
-fn held(scene: &Scene, positions: &[Option<f64>]) -> HeldMachine {
+fn held_machine(scene: &Scene, positions: &[Option<f64>]) -> HeldMachine {
     HeldMachine::new(&scene.machine, positions).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Unit vectors all around in the plane of x and z, none of them square to a rod.
-fn around(count: usize) -> impl Iterator<Item = Vec3> {
+/// Unit vectors around the xz plane, none of them perpendicular to a rod.
+fn directions(count: usize) -> impl Iterator<Item = Vec3> {
     (0..count).map(move |i| {
         let turn = std::f64::consts::TAU * (i as f64 + 0.137) / count as f64;
         Vec3::new(libm::cos(turn), 0.0, libm::sin(turn))
@@ -23,7 +23,7 @@ fn error(farthest: &Farthest) -> Vec3 {
     farthest.error.unwrap_or_else(|| panic!("no pose: {farthest:?}"))
 }
 
-/// How much longer each rod of [`TWO`] is with the tip displaced by `e`, over its play.
+/// Elongation of each rod of [`TWO`] when the tip is displaced by `e`, relative to its clearance.
 fn stretch(e: &Vec3) -> [f64; 2] {
     TWO.map(|rod| {
         let (length, _) = rod.length_and_direction(TIP);
@@ -36,29 +36,29 @@ fn stretch(e: &Vec3) -> [f64; 2] {
 fn two_rods_hold_the_tip_within_their_parallelogram() {
     for guide in [Guide::Plane, Guide::None] {
         let scene = parse(&truss(&TWO, TIP, guide, "friction_law = \"none\""), &[]);
-        // Free, the rods turn about the line of their fixed points: without weight they stay where they are.
+        // If the tip is free, the rods can rotate about the line of their fixed points; without weight they do not.
         let mut machine = scene.machine.clone();
         machine.gravity = Vec3::zeros();
-        let mut held = HeldMachine::new(&machine, &[]).unwrap();
-        assert!((held.ideal_tip() - Vec3::new(TIP[0], 0.0, TIP[1])).norm() < 1e-12);
-        let freedoms = held.freedoms();
+        let mut held_machine = HeldMachine::new(&machine, &[]).unwrap();
+        assert!((held_machine.ideal_tip() - Vec3::new(TIP[0], 0.0, TIP[1])).norm() < 1e-12);
+        let freedoms = held_machine.freedoms();
         assert_eq!(freedoms.unbounded.len(), usize::from(guide == Guide::None), "{freedoms:?}");
         assert!(freedoms.unbounded.iter().all(|free| free.y.abs() > 1.0 - 1e-9), "{freedoms:?}");
         assert_eq!(freedoms.bounded.len(), 2);
         assert!(freedoms.bounded.iter().all(|axis| axis.y.abs() < 1e-9), "{freedoms:?}");
         let mut corners = Vec::new();
-        for u in around(60) {
-            let farthest = held.farthest(&u);
+        for u in directions(60) {
+            let farthest = held_machine.farthest(&u);
             let expected = support(&TWO, TIP, [u.x, u.z]);
             assert!((farthest.support / expected - 1.0).abs() < 1e-9, "{} {expected}", farthest.support);
-            // Each joint's part is in proportion to its play.
+            // Each joint's share is proportional to its clearance.
             let shares = &farthest.shares;
             assert!((shares.iter().sum::<f64>() / expected - 1.0).abs() < 1e-9);
             assert!(
                 (shares[1] / shares[0] - 1.5).abs() < 1e-9 && (shares[3] / shares[2] - 4.0).abs() < 1e-9,
                 "{shares:?}"
             );
-            // A corner: both rods with all their play, in or out, exactly, with balls beyond no wall.
+            // At a corner both rods use their whole clearance, in tension or compression.
             let e = error(&farthest);
             for stretch in stretch(&e) {
                 assert!((stretch.abs() - 1.0).abs() < 1e-6, "{guide:?} {u:?}: {stretch}");
@@ -74,11 +74,11 @@ fn two_rods_hold_the_tip_within_their_parallelogram() {
 }
 
 #[test]
-fn opposite_errors_are_equal_but_for_the_square_of_the_play() {
+fn opposite_errors_are_equal_up_to_the_square_of_the_clearance() {
     let scene = parse(&truss(&TWO, TIP, Guide::Plane, ""), &[]);
-    let mut held = held(&scene, &[]);
-    for u in around(16) {
-        let [one, other] = [u, -u].map(|u| held.farthest(&u));
+    let mut held_machine = held_machine(&scene, &[]);
+    for u in directions(16) {
+        let [one, other] = [u, -u].map(|u| held_machine.farthest(&u));
         assert!((one.support / other.support - 1.0).abs() < 1e-9);
         let (a, b) = (error(&one), error(&other));
         assert!((a + b).norm() < 10.0 * a.norm_squared() / 0.2, "{a:?} {b:?}");
@@ -87,27 +87,27 @@ fn opposite_errors_are_equal_but_for_the_square_of_the_play() {
 }
 
 #[test]
-fn parallel_rods_err_as_the_tightest_allows() {
-    // Along a line: the tighter rod alone.
+fn the_tightest_of_parallel_rods_limits_the_error() {
+    // Along a line the tighter rod limits the error.
     let along = |play: [f64; 2]| Rod { from: [0.3, 0.0], play };
     for (a, b) in [(0.1e-3, 0.25e-3), (0.3e-3, 0.2e-3), (0.2e-3, 0.2e-3)] {
         let rods = [along([0.4 * a, 0.6 * a]), along([0.5 * b; 2])];
-        let mut held = held(&parse(&truss(&rods, [0.0, 0.0], Guide::Line, ""), &[]), &[]);
-        let freedoms = held.freedoms();
+        let mut held_machine = held_machine(&parse(&truss(&rods, [0.0, 0.0], Guide::Line, ""), &[]), &[]);
+        let freedoms = held_machine.freedoms();
         assert!(freedoms.unbounded.is_empty() && freedoms.bounded.len() == 1, "{freedoms:?}");
         for u in [freedoms.bounded[0], -freedoms.bounded[0]] {
-            let farthest = held.farthest(&u);
+            let farthest = held_machine.farthest(&u);
             let least = a.min(b);
             assert!((farthest.support / least - 1.0).abs() < 1e-9, "{} {least}", farthest.support);
             assert!((error(&farthest) - u * least).norm() < 1e-8 * least, "{farthest:?}");
         }
     }
-    // In a plane: of three strips, the two that matter in a direction.
+    // In a plane two of the three strips limit the error in each direction.
     let rods = [TWO[0], TWO[1], Rod { from: [-0.1, -0.25], play: [0.1e-3, 0.1e-3] }];
-    let mut held = held(&parse(&truss(&rods, TIP, Guide::Plane, ""), &[]), &[]);
-    let mut idle = 0;
-    for u in around(48) {
-        let farthest = held.farthest(&u);
+    let mut held_machine = held_machine(&parse(&truss(&rods, TIP, Guide::Plane, ""), &[]), &[]);
+    let mut inactive = 0;
+    for u in directions(48) {
+        let farthest = held_machine.farthest(&u);
         let expected = support(&rods, TIP, [u.x, u.z]);
         assert!((farthest.support / expected - 1.0).abs() < 1e-9, "{u:?}: {} {expected}", farthest.support);
         let e = error(&farthest);
@@ -116,14 +116,14 @@ fn parallel_rods_err_as_the_tightest_allows() {
                 (rod.length_and_direction(TIP), rod.length_and_direction([TIP[0] + e.x, TIP[1] + e.z]));
             let stretch = (now - length) / rod.total_play();
             assert!(stretch.abs() < 1.0 + 1e-6, "{u:?}: {stretch}");
-            idle += usize::from(stretch.abs() < 0.99);
+            inactive += usize::from(stretch.abs() < 0.99);
         }
         assert!((u.dot(&e) / expected - 1.0).abs() < 1e-2, "{u:?}: {e:?} {expected}");
     }
-    assert!(idle > 20, "{idle}");
+    assert!(inactive > 20, "{inactive}");
 }
 
-/// A slider on x, moved by a crank of 50 mm about y and a rod of 160 mm.
+/// A slider on x, driven by a crank of 50 mm about y and a rod of 160 mm.
 fn slider_crank(plays: [f64; 2]) -> Scene {
     parse(
         &format!(
@@ -148,38 +148,38 @@ fn slider_crank(plays: [f64; 2]) -> Scene {
 }
 
 #[test]
-fn a_slider_errs_by_the_play_along_its_rod() {
+fn the_error_of_a_slider_is_the_clearance_along_its_rod() {
     const PLAYS: [f64; 2] = [0.2e-3, 0.3e-3];
     let scene = slider_crank(PLAYS);
     let (crank, rod, play) = (0.05, 0.16, PLAYS[0] + PLAYS[1]);
     for angle in [0.0_f64, 0.4, 1.2, 1.57, 2.8, 4.1, -1.0, 12.0] {
-        let mut held = held(&scene, &[Some(angle)]);
+        let mut held_machine = held_machine(&scene, &[Some(angle)]);
         let (sine, cosine) = libm::sincos(angle);
         let slider = |length: f64| crank * cosine + (length * length - crank * crank * sine * sine).sqrt();
         assert!(
-            (held.ideal_tip() - Vec3::new(slider(rod), 0.0, 0.02)).norm() < 1e-12,
+            (held_machine.ideal_tip() - Vec3::new(slider(rod), 0.0, 0.02)).norm() < 1e-12,
             "{angle}: {:?}",
-            held.ideal_tip()
+            held_machine.ideal_tip()
         );
         let tilt = (slider(rod) - crank * cosine) / rod;
-        assert_eq!(held.freedoms().bounded, [Vec3::x()]);
-        for length_and_direction in [1.0, -1.0] {
-            let farthest = held.farthest(&(Vec3::x() * length_and_direction));
+        assert_eq!(held_machine.freedoms().bounded, [Vec3::x()]);
+        for sign in [1.0, -1.0] {
+            let farthest = held_machine.farthest(&(Vec3::x() * sign));
             assert!((farthest.support * tilt / play - 1.0).abs() < 1e-9, "{angle}: {}", farthest.support);
-            let expected = Vec3::x() * (slider(rod + length_and_direction * play) - slider(rod));
+            let expected = Vec3::x() * (slider(rod + sign * play) - slider(rod));
             assert!((error(&farthest) - expected).norm() < 1e-11, "{angle}: {farthest:?} {expected:?}");
         }
     }
 }
 
-/// `machine` without play, its balls fixed in their sockets at `places` in the axes of their bodies, m.
-fn with_balls_at(machine: &Machine, places: &[Vec3]) -> Option<Vec3> {
+/// Tip of `machine` with its balls fixed at `places` in their sockets, in the bodies' axes, m.
+fn tip_with_balls_at(machine: &Machine, places: &[Vec3]) -> Option<Vec3> {
     let mut fixed = machine.clone();
     for (joint, place) in fixed.ball_joints.iter_mut().zip(places) {
         joint.contact.clearance = 0.0;
         joint.ball.point -= place;
     }
-    HeldMachine::new(&fixed, &[]).ok().map(|held| held.ideal_tip())
+    HeldMachine::new(&fixed, &[]).ok().map(|held_machine| held_machine.ideal_tip())
 }
 
 #[test]
@@ -191,76 +191,76 @@ fn no_position_of_the_balls_exceeds_the_computed_error() {
     };
     for name in ["four-bar", "spcmm"] {
         let scene = scene(name, &[]);
-        let mut held = held(&scene, &[]);
-        let bounded = held.freedoms().bounded;
-        let (mut nearest, mut poses) = (0.0_f64, 0);
+        let mut held_machine = held_machine(&scene, &[]);
+        let bounded = held_machine.freedoms().bounded;
+        let (mut largest_ratio, mut poses) = (0.0_f64, 0);
         let directions: Vec<Vec3> = bounded.iter().flat_map(|axis| [*axis, -axis]).collect();
-        let supports: Vec<Farthest> = directions.iter().map(|u| held.farthest(u)).collect();
+        let supports: Vec<Farthest> = directions.iter().map(|u| held_machine.farthest(u)).collect();
         for _ in 0..150 {
             let places: Vec<Vec3> = scene
                 .machine
                 .ball_joints
                 .iter()
                 .map(|joint| {
-                    // Most on their walls, where the extremes are.
+                    // Mostly on the walls, where the extremes are.
                     let place = Vec3::new(next(), next(), next());
                     place.normalize() * joint.contact.clearance * (1.0 - 0.1 * next().abs())
                 })
                 .collect();
-            let Some(tip) = with_balls_at(&scene.machine, &places) else { continue };
+            let Some(tip) = tip_with_balls_at(&scene.machine, &places) else { continue };
             poses += 1;
-            let e = tip - held.ideal_tip();
+            let e = tip - held_machine.ideal_tip();
             for (u, farthest) in directions.iter().zip(&supports) {
-                let most = u.dot(&error(farthest));
-                assert!(u.dot(&e) <= most * (1.0 + 1e-3), "{name} {u:?}: {} {most}", u.dot(&e));
-                nearest = nearest.max(u.dot(&e) / most);
+                let limit = u.dot(&error(farthest));
+                assert!(u.dot(&e) <= limit * (1.0 + 1e-3), "{name} {u:?}: {} {limit}", u.dot(&e));
+                largest_ratio = largest_ratio.max(u.dot(&e) / limit);
             }
         }
-        assert!(poses > 100 && nearest > 0.6, "{name}: {poses} poses, {nearest}");
+        assert!(poses > 100 && largest_ratio > 0.6, "{name}: {poses} poses, {largest_ratio}");
     }
 }
 
 #[test]
 fn without_play_nothing_moves_and_idle_spin_has_no_effect() {
     let tight = TWO.map(|rod| Rod { play: [0.0; 2], ..rod });
-    let mut held = held(&parse(&truss(&tight, TIP, Guide::Plane, ""), &[]), &[]);
-    let freedoms = held.freedoms();
+    let mut held_machine = held_machine(&parse(&truss(&tight, TIP, Guide::Plane, ""), &[]), &[]);
+    let freedoms = held_machine.freedoms();
     assert!(freedoms.bounded.is_empty() && freedoms.unbounded.is_empty(), "{freedoms:?}");
-    let farthest = held.farthest(&Vec3::x());
+    let farthest = held_machine.farthest(&Vec3::x());
     assert!(farthest.support == 0.0 && error(&farthest).norm() < 1e-14, "{farthest:?}");
-    assert!(held.settled_error().unwrap().norm() < 1e-12);
+    assert!(held_machine.settled_error().unwrap().norm() < 1e-12);
 }
 
 #[test]
 fn the_tip_rests_where_a_long_run_leaves_it() {
     let contact = "friction = 0.15\nrestitution = 0.3";
     let scene = parse(&truss(&TWO, TIP, Guide::Plane, contact), &[]);
-    let mut held = held(&scene, &[]);
-    let settled = held.settled_error().unwrap();
+    let mut held_machine = held_machine(&scene, &[]);
+    let settled = held_machine.settled_error().unwrap();
     let mut simulation = Simulation::new(&scene.machine).unwrap();
     run_until(&mut simulation, 3.0);
     let mut frame = Frame::default();
     simulation.sample_now(&mut frame);
     let tip = frame.bodies[scene.machine.output.body].position;
-    let run = tip - held.ideal_tip();
-    // Friction holds a ball up to atan(0.15) from where it is pressed to without: 1 - cos of that along the rod.
+    let run = tip - held_machine.ideal_tip();
+    // Friction holds a ball up to atan(0.15) from its frictionless position, which is 1 - cos of that along the rod.
     assert!((run - settled).norm() < 0.02 * settled.norm(), "{run:?} {settled:?}");
-    // The weight presses both rods together, and its direction is no corner's: one of the four corners, a little deeper.
-    let farthest = held.farthest(&-Vec3::z());
+    // The weight loads both rods, so the tip rests at one of the four corners, slightly deeper because the walls yield.
+    let farthest = held_machine.farthest(&-Vec3::z());
     assert!((error(&farthest) - settled).norm() < 0.02 * settled.norm(), "{farthest:?} {settled:?}");
 }
 
 #[test]
-fn unreachable_drive_positions_report_how_far_they_get() {
+fn unreachable_drive_positions_report_the_reached_fraction() {
     let scene = parse(&truss(&TWO, TIP, Guide::Plane, ""), &[]);
     // The fixed end of the first rod moves 0.1 m, and the tip with it.
-    let mut moved = held(&scene, &[Some(0.1)]);
+    let mut moved = held_machine(&scene, &[Some(0.1)]);
     let tip = [moved.ideal_tip().x, moved.ideal_tip().z];
     let rods = [Rod { from: [TWO[0].from[0] + 0.1, TWO[0].from[1]], ..TWO[0] }, TWO[1]];
     for (rod, own) in rods.iter().zip(TWO) {
         assert!((rod.length_and_direction(tip).0 - own.length_and_direction(TIP).0).abs() < 1e-12);
     }
-    for u in around(8) {
+    for u in directions(8) {
         let farthest = moved.farthest(&u);
         assert!((farthest.support / support(&rods, tip, [u.x, u.z]) - 1.0).abs() < 1e-9);
     }

@@ -1,4 +1,4 @@
-//! What joints of the tree exert: against closed solutions, and by Newton and Euler for every body.
+//! Reactions of the tree's joints: against closed-form solutions, and by the Newton-Euler equations of every body.
 
 use crate::common::matrix::FORMULATIONS;
 use crate::common::{parse, scene};
@@ -6,24 +6,24 @@ use jointplay::machine::{JointKind, Vec3};
 use jointplay::scene::Scene;
 use jointplay::simulate::{BodyMotion, Frame, Simulation};
 
-/// A frame that asks for reactions.
-fn asking() -> Frame {
+/// A frame that requests reactions.
+fn with_reactions() -> Frame {
     Frame { reactions: Some(Vec::new()), ..Frame::default() }
 }
 
-/// Everything at `time`, s, with reactions.
-fn at(simulation: &mut Simulation, time: f64) -> Frame {
+/// The frame at `time`, s, with reactions.
+fn frame_at(simulation: &mut Simulation, time: f64) -> Frame {
     while simulation.time() < time {
         simulation.step_until(time).unwrap();
     }
-    let mut frame = asking();
+    let mut frame = with_reactions();
     simulation.sample(time, &mut frame);
     frame
 }
 
-/// Force and torque of the `i`-th joint that holds its child.
+/// Force and torque of the `i`-th joint that is not free.
 fn reaction(frame: &Frame, i: usize) -> [Vec3; 2] {
-    frame.reactions.as_ref().expect("was asked for")[i]
+    frame.reactions.as_ref().expect("reactions were requested")[i]
 }
 
 const MASS: f64 = 0.7;
@@ -34,44 +34,44 @@ fn body(name: &str, more: &str) -> String {
 }
 
 #[test]
-fn the_pin_of_a_pendulum_bears_weight_and_centrifugal_force() {
-    // About y; its centroid 0.2 m from the pin and 0.05 m beside the plane of the pin.
+fn the_pin_of_a_pendulum_carries_weight_and_centrifugal_force() {
+    // The pin is along y; the centroid is 0.2 m from it and 0.05 m off the plane through the joint point.
     let text = format!(
         "[gravity]\nz = \"-{GRAVITY} m/s^2\"\n{}\
          [[joint]]\nname = \"pin\"\nkind = \"revolute\"\nchild = \"rod\"\naxis = [0, 1, 0]\nchild_point = \"-150 30 0 mm\"\n\
          start = {{ position = \"20 deg\" }}\n",
         body("rod", "centre = \"50 80 0 mm\"")
     );
-    let (r, aside) = (0.2, 0.05);
+    let (r, offset) = (0.2, 0.05);
     let inertia = 3e-3 + MASS * r * r;
     let start = 20_f64.to_radians();
     for formulation in FORMULATIONS {
         let changes = [("formulation", formulation), ("solver.tolerance", "1e-11")];
         let mut simulation = Simulation::new(&parse(&text, &changes).machine).unwrap();
         for time in [0.0, 0.1, 0.23, 0.4] {
-            let frame = at(&mut simulation, time);
-            // The angle by which it hangs below the horizontal, with the right-hand rule about y.
+            let frame = frame_at(&mut simulation, time);
+            // Angle below the horizontal, positive about y.
             let angle = frame.coordinates[0][0];
             let along = Vec3::new(angle.cos(), 0.0, -angle.sin());
-            let ahead = Vec3::new(-angle.sin(), 0.0, -angle.cos());
+            let tangent = Vec3::new(-angle.sin(), 0.0, -angle.cos());
             let moment = MASS * GRAVITY * r;
             let square = 2.0 * moment * (angle.sin() - start.sin()) / inertia;
             let acceleration = moment * angle.cos() / inertia;
-            let needed =
-                MASS * (ahead * (r * acceleration) - along * (r * square)) + Vec3::new(0.0, 0.0, MASS * GRAVITY);
+            let expected_force =
+                MASS * (tangent * (r * acceleration) - along * (r * square)) + Vec3::new(0.0, 0.0, MASS * GRAVITY);
             let [force, torque] = reaction(&frame, 0);
             let label = format!("{formulation} {time}");
-            assert!((force - needed).norm() < 1e-6, "{label}: {force} {needed}");
-            // About the pin: what its offset along the axis asks for, nothing about the axis.
-            let expected = Vec3::new(0.0, aside, 0.0).cross(&needed);
-            assert!((torque - expected).norm() < 1e-6, "{label}: {torque} {expected}");
+            assert!((force - expected_force).norm() < 1e-6, "{label}: {force} {expected_force}");
+            // The offset along the axis needs a torque; about the axis there is none.
+            let expected_torque = Vec3::new(0.0, offset, 0.0).cross(&expected_force);
+            assert!((torque - expected_torque).norm() < 1e-6, "{label}: {torque} {expected_torque}");
             assert!(torque.y.abs() < 1e-9, "{label}");
         }
     }
 }
 
 #[test]
-fn a_slide_bears_what_is_across_it() {
+fn a_slide_carries_the_transverse_load() {
     let text = format!(
         "[gravity]\nz = \"-{GRAVITY} m/s^2\"\n{}\
          [[joint]]\nname = \"slope\"\nkind = \"prismatic\"\nchild = \"box\"\naxis = [0.8, 0, -0.6]\nchild_point = \"0 0 -40 mm\"\n\
@@ -81,20 +81,20 @@ fn a_slide_bears_what_is_across_it() {
     for formulation in FORMULATIONS {
         let mut simulation = Simulation::new(&parse(&text, &[("formulation", formulation)]).machine).unwrap();
         for time in [0.0, 0.3] {
-            let frame = at(&mut simulation, time);
+            let frame = frame_at(&mut simulation, time);
             let [force, torque] = reaction(&frame, 0);
             let normal = Vec3::new(0.6, 0.0, 0.8) * (MASS * GRAVITY * 0.8);
             let expected = normal - Vec3::new(0.0, 3.0, 0.0);
             assert!((force - expected).norm() < 1e-9, "{formulation}: {force}");
-            // Nothing turns: about the centroid force and torque cancel.
-            let turning = Vec3::new(0.0, 0.0, 0.04).cross(&expected);
-            assert!((torque - turning).norm() < 1e-9, "{formulation}: {torque}");
+            // Nothing rotates: about the centroid force and torque cancel.
+            let expected_torque = Vec3::new(0.0, 0.0, 0.04).cross(&expected);
+            assert!((torque - expected_torque).norm() < 1e-9, "{formulation}: {torque}");
         }
     }
 }
 
 #[test]
-fn a_driven_crank_is_held_and_turned() {
+fn a_driven_crank_has_the_reactions_of_its_bearing_and_its_drive() {
     let text = format!(
         "[gravity]\nz = \"-{GRAVITY} m/s^2\"\n{}{}\
          [[joint]]\nname = \"crank\"\nkind = \"revolute\"\nchild = \"crank\"\naxis = [0, 1, 0]\n\
@@ -106,34 +106,33 @@ fn a_driven_crank_is_held_and_turned() {
     for formulation in FORMULATIONS {
         let mut simulation = Simulation::new(&parse(&text, &[("formulation", formulation)]).machine).unwrap();
         for time in [0.0, 0.011, 0.05] {
-            let frame = at(&mut simulation, time);
+            let frame = frame_at(&mut simulation, time);
             let turn = frame.bodies[0].rotation;
             let centres = [Vec3::new(0.04, 0.0, 0.0), Vec3::new(0.06, 0.0, 0.02)].map(|c| turn * c);
-            let needed = centres.map(|c| MASS * (Vec3::new(0.0, 0.0, GRAVITY) - c * 900.0));
+            let inertia_forces = centres.map(|c| MASS * (Vec3::new(0.0, 0.0, GRAVITY) - c * 900.0));
             let label = format!("{formulation} {time}");
-            // The lagrange form lets constraints drift a little.
+            // `lagrange` allows a small constraint drift.
             let bound = if formulation == "tree" { 1e-9 } else { 1e-4 };
             let [force, torque] = reaction(&frame, 0);
-            assert!((force - needed[0] - needed[1]).norm() < bound * 1e2, "{label}: {force}");
-            let moment = centres[0].cross(&needed[0]) + centres[1].cross(&needed[1]);
+            assert!((force - inertia_forces[0] - inertia_forces[1]).norm() < bound * 1e2, "{label}: {force}");
+            let moment = centres[0].cross(&inertia_forces[0]) + centres[1].cross(&inertia_forces[1]);
             assert!((torque - moment).norm() < bound * 1e2, "{label}: {torque} {moment}");
             assert!((torque.y - frame.actuators[0]).abs() < 1e-9, "{label}");
             let [force, torque] = reaction(&frame, 1);
-            assert!((force - needed[1]).norm() < bound * 1e2, "{label}: {force}");
+            assert!((force - inertia_forces[1]).norm() < bound * 1e2, "{label}: {force}");
             let arm = turn * Vec3::new(0.0, 0.0, 0.02);
-            assert!((torque - arm.cross(&needed[1])).norm() < bound * 1e2, "{label}");
+            assert!((torque - arm.cross(&inertia_forces[1])).norm() < bound * 1e2, "{label}");
         }
     }
 }
 
-/// For every body, what is left of m a and of the change of its spin when all forces and torques on it that a frame reports
-/// are taken away, N and N m, and their largest force and torque.
-fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
+/// Residuals of the Newton-Euler equations of every body, N and N m, with all forces and torques that the frame reports.
+fn residuals(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
     let centre = |b: usize| {
         let m = &frame.bodies[b];
         m.position + m.rotation * scene.machine.bodies[b].centre
     };
-    let mut left: Vec<[Vec3; 2]> = scene
+    let mut residuals: Vec<[Vec3; 2]> = scene
         .machine
         .bodies
         .iter()
@@ -148,8 +147,8 @@ fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
         .collect();
     let mut push = |body: Option<usize>, point: Vec3, force: Vec3, torque: Vec3| {
         if let Some(b) = body {
-            left[b][0] -= force;
-            left[b][1] -= torque + (point - centre(b)).cross(&force);
+            residuals[b][0] -= force;
+            residuals[b][1] -= torque + (point - centre(b)).cross(&force);
         }
     };
     let holding = scene.machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
@@ -176,11 +175,11 @@ fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
             _ => unreachable!("an element has one or two points"),
         }
     }
-    left
+    residuals
 }
 
-/// A machine with every kind of joint and element: a driven turntable, on it an arm with a slide, on that a fixed tool; a free
-/// body held by a ball joint without play to the tool.
+/// A machine with every kind of joint and element: a driven turntable that carries an arm with a slide and a fixed tool, and a free
+/// body attached to the tool by an ideal ball joint.
 fn machine() -> String {
     ["table", "arm", "ram", "tool", "ball"].map(|name| body(name, "centre = \"5 -3 8 mm\"")).concat()
         + "[gravity]\nx = \"1 m/s^2\"\nz = \"-9.81 m/s^2\"\n[contact]\nclearance = 0\n\
@@ -206,28 +205,31 @@ fn machine() -> String {
 }
 
 #[test]
-fn reactions_satisfy_newton_and_euler_for_every_body() {
+fn reactions_satisfy_the_newton_euler_equations_of_every_body() {
     let text = format!("start = \"ideal\"\n{}", machine());
-    let mut found = Vec::new();
+    let mut frames = Vec::new();
     for formulation in FORMULATIONS {
         let changes = [("formulation", formulation), ("solver.tolerance", "1e-11")];
         let scene = parse(&text, &changes);
         let mut simulation = Simulation::new(&scene.machine).unwrap();
         for time in [0.0, 0.07, 0.2] {
-            let frame = at(&mut simulation, time);
+            let frame = frame_at(&mut simulation, time);
             assert_eq!(frame.reactions.as_ref().map(Vec::len), Some(4));
-            for (b, left) in unbalanced(&scene, &frame).into_iter().enumerate() {
+            for (b, residual) in residuals(&scene, &frame).into_iter().enumerate() {
                 let name = &scene.machine.bodies[b].name;
-                assert!(left[0].norm() < 1e-9 && left[1].norm() < 1e-9, "{formulation} {time} {name}: {left:?}");
+                assert!(
+                    residual[0].norm() < 1e-9 && residual[1].norm() < 1e-9,
+                    "{formulation} {time} {name}: {residual:?}"
+                );
             }
-            found.push(frame);
+            frames.push(frame);
         }
     }
-    let (tree, lagrange) = found.split_at(3);
+    let (tree, lagrange) = frames.split_at(3);
     for (a, b) in tree.iter().zip(lagrange) {
         for i in 0..4 {
             for (a, b) in reaction(a, i).iter().zip(reaction(b, i)) {
-                // By then the two have drifted apart by that much.
+                // The bound covers the drift between the two formulations.
                 assert!(a.norm() > 1e-3 && (a - b).norm() < 1e-4, "{i}: {a} {b}");
             }
         }
@@ -245,12 +247,12 @@ fn contacts_load_the_reactions_too() {
             for n in 0..4 {
                 simulation.advance_to(0.01 * f64::from(n)).unwrap();
                 let time = simulation.time();
-                let frame = at(&mut simulation, time);
+                let frame = frame_at(&mut simulation, time);
                 touched |= frame.joints.iter().any(|joint| joint.normal_force.norm() > 1.0);
-                for (b, left) in unbalanced(&scene, &frame).into_iter().enumerate() {
+                for (b, residual) in residuals(&scene, &frame).into_iter().enumerate() {
                     let body = &scene.machine.bodies[b].name;
                     let size = scene.machine.bodies[b].mass * 1e3;
-                    assert!(left[0].norm() < 1e-9 * size, "{name} {formulation} {time} {body}: {left:?}");
+                    assert!(residual[0].norm() < 1e-9 * size, "{name} {formulation} {time} {body}: {residual:?}");
                 }
             }
             assert!(touched, "{name} {formulation}");

@@ -1,4 +1,4 @@
-//! The documents say what the program does.
+//! The documents agree with the program.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ fn read(path: impl AsRef<Path>) -> String {
 }
 
 #[test]
-fn the_page_of_parameters_is_what_the_program_prints() {
+fn the_parameter_page_is_what_the_program_prints() {
     assert!(read("docs/parameters.md") == reference_page(), "cargo run -- parameters > docs/parameters.md");
 }
 
@@ -29,14 +29,14 @@ fn the_citation_names_this_version() {
     assert_eq!(version, Some(env!("CARGO_PKG_VERSION")));
 }
 
-/// The blocks of TOML of the page about scenes.
+/// The TOML blocks of `docs/scene-format.md`.
 fn examples() -> Vec<String> {
     let page = read("docs/scene-format.md");
     let blocks = page.split("```toml\n").skip(1);
     blocks.filter_map(|rest| rest.split("```").next().map(str::to_owned)).collect()
 }
 
-/// The first of them that contains `line`.
+/// The first TOML block of that page that contains `line`.
 fn example(line: &str) -> String {
     let blocks = examples();
     let found = blocks.into_iter().find(|block| block.contains(line));
@@ -44,7 +44,7 @@ fn example(line: &str) -> String {
 }
 
 #[test]
-fn the_page_of_scenes_says_what_each_role_is_for() {
+fn the_scene_page_describes_each_role() {
     let page = read("docs/scene-format.md");
     let (_, table) = page.split_once("| role | for |\n|---|---|\n").unwrap();
     let rows = table.lines().take_while(|line| line.starts_with('|'));
@@ -53,7 +53,7 @@ fn the_page_of_scenes_says_what_each_role_is_for() {
 }
 
 #[test]
-fn every_example_of_the_page_of_scenes_runs() {
+fn every_example_of_the_scene_page_runs() {
     let examples = examples();
     assert!(examples.len() > 4);
     for text in examples {
@@ -64,8 +64,8 @@ fn every_example_of_the_page_of_scenes_runs() {
     }
 }
 
-/// Whether the file at `path` is `text`; with `UPDATE_PAGES` set it becomes that.
-fn is_page(path: &str, text: &str, command: &str) {
+/// Checks that the file at `path` equals `text`; with `UPDATE_PAGES` set, writes it first.
+fn check_page(path: &str, text: &str, command: &str) {
     if std::env::var_os("UPDATE_PAGES").is_some() {
         fs::write(root().join(path), text).unwrap();
     }
@@ -73,10 +73,10 @@ fn is_page(path: &str, text: &str, command: &str) {
 }
 
 #[test]
-fn the_page_of_scenes_has_the_tables_of_the_rows() {
+fn the_scene_page_has_the_tables_of_the_format() {
     let path = "docs/scene-format.md";
     let page = reference::fill(&read(path)).unwrap_or_else(|name| panic!("no table `{name}`"));
-    is_page(path, &page, "jointplay reference");
+    check_page(path, &page, "jointplay reference");
     for table in file_tables() {
         assert!(reference::contains_table(&page, table), "no table `{}`", table.name);
     }
@@ -87,11 +87,11 @@ fn the_page_of_scenes_has_the_tables_of_the_rows() {
 
 #[test]
 fn the_schema_is_what_the_program_prints() {
-    is_page("assets/scene.schema.json", &schema::page(), "jointplay schema");
+    check_page("assets/scene.schema.json", &schema::page(), "jointplay schema");
 }
 
 #[test]
-fn hinges_that_are_not_parallel_stand_where_the_page_says() {
+fn the_two_hinges_of_the_page_have_the_stated_positions() {
     let scene = Scene::parse(&example("name = \"turn\""), None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene.machine).expect("the example starts");
     let mut frame = Frame::default();
@@ -106,7 +106,7 @@ fn hinges_that_are_not_parallel_stand_where_the_page_says() {
     for point in [arm.position, tip] {
         assert!(page.contains(&millimetres(point)), "{}", millimetres(point));
     }
-    // The arm's hinge, y of the table and of the arm alike, along the world's -x.
+    // The arm's hinge axis, y in the frames of table and arm, is along the world's -x.
     assert!((arm.rotation * Vec3::y() + Vec3::x()).norm() < 1e-12);
     let lifting = 5f64.to_radians() * std::f64::consts::TAU;
     let turning = 10.0 * std::f64::consts::TAU / 60.0;
@@ -121,10 +121,10 @@ fn the_example_of_the_scene_format_runs() {
     let scene = Scene::parse(example, None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene.machine).expect("the example starts");
     simulation.advance_to(0.02).expect("the example runs");
-    assert!(simulation.statistics().impacts[0] > 0, "a rod that is let go falls onto its socket");
+    assert!(simulation.statistics().impacts[0] > 0, "a released rod falls onto its socket");
 }
 
-/// The scenes of `assets/presets.json`: the built-in ones, in their order.
+/// The scenes of `assets/presets.json`: all built-in ones, in order.
 fn measured_scenes() -> Vec<&'static str> {
     let record = &jointplay::analysis::presets::record().scenes;
     let all = jointplay::scene::BUILT_IN;
@@ -135,8 +135,8 @@ fn measured_scenes() -> Vec<&'static str> {
 }
 
 #[test]
-fn the_page_of_the_trade_has_the_headings_and_diagrams_that_the_command_writes() {
-    /// Headings and heads of tables.
+fn the_tradeoff_page_has_the_headings_and_diagrams_of_the_command() {
+    /// Headings and table heads.
     fn structure(page: &str) -> Vec<&str> {
         let lines: Vec<&str> = page.lines().collect();
         let is_rule = |line: &&str| line.starts_with("|---");
@@ -160,14 +160,14 @@ fn the_page_of_the_trade_has_the_headings_and_diagrams_that_the_command_writes()
     }
 }
 
-/// The pages in `docs/`, by their paths from the root.
+/// Paths of the pages in `docs/`, relative to the root.
 fn pages() -> Vec<String> {
     let entries = fs::read_dir(root().join("docs")).expect("the folder of documents");
     let names = entries.map(|entry| entry.expect("an entry").file_name().into_string().expect("ASCII"));
     names.filter(|name| name.ends_with(".md")).map(|name| format!("docs/{name}")).collect()
 }
 
-/// Every file that a document names is there.
+/// Every file named in a document exists.
 #[test]
 fn documents_name_files_that_exist() {
     let pages = pages();
@@ -176,10 +176,10 @@ fn documents_name_files_that_exist() {
     for document in documents.into_iter().chain(pages) {
         let text = read(&document);
         for word in text.split(['`', '(', ')']) {
-            let kept = ["src/", "crates/", "docs/", "assets/", "tests/", "benches/", "examples/", "shaders/"]
+            let is_path = ["src/", "crates/", "docs/", "assets/", "tests/", "benches/", "examples/", "shaders/"]
                 .iter()
                 .any(|folder| word.starts_with(folder));
-            if kept && !word.contains(['*', '<', ' ', '\n']) {
+            if is_path && !word.contains(['*', '<', ' ', '\n']) {
                 assert!(root().join(word).exists(), "{document} names {word}");
             }
         }
@@ -194,7 +194,7 @@ fn the_readme_lists_every_document() {
     }
 }
 
-/// Commands and options in the blocks of shell of README.md and `docs/` are those of the program.
+/// The program has all commands and options in the shell blocks of README.md and `docs/`.
 #[test]
 fn documents_use_commands_and_options_that_exist() {
     let mut checked = 0;
@@ -205,7 +205,7 @@ fn documents_use_commands_and_options_that_exist() {
             let line = line.split(" #").next().unwrap_or(line);
             let is_program = |word: &str| ["./run", "jointplay", "target/release/jointplay"].contains(&word);
             let mut words = line.split_whitespace().skip_while(|word| !is_program(word));
-            // `web` is a command of the script.
+            // `web` is a command of the script, not of the program.
             let (Some(_), Some(command)) = (words.next(), words.next().filter(|word| *word != "web")) else {
                 continue;
             };
@@ -225,7 +225,7 @@ fn documents_use_commands_and_options_that_exist() {
 }
 
 #[test]
-fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
+fn the_mass_on_a_spring_of_the_page_starts_and_balances_its_energy() {
     let scene = Scene::parse(&example("name = \"s1\""), None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene.machine).expect("the example starts");
     let mut frame = Frame::default();
@@ -240,11 +240,11 @@ fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
 }
 
 #[test]
-fn the_wheel_of_the_page_rides_over_its_bump() {
+fn the_wheel_of_the_page_rolls_over_its_bump() {
     let scene = Scene::parse(&example("name = \"strut\""), None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene.machine).expect("the example starts");
     let mut frame = Frame::default();
-    let (mut highest, mut most, mut least) = (0.0_f64, 0.0_f64, f64::INFINITY);
+    let (mut highest, mut max_force, mut min_force) = (0.0_f64, 0.0_f64, f64::INFINITY);
     while simulation.time() < 1.0 {
         let next = simulation.time() + 2e-3;
         simulation.step_until(next).expect("it runs");
@@ -253,11 +253,11 @@ fn the_wheel_of_the_page_rides_over_its_bump() {
         let force = frame.elements[1].force.z;
         assert!(force == 0.0 || wheel.z - ground.z < 0.3);
         highest = highest.max(ground.z);
-        (most, least) = (most.max(force), least.min(force));
+        (max_force, min_force) = (max_force.max(force), min_force.min(force));
     }
     assert!((highest - 0.04).abs() < 1e-4, "{highest}");
     let weight = 320.0 * 9.81;
-    assert!(most > 2.0 * weight && least < 0.5 * weight, "{most} {least}");
+    assert!(max_force > 2.0 * weight && min_force < 0.5 * weight, "{max_force} {min_force}");
     let ledger = simulation.ledger().expect("is kept");
     assert!(ledger.drive_work > 0.0 && ledger.damping_loss > 0.0, "{ledger:?}");
     assert!(ledger.relative_residual().abs() < 1e-3, "{ledger:?}");
@@ -268,7 +268,7 @@ fn the_flap_of_the_page_opens_against_its_stop_and_shuts() {
     let scene = Scene::parse(&example("name = \"flap\""), None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene.machine).expect("the example starts");
     let mut frame = Frame::default();
-    let (mut widest, mut deepest, mut most) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let (mut widest, mut deepest, mut max_torque) = (0.0_f64, 0.0_f64, 0.0_f64);
     while simulation.time() < 1.0 {
         let next = simulation.time() + 2e-3;
         simulation.step_until(next).expect("it runs");
@@ -276,9 +276,9 @@ fn the_flap_of_the_page_opens_against_its_stop_and_shuts() {
         let rotation = &frame.bodies[0].rotation;
         let angle = libm::atan2(rotation[(0, 2)], rotation[(0, 0)]).to_degrees();
         (widest, deepest) = (widest.max(angle), deepest.min(angle));
-        most = most.max(frame.elements[2].torque.expect("a torque").norm());
+        max_torque = max_torque.max(frame.elements[2].torque.expect("a torque").norm());
     }
     assert!((30.0..70.0).contains(&widest), "{widest}");
     assert!((-2.0..-0.05).contains(&deepest), "{deepest}");
-    assert!((0.3..=0.6 + 1e-12).contains(&most), "{most}");
+    assert!((0.3..=0.6 + 1e-12).contains(&max_torque), "{max_torque}");
 }

@@ -1,4 +1,4 @@
-//! Shapes from files beside a scene, roles and colours.
+//! Shapes from mesh files, roles and colours.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -6,7 +6,7 @@ use std::fs;
 use jointplay::machine::{Geometry, Role};
 use jointplay::scene::{MAX_MESH_SIZE, Scene, file_bytes};
 
-/// A body whose only shape is `shape`, with other keys.
+/// A body with the single shape `shape` and further keys.
 fn scene(shape: &str, keys: &str) -> String {
     format!(
         "[[body]]\nname = \"arm\"\n{keys}\nshapes = [{{ {shape} }}]\n\n\
@@ -14,15 +14,15 @@ fn scene(shape: &str, keys: &str) -> String {
     )
 }
 
-const HEAVY: &str = "density = \"2 g/cm^3\"";
-const GIVEN: &str = "mass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"";
+const WITH_DENSITY: &str = "density = \"2 g/cm^3\"";
+const WITH_MASS: &str = "mass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"";
 const OBJ: &str = "form = \"mesh\", file = \"arm.obj\", unit = \"mm\"";
 
-/// A box of 10 x 20 x 30 mm in one corner, as OBJ; without its last side it is open.
+/// A box of 10 x 20 x 30 mm with a corner at the origin, as OBJ; without the last face it is open.
 const BOX: &str = "v 0 0 0\nv 10 0 0\nv 0 20 0\nv 10 20 0\nv 0 0 30\nv 10 0 30\nv 0 20 30\nv 10 20 30\n\
                    f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
 
-/// A binary STL file of one triangle, with so many bytes left out at its end.
+/// A binary STL file of one triangle without its last `missing` bytes.
 fn stl(missing: usize) -> Vec<u8> {
     let mut bytes = vec![b's'; 80];
     bytes.extend(1_u32.to_le_bytes());
@@ -36,7 +36,7 @@ fn stl(missing: usize) -> Vec<u8> {
 struct Folder(tempfile::TempDir);
 
 impl Folder {
-    fn with(files: &[(&str, &[u8])]) -> Self {
+    fn with_files(files: &[(&str, &[u8])]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         for (name, content) in files {
             fs::write(folder.path().join(name), content).unwrap();
@@ -51,51 +51,51 @@ impl Folder {
 }
 
 #[test]
-fn a_body_has_the_mass_of_the_volume_of_its_mesh() {
-    let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
+fn the_mass_of_a_body_follows_from_the_volume_of_its_mesh() {
+    let folder = Folder::with_files(&[("arm.obj", BOX.as_bytes())]);
     let place = format!("{OBJ}, position = \"0 5 0 mm\", rotation = {{ axis = [0, 0, 1], angle = \"90 deg\" }}");
-    let scene = folder.read(&scene(&place, HEAVY)).unwrap();
+    let scene = folder.read(&scene(&place, WITH_DENSITY)).unwrap();
     let body = &scene.machine.bodies[0];
     assert!((body.mass - 0.012).abs() < 1e-12, "{}", body.mass);
     let centre = jointplay::machine::Vec3::new(-0.01, 0.01, 0.015);
     assert!((body.centre - centre).norm() < 1e-12, "{}", body.centre);
     let (x, y, z) = (20e-3_f64, 10e-3_f64, 30e-3_f64);
     let about = [y * y + z * z, x * x + z * z, x * x + y * y].map(|sum| 0.012 * sum / 12.0);
-    for (i, wanted) in about.into_iter().enumerate() {
-        assert!((body.inertia[(i, i)] / wanted - 1.0).abs() < 1e-9);
+    for (i, expected) in about.into_iter().enumerate() {
+        assert!((body.inertia[(i, i)] / expected - 1.0).abs() < 1e-9);
     }
 }
 
 #[test]
-fn a_mesh_that_does_not_fit_its_machine_is_warned_of_with_the_unit_that_does() {
+fn a_mesh_of_implausible_size_raises_a_warning_with_a_better_unit() {
     let metres = BOX.replace("10", "0.01").replace("20", "0.02").replace("30", "0.03");
-    let folder = Folder::with(&[("arm.obj", BOX.as_bytes()), ("metres.obj", metres.as_bytes())]);
-    // A wheel on its hinge, beside an arm of 0.4 m.
+    let folder = Folder::with_files(&[("arm.obj", BOX.as_bytes()), ("metres.obj", metres.as_bytes())]);
+    // A wheel on its hinge with an arm of 0.4 m.
     let machine = "child_point = [0, 0, 0]\n\n[[body]]\nname = \"long\"\nmass = \"1 kg\"\ninertia = \"1e-6 1e-6 1e-6 kg m^2\"\n\n\
                    [[joint]]\nname = \"end\"\nkind = \"revolute\"\nchild = \"long\"\nparent = \"arm\"\naxis = [0, 1, 0]\n\
                    child_point = \"400 0 0 mm\"\n";
-    let held = "child_point = \"0 0 30 mm\"\n";
+    let joint_point = "child_point = \"0 0 30 mm\"\n";
     for (file, unit, keys, rest, better) in [
-        ("arm.obj", "m", HEAVY, held, Some("unit = \"mm\" would make it 37.4 mm")),
-        ("arm.obj", "m", GIVEN, "", Some("the rest of the machine 38.7 mm; unit = \"mm\"")),
+        ("arm.obj", "m", WITH_DENSITY, joint_point, Some("unit = \"mm\" would make it 37.4 mm")),
+        ("arm.obj", "m", WITH_MASS, "", Some("the rest of the machine 38.7 mm; unit = \"mm\"")),
         (
             "arm.obj",
             "m",
-            HEAVY,
+            WITH_DENSITY,
             machine,
             Some("with the unit 1 m this mesh reaches 37.4 m, the rest of the machine 400 mm"),
         ),
-        ("metres.obj", "mm", HEAVY, held, Some("unit = \"m\" would make it 37.4 mm")),
-        ("metres.obj", "mm", GIVEN, "", Some("reaches 0.0374 mm, the rest of the machine 38.7 mm; unit = \"m\"")),
-        ("metres.obj", "mm", HEAVY, machine, Some("unit = \"m\"")),
-        // Nothing to compare it with, or nothing wrong: a part may be small in its machine, and reach beyond its points.
-        ("arm.obj", "m", HEAVY, "", None),
-        ("metres.obj", "mm", HEAVY, "", None),
-        ("arm.obj", "mm", HEAVY, held, None),
-        ("arm.obj", "mm", GIVEN, "", None),
-        ("arm.obj", "mm", HEAVY, machine, None),
-        ("metres.obj", "m", HEAVY, "child_point = \"0 0 2 mm\"\n", None),
-        ("arm.obj", "25.4 mm", HEAVY, machine, None),
+        ("metres.obj", "mm", WITH_DENSITY, joint_point, Some("unit = \"m\" would make it 37.4 mm")),
+        ("metres.obj", "mm", WITH_MASS, "", Some("reaches 0.0374 mm, the rest of the machine 38.7 mm; unit = \"m\"")),
+        ("metres.obj", "mm", WITH_DENSITY, machine, Some("unit = \"m\"")),
+        // There is nothing to compare with, or the size is plausible: a part may be small and may extend beyond its joint points.
+        ("arm.obj", "m", WITH_DENSITY, "", None),
+        ("metres.obj", "mm", WITH_DENSITY, "", None),
+        ("arm.obj", "mm", WITH_DENSITY, joint_point, None),
+        ("arm.obj", "mm", WITH_MASS, "", None),
+        ("arm.obj", "mm", WITH_DENSITY, machine, None),
+        ("metres.obj", "m", WITH_DENSITY, "child_point = \"0 0 2 mm\"\n", None),
+        ("arm.obj", "25.4 mm", WITH_DENSITY, machine, None),
     ] {
         let shape = format!("form = \"mesh\", file = \"{file}\", unit = \"{unit}\"");
         let read = folder.read(&(scene(&shape, keys) + rest)).unwrap();
@@ -103,24 +103,25 @@ fn a_mesh_that_does_not_fit_its_machine_is_warned_of_with_the_unit_that_does() {
         match better {
             None => assert_eq!(warnings, [""; 0], "{file} {unit} {keys} {rest}"),
             Some(better) => {
-                let said = |w: &String| w.starts_with("body.arm.shapes[0]: with the unit 1 m") && w.contains(better);
-                assert!(warnings.len() == 1 && said(&warnings[0]), "{file} {unit} {keys} {rest}: {warnings:?}");
+                let is_expected =
+                    |w: &String| w.starts_with("body.arm.shapes[0]: with the unit 1 m") && w.contains(better);
+                assert!(warnings.len() == 1 && is_expected(&warnings[0]), "{file} {unit} {keys} {rest}: {warnings:?}");
             }
         }
     }
     let two = format!("{OBJ} }}, {{ {OBJ}").replace("\"mm\"", "\"m\"");
-    let warnings = folder.read(&scene(&two, GIVEN)).unwrap().machine.warnings();
+    let warnings = folder.read(&scene(&two, WITH_MASS)).unwrap().machine.warnings();
     assert!(warnings[0].to_string().contains(" (and 1 more): with the unit 1 m"), "{warnings:?}");
 }
 
 #[test]
 fn a_mesh_is_read_once() {
     let bytes = stl(0);
-    let folder = Folder::with(&[("arm.stl", &bytes)]);
+    let folder = Folder::with_files(&[("arm.stl", &bytes)]);
     let shape = "form = \"mesh\", file = \"arm.stl\", unit = \"mm\"";
-    let first = folder.read(&scene(shape, GIVEN)).unwrap();
+    let first = folder.read(&scene(shape, WITH_MASS)).unwrap();
     assert_eq!(*file_bytes(&first.source.beside["arm.stl"]), bytes);
-    // What it was then is used again, whatever became of the file.
+    // The stored content is used even after the file is deleted.
     drop(folder);
     let source = &first.source;
     let again = Scene::parse_with(&source.text, Some("scene.toml"), &source.beside, &[]).unwrap();
@@ -134,9 +135,9 @@ fn a_mesh_is_read_once() {
 
 #[test]
 fn shapes_of_one_file_share_its_triangles() {
-    let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
+    let folder = Folder::with_files(&[("arm.obj", BOX.as_bytes())]);
     let shapes = format!("{OBJ} }}, {{ {OBJ}, position = \"1 0 0 m\"");
-    let scene = folder.read(&scene(&shapes, GIVEN)).unwrap();
+    let scene = folder.read(&scene(&shapes, WITH_MASS)).unwrap();
     let meshes: Vec<_> = scene.machine.bodies[0].shapes.iter().map(|shape| &shape.geometry).collect();
     let [Geometry::Mesh { mesh: a, .. }, Geometry::Mesh { mesh: b, .. }] = meshes[..] else {
         panic!("two meshes");
@@ -146,11 +147,11 @@ fn shapes_of_one_file_share_its_triangles() {
 
 #[test]
 fn a_fixed_mesh_follows_a_pattern() {
-    let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
+    let folder = Folder::with_files(&[("arm.obj", BOX.as_bytes())]);
     let text = format!(
         "{}\n[[pattern]]\nname = \"ring\"\ncount = 2\nabout = {{ axis = [0, 0, 1] }}\n\n\
          [[pattern.fixed_shape]]\nform = \"mesh\"\nfile = \"arm.obj\"\nunit = \"1 cm\"\nposition = \"2 0 0 m\"\n",
-        scene(OBJ, GIVEN)
+        scene(OBJ, WITH_MASS)
     );
     let scene = folder.read(&text).unwrap();
     let Geometry::Mesh { position, rotation, unit, .. } = scene.machine.fixed_shapes[1].geometry else {
@@ -166,7 +167,7 @@ fn errors_in_a_mesh_are_reported_with_their_position() {
     let open = BOX.replace("f 5 6 8 7\n", "");
     let cut = stl(7);
     let large = vec![b'#'; MAX_MESH_SIZE as usize + 1];
-    let folder = Folder::with(&[
+    let folder = Folder::with_files(&[
         ("arm.obj", BOX.as_bytes()),
         ("bad.obj", bad.as_bytes()),
         ("open.obj", open.as_bytes()),
@@ -176,28 +177,28 @@ fn errors_in_a_mesh_are_reported_with_their_position() {
     ]);
     let mesh = |file: &str, more: &str| format!("form = \"mesh\", file = \"{file}\"{more}");
     let mm = ", unit = \"mm\"";
-    for (shape, keys, wanted) in [
-        (mesh("bad.obj", mm), GIVEN, &["bad.obj:8:6: is not a number", "v 10 2O 30"][..]),
-        (mesh("cut.stl", mm), GIVEN, &["cut.stl: byte 80: ", "has 134 bytes, this file has 127"]),
-        (mesh("arm.gltf", ""), GIVEN, &["arm.gltf: not a glTF file: ", "line 2 column"]),
-        (mesh("large.obj", mm), GIVEN, &["shapes[0].file", "at most 8 MiB in all meshes"]),
-        (mesh("arm.obj", ""), GIVEN, &["shapes[0].unit: missing", "unit = \"1 mm\""]),
-        (mesh("arm.obj", ", unit = \"kg\""), GIVEN, &["shapes[0].unit", "mm"]),
-        (mesh("arm.obj", ", unit = \"50 m\""), GIVEN, &["reaches 1500 m far", "up to 1000 m"]),
-        (mesh("arm.step", mm), GIVEN, &["shapes[0].file", ".stl, .obj, .gltf, .glb"]),
-        (mesh("none.obj", mm), GIVEN, &["shapes[0].file", "cannot read this file"]),
-        (mesh("../arm.obj", mm), GIVEN, &["shapes[0].file", "without `..`"]),
-        (mesh("arm.obj", ", unit = \"mm\", size = \"1 1 1 mm\""), GIVEN, &["a mesh has file, unit"]),
-        (mesh("open.obj", mm), HEAVY, &["body.arm.shapes[0]", "not closed", "(0, 0, 30)", "`mass`"]),
+    for (shape, keys, fragments) in [
+        (mesh("bad.obj", mm), WITH_MASS, &["bad.obj:8:6: is not a number", "v 10 2O 30"][..]),
+        (mesh("cut.stl", mm), WITH_MASS, &["cut.stl: byte 80: ", "has 134 bytes, this file has 127"]),
+        (mesh("arm.gltf", ""), WITH_MASS, &["arm.gltf: not a glTF file: ", "line 2 column"]),
+        (mesh("large.obj", mm), WITH_MASS, &["shapes[0].file", "at most 8 MiB in all meshes"]),
+        (mesh("arm.obj", ""), WITH_MASS, &["shapes[0].unit: missing", "unit = \"1 mm\""]),
+        (mesh("arm.obj", ", unit = \"kg\""), WITH_MASS, &["shapes[0].unit", "mm"]),
+        (mesh("arm.obj", ", unit = \"50 m\""), WITH_MASS, &["reaches 1500 m far", "up to 1000 m"]),
+        (mesh("arm.step", mm), WITH_MASS, &["shapes[0].file", ".stl, .obj, .gltf, .glb"]),
+        (mesh("none.obj", mm), WITH_MASS, &["shapes[0].file", "cannot read this file"]),
+        (mesh("../arm.obj", mm), WITH_MASS, &["shapes[0].file", "without `..`"]),
+        (mesh("arm.obj", ", unit = \"mm\", size = \"1 1 1 mm\""), WITH_MASS, &["a mesh has file, unit"]),
+        (mesh("open.obj", mm), WITH_DENSITY, &["body.arm.shapes[0]", "not closed", "(0, 0, 30)", "`mass`"]),
     ] {
         let error = folder.read(&scene(&shape, keys)).unwrap_err();
-        for part in wanted {
+        for part in fragments {
             assert!(error.contains(part), "{error}\nlacks {part}");
         }
     }
-    // Open, it may still be looked at.
-    assert!(folder.read(&scene(&mesh("open.obj", mm), GIVEN)).is_ok());
-    let nowhere = Scene::parse(&scene(OBJ, GIVEN), None, &[]).unwrap_err();
+    // An open mesh is accepted where the mass is given.
+    assert!(folder.read(&scene(&mesh("open.obj", mm), WITH_MASS)).is_ok());
+    let nowhere = Scene::parse(&scene(OBJ, WITH_MASS), None, &[]).unwrap_err();
     assert!(nowhere.to_string().contains("no folder"), "{nowhere}");
 }
 
@@ -205,7 +206,7 @@ fn errors_in_a_mesh_are_reported_with_their_position() {
 fn colours_are_read_and_refused() {
     let sphere = |colour: &str| {
         let shape = format!("form = \"sphere\", centre = [0, 0, 0], radius = \"1 mm\", colour = \"{colour}\"");
-        Scene::parse(&scene(&shape, GIVEN), None, &[])
+        Scene::parse(&scene(&shape, WITH_MASS), None, &[])
     };
     let read = sphere("#C2255c").unwrap();
     assert_eq!(read.machine.bodies[0].shapes[0].colour, Some([0xc2, 0x25, 0x5c]));
@@ -216,8 +217,8 @@ fn colours_are_read_and_refused() {
 }
 
 #[test]
-fn a_shape_without_a_role_has_that_of_its_body() {
-    let body = |name: &str| format!("[[body]]\nname = \"{name}\"\n{GIVEN}\n");
+fn a_shape_without_a_role_has_the_role_of_its_body() {
+    let body = |name: &str| format!("[[body]]\nname = \"{name}\"\n{WITH_MASS}\n");
     let joint = |name: &str, kind: &str, more: &str| {
         format!("[[joint]]\nname = \"{name}\"\nchild = \"{name}\"\nkind = \"{kind}\"\n{more}\n")
     };
@@ -239,7 +240,7 @@ fn a_shape_without_a_role_has_that_of_its_body() {
         let body = scene.machine.bodies.iter().position(|body| body.name == name);
         roles[body.unwrap()]
     };
-    let wanted = [
+    let expected = [
         Role::DrivingRod,
         Role::Slider,
         Role::DrivenRod,
@@ -249,7 +250,7 @@ fn a_shape_without_a_role_has_that_of_its_body() {
         Role::Frame,
         Role::Platform,
     ];
-    for (name, wanted) in names.iter().zip(wanted) {
-        assert_eq!(of(name), wanted, "{name}");
+    for (name, expected) in names.iter().zip(expected) {
+        assert_eq!(of(name), expected, "{name}");
     }
 }

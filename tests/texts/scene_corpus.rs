@@ -1,4 +1,4 @@
-//! The corpus of the fuzz target, the built-in scenes, and thousands of mutations of both: no panic, and errors that say where.
+//! The corpus of the fuzz target, the built-in scenes, and thousands of mutations of both: no panics, and errors with positions.
 
 #[path = "../fuzz/check.rs"]
 mod fuzz;
@@ -10,11 +10,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use fuzz::{Fate, check};
 use jointplay::scene::{BUILT_IN, built_in_text};
 
-/// Mutations of each text of the corpus, and of each built-in scene; times `SCENE_MUTATIONS`, a number in the environment.
+/// Mutations of each file of the corpus and of each built-in scene, multiplied by the environment variable `SCENE_MUTATIONS`.
 const MUTATIONS: u64 = 40;
 const MUTATIONS_OF_BUILT_IN: u64 = 200;
 
-/// Changes that a mutated text comes with now and then, some of them right.
+/// Changes that are appended to some mutated texts; some of them are valid.
 const CHANGES: [&str; 25] = [
     "parameter.stroke=12 mm",
     "parameter.stroke=1",
@@ -43,7 +43,7 @@ const CHANGES: [&str; 25] = [
     "\u{202e}=\u{9b}",
 ];
 
-/// What tends to break readers.
+/// Tokens that tend to break parsers.
 const TOKENS: [&str; 45] = [
     "0",
     "-0",
@@ -107,21 +107,21 @@ impl Numbers {
     }
 }
 
-/// Byte ranges of words, numbers, texts and signs.
+/// Byte ranges of words, numbers, strings and symbols.
 fn tokens(bytes: &[u8]) -> Vec<(usize, usize)> {
     let mut tokens = Vec::new();
     let mut i = 0;
     while i < bytes.len() {
         let start = i;
-        let wordy = |b: u8| b.is_ascii_alphanumeric() || b"_.-+".contains(&b);
+        let is_word_byte = |b: u8| b.is_ascii_alphanumeric() || b"_.-+".contains(&b);
         if bytes[i] == b'"' {
             i += 1;
             while i < bytes.len() && bytes[i] != b'"' && bytes[i] != b'\n' {
                 i += 1;
             }
             i = (i + 1).min(bytes.len());
-        } else if wordy(bytes[i]) {
-            while i < bytes.len() && wordy(bytes[i]) {
+        } else if is_word_byte(bytes[i]) {
+            while i < bytes.len() && is_word_byte(bytes[i]) {
                 i += 1;
             }
         } else {
@@ -135,16 +135,16 @@ fn tokens(bytes: &[u8]) -> Vec<(usize, usize)> {
     tokens
 }
 
-/// Breaks `text` in one or two ways.
+/// Mutates `text` once or twice.
 pub fn mutate(text: &[u8], numbers: &mut Numbers) -> Vec<u8> {
     let mut bytes = text.to_vec();
     for _ in 0..=numbers.below(2) {
-        let places = tokens(&bytes);
-        if places.is_empty() {
+        let ranges = tokens(&bytes);
+        if ranges.is_empty() {
             break;
         }
-        let (from, to) = places[numbers.below(places.len())];
-        let (other_from, other_to) = places[numbers.below(places.len())];
+        let (from, to) = ranges[numbers.below(ranges.len())];
+        let (other_from, other_to) = ranges[numbers.below(ranges.len())];
         let lines: Vec<&[u8]> = bytes.split_inclusive(|b| *b == b'\n').collect();
         let line = numbers.below(lines.len());
         match numbers.below(12) {
@@ -165,16 +165,16 @@ pub fn mutate(text: &[u8], numbers: &mut Numbers) -> Vec<u8> {
                 bytes.drain(from..to);
             }
             6 => {
-                let mut kept = lines;
-                kept.remove(line);
-                bytes = kept.concat();
+                let mut shorter = lines;
+                shorter.remove(line);
+                bytes = shorter.concat();
             }
             7 => {
-                let mut more = lines.clone();
-                more.insert(numbers.below(lines.len()), lines[line]);
-                bytes = more.concat();
+                let mut longer = lines.clone();
+                longer.insert(numbers.below(lines.len()), lines[line]);
+                bytes = longer.concat();
             }
-            // The likeliest to remain a scene: another digit, sign or power of ten.
+            // The mutation most likely to leave a valid scene: another digit, sign or power of ten.
             _ => {
                 let digits: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i].is_ascii_digit()).collect();
                 let Some(&at) = digits.get(numbers.below(digits.len())) else {
@@ -205,8 +205,8 @@ fn corpus() -> Vec<(String, Vec<u8>)> {
     paths.into_iter().map(read).collect()
 }
 
-/// Checks, and names the text of a panic.
-fn survives(what: &str, bytes: &[u8]) -> Fate {
+/// Checks a text; a panic is reported with the text.
+fn check_without_panic(what: &str, bytes: &[u8]) -> Fate {
     std::panic::catch_unwind(|| check(bytes))
         .unwrap_or_else(|_| panic!("{what} breaks the reader:\n{}", String::from_utf8_lossy(bytes)))
 }
@@ -223,7 +223,7 @@ fn each_scene_of_the_corpus_ends_as_its_name_states() {
             Some("bytes") => Fate::NoText,
             _ => Fate::Refused,
         };
-        let fate = survives(name, bytes);
+        let fate = check_without_panic(name, bytes);
         if fate != expected {
             wrong.push(format!("{name}: {fate:?}"));
         }
@@ -239,7 +239,7 @@ fn mutations_of_the_corpus_cause_no_panic() {
         corpus().into_iter().map(|(name, bytes)| (name, bytes, MUTATIONS)).collect();
     for name in BUILT_IN {
         let text = built_in_text(name).unwrap();
-        assert_eq!(survives(name, text.as_bytes()), Fate::Starts);
+        assert_eq!(check_without_panic(name, text.as_bytes()), Fate::Starts);
         seeds.push((name.to_owned(), text.as_bytes().to_vec(), MUTATIONS_OF_BUILT_IN));
     }
     let next = AtomicUsize::new(0);
@@ -250,7 +250,7 @@ fn mutations_of_the_corpus_cause_no_panic() {
                 while let Some((name, bytes, count)) = seeds.get(next.fetch_add(1, Ordering::Relaxed)) {
                     for seed in 1..=*count * times {
                         let mutated = mutate(bytes, &mut Numbers(seed));
-                        let fate = survives(&format!("{name}, mutation {seed}"), &mutated);
+                        let fate = check_without_panic(&format!("{name}, mutation {seed}"), &mutated);
                         *fates.lock().unwrap().entry(format!("{fate:?}")).or_default() += 1;
                     }
                 }
@@ -259,6 +259,6 @@ fn mutations_of_the_corpus_cause_no_panic() {
     });
     let fates = fates.into_inner().unwrap();
     println!("{fates:?}");
-    // Mutations that only ever fail to parse would look at nothing.
+    // If all mutations failed to parse, the test would check nothing.
     assert!(fates["Refused"] > 1000 && fates["Starts"] > 200, "{fates:?}");
 }

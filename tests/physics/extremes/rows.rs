@@ -1,19 +1,20 @@
-//! The extremes: which scenes, changed how, and what each is run with.
+//! The extreme cases: their scenes and changes, and the methods or presets of each.
 
 use jointplay::machine::{JointStart, Vec3};
 use jointplay::scene::Scene;
 use jointplay::simulate::Simulation;
 
-/// Simulated time that a run is asked for, s: the first impacts of every scene lie within; and until contacts settle.
+/// Simulated time, s, that includes the first impacts of every scene.
 const DURATION: f64 = 0.03;
+/// Simulated time, s, until contacts settle.
 const SETTLED: f64 = 0.2;
 
-/// What a row is run with.
+/// Columns of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Columns {
     /// Every preset.
     Presets,
-    /// Every method: the row is about its step or tolerance.
+    /// Every method, for rows about step size or tolerance.
     Methods,
 }
 
@@ -26,7 +27,7 @@ pub struct Row {
     edit: fn(&mut Scene),
     /// Simulated time, s.
     pub duration: f64,
-    /// Nothing drives the scene, and friction takes energy only.
+    /// Nothing drives the scene, so its energy must not rise.
     pub passive: bool,
 }
 
@@ -59,7 +60,7 @@ impl Row {
         self
     }
 
-    /// The scene of one cell, or why there is none.
+    /// The scene of one cell, or the error.
     pub fn load(&self, form: &str, column: &str) -> Result<Scene, String> {
         let key = match self.columns {
             Columns::Presets => "solver.preset",
@@ -82,25 +83,25 @@ fn scale_masses(scene: &mut Scene, factor: f64) {
     }
 }
 
-/// The rods' inertia about their own axis, nearly zero.
+/// Sets the rods' moments of inertia about their own axes to nearly zero.
 fn thin_rods(scene: &mut Scene) {
     for body in &mut scene.machine.bodies {
         let i = &mut body.inertia;
-        let least = (0..3).min_by(|&a, &b| i[(a, a)].total_cmp(&i[(b, b)]));
+        let axis = (0..3).min_by(|&a, &b| i[(a, a)].total_cmp(&i[(b, b)]));
         if body.name.starts_with("rod") || body.name.starts_with("link") {
-            let axis = least.unwrap();
+            let axis = axis.unwrap();
             i[(axis, axis)] = 1e-14;
         }
     }
 }
 
-/// Where the pendulum's ball starts, from the centre of its socket.
+/// Offsets the start of the pendulum's ball from the centre of its socket.
 fn start_at(scene: &mut Scene, offset: Vec3) {
     let JointStart::Pose { position, .. } = &mut scene.machine.joints[0].start else { panic!("the pendulum is free") };
     *position += offset;
 }
 
-/// Slider planes of which the first is reached and the second, at most 1e-6 m further, is not, between `good` and `bad`.
+/// Bisects between slider planes `good`, within reach, and `bad`, beyond it, until they are at most 1e-6 m apart.
 fn reach_limit(mut good: f64, mut bad: f64) -> (f64, f64) {
     let reached = |plane: f64| {
         let changes = [("spcmm.slider_plane".to_owned(), format!("{plane} m"))];
@@ -218,7 +219,7 @@ pub fn rows() -> Vec<Row> {
     }
     for plane in ["132 mm", "162 mm", "175 mm", "189 mm", "222 mm", "336 mm"] {
         for (kind, clearance) in [("clearance 0.3 mm", "0.3 mm"), ("ideal", "0")] {
-            // Fast enough to cross the range in the time there is.
+            // Fast enough to cross the singular range within the run.
             let changes =
                 [("spcmm.slider_plane", plane), ("contact.clearance", clearance), ("spcmm.frequency", "5 Hz")];
             rows.push(Row::new(&format!("slider plane {plane}, {kind}"), "spcmm", &changes));

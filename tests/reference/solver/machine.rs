@@ -1,4 +1,4 @@
-//! The measuring mechanism written down again.
+//! An independent model of the measuring mechanism.
 
 use std::cell::RefCell;
 
@@ -7,20 +7,20 @@ use jointplay::simulate::{Frame, Simulation};
 
 use crate::integrate::Equations;
 
-/// The measuring mechanism written down again: platform and three rods with all their coordinates, hinges by multipliers, sliders
-/// by (39) as functions of time, contacts by (19)-(21). State: position, quaternion (w, x, y, z), velocity and angular velocity of
+/// An independent model of the measuring mechanism: platform and three rods with full coordinates, hinges by multipliers, sliders by
+/// (39) as functions of time, contacts by (19)-(21). State: position, quaternion (w, x, y, z), velocity and angular velocity of
 /// platform, rod 1, 2, 3, one body after the other; world axes.
 pub struct Machine {
     clearance: f64,
     friction: f64,
-    /// Friction reads the velocities of (13) as printed, not (15)-(16).
+/// Whether friction uses the velocities of (13) as printed, not (15)-(16).
     printed: bool,
     start: Vec<f64>,
     approach: RefCell<Vec<Option<f64>>>,
 }
 
-/// One contact: force on the ball, where it acts, delta, its rate, F_N.
-struct Touch {
+/// One contact: force on the ball, its point of action, delta, its rate, F_N.
+struct Contact {
     force: Vec3,
     at: Vec3,
     depth: f64,
@@ -29,7 +29,7 @@ struct Touch {
 }
 
 /// One body of [`Machine`].
-struct Moving {
+struct BodyState {
     position: Vec3,
     axes: Mat3,
     velocity: Vec3,
@@ -49,12 +49,12 @@ impl Machine {
     ];
     const RADIUS: f64 = 0.010;
 
-    /// Starts where the program starts `scene`.
+/// Starts in the program's initial state of `scene`.
     pub fn new(clearance: f64, friction: f64, printed: bool, scene: &Scene) -> Self {
         let mut frame = Frame::default();
         Simulation::new(&scene.machine).unwrap().sample(0.0, &mut frame);
         let mut start = Vec::new();
-        // Parents come first: sliders, platform, rods.
+// Bodies are in the order sliders, platform, rods.
         for body in [3, 4, 5, 6].map(|b| frame.bodies[b]) {
             let turn = nalgebra::Rotation3::from_matrix_unchecked(body.rotation);
             let q = nalgebra::UnitQuaternion::from_rotation_matrix(&turn);
@@ -66,10 +66,10 @@ impl Machine {
         Self { clearance, friction, printed, start, approach: RefCell::new(vec![None; 3]) }
     }
 
-    fn bodies(y: &[f64]) -> Vec<Moving> {
+    fn bodies(y: &[f64]) -> Vec<BodyState> {
         let of = |s: &[f64]| {
             let q = nalgebra::Quaternion::new(s[3], s[4], s[5], s[6]);
-            Moving {
+            BodyState {
                 position: Vec3::new(s[0], s[1], s[2]),
                 axes: *nalgebra::UnitQuaternion::from_quaternion(q).to_rotation_matrix().matrix(),
                 velocity: Vec3::new(s[7], s[8], s[9]),
@@ -101,7 +101,7 @@ impl Machine {
         [Vec3::new(plane, 0.0, f1), Vec3::new(plane, 0.0, -f2), Vec3::new(plane, f3, 0.0)]
     }
 
-    /// Their velocities, by central differences of order 8.
+/// Velocities of the socket centres, by central differences of order 8.
     fn socket_rates(t: f64) -> [Vec3; 3] {
         let h = 1e-3;
         let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
@@ -115,44 +115,44 @@ impl Machine {
         rates
     }
 
-    fn touches(&self, t: f64, bodies: &[Moving]) -> Vec<Touch> {
+    fn contacts(&self, t: f64, bodies: &[BodyState]) -> Vec<Contact> {
         let (sockets, rates) = (Self::sockets(t), Self::socket_rates(t));
         let approach = self.approach.borrow();
         let (young, poisson, restitution) = (206e9, 0.3, 0.9);
         let s = (1.0 - poisson * poisson) / young;
         let socket = Self::RADIUS + self.clearance;
         let k = 4.0 / (3.0 * (s + s)) * (socket * Self::RADIUS / self.clearance).sqrt();
-        let of = |j: usize| {
+        let contact_of = |j: usize| {
             let rod = &bodies[j + 1];
             let arm = rod.axes * Vec3::new(-0.1, 0.0, 0.0);
             let e = rod.position + arm - sockets[j];
-            let moving = rod.velocity + rod.spin.cross(&arm) - rates[j];
+            let relative_velocity = rod.velocity + rod.spin.cross(&arm) - rates[j];
             let size = e.norm();
             let n = if size > 0.0 { e / size } else { e };
-            let (depth, rate) = (size - self.clearance, n.dot(&moving));
-            let mut touch =
-                Touch { force: Vec3::zeros(), at: rod.position + arm + n * Self::RADIUS, depth, rate, normal: 0.0 };
-            let Some(began) = approach[j].filter(|_| depth > 0.0) else {
-                return touch;
+            let (depth, rate) = (size - self.clearance, n.dot(&relative_velocity));
+            let mut contact =
+                Contact { force: Vec3::zeros(), at: rod.position + arm + n * Self::RADIUS, depth, rate, normal: 0.0 };
+            let Some(approach_speed) = approach[j].filter(|_| depth > 0.0) else {
+                return contact;
             };
-            let damping = 1.0 + 0.75 * (1.0 - restitution * restitution) * rate / began;
-            touch.normal = (k * depth.powf(1.5) * damping).max(0.0);
-            let mut sliding = moving - n * rate;
+            let damping = 1.0 + 0.75 * (1.0 - restitution * restitution) * rate / approach_speed;
+            contact.normal = (k * depth.powf(1.5) * damping).max(0.0);
+            let mut slip = relative_velocity - n * rate;
             if self.printed {
                 // Z_j + r n against Z_i + R n, with dn/dt.
-                let turning = (moving - n * rate) / size;
-                sliding += turning * Self::RADIUS - turning * socket;
+                let normal_rate = (relative_velocity - n * rate) / size;
+                slip += normal_rate * Self::RADIUS - normal_rate * socket;
             }
-            let speed = sliding.norm();
+            let speed = slip.norm();
             let (low, high) = (1e-6, 1e-4);
             let correction = ((speed - low) / (high - low)).clamp(0.0, 1.0);
-            touch.force = -n * touch.normal;
+            contact.force = -n * contact.normal;
             if speed > 0.0 {
-                touch.force -= sliding * (self.friction * correction * touch.normal / speed);
+                contact.force -= slip * (self.friction * correction * contact.normal / speed);
             }
-            touch
+            contact
         };
-        (0..3).map(of).collect()
+        (0..3).map(contact_of).collect()
     }
 }
 
@@ -174,14 +174,14 @@ impl Equations for Machine {
             }
             matrix.view_mut((6 * b + 3, 6 * b + 3), (3, 3)).copy_from(&inertia);
             right[6 * b] = 9.81 * Self::MASSES[b];
-            let turning = -body.spin.cross(&(inertia * body.spin));
-            right.rows_mut(6 * b + 3, 3).copy_from(&turning);
+            let gyroscopic = -body.spin.cross(&(inertia * body.spin));
+            right.rows_mut(6 * b + 3, 3).copy_from(&gyroscopic);
         }
-        for (j, touch) in self.touches(t, &bodies).iter().enumerate() {
+        for (j, contact) in self.contacts(t, &bodies).iter().enumerate() {
             let b = j + 1;
-            let torque = (touch.at - bodies[b].position).cross(&touch.force);
+            let torque = (contact.at - bodies[b].position).cross(&contact.force);
             for i in 0..3 {
-                right[6 * b + i] += touch.force[i];
+                right[6 * b + i] += contact.force[i];
                 right[6 * b + 3 + i] += torque[i];
             }
         }
@@ -225,7 +225,7 @@ impl Equations for Machine {
                 row += 1;
             }
         }
-        let found = matrix.lu().solve(&right).unwrap();
+        let accelerations = matrix.lu().solve(&right).unwrap();
         for (b, body) in bodies.iter().enumerate() {
             let (out, q) = (&mut dy[13 * b..13 * b + 13], &y[13 * b + 3..13 * b + 7]);
             out[..3].copy_from_slice(body.velocity.as_slice());
@@ -233,19 +233,19 @@ impl Equations for Machine {
             let rate = nalgebra::Quaternion::from_imag(body.spin) * q * 0.5;
             out[3..7].copy_from_slice(&[rate.w, rate.i, rate.j, rate.k]);
             for i in 0..6 {
-                out[7 + i] = found[6 * b + i];
+                out[7 + i] = accelerations[6 * b + i];
             }
         }
     }
 
     fn gaps(&self, t: f64, y: &[f64]) -> Vec<(f64, f64)> {
-        let touches = self.touches(t, &Self::bodies(y));
-        touches.iter().map(|touch| (touch.depth, touch.rate)).collect()
+        let contacts = self.contacts(t, &Self::bodies(y));
+        contacts.iter().map(|contact| (contact.depth, contact.rate)).collect()
     }
 
     fn forces(&self, t: f64, y: &[f64]) -> Vec<f64> {
-        let touches = self.touches(t, &Self::bodies(y));
-        touches.iter().map(|touch| touch.normal).collect()
+        let contacts = self.contacts(t, &Self::bodies(y));
+        contacts.iter().map(|contact| contact.normal).collect()
     }
 
     fn speed_floor(&self) -> f64 {
