@@ -13,7 +13,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 thread_local! {
-    /// Allocations of this thread, and their bytes: tests run side by side.
+/// Allocations of this thread and their bytes; other tests run in parallel.
     static COUNT: Cell<u64> = const { Cell::new(0) };
     static BYTES: Cell<u64> = const { Cell::new(0) };
 }
@@ -21,12 +21,12 @@ thread_local! {
 struct Counting;
 
 fn count(bytes: usize) {
-    // A thread that is ending has no counter any more, and none of its allocations matter.
+    // A thread that is ending has no counter anymore, and its allocations do not matter.
     let _ = COUNT.try_with(|count| count.set(count.get() + 1));
     let _ = BYTES.try_with(|count| count.set(count.get() + bytes as u64));
 }
 
-// SAFETY: every call is handed on unchanged to the system's allocator.
+// SAFETY: every call is passed unchanged to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(layout.size());
@@ -48,7 +48,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Allocations that `work` makes.
+/// Number of allocations made by `work`.
 fn allocations(work: impl FnOnce()) -> u64 {
     let before = COUNT.get();
     work();
@@ -56,7 +56,7 @@ fn allocations(work: impl FnOnce()) -> u64 {
 }
 
 #[test]
-fn the_counter_counts() {
+fn the_counter_counts_allocations() {
     assert_eq!(allocations(|| drop(std::hint::black_box(vec![1.0; 8]))), 1);
     let mut grown = vec![1.0];
     assert!(allocations(|| grown.extend(std::hint::black_box([2.0; 9]))) > 0);
@@ -98,7 +98,7 @@ fn curves_tyres_and_samples_of_reactions_allocate_nothing() {
 }
 
 #[test]
-fn joints_of_two_degrees_and_those_that_close_loops_allocate_nothing() {
+fn joints_with_two_degrees_of_freedom_and_closing_joints_allocate_nothing() {
     for text in [include_str!("fuzz/corpus/good-universal.toml"), include_str!("fuzz/corpus/good-loop-joints.toml")] {
         for method in METHODS {
             for form in ["tree", "lagrange"] {
@@ -170,7 +170,7 @@ fn steps_of_the_machines_allocate_nothing() {
 }
 
 #[test]
-fn a_clearance_on_its_way_allocates_nothing() {
+fn a_moving_clearance_allocates_nothing() {
     for method in METHODS {
         let mut simulation = common::live("pendulum", &[("solver.method", method)]);
         simulation.advance_to(0.03).unwrap();
@@ -182,7 +182,7 @@ fn a_clearance_on_its_way_allocates_nothing() {
 }
 
 #[test]
-fn what_setting_up_allocates_grows_with_the_scene_and_not_with_its_square() {
+fn setup_allocations_grow_linearly_with_the_scene() {
     for (kind, form, clearance) in [
         ("free bodies", "tree", "0 m"),
         ("free bodies", "lagrange", "0 m"),
@@ -204,9 +204,9 @@ fn what_setting_up_allocates_grows_with_the_scene_and_not_with_its_square() {
             std::hint::black_box(Simulation::new(&scene.machine).unwrap().time());
             BYTES.get() - before
         };
-        let (once, twice) = (bytes(400), bytes(800));
-        // Vectors double as they grow: which of two sizes wastes more is a matter of chance.
-        let growth = twice as f64 / once as f64;
-        assert!(growth < 2.6, "{kind}, {form}: {once}, then {twice} bytes");
+        let (single, double) = (bytes(400), bytes(800));
+        // Vectors double their capacity as they grow, so that the waste varies between sizes.
+        let growth = double as f64 / single as f64;
+        assert!(growth < 2.6, "{kind}, {form}: {single}, then {double} bytes");
     }
 }

@@ -1,4 +1,4 @@
-//! Joints of robot descriptions that a scene has no single joint for: chains of hinges and slides, and welds.
+//! Joints of robot descriptions without a single equivalent joint in scenes: chains of hinges and slides, and welds.
 
 use crate::import::{import_error, imported, initial_frame, mujoco};
 use jointplay::machine::{JointKind, Vec3};
@@ -19,7 +19,7 @@ fn index(scene: &Scene, name: &str) -> usize {
     scene.machine.bodies.iter().position(|body| body.name == name).unwrap()
 }
 
-fn later(scene: &Scene, time: f64) -> Frame {
+fn frame_at(scene: &Scene, time: f64) -> Frame {
     let mut simulation = Simulation::new(&scene.machine).unwrap();
     while simulation.time() < time {
         simulation.step_until(time).unwrap();
@@ -29,11 +29,11 @@ fn later(scene: &Scene, time: f64) -> Frame {
     frame
 }
 
-/// Three hinges through one point leave what a ball joint leaves.
+/// Three hinges through one point have the degrees of freedom of a ball joint.
 #[test]
 fn three_hinges_of_a_body_form_a_chain_that_moves_like_a_ball_joint() {
-    let (chain, said) = imported(&leg(HINGES).replace("stiffness=\"3\"", "").replace("damping=\"2\"", ""));
-    assert_eq!(said.lines().count(), 1, "only the contact is not taken: {said}");
+    let (chain, messages) = imported(&leg(HINGES).replace("stiffness=\"3\"", "").replace("damping=\"2\"", ""));
+    assert_eq!(messages.lines().count(), 1, "only the contact is not imported: {messages}");
     let names: Vec<&str> = chain.machine.bodies.iter().map(|body| body.name.as_str()).collect();
     assert_eq!(names, ["hip_x", "hip_z", "thigh", "shin"]);
     assert_eq!(
@@ -44,7 +44,7 @@ fn three_hinges_of_a_body_form_a_chain_that_moves_like_a_ball_joint() {
     assert_eq!(joints, ["hip_x", "hip_z", "hip_y", "knee"]);
     let (ball, _) = imported(&leg("<joint type=\"ball\" pos=\"0 0 0.02\"/>"));
     for (time, bound) in [(0.0, 1e-12), (0.1, 1e-5)] {
-        let (one, other) = (later(&chain, time), later(&ball, time));
+        let (one, other) = (frame_at(&chain, time), frame_at(&ball, time));
         for name in ["thigh", "shin"] {
             let (a, b) = (&one.bodies[index(&chain, name)], &other.bodies[index(&ball, name)]);
             assert!((a.position - b.position).norm() < bound, "{name} at {time} s");
@@ -61,8 +61,8 @@ fn three_hinges_of_a_body_form_a_chain_that_moves_like_a_ball_joint() {
     }
 }
 
-/// Two slides and a hinge, a hinge and a slide across it, and hinges at different points: each joint acts in the frame that those before
-/// it have moved.
+/// Two slides and a hinge, a hinge and a slide across it, and hinges at different points: each joint acts in the frame moved by the
+/// joints before it.
 #[test]
 fn hinges_and_slides_act_in_their_order() {
     let ball = "<geom size=\"0.1\"/>";
@@ -72,7 +72,7 @@ fn hinges_and_slides_act_in_their_order() {
     let kinds: Vec<JointKind> = plane.machine.joints.iter().map(|joint| joint.kind).collect();
     assert_eq!(kinds, [JointKind::Prismatic, JointKind::Prismatic, JointKind::Revolute]);
     assert_eq!(Simulation::new(&plane.machine).unwrap().mechanism().summary().degrees_of_freedom, 3);
-    // Pose of the body when the first coordinate is a quarter turn, and the second, 0.3 m or a quarter turn.
+    // Pose of the body when the first coordinate is a quarter turn and the second is `second`.
     let moved = |joints: &str, second: &str| {
         let scene = body(joints);
         let text = scene.source.text.replacen("[[joint]]\n", "[[joint]]\nstart = { position = \"90 deg\" }\n", 1);
@@ -80,15 +80,15 @@ fn hinges_and_slides_act_in_their_order() {
         let text = format!("{}start = {{ position = \"{second}\" }}\n{}", &text[..at], &text[at..]);
         initial_frame(&Scene::parse(&text, None, &[]).unwrap()).bodies[1]
     };
-    // The slide turns with the hinge before it: 0.3 m along the turned x axis.
+    // The slide rotates with the hinge before it: 0.3 m along the rotated x axis.
     let slid = moved(&format!("<joint axis=\"0 0 1\"/>{}", slide("1 0 0")), "0.3 m");
     assert!((slid.position - Vec3::new(0.0, 0.3, 0.0)).norm() < 1e-12, "{}", slid.position);
-    // About z through (1, 0, 0), then about the turned x axis through what was (0, 0, 2).
+    // About z through (1, 0, 0), then about the rotated x axis through the image of (0, 0, 2).
     let turned = moved("<joint axis=\"0 0 1\" pos=\"1 0 0\"/><joint axis=\"1 0 0\" pos=\"0 0 2\"/>", "90 deg");
-    // The second hinge takes the origin to (0, 2, 2) of its frame, the first (x, y, z) to (1 - y, x - 1, z).
+    // The second hinge maps the origin to (0, 2, 2) of its frame, the first maps (x, y, z) to (1 - y, x - 1, z).
     assert!((turned.position - Vec3::new(-1.0, -1.0, 2.0)).norm() < 1e-12, "{}", turned.position);
-    let said = import_error(&mujoco(&format!("<body><joint/><joint type=\"free\"/>{ball}</body>")));
-    assert!(said.contains("a ball or free joint is the only joint of its body"), "{said}");
+    let message = import_error(&mujoco(&format!("<body><joint/><joint type=\"free\"/>{ball}</body>")));
+    assert!(message.contains("a ball or free joint is the only joint of its body"), "{message}");
 }
 
 #[test]
@@ -109,37 +109,40 @@ fn links_without_mass_connect_the_joints_of_a_urdf() {
     };
     let (scene, _) = imported(&robot(mass, "continuous"));
     assert_eq!(scene.machine.bodies.iter().map(|body| body.mass).collect::<Vec<_>>(), [0.0, 0.0, 2.0]);
-    assert_eq!(initial_frame(&scene).bodies[2].acceleration.norm(), 0.0, "gravity is across");
+    assert_eq!(initial_frame(&scene).bodies[2].acceleration.norm(), 0.0, "gravity is perpendicular to the joints");
     for (text, link) in
         [(robot("", "continuous"), "robot:3: link car"), (robot(mass, "spherical"), "robot:2: link sled")]
     {
-        let said = import_error(&text);
-        assert!(said.contains(&format!("{link}: a moving link needs an <inertial> with a mass above 0 kg")), "{said}");
+        let message = import_error(&text);
+        assert!(
+            message.contains(&format!("{link}: a moving link needs an <inertial> with a mass above 0 kg")),
+            "{message}"
+        );
     }
 }
 
-/// A pendulum with a free weight welded to it swings as one with the weight as a part of it.
+/// A pendulum with a free weight welded to it swings as one with the weight as part of its body.
 #[test]
 fn a_welded_body_moves_as_part_of_the_other() {
     let rod = "<geom type=\"capsule\" fromto=\"0 0 0 0.5 0 0\" size=\"0.02\"/><site name=\"tip\" pos=\"0.5 0 0\" euler=\"0 30 0\"/>";
     let weight = "<geom type=\"box\" size=\"0.1 0.05 0.02\"/><site name=\"eye\" pos=\"-0.1 0 0\"/>";
-    // Assembly moves both to where the weld closes: the same at the angle of the rod that it finds.
+    // Assembly moves both bodies until the weld closes; the reference uses the resulting angle of the rod.
     let expected = |angle: f64| {
-        let (whole, _) = imported(&mujoco(&format!(
+        let (single_body, _) = imported(&mujoco(&format!(
             "<body name=\"rod\" euler=\"0 {} 0\"><joint axis=\"0 1 0\"/>{rod}<body name=\"weight\" pos=\"0.5 0 0\" euler=\"0 30 0\">{}</body></body>",
             angle.to_degrees(),
             weight.replace("<geom", "<geom pos=\"0.1 0 0\"")
         )));
-        initial_frame(&whole).bodies[0].angular_acceleration.y
+        initial_frame(&single_body).bodies[0].angular_acceleration.y
     };
-    let apart = |at: &str, weld: &str| {
+    let welded = |at: &str, weld: &str| {
         mujoco(&format!(
             "<body name=\"rod\"><joint axis=\"0 1 0\"/>{rod}</body><body name=\"weight\" {at}><freejoint/>{}</body>",
             weight
         ))
         .replace("</mujoco>", &format!("<equality><weld name=\"w\" {weld}/></equality></mujoco>"))
     };
-    // 0.1 m along the x axis that is turned by 30 deg about y.
+    // 0.1 m along the x axis rotated by 30 deg about y.
     let (sine, cosine) = 30.0_f64.to_radians().sin_cos();
     let drawn = format!("pos=\"{} 0 {}\" euler=\"0 30 0\"", 0.5 + 0.1 * cosine, -0.1 * sine);
     let quaternion = "0.9659258262890683 0 0.25881904510252074 0";
@@ -152,24 +155,24 @@ fn a_welded_body_moves_as_part_of_the_other() {
             format!("body1=\"rod\" body2=\"weight\" anchor=\"-0.1 0 0\" relpose=\"0.5 0 0 {quaternion}\""),
         ),
     ] {
-        let (scene, said) = imported(&apart(at, &weld));
-        assert!(!said.contains("<weld>"), "{said}");
+        let (scene, messages) = imported(&welded(at, &weld));
+        assert!(!messages.contains("<weld>"), "{messages}");
         assert_eq!(scene.machine.closing_joints[0].kind, JointKind::Fixed);
         let simulation = Simulation::new(&scene.machine).unwrap();
         assert_eq!(simulation.mechanism().summary().degrees_of_freedom, 1, "{weld}");
         let frame = initial_frame(&scene);
         let rod = &frame.bodies[index(&scene, "rod")];
         let expected = expected(rod.rotation[(0, 2)].atan2(rod.rotation[(0, 0)]));
-        let found = rod.angular_acceleration.y;
-        assert!((found / expected - 1.0).abs() < 1e-6, "{weld}: {found} {expected}");
+        let acceleration = rod.angular_acceleration.y;
+        assert!((acceleration / expected - 1.0).abs() < 1e-6, "{weld}: {acceleration} {expected}");
     }
-    let (held, _) = imported(&apart(&drawn, "body1=\"weight\""));
-    // Rounding of the weight that the weld carries.
-    assert!(initial_frame(&held).bodies[index(&held, "weight")].acceleration.norm() < 1e-9);
-    let (hung, _) = imported(&apart(&drawn, "body1=\"rod\" body2=\"weight\" torquescale=\"0\""));
-    assert_eq!((hung.machine.closing_joints.len(), hung.machine.ball_joints.len()), (0, 1));
-    let inactive = imported(&apart(&drawn, "body1=\"rod\" active=\"false\"")).1;
+    let (welded_to_world, _) = imported(&welded(&drawn, "body1=\"weight\""));
+    // The bound covers rounding of the weight carried by the weld.
+    assert!(initial_frame(&welded_to_world).bodies[index(&welded_to_world, "weight")].acceleration.norm() < 1e-9);
+    let (hinged, _) = imported(&welded(&drawn, "body1=\"rod\" body2=\"weight\" torquescale=\"0\""));
+    assert_eq!((hinged.machine.closing_joints.len(), hinged.machine.ball_joints.len()), (0, 1));
+    let inactive = imported(&welded(&drawn, "body1=\"rod\" active=\"false\"")).1;
     assert!(inactive.contains("not taken: <weld> of <equality>"), "{inactive}");
-    let said = import_error(&apart(&drawn, "body1=\"rod\" body2=\"rod\""));
-    assert!(said.contains("weld w: both ends are on one body"), "{said}");
+    let messages = import_error(&welded(&drawn, "body1=\"rod\" body2=\"rod\""));
+    assert!(messages.contains("weld w: both ends are on one body"), "{messages}");
 }

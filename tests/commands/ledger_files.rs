@@ -1,4 +1,4 @@
-//! The energy ledger and the restitution check as scripts see them.
+//! The energy ledger and the restitution check in files and summaries.
 
 use std::fs;
 use std::path::Path;
@@ -7,8 +7,8 @@ use serde_json::Value as Json;
 
 use crate::program::jointplay;
 
-/// Standard output of a run that is done.
-fn done(folder: &Path, line: &str) -> String {
+/// Standard output of a successful run.
+fn stdout_of(folder: &Path, line: &str) -> String {
     jointplay(folder, line).expect(0).stdout
 }
 
@@ -29,7 +29,7 @@ const LAST_COLUMNS: &str = "drive_work_J,gravity_work_J,restitution_loss_J,frict
 fn rows_contain_an_energy_ledger_that_balances() {
     let folder = tempfile::tempdir().unwrap();
     let run = "run spcmm --duration 30ms --every 0.1ms";
-    let summary = done(folder.path(), &format!("{run} --out run.json --summary json"));
+    let summary = stdout_of(folder.path(), &format!("{run} --out run.json --summary json"));
     let summary: Json = serde_json::from_str(&summary).unwrap();
     let file = json(&folder.path().join("run.json"));
     let get = |name: &str| column(&file, name);
@@ -51,13 +51,13 @@ fn rows_contain_an_energy_ledger_that_balances() {
     let relative = summary["energy_J"]["relative_residual"].as_f64().unwrap();
     let residual = summary["energy_J"]["residual"].as_f64().unwrap();
     assert!((relative - residual / exchanged).abs() < 1e-15);
-    let text = done(folder.path(), "run spcmm --duration 10ms");
+    let text = stdout_of(folder.path(), "run spcmm --duration 10ms");
     assert!(text.contains("of the energy exchanged"), "{text}");
 
-    // They are the last columns, and without the ledger they are not there; the motion is the same.
-    done(folder.path(), &format!("{run} --out with.csv"));
+    // These are the last columns; without the ledger they are absent, and the motion is the same.
+    stdout_of(folder.path(), &format!("{run} --out with.csv"));
     let off = "--set solver.energy_ledger=off";
-    let without = done(folder.path(), &format!("{run} {off} --out without.csv --summary json"));
+    let without = stdout_of(folder.path(), &format!("{run} {off} --out without.csv --summary json"));
     let without: Json = serde_json::from_str(&without).unwrap();
     assert_eq!(without["state_hash"], summary["state_hash"]);
     assert_eq!(without["energy_J"], Json::Null);
@@ -73,7 +73,7 @@ fn rows_contain_an_energy_ledger_that_balances() {
 fn every_impact_has_its_row() {
     let folder = tempfile::tempdir().unwrap();
     let run = "run spcmm --duration 50ms --set contact.clearance=0.2mm";
-    let summary = done(folder.path(), &format!("{run} --impacts hits.json --summary json"));
+    let summary = stdout_of(folder.path(), &format!("{run} --impacts hits.json --summary json"));
     let summary: Json = serde_json::from_str(&summary).unwrap();
     let file = json(&folder.path().join("hits.json"));
     assert_eq!(file["meta"]["ball_joints"], serde_json::json!(["S1", "S2", "S3"]));
@@ -81,44 +81,44 @@ fn every_impact_has_its_row() {
     assert!(file["meta"]["wall_s"].is_null(), "files of one run are the same");
     let joint = column(&file, "joint");
     let (approach, separation) = (column(&file, "approach_m_s"), column(&file, "separation_m_s"));
-    let (given, asked) = (column(&file, "restitution_given"), column(&file, "restitution_asked"));
+    let (achieved, asked) = (column(&file, "restitution_given"), column(&file, "restitution_asked"));
     let (start, end) = (column(&file, "start_s"), column(&file, "end_s"));
     let disturbed = column(&file, "disturbed");
     assert!(joint.len() > 20, "{}", joint.len());
     for k in 0..joint.len() {
-        assert!((given[k] - separation[k] / approach[k]).abs() < 1e-15);
+        assert!((achieved[k] - separation[k] / approach[k]).abs() < 1e-15);
         assert!(end[k] > start[k] && asked[k] == 0.9);
         assert!(k == 0 || end[k] >= end[k - 1]);
     }
     for name in ["restitution_law", "floored", "steps", "deepest_m", "peak_N"] {
         assert_eq!(column(&file, name).len(), joint.len());
     }
-    // None is lost: all that began have ended, or are under way.
+    // No impact is lost: all that began have ended or are in progress.
     for (j, name) in ["S1", "S2", "S3"].into_iter().enumerate() {
         let of = |k: &usize| joint[*k] == j as f64;
         let finished = (0..joint.len()).filter(of).count() as u64;
-        let begun = summary["impacts"][name].as_u64().unwrap();
-        assert!(begun - finished <= 1, "{name}: {finished} of {begun}");
+        let started = summary["impacts"][name].as_u64().unwrap();
+        assert!(started - finished <= 1, "{name}: {finished} of {started}");
         let entry = &summary["restitution"][name];
         assert_eq!(entry["finished"], finished);
-        let alone = (0..joint.len()).filter(of).filter(|&k| disturbed[k] == 0.0).count();
-        assert!(entry["undisturbed"].as_u64().unwrap() <= alone as u64);
+        let undisturbed = (0..joint.len()).filter(of).filter(|&k| disturbed[k] == 0.0).count();
+        assert!(entry["undisturbed"].as_u64().unwrap() <= undisturbed as u64);
         assert!(entry["median_excess"].as_f64().unwrap().abs() < 0.2);
     }
 
-    let words = done(folder.path(), "run spcmm --duration 30ms --impacts words.csv");
-    let said: Vec<&str> = words.lines().filter(|l| l.contains("than asked")).collect();
-    assert!(!said.is_empty(), "{words}");
-    for line in said {
+    let words = stdout_of(folder.path(), "run spcmm --duration 30ms --impacts words.csv");
+    let lines: Vec<&str> = words.lines().filter(|l| l.contains("than asked")).collect();
+    assert!(!lines.is_empty(), "{words}");
+    for line in lines {
         assert!(!line.contains(" -"), "a sign and a word: {line}");
     }
 
-    // As with rows: by the ending, whole, and over nothing that is there.
-    done(folder.path(), &format!("{run} --impacts hits.csv"));
+    // As for rows, the file format follows the ending, and existing files are not overwritten.
+    stdout_of(folder.path(), &format!("{run} --impacts hits.csv"));
     let text = fs::read_to_string(folder.path().join("hits.csv")).unwrap();
     assert_eq!(text.lines().count(), joint.len() + 1);
     assert!(folder.path().join("hits.csv.meta.json").is_file());
-    done(folder.path(), &format!("{run} --impacts hits.npz"));
+    stdout_of(folder.path(), &format!("{run} --impacts hits.npz"));
     #[cfg(unix)]
     std::os::unix::fs::symlink("same.csv", folder.path().join("link.csv")).unwrap();
     for (line, code, word) in [
@@ -139,9 +139,9 @@ fn every_impact_has_its_row() {
         assert_eq!(output.code, Some(code), "{line}");
         assert!(output.stderr.contains(word), "{line}");
     }
-    done(folder.path(), &format!("{run} --impacts hits.csv --force"));
-    // A run without impacts writes none.
-    done(folder.path(), "run spcmm --duration 1ms --impacts none.csv");
+    stdout_of(folder.path(), &format!("{run} --impacts hits.csv --force"));
+    // A run without impacts writes only the header.
+    stdout_of(folder.path(), "run spcmm --duration 1ms --impacts none.csv");
     let text = fs::read_to_string(folder.path().join("none.csv")).unwrap();
     assert_eq!(text.lines().count(), 1);
 }
@@ -150,7 +150,8 @@ fn every_impact_has_its_row() {
 fn the_wear_map_adds_up_to_the_rows_and_the_ledger() {
     let folder = tempfile::tempdir().unwrap();
     let run = "run spcmm --duration 30ms";
-    let summary = done(folder.path(), &format!("{run} --every 5us --out rows.json --wear wear.json --summary json"));
+    let summary =
+        stdout_of(folder.path(), &format!("{run} --every 5us --out rows.json --wear wear.json --summary json"));
     let summary: Json = serde_json::from_str(&summary).unwrap();
     assert_eq!(summary["wear_out"], "wear.json");
     let (rows, wear) = (json(&folder.path().join("rows.json")), json(&folder.path().join("wear.json")));
@@ -159,12 +160,12 @@ fn the_wear_map_adds_up_to_the_rows_and_the_ledger() {
     let contacts = get("contacts");
     for (j, name) in ["S1", "S2", "S3"].into_iter().enumerate() {
         let of = |values: &[f64]| -> f64 {
-            let own = (0..joint.len()).filter(|&k| joint[k] == j as f64);
-            own.map(|k| values[k]).sum()
+            let area_of_cell = (0..joint.len()).filter(|&k| joint[k] == j as f64);
+            area_of_cell.map(|k| values[k]).sum()
         };
         let force = column(&rows, &format!("{name}_normal_N"));
         let expected: f64 = force.windows(2).map(|f| 0.5 * (f[0] + f[1]) * 5e-6).sum();
-        // The trapezoidal rule with twenty rows an impact.
+        // The bound is the error of the trapezoidal rule with twenty rows per impact.
         let error = of(&impulse) / expected - 1.0;
         assert!(error.abs() < 1e-3, "{name}: {error:e} of {expected} N s");
         assert_eq!(of(&contacts), summary["impacts"][name].as_f64().unwrap());
@@ -172,30 +173,30 @@ fn the_wear_map_adds_up_to_the_rows_and_the_ledger() {
     let loss = summary["energy_J"]["friction_loss"].as_f64().unwrap();
     let size: f64 = work.iter().map(|work| work.abs()).sum();
     assert!((work.iter().sum::<f64>() - loss).abs() < 1e-9 * size);
-    // Equal areas, and the sphere of r + c is covered.
+    // The cells have their stated areas and cover the sphere of radius r + c.
     let (area, density) = (get("area_m2"), get("impulse_N_s_m2"));
     let polar = [get("polar_from_rad"), get("polar_to_rad")];
     let azimuth = [get("azimuth_from_rad"), get("azimuth_to_rad")];
     let radius: f64 = 10.3e-3;
     for k in 0..area.len() {
         let height = polar[0][k].cos() - polar[1][k].cos();
-        let own = radius * radius * height * (azimuth[1][k] - azimuth[0][k]);
-        assert!((own / area[k] - 1.0).abs() < 1e-9, "cell {k}");
+        let area_of_cell = radius * radius * height * (azimuth[1][k] - azimuth[0][k]);
+        assert!((area_of_cell / area[k] - 1.0).abs() < 1e-9, "cell {k}");
         assert!((density[k] * area[k] - impulse[k]).abs() <= 1e-12 * impulse[k]);
     }
-    let whole = 3.0 * 4.0 * std::f64::consts::PI * radius * radius;
-    assert!((area.iter().sum::<f64>() / whole - 1.0).abs() < 1e-9);
+    let sphere = 3.0 * 4.0 * std::f64::consts::PI * radius * radius;
+    assert!((area.iter().sum::<f64>() / sphere - 1.0).abs() < 1e-9);
     let axes = &wear["meta"]["socket_axes"]["S1"];
     assert_eq!(wear["meta"]["ball_joints"], serde_json::json!(["S1", "S2", "S3"]));
     assert!(axes["body"].is_string() && axes["z"].as_array().unwrap().len() == 3);
 
-    // The run is the same without, and the file as whole as the others.
-    let without = done(folder.path(), &format!("{run} --summary json"));
+    // Without the map the run is the same.
+    let without = stdout_of(folder.path(), &format!("{run} --summary json"));
     let without: Json = serde_json::from_str(&without).unwrap();
     assert_eq!(without["state_hash"], summary["state_hash"]);
     assert_eq!(without["evaluations"], summary["evaluations"]);
-    let said = done(folder.path(), &format!("{run} --wear wear.csv"));
-    assert!(said.contains(&format!("{} cells to wear.csv", joint.len())), "{said}");
+    let text_summary = stdout_of(folder.path(), &format!("{run} --wear wear.csv"));
+    assert!(text_summary.contains(&format!("{} cells to wear.csv", joint.len())), "{text_summary}");
     let text = fs::read_to_string(folder.path().join("wear.csv")).unwrap();
     assert_eq!(text.lines().count(), joint.len() + 1);
     assert!(folder.path().join("wear.csv.meta.json").is_file());
@@ -208,8 +209,8 @@ fn the_wear_map_adds_up_to_the_rows_and_the_ledger() {
         assert_eq!(output.code, Some(code), "{line}");
         assert!(output.stderr.contains(word), "{line}");
     }
-    // Without play there is no wall to strike.
-    done(folder.path(), "run pendulum --set contact.clearance=0 --duration 1ms --wear none.csv");
+    // Without clearance there is no wall to hit.
+    stdout_of(folder.path(), "run pendulum --set contact.clearance=0 --duration 1ms --wear none.csv");
     let text = fs::read_to_string(folder.path().join("none.csv")).unwrap();
     assert_eq!(text.lines().count(), 1);
 }

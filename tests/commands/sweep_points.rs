@@ -1,4 +1,4 @@
-//! Sweeps of any points: durations, tables, words, statistics of channels, several starts, crossings.
+//! Sweeps over arbitrary points: durations, tables, words, statistics of channels, several starts, crossings.
 
 use std::fs;
 
@@ -11,13 +11,13 @@ use crate::program::{folder, jointplay};
 use crate::sweep::{PENDULUM, archive};
 
 #[test]
-fn a_duration_needs_no_drive_and_threads_and_shards_change_no_bit_of_it() {
+fn a_sweep_over_a_duration_needs_no_drive_and_threads_and_shards_change_no_bit() {
     let folder = folder();
     let line = format!("{PENDULUM} --from 10ms --vary contact.normal_law=hertz,flores");
     let run = |rest: &str| jointplay(folder.path(), &format!("{line} {rest}")).expect(0);
     let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
-    let said = run("--threads 1 --out one.npz").stdout;
-    assert!(said.contains("Points            6") && !said.contains("Regimes"), "{said}");
+    let text = run("--threads 1 --out one.npz").stdout;
+    assert!(text.contains("Points            6") && !text.contains("Regimes"), "{text}");
     run("--threads 2 --out two.npz");
     run("--threads 2 --out two.csv");
     run("--threads 2 --out two.parquet");
@@ -37,15 +37,15 @@ fn a_duration_needs_no_drive_and_threads_and_shards_change_no_bit_of_it() {
                     S1_impacts_kept S1_last_separation_s";
     assert_eq!(own.join(" "), expected);
     assert_eq!(arrays["S1_peak_N"].shape(), [3, 2]);
-    // NumPy's arrays of words are UTF-32.
+    // NumPy stores strings as UTF-32.
     let utf32 = |word: &str| word.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect::<Vec<u8>>();
     let holds = |bytes: &[u8]| read("one.npz").windows(bytes.len()).any(|window| window == bytes);
     assert!(holds(b"<U32") && holds(&utf32("hertz")) && holds(&utf32("flores")) && !holds(&utf32("gonthier")));
 
-    // The tables have the same numbers, point by point.
+    // The tables have the same numbers at every point.
     let table = SerializedFileReader::new(fs::File::open(folder.path().join("two.parquet")).unwrap()).unwrap();
-    let of_file = table.metadata().file_metadata();
-    let own = of_file.key_value_metadata().unwrap().iter().find(|own| own.key == "meta").unwrap();
+    let file_metadata = table.metadata().file_metadata();
+    let own = file_metadata.key_value_metadata().unwrap().iter().find(|own| own.key == "meta").unwrap();
     let own: Json = serde_json::from_str(own.value.as_ref().unwrap()).unwrap();
     assert_eq!(own, meta);
     let mut points = 0;
@@ -109,26 +109,26 @@ fn statistics_equal_those_of_the_rows_of_a_run() {
         let mean =
             |values: &[f64]| values.windows(2).map(|w| 0.5 * (w[0] + w[1])).sum::<f64>() / (values.len() - 1) as f64;
         let squares = |values: &[f64], about: f64| values.iter().map(|v| (v - about).powi(2)).collect::<Vec<_>>();
-        let (least, largest) = (
+        let (smallest, largest) = (
             |v: &[f64]| v.iter().copied().fold(f64::INFINITY, f64::min),
             |v: &[f64]| v.iter().copied().fold(f64::NEG_INFINITY, f64::max),
         );
         let (normal, tip, rate) = (column("S1_normal_N"), column("probe_error_m"), column("P1_rate_m_s"));
-        // Both see every impact, of some 0.1 ms, at instants of their own.
-        let near = |name: &str, expected: f64, part: f64| {
+        // Both resolve every impact, of about 0.1 ms, at different instants.
+        let assert_near = |name: &str, expected: f64, part: f64| {
             let error = value(name) - expected;
             assert!(error.abs() <= part * expected.abs(), "{method}: {name}: {} for {expected}", value(name));
         };
-        assert_eq!(value("S1_normal_min_N"), least(&normal));
-        near("S1_normal_mean_N", mean(&normal), 1e-2);
+        assert_eq!(value("S1_normal_min_N"), smallest(&normal));
+        assert_near("S1_normal_mean_N", mean(&normal), 1e-2);
         for joint in ["S1", "S2", "S3"] {
             let force = column(&format!("{joint}_force_x_N"));
-            near(&format!("{joint}_force_x_rms_N"), mean(&squares(&force, 0.0)).sqrt(), 1e-2);
+            assert_near(&format!("{joint}_force_x_rms_N"), mean(&squares(&force, 0.0)).sqrt(), 1e-2);
         }
-        near("probe_error_max_m", largest(&tip), 1e-3);
-        near("probe_error_end_m", tip[tip.len() - 1], 1e-9);
-        near("P1_rate_range_m_s", largest(&rate) - least(&rate), 1e-3);
-        near("P1_rate_std_m_s", mean(&squares(&rate, mean(&rate))).sqrt(), 1e-4);
+        assert_near("probe_error_max_m", largest(&tip), 1e-3);
+        assert_near("probe_error_end_m", tip[tip.len() - 1], 1e-9);
+        assert_near("P1_rate_range_m_s", largest(&rate) - smallest(&rate), 1e-3);
+        assert_near("P1_rate_std_m_s", mean(&squares(&rate, mean(&rate))).sqrt(), 1e-4);
     }
 }
 
@@ -157,13 +157,13 @@ fn points_from_a_file_zipped_and_crossed_agree() {
     assert_eq!(meta["arrangement"], "zipped");
     assert_eq!((arrays["contact.friction"].shape(), arrays["S1_normal_max_N"].shape()), (&[2][..], &[2][..]));
 
-    let refused =
+    let outcome =
         jointplay(folder.path(), "sweep pendulum --points points.csv --duration 1ms --out points.csv --force");
-    assert!(refused.expect(2).stderr.contains("the same file"), "the points are not overwritten");
+    assert!(outcome.expect(2).stderr.contains("the same file"), "the points are not overwritten");
 }
 
 #[test]
-fn sections_at_crossings_lie_at_the_value_and_repeat_with_the_drive() {
+fn sections_at_crossings_have_the_value_and_repeat_with_the_drive() {
     let folder = folder();
     let line = "sweep slider-crank-driven --vary contact.clearance=0.1mm..0.2mm:2 --section crank.angle=90deg:up --crossings 4 \
                 --discard 2 --duration 10s --keep crank.angle:end --out a.npz";

@@ -1,4 +1,4 @@
-//! The trade of speed for accuracy as scripts see it, and as the library measures it.
+//! The trade-off of speed and accuracy on the command line and in the library.
 
 use std::cell::Cell;
 use std::fs;
@@ -17,13 +17,13 @@ use crate::program::{jointplay, names};
 
 #[track_caller]
 fn run(folder: &Path, line: &str, code: i32) -> String {
-    let said = jointplay(folder, line).expect(code);
-    said.stdout + &said.stderr
+    let outcome = jointplay(folder, line).expect(code);
+    outcome.stdout + &outcome.stderr
 }
 
 const FILES: [&str; 5] = ["manifest.json", "tradeoff.csv", "tradeoff.json", "tradeoff.png", "tradeoff.svg"];
 
-/// A scene with little to do: a rod without play.
+/// A cheap scene: a rod on an ideal joint.
 const SMALL: &str = "pendulum --set contact.clearance=0 --quick --quiet";
 
 #[test]
@@ -32,7 +32,7 @@ fn the_command_writes_all_files_or_none() {
     let out = run(folder.path(), &format!("tradeoff {SMALL} --out found"), 0);
     assert!(out.contains("rk4") && out.contains("Settled motion"), "{out}");
     let found = folder.path().join("found");
-    assert_eq!(names(folder.path()), ["found"], "nothing is left beside");
+    assert_eq!(names(folder.path()), ["found"], "no other file is left");
     assert_eq!(names(&found), FILES);
 
     let csv = fs::read_to_string(found.join("tradeoff.csv")).unwrap();
@@ -67,9 +67,9 @@ fn the_command_writes_all_files_or_none() {
     let svg = fs::read_to_string(found.join("tradeoff.svg")).unwrap();
     assert!(svg.contains("radau5") && svg.contains("Time for a simulated second"));
 
-    // Refused before anything is measured, and left as it was.
-    let said = run(folder.path(), &format!("tradeoff {SMALL} --out found"), 1);
-    assert!(said.contains("--force"), "{said}");
+    // Existing folders are refused before any measurement and stay unchanged.
+    let message = run(folder.path(), &format!("tradeoff {SMALL} --out found"), 1);
+    assert!(message.contains("--force"), "{message}");
     fs::create_dir(folder.path().join("photos")).unwrap();
     fs::write(folder.path().join("photos/holiday"), "mine").unwrap();
     let line = format!("tradeoff {SMALL} --out photos --force");
@@ -78,9 +78,9 @@ fn the_command_writes_all_files_or_none() {
 }
 
 #[test]
-fn errors_about_bad_input_state_what_is_allowed() {
+fn errors_about_invalid_input_state_what_is_allowed() {
     let folder = tempfile::tempdir().unwrap();
-    for (line, said) in [
+    for (line, fragment) in [
         ("tradeoff", "--all"),
         ("tradeoff pendulm --quick", "pendulum"),
         ("tradeoff --all", "--write"),
@@ -88,11 +88,11 @@ fn errors_about_bad_input_state_what_is_allowed() {
         ("tradeoff pendulum --set contact.clearence=1mm", "contact.clearance"),
         ("bench --set contact.friction=-1", "contact.friction"),
     ] {
-        let answer = run(folder.path(), line, 2);
-        assert!(answer.contains(said), "{line}: {answer}");
+        let message = run(folder.path(), line, 2);
+        assert!(message.contains(fragment), "{line}: {message}");
     }
-    let answer = run(folder.path(), "tradeoff --all --write .", 1);
-    assert!(answer.contains("tradeoff"), "{answer}");
+    let message = run(folder.path(), "tradeoff --all --write .", 1);
+    assert!(message.contains("tradeoff"), "{message}");
     assert!(names(folder.path()).is_empty());
 }
 
@@ -109,22 +109,22 @@ fn an_interrupted_measurement_writes_nothing() {
     assert!(names(folder.path()).is_empty(), "{:?}", names(folder.path()));
 }
 
-/// By a clock that goes on at every look: the same on every machine.
+/// Runs an analysis with a clock that advances at every reading, so that the result is the same on every computer.
 fn measure<T>(
     analysis: impl FnOnce(&mut RunContext) -> Result<T, AnalysisError>,
-    most_reports: u64,
+    max_reports: u64,
 ) -> Result<T, AnalysisError> {
-    let (looks, reports) = (Cell::new(0), Cell::new(0));
+    let (readings, reports) = (Cell::new(0), Cell::new(0));
     let mut clock = || {
-        looks.set(looks.get() + 1);
-        looks.get() as f64 * 1e-4
+        readings.set(readings.get() + 1);
+        readings.get() as f64 * 1e-4
     };
-    let mut go_on = |done: f64| {
+    let mut progress = |done: f64| {
         assert!((0.0..=1.0).contains(&done), "{done}");
         reports.set(reports.get() + 1);
-        if reports.get() > most_reports { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if reports.get() > max_reports { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    analysis(&mut RunContext::new(&mut clock, &mut go_on))
+    analysis(&mut RunContext::new(&mut clock, &mut progress))
 }
 
 fn error_at(found: &WorkPrecision, method: Method, value: f64) -> f64 {
@@ -163,11 +163,11 @@ fn finer_steps_and_tolerances_reduce_the_error_and_raise_the_cost() {
         };
         assert!(evaluations(fine) > 2 * evaluations(coarse), "{method}");
     }
-    // The reference is good enough to tell all of these apart, and the best come near it.
+    // The reference is accurate enough to distinguish all settings, and the best settings approach it.
     let floor = found.reference.floor.peak.unwrap();
     assert!(floor < 1e-6, "{floor}");
     assert!(error_at(&found, Method::Radau5, 1e-8) < 1e-5);
-    // Somebody is on the front, and nobody is beaten there.
+    // The Pareto front is not empty, and no point on it is dominated.
     let front: Vec<_> = found.points.iter().filter(|p| p.impacts.front).collect();
     assert!(!front.is_empty());
     for point in &front {
@@ -184,8 +184,10 @@ fn finer_steps_and_tolerances_reduce_the_error_and_raise_the_cost() {
 #[test]
 fn presets_can_be_measured_on_any_scene_and_cancelled() {
     let scene = crate::common::scene("pendulum", &[("contact.clearance", "0.5 mm")]);
-    let of = |scene: &Scene, most: u64| measure(|context| presets::measure(scene, &Preset::ALL, context), most);
-    let points = of(&scene, u64::MAX).unwrap();
+    let measure_presets = |scene: &Scene, max_reports: u64| {
+        measure(|context| presets::measure(scene, &Preset::ALL, context), max_reports)
+    };
+    let points = measure_presets(&scene, u64::MAX).unwrap();
     assert_eq!(points.len(), Preset::ALL.len());
     let errors: Vec<f64> = points.iter().map(|p| p.errors.peak.unwrap()).collect();
     assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "from fast to accurate: {errors:?}");
@@ -193,10 +195,10 @@ fn presets_can_be_measured_on_any_scene_and_cancelled() {
         assert_eq!(point.preset, Some(preset));
         assert!(presets::Measured::of(point).impacts_ratio.is_some());
     }
-    assert_eq!(of(&scene, 20).unwrap_err(), AnalysisError::Cancelled);
-    // The reference itself cannot be made: balls that leave their sockets.
+    assert_eq!(measure_presets(&scene, 20).unwrap_err(), AnalysisError::Cancelled);
+    // The reference run fails because balls leave their sockets.
     let soft = crate::common::scene("pendulum", &[("contact.youngs_modulus", "1 MPa"), ("gravity.z", "-1000 m/s^2")]);
-    let error = of(&soft, u64::MAX).unwrap_err();
+    let error = measure_presets(&soft, u64::MAX).unwrap_err();
     assert!(matches!(error, AnalysisError::Stopped(_)), "{error}");
 }
 
@@ -204,7 +206,7 @@ fn presets_can_be_measured_on_any_scene_and_cancelled() {
 fn the_built_in_presets_equal_the_measured_ones() {
     let record = presets::record();
     for preset in Preset::ALL {
-        // Whether it has all built-in scenes, `tests/texts/documents.rs` checks.
+        // `tests/texts/documents.rs` checks that the record has all built-in scenes.
         for name in presets::record().scenes.keys() {
             let (method, value) = &record.points[name][preset.word()];
             let setting = Setting::of_preset(preset, &crate::common::scene(name, &[]).machine);

@@ -1,4 +1,4 @@
-//! Whatever can be clicked is clicked where it lies, by a pointer: an action of a screen reader reaches what something else covers.
+//! Clicks every control with a pointer at its position, since an accessibility action also reaches covered controls.
 
 use eframe::egui::{self, Key, Popup, Pos2, Rect, accesskit::Role, vec2};
 use egui_kittest::{
@@ -10,13 +10,13 @@ use jointplay::app::App;
 use crate::window::sized;
 
 const WIDE: [f32; 2] = [1280.0, 800.0];
-const UPRIGHT: [f32; 2] = [390.0, 844.0];
-const LYING: [f32; 2] = [844.0, 390.0];
+const PORTRAIT: [f32; 2] = [390.0, 844.0];
+const LANDSCAPE: [f32; 2] = [844.0, 390.0];
 
-/// What is clicked.
-const CLICKED: [Role; 5] = [Role::Button, Role::ComboBox, Role::CheckBox, Role::RadioButton, Role::Switch];
+/// Roles of clickable widgets.
+const CLICKABLE: [Role; 5] = [Role::Button, Role::ComboBox, Role::CheckBox, Role::RadioButton, Role::Switch];
 
-/// A widget that takes clicks.
+/// A clickable widget.
 struct Target {
     id: egui::accesskit::NodeId,
     role: Role,
@@ -24,10 +24,10 @@ struct Target {
     rect: Rect,
 }
 
-/// Those that are enabled and have their centre in the window.
+/// Enabled clickable widgets whose centre is in the window.
 fn targets(harness: &Harness<'_, App>) -> Vec<Target> {
     let window = harness.ctx.content_rect();
-    let all = CLICKED.into_iter().flat_map(|role| harness.query_all_by_role(role));
+    let all = CLICKABLE.into_iter().flat_map(|role| harness.query_all_by_role(role));
     all.filter(|node| !node.accesskit_node().is_disabled() && window.contains(node.rect().center()))
         .map(|node| {
             let own = node.accesskit_node();
@@ -37,7 +37,7 @@ fn targets(harness: &Harness<'_, App>) -> Vec<Target> {
         .collect()
 }
 
-/// Moves the pointer to the centre of each, and asserts that it would be clicked there.
+/// Moves the pointer to the centre of each target and asserts that a click would hit it.
 #[track_caller]
 fn assert_in_reach(harness: &mut Harness<'_, App>, what: &str) -> usize {
     let targets = targets(harness);
@@ -62,16 +62,16 @@ fn press(harness: &mut Harness<'_, App>, at: Pos2) {
     harness.run_steps(3);
 }
 
-fn place(harness: &Harness<'_, App>, role: Role, name: &str) -> Pos2 {
+fn centre_of(harness: &Harness<'_, App>, role: Role, name: &str) -> Pos2 {
     harness.get_by_role_and_label(role, name).rect().center()
 }
 
 fn press_on(harness: &mut Harness<'_, App>, role: Role, name: &str) {
-    let at = place(harness, role, name);
+    let at = centre_of(harness, role, name);
     press(harness, at);
 }
 
-/// Presses the list or menu of this name, and asserts that it opens.
+/// Presses the list or menu `name` and asserts that it opens.
 #[track_caller]
 fn assert_opens(harness: &mut Harness<'_, App>, what: &str, role: Role, name: &str) {
     press_on(harness, role, name);
@@ -81,7 +81,7 @@ fn assert_opens(harness: &mut Harness<'_, App>, what: &str, role: Role, name: &s
     assert!(!Popup::is_any_open(&harness.ctx), "{what}: {name} stays open");
 }
 
-/// Presses every list in sight.
+/// Opens every visible list.
 fn open_lists(harness: &mut Harness<'_, App>, what: &str) -> usize {
     let lists: Vec<Target> = targets(harness).into_iter().filter(|target| target.role == Role::ComboBox).collect();
     for list in &lists {
@@ -101,12 +101,12 @@ fn presenting(size: [f32; 2]) -> Harness<'static, App> {
 }
 
 #[test]
-fn every_button_list_and_switch_is_clicked_where_it_lies() {
-    for (size, least) in [(WIDE, 30), (UPRIGHT, 10), (LYING, 10)] {
+fn every_button_list_and_switch_can_be_clicked_at_its_centre() {
+    for (size, min_count) in [(WIDE, 30), (PORTRAIT, 10), (LANDSCAPE, 10)] {
         let mut harness = sized("spcmm", size, egui::Theme::Light);
         let what = format!("{size:?}");
-        let found = assert_in_reach(&mut harness, &what);
-        assert!(found >= least, "{what}: {found}");
+        let count = assert_in_reach(&mut harness, &what);
+        assert!(count >= min_count, "{what}: {count}");
         for key in [Key::C, Key::G] {
             harness.key_press(key);
             harness.run();
@@ -118,7 +118,7 @@ fn every_button_list_and_switch_is_clicked_where_it_lies() {
 }
 
 #[test]
-fn every_list_and_menu_opens_by_a_press_where_it_lies() {
+fn every_list_and_menu_opens_by_a_press_at_its_centre() {
     let mut harness = sized("spcmm", WIDE, egui::Theme::Light);
     assert!(open_lists(&mut harness, "window") >= 3);
     for menu in ["Save", "Lessons", "View options", "Choose plots"] {
@@ -126,7 +126,7 @@ fn every_list_and_menu_opens_by_a_press_where_it_lies() {
     }
     let mut harness = presenting(WIDE);
     assert!(open_lists(&mut harness, "presentation") >= 1);
-    for size in [UPRIGHT, LYING] {
+    for size in [PORTRAIT, LANDSCAPE] {
         let mut harness = sized("spcmm", size, egui::Theme::Light);
         assert!(open_lists(&mut harness, "small window") >= 2);
         for menu in ["Menu", "View options"] {
@@ -145,24 +145,24 @@ fn a_time_scale_is_chosen_from_the_list_by_a_mouse_and_by_a_drag_across_it() {
             assert_eq!(scale(&harness), expected, "{entry}");
             assert!(!Popup::is_any_open(&harness.ctx));
         }
-        let at = place(&harness, Role::ComboBox, "Time scale preset");
+        let at = centre_of(&harness, Role::ComboBox, "Time scale preset");
         harness.hover_at(at);
         harness.step();
         harness.drag_at(at);
         harness.step();
-        for way in [10.0, 20.0, 30.0, 40.0] {
-            harness.hover_at(at + vec2(way, 0.0));
+        for offset in [10.0, 20.0, 30.0, 40.0] {
+            harness.hover_at(at + vec2(offset, 0.0));
             harness.step();
         }
         harness.drop_at(at + vec2(40.0, 0.0));
         harness.run_steps(3);
-        assert_eq!(scale(&harness), 0.5, "two further than 1:20");
+        assert_eq!(scale(&harness), 0.5, "two entries beyond 1:20");
         assert!(!Popup::is_any_open(&harness.ctx), "a drag opens nothing");
     }
 }
 
 #[test]
-fn a_menu_opens_at_the_first_click_after_a_slider_was_drawn() {
+fn a_menu_opens_at_the_first_click_after_a_slider_drag() {
     for menu in ["Save", "Lessons", "Before and after (1)"] {
         let mut harness = sized("slider-crank", WIDE, egui::Theme::Light);
         let track = harness.get_by_role_and_label(Role::Slider, "Clearance").rect();

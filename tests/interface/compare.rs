@@ -1,4 +1,4 @@
-//! Runs kept from before a change: their curves in the plots, and their machine beside the machine.
+//! Runs kept from before a change: their curves in the plots, and their machine side by side with the current one.
 
 use eframe::egui::{self, Rect, Theme, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
@@ -16,7 +16,7 @@ fn window() -> Harness<'static, App> {
     harness
 }
 
-/// Sets a slider, and lets so much time pass that the next change is one of its own.
+/// Sets a slider and waits until the next change counts as a separate one.
 fn set(harness: &mut Harness<'_, App>, slider: &str, value: f64) {
     harness.get_by_role_and_label(Role::Slider, slider).set_value_accesskit(value);
     harness.run_steps(45);
@@ -33,13 +33,13 @@ fn force(player: &Player, from: f64, to: f64) -> Vec<Bin> {
     bins
 }
 
-/// The window's pixels, as seen.
-fn seen(harness: &mut Harness<'_, App>) -> Picture {
+/// The window's pixels.
+fn window_picture(harness: &mut Harness<'_, App>) -> Picture {
     let picture = harness.render().expect("draws");
     Picture::new(picture.width(), picture.into_raw())
 }
 
-/// Levels of a colour by which pixels of the same picture at another place of the window differ.
+/// Colour levels by which pixels of the same picture differ at another position in the window.
 const DITHER: u8 = 10;
 
 /// Pixels of a rectangle.
@@ -47,16 +47,16 @@ fn area(rect: Rect) -> Area {
     [rect.left(), rect.top(), rect.right(), rect.bottom()].map(|edge| edge.round() as usize)
 }
 
-/// Number of pixels of an area of `one` that differ, by more than the dither, from those of `other` that lie `by` columns further to
-/// the right.
-fn differing(one: &Picture, other: &Picture, [left, top, right, bottom]: Area, by: usize) -> usize {
-    let places = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
-    let apart = |x, y| one.at(x, y).iter().zip(other.at(x + by, y)).any(|(a, b)| a.abs_diff(b) > DITHER);
-    places.filter(|(x, y)| apart(*x, *y)).count()
+/// Number of pixels in an area of `one` that differ by more than the dither from those of `other` that are `by` columns further
+/// right.
+fn count_differing(one: &Picture, other: &Picture, [left, top, right, bottom]: Area, by: usize) -> usize {
+    let pixels = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
+    let differs = |x, y| one.at(x, y).iter().zip(other.at(x + by, y)).any(|(a, b)| a.abs_diff(b) > DITHER);
+    pixels.filter(|(x, y)| differs(*x, *y)).count()
 }
 
 #[test]
-fn the_grey_curves_are_the_run_that_would_have_been() {
+fn the_grey_curves_continue_the_run_without_the_change() {
     let mut harness = window();
     set(&mut harness, "Clearance", 0.9);
     assert_eq!(names(&harness), ["Clearance: 0.3 mm"]);
@@ -69,18 +69,18 @@ fn the_grey_curves_are_the_run_that_would_have_been() {
     other.reset().expect("starts");
     other.run_to(0.02);
     other.run_to(0.05);
-    let wanted = force(&other, 0.02, 0.05);
-    assert!(wanted.len() > 100 && wanted.iter().any(|bin| bin.greatest > 0.0));
-    assert_eq!(force(kept.run(), 0.02, 0.05), wanted);
-    assert_ne!(force(app.player(), 0.02, 0.05), wanted);
-    // They are drawn in every plot of curves, unless they are hidden.
+    let expected = force(&other, 0.02, 0.05);
+    assert!(expected.len() > 100 && expected.iter().any(|bin| bin.greatest > 0.0));
+    assert_eq!(force(kept.run(), 0.02, 0.05), expected);
+    assert_ne!(force(app.player(), 0.02, 0.05), expected);
+    // They are drawn in every plot of curves unless hidden.
     let plots = ["Normal force", "Acceleration"].map(|plot| harness.get_by_label(&format!("Plot of {plot}")).rect());
-    let with = seen(&mut harness);
+    let with_grey = window_picture(&mut harness);
     harness.get_by_label("— Clearance: 0.3 mm in Normal force").click();
     harness.run_steps(3);
-    let without = seen(&mut harness);
+    let without_grey = window_picture(&mut harness);
     for plot in plots {
-        let changed = differing(&with, &without, area(plot), 0);
+        let changed = count_differing(&with_grey, &without_grey, area(plot), 0);
         assert!(changed > 50, "{changed}");
     }
 }
@@ -88,7 +88,7 @@ fn the_grey_curves_are_the_run_that_would_have_been() {
 #[test]
 fn of_many_changes_the_latest_and_three_pinned_runs_stay() {
     let mut harness = window();
-    // A drag is one change.
+    // A drag counts as one change.
     let track = harness.get_by_role_and_label(Role::Slider, "Clearance").rect();
     harness.drag_at(track.left_center() + egui::vec2(12.0, 0.0));
     for part in 1..4 {
@@ -112,7 +112,7 @@ fn of_many_changes_the_latest_and_three_pinned_runs_stay() {
 }
 
 #[test]
-fn another_parameter_is_another_change_however_soon_it_comes() {
+fn a_change_of_another_parameter_counts_separately_even_if_immediate() {
     let mut harness = window();
     for (slider, value, before) in
         [("Clearance", 0.9, "Clearance: 0.3 mm"), ("Friction coefficient", 0.4, "Friction coefficient: 0.15")]
@@ -136,7 +136,7 @@ fn a_reset_keeps_the_record_of_a_run_that_was_never_changed() {
     let kept = app.comparison().kept()[0].run();
     assert!(kept.reached() >= 0.02 && force(kept, 0.0, 0.02).len() > 100);
     assert_eq!(kept.running().machine.contact.clearance, 3e-4);
-    // This one was changed on its way: it begins anew with what it had last.
+    // A run that was changed on its way restarts with its latest values.
     harness.state_mut().run_to(0.01);
     set(&mut harness, "Clearance", 0.7);
     harness.state_mut().run_to(0.02);
@@ -148,7 +148,7 @@ fn a_reset_keeps_the_record_of_a_run_that_was_never_changed() {
 }
 
 #[test]
-fn two_machines_of_the_same_parameters_are_the_same_picture() {
+fn two_machines_with_the_same_parameters_have_the_same_picture() {
     let mut harness = window();
     set(&mut harness, "Clearance", 0.9);
     click(&mut harness, "Before and after (1)");
@@ -158,14 +158,14 @@ fn two_machines_of_the_same_parameters_are_the_same_picture() {
     let before = harness.get_by_label("3D view before the change").rect();
     let now = harness.get_by_label("3D view").rect();
     assert_eq!(before.size(), now.size());
-    // Below the time and the highest name, above buttons and messages.
+    // Excludes the time, the topmost name, buttons and messages.
     let middle = area(Rect::from_min_max(before.min + egui::vec2(1.0, 110.0), before.max - egui::vec2(1.0, 60.0)));
     let by = (now.left() - before.left()).round() as usize;
     harness.state_mut().run_to(0.05);
     harness.run_steps(200);
-    let other = seen(&mut harness);
-    assert!(differing(&other, &other, middle, by) > 100, "other clearances");
-    // The same again, from the start.
+    let other = window_picture(&mut harness);
+    assert!(count_differing(&other, &other, middle, by) > 100, "other clearances");
+    // The same parameters again, from the start.
     set(&mut harness, "Clearance", 0.3);
     harness.state_mut().reset();
     harness.state_mut().run_to(0.06);
@@ -175,25 +175,25 @@ fn two_machines_of_the_same_parameters_are_the_same_picture() {
     let kept = &app.comparison().kept()[1];
     assert_eq!(kept.name(), "Clearance: 0.3 mm");
     assert_eq!(kept.run().frame().time, app.player().frame().time);
-    let same = seen(&mut harness);
-    assert_eq!(differing(&same, &same, middle, by), 0);
-    // There is one camera for both.
+    let same = window_picture(&mut harness);
+    assert_eq!(count_differing(&same, &same, middle, by), 0);
+    // Both views share one camera.
     let centre = before.center();
     harness.drag_at(centre);
     harness.hover_at(centre + egui::vec2(60.0, 20.0));
     harness.run_steps(2);
     harness.drop_at(centre + egui::vec2(60.0, 20.0));
     harness.run_steps(30);
-    let turned = seen(&mut harness);
-    assert!(differing(&same, &turned, middle, 0) > 1000, "turned");
-    assert_eq!(differing(&turned, &turned, middle, by), 0);
+    let turned = window_picture(&mut harness);
+    assert!(count_differing(&same, &turned, middle, 0) > 1000, "turned");
+    assert_eq!(count_differing(&turned, &turned, middle, by), 0);
 }
 
 #[test]
-fn the_machine_now_waits_for_the_one_beside_it() {
+fn the_current_machine_waits_for_the_one_before_the_change() {
     let mut harness = window();
     set(&mut harness, "Clearance", 0.9);
-    // The one now is far ahead, and goes on.
+    // The current run is far ahead.
     harness.state_mut().run_to(0.3);
     click(&mut harness, "Before and after (1)");
     click(&mut harness, "Side by side");
@@ -205,7 +205,7 @@ fn the_machine_now_waits_for_the_one_beside_it() {
     harness.state_mut().player_mut().set_playing(true);
     let mut waited = 0;
     while instants(&harness)[0] < 0.3 {
-        assert_eq!(instants(&harness)[1], 0.3, "it goes on alone");
+        assert_eq!(instants(&harness)[1], 0.3, "the current run must wait");
         harness.step();
         waited += 1;
         assert!(waited < 5000);

@@ -1,6 +1,6 @@
-//! Golden frames: what `jointplay render` draws, pixel for pixel, against `tests/golden/`.
+//! Golden frames: pictures of `jointplay render` against those in `tests/golden/`.
 //!
-//! `UPDATE_GOLDEN=1 cargo test --test interface frames::` draws them anew; look at each before committing it.
+//! `UPDATE_GOLDEN=1 cargo test --test interface frames::` redraws them; look at each before committing it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value as Json;
 
-use crate::golden::{PLAIN, Picture, TOLERANCE, compare, objection};
+use crate::golden::{PLAIN, Picture, TOLERANCE, compare, picture_mismatch};
 
 fn jointplay(folder: &Path, line: &str) -> Output {
     let output = Command::new(env!("CARGO_BIN_EXE_jointplay"))
@@ -47,7 +47,7 @@ fn golden_in(folder: &str, name: &str, what: &str) {
 /// The default scene in the middle of its first impacts.
 const IMPACT: &str = "spcmm --at 7.85ms --size 640x400 --magnification 20 --overlay";
 
-/// Every built-in scene: its instant, and how much its play is magnified.
+/// Every built-in scene: the instant, and the magnification of its clearances.
 const SCENES: [(&str, &str, u32); 10] = [
     ("spcmm", "7.85ms", 20),
     ("pendulum", "0.1s", 1),
@@ -62,7 +62,7 @@ const SCENES: [(&str, &str, u32); 10] = [
 ];
 
 #[test]
-fn every_scene_is_drawn_as_it_was() {
+fn every_scene_is_drawn_as_stored() {
     assert_eq!(SCENES.map(|(scene, ..)| scene), jointplay::scene::BUILT_IN);
     for (scene, instant, magnification) in SCENES {
         golden(
@@ -72,9 +72,9 @@ fn every_scene_is_drawn_as_it_was() {
     }
 }
 
-/// The press has parts of every role, the suspension springs: what they are made of in the dark does not depend on the scene.
+/// The press has parts of every role and the suspension has springs; their materials in the dark theme do not depend on the scene.
 #[test]
-fn every_role_is_drawn_dark_as_it_was() {
+fn every_role_is_drawn_dark_as_stored() {
     for scene in ["press", "suspension"] {
         let what = format!("{scene} --at 0.1s --magnification 10 --size 400x250 --theme dark");
         golden(&format!("{scene}_dark"), &what);
@@ -82,28 +82,28 @@ fn every_role_is_drawn_dark_as_it_was() {
 }
 
 #[test]
-fn spcmm_dark_near_a_ball_joint() {
+fn a_dark_close_up_of_a_ball_joint_is_drawn_as_stored() {
     golden("spcmm_close_up_dark", "spcmm --at 7.85ms --size 480x300 --magnification 20 --close-up S1 --theme dark");
 }
 
 #[test]
-fn spcmm_in_the_window() {
+fn spcmm_in_the_window_is_drawn_as_stored() {
     golden("spcmm_window", "spcmm --at 7.85ms --size 800x500 --ui");
 }
 
 #[test]
-fn the_readme_shows_the_window_as_it_is() {
+fn the_readme_shows_the_current_window() {
     golden_in("assets", "window", "spcmm --at 26ms --size 1200x740 --ui");
 }
 
 #[test]
-fn a_missing_golden_picture_is_found() {
+fn a_missing_part_of_a_picture_is_detected() {
     let folder = tempfile::tempdir().expect("a scratch folder");
-    let whole = Picture::read(&draw(folder.path(), IMPACT));
-    assert!(objection(&whole, &whole).is_none());
+    let complete = Picture::read(&draw(folder.path(), IMPACT));
+    assert!(picture_mismatch(&complete, &complete).is_none());
     for less in ["--arrows none", "--hide sockets", "--hide names", "--set contact.clearance=0.1mm"] {
         let picture = Picture::read(&draw(folder.path(), &format!("{IMPACT} {less}")));
-        let count = whole.differences(&picture);
+        let count = complete.differences(&picture);
         assert!(count > 2 * TOLERANCE.1, "{less} changes {count} pixels only");
     }
 }
@@ -118,20 +118,20 @@ fn a_frame_has_the_same_bytes_each_time() {
 }
 
 #[test]
-fn a_frame_of_the_window_shows_the_plots_that_its_link_asks_for() {
-    let shown = |scene: &str| {
+fn a_frame_of_the_window_shows_the_plots_of_its_link() {
+    let render_window = |scene: &str| {
         let folder = tempfile::tempdir().expect("a scratch folder");
         jointplay(folder.path(), &format!("render {scene} --ui --at 5ms --size 900x600 --out frames --quiet"));
         fs::read(folder.path().join("frames/frame_00000.png")).expect("written")
     };
-    let plain = shown("pendulum");
-    assert!(plain == shown("--link ?scene=pendulum"), "a link to the scene alone");
-    let energy = shown("--link ?scene=pendulum&plots=energy");
+    let plain = render_window("pendulum");
+    assert!(plain == render_window("--link ?scene=pendulum"), "a link to the scene alone");
+    let energy = render_window("--link ?scene=pendulum&plots=energy");
     assert!(plain != energy, "other plots");
-    assert!(energy != shown("--link ?scene=pendulum&plots=energy&window=1ms"), "another time window");
+    assert!(energy != render_window("--link ?scene=pendulum&plots=energy&window=1ms"), "another time window");
 }
 
-/// A frame's hash is that of a run to the end of the step that contains it: with a fixed step the two take the same steps.
+/// A frame's hash is that of a run to the end of the step that contains the frame; with a fixed step both take the same steps.
 #[test]
 fn the_manifest_has_the_state_that_a_run_reaches() {
     let folder = tempfile::tempdir().expect("a scratch folder");
@@ -155,7 +155,7 @@ fn the_manifest_has_the_state_that_a_run_reaches() {
     }
 }
 
-/// Of a force element that is drawn a picture differs from one without it, and of two it differs in different places.
+/// A picture with a force element differs from one without it and from one with another element.
 #[test]
 fn bushings_stops_and_motors_are_drawn() {
     const MACHINE: &str = "[[body]]

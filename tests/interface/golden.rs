@@ -1,26 +1,26 @@
-//! Stored pictures: how they are kept, and what is compared with them.
+//! Stored pictures: their format and comparison.
 //!
-//! `UPDATE_GOLDEN=1 cargo test --test interface` stores all pictures and texts anew; look at each before committing it. A failure
+//! `UPDATE_GOLDEN=1 cargo test --test interface` updates all pictures and texts; look at each before committing it. A failure
 //! leaves `<name>.actual.png` and `<name>.diff.png` (differing pixels red) in `tests/golden/`.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// Distance of a colour channel, of 255, from which a pixel counts as different, and how many may.
+/// Difference of a colour channel, of 255, above which a pixel counts as different, and the allowed number of such pixels.
 ///
-/// The one tolerance of all pictures: another processor or driver rounds some tens of pixels along edges otherwise; the
-/// least of the things drawn, an arrow, covers hundreds.
+/// The single tolerance of all pictures: other processors and drivers round some tens of pixels along edges differently, while the
+/// smallest object drawn, an arrow, covers hundreds.
 pub const TOLERANCE: (u8, usize) = (24, 120);
 
-/// Distance of a colour channel by which a stored pixel may be off, less than the tolerance: a palette holds 256 colours.
+/// Error of a colour channel from the palette of 256 colours, smaller than the tolerance.
 const PALETTE_ERROR: u8 = 20;
 
-/// Fixed steps of one plain method, for all that is stored: nothing in it follows how an adaptive method chooses its steps.
+/// Fixed steps of a simple method for everything stored, so that it does not depend on the step control of adaptive methods.
 pub const PLAIN: [(&str, &str); 2] = [("solver.method", "rk4"), ("solver.step", "20 us")];
 
-/// Square distance of colours below which a palette does not tell them apart: the noise that keeps gradients from banding.
-const ALIKE: u32 = 32;
+/// Squared distance of colours below which a palette merges them: that of the dither against banding.
+const MERGE_DISTANCE: u32 = 32;
 
 /// Whether pictures and texts are stored instead of compared.
 pub fn storing() -> bool {
@@ -34,7 +34,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Of so many pixels across and down.
+    /// From width and height in pixels and RGBA data.
     pub fn new(size: [u32; 2], rgba: &[u8]) -> Self {
         Self { size, rgb: rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect() }
     }
@@ -66,7 +66,7 @@ impl Picture {
         Self { size: [width, height], rgb: places.flat_map(|(x, y)| [0, 1, 2].map(|part| mean(x, y, part))).collect() }
     }
 
-    /// Writes the picture with a palette: what is stored lives in the history for ever.
+    /// Writes the picture with a palette, since stored files stay in the history forever.
     pub fn write(&self, path: &Path) {
         let (palette, indices) = self.palette();
         let file = fs::File::create(path).expect("writable");
@@ -80,12 +80,12 @@ impl Picture {
         writer.finish().expect("writable");
     }
 
-    /// At most 256 of its colours, and which of them each pixel has. The next one is always that which is farthest from all before, the
-    /// frequent ones a little earlier: so no pixel is far off, however few have its colour.
+    /// At most 256 of its colours, and the index of each pixel. The next colour is the one farthest from all before, with a slight
+    /// preference for frequent ones, so that no pixel is far off, however rare its colour.
     fn palette(&self) -> (Vec<[u8; 3]>, Vec<u8>) {
-        let far =
+        let distance_squared =
             |a: [u8; 3], b: [u8; 3]| -> u32 { [0, 1, 2].map(|i| u32::from(a[i].abs_diff(b[i])).pow(2)).iter().sum() };
-        // Of each colour how many pixels have it, how far the nearest of the palette is, and its index there.
+        // For each colour: its number of pixels, the distance to the nearest palette colour, and that colour's index.
         let mut colours: BTreeMap<[u8; 3], (f64, u32, u8)> = BTreeMap::new();
         for colour in self.pixels() {
             colours.entry(colour).or_insert((0.0, u32::MAX, 0)).0 += 1.0;
@@ -93,15 +93,15 @@ impl Picture {
         let mut palette = Vec::new();
         for index in 0..=255 {
             let gain = |(count, distance, _): (f64, u32, u8)| count.sqrt().sqrt() * f64::from(distance);
-            let others = colours.iter().filter(|(_, (_, distance, _))| *distance >= ALIKE);
+            let others = colours.iter().filter(|(_, (_, distance, _))| *distance >= MERGE_DISTANCE);
             let Some((&next, _)) = others.max_by(|a, b| gain(*a.1).total_cmp(&gain(*b.1))) else {
                 break;
             };
             palette.push(next);
             for (colour, (_, distance, nearest)) in &mut colours {
-                let there = far(*colour, next);
-                if there < *distance {
-                    (*distance, *nearest) = (there, index);
+                let new_distance = distance_squared(*colour, next);
+                if new_distance < *distance {
+                    (*distance, *nearest) = (new_distance, index);
                 }
             }
         }
@@ -113,13 +113,13 @@ impl Picture {
         self.rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2]])
     }
 
-    /// Which pixels differ from `other`'s, which has the same size, by more than `most`.
+    /// Marks the pixels that differ by more than `most` from those of `other`, which has the same size.
     fn differing(&self, other: &Self, most: u8) -> Vec<bool> {
         let far = |(a, b): (&u8, &u8)| a.abs_diff(*b) > most;
         self.rgb.chunks_exact(3).zip(other.rgb.chunks_exact(3)).map(|(a, b)| a.iter().zip(b).any(far)).collect()
     }
 
-    /// How many pixels differ from `other`'s, which has the same size.
+    /// Number of pixels that differ from those of `other`, which has the same size.
     pub fn differences(&self, other: &Self) -> usize {
         self.differing(other, TOLERANCE.0).into_iter().filter(|mark| *mark).count()
     }
@@ -131,8 +131,8 @@ impl Picture {
     }
 }
 
-/// Why `actual` is not `golden`; and where, if they have the same size.
-pub fn objection(actual: &Picture, golden: &Picture) -> Option<(String, Option<Picture>)> {
+/// Difference of `actual` from `golden`, if any, with a picture of it if both have the same size.
+pub fn picture_mismatch(actual: &Picture, golden: &Picture) -> Option<(String, Option<Picture>)> {
     if actual.size != golden.size {
         let text = format!("{:?} pixels instead of {:?}", actual.size, golden.size);
         return Some((text, None));
@@ -145,14 +145,14 @@ pub fn objection(actual: &Picture, golden: &Picture) -> Option<(String, Option<P
     })
 }
 
-/// Compares a picture with the one of that `name` in a `folder` of the repository; `what` says how it is made.
+/// Compares a picture with the stored one `name` in `folder` of the repository; `what` describes how it is made.
 #[track_caller]
 pub fn compare(folder: &str, name: &str, actual: &Picture, what: &str) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let golden = root.join(format!("{folder}/{name}.png"));
-    let left = |ending: &str| root.join(format!("tests/golden/{name}.{ending}.png"));
+    let output = |ending: &str| root.join(format!("tests/golden/{name}.{ending}.png"));
     for stale in ["actual", "diff"] {
-        let _ = fs::remove_file(left(stale));
+        let _ = fs::remove_file(output(stale));
     }
     if storing() {
         fs::create_dir_all(golden.parent().expect("has one")).expect("writable");
@@ -161,10 +161,10 @@ pub fn compare(folder: &str, name: &str, actual: &Picture, what: &str) {
         assert!(!off.contains(&true), "{folder}/{name}.png: its colours are too many for a palette");
         return;
     }
-    if let Some((why, diff)) = objection(actual, &Picture::read(&golden)) {
-        actual.write(&left("actual"));
+    if let Some((why, diff)) = picture_mismatch(actual, &Picture::read(&golden)) {
+        actual.write(&output("actual"));
         if let Some(diff) = diff {
-            diff.write(&left("diff"));
+            diff.write(&output("diff"));
         }
         panic!("{folder}/{name}.png: {why}; see tests/golden/{name}.actual.png and .diff.png ({what})");
     }

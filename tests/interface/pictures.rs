@@ -1,6 +1,6 @@
-//! The pictures of `docs/scene-format.md`: every complete example has one, and each is what the program draws.
+//! The pictures of `docs/scene-format.md`: every complete example has one, and each agrees with the program.
 //!
-//! `UPDATE_GOLDEN=1 cargo test --test interface pictures::` draws them anew; look at each before committing it.
+//! `UPDATE_GOLDEN=1 cargo test --test interface pictures::` redraws them; look at each before committing it.
 
 use std::fs;
 use std::path::Path;
@@ -14,13 +14,13 @@ use crate::golden::{Picture, compare};
 
 const FOLDER: &str = "docs/pictures";
 const SIZE: (u32, u32) = (512, 320);
-/// Largest file, bytes.
-const LARGEST: u64 = 40_000;
+/// Limit of file sizes, bytes.
+const MAX_SIZE: u64 = 40_000;
 
-/// The picture of the laws.
+/// Name of the picture of the laws.
 const LAWS: &str = "drives";
 
-/// Instants of the pictures; 0.1 s for the others.
+/// Instants of pictures other than 0.1 s.
 const INSTANTS: [(&str, &str); 5] =
     [("shapes", "0s"), ("joints", "0s"), ("own-parameters", "0s"), ("crank", "25ms"), ("flap", "25ms")];
 
@@ -32,7 +32,7 @@ fn page() -> String {
     fs::read_to_string(root().join("docs/scene-format.md")).expect("the page")
 }
 
-/// Name of the picture that `text` begins with, if it does.
+/// Name of the picture at the beginning of `text`, if any.
 fn first_picture(text: &str) -> Option<&str> {
     let link = text.trim_start().strip_prefix("![")?;
     let (alternative, link) = link.split_once("](pictures/")?;
@@ -40,7 +40,7 @@ fn first_picture(text: &str) -> Option<&str> {
     Some(link.split_once(".png)")?.0)
 }
 
-/// Names of all pictures of the page, in its order.
+/// Names of all pictures of the page, in order.
 fn all_pictures(page: &str) -> Vec<&str> {
     let places = page.match_indices("![");
     let names = places.map(|(at, _)| first_picture(&page[at..]).expect("a picture of its own folder"));
@@ -80,7 +80,7 @@ fn every_example_has_its_picture() {
 }
 
 #[test]
-fn pictures_of_scenes_in_their_folder_are_those_of_the_scenes() {
+fn pictures_of_the_scenes_in_the_folder_are_current() {
     for name in ["shapes", "joints"] {
         let file = root().join(format!("{FOLDER}/{name}.toml"));
         check(name, file.to_str().expect("UTF-8"));
@@ -98,7 +98,7 @@ fn every_picture_is_linked_once_and_small() {
     let mut names = Vec::new();
     for file in pictures {
         let size = fs::metadata(&file).expect("readable").len();
-        assert!(size < LARGEST, "{}: {size} bytes", file.display());
+        assert!(size < MAX_SIZE, "{}: {size} bytes", file.display());
         let name = file.file_stem().and_then(|name| name.to_str());
         names.push(name.expect("UTF-8").to_owned());
     }
@@ -110,7 +110,7 @@ fn every_picture_is_linked_once_and_small() {
     assert_eq!(drawn, linked, "each is drawn by a test");
 }
 
-/// Laws, each with what it is asked to do within a second.
+/// Laws with their keys for a motion within a second.
 const DRIVES: [(&str, &str); 7] = [
     ("constant", "velocity = \"60 mm/s\", position = \"-30 mm\""),
     ("harmonic", "amplitude = \"40 mm\", frequency = \"2 Hz\""),
@@ -127,7 +127,7 @@ const DRIVES: [(&str, &str); 7] = [
     ("formula", "formula = \"45 * sin(2*pi*5*t) * exp(-3*t)\", unit = \"mm\""),
 ];
 
-/// The motion of a slide under a law through a second, as the program runs it: s, mm.
+/// The motion of a slide under a law over a second, from a run: s, mm.
 fn motion(law: &str, keys: &str) -> Vec<(f64, f64)> {
     let text = format!(
         "[[body]]\nname = \"slide\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\n\

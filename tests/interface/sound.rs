@@ -1,4 +1,4 @@
-//! Sound: what the host is asked to sound while the run plays.
+//! Sound: the clicks that the host receives during playback.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -13,18 +13,18 @@ use jointplay::simulate::{Impact, Simulation};
 
 use crate::window::{click, shown, sized, window};
 
-/// What a host with ears has heard.
+/// Records of a host that receives sound.
 #[derive(Default)]
-struct Heard {
+struct Recorded {
     on: Cell<bool>,
     clicks: RefCell<Vec<Click>>,
-    /// Why it can hear nothing.
-    deaf: RefCell<Option<String>>,
+    /// Reason for having no sound device.
+    no_device: RefCell<Option<String>>,
 }
 
-struct Ears(Rc<Heard>);
+struct RecordingHost(Rc<Recorded>);
 
-impl Host for Ears {
+impl Host for RecordingHost {
     fn read_dropped(&mut self, _files: Vec<DroppedFile>) {}
 
     fn opened(&mut self) -> Option<Vec<OpenedFile>> {
@@ -41,25 +41,25 @@ impl Host for Ears {
     }
 
     fn no_sound(&mut self) -> Option<String> {
-        self.0.deaf.borrow_mut().take()
+        self.0.no_device.borrow_mut().take()
     }
 }
 
-fn with_ears(scene: &str) -> (Harness<'static, App>, Rc<Heard>) {
+fn with_recording_host(scene: &str) -> (Harness<'static, App>, Rc<Recorded>) {
     let mut harness = window(scene);
-    let heard = Rc::new(Heard::default());
-    harness.state_mut().set_host(Box::new(Ears(heard.clone())));
-    (harness, heard)
+    let recorded = Rc::new(Recorded::default());
+    harness.state_mut().set_host(Box::new(RecordingHost(recorded.clone())));
+    (harness, recorded)
 }
 
-/// One frame; the stretch of the run that it showed, and its clicks.
-fn frame(harness: &mut Harness<'_, App>, heard: &Heard) -> (f64, f64, Vec<Click>) {
+/// Steps one frame; returns the time span that it showed, and its clicks.
+fn frame(harness: &mut Harness<'_, App>, recorded: &Recorded) -> (f64, f64, Vec<Click>) {
     let from = shown(harness);
     harness.step();
-    (from, shown(harness), heard.clicks.take())
+    (from, shown(harness), recorded.clicks.take())
 }
 
-/// All impacts of the scene that end up to `time`, s, by a run of its own.
+/// All impacts of a separate run of the scene that end by `time`, s.
 fn impacts(harness: &Harness<'_, App>, time: f64) -> Vec<Impact> {
     let mut simulation = Simulation::new(&harness.state().player().running().machine).expect("starts");
     let mut impacts = Vec::new();
@@ -72,97 +72,97 @@ fn impacts(harness: &Harness<'_, App>, time: f64) -> Vec<Impact> {
 }
 
 #[test]
-fn while_it_plays_the_clicks_are_the_impacts_of_the_run_at_any_speed() {
+fn clicks_during_playback_are_the_impacts_of_the_run_at_any_speed() {
     for (scene, scale, frames) in [("pendulum", 0.02, 240), ("spcmm", 0.005, 240), ("spcmm", 0.05, 90)] {
-        let (mut harness, heard) = with_ears(scene);
+        let (mut harness, recorded) = with_recording_host(scene);
         harness.key_press(Key::M);
         harness.step();
-        assert!(heard.on.get());
+        assert!(recorded.on.get());
         harness.state_mut().player_mut().pacer.set_scale(scale);
         harness.state_mut().player_mut().set_playing(true);
-        let stretches: Vec<_> = (0..frames).map(|_| frame(&mut harness, &heard)).collect();
+        let spans: Vec<_> = (0..frames).map(|_| frame(&mut harness, &recorded)).collect();
         let all = impacts(&harness, shown(&harness));
         assert!(all.len() > 5, "{scene}: {} impacts", all.len());
         let mass: f64 = harness.state().player().running().machine.bodies.iter().map(|body| body.mass).sum();
-        let mut told = 0;
-        for (from, to, clicks) in stretches {
-            let within = |impact: &&Impact| from < impact.end && impact.end <= to;
-            let ended: Vec<&Impact> = all.iter().filter(within).collect();
+        let mut checked = 0;
+        for (from, to, clicks) in spans {
+            let in_span = |impact: &&Impact| from < impact.end && impact.end <= to;
+            let ended: Vec<&Impact> = all.iter().filter(in_span).collect();
             assert_eq!(clicks.len(), ended.len().min(MAX_CLICKS), "{scene} at {to} s");
             if ended.len() > MAX_CLICKS {
                 continue;
             }
             for (click, impact) in clicks.iter().zip(ended) {
-                told += 1;
+                checked += 1;
                 let time = from + click.after * scale;
                 assert!((time - impact.end).abs() < 1e-9, "{time} s for {} s", impact.end);
                 let pitch = (0.5 / (impact.end - impact.start)).clamp(PITCHES.0, PITCHES.1);
                 assert!((click.pitch / pitch - 1.0).abs() < 1e-9);
-                // Two fifths of force times way is the energy of the blow after Hertz.
-                let behind = 0.8 * impact.peak * impact.deepest / impact.approach_speed.powi(2);
-                let impulse = behind.min(mass) * (impact.approach_speed + impact.separation_speed);
+                // By Hertz, two fifths of peak force times depth is the energy of the impact.
+                let effective_mass = 0.8 * impact.peak * impact.deepest / impact.approach_speed.powi(2);
+                let impulse = effective_mass.min(mass) * (impact.approach_speed + impact.separation_speed);
                 let loudness = (impulse / mass / 0.1).powf(0.4).min(1.0);
                 assert!((click.loudness - loudness).abs() < 1e-9, "{impact:?}");
             }
         }
-        assert!(told > 5, "{scene}: {told}");
+        assert!(checked > 5, "{scene}: {checked}");
     }
 }
 
 #[test]
 fn only_forward_play_with_sound_on_is_audible() {
-    let (mut harness, heard) = with_ears("pendulum");
-    let silent = |harness: &mut Harness<'_, App>, frames: usize, what: &str| {
+    let (mut harness, recorded) = with_recording_host("pendulum");
+    let assert_silent = |harness: &mut Harness<'_, App>, frames: usize, what: &str| {
         for _ in 0..frames {
-            let (_, _, clicks) = frame(harness, &heard);
+            let (_, _, clicks) = frame(harness, &recorded);
             assert!(clicks.is_empty(), "{what}");
         }
     };
-    // Off at first.
+    // Sound is off by default.
     harness.state_mut().player_mut().set_playing(true);
-    silent(&mut harness, 90, "sound is off");
+    assert_silent(&mut harness, 90, "sound is off");
     assert!(impacts(&harness, shown(&harness)).len() > 3);
     harness.key_press(Key::M);
     harness.step();
     harness.state_mut().player_mut().set_playing(false);
-    heard.clicks.take();
-    silent(&mut harness, 5, "paused");
+    recorded.clicks.take();
+    assert_silent(&mut harness, 5, "paused");
     harness.key_press(Key::J);
     harness.step();
     assert!(harness.state().player().is_playing_backwards());
-    silent(&mut harness, 60, "backwards");
+    assert_silent(&mut harness, 60, "backwards");
     for (key, what) in [
         (Key::End, "a jump to the end"),
         (Key::Home, "a jump to the start"),
-        (Key::Period, "on to an impact"),
+        (Key::Period, "a seek to an impact"),
         (Key::ArrowRight, "a step"),
         (Key::End, "a jump to the end"),
-        // None has happened there yet: the run goes on to it.
-        (Key::Period, "on to an impact to come"),
+        // No impact is recorded ahead, so the run continues to the next one.
+        (Key::Period, "a seek to a future impact"),
         (Key::R, "a reset"),
     ] {
         harness.key_press(key);
-        silent(&mut harness, 30, what);
+        assert_silent(&mut harness, 30, what);
     }
-    // What was shown before sounds again when it is played again.
+    // Replaying a shown part makes its impacts audible again.
     harness.state_mut().player_mut().set_playing(true);
-    let again: usize = (0..90).map(|_| frame(&mut harness, &heard).2.len()).sum();
-    assert_eq!(again, impacts(&harness, shown(&harness)).len());
+    let replayed: usize = (0..90).map(|_| frame(&mut harness, &recorded).2.len()).sum();
+    assert_eq!(replayed, impacts(&harness, shown(&harness)).len());
     harness.key_press(Key::M);
     harness.step();
-    heard.clicks.take();
-    assert!(!heard.on.get());
-    silent(&mut harness, 60, "off again");
+    recorded.clicks.take();
+    assert!(!recorded.on.get());
+    assert_silent(&mut harness, 60, "off again");
 }
 
 #[test]
 fn a_run_has_the_same_bits_with_sound_and_without() {
     let run = |sound: bool| {
-        let (mut harness, heard) = with_ears("spcmm");
+        let (mut harness, recorded) = with_recording_host("spcmm");
         harness.state_mut().set_sound(sound);
         harness.state_mut().player_mut().set_playing(true);
         harness.run_steps(90);
-        assert_eq!(heard.clicks.borrow().is_empty(), !sound);
+        assert_eq!(recorded.clicks.borrow().is_empty(), !sound);
         let player = harness.state().player();
         (player.simulation().state_hash(), player.pacer.shown(), player.steps())
     };
@@ -170,8 +170,8 @@ fn a_run_has_the_same_bits_with_sound_and_without() {
 }
 
 #[test]
-fn the_switch_is_in_the_menu_and_the_key_is_its_own() {
-    let (mut harness, heard) = with_ears("pendulum");
+fn sound_has_a_switch_in_the_menu_and_its_own_key() {
+    let (mut harness, recorded) = with_recording_host("pendulum");
     let switch = |harness: &mut Harness<'_, App>, change: bool| {
         click(harness, "View options");
         let node = harness.get_by_role_and_label(Role::CheckBox, "Sound");
@@ -185,12 +185,12 @@ fn the_switch_is_in_the_menu_and_the_key_is_its_own() {
         on
     };
     assert!(!switch(&mut harness, true));
-    assert!(heard.on.get() && harness.state().is_sounding());
+    assert!(recorded.on.get() && harness.state().is_sounding());
     assert!(switch(&mut harness, false));
     harness.key_press(Key::M);
     harness.run();
-    assert!(!switch(&mut harness, false) && !heard.on.get());
-    // The magnification has another.
+    assert!(!switch(&mut harness, false) && !recorded.on.get());
+    // The magnification has a different key.
     let magnified = |harness: &Harness<'_, App>| harness.state().link().magnification;
     let before = magnified(&harness);
     harness.key_press(Key::X);
@@ -200,21 +200,21 @@ fn the_switch_is_in_the_menu_and_the_key_is_its_own() {
 }
 
 #[test]
-fn without_a_device_the_window_says_so_and_goes_on() {
-    let (mut harness, heard) = with_ears("pendulum");
+fn without_a_sound_device_the_window_reports_it_and_continues() {
+    let (mut harness, recorded) = with_recording_host("pendulum");
     harness.state_mut().player_mut().set_playing(true);
     harness.key_press(Key::M);
     harness.run_steps(3);
     assert!(harness.state().is_sounding());
-    // It turns out later, as opening a device takes a while.
-    heard.deaf.replace(Some("this machine has no sound device".to_owned()));
+    // The failure arrives later, as opening a device takes a while.
+    recorded.no_device.replace(Some("this machine has no sound device".to_owned()));
     harness.run_steps(90);
-    assert!(!harness.state().is_sounding() && !heard.on.get());
+    assert!(!harness.state().is_sounding() && !recorded.on.get());
     let words = harness.state().announcement();
     assert!(words.contains("No sound: this machine has no sound device."), "{words}");
     assert!(harness.state().player().is_playing());
 
-    // A window without any services knows at once.
+    // A window without a host reports it at once.
     let mut harness = sized("pendulum", [1280.0, 800.0], egui::Theme::Light);
     harness.key_press(Key::M);
     harness.run_steps(90);

@@ -1,4 +1,4 @@
-//! Bushings against closed solutions: deflections, natural frequencies, momentum and energy.
+//! Bushings against closed-form solutions: deflections, natural frequencies, momentum and energy.
 
 use crate::common::matrix::{FORMULATIONS, for_every};
 use crate::elements::frame_at;
@@ -6,8 +6,8 @@ use crate::joint_elements::{momenta, start_simulation};
 use jointplay::machine::{Quat, Vec3};
 use jointplay::scene::Scene;
 
-/// One free body of 0.5 kg at (0.1, 0.2, 0.3) m with `start` besides, and a bushing at its centroid to the world with `more`.
-fn one(start: &str, more: &str) -> String {
+/// A free body of 0.5 kg with the pose `start`, and a bushing from the world at (0.1, 0.2, 0.3) m to its centroid; `more` has further keys.
+fn bushing_scene(start: &str, more: &str) -> String {
     format!(
         "[gravity]\nx = 0\ny = 0\nz = 0\n\
          [[body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
@@ -21,8 +21,8 @@ const STIFFNESS: [f64; 3] = [200.0, 300.0, 500.0];
 const TURNING: [f64; 3] = [0.1, 0.2, 0.3];
 const INERTIA: [f64; 3] = [2e-4, 3e-4, 4e-4];
 
-/// Rotation vector of a matrix, by the angle and axis of nalgebra.
-fn turned(rotation: &nalgebra::Matrix3<f64>) -> Vec3 {
+/// Rotation vector of a rotation matrix.
+fn rotation_vector(rotation: &nalgebra::Matrix3<f64>) -> Vec3 {
     Quat::from_matrix(rotation).scaled_axis()
 }
 
@@ -30,10 +30,10 @@ fn turned(rotation: &nalgebra::Matrix3<f64>) -> Vec3 {
 fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
     for_every(0..3, |axis, variant| {
         let (bound, label) = (variant.bound(), format!("{variant}, axis {axis}"));
-        let mut place = [100.0, 200.0, 300.0];
-        place[axis] += 20.0;
-        let start = format!("position = \"{} {} {} mm\"", place[0], place[1], place[2]);
-        let mut simulation = start_simulation(&one(&start, ""), &variant.close());
+        let mut position = [100.0, 200.0, 300.0];
+        position[axis] += 20.0;
+        let start = format!("position = \"{} {} {} mm\"", position[0], position[1], position[2]);
+        let mut simulation = start_simulation(&bushing_scene(&start, ""), &variant.close());
         let t = 0.15;
         let frame = frame_at(&mut simulation, t);
         let omega = (STIFFNESS[axis] / 0.5).sqrt();
@@ -44,15 +44,15 @@ fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
         let force = frame.elements[0].force[axis] + STIFFNESS[axis] * off;
         assert!(force.abs() < 2e3 * bound, "{label}: {force:e}");
 
-        // About one axis it is linear however far it turns.
+        // Rotation about one axis is linear up to any angle.
         let mut about = [0, 0, 0];
         about[axis] = 1;
         let start = format!("position = \"100 200 300 mm\", rotation = {{ axis = {about:?}, angle = \"1 rad\" }}");
-        let mut simulation = start_simulation(&one(&start, ""), &variant.close());
+        let mut simulation = start_simulation(&bushing_scene(&start, ""), &variant.close());
         let frame = frame_at(&mut simulation, t);
         let omega = (TURNING[axis] / INERTIA[axis]).sqrt();
         let angle = (omega * t).cos();
-        let wrong = (turned(&frame.bodies[0].rotation) - Vec3::ith(axis, angle)).norm();
+        let wrong = (rotation_vector(&frame.bodies[0].rotation) - Vec3::ith(axis, angle)).norm();
         assert!(wrong < 200.0 * bound, "{label}: {wrong:e}");
         let residual = simulation.ledger().unwrap().relative_residual();
         assert!(residual.abs() < 1e-3, "{label}: {residual:e}");
@@ -60,8 +60,8 @@ fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
 }
 
 #[test]
-fn under_a_load_a_bushing_gives_way_along_and_about_its_own_axes() {
-    // Its axes are turned by 30 degrees about z, and the body rests 20 degrees about x from the world.
+fn a_loaded_bushing_deflects_along_and_about_its_own_axes() {
+    // Its axes are rotated by 30 degrees about z; the body's rest orientation is 20 degrees about x.
     let (sin, cos) = 30_f64.to_radians().sin_cos();
     let axes = nalgebra::Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
     let rest = Quat::from_axis_angle(&Vec3::x_axis(), 20_f64.to_radians());
@@ -82,17 +82,17 @@ fn under_a_load_a_bushing_gives_way_along_and_about_its_own_axes() {
                     list(0.05, "N m")
                 );
                 let changes = [("solver.method", method), ("solver.tolerance", "1e-8"), ("formulation", formulation)];
-                let text = one(start, bushing) + &load;
+                let text = bushing_scene(start, bushing) + &load;
                 let mut simulation = start_simulation(&text, &changes);
                 let frame = frame_at(&mut simulation, 3.0);
                 let label = format!("{method} {formulation} {axis}");
                 let moved = frame.bodies[0].position - Vec3::new(0.1, 0.2, 0.3);
                 let expected = direction * (4.0 / STIFFNESS[axis]);
                 assert!((moved - expected).norm() < 1e-7, "{label}: {moved} {expected}");
-                let turn = turned(&(frame.bodies[0].rotation * rest.inverse().to_rotation_matrix()));
+                let turn = rotation_vector(&(frame.bodies[0].rotation * rest.inverse().to_rotation_matrix()));
                 let expected = direction * (0.05 / TURNING[axis]);
                 assert!((turn - expected).norm() < 1e-6, "{label}: {turn} {expected}");
-                // Loads come first.
+                // The load is the first element.
                 let report = &frame.elements[1];
                 let off = (report.force + direction * 4.0).norm();
                 assert!(off < 1e-3, "{label}: {off:e}");
@@ -103,8 +103,8 @@ fn under_a_load_a_bushing_gives_way_along_and_about_its_own_axes() {
 }
 
 #[test]
-fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
-    // So soft that the bodies turn far against each other: no small angles.
+fn a_tumbling_pair_on_a_soft_bushing_conserves_momentum_and_energy() {
+    // So soft that the relative rotations are large.
     let pair = "[gravity]\nx = 0\ny = 0\nz = 0\n\
         [[body]]\nname = \"one\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
         [[body]]\nname = \"two\"\nmass = \"0.3 kg\"\ninertia = \"1e-4 2e-4 1.5e-4 kg m^2\"\n\
@@ -119,15 +119,15 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
     let damped = "damping = \"0.5 0.2 1 N s/m\"\nturning_damping = \"1e-3 5e-4 2e-3 N m s/rad\"\n";
     for more in ["", damped] {
         let mut ends = Vec::new();
-        let ways = [
+        let variants = [
             ("dopri5", "tree"),
             ("radau5", "tree"),
             ("radau5", "lagrange"),
             ("automatic", "tree"),
             ("dopri5", "lagrange"),
         ];
-        // What damps has no part in how they differ: there two are enough.
-        for (method, formulation) in ways.into_iter().skip(if more.is_empty() { 0 } else { 3 }) {
+        // Damping adds no difference between the variants: two are enough with it.
+        for (method, formulation) in variants.into_iter().skip(if more.is_empty() { 0 } else { 3 }) {
             let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
             let mut simulation = start_simulation(&format!("{pair}{more}"), &changes);
             let machine = simulation.machine().clone();
@@ -136,7 +136,7 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
             for sample in 1..=20 {
                 let frame = frame_at(&mut simulation, 0.05 * f64::from(sample));
                 let relative = frame.bodies[0].rotation.transpose() * frame.bodies[1].rotation;
-                furthest = furthest.max(turned(&relative).norm());
+                furthest = furthest.max(rotation_vector(&relative).norm());
             }
             assert!(furthest > 0.7 && furthest < 3.0, "{furthest}");
             let frame = frame_at(&mut simulation, 1.0);
@@ -162,8 +162,8 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
 }
 
 #[test]
-fn a_body_on_a_bushing_does_not_fly_freely() {
-    // Three free bodies with play: bodies that touch nothing are left out of steps, unless something else acts on them.
+fn a_body_on_a_bushing_is_not_in_free_flight() {
+    // Bodies without contact are excluded from the steps, unless a force element acts on them.
     let text = jointplay::scene::built_in_text("chain").unwrap();
     let bushing = "[[bushing]]\nname = \"b\"\nfrom = { body = \"world\", at = \"0 0 0 mm\" }\nto = { body = \"link3\" }\n\
                    stiffness = \"0 2 0 N/m\"\nrotation = { axis = [1, 0, 0], angle = \"0 deg\" }\n\
@@ -176,30 +176,36 @@ fn a_body_on_a_bushing_does_not_fly_freely() {
 }
 
 #[test]
-fn bad_bushings_are_refused_with_their_position() {
+fn invalid_bushings_are_refused_with_their_position() {
     let start = "position = [0, 0, 0]";
-    for (text, said) in [
-        (one(start, "").replace("200 300 500 N/m", "200 -300 500 N/m"), ["bushing.b.stiffness", "allowed 0 N/m to"]),
-        (one(start, "").replace("0.3 N m/rad", "0.3 N/m"), ["wrong unit `N/m`", "units of turning stiffness"]),
+    for (text, fragments) in [
         (
-            one(start, "").replace("200 300 500", "0 0 0").replace("0.1 0.2 0.3", "0 0 0"),
+            bushing_scene(start, "").replace("200 300 500 N/m", "200 -300 500 N/m"),
+            ["bushing.b.stiffness", "allowed 0 N/m to"],
+        ),
+        (
+            bushing_scene(start, "").replace("0.3 N m/rad", "0.3 N/m"),
+            ["wrong unit `N/m`", "units of turning stiffness"],
+        ),
+        (
+            bushing_scene(start, "").replace("200 300 500", "0 0 0").replace("0.1 0.2 0.3", "0 0 0"),
             ["does nothing: stiffness, damping, turning_stiffness", "are 0"],
         ),
-        (one(start, "axes = { axis = [0, 0, 1] }\n"), ["bushing.b.axes.angle", "missing"]),
+        (bushing_scene(start, "axes = { axis = [0, 0, 1] }\n"), ["bushing.b.axes.angle", "missing"]),
         (
-            one(start, "").replace("body = \"mass\" }\nstiff", "body = \"world\" }\nstiff"),
+            bushing_scene(start, "").replace("body = \"mass\" }\nstiff", "body = \"world\" }\nstiff"),
             ["bushing.b.to", "same body"],
         ),
     ] {
         let error = Scene::parse(&text, Some("mine.toml"), &[]).expect_err(&text);
         let message = error.to_string();
-        for said in said {
-            assert!(message.contains(said), "{message}\nlacks {said}");
+        for fragment in fragments {
+            assert!(message.contains(fragment), "{message}\nlacks {fragment}");
         }
     }
 }
 
-/// Three bodies about the z axis, each 20 mm further out than a bushing to the world that is stiffest that way.
+/// Three bodies around the z axis, each 20 mm outside a bushing to the world that is stiffest in the radial direction.
 const RING: &str = "[gravity]\nx = 0\ny = 0\nz = 0\n\
     [[pattern]]\nname = \"ring\"\ncount = 3\nabout = { axis = [0, 0, 1] }\n\
     [[pattern.body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
@@ -208,8 +214,8 @@ const RING: &str = "[gravity]\nx = 0\ny = 0\nz = 0\n\
     stiffness = \"500 300 200 N/m\"\nturning_stiffness = \"1 2 3 N m/rad\"\n";
 
 #[test]
-fn bushings_of_a_pattern_turn_with_its_copies() {
-    // The axes turn with the copies whichever end the world is.
+fn bushings_of_a_pattern_rotate_with_its_instances() {
+    // The axes rotate with the instances, whichever end is the world.
     let backwards = RING.replace(
         "from = { body = \"world\", at = \"100 0 0 mm\" }\nto = { body = \"mass\" }",
         "from = { body = \"mass\" }\nto = { body = \"world\", at = \"100 0 0 mm\" }",

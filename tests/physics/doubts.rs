@@ -1,14 +1,14 @@
-//! A result that is not to be trusted says so, and why; one that is says nothing.
+//! Untrustworthy results raise a doubt with its reason; trustworthy ones raise none.
 
 use crate::common::{Changes, frame_now, free_ball, parse, run_until, simulation};
 use jointplay::simulate::{Doubt, Simulation};
 
-fn words(simulation: &Simulation) -> Vec<String> {
+fn doubt_texts(simulation: &Simulation) -> Vec<String> {
     let doubts = simulation.doubts();
     doubts.iter().map(ToString::to_string).collect()
 }
 
-fn ran(scene: &str, changes: &Changes, duration: f64) -> Simulation {
+fn run_for(scene: &str, changes: &Changes, duration: f64) -> Simulation {
     let mut simulation = simulation(scene, changes);
     run_until(&mut simulation, duration);
     simulation
@@ -18,12 +18,12 @@ fn ran(scene: &str, changes: &Changes, duration: f64) -> Simulation {
 fn the_built_in_scenes_raise_no_doubt_with_any_preset() {
     for scene in crate::common::SCENES {
         for preset in ["preview", "real-time", "accurate"] {
-            let simulation = ran(scene, &[("solver.preset", preset)], 0.03);
+            let simulation = run_for(scene, &[("solver.preset", preset)], 0.03);
             let none: [String; 0] = [];
-            assert_eq!(words(&simulation), none, "{scene}, {preset}");
+            assert_eq!(doubt_texts(&simulation), none, "{scene}, {preset}");
         }
     }
-    let rk4 = ran("spcmm", &[("solver.method", "rk4")], 0.03);
+    let rk4 = run_for("spcmm", &[("solver.method", "rk4")], 0.03);
     assert_eq!(rk4.statistics().coarse, [0; 3]);
     assert!(rk4.doubts().is_empty(), "{:?}", rk4.doubts());
 }
@@ -31,9 +31,9 @@ fn the_built_in_scenes_raise_no_doubt_with_any_preset() {
 #[test]
 fn longer_runs_with_default_settings_raise_no_doubt() {
     for scene in crate::common::SCENES {
-        let simulation = ran(scene, &[], 0.1);
+        let simulation = run_for(scene, &[], 0.1);
         assert_eq!(simulation.doubts(), [], "{scene}");
-        let simulation = ran(scene, &[("formulation", "lagrange")], 0.03);
+        let simulation = run_for(scene, &[("formulation", "lagrange")], 0.03);
         assert_eq!(simulation.doubts(), [], "{scene}, lagrange");
     }
 }
@@ -47,47 +47,47 @@ fn a_wrong_energy_raises_a_doubt() {
     let loose = [("solver.method", "dopri5"), ("solver.tolerance", "1e-3")];
     let heavy = [("solver.method", "rk4"), ("gravity.x", "981 m/s^2")];
     let energy = |doubt: &Doubt| matches!(doubt, Doubt::Energy { share, .. } if *share > 5e-3);
-    let short = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { steps: 5, .. });
-    let held = |doubt: &Doubt| matches!(doubt, Doubt::StabilityLimited { share, .. } if *share > 0.1);
+    let too_few_steps = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { steps: 5, .. });
+    let stability_limited = |doubt: &Doubt| matches!(doubt, Doubt::StabilityLimited { share, .. } if *share > 0.1);
     let work =
         |doubt: &Doubt| matches!(doubt, Doubt::Work { value, residual, .. } if residual.abs() > 0.1 * value.abs());
     let looser = [("solver.method", "dopri5"), ("solver.tolerance", "4e-4")];
     let cases: [Case; 7] = [
         ("pendulum", &coarse, 0.01, energy),
-        ("pendulum", &coarse, 0.01, short),
+        ("pendulum", &coarse, 0.01, too_few_steps),
         ("spcmm", &coarse, 0.012, energy),
-        ("spcmm", &coarse, 0.012, short),
+        ("spcmm", &coarse, 0.012, too_few_steps),
         ("spcmm", &heavy, 0.01, energy),
-        ("spcmm", &loose, 0.5, held),
+        ("spcmm", &loose, 0.5, stability_limited),
         ("pendulum", &looser, 0.5, work),
     ];
     for (scene, changes, duration, expected) in cases {
-        let doubts = ran(scene, changes, duration).doubts();
-        let told = doubts.iter().filter(|doubt| expected(doubt)).count();
-        assert_eq!(told, 1, "{scene} {changes:?}: {doubts:#?}");
+        let doubts = run_for(scene, changes, duration).doubts();
+        let count = doubts.iter().filter(|doubt| expected(doubt)).count();
+        assert_eq!(count, 1, "{scene} {changes:?}: {doubts:#?}");
         for doubt in &doubts {
-            let words = doubt.to_string();
-            assert!(words.ends_with('.') && !words.contains("NaN"), "{words}");
+            let text = doubt.to_string();
+            assert!(text.ends_with('.') && !text.contains("NaN"), "{text}");
         }
     }
-    // Without a ledger the energy says nothing; what the steps say stays.
+    // Without a ledger there is no doubt about energy; that about the steps stays.
     let off = [coarse[0], coarse[1], ("solver.energy_ledger", "off")];
-    let doubts = ran("pendulum", &off, 0.01).doubts();
-    assert!(doubts.iter().any(short) && !doubts.iter().any(energy), "{doubts:?}");
+    let doubts = run_for("pendulum", &off, 0.01).doubts();
+    assert!(doubts.iter().any(too_few_steps) && !doubts.iter().any(energy), "{doubts:?}");
 }
 
 #[test]
 fn damping_beyond_its_domain_names_joint_and_instant() {
     let changes = [("chain.links", "12"), ("contact.approach_speed", "start"), ("solver.tolerance", "1e-4")];
-    let simulation = ran("chain", &changes, 0.06);
+    let simulation = run_for("chain", &changes, 0.06);
     let doubts = simulation.doubts();
     let found = doubts.iter().find_map(|doubt| match doubt {
         Doubt::Damping { joints, time, ratio, usual } => Some((joints, *time, *ratio, *usual)),
         _ => None,
     });
-    let (joints, time, ratio, usual) = found.expect("a doubt about damping");
+    let (joints, time, ratio, undisturbed) = found.expect("a doubt about damping");
     assert!(joints.worst.starts_with('J') && (0.0..0.06).contains(&time), "{doubts:?}");
-    assert!(ratio > usual + 1.0 && (usual - 0.1425).abs() < 1e-6, "{doubts:?}");
+    assert!(ratio > undisturbed + 1.0 && (undisturbed - 0.1425).abs() < 1e-6, "{doubts:?}");
 }
 
 #[test]
@@ -110,9 +110,9 @@ fn each_doubt_is_reported_once_with_its_joint() {
         ("spcmm", &[("joint.S2.clearance", "5 um")], "S2: clearance 0.005 mm is so small"),
     ];
     for (scene, changes, expected) in cases {
-        let doubts = words(&ran(scene, changes, 0.03));
-        let said = doubts.iter().filter(|doubt| doubt.contains(expected));
-        assert_eq!(said.count(), 1, "{scene} {changes:?}: {doubts:#?}");
+        let doubts = doubt_texts(&run_for(scene, changes, 0.03));
+        let matching = doubts.iter().filter(|doubt| doubt.contains(expected));
+        assert_eq!(matching.count(), 1, "{scene} {changes:?}: {doubts:#?}");
     }
 }
 
@@ -121,17 +121,17 @@ fn a_reset_clears_doubts_and_a_snapshot_keeps_them() {
     let changes = [("contact.impact_speed_floor", "10 m/s")];
     let mut simulation = crate::common::live("pendulum", &changes);
     run_until(&mut simulation, 0.03);
-    let kept = simulation.doubts();
-    assert_eq!(kept.len(), 1);
+    let expected = simulation.doubts();
+    assert_eq!(expected.len(), 1);
     let snapshot = simulation.snapshot();
     simulation.reset().unwrap();
     assert!(simulation.doubts().is_empty());
     simulation.restore(&snapshot);
-    assert_eq!(simulation.doubts(), kept);
+    assert_eq!(simulation.doubts(), expected);
 }
 
 #[test]
-fn the_summary_of_a_run_marks_it() {
+fn the_summary_of_a_run_reports_doubts() {
     let run = |form: &str, floor: &str| {
         let output = std::process::Command::new(env!("CARGO_BIN_EXE_jointplay"))
             .args(["run", "pendulum", "--duration", "20ms", "--quiet", "--summary", form])
@@ -141,22 +141,22 @@ fn the_summary_of_a_run_marks_it() {
         assert!(output.status.success(), "{output:?}");
         String::from_utf8(output.stdout).unwrap()
     };
-    let (odd, usual) = ("contact.impact_speed_floor=10m/s", "contact.impact_speed_floor=1mm/s");
-    let json: serde_json::Value = serde_json::from_str(&run("json", odd)).unwrap();
+    let (doubtful, trusted) = ("contact.impact_speed_floor=10m/s", "contact.impact_speed_floor=1mm/s");
+    let json: serde_json::Value = serde_json::from_str(&run("json", doubtful)).unwrap();
     assert_eq!(json["doubts"].as_array().unwrap().len(), 1, "{json}");
     assert_eq!(json["slower_than_asked"], false);
-    let json: serde_json::Value = serde_json::from_str(&run("json", usual)).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&run("json", trusted)).unwrap();
     assert!(json["doubts"].as_array().unwrap().is_empty(), "{json}");
-    assert!(run("text", odd).contains("Not trusted       S1: "), "{}", run("text", odd));
-    assert!(!run("text", usual).contains("Not trusted"));
+    assert!(run("text", doubtful).contains("Not trusted       S1: "), "{}", run("text", doubtful));
+    assert!(!run("text", trusted).contains("Not trusted"));
 }
 
 /// Lines of `[contact]`.
 const PLAY: &str = r#"clearance = "0.3 mm""#;
 
-/// What a bouncing ball exchanges grows with every bounce; what it holds does not.
+/// The energy exchanged by a bouncing ball grows with every bounce, its stored energy does not.
 #[test]
-fn steady_drift_is_marked_however_often_energy_was_exchanged() {
+fn steady_drift_raises_a_doubt_even_after_many_exchanges_of_energy() {
     let text = free_ball(0.0, 0.0, -9.81, PLAY);
     let cases: [(&Changes, bool); 3] = [
         (&[("solver.preset", "preview")], true),
@@ -169,13 +169,13 @@ fn steady_drift_is_marked_however_often_energy_was_exchanged() {
         run_until(&mut simulation, 10.0);
         let ledger = simulation.ledger().unwrap();
         let share = ledger.residual().abs() / (0.1 * 9.81 * 3e-4);
-        let said = simulation.doubts().iter().any(|doubt| matches!(doubt, Doubt::Energy { .. }));
-        assert_eq!(said, drifts, "{changes:?}: {:?}", simulation.doubts());
+        let has_doubt = simulation.doubts().iter().any(|doubt| matches!(doubt, Doubt::Energy { .. }));
+        assert_eq!(has_doubt, drifts, "{changes:?}: {:?}", simulation.doubts());
         assert_eq!(share > 0.1, drifts, "{changes:?}: {share}");
     }
 }
 
-/// At rest under a load hardly anything is exchanged, so that rounding is a large part of it; and nothing rebounds.
+/// At rest under a load hardly any energy is exchanged, so that rounding is a large part of it, and nothing rebounds.
 #[test]
 fn a_ball_at_rest_under_a_load_raises_no_doubt() {
     let load = "[[load]]\nname = \"L\"\non = { body = \"ball\" }\nforce = \"0 0 -100 N\"";
@@ -199,7 +199,7 @@ fn a_ball_at_rest_under_a_load_raises_no_doubt() {
 }
 
 #[test]
-fn a_machine_that_starts_inside_a_stop_says_how_deep_and_how_hard() {
+fn a_start_inside_a_stop_raises_a_doubt_with_depth_and_force() {
     let text = |start: &str| {
         format!(
             r#"
@@ -224,10 +224,10 @@ fn a_machine_that_starts_inside_a_stop_says_how_deep_and_how_hard() {
             "#
         )
     };
-    let doubts = |start: &str| words(&Simulation::new(&parse(&text(start), &[]).machine).unwrap());
-    let said = "end: the machine starts 40 mm inside this stop, whose depth is 0.1 mm: it pushes with 800000 N; the start or the \
+    let doubts = |start: &str| doubt_texts(&Simulation::new(&parse(&text(start), &[]).machine).unwrap());
+    let expected = "end: the machine starts 40 mm inside this stop, whose depth is 0.1 mm: it pushes with 800000 N; the start or the \
                 limit is wrong.";
-    assert_eq!(doubts("50"), [said]);
-    // One that rests on it is where it may be.
+    assert_eq!(doubts("50"), [expected]);
+    // A machine that rests on the stop raises none.
     assert!(doubts("10.05").is_empty() && doubts("5").is_empty());
 }

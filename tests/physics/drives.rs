@@ -1,9 +1,9 @@
-//! Laws of drives in running machines: nothing short is stepped over, and every joule is accounted for.
+//! Laws of drives in running machines: short pulses are not stepped over, and every joule is accounted for.
 
 use crate::common::{Changes, frame_now, parse, run_until};
 use jointplay::simulate::Simulation;
 
-/// A slider with this drive along x, from which a rod hangs in a ball joint.
+/// A slider with this drive along x and a rod that hangs from it on a ball joint.
 fn hanging(drive: &str, changes: &Changes) -> Simulation {
     let text = format!(
         "start = \"ideal\"\n[gravity]\nz = \"-9.81 m/s^2\"\n\
@@ -17,7 +17,7 @@ fn hanging(drive: &str, changes: &Changes) -> Simulation {
     Simulation::new(&parse(&text, changes).machine).unwrap()
 }
 
-/// A slider-crank whose crank has this drive, without play: its motion is a function of time alone.
+/// A slider-crank with this drive and ideal joints, whose motion is a function of time alone.
 fn kinematic(drive: &str, changes: &Changes) -> Simulation {
     let body =
         |name: &str| format!("[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n");
@@ -50,7 +50,7 @@ const LAWS: [&str; 8] = [
 ];
 
 #[test]
-fn the_ledger_closes_under_every_law() {
+fn the_ledger_balances_under_every_law() {
     for law in LAWS {
         for formulation in ["tree", "lagrange"] {
             for clearance in ["0", "0.3 mm"] {
@@ -70,7 +70,7 @@ fn the_ledger_closes_under_every_law() {
 }
 
 #[test]
-fn the_ledger_closes_where_the_motion_is_a_function_of_time_alone() {
+fn the_ledger_balances_for_kinematic_motion() {
     for law in LAWS {
         let law = law.replace("mm/s", "rad/s").replace("5 mm", "1 rad").replace("mm", "deg");
         for formulation in ["tree", "lagrange"] {
@@ -90,7 +90,7 @@ fn the_ledger_closes_where_the_motion_is_a_function_of_time_alone() {
 fn no_step_passes_over_a_pulse_after_a_second_of_rest() {
     for (height, duration) in [("2 mm", "5 ms"), ("0.2 mm", "0.5 ms")] {
         let law = format!("law = \"pulse\", height = \"{height}\", start = \"1.0037 s\", duration = \"{duration}\"");
-        let after = |method: &str, formulation: &str| {
+        let exchanged_energy = |method: &str, formulation: &str| {
             let changes = [
                 ("contact.clearance", "0"),
                 ("solver.method", method),
@@ -107,19 +107,19 @@ fn no_step_passes_over_a_pulse_after_a_second_of_rest() {
             assert!(residual.abs() < 1e-5, "{method} {formulation}: {residual:e}");
             ledger.exchanged
         };
-        let fixed = after("rk4", "tree");
+        let fixed = exchanged_energy("rk4", "tree");
         assert!(fixed > 1e-3, "{fixed}");
         for method in ["dopri5", "automatic", "radau5"] {
             for formulation in ["tree", "lagrange"] {
-                let ratio = after(method, formulation) / fixed;
-                // What goes there and back within one step is not seen.
+                let ratio = exchanged_energy(method, formulation) / fixed;
+                // The tolerance covers energy that is exchanged and returned within a step.
                 assert!((ratio - 1.0).abs() < 0.02, "{method} {formulation}: {ratio}");
             }
         }
     }
 }
 
-/// The same, without an instant at which the run was looked at.
+/// The same without a sample before the pulse.
 #[test]
 fn no_step_passes_over_a_pulse_between_two_samples() {
     let law = "law = \"pulse\", height = \"0.2 mm\", start = \"1.0037 s\", duration = \"0.5 ms\"";
@@ -132,7 +132,7 @@ fn no_step_passes_over_a_pulse_between_two_samples() {
         let steps = simulation.statistics().steps;
         assert!(steps < 600, "{method}: {steps} steps");
     }
-    // Of a formula, by its key.
+    // A formula needs the key `resolve`.
     let formula = "law = \"formula\", resolve = \"50 us\", unit = \"mm\", \
                    formula = \"0.2 * smoothstep((t - 0.1037)/2e-4) * (1 - smoothstep((t - 0.1039)/2e-4))\"";
     let mut simulation = hanging(formula, &[("contact.clearance", "0")]);
@@ -141,7 +141,7 @@ fn no_step_passes_over_a_pulse_between_two_samples() {
 }
 
 #[test]
-fn formula_table_and_sum_move_a_machine_as_the_harmonic_law_does() {
+fn equivalent_formula_table_and_sum_move_a_machine_as_the_harmonic_law() {
     let points: Vec<String> = (0..=200)
         .map(|n| {
             let t = f64::from(n) / 800.0;
@@ -149,7 +149,7 @@ fn formula_table_and_sum_move_a_machine_as_the_harmonic_law_does() {
             format!("[\"{t} s\", \"{x:e} m\"]")
         })
         .collect();
-    let same = [
+    let equivalent = [
         "law = \"harmonics\", terms = [{ amplitude = \"5 mm\", frequency = \"4 Hz\" }]".to_owned(),
         "law = \"formula\", formula = \"0.005 * sin(2*pi*4*t)\"".to_owned(),
         "law = \"formula\", formula = \"5*sin(8*pi*t)\", unit = \"mm\"".to_owned(),
@@ -164,7 +164,7 @@ fn formula_table_and_sum_move_a_machine_as_the_harmonic_law_does() {
             [frame.bodies[0].position, frame.bodies[1].position]
         };
         let [slider, rod] = end("law = \"harmonic\", amplitude = \"5 mm\", frequency = \"4 Hz\"");
-        for law in &same {
+        for law in &equivalent {
             let [s, r] = end(law);
             assert!((s - slider).norm() < 1e-8, "{formulation} {law}: {s} {slider}");
             assert!((r - rod).norm() < 1e-7, "{formulation} {law}: {r} {rod}");
@@ -185,9 +185,9 @@ fn a_hinge_follows_a_ramp_to_its_end_angle() {
     let before = frame_now(&mut simulation).bodies[crank].rotation;
     run_until(&mut simulation, 0.2);
     let now = frame_now(&mut simulation).bodies[crank];
-    let turned = (before.transpose() * now.rotation).trace();
-    let turned = (0.5 * (turned - 1.0)).acos().to_degrees();
-    assert!((turned - 60.0).abs() < 1e-9, "{turned}");
+    let angle = (before.transpose() * now.rotation).trace();
+    let angle = (0.5 * (angle - 1.0)).acos().to_degrees();
+    assert!((angle - 60.0).abs() < 1e-9, "{angle}");
     assert!(now.angular_velocity.norm() < 1e-12);
 }
 

@@ -1,17 +1,17 @@
-//! Energy is neither made nor lost where nothing gives or takes it, and what actuators give is what arrives.
+//! Energy is conserved without actuators and dissipation, and the work of actuators equals the gain of energy.
 
 use crate::common::{Changes, parse, simulation};
 use jointplay::scene::built_in_text;
 use jointplay::simulate::{Frame, Simulation};
 
-/// Elastic and frictionless contacts; the tolerance at which impacts keep their energy to 1e-6, also over a second.
+/// Elastic and frictionless contacts, with a tolerance at which impacts conserve energy to 1e-6.
 const ELASTIC: [(&str, &str); 3] =
     [("contact.normal_law", "hertz"), ("contact.friction_law", "none"), ("solver.tolerance", "1e-11")];
-/// Restitution 1 makes every damped law elastic too.
+/// Restitution 1 makes every damped law elastic, too.
 const RESTITUTION_ONE: [(&str, &str); 3] =
     [("contact.restitution", "1"), ("contact.friction", "0"), ("solver.tolerance", "1e-11")];
 
-/// Largest change of the total energy over `duration`, relative to the largest kinetic plus elastic energy; and impacts.
+/// Largest change of the total energy over `duration`, relative to the largest kinetic plus elastic energy, and the number of impacts.
 fn drift(simulation: &mut Simulation, duration: f64) -> (f64, u64) {
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
@@ -27,7 +27,7 @@ fn drift(simulation: &mut Simulation, duration: f64) -> (f64, u64) {
 }
 
 #[test]
-fn elastic_impacts_keep_the_total_energy() {
+fn elastic_impacts_conserve_the_total_energy() {
     let resting = [("spcmm.amplitude_x", "0"), ("spcmm.amplitude_beta", "0")];
     let cases: [(&str, &Changes, &Changes); 5] = [
         ("spcmm", &resting, &ELASTIC),
@@ -46,7 +46,7 @@ fn elastic_impacts_keep_the_total_energy() {
     }
 }
 
-/// The pendulum with an ideal joint, turned by `angle` from the vertical, with an angular velocity.
+/// The pendulum with an ideal joint, at `angle` from the vertical, with an angular velocity.
 fn ideal_pendulum(angle: &str, angular_velocity: &str) -> Simulation {
     let text = built_in_text("pendulum").unwrap();
     let start = "rotation = { axis = [0, 1, 0], angle = \"-30 deg\" }";
@@ -60,7 +60,7 @@ fn ideal_pendulum(angle: &str, angular_velocity: &str) -> Simulation {
 }
 
 #[test]
-fn ideal_pendulum_keeps_energy_and_vertical_angular_momentum() {
+fn an_ideal_pendulum_conserves_energy_and_vertical_angular_momentum() {
     let mut simulation = ideal_pendulum("-50 deg", "1 2 3 rad/s");
     let body = simulation.machine().bodies[0].clone();
     let momentum = |frame: &Frame| {
@@ -129,10 +129,10 @@ fn gauss() -> [(f64, f64); 3] {
     [(0.5 - d, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + d, 5.0 / 18.0)]
 }
 
-/// Work of the actuators minus change of energy, J, at its worst over `duration`; the largest |work|; impacts.
+/// Largest difference, J, between actuator work and change of energy over `duration`; the largest |work|; the number of impacts.
 fn power_balance(simulation: &mut Simulation, duration: f64) -> (f64, f64, u64) {
     let machine = simulation.machine().clone();
-    // Driven joints hang on the world here: their axes are world axes.
+    // All driven joints are on the world, so their axes are world axes.
     let drives: Vec<_> = machine.joints.iter().filter(|j| j.drive.is_some()).collect();
     assert!(drives.iter().all(|j| j.parent.is_none()));
     let power = |frame: &Frame| -> f64 {
@@ -151,9 +151,9 @@ fn power_balance(simulation: &mut Simulation, duration: f64) -> (f64, f64, u64) 
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     let start = frame.kinetic + frame.potential;
-    let (mut work, mut worst, mut most) = (0.0, 0.0_f64, 0.0_f64);
+    let (mut work, mut worst, mut max_work) = (0.0, 0.0_f64, 0.0_f64);
     while simulation.time() < duration {
-        // Short enough for the quadrature where nothing else limits the step.
+        // Limits the step for the quadrature where nothing else does.
         let end = simulation.time() + 2e-3;
         simulation.step_until(end).unwrap();
         let (from, to) = (simulation.step_start(), simulation.time());
@@ -163,18 +163,18 @@ fn power_balance(simulation: &mut Simulation, duration: f64) -> (f64, f64, u64) 
         }
         simulation.sample(to, &mut frame);
         worst = worst.max((frame.kinetic + frame.potential - start - work).abs());
-        most = most.max(work.abs());
+        max_work = max_work.max(work.abs());
     }
-    (worst, most, simulation.statistics().impacts.iter().sum())
+    (worst, max_work, simulation.statistics().impacts.iter().sum())
 }
 
 #[test]
-fn actuators_do_the_work_that_the_energy_gains() {
+fn the_work_of_actuators_equals_the_gain_of_energy() {
     let ideal = |joint: &'static str| (joint, "0");
     let fast = ("spcmm.frequency", "2 Hz");
     let lagrange = ("formulation", "lagrange");
-    // (scene, changes, bound relative to the largest work). Pure kinematics leaves rounding. Elsewhere the integrator's
-    // error sets it, some hundred times its tolerance.
+    // (scene, changes, bound relative to the largest work): rounding for pure kinematics, otherwise some hundred times the
+    // integrator's tolerance.
     let cases: [(&str, &Changes, f64); 7] = [
         ("spcmm", &[ideal("contact.clearance"), fast], 1e-12),
         ("spcmm", &[ideal("contact.clearance"), fast, lagrange], 1e-9),
@@ -206,8 +206,8 @@ fn actuators_do_the_work_that_the_energy_gains() {
 }
 
 #[test]
-fn friction_and_damping_only_take_energy() {
-    // Friction that reads the surfaces' velocity opposes the motion of the points it acts on.
+fn friction_and_damping_only_dissipate_energy() {
+    // With surface velocities friction opposes the motion of its points of action.
     for (name, links) in [("pendulum", None), ("chain", Some(("chain.links", "3")))] {
         let mut changes = vec![("solver.tolerance", "1e-9")];
         changes.extend(links);
@@ -219,7 +219,7 @@ fn friction_and_damping_only_take_energy() {
         while simulation.time() < 0.3 {
             simulation.step().unwrap();
             simulation.sample(simulation.time(), &mut frame);
-            // Free of the elastic part's exchange with the damper: total energy never rises.
+            // The potential energy includes the elastic one, so the total never rises.
             let energy = frame.kinetic + frame.potential;
             assert!(energy < lowest + 1e-8, "{name}, {}: {energy} after {lowest}", frame.time);
             lowest = lowest.min(energy);

@@ -1,4 +1,4 @@
-//! One ball and one socket: restitution of every law, friction, contacts that exist at the start.
+//! One ball and one socket: restitution of every law, friction, and contacts at the start.
 
 use crate::common::{frame_now, parse};
 use jointplay::contact::{NormalLaw, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution};
@@ -10,7 +10,7 @@ const INERTIA: f64 = 2e-5;
 const RADIUS: f64 = 0.010;
 const CLEARANCE: f64 = 0.3e-3;
 
-/// A ball of 10 mm, free in a socket fixed to the world, gravity `gravity` along x: m, m/s, rad/s.
+/// A free ball of 10 mm in a fixed socket, under `gravity` along x; position in m, velocity in m/s, spin in rad/s.
 fn ball(position: Vec3, velocity: Vec3, spin: Vec3, gravity: f64, changes: &[(&str, &str)]) -> Simulation {
     let vector = |v: Vec3, unit: &str| format!("\"{:e} {:e} {:e} {unit}\"", v.x, v.y, v.z);
     let text = format!(
@@ -81,7 +81,7 @@ fn restitution_by_quadrature(chi: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Speed after over speed before the first impact of a ball flung along x.
+/// Restitution of the first impact of a ball that moves along x.
 fn rebound(speed: f64, changes: &[(&str, &str)]) -> (f64, Simulation) {
     let mut simulation = ball(Vec3::zeros(), Vec3::x() * speed, Vec3::zeros(), 0.0, changes);
     while simulation.statistics().last_separation[0].is_none() {
@@ -117,9 +117,9 @@ fn head_on_impacts_give_the_restitution_of_their_law() {
             }
             let changes = [("contact.normal_law", name), ("contact.restitution", ce)];
             for speed in [0.02, 0.5] {
-                let (got, _) = rebound(speed, &changes);
-                worst = worst.max((got - expected).abs());
-                assert!((got - expected).abs() < 1e-7, "{name}, {ce}, {speed} m/s: {got} against {expected}");
+                let (actual, _) = rebound(speed, &changes);
+                worst = worst.max((actual - expected).abs());
+                assert!((actual - expected).abs() < 1e-7, "{name}, {ce}, {speed} m/s: {actual} against {expected}");
             }
         }
     }
@@ -127,7 +127,7 @@ fn head_on_impacts_give_the_restitution_of_their_law() {
 }
 
 #[test]
-fn elastic_impacts_have_the_peak_of_hertz() {
+fn elastic_impacts_have_the_peak_force_of_hertz() {
     let speed = 0.1;
     let (_, simulation) = rebound(speed, &[("contact.normal_law", "hertz")]);
     let contact = simulation.machine().contact;
@@ -141,14 +141,14 @@ fn elastic_impacts_have_the_peak_of_hertz() {
 }
 
 #[test]
-fn slow_impacts_take_the_floor_and_rebound_higher() {
+fn slow_impacts_use_the_speed_floor_and_rebound_higher() {
     let mut simulation = ball(Vec3::zeros(), Vec3::x() * 4e-4, Vec3::zeros(), 0.0, &[]);
     while simulation.statistics().impacts[0] == 0 {
         simulation.step().unwrap();
     }
-    let memory = simulation.contact_state(0);
-    assert!(memory.active && memory.floored);
-    assert_eq!(memory.approach_speed, 1e-3);
+    let contact = simulation.contact_state(0);
+    assert!(contact.active && contact.floored);
+    assert_eq!(contact.approach_speed, 1e-3);
     let (slow, _) = rebound(4e-4, &[]);
     let (fast, _) = rebound(0.1, &[]);
     assert!(slow > fast + 0.01 && slow < 1.0, "{slow} {fast}");
@@ -156,12 +156,12 @@ fn slow_impacts_take_the_floor_and_rebound_higher() {
     while above.statistics().impacts[0] == 0 {
         above.step().unwrap();
     }
-    let memory = above.contact_state(0);
-    assert!(!memory.floored);
-    assert!((memory.approach_speed - 0.1).abs() < 1e-12, "{memory:?}");
+    let contact = above.contact_state(0);
+    assert!(!contact.floored);
+    assert!((contact.approach_speed - 0.1).abs() < 1e-12, "{contact:?}");
 }
 
-/// A ball pressed against the wall at +x by its weight, with the given motion across.
+/// A ball pressed against the wall at +x by its weight, with the given tangential velocity and spin.
 fn pressed(velocity: Vec3, spin: Vec3, changes: &[(&str, &str)]) -> (Simulation, Frame) {
     let parameters = jointplay::contact::Parameters::default();
     let load = MASS * 9.81;
@@ -169,18 +169,18 @@ fn pressed(velocity: Vec3, spin: Vec3, changes: &[(&str, &str)]) -> (Simulation,
     let position = Vec3::x() * (CLEARANCE + depth);
     let mut simulation = ball(position, velocity, spin, 9.81, changes);
     let frame = frame_now(&mut simulation);
-    // Nothing moves along the normal: the elastic force alone, which bears the weight.
+    // Nothing moves along the normal, so the elastic force alone carries the weight.
     let normal = frame.joints[0].normal_force;
     assert!((normal + Vec3::x() * load).norm() < 1e-8 * load, "{normal}");
     (simulation, frame)
 }
 
 #[test]
-fn contacts_that_exist_at_the_start_take_the_floor() {
+fn contacts_at_the_start_have_the_floor_as_approach_speed() {
     let (simulation, frame) = pressed(Vec3::zeros(), Vec3::zeros(), &[]);
-    let memory = simulation.contact_state(0);
-    assert!(memory.active && memory.floored);
-    assert_eq!(memory.approach_speed, 1e-3);
+    let contact = simulation.contact_state(0);
+    assert!(contact.active && contact.floored);
+    assert_eq!(contact.approach_speed, 1e-3);
     assert_eq!(simulation.statistics().impacts[0], 1);
     assert_eq!(frame.joints[0].state, ContactMode::Creep);
     assert_eq!(frame.joints[0].friction_force, Vec3::zeros());
@@ -190,20 +190,20 @@ fn contacts_that_exist_at_the_start_take_the_floor() {
 #[test]
 fn friction_opposes_the_slip_with_its_share_of_the_normal_force() {
     let load = MASS * 9.81;
-    // (slip speed, share of cf): full above v_theta = 1e-4 m/s, linear above v_a = 1e-6 m/s, none below.
-    for (speed, share) in [(0.05, 1.0), (2e-4, 1.0), (0.4e-4, (0.4e-4 - 1e-6) / (1e-4 - 1e-6)), (0.9e-6, 0.0)] {
+    // (slip speed, fraction of cf): full above v_theta = 1e-4 m/s, linear above v_a = 1e-6 m/s, none below.
+    for (speed, fraction) in [(0.05, 1.0), (2e-4, 1.0), (0.4e-4, (0.4e-4 - 1e-6) / (1e-4 - 1e-6)), (0.9e-6, 0.0)] {
         for reading in ["centres", "surface"] {
             let slip = Vec3::new(0.0, 0.6, -0.8) * speed;
             let changes = [("contact.friction_velocity", reading)];
             let (_, frame) = pressed(slip, Vec3::zeros(), &changes);
             let joint = &frame.joints[0];
-            let expected = slip * (-0.2 * share * load / speed);
+            let expected = slip * (-0.2 * fraction * load / speed);
             let off = (joint.friction_force - expected).norm();
             assert!(off < 1e-8 * load, "{reading} {speed}: {}", joint.friction_force);
             assert!((joint.slip_speed - speed).abs() < 1e-12);
             let state = if speed < 1e-4 { ContactMode::Creep } else { ContactMode::Slip };
             assert_eq!(joint.state, state);
-            // Newton and Euler about the centroid, the force at r n.
+            // Newton-Euler equations about the centroid, with the force at r n.
             let body = &frame.bodies[0];
             let arm = Vec3::x() * RADIUS;
             let turn = arm.cross(&joint.friction_force) / INERTIA;
@@ -214,7 +214,7 @@ fn friction_opposes_the_slip_with_its_share_of_the_normal_force() {
 }
 
 #[test]
-fn spin_rubs_where_friction_reads_surfaces_and_not_where_it_reads_centres() {
+fn spin_causes_friction_with_surface_velocities_and_none_with_centre_velocities() {
     let spin = Vec3::z() * 5.0;
     let surface_speed = spin.cross(&(Vec3::x() * RADIUS));
     let friction = |velocity: Vec3, reading: &str| {
@@ -222,19 +222,19 @@ fn spin_rubs_where_friction_reads_surfaces_and_not_where_it_reads_centres() {
         pressed(velocity, spin, &changes).1.joints[0].friction_force
     };
     let full = 0.2 * MASS * 9.81;
-    // Spinning on the spot.
+    // Spinning in place.
     assert_eq!(friction(Vec3::zeros(), "centres"), Vec3::zeros());
     let on_spot = friction(Vec3::zeros(), "surface");
     assert!((on_spot + surface_speed.normalize() * full).norm() < 1e-8);
-    // Rolling: the touching points rest on each other, the centres do not.
+    // Rolling: the contact points have no relative velocity, the centres have.
     let rolling = -surface_speed;
     assert!(friction(rolling, "surface").norm() < 1e-12);
-    let reads_centres = friction(rolling, "centres");
-    assert!((reads_centres + rolling.normalize() * full).norm() < 1e-8);
+    let with_centres = friction(rolling, "centres");
+    assert!((with_centres + rolling.normalize() * full).norm() < 1e-8);
 }
 
 #[test]
-fn rubbing_slows_a_spinning_ball_until_it_rolls() {
+fn friction_slows_a_spinning_ball_until_it_rolls() {
     let (mut simulation, frame) = pressed(Vec3::zeros(), Vec3::z() * 5.0, &[]);
     let start = frame.kinetic;
     let mut energy = frame.kinetic + frame.potential;
@@ -246,6 +246,6 @@ fn rubbing_slows_a_spinning_ball_until_it_rolls() {
         assert!(now < energy + 1e-12, "{}: {now} after {energy}", frame.time);
         energy = now;
     }
-    println!("of {start:.3e} J, {:.3e} J rubbed off", first - energy);
+    println!("friction took {:.3e} J of {start:.3e} J", first - energy);
     assert!(first - energy > 0.01 * start);
 }

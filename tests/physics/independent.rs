@@ -1,5 +1,5 @@
-//! Another solver, and equations written down a second time: the program's runs against the rows in
-//! `tests/reference/solver.toml`, made by `tests/reference/solver`.
+//! The program's runs against another solver and independently derived equations, stored in `tests/reference/solver.toml` by
+//! `tests/reference/solver`.
 
 use crate::common::{Changes, frame_now, run_until, scene};
 use jointplay::mechanism::Mechanism;
@@ -12,7 +12,7 @@ struct Rows {
     run: Vec<Run>,
 }
 
-/// What another solver gave.
+/// A stored run of another solver.
 #[derive(Deserialize)]
 struct Run {
     scene: String,
@@ -24,11 +24,11 @@ struct Run {
     state: Vec<f64>,
 }
 
-/// Joint, time, approach speed, largest normal force seen, in order of beginning.
+/// Joint, time, approach speed and largest normal force, in order of the starts.
 type Contact = (usize, f64, f64, f64);
 
-/// The run of `solver` with `equations` that are the program's (`borrowed`) or were written down `again`.
-fn theirs(name: &str, changes: &Changes, equations: &str, solver: &str, end: f64) -> Run {
+/// The stored run of `solver` with `equations` that are the program's (`borrowed`) or independent (`again`).
+fn stored_run(name: &str, changes: &Changes, equations: &str, solver: &str, end: f64) -> Run {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/solver.toml");
     let rows: Rows = toml::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
     let mut runs = rows.run.into_iter();
@@ -41,8 +41,8 @@ fn theirs(name: &str, changes: &Changes, equations: &str, solver: &str, end: f64
     })
 }
 
-/// The program's own run to `time`, and its contacts as in [`Run`].
-fn program(name: &str, changes: &Changes, time: f64) -> (Simulation, Vec<Contact>) {
+/// The program's run to `time`, and its contacts as in [`Run`].
+fn own_run(name: &str, changes: &Changes, time: f64) -> (Simulation, Vec<Contact>) {
     let mut simulation = Simulation::new(&scene(name, changes).machine).unwrap();
     let mut contacts: Vec<Contact> = Vec::new();
     let mut peaks = Vec::new();
@@ -61,11 +61,11 @@ fn program(name: &str, changes: &Changes, time: f64) -> (Simulation, Vec<Contact
     (simulation, contacts)
 }
 
-/// Compares the contacts one by one.
-fn same_contacts(what: &str, ours: &[Contact], theirs: &[Contact]) {
-    assert_eq!(ours.len(), theirs.len(), "{what}");
-    // The last may be under way.
-    for (n, (a, b)) in ours.iter().zip(theirs).enumerate().take(ours.len() - 1) {
+/// Checks that the contacts agree one by one.
+fn assert_same_contacts(what: &str, ours: &[Contact], expected: &[Contact]) {
+    assert_eq!(ours.len(), expected.len(), "{what}");
+    // The last contact may be in progress.
+    for (n, (a, b)) in ours.iter().zip(expected).enumerate().take(ours.len() - 1) {
         println!(
             "{what}: contact {n}: joint {}, {:.9} s, off by {:.1e} s, {:.1e} m/s; {:.3} N, off by {:.1e}",
             b.0,
@@ -88,19 +88,19 @@ const TIGHT: (&str, &str) = ("solver.tolerance", "1e-11");
 fn the_pendulum_agrees_with_other_equations_and_another_solver() {
     let end = 0.03;
     for solver in ["Tsitouras", "Bdf"] {
-        let theirs = theirs("pendulum", &[], "again", solver, end);
+        let stored_run = stored_run("pendulum", &[], "again", solver, end);
         for method in ["dopri5", "automatic"] {
             let changes = [("solver.method", method), TIGHT];
-            let (mut simulation, contacts) = program("pendulum", &changes, end);
+            let (mut simulation, contacts) = own_run("pendulum", &changes, end);
             let what = format!("{solver} and {method}");
-            same_contacts(&what, &contacts, &theirs.contacts);
+            assert_same_contacts(&what, &contacts, &stored_run.contacts);
             assert!(contacts.len() > 3, "only {} contacts", contacts.len());
             let body = frame_now(&mut simulation).bodies[0];
             let angle = body.rotation[(0, 2)].atan2(body.rotation[(2, 2)]);
-            let [x, z, turned] = theirs.state[..3] else { panic!() };
-            let off = [body.position.x - x, body.position.y, body.position.z - z, angle - turned];
-            println!("{what}: off by {off:?} m, m, m, rad");
-            assert!(off.iter().all(|off| off.abs() < 1e-9), "{what}: {off:?}");
+            let [x, z, turned] = stored_run.state[..3] else { panic!() };
+            let errors = [body.position.x - x, body.position.y, body.position.z - z, angle - turned];
+            println!("{what}: off by {errors:?} m, m, m, rad");
+            assert!(errors.iter().all(|error| error.abs() < 1e-9), "{what}: {errors:?}");
         }
     }
 }
@@ -112,76 +112,76 @@ fn the_measuring_mechanism_agrees_with_other_equations_for_either_friction_veloc
     for word in ["centres", "printed"] {
         let changes =
             [("contact.clearance", "0.5 mm"), ("contact.friction", "0.2"), ("contact.friction_velocity", word)];
-        let theirs = theirs("spcmm", &changes, "again", "Tsitouras", end);
+        let stored_run = stored_run("spcmm", &changes, "again", "Tsitouras", end);
         let method = [("solver.method", "dopri5"), TIGHT];
-        let (mut simulation, contacts) = program("spcmm", &[&changes[..], &method].concat(), end);
-        same_contacts(word, &contacts, &theirs.contacts);
+        let (mut simulation, contacts) = own_run("spcmm", &[&changes[..], &method].concat(), end);
+        assert_same_contacts(word, &contacts, &stored_run.contacts);
         assert!(contacts.len() >= 6, "only {} contacts", contacts.len());
-        // What a section holds.
+        // The quantities of a Poincaré section.
         let pose = frame_now(&mut simulation).pose;
-        let [x, _, _, w, i, j, k] = theirs.state[..7] else { panic!() };
+        let [x, _, _, w, i, j, k] = stored_run.state[..7] else { panic!() };
         let axes = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k)).to_rotation_matrix();
         let beta = -axes[(0, 1)].asin();
-        let off = [pose.position.x - x, pose.angles.y - beta];
-        println!("{word}: x {x} m, beta {beta} rad, off by {off:?}");
-        assert!(off.iter().all(|off| off.abs() < 1e-9), "{word}: {off:?}");
+        let errors = [pose.position.x - x, pose.angles.y - beta];
+        println!("{word}: x {x} m, beta {beta} rad, off by {errors:?}");
+        assert!(errors.iter().all(|error| error.abs() < 1e-9), "{word}: {errors:?}");
         ends.push(x);
     }
-    // Or the comparison would not tell the two.
+    // Otherwise the comparison would not distinguish the two.
     assert!((ends[0] - ends[1]).abs() > 1e-7, "{ends:?}");
 }
 
 #[test]
 fn the_measuring_mechanism_moves_the_same_under_another_solver() {
     let end = 0.013;
-    let theirs = theirs("spcmm", &[], "borrowed", "Tsitouras", end);
-    let (simulation, contacts) = program("spcmm", &[("solver.method", "dopri5"), TIGHT], end);
-    same_contacts("spcmm", &contacts, &theirs.contacts);
+    let stored_run = stored_run("spcmm", &[], "borrowed", "Tsitouras", end);
+    let (simulation, contacts) = own_run("spcmm", &[("solver.method", "dopri5"), TIGHT], end);
+    assert_same_contacts("spcmm", &contacts, &stored_run.contacts);
     assert!(contacts.len() >= 6, "only {} contacts", contacts.len());
-    let off = off(&simulation, &theirs);
-    println!("off by {off:.1e} m or rad");
-    assert!(off < 1e-9, "{off}");
+    let position_error = position_error(&simulation, &stored_run);
+    println!("off by {position_error:.1e} m or rad");
+    assert!(position_error < 1e-9, "{position_error}");
 }
 
-/// How far the program's positions are from those of another solver, m or rad.
-fn off(simulation: &Simulation, theirs: &Run) -> f64 {
+/// Largest difference of positions from those of another solver, m or rad.
+fn position_error(simulation: &Simulation, stored_run: &Run) -> f64 {
     let positions = Mechanism::new(simulation.machine()).unwrap().positions();
-    assert_eq!(simulation.state_vector().len(), theirs.state.len());
-    let pairs = simulation.state_vector()[..positions].iter().zip(&theirs.state);
+    assert_eq!(simulation.state_vector().len(), stored_run.state.len());
+    let pairs = simulation.state_vector()[..positions].iter().zip(&stored_run.state);
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// How many contacts a scene with ideal joints has until `end` under an implicit solver, and how far it then is from the
-/// program's, m or rad.
+/// Number of contacts until `end` of a scene with ideal joints under an implicit solver, and the largest difference of positions
+/// then, m or rad.
 pub fn compare_with_other_solver(name: &str, changes: &Changes, end: f64) -> (usize, f64) {
-    let theirs = theirs(name, changes, "borrowed", "Bdf", end);
+    let stored_run = stored_run(name, changes, "borrowed", "Bdf", end);
     let mut simulation = Simulation::new(&scene(name, &[changes, &[TIGHT]].concat()).machine).unwrap();
     run_until(&mut simulation, end);
-    let off = off(&simulation, &theirs);
-    println!("{name}: off by {off:.1e} m or rad, {} contacts", theirs.contacts.len());
-    (theirs.contacts.len(), off)
+    let position_error = position_error(&simulation, &stored_run);
+    println!("{name}: off by {position_error:.1e} m or rad, {} contacts", stored_run.contacts.len());
+    (stored_run.contacts.len(), position_error)
 }
 
 #[test]
 fn a_mechanism_with_an_ideal_joint_moves_the_same_under_an_implicit_solver() {
-    let (contacts, off) = compare_with_other_solver("spcmm", &[("joint.S1.clearance", "0")], 0.012);
+    let (contacts, position_error) = compare_with_other_solver("spcmm", &[("joint.S1.clearance", "0")], 0.012);
     assert!(contacts >= 2);
-    assert!(off < 1e-9, "{off}");
+    assert!(position_error < 1e-9, "{position_error}");
 }
 
 #[test]
-fn peaks_of_the_presets_are_those_of_another_solver() {
+fn peaks_with_the_presets_agree_with_another_solver() {
     // The first five impacts are over, the sixth has not begun.
     let end = 0.0118;
-    let theirs = theirs("spcmm", &[], "borrowed", "Tsitouras", end);
-    assert_eq!(theirs.contacts.len(), 5);
+    let stored_run = stored_run("spcmm", &[], "borrowed", "Tsitouras", end);
+    assert_eq!(stored_run.contacts.len(), 5);
     for preset in ["real-time", "accurate", "reference"] {
-        let (_, contacts) = program("spcmm", &[("solver.preset", preset)], end);
+        let (_, contacts) = own_run("spcmm", &[("solver.preset", preset)], end);
         assert_eq!(contacts.len(), 5, "{preset}");
-        for (a, b) in contacts.iter().zip(&theirs.contacts) {
-            let off = a.3 / b.3 - 1.0;
-            println!("{preset}: joint {}: {:.2} N, off by {off:.1e}", a.0, b.3);
-            assert!(a.0 == b.0 && off.abs() < 0.01, "{preset}: {off}");
+        for (a, b) in contacts.iter().zip(&stored_run.contacts) {
+            let force_error = a.3 / b.3 - 1.0;
+            println!("{preset}: joint {}: {:.2} N, off by {force_error:.1e}", a.0, b.3);
+            assert!(a.0 == b.0 && force_error.abs() < 0.01, "{preset}: {force_error}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Bodies without mass between joints: joints of several degrees in series, against joints of one piece and closed forms.
+//! Massless bodies between joints: joints in series, against equivalent single joints and closed-form solutions.
 
 use crate::common::frame_now;
 use crate::common::matrix::every_variant;
@@ -14,7 +14,7 @@ fn link(name: &str) -> String {
     format!("[[body]]\nname = \"{name}\"\nmass = 0\ninertia = [0, 0, 0]\n")
 }
 
-/// The train of `two_degrees` with slide and hinge in place of its cylindrical, two hinges in place of its universal joint.
+/// The chain of `two_degrees` with slide and hinge instead of its cylindrical joint, and two hinges instead of its universal joint.
 fn in_series(gravity: f64) -> String {
     let text = train(gravity);
     let (before, joints) = text.split_once("[[joint]]\nname = \"c\"").expect("a cylindrical joint");
@@ -38,8 +38,8 @@ fn in_series(gravity: f64) -> String {
     format!("{before}{}{}{slide}{hinges}", link("sleeve"), link("cross"))
 }
 
-/// The same as `body` of `other`, to a fraction `bound` of lengths of 1 m, turns of 1 rad, 1 s.
-fn agree(frame: &Frame, other: &Frame, bodies: &[(usize, usize)], bound: f64, what: &str) {
+/// Checks that pairs of bodies of two frames agree within `bound` (m, rad; velocities within 10 `bound`).
+fn assert_agree(frame: &Frame, other: &Frame, bodies: &[(usize, usize)], bound: f64, what: &str) {
     for &(one, two) in bodies {
         let (a, b) = (&frame.bodies[one], &other.bodies[two]);
         let off = [
@@ -53,26 +53,26 @@ fn agree(frame: &Frame, other: &Frame, bodies: &[(usize, usize)], bound: f64, wh
 }
 
 #[test]
-fn slide_and_hinge_are_a_cylindrical_and_two_hinges_a_universal_joint() {
-    // The bodies of the scene are sorted by their joints.
+fn joints_in_series_move_as_a_cylindrical_and_a_universal_joint() {
+    // Bodies are sorted by their joints.
     let text = in_series(-G);
     let scene = Scene::parse(&text, None, &[]).unwrap();
     let index = |name: &str| scene.machine.bodies.iter().position(|body| body.name == name).unwrap();
     let pairs = [(0, index("base")), (1, index("ring")), (2, index("rod"))];
     for variant in every_variant().filter(|variant| variant.formulation == "tree") {
-        let mut whole = start_simulation(&train(-G), &variant.close());
+        let mut single = start_simulation(&train(-G), &variant.close());
         let mut series = start_simulation(&text, &variant.close());
-        let (summary, other) = (whole.mechanism().summary(), series.mechanism().summary());
+        let (summary, other) = (single.mechanism().summary(), series.mechanism().summary());
         assert_eq!((summary.degrees_of_freedom, summary.velocity_coordinates), (10, other.velocity_coordinates));
-        // At the start all but rounding, later what the method allows.
-        agree(&frame_now(&mut whole), &frame_now(&mut series), &pairs, 1e-13, "at the start");
+        // Agreement within rounding at the start, later within the method's error.
+        assert_agree(&frame_now(&mut single), &frame_now(&mut series), &pairs, 1e-13, "at the start");
         for (a, b) in pairs {
-            let (own, other) = (frame_now(&mut whole), frame_now(&mut series));
+            let (own, other) = (frame_now(&mut single), frame_now(&mut series));
             let off = (own.bodies[a].acceleration - other.bodies[b].acceleration).norm();
             assert!(off < 1e-9, "{variant}: {off:e}");
         }
-        agree(
-            &frame_at(&mut whole, 0.2),
+        assert_agree(
+            &frame_at(&mut single, 0.2),
             &frame_at(&mut series, 0.2),
             &pairs,
             10.0 * variant.bound(),
@@ -81,7 +81,7 @@ fn slide_and_hinge_are_a_cylindrical_and_two_hinges_a_universal_joint() {
     }
 }
 
-/// A top on a ball joint, or on three hinges in one point.
+/// A top with the given joints and further bodies.
 fn top(joints: &str, bodies: &str) -> String {
     format!(
         "[gravity]\nz = \"-9.81 m/s^2\"\n[solver]\ntolerance = 1e-11\n[contact]\nclearance = \"0 mm\"\n{bodies}\
@@ -100,8 +100,8 @@ fn hinges(second: &str) -> String {
 }
 
 #[test]
-fn three_hinges_in_one_point_are_a_ball_joint_until_two_of_their_axes_coincide() {
-    // Hinge x turns about the world's x, hinge z about the top's axis, which is turned about y by half a radian.
+fn three_hinges_through_one_point_move_as_a_ball_joint_until_two_axes_coincide() {
+    // Hinge x is about the world's x, hinge z about the top's axis, which is tilted about y by half a radian.
     let (sine, cosine) = (0.5_f64.sin(), 0.5_f64.cos());
     let ball = format!(
         "[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"top\"\n\
@@ -111,30 +111,30 @@ fn three_hinges_in_one_point_are_a_ball_joint_until_two_of_their_axes_coincide()
         2.0 + 30.0 * sine,
         30.0 * cosine
     );
-    let mut whole = start_simulation(&top(&ball, ""), &[]);
+    let mut single = start_simulation(&top(&ball, ""), &[]);
     let mut series = start_simulation(&hinges("0.5 rad"), &[]);
     let mut energy = None;
     for step in 0..=10 {
         let t = 0.03 * f64::from(step);
-        let (one, other) = (frame_at(&mut whole, t), frame_at(&mut series, t));
-        agree(&one, &other, &[(0, 2)], 1e-7, &format!("{t} s"));
+        let (one, other) = (frame_at(&mut single, t), frame_at(&mut series, t));
+        assert_agree(&one, &other, &[(0, 2)], 1e-7, &format!("{t} s"));
         let now = other.kinetic + other.potential;
         let lost = now - *energy.get_or_insert(now);
         assert!(lost.abs() < 1e-8, "{lost:e} J");
     }
-    let fault = |text: &str| {
+    let start_error = |text: &str| {
         let scene = Scene::parse(text, Some("top.toml"), &[]).unwrap();
         let error = Simulation::new(&scene.machine).expect_err("singular");
         scene.locate(&error).to_string()
     };
-    let said = fault(&hinges("90 deg"));
-    assert!(said.contains("joint.x: joint x: at the start values it moves all mass in the same way"), "{said}");
-    assert!(said.contains("| [[joint]]"), "{said}");
+    let error = start_error(&hinges("90 deg"));
+    assert!(error.contains("joint.x: joint x: at the start values it moves all mass in the same way"), "{error}");
+    assert!(error.contains("| [[joint]]"), "{error}");
     let parallel = hinges("0.5 rad").replace("axis = [0, 1, 0]", "axis = [1, 0, 0]");
-    assert!(fault(&parallel).contains("joint x: at the start values"), "{}", fault(&parallel));
+    assert!(start_error(&parallel).contains("joint x: at the start values"), "{}", start_error(&parallel));
 }
 
-/// Two slides and a hinge carry a plate in its plane: without forces its centroid moves on a line, and it turns steadily.
+/// Two slides and a hinge carry a plate in its plane: without forces its centroid moves uniformly and it rotates uniformly.
 #[test]
 fn two_slides_and_a_hinge_move_a_plate_in_its_plane() {
     let joint = |name: &str, kind: &str, parent: &str, child: &str, axis: &str, start: &str| {
@@ -172,7 +172,7 @@ fn two_slides_and_a_hinge_move_a_plate_in_its_plane() {
 
 #[test]
 fn a_body_that_needs_its_mass_is_refused_with_its_line() {
-    let refused = |text: &str| Scene::parse(text, Some("top.toml"), &[]).expect_err("refused").to_string();
+    let parse_error = |text: &str| Scene::parse(text, Some("top.toml"), &[]).expect_err("refused").to_string();
     let good = hinges("0.5 rad");
     let carried_by_none = good.replace("parent = \"inner\"", "parent = \"outer\"");
     let loose = "[[ball_joint]]\nname = \"b\"\nsocket = { body = \"world\" }\nball = { body = \"inner\" }\n";
@@ -193,13 +193,13 @@ fn a_body_that_needs_its_mass_is_refused_with_its_line() {
         ),
         (good.replacen("mass = 0", "mass = \"1 kg\"", 1), "allowed above 0; units"),
     ] {
-        let said = refused(&text);
-        assert!(said.contains(expected) && said.starts_with("top.toml:"), "{said}\n  should say `{expected}`");
+        let error = parse_error(&text);
+        assert!(error.contains(expected) && error.starts_with("top.toml:"), "{error}\n  should say `{expected}`");
     }
     let change = ("formulation".to_owned(), "lagrange".to_owned());
     let scene = Scene::parse(&good, Some("top.toml"), &[change]).unwrap();
-    let said = scene.locate(&Simulation::new(&scene.machine).expect_err("refused")).to_string();
-    assert!(said.contains("formulation = lagrange: body outer has mass 0 kg"), "{said}");
+    let error = scene.locate(&Simulation::new(&scene.machine).expect_err("refused")).to_string();
+    assert!(error.contains("formulation = lagrange: body outer has mass 0 kg"), "{error}");
     let mut machine = scene.machine;
     machine.bodies[0].inertia.m11 = 1.0;
     let fault = MechanismError::Machine(MachineFault::Inertia { body: "outer".to_owned() });

@@ -1,4 +1,4 @@
-//! The numbers of the contract: anchors, reference trajectories, and agreement between the two formulations.
+//! Reference values of the physics contract: single numbers, trajectories, and agreement between the two formulations.
 
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
@@ -28,6 +28,7 @@ fn reference(file: &str) -> Vec<[f64; 16]> {
         .collect()
 }
 
+/// Largest position error up to 12 ms and over the whole trajectory, m.
 fn compare(file: &str, changes: &[(&str, &str)]) -> (f64, f64) {
     let mut changes = changes.to_vec();
     changes.push(("solver.tolerance", "1e-11"));
@@ -68,11 +69,11 @@ fn positions_follow_the_reference_trajectories() {
 }
 
 #[test]
-fn ideal_reactions_are_the_anchors() {
+fn ideal_reactions_have_their_reference_values() {
     let mut simulation = simulation("spcmm", &[("contact.clearance", "0")]);
     let mut frame = Frame::default();
-    let anchors = [(0.0, [8.28797785, 8.5687895, 2.83010815]), (0.5, [7.83492554, 7.20329026, 3.07470177])];
-    for (time, expected) in anchors {
+    let references = [(0.0, [8.28797785, 8.5687895, 2.83010815]), (0.5, [7.83492554, 7.20329026, 3.07470177])];
+    for (time, expected) in references {
         simulation.advance_to(time).unwrap();
         simulation.sample(time, &mut frame);
         for (joint, expected) in frame.joints.iter().zip(expected) {
@@ -83,9 +84,9 @@ fn ideal_reactions_are_the_anchors() {
 }
 
 #[test]
-fn first_impacts_have_the_anchors_speeds_and_peaks() {
+fn first_impacts_have_their_reference_speeds_and_peaks() {
     let mut simulation = simulation("spcmm", &[("solver.tolerance", "1e-9")]);
-    // (joint, start, s; approach speed, m/s; peak, N): anchors of the contract.
+    // (joint; start, s; approach speed, m/s; peak, N): reference values of the contract.
     let expected = [
         (0, 7.801422908e-3, 0.07690900, 621.35),
         (1, 7.807677416e-3, 0.07687389, 560.67),
@@ -94,7 +95,7 @@ fn first_impacts_have_the_anchors_speeds_and_peaks() {
         (0, 10.50063e-3, 0.07533, 771.13),
         (2, 12.38051e-3, 0.04730, 321.29),
     ];
-    let mut found: Vec<(usize, f64, f64, f64)> = Vec::new();
+    let mut impacts: Vec<(usize, f64, f64, f64)> = Vec::new();
     let mut open: [Option<usize>; 3] = [None; 3];
     let mut peaks = Vec::new();
     while simulation.time() < 0.013 {
@@ -102,23 +103,23 @@ fn first_impacts_have_the_anchors_speeds_and_peaks() {
         simulation.take_peaks(&mut peaks);
         for j in 0..3 {
             if peaks[j].impacts > 0 {
-                open[j] = Some(found.len());
-                found.push((j, simulation.time(), peaks[j].approach_speed, 0.0));
+                open[j] = Some(impacts.len());
+                impacts.push((j, simulation.time(), peaks[j].approach_speed, 0.0));
             }
             if let Some(at) = open[j] {
-                found[at].3 = found[at].3.max(peaks[j].normal);
+                impacts[at].3 = impacts[at].3.max(peaks[j].normal);
             }
             if !simulation.contact_state(j).active {
                 open[j] = None;
             }
         }
     }
-    assert!(found.len() >= expected.len());
-    for (got, want) in found.iter().zip(expected) {
-        assert_eq!(got.0, want.0);
-        assert!((got.1 - want.1).abs() < 2e-8, "start {got:?} against {want:?}");
-        assert!((got.2 / want.2 - 1.0).abs() < 1e-3, "speed {got:?} against {want:?}");
-        assert!((got.3 / want.3 - 1.0).abs() < 5e-4, "peak {got:?} against {want:?}");
+    assert!(impacts.len() >= expected.len());
+    for (actual, expected_impact) in impacts.iter().zip(expected) {
+        assert_eq!(actual.0, expected_impact.0);
+        assert!((actual.1 - expected_impact.1).abs() < 2e-8, "start {actual:?} against {expected_impact:?}");
+        assert!((actual.2 / expected_impact.2 - 1.0).abs() < 1e-3, "speed {actual:?} against {expected_impact:?}");
+        assert!((actual.3 / expected_impact.3 - 1.0).abs() < 5e-4, "peak {actual:?} against {expected_impact:?}");
     }
 }
 
@@ -170,7 +171,7 @@ fn settled_contact_carries_the_ideal_reaction() {
 }
 
 #[test]
-fn free_slider_crank_passes_through_its_anchors_and_keeps_its_energy() {
+fn a_free_slider_crank_has_its_reference_positions_and_conserves_energy() {
     let mut simulation = simulation(
         "slider-crank",
         &[("contact.clearance", "0"), ("joint.C.clearance", "0"), ("solver.tolerance", "1e-10")],

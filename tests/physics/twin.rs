@@ -1,4 +1,4 @@
-//! A state moved by hand, and what twin runs of a mechanism tell.
+//! Displaced states, and exponents and regimes from twin runs of a mechanism.
 
 use crate::common::{Changes, frame_now, parse, run_until, scene, simulation};
 use jointplay::analysis::drive::{drive_period, observed};
@@ -6,8 +6,8 @@ use jointplay::analysis::point::{Plan, PointResult, PointRun};
 use jointplay::analysis::regime::Regime;
 use jointplay::simulate::Simulation;
 
-/// State with coordinate `i` moved by `by` and nothing else.
-fn moved(simulation: &mut Simulation, i: usize, by: f64) {
+/// Displaces coordinate `i` by `by` and nothing else.
+fn displace_coordinate(simulation: &mut Simulation, i: usize, by: f64) {
     let mut offset = vec![0.0; simulation.state_vector().len()];
     offset[i] = by;
     simulation.displace(&offset);
@@ -19,7 +19,7 @@ fn a_displaced_state_continues_from_its_displacement() {
     run_until(&mut simulation, 0.005);
     let before = frame_now(&mut simulation);
     // The first coordinate of the tree is the free platform's x.
-    moved(&mut simulation, 0, 1e-5);
+    displace_coordinate(&mut simulation, 0, 1e-5);
     let after = frame_now(&mut simulation);
     assert_eq!(after.time, before.time);
     let shift = after.pose.position - before.pose.position;
@@ -28,36 +28,36 @@ fn a_displaced_state_continues_from_its_displacement() {
         assert!(((b.eccentricity - a.eccentricity).x - 1e-5).abs() < 1e-14);
     }
     let norm = |simulation: &Simulation| simulation.state_vector()[3..7].iter().map(|q| q * q).sum::<f64>();
-    moved(&mut simulation, 4, 1e-3);
+    displace_coordinate(&mut simulation, 4, 1e-3);
     assert!((norm(&simulation) - 1.0).abs() < 1e-15);
     run_until(&mut simulation, 0.02);
 }
 
 #[test]
-fn contacts_follow_the_displacement_and_keep_their_state() {
+fn contacts_follow_a_displacement_and_keep_their_state() {
     let mut simulation = simulation("spcmm", &[]);
     run_until(&mut simulation, 1.0);
-    let memory = |simulation: &Simulation| [0, 1, 2].map(|j| simulation.contact_state(j));
-    let (settled, hash) = (memory(&simulation), simulation.state_hash());
+    let contacts = |simulation: &Simulation| [0, 1, 2].map(|j| simulation.contact_state(j));
+    let (settled, hash) = (contacts(&simulation), simulation.state_hash());
     assert!(settled.iter().all(|m| m.active));
     let impacts = simulation.statistics().impacts.clone();
-    // Nothing moved: nothing changed.
+    // A zero displacement changes nothing.
     let none = vec![0.0; simulation.state_vector().len()];
     simulation.displace(&none);
     assert_eq!(simulation.state_hash(), hash);
-    // The balls hang, X points down: 50 um up lifts them off their walls, and 50 um down puts them back.
-    moved(&mut simulation, 0, -5e-5);
-    assert!(memory(&simulation).iter().all(|m| !m.active));
-    moved(&mut simulation, 0, 5e-5);
+    // X points down: 50 um up lifts the balls off their walls, and 50 um down restores contact.
+    displace_coordinate(&mut simulation, 0, -5e-5);
+    assert!(contacts(&simulation).iter().all(|m| !m.active));
+    displace_coordinate(&mut simulation, 0, 5e-5);
     let floor = simulation.machine().contact.impact_speed_floor;
-    for m in memory(&simulation) {
+    for m in contacts(&simulation) {
         assert!(m.active && m.approach_speed >= floor);
     }
     assert_eq!(simulation.statistics().impacts, impacts);
-    // A tenth of a nanometre deeper the contacts are the same ones.
-    let before = memory(&simulation);
-    moved(&mut simulation, 0, 1e-10);
-    assert_eq!(memory(&simulation), before);
+    // A displacement of a tenth of a nanometre keeps the contacts.
+    let before = contacts(&simulation);
+    displace_coordinate(&mut simulation, 0, 1e-10);
+    assert_eq!(contacts(&simulation), before);
     run_until(&mut simulation, 1.01);
 }
 
@@ -82,10 +82,10 @@ fn point(name: &str, changes: &Changes, periods: usize, discard: usize) -> Point
     run.finish().0
 }
 
-/// A settled ball creeps through its socket like an overdamped pendulum of length c: its load N pulls it back with N / c
-/// per metre, and friction resists with cf N / (v_theta - v_a) per speed. A deviation fades at (v_theta - v_a) / (c cf).
+/// A settled ball creeps in its socket like an overdamped pendulum of length c: its load N pulls it back with stiffness N / c, and
+/// friction damps it with cf N / (v_theta - v_a). A deviation decays at the rate (v_theta - v_a) / (c cf).
 #[test]
-fn settled_creeping_has_the_exponent_of_an_overdamped_pendulum() {
+fn settled_creep_has_the_exponent_of_an_overdamped_pendulum() {
     for (clearance, friction) in [(3e-4, 0.15), (3e-4, 0.3), (1.5e-4, 0.2)] {
         let (c, cf) = (format!("{clearance} m"), friction.to_string());
         let changes = [("contact.clearance", c.as_str()), ("contact.friction", cf.as_str())];
@@ -101,7 +101,7 @@ fn settled_creeping_has_the_exponent_of_an_overdamped_pendulum() {
     }
 }
 
-/// Without friction nothing stops the balls from swinging in their sockets.
+/// Without friction nothing damps the swinging of the balls in their sockets.
 #[test]
 fn a_frictionless_mechanism_is_chaotic() {
     let result = point("spcmm", &[("contact.friction", "0"), ("spcmm.frequency", "2 Hz")], 12, 2);
@@ -112,7 +112,7 @@ fn a_frictionless_mechanism_is_chaotic() {
 }
 
 #[test]
-fn an_ideal_mechanism_repeats_exactly_and_has_no_neighbours() {
+fn an_ideal_mechanism_repeats_exactly_and_has_no_exponent() {
     let result = point("spcmm", &[("contact.clearance", "0")], 10, 1);
     assert_eq!(result.regime, Regime::Periodic(1));
     assert!(result.evidence.exponent.is_none());
@@ -122,7 +122,7 @@ fn an_ideal_mechanism_repeats_exactly_and_has_no_neighbours() {
     assert!(reaction > 8.5687 && reaction < 12.0, "{reaction}");
 }
 
-/// The twin never disturbs the run it follows.
+/// The twin does not disturb the run.
 #[test]
 fn sections_equal_those_of_a_run_without_a_twin() {
     let scene = scene("spcmm", &[]);
@@ -137,7 +137,7 @@ fn sections_equal_those_of_a_run_without_a_twin() {
     };
     let plain = sections(false);
     assert_eq!(plain, sections(true));
-    // And they lie at the drive phase: the machine stands where it stands at 6 s.
+    // The last section has the pose of the machine at 6 s.
     let mut simulation = Simulation::new(&scene.machine).unwrap();
     for end in [2.0, 4.0, 6.0] {
         run_until(&mut simulation, end);
@@ -150,7 +150,7 @@ fn drives_report_their_common_period() {
     assert_eq!(drive_period(&scene("spcmm", &[])), Ok(2.0));
     let crank = drive_period(&scene("slider-crank-driven", &[])).unwrap();
     assert!((crank - std::f64::consts::TAU / 6.0).abs() < 1e-15);
-    // What force elements follow repeats as well as a drive.
+    // The laws of force elements have periods like those of drives.
     let tyre = "ground = { law = \"harmonic\", amplitude = \"1 mm\", frequency = \"4 Hz\" }";
     let load = "[[load]]\nname = \"wind\"\non = { body = \"wheel\" }\nforce = \"1 0 0 N\"\nfrequency = \"4 Hz\"";
     for element in [tyre, load, ""] {
@@ -162,12 +162,12 @@ fn drives_report_their_common_period() {
         let period = drive_period(&parse(&text, &[]));
         assert_eq!(period.ok(), (!element.is_empty()).then_some(0.25), "{element}");
     }
-    for without in ["pendulum", "chain", "slider-crank"] {
-        assert!(drive_period(&scene(without, &[])).is_err(), "{without}");
+    for scene_name in ["pendulum", "chain", "slider-crank"] {
+        assert!(drive_period(&scene(scene_name, &[])).is_err(), "{scene_name}");
     }
 }
 
-/// The exponent of a scene over so many periods, the first ones discarded.
+/// Sections and exponent of a scene over `periods` periods, of which the first `discard` are discarded.
 fn exponent_of(scene: &jointplay::scene::Scene, periods: usize, discard: usize) -> PointResult {
     let period = drive_period(scene).expect("a drive");
     let plan = Plan { periods, discard, phase: 0.0, exponent: true };
@@ -178,9 +178,9 @@ fn exponent_of(scene: &jointplay::scene::Scene, periods: usize, discard: usize) 
     run.finish().0
 }
 
-/// A scene whose motion repeats has no exponent above 0, whatever steps its method takes: single periods once gave +165 1/s.
+/// A periodic motion has no positive exponent, whatever steps its method takes; it was once reported as +165 1/s.
 #[test]
-fn a_motion_that_repeats_has_no_positive_exponent() {
+fn a_periodic_motion_has_no_positive_exponent() {
     for method in ["automatic", "dopri5", "radau5"] {
         let changes = [("parameter.speed", "22.6271186440678 rad/s"), ("solver.method", method)];
         let result = exponent_of(&scene("four-bar", &changes), 30, 20);
@@ -190,11 +190,11 @@ fn a_motion_that_repeats_has_no_positive_exponent() {
     }
 }
 
-/// Exponents that independent computations give (SciPy DOP853 at 1e-12 with located contacts, eight neighbours): of a mass between
-/// two stops on a shaken carriage, and of the frictionless slider-crank of Flores & Ambrosio (2004) with 0.5 mm of play.
+/// Exponents of a mass between two stops on an oscillating carriage against independent computations (SciPy DOP853 at 1e-12 with
+/// located contacts, eight neighbours).
 #[test]
-fn exponents_equal_those_of_independent_computations() {
-    let shaken = |rate: &str| {
+fn exponents_agree_with_independent_computations() {
+    let carriage = |rate: &str| {
         let text = format!(
             r#"
             [gravity]
@@ -239,12 +239,13 @@ fn exponents_equal_those_of_independent_computations() {
         parse(&text, &[])
     };
     let value = |result: &PointResult| result.evidence.exponent.as_ref().expect("a twin").value;
-    for (rate, right, doubt) in [("3.6", 1.85, 0.4), ("4.2", 2.30, 0.4), ("5.4", 3.20, 0.4), ("5.8", 2.83, 0.4)] {
-        let result = exponent_of(&shaken(rate), 600, 100);
+    for (rate, expected, tolerance) in [("3.6", 1.85, 0.4), ("4.2", 2.30, 0.4), ("5.4", 3.20, 0.4), ("5.8", 2.83, 0.4)]
+    {
+        let result = exponent_of(&carriage(rate), 600, 100);
         assert_eq!(result.regime, Regime::Chaotic, "{rate} Hz");
-        assert!((value(&result) - right).abs() < doubt, "{rate} Hz: {}", value(&result));
+        assert!((value(&result) - expected).abs() < tolerance, "{rate} Hz: {}", value(&result));
     }
-    let result = exponent_of(&shaken("10"), 160, 60);
+    let result = exponent_of(&carriage("10"), 160, 60);
     assert_eq!(result.regime, Regime::Periodic(2));
     assert!((value(&result) + 12.51).abs() < 0.2, "{}", value(&result));
 }

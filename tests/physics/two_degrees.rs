@@ -1,4 +1,4 @@
-//! Joints of two degrees, cylindrical and universal: closed forms, conservation laws and both formulations.
+//! Joints with two degrees of freedom, cylindrical and universal: closed forms, conservation laws and both formulations.
 
 use crate::common::matrix::{FORMULATIONS, every_variant};
 use crate::common::{frame_now, slope};
@@ -9,11 +9,11 @@ use jointplay::simulate::Frame;
 
 pub const G: f64 = 9.81;
 
-fn turn(axis: Vec3, angle: f64) -> Quat {
+fn rotation_about(axis: Vec3, angle: f64) -> Quat {
     Quat::from_axis_angle(&nalgebra::Unit::new_normalize(axis), angle)
 }
 
-/// How far two angles differ, modulo a turn.
+/// Absolute difference of two angles modulo a turn, by its chord.
 pub fn angle_difference(a: f64, b: f64) -> f64 {
     (0.5 * (a - b)).sin().abs() * 2.0
 }
@@ -44,7 +44,7 @@ fn a_cylindrical_joint_slides_and_turns_independently() {
     }
 }
 
-/// A free body that tumbles, on it a ring on a cylindrical joint, and on that a rod on a universal one: masses and centroids.
+/// Masses, centroids and inertias of a free body, a ring on a cylindrical joint of it, and a rod on a universal joint of the ring.
 const MASS: [f64; 3] = [1.2, 0.5, 0.3];
 const CENTRE: [[f64; 3]; 3] = [[0.01, -0.02, 0.005], [0.03, 0.01, -0.02], [-0.02, 0.0, 0.06]];
 const INERTIA: [[f64; 3]; 3] = [[2e-3, 3e-3, 4e-3], [5e-4, 8e-4, 6e-4], [3e-4, 4e-4, 2e-4]];
@@ -57,8 +57,8 @@ pub fn train(gravity: f64) -> String {
             MASS[i]
         )
     };
-    // The universal joint's second axis, (0, 0, 1) of the ring, as the rod sees it.
-    let rest = turn(Vec3::new(1.0, 2.0, -1.0), 0.6);
+    // The universal joint's second axis, (0, 0, 1) of the ring, in the rod's frame.
+    let rest = rotation_about(Vec3::new(1.0, 2.0, -1.0), 0.6);
     let second = rest.inverse() * Vec3::z();
     format!(
         "[gravity]\nx = 0\ny = 0\nz = \"{gravity} m/s^2\"\n{}{}{}\
@@ -104,7 +104,8 @@ fn a_chain_of_both_joints_starts_at_its_coordinates() {
             panic!("three bodies");
         };
         let along = Vec3::new(1.0, 1.0, 0.0).normalize();
-        let ring_turn = turn(along, 20_f64.to_radians()) * turn(Vec3::new(0.0, 1.0, 1.0), 35_f64.to_radians());
+        let ring_turn =
+            rotation_about(along, 20_f64.to_radians()) * rotation_about(Vec3::new(0.0, 1.0, 1.0), 35_f64.to_radians());
         let of_ring = base.rotation * ring_turn.to_rotation_matrix().into_inner();
         assert!((ring.rotation - of_ring).amax() < 1e-14);
         let joint = base.position + base.rotation * (Vec3::new(0.05, 0.0, 0.02) + along * 5e-3);
@@ -112,9 +113,10 @@ fn a_chain_of_both_joints_starts_at_its_coordinates() {
         assert!(off.norm() < 1e-15, "{off}");
         let spin = base.angular_velocity + base.rotation * along * 6.0;
         assert!((ring.angular_velocity - spin).norm() < 1e-13);
-        let rest = turn(Vec3::new(1.0, 2.0, -1.0), 0.6);
+        let rest = rotation_about(Vec3::new(1.0, 2.0, -1.0), 0.6);
         let second = rest.inverse() * Vec3::z();
-        let rod_turn = turn(Vec3::x(), 25_f64.to_radians()) * rest * turn(second, -40_f64.to_radians());
+        let rod_turn =
+            rotation_about(Vec3::x(), 25_f64.to_radians()) * rest * rotation_about(second, -40_f64.to_radians());
         let of_rod = ring.rotation * rod_turn.to_rotation_matrix().into_inner();
         assert!((rod.rotation - of_rod).amax() < 1e-13);
         let spin = ring.angular_velocity + ring.rotation * Vec3::x() * 3.0 - rod.rotation * second * 5.0;
@@ -146,7 +148,7 @@ fn a_free_chain_conserves_momenta_and_energy_in_both_formulations() {
         ends.push(after);
     }
     let [tree, lagrange] = &ends[..] else {
-        panic!("two forms");
+        panic!("two formulations");
     };
     for (a, b) in tree.bodies.iter().zip(&lagrange.bodies) {
         let off = (a.position - b.position).norm();

@@ -1,4 +1,4 @@
-//! Tyres on a moving ground against closed solutions, in every method and both formulations.
+//! Tyres on a moving ground against closed-form solutions, in every method and both formulations.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ const G: f64 = 9.81;
 /// Height of the wheel's centre at rest on level ground, m.
 const REST: f64 = RADIUS - MASS * G / STIFFNESS;
 
-/// A wheel of `MASS` that goes up and down along z, from `height`, m, at rest.
+/// A wheel of `MASS` that moves along z, starting at rest at `height`, m.
 fn wheel(height: f64, tyre: &str) -> String {
     format!(
         "[gravity]\nz = \"-{G} m/s^2\"\n\
@@ -31,8 +31,8 @@ fn start_simulation(text: &str, changes: &[(&str, &str)]) -> LiveScene {
     LiveScene::new(&parse(text, changes)).unwrap()
 }
 
-/// Height from that at rest on level ground of a wheel with `damping` on a ground a sin(w t), started at rest there.
-fn ridden(damping: f64, [a, w]: [f64; 2], t: f64) -> f64 {
+/// Height above rest of a wheel with `damping` on the ground a sin(w t), starting at rest on level ground.
+fn ride_height(damping: f64, [a, w]: [f64; 2], t: f64) -> f64 {
     // m x'' + c x' + k x = k a sin w t + c a w cos w t.
     let (k, c, m) = (STIFFNESS, damping, MASS);
     let (stiff, damp) = (k - m * w * w, c * w);
@@ -41,15 +41,15 @@ fn ridden(damping: f64, [a, w]: [f64; 2], t: f64) -> f64 {
     let p = (stiff * k * a + damp * c * a * w) / size;
     let q = (stiff * c * a * w - damp * k * a) / size;
     let d = c / (2.0 * m);
-    let own = (k / m - d * d).sqrt();
+    let natural = (k / m - d * d).sqrt();
     let (x, v) = (-q, -p * w);
-    let (sin, cos) = (own * t).sin_cos();
-    let free = (-d * t).exp() * (x * cos + (v + d * x) / own * sin);
+    let (sin, cos) = (natural * t).sin_cos();
+    let free = (-d * t).exp() * (x * cos + (v + d * x) / natural * sin);
     free + p * (w * t).sin() + q * (w * t).cos()
 }
 
 #[test]
-fn a_wheel_rides_a_wavy_road_as_the_linear_solution_says() {
+fn a_wheel_follows_a_wavy_road_as_in_the_linear_solution() {
     let (waves, time) = ([1e-3, TAU * 6.0], 0.3);
     for_every([0.0, 400.0], |damping, variant| {
         let text = wheel(
@@ -61,7 +61,7 @@ fn a_wheel_rides_a_wavy_road_as_the_linear_solution_says() {
         let mut simulation = start_simulation(&text, &variant.close());
         let frame = frame_at(&mut simulation, time);
         let label = format!("{variant}, damping {damping}");
-        let expected = ridden(damping, waves, time);
+        let expected = ride_height(damping, waves, time);
         let off = frame.bodies[0].position.z - REST - expected;
         assert!(off.abs() < variant.bound(), "{label}: {off:e} of {expected:e}");
         let ground = waves[0] * (waves[1] * time).sin();
@@ -78,7 +78,7 @@ fn a_wheel_rides_a_wavy_road_as_the_linear_solution_says() {
 }
 
 #[test]
-fn a_wheel_that_falls_on_a_hard_tyre_flies_again() {
+fn a_wheel_that_falls_on_an_undamped_tyre_bounces_back() {
     let text = wheel(0.5, "");
     for (method, formulation) in THREE_VARIANTS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
@@ -102,7 +102,7 @@ fn a_wheel_that_falls_on_a_hard_tyre_flies_again() {
 
 #[test]
 fn no_bump_is_stepped_over() {
-    // Half a millisecond after a second of rest, a hundredth of the wheel's period: an impulse.
+    // A bump of half a millisecond, a hundredth of the wheel's period, acts as an impulse.
     let text = wheel(REST, "ground = { law = \"pulse\", height = \"2 mm\", start = \"1 s\", duration = \"0.5 ms\" }");
     // The integral of sin^3(pi s) from 0 to 1 is 4 / 3 pi.
     let impulse = STIFFNESS * 2e-3 * 0.5e-3 * 4.0 / (3.0 * std::f64::consts::PI);
@@ -113,11 +113,11 @@ fn no_bump_is_stepped_over() {
         assert!((before.bodies[0].position.z - REST).abs() < 1e-9, "{method}");
         let swing = frame_at(&mut simulation, 1.00025 + 0.25 * TAU / (STIFFNESS / MASS).sqrt());
         let expected = speed / (STIFFNESS / MASS).sqrt();
-        let found = swing.bodies[0].position.z - REST;
-        assert!((found / expected - 1.0).abs() < 1e-3, "{method}: {found} {expected}");
+        let amplitude = swing.bodies[0].position.z - REST;
+        assert!((amplitude / expected - 1.0).abs() < 1e-3, "{method}: {amplitude} {expected}");
         let ledger = simulation.ledger().unwrap();
-        let given = 0.5 * MASS * speed * speed;
-        assert!((ledger.drive_work / given - 1.0).abs() < 1e-2, "{method} {ledger:?}");
+        let work = 0.5 * MASS * speed * speed;
+        assert!((ledger.drive_work / work - 1.0).abs() < 1e-2, "{method} {ledger:?}");
         assert!(ledger.relative_residual().abs() < 1e-5, "{method} {ledger:?}");
     }
 }
@@ -142,13 +142,13 @@ fn a_tyre_is_a_one_sided_spring_on_a_driven_road() {
         assert!((a.bodies[0].position - b.bodies[0].position).norm() < 1e-7);
         assert!((a.elements[0].force - b.elements[0].force).norm() < 1e-2);
     }
-    assert!(lifted, "the road throws the wheel off");
+    assert!(lifted, "the road must throw the wheel off");
     let [a, b] = [a, b].map(|s| *s.ledger().unwrap());
     assert!((a.damping_loss / b.damping_loss - 1.0).abs() < 1e-4, "{a:?} {b:?}");
 }
 
 #[test]
-fn up_is_against_the_gravity_of_the_file_or_given() {
+fn up_is_opposite_to_the_gravity_of_the_file_unless_given() {
     let push = |text: &str, changes: &[(&str, &str)]| -> Vec3 {
         let mut frame = Frame::default();
         start_simulation(text, changes).sample(0.0, &mut frame);
@@ -157,7 +157,7 @@ fn up_is_against_the_gravity_of_the_file_or_given() {
     let text = wheel(REST, "");
     let weight = Vec3::new(0.0, 0.0, MASS * G);
     assert!((push(&text, &[]) - weight).norm() < 1e-9);
-    // A changed gravity moves no ground.
+    // A changed gravity does not change the ground's direction.
     assert!((push(&text, &[("gravity.z", "0"), ("gravity.x", "3 m/s^2")]) - weight).norm() < 1e-9);
     let mut simulation = start_simulation(&text, &[]);
     simulation.set("gravity.z", "5 m/s^2").unwrap();
@@ -169,11 +169,11 @@ fn up_is_against_the_gravity_of_the_file_or_given() {
 }
 
 #[test]
-fn errors_in_a_tyre_are_named() {
+fn errors_in_a_tyre_are_located() {
     let error = |text: &str| Scene::parse(text, Some("mine.toml"), &[]).unwrap_err().to_string();
-    let still = wheel(REST, "").replace("z = \"-9.81 m/s^2\"", "x = 0\ny = 0\nz = 0");
-    for (text, said) in [
-        (still, ["tyre.t.up", "without gravity only the file can say which way is up"]),
+    let without_gravity = wheel(REST, "").replace("z = \"-9.81 m/s^2\"", "x = 0\ny = 0\nz = 0");
+    for (text, fragments) in [
+        (without_gravity, ["tyre.t.up", "without gravity only the file can say which way is up"]),
         (
             wheel(REST, "").replace("body = \"wheel\" }\nradius", "body = \"world\" }\nradius"),
             ["tyre.t.on", "acts on a body, not on the world"],
@@ -188,8 +188,8 @@ fn errors_in_a_tyre_are_named() {
         (wheel(REST, "ground = \"flat\""), ["tyre.t.ground", "a table"]),
     ] {
         let message = error(&text);
-        for said in said {
-            assert!(message.contains(said), "{message}\nlacks {said}");
+        for fragment in fragments {
+            assert!(message.contains(fragment), "{message}\nlacks {fragment}");
         }
         assert!(message.starts_with("mine.toml:"), "{message}");
     }

@@ -1,4 +1,4 @@
-//! Every extreme that a scene may ask for, with every preset or method, ends in an outcome with a name.
+//! Every extreme of a scene's parameters, with every preset or method, ends in a named outcome.
 
 mod outcome;
 mod rows;
@@ -12,8 +12,8 @@ use crate::common::METHODS;
 use outcome::{Outcome, run};
 use rows::{Columns, Row, rows};
 
-/// Without a result for so long a call hangs.
-const DEAD: Duration = Duration::from_secs(600);
+/// A call without a result for this long hangs.
+const TIMEOUT: Duration = Duration::from_secs(600);
 const FORMS: [&str; 2] = ["tree", "lagrange"];
 const PRESETS: [&str; 4] = ["preview", "real-time", "accurate", "reference"];
 
@@ -25,7 +25,7 @@ impl Columns {
         }
     }
 
-    /// What stands above its table of a formulation.
+    /// Heading of its table for a formulation.
     fn title(self, form: &str) -> String {
         let about = match self {
             Self::Presets => "every preset",
@@ -35,14 +35,14 @@ impl Columns {
     }
 }
 
-/// Outcomes of a row: each formulation's in order of its columns.
+/// Outcomes of a row: those of each formulation in the order of its columns.
 type Outcomes = [Vec<Outcome>; 2];
 
-/// A cell: places of its row and its formulation, and the word of its column.
-type Place = (usize, usize, &'static str);
+/// A cell: indices of its row and its formulation, and the word of its column.
+type Cell = (usize, usize, &'static str);
 
-/// Outcomes of some cells, in their order.
-fn outcomes(rows: &Arc<Vec<Row>>, cells: Vec<Place>) -> Vec<Outcome> {
+/// Outcomes of `cells`, in their order.
+fn outcomes(rows: &Arc<Vec<Row>>, cells: Vec<Cell>) -> Vec<Outcome> {
     let cells = Arc::new(cells);
     let next = Arc::new(Mutex::new(0));
     let (send, receive) = channel();
@@ -70,12 +70,12 @@ fn outcomes(rows: &Arc<Vec<Row>>, cells: Vec<Place>) -> Vec<Outcome> {
     drop(send);
     let mut outcomes = vec![None; cells.len()];
     loop {
-        match receive.recv_timeout(DEAD) {
+        match receive.recv_timeout(TIMEOUT) {
             Ok((cell, outcome)) => outcomes[cell] = Some(outcome),
             Err(RecvTimeoutError::Disconnected) => break,
             Err(RecvTimeoutError::Timeout) => {
-                let open = outcomes.iter().position(Option::is_none).unwrap();
-                let (row, form, word) = cells[open];
+                let missing = outcomes.iter().position(Option::is_none).unwrap();
+                let (row, form, word) = cells[missing];
                 let row = &rows[row];
                 panic!("hangs: {}, {}, {}, {word}", row.scene, row.what, FORMS[form]);
             }
@@ -117,7 +117,7 @@ the row varies step or tolerance. `cargo test --test physics extremes::` compute
 - **stopped**: the divergence guard stopped the run, with a reason, and kept the last good state.
 - **refused**: the run does not start, with a reason.
 ";
-/// What another test writes below the tables.
+/// Heading of the part of the page that another test writes.
 const LONG_RUN: &str = "\n## 1000 simulated seconds\n";
 
 fn page(table: &[(Row, Outcomes)]) -> String {
@@ -139,13 +139,13 @@ fn page(table: &[(Row, Outcomes)]) -> String {
     }
     page.push_str("\n## Reasons\n\nThe first reason of each outcome in a row.\n\n");
     for (row, outcomes) in table {
-        let mut said: Vec<&str> = Vec::new();
+        let mut reported: Vec<&str> = Vec::new();
         for (f, form) in FORMS.iter().enumerate() {
             for (outcome, column) in outcomes[f].iter().zip(row.columns.words()) {
-                if outcome.reason().is_empty() || said.contains(&outcome.word()) {
+                if outcome.reason().is_empty() || reported.contains(&outcome.word()) {
                     continue;
                 }
-                said.push(outcome.word());
+                reported.push(outcome.word());
                 let (what, word, why) = (&row.what, outcome.word(), outcome.reason());
                 let why = why.lines().next().unwrap_or_default();
                 let _ = writeln!(page, "- {}, {what}, {form}, {column}: **{word}**: {why}", row.scene);
@@ -159,22 +159,22 @@ fn page_path() -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/extremes.md")
 }
 
-/// The page as it is kept: the tables, and the rest.
-fn kept() -> (String, String) {
-    let kept = std::fs::read_to_string(page_path()).unwrap_or_default();
-    let at = kept.find(LONG_RUN).unwrap_or(kept.len());
-    (kept[..at].to_owned(), kept[at..].to_owned())
+/// The stored page: the tables, and the rest.
+fn stored_page() -> (String, String) {
+    let text = std::fs::read_to_string(page_path()).unwrap_or_default();
+    let at = text.find(LONG_RUN).unwrap_or(text.len());
+    (text[..at].to_owned(), text[at..].to_owned())
 }
 
 #[test]
 #[ignore = "writes docs/extremes.md"]
 fn write_the_page() {
-    let page = page(&table()) + &kept().1;
+    let page = page(&table()) + &stored_page().1;
     std::fs::write(page_path(), page).unwrap();
 }
 
-/// What speaks against an outcome or for a name of it, to be shown; whether it must not be.
-fn tell(row: &Row, form: &str, column: &str, outcome: &Outcome) -> bool {
+/// Prints the reason of an outcome; returns whether it is wrong.
+fn report_outcome(row: &Row, form: &str, column: &str, outcome: &Outcome) -> bool {
     let (word, why) = (outcome.word(), outcome.reason());
     if !why.is_empty() {
         println!("{word}: {}, {}, {form}, {column}: {why}", row.scene, row.what);
@@ -182,7 +182,7 @@ fn tell(row: &Row, form: &str, column: &str, outcome: &Outcome) -> bool {
     matches!(outcome, Outcome::Wrong(_))
 }
 
-const ANEW: &str = "cargo test --test physics -- --ignored extremes::write_the_page";
+const UPDATE_COMMAND: &str = "cargo test --test physics -- --ignored extremes::write_the_page";
 
 #[test]
 #[ignore = "full: half a minute"]
@@ -192,33 +192,36 @@ fn full_every_extreme_ends_in_a_named_outcome() {
     for (row, outcomes) in &table {
         for (f, form) in FORMS.iter().enumerate() {
             for (outcome, column) in outcomes[f].iter().zip(row.columns.words()) {
-                wrong += u32::from(tell(row, form, column, outcome));
+                wrong += u32::from(report_outcome(row, form, column, outcome));
             }
         }
     }
-    assert_eq!(wrong, 0, "outcomes that must not be");
-    assert!(kept().0 == page(&table), "{ANEW}");
+    assert_eq!(wrong, 0, "wrong outcomes");
+    assert!(stored_page().0 == page(&table), "{UPDATE_COMMAND}");
 }
 
-/// One cell of each row: formulations and columns take turns.
+/// Checks one cell of each row, rotating through formulations and columns.
 #[test]
-fn an_outcome_of_every_extreme_is_that_of_the_page() {
+fn an_outcome_of_every_extreme_agrees_with_the_page() {
     let rows = Arc::new(rows());
-    let cell = |(r, row): (usize, &Row)| {
+    let cell_of_row = |(r, row): (usize, &Row)| {
         let words = row.columns.words();
         (r, r % FORMS.len(), words[r / FORMS.len() % words.len()])
     };
-    let cells: Vec<Place> = rows.iter().enumerate().map(cell).collect();
+    let cells: Vec<Cell> = rows.iter().enumerate().map(cell_of_row).collect();
     let outcomes = outcomes(&rows, cells.clone());
-    let page = kept().0;
+    let page = stored_page().0;
     for ((r, f, word), outcome) in cells.into_iter().zip(outcomes) {
         let (row, form) = (&rows[r], FORMS[f]);
-        assert!(!tell(row, form, word, &outcome), "must not be");
+        assert!(!report_outcome(row, form, word, &outcome), "wrong outcome");
         let (_, table) = page.split_once(&row.columns.title(form)).expect("its table");
         let head = format!("| {} | {} |", row.scene, row.what);
-        let line = table.lines().find_map(|line| line.strip_prefix(&*head)).unwrap_or_else(|| panic!("{head}: {ANEW}"));
+        let line = table
+            .lines()
+            .find_map(|line| line.strip_prefix(&*head))
+            .unwrap_or_else(|| panic!("{head}: {UPDATE_COMMAND}"));
         let column = row.columns.words().iter().position(|other| *other == word).expect("a column");
-        let kept = line.split('|').nth(column).expect("a cell").trim();
-        assert_eq!(outcome.word(), kept, "{head} {form} {word}: {ANEW}");
+        let stored = line.split('|').nth(column).expect("a cell").trim();
+        assert_eq!(outcome.word(), stored, "{head} {form} {word}: {UPDATE_COMMAND}");
     }
 }

@@ -1,4 +1,4 @@
-//! One cell of the table: a run, and how it ends.
+//! One cell of the table: a run and its outcome.
 
 use jointplay::simulate::{Frame, Pacer, Simulation};
 
@@ -6,32 +6,33 @@ use super::rows::Row;
 use crate::common::frame_now;
 use crate::common::invariants::{finite, violation};
 
-/// What is asked for: simulated seconds a second, in frames of so many seconds, of a machine that does so many evaluations
-/// of the equations a second. Work is counted, not timed, so that a busy machine fails nothing.
-const ASKED: f64 = 0.1;
+/// Requested time scale. Work is counted, not timed, so that a busy computer does not fail the test.
+const REQUESTED_SCALE: f64 = 0.1;
+/// Duration of a frame, s.
 const FRAME: f64 = 1.0 / 60.0;
+/// Speed of the assumed computer.
 const EVALUATIONS_PER_SECOND: f64 = 50_000.0;
-/// Frames, of those that the run should take, after which a slow run has done enough.
-const PATIENCE: f64 = 1.5;
-/// Evaluations that no single step may take.
-const MOST_IN_A_STEP: u64 = 2000;
-/// Energy that a passive scene may gain, of that exchanged: a method of order 1 with ten steps in an impact, and the others.
-const CREATED: [f64; 2] = [0.06, 0.02];
+/// Multiple of the expected number of frames after which a slow run is ended.
+const FRAME_LIMIT: f64 = 1.5;
+/// Limit of evaluations in a single step.
+const MAX_STEP_EVALUATIONS: u64 = 2000;
+/// Allowed gain of energy of a passive scene, relative to that exchanged: for a first-order method with ten steps per impact, and for the others.
+const ALLOWED_GAIN: [f64; 2] = [0.06, 0.02];
 
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// To the end, with every invariant.
+    /// The run reached its end and satisfies every invariant.
     Ran,
-    /// With every invariant, and slower than asked: the pacer, from which the window has it, says so.
+    /// The same, but slower than requested, as reported by the pacer.
     Slow,
-    /// Marked by the program as not to be trusted: why.
+    /// The program raised doubts about the result.
     Doubtful(String),
-    /// By the divergence guard, which says why; the last good state is kept.
+    /// The divergence guard stopped the run at its last good state.
     Stopped(String),
-    /// Before it began, with a reason.
+    /// The run was refused at the start.
     Refused(String),
-    /// What must not be.
+    /// A wrong behaviour.
     Wrong(String),
 }
 
@@ -55,7 +56,7 @@ impl Outcome {
     }
 }
 
-/// Energy of a run that nothing drives.
+/// Energy of a run without drives.
 struct Balance {
     start: f64,
     created: f64,
@@ -73,13 +74,13 @@ impl Balance {
         self.exchanged = self.exchanged.max(frame.kinetic + frame.elastic);
     }
 
-    /// What part of the energy exchanged came from nowhere.
+    /// Energy created, relative to the energy exchanged.
     fn gain(&self) -> f64 {
         self.created / self.exchanged.max(1e-12)
     }
 }
 
-/// Runs one cell of the table as the window would: frame by frame, behind its pacer.
+/// Runs one cell of the table as the window would, frame by frame with a pacer.
 pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
     let scene = match row.load(form, column) {
         Ok(scene) => scene,
@@ -94,13 +95,13 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
         return Outcome::Wrong(format!("{what}, at the start"));
     }
     let mut balance = Balance::new(&frame);
-    // The other form has all bodies' coordinates: an evaluation costs more.
+    // `lagrange` has the coordinates of all bodies, so an evaluation costs more.
     let rate = EVALUATIONS_PER_SECOND * if form == "tree" { 1.0 } else { 0.5 };
-    let expected = (row.duration / (ASKED * FRAME)).ceil();
+    let expected = (row.duration / (REQUESTED_SCALE * FRAME)).ceil();
     let mut pacer = Pacer::default();
-    pacer.set_scale(ASKED);
-    let (mut frames, mut said_slow, mut steps) = (0.0, false, 0_u64);
-    while simulation.time() < row.duration && frames < PATIENCE * expected {
+    pacer.set_scale(REQUESTED_SCALE);
+    let (mut frames, mut reported_slow, mut steps) = (0.0, false, 0_u64);
+    while simulation.time() < row.duration && frames < FRAME_LIMIT * expected {
         let target = pacer.begin(FRAME);
         let mut spent = 0.0;
         while simulation.time() < target.min(row.duration) && pacer.may_step(spent) {
@@ -117,11 +118,11 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
                 return Outcome::Stopped(stopped.to_string());
             }
             let evaluations = simulation.statistics().evaluations - before;
-            if evaluations > MOST_IN_A_STEP {
+            if evaluations > MAX_STEP_EVALUATIONS {
                 return Outcome::Wrong(format!("a step took {evaluations} evaluations"));
             }
             steps += 1;
-            // A step of a scene that is a function of time alone evaluates outside the stepper.
+            // A purely kinematic step evaluates outside the stepper.
             spent += evaluations.max(1) as f64 / rate;
             if steps < 200 || steps.is_multiple_of(16) || simulation.time() >= row.duration {
                 let middle = 0.5 * (simulation.step_start() + simulation.time());
@@ -139,13 +140,13 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
         let target = target.min(row.duration);
         pacer.end(FRAME, target, simulation.time(), spent);
         let reached = pacer.reached_scale();
-        said_slow |= reached.is_some_and(|reached| reached < (1.0 - 1e-6) * ASKED);
+        reported_slow |= reached.is_some_and(|reached| reached < (1.0 - 1e-6) * REQUESTED_SCALE);
         frames += 1.0;
     }
     let doubts = simulation.doubts();
     let mut doubts: Vec<String> = doubts.iter().map(ToString::to_string).collect();
     let euler = scene.machine.solver.method == jointplay::integrate::Method::SemiImplicitEuler;
-    if row.passive && balance.gain() > CREATED[usize::from(!euler)] {
+    if row.passive && balance.gain() > ALLOWED_GAIN[usize::from(!euler)] {
         let what = format!("{:.3} of the energy created", balance.gain());
         if doubts.is_empty() {
             return Outcome::Wrong(what);
@@ -153,8 +154,8 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
         doubts.push(what);
     }
     let late = simulation.time() < row.duration || frames > expected + 1.0;
-    if late && !said_slow {
-        return Outcome::Wrong("slower than asked, and does not say so".to_owned());
+    if late && !reported_slow {
+        return Outcome::Wrong("slower than requested without reporting it".to_owned());
     }
     if !doubts.is_empty() {
         Outcome::Doubtful(doubts.join(" "))
