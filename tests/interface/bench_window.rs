@@ -124,7 +124,7 @@ pub fn wait(harness: &mut Harness<'_, App>, mut done: impl FnMut(&App) -> bool) 
 }
 
 /// Number of sweep points received so far.
-fn come(app: &App) -> usize {
+fn received_points(app: &App) -> usize {
     let swept = app.bench().swept();
     swept.map_or(0, |swept| swept.points.iter().flatten().count())
 }
