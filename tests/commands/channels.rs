@@ -1,4 +1,4 @@
-//! `run --channels` and `check --channels`: rows with chosen columns.
+//! `run --channels` and `check --channels`: rows with selected columns.
 
 use std::fs;
 
@@ -18,33 +18,33 @@ fn selected_columns_equal_those_of_a_full_run() {
         let line = format!("run spcmm --duration 10ms --every 1ms --quiet {more}");
         jointplay(folder.path(), &line).expect(0);
     };
-    run("--out whole.csv");
-    run("--out chosen.csv --channels time,S2.force,platform.pose --channels energy.resid*");
+    run("--out full.csv");
+    run("--out selected.csv --channels time,S2.force,platform.pose --channels energy.resid*");
     run("--out other.csv --channels rod1.pose.x,P1.position,P1.rate,S?.gap,R1.angle");
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
-    let (whole, chosen) = (read("whole.csv"), read("chosen.csv"));
-    let (whole, chosen) = (lines(&whole), lines(&chosen));
+    let (full, selected) = (read("full.csv"), read("selected.csv"));
+    let (full, selected) = (lines(&full), lines(&selected));
     let header =
         "t_s,x_m,y_m,z_m,alpha_rad,beta_rad,gamma_rad,S2_force_x_N,S2_force_y_N,S2_force_z_N,energy_residual_J";
-    assert_eq!(chosen[0].join(","), header);
-    assert_eq!((chosen.len(), whole.len()), (12, 12));
-    for (column, name) in chosen[0].iter().enumerate() {
-        let same = whole[0].iter().position(|other| other == name).unwrap();
-        for (a, b) in chosen.iter().zip(&whole) {
+    assert_eq!(selected[0].join(","), header);
+    assert_eq!((selected.len(), full.len()), (12, 12));
+    for (column, name) in selected[0].iter().enumerate() {
+        let same = full[0].iter().position(|other| other == name).unwrap();
+        for (a, b) in selected.iter().zip(&full) {
             assert_eq!(a[column], b[same], "{name}");
         }
     }
     let other = read("other.csv");
     let other = lines(&other);
     assert_eq!(other[0].join(","), "t_s,rod1_x_m,P1_position_m,P1_rate_m_s,R1_angle_rad,S1_gap_m,S2_gap_m,S3_gap_m");
-    let gap = whole[0].iter().position(|name| *name == "S2_penetration_m");
-    for (a, b) in other[1..].iter().zip(&whole[1..]) {
+    let gap = full[0].iter().position(|name| *name == "S2_penetration_m");
+    for (a, b) in other[1..].iter().zip(&full[1..]) {
         let [a, b]: [f64; 2] = [a[6], b[gap.unwrap()]].map(|value| value.parse().unwrap());
         assert_eq!(a, -b);
     }
-    let meta: Json = serde_json::from_str(&read("chosen.csv.meta.json")).expect("metadata is JSON");
-    let asked = ["time", "S2.force", "platform.pose", "energy.resid*"];
-    assert_eq!(meta["channels"], serde_json::json!(asked));
+    let meta: Json = serde_json::from_str(&read("selected.csv.meta.json")).expect("metadata is JSON");
+    let requested = ["time", "S2.force", "platform.pose", "energy.resid*"];
+    assert_eq!(meta["channels"], serde_json::json!(requested));
 }
 
 #[test]
@@ -83,8 +83,8 @@ fn an_unknown_channel_is_refused_with_the_nearest_name() {
             assert!(run.stderr.contains(word), "{word}: {}", run.stderr);
         }
     }
-    let alone = jointplay(folder.path(), "run pendulum --duration 1ms --channels S1");
-    assert!(alone.expect(2).stderr.contains("--out"));
+    let without_file = jointplay(folder.path(), "run pendulum --duration 1ms --channels S1");
+    assert!(without_file.expect(2).stderr.contains("--out"));
     assert_eq!(names(folder.path()), [""; 0]);
 }
 
@@ -92,16 +92,16 @@ fn an_unknown_channel_is_refused_with_the_nearest_name() {
 fn check_lists_every_channel() {
     let folder = folder();
     let list = jointplay(folder.path(), "check spcmm --channels").expect(0).stdout;
-    let (unasked, asked) = list.split_once("Written on request:\n").unwrap();
+    let (default, on_request) = list.split_once("Written on request:\n").unwrap();
     let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-    let unasked: Vec<_> = unasked.lines().skip(1).map(words).collect();
-    assert_eq!(unasked[0][..3], ["time", "s", "t_s"]);
-    assert!(asked.lines().any(|line| words(line)[..3] == ["rod1.pose.x", "m", "rod1_x_m"]));
+    let default: Vec<_> = default.lines().skip(1).map(words).collect();
+    assert_eq!(default[0][..3], ["time", "s", "t_s"]);
+    assert!(on_request.lines().any(|line| words(line)[..3] == ["rod1.pose.x", "m", "rod1_x_m"]));
     let run = "run spcmm --duration 0s --every 1s --out a.csv";
     jointplay(folder.path(), run).expect(0);
     let text = fs::read_to_string(folder.path().join("a.csv")).unwrap();
-    assert_eq!(lines(&text)[0].len(), unasked.len());
+    assert_eq!(lines(&text)[0].len(), default.len());
     jointplay(folder.path(), &format!("{run} --force --channels *")).expect(0);
     let text = fs::read_to_string(folder.path().join("a.csv")).unwrap();
-    assert_eq!(lines(&text)[0].len(), unasked.len() + asked.lines().count());
+    assert_eq!(lines(&text)[0].len(), default.len() + on_request.lines().count());
 }

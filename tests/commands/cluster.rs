@@ -1,4 +1,4 @@
-//! The worked example of a scheduler spreads a sweep, merges it, and goes on after a failure.
+//! The scheduler example distributes a sweep over shards, merges them, and resumes after a failure.
 #![cfg(target_os = "linux")]
 
 use std::fs;
@@ -16,7 +16,7 @@ fn example(folder: &Path, line: &str) -> Output {
         .current_dir(folder)
         .env("JOINTPLAY", env!("CARGO_BIN_EXE_jointplay"))
         .env("PARALLEL_OPTIONS", "--jobs 2")
-        // parallel keeps its own settings there.
+        // GNU parallel stores its settings there.
         .env("HOME", folder)
         .output()
         .unwrap()
@@ -25,22 +25,22 @@ fn example(folder: &Path, line: &str) -> Output {
 #[test]
 fn gnu_parallel_distributes_a_sweep_and_resumes_after_a_failure() {
     let version = Command::new("parallel").arg("--version").output();
-    let there = version.is_ok_and(|v| String::from_utf8_lossy(&v.stdout).contains("GNU parallel"));
-    assert!(there, "GNU parallel is missing: ./test installs it (Debian, Ubuntu: parallel)");
+    let is_installed = version.is_ok_and(|v| String::from_utf8_lossy(&v.stdout).contains("GNU parallel"));
+    assert!(is_installed, "GNU parallel is missing: ./test installs it (Debian, Ubuntu: parallel)");
     let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+    let path = |name: &str| folder.path().join(name);
     jointplay(folder.path(), &format!("sweep {SWEEP} --out whole.npz")).expect(0);
 
     // A shard that cannot be written fails, and nothing is merged.
-    fs::create_dir_all(at("spread.npz.shards/2.npz.partial")).unwrap();
+    fs::create_dir_all(path("spread.npz.shards/2.npz.partial")).unwrap();
     let failed = example(folder.path(), &format!("2 spread.npz {SWEEP}"));
     let stderr = String::from_utf8_lossy(&failed.stderr).into_owned();
-    assert!(!failed.status.success() && !at("spread.npz").exists());
+    assert!(!failed.status.success() && !path("spread.npz").exists());
     assert!(stderr.contains("2.npz.partial"), "{stderr}");
-    fs::remove_dir(at("spread.npz.shards/2.npz.partial")).unwrap();
+    fs::remove_dir(path("spread.npz.shards/2.npz.partial")).unwrap();
 
-    let done = example(folder.path(), &format!("2 spread.npz {SWEEP}"));
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    assert!(fs::read(at("spread.npz")).unwrap() == fs::read(at("whole.npz")).unwrap());
-    assert!(!at("spread.npz.shards").exists());
+    let resumed = example(folder.path(), &format!("2 spread.npz {SWEEP}"));
+    assert!(resumed.status.success(), "{}", String::from_utf8_lossy(&resumed.stderr));
+    assert!(fs::read(path("spread.npz")).unwrap() == fs::read(path("whole.npz")).unwrap());
+    assert!(!path("spread.npz.shards").exists());
 }

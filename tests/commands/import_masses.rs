@@ -1,4 +1,4 @@
-//! Masses and inertias of robot descriptions: meshes, what no body can have, and lines of faults that a scene would find.
+//! Masses and inertias of robot descriptions: meshes, impossible inertias, and the lines of errors that the scene reader reports.
 
 use std::fs;
 
@@ -35,7 +35,7 @@ fn outcome(text: &str, mesh: &str, status: i32) -> (String, String) {
 
 #[test]
 fn a_mesh_has_the_mass_of_its_volume_at_the_pose_of_its_geom() {
-    let body = |asset: &str, geom: &str| {
+    let body_with_mesh = |asset: &str, geom: &str| {
         let (text, _) = outcome(&with_mesh(asset, geom), &cuboid(false), 0);
         Scene::parse(&text, None, &[]).unwrap().machine.bodies.remove(0)
     };
@@ -43,27 +43,27 @@ fn a_mesh_has_the_mass_of_its_volume_at_the_pose_of_its_geom() {
     let scale = "scale=\"0.01 0.01 0.01\"";
     let mass = 1000.0 * 5.6e-5;
     for inertia in ["", "inertia=\"convex\"", "inertia=\"exact\"", "inertia=\"legacy\""] {
-        let found = body(&format!("{scale} {inertia}"), "pos=\"1 0 0\" euler=\"0 0 90\"");
-        assert!((found.mass / mass - 1.0).abs() < 1e-6, "{} {mass}", found.mass);
+        let body = body_with_mesh(&format!("{scale} {inertia}"), "pos=\"1 0 0\" euler=\"0 0 90\"");
+        assert!((body.mass / mass - 1.0).abs() < 1e-6, "{} {mass}", body.mass);
         // Its x axis is the body's y, its y axis the body's -x.
-        assert!((found.centre - Vec3::new(1.0 - 0.02, 0.01, 0.035)).norm() < 1e-8, "{}", found.centre);
+        assert!((body.centre - Vec3::new(1.0 - 0.02, 0.01, 0.035)).norm() < 1e-8, "{}", body.centre);
         let zz = mass * (0.02_f64.powi(2) + 0.04_f64.powi(2)) / 12.0;
         let xx = mass * (0.02_f64.powi(2) + 0.07_f64.powi(2)) / 12.0;
-        assert!((found.inertia.m33 / zz - 1.0).abs() < 1e-5 && (found.inertia.m11 / xx - 1.0).abs() < 1e-5);
+        assert!((body.inertia.m33 / zz - 1.0).abs() < 1e-5 && (body.inertia.m11 / xx - 1.0).abs() < 1e-5);
     }
     // Edges of 0.02, 0.08 and 0.07 m, mirrored and moved by the mesh's own frame; a mass in place of a density.
-    let moved = body("scale=\"-0.01 0.02 0.01\" refpos=\"1 2 3.5\"", "mass=\"3\"");
+    let moved = body_with_mesh("scale=\"-0.01 0.02 0.01\" refpos=\"1 2 3.5\"", "mass=\"3\"");
     assert!((moved.mass - 3.0).abs() < 1e-12 && moved.centre.norm() < 1e-8, "{} {}", moved.mass, moved.centre);
     let zz = 3.0 * (0.02_f64.powi(2) + 0.08_f64.powi(2)) / 12.0;
     assert!((moved.inertia.m33 / zz - 1.0).abs() < 1e-5);
     // kg/m^2 on a surface of 2 (8 + 14 + 28) square units.
-    let shell = body(&format!("{scale} inertia=\"shell\""), "density=\"10\"");
+    let shell = body_with_mesh(&format!("{scale} inertia=\"shell\""), "density=\"10\"");
     assert!((shell.mass / (10.0 * 1e-2) - 1.0).abs() < 1e-6, "{}", shell.mass);
 }
 
 #[test]
 fn a_mesh_without_a_computable_mass_is_refused_with_its_line() {
-    let said = |asset: &str, geom: &str, mesh: &str| outcome(&with_mesh(asset, geom), mesh, 2).1;
+    let error = |asset: &str, geom: &str, mesh: &str| outcome(&with_mesh(asset, geom), mesh, 2).1;
     for (asset, mesh, expected) in [
         (
             "",
@@ -74,15 +74,18 @@ fn a_mesh_without_a_computable_mass_is_refused_with_its_line() {
         ("inertia=\"convex\"", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n".to_owned(), "lie in one plane"),
         ("", "v 0 0 x\n".to_owned(), "mesh without a computable mass: m.obj: "),
     ] {
-        let said = said(asset, "", &mesh);
-        assert!(said.contains(expected), "{said}\n  should say `{expected}`");
+        let message = error(asset, "", &mesh);
+        assert!(message.contains(expected), "{message}\n  does not contain `{expected}`");
     }
     let open = cuboid(true);
-    // Without mass, or with the mass of its hull, an open mesh is taken.
+    // An open mesh is accepted without mass or with the mass of its hull.
     outcome(&with_mesh("inertia=\"convex\"", ""), &open, 0);
     outcome(&with_mesh("", "mass=\"0\"").replace("<joint/>", "<joint/><geom size=\"0.1\"/>"), &open, 0);
-    let gone = outcome(&with_mesh("", "").replace("m.obj", "gone.obj"), &open, 2).1;
-    assert!(gone.contains("cannot read gone.obj") && gone.contains("give its body an <inertial>"), "{gone}");
+    let missing_file = outcome(&with_mesh("", "").replace("m.obj", "gone.obj"), &open, 2).1;
+    assert!(
+        missing_file.contains("cannot read gone.obj") && missing_file.contains("give its body an <inertial>"),
+        "{missing_file}"
+    );
     let shell = mujoco("<body><joint/><geom size=\"0.1\" shellinertia=\"true\"/></body>");
     assert!(import_error(&shell).contains("shellinertia = \"true\" is not read"));
 }
@@ -115,15 +118,15 @@ fn impossible_inertias_are_refused_with_their_line() {
             diagonal("0.1 0.1 0.3"),
             "robot:5: inertial: no body has this inertia: its largest principal moment, 0.3 kg m^2, exceeds",
         ),
-        // What only the scene finds.
+        // Errors that only the scene reader finds.
         (link("2e9", ["1", "1", "1"], ""), "robot:3: body.a.mass = "),
         (link("1", ["0", "0", "0"], ""), "robot:3: body.a.inertia = "),
         (link("1", ["1", "1", "1"], sphere), "robot:6: body.a.shapes[0].radius = "),
     ] {
-        let said = import_error(&text);
-        assert!(said.contains(expected), "{text}\n  should say `{expected}`, says: {said}");
+        let message = import_error(&text);
+        assert!(message.contains(expected), "{text}\n  error without `{expected}`: {message}");
     }
-    // A point mass is a part of a body like any other.
+    // A point mass can be a part of a body.
     let joint = "</link><link name=\"p\"><inertial><mass value=\"1\"/><inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/></inertial></link>\
                  <joint name=\"f\" type=\"fixed\"><parent link=\"a\"/><child link=\"p\"/></joint><link name=\"q\">";
     let text = link("1", ["1", "1", "1"], joint).replace(
@@ -134,7 +137,7 @@ fn impossible_inertias_are_refused_with_their_line() {
 }
 
 #[test]
-fn a_material_is_known_wherever_it_is_defined_and_a_document_type_is_accepted() {
+fn a_material_may_be_defined_anywhere_and_a_document_type_is_accepted() {
     let visual = |material: &str| format!("<visual><geometry><sphere radius=\"1\"/></geometry>{material}</visual>");
     let defined = "<material name=\"blue\"><color rgba=\"0 0 1 1\"/></material>";
     let text = link("1", ["1", "1", "1"], &(visual("<material name=\"blue\"/>") + &visual(defined)));
@@ -146,8 +149,8 @@ fn a_material_is_known_wherever_it_is_defined_and_a_document_type_is_accepted() 
     );
     let (scene, _) = imported(&outer);
     assert_eq!(scene.source.text.matches("colour = \"#ff0000\"").count(), 1, "{}", scene.source.text);
-    let typed = |inside: &str| format!("<?xml version=\"1.0\"?>\n<!DOCTYPE robot{inside}>\n{text}");
-    assert_eq!(imported(&typed("")).0.machine.bodies.len(), 1);
-    let said = import_error(&typed(" [\n<!ENTITY a \"b\">]"));
-    assert!(said.contains("robot:3: entities are not read: write their text in their places"), "{said}");
+    let with_document_type = |inside: &str| format!("<?xml version=\"1.0\"?>\n<!DOCTYPE robot{inside}>\n{text}");
+    assert_eq!(imported(&with_document_type("")).0.machine.bodies.len(), 1);
+    let message = import_error(&with_document_type(" [\n<!ENTITY a \"b\">]"));
+    assert!(message.contains("robot:3: entities are not read: write their text in their places"), "{message}");
 }

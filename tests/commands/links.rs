@@ -1,4 +1,4 @@
-//! Share links on the command line: the run of a window, done again.
+//! Share links on the command line: the run of a window, repeated.
 #![cfg(feature = "gui")]
 
 use jointplay::app::{Link, Player, SceneText};
@@ -6,7 +6,7 @@ use jointplay::scene::Scene;
 
 use crate::program::{folder, jointplay};
 
-/// A link to a run in which a parameter was changed twice on the way, and its state there.
+/// A link to a run in which a parameter was changed twice, and the state hash at its end.
 fn link() -> (String, u64) {
     let scene = Scene::load("slider-crank", &[("contact.friction".to_owned(), "0.1".to_owned())]).expect("built in");
     let mut player = Player::new(&scene).expect("starts");
@@ -38,15 +38,15 @@ fn run_replays_a_link_to_the_same_bits_and_reports_differences() {
     let page = format!("https://example.org/lab/#{link}");
     let text = run(&format!("run --link {page}")).expect(0).stdout;
     assert!(text.contains("agrees"), "{text}");
-    // On from there, where asked.
+    // Continues to a later time on request.
     let longer = run(&format!("run --link {link} --duration 50ms --summary json")).expect(0).json();
     assert_eq!(longer["time_s"], 0.05);
     assert_ne!(longer["state_hash"], summary["state_hash"]);
-    // Another state is no success.
+    // A different state is a failure.
     let wrong = link.replace(&format!("hash={hash:016x}"), "hash=0123456789abcdef");
     let differs = run(&format!("run --link {wrong}")).expect(5);
     assert!(differs.stderr.contains("the link says 0123456789abcdef"));
-    // The scene alone, with what the run began with.
+    // `check` reads the scene with the initial parameters of the run.
     let checked = run(&format!("check --link {link}")).expect(0).stdout;
     assert!(checked.contains("changed: contact.friction = 0.1"), "{checked}");
     for (line, words) in [
@@ -54,7 +54,7 @@ fn run_replays_a_link_to_the_same_bits_and_reports_differences() {
         ("run --link ?scene=pendulun --duration 1ms", "did you mean `pendulum`"),
         ("run pendulum --link ?c=1mm --duration 1ms", "cannot be used with"),
     ] {
-        let refused = run(line).expect(2);
-        assert!(refused.stderr.contains(words), "{line}: {}", refused.stderr);
+        let outcome = run(line).expect(2);
+        assert!(outcome.stderr.contains(words), "{line}: {}", outcome.stderr);
     }
 }

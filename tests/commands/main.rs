@@ -1,4 +1,4 @@
-//! The program as scripts see it.
+//! Tests of the command-line program: exit status, output and files.
 
 #[path = "../common/mod.rs"]
 mod common;

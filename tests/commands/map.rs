@@ -1,4 +1,4 @@
-//! `map`: the error polygon of two rods over a line of positions, its files, and what a user may get wrong.
+//! `map`: the error polygon of two rods at positions along a line, its files, and errors in its arguments.
 
 use std::fs;
 use std::path::Path;
@@ -10,14 +10,14 @@ use crate::common::truss::{Guide, Rod, TIP, TWO, support, truss};
 use crate::program::{folder, jointplay, names};
 use crate::sweep::archive;
 
-/// The scene of two rods, of which one end slides; 3 of the 4 positions can be reached.
-const OVER: &str = "map ./truss.toml --over base.position=-50mm,0mm,40mm,-2m";
+/// Maps the scene of two rods, whose base slides; 3 of the 4 positions are reachable.
+const MAP_COMMAND: &str = "map ./truss.toml --over base.position=-50mm,0mm,40mm,-2m";
 
 fn scene(folder: &Path) {
     fs::write(folder.join("truss.toml"), truss(&TWO, TIP, Guide::Plane, "")).unwrap();
 }
 
-/// What follows the line `head` of a VTK file, as so many doubles.
+/// The `count` doubles after the line `head` of a VTK file.
 fn doubles(file: &[u8], head: &str, count: usize) -> Vec<f64> {
     let head = format!("{head}\n");
     let at = file.windows(head.len()).position(|part| part == head.as_bytes());
@@ -30,8 +30,8 @@ fn doubles(file: &[u8], head: &str, count: usize) -> Vec<f64> {
 fn the_files_contain_the_error_polygon_of_two_rods_at_every_position() {
     let folder = folder();
     scene(folder.path());
-    let line = format!("{OVER} --directions 24 --out map.npz --out map.vtk");
-    let said = jointplay(folder.path(), &line).expect(0).stdout;
+    let line = format!("{MAP_COMMAND} --directions 24 --out map.npz --out map.vtk");
+    let output = jointplay(folder.path(), &line).expect(0).stdout;
     for words in [
         "4, 1 without a pose",
         "base.position = -2000 mm",
@@ -40,7 +40,7 @@ fn the_files_contain_the_error_polygon_of_two_rods_at_every_position() {
         "best",
         "static equilibrium",
     ] {
-        assert!(said.contains(words), "{words}: {said}");
+        assert!(output.contains(words), "{words}: {output}");
     }
     let (arrays, meta) = archive(&folder.path().join("map.npz"));
     assert_eq!(arrays["base.position"].as_slice().unwrap(), [-0.05, 0.0, 0.04, -2.0]);
@@ -53,27 +53,27 @@ fn the_files_contain_the_error_polygon_of_two_rods_at_every_position() {
         let tip = vector("ideal_tip_m", point);
         let moved = Rod { from: [TWO[0].from[0] + arrays["base.position"][point], TWO[0].from[1]], ..TWO[0] };
         let rods = [moved, TWO[1]];
-        let mut most = 0.0_f64;
+        let mut max_error = 0.0_f64;
         for direction in 0..24 {
             let u = arrays["direction"].slice(s![point, direction, ..]).to_vec();
             let expected = support(&rods, [tip[0], tip[2]], [u[0], u[2]]);
             assert!((arrays["support_m"][[point, direction]] / expected - 1.0).abs() < 1e-9);
             let error = arrays["error_m"].slice(s![point, direction, ..]).to_vec();
-            most = most.max(error.iter().map(|part| part * part).sum::<f64>().sqrt());
+            max_error = max_error.max(error.iter().map(|part| part * part).sum::<f64>().sqrt());
         }
         let largest = vector("largest_error_m", point);
         let size = largest.iter().map(|part| part * part).sum::<f64>().sqrt();
-        assert!(size >= most * (1.0 - 1e-12) && size < 1.01 * most, "{size} {most}");
+        assert!(size >= max_error * (1.0 - 1e-12) && size < 1.01 * max_error, "{size} {max_error}");
         // The joint with the largest share of the largest error.
         let shares = vector("share_m", point);
         let joint = arrays["largest_joint"][point] as usize;
         assert!(shares.iter().all(|share| *share <= shares[joint]), "{shares:?}");
-        // At rest the tip is within what can be reached, but for the depth of the balls in their walls.
+        // At rest the tip error is within the largest error, but for the penetration of the balls.
         let settled = vector("settled_error_m", point);
         let rest = settled.iter().map(|part| part * part).sum::<f64>().sqrt();
         assert!(rest > 0.1 * size && rest < size * 1.02, "{rest} {size}");
     }
-    // The same at the points with a pose.
+    // The VTK file has the same values at the points with a pose.
     let vtk = fs::read(folder.path().join("map.vtk")).unwrap();
     let text = String::from_utf8_lossy(&vtk);
     assert!(
@@ -97,19 +97,19 @@ fn the_files_contain_the_error_polygon_of_two_rods_at_every_position() {
 fn threads_change_no_byte_and_json_has_the_worst_point() {
     let folder = folder();
     scene(folder.path());
-    let mut said = Vec::new();
+    let mut summaries = Vec::new();
     for (threads, out) in [(1, "a"), (2, "b")] {
         let line = format!(
-            "{OVER} --over contact.restitution=0.5..0.9:2 --directions 8 --threads {threads} --out {out}.npz --out {out}.vtk \
+            "{MAP_COMMAND} --over contact.restitution=0.5..0.9:2 --directions 8 --threads {threads} --out {out}.npz --out {out}.vtk \
              --summary json"
         );
-        said.push(jointplay(folder.path(), &line).expect(0).json());
+        summaries.push(jointplay(folder.path(), &line).expect(0).json());
     }
     for ending in ["npz", "vtk"] {
         let read = |out: &str| fs::read(folder.path().join(format!("{out}.{ending}"))).unwrap();
         assert!(read("a") == read("b"), "{ending}");
     }
-    let json = &said[0];
+    let json = &summaries[0];
     assert_eq!(
         (json["points"].as_u64(), json["no_pose"].as_u64(), json["unbounded"].as_u64()),
         (Some(8), Some(2), Some(0))
@@ -129,19 +129,27 @@ fn threads_change_no_byte_and_json_has_the_worst_point() {
 #[test]
 fn built_in_machines_with_free_tips_are_reported() {
     let folder = folder();
-    let said =
+    let outcome =
         jointplay(folder.path(), "map pendulum --over contact.clearance=0.1mm..0.2mm:2 --directions 4").expect(0);
-    assert!(said.stdout.contains("Unbounded") && said.stdout.contains("tip moves without play"), "{}", said.stdout);
+    assert!(
+        outcome.stdout.contains("Unbounded") && outcome.stdout.contains("tip moves without play"),
+        "{}",
+        outcome.stdout
+    );
     // Driven, without a free tip.
-    let said = jointplay(folder.path(), "map four-bar --over crank.angle=0deg..90deg:3 --directions 4").expect(0);
-    assert!(!said.stdout.contains("Unbounded") && said.stdout.contains("crank.angle = 90 deg"), "{}", said.stdout);
+    let outcome = jointplay(folder.path(), "map four-bar --over crank.angle=0deg..90deg:3 --directions 4").expect(0);
+    assert!(
+        !outcome.stdout.contains("Unbounded") && outcome.stdout.contains("crank.angle = 90 deg"),
+        "{}",
+        outcome.stdout
+    );
 }
 
 #[test]
-fn bad_input_says_what_is_allowed() {
+fn errors_name_the_allowed_values() {
     let folder = folder();
     scene(folder.path());
-    fs::write(folder.path().join("there.npz"), "").unwrap();
+    fs::write(folder.path().join("existing.npz"), "").unwrap();
     for (line, code, words) in [
         ("map ./truss.toml", 2, "--over"),
         ("map ./truss.toml --over base.angle=0deg..1deg:2", 2, "driven coordinates: base.position"),
@@ -161,11 +169,11 @@ fn bad_input_says_what_is_allowed() {
         ("map ./truss.toml --over base.position=0mm..1mm:5000 --directions 4096", 2, "fewer --directions"),
         ("map ./truss.toml --over base.position=0mm,1mm --out a.csv", 2, ".npz or .vtk"),
         ("map ./truss.toml --over base.position=0mm,1mm --out a.vtk --out ./a.vtk", 2, "the same file"),
-        ("map ./truss.toml --over base.position=0mm,1mm --out there.npz", 1, "already exists"),
+        ("map ./truss.toml --over base.position=0mm,1mm --out existing.npz", 1, "already exists"),
         ("map ./truss.toml --over base.position=-2m,-3m --out a.npz", 2, "no point has a pose"),
     ] {
-        let said = jointplay(folder.path(), line).expect(code);
-        assert!(said.stderr.contains(words), "{line}: {}", said.stderr);
+        let outcome = jointplay(folder.path(), line).expect(code);
+        assert!(outcome.stderr.contains(words), "{line}: {}", outcome.stderr);
     }
-    assert_eq!(names(folder.path()), ["there.npz", "truss.toml"]);
+    assert_eq!(names(folder.path()), ["existing.npz", "truss.toml"]);
 }

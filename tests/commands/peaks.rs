@@ -31,7 +31,7 @@ fn largest(file: &Json, stem: &str, unit: &str) -> (f64, f64) {
 fn peaks_are_at_least_those_of_the_rows() {
     let folder = folder();
     let cases = [
-        // The first blow of its dampers and the first impacts.
+        // The first peak of its damper forces and the first impacts.
         ("suspension", "2ms", "0.5us", &SUSPENSION[..]),
         (
             "press",
@@ -47,7 +47,7 @@ fn peaks_are_at_least_those_of_the_rows() {
         let with_rows = jointplay(folder.path(), &line).expect(0).json();
         let without = jointplay(folder.path(), &run).expect(0).json();
         let text = jointplay(folder.path(), &format!("run {scene} --duration {duration}")).expect(0).stdout;
-        assert!(!text.contains("e-1"), "rounding is no peak: {text}");
+        assert!(!text.contains("e-1"), "a rounding error is reported as a peak: {text}");
         let file: Json =
             serde_json::from_str(&fs::read_to_string(folder.path().join(format!("{scene}.json"))).unwrap()).unwrap();
         for &(name, element, turns) in parts {
@@ -56,18 +56,21 @@ fn peaks_are_at_least_those_of_the_rows() {
             let loads = [("peak_force", what, "N"), ("peak_torque", "reaction_torque", "Nm")];
             for (member, what, unit) in loads.into_iter().take(1 + usize::from(turns)) {
                 let (row, time) = largest(&file, &format!("{name}_{what}"), unit);
-                let of = |summary: &Json| {
+                let peak = |summary: &Json| {
                     let number =
                         |member: String| summary[member][name].as_f64().unwrap_or_else(|| panic!("{name}: {summary}"));
                     (number(format!("{member}_{unit}")), number(format!("{member}_time_s")))
                 };
-                let (peak, when) = of(&with_rows);
-                // Between rows it may be higher: a torque peaks while friction turns around, for 0.2 us.
-                let most = if unit == "N" { 1.02 } else { 1.3 };
-                assert!(peak >= row && peak < most * row, "{scene} {name} {what}: {peak} in rows {row}");
+                let (largest, when) = peak(&with_rows);
+                // The peak between rows may be higher: a torque peaks while friction reverses, for 0.2 us.
+                let limit = if unit == "N" { 1.02 } else { 1.3 };
+                assert!(largest >= row && largest < limit * row, "{scene} {name} {what}: {largest} in rows {row}");
                 assert!((when - time).abs() < 2e-4, "{scene} {name} {what}: at {when} s, in rows {time} s");
-                let (alone, _) = of(&without);
-                assert!(alone > 0.95 * row && alone <= peak, "{scene} {name} {what}: {alone}, with rows {peak}");
+                let (without_rows, _) = peak(&without);
+                assert!(
+                    without_rows > 0.95 * row && without_rows <= largest,
+                    "{scene} {name} {what}: {without_rows}, with rows {largest}"
+                );
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The program started as a script would, and what it leaves.
+//! Runs the program as a script would, and lists the files that it writes.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::process::Command;
 use serde_json::Value as Json;
 use tempfile::TempDir;
 
-/// What a run of the program said.
+/// Exit status and output of a run of the program.
 pub struct Outcome {
     pub code: Option<i32>,
     pub stdout: String,
@@ -56,9 +56,9 @@ pub fn folder() -> TempDir {
 }
 
 #[cfg(target_os = "linux")]
-/// Waits until something is so, which the program is on its way to.
-pub fn until(so: impl Fn() -> bool) {
-    while !so() {
+/// Polls until `condition` holds, without a time limit.
+pub fn until(condition: impl Fn() -> bool) {
+    while !condition() {
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
 }

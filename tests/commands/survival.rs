@@ -1,5 +1,5 @@
-//! Commands that fail or are killed while they write: every file under a final name is whole, either as it was or new, and
-//! repeating the command makes the same bytes as an undisturbed run.
+//! Commands that fail or are killed while they write: every file under a final name is complete, either the old or the new
+//! one, and repeating the command gives the same bytes as an undisturbed run.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -12,25 +12,25 @@ use serde_json::Value as Json;
 use crate::program::{command, folder, jointplay, names};
 use crate::reproduce::files as tree;
 
-/// Files by their names.
+/// Contents of files by name.
 type Tree = BTreeMap<String, Vec<u8>>;
 
-/// What a user takes for results: no temporary file, nothing that a later run resumes from.
+/// The result files in `folder`: neither temporary files nor partial results that a later run resumes from.
 fn results(folder: &Path) -> Tree {
-    let mut found = tree(folder);
-    found.retain(|name, _| !name.starts_with(".jointplay-") && !name.ends_with(".partial"));
-    found
+    let mut files = tree(folder);
+    files.retain(|name, _| !name.starts_with(".jointplay-") && !name.ends_with(".partial"));
+    files
 }
 
-/// Runs the commands `before`, then `line` with ever larger limits on the size of a file: a write beyond it fails as on a full
-/// disk, and then, with the signal not ignored, kills the program.
-fn check(before: &[&str], line: &str) {
-    let start = || {
+/// Runs the commands `before`, then `line` with increasing limits on the file size. A write beyond the limit fails as on a full
+/// disk or, where the signal is not ignored, kills the program.
+fn check_failures(before: &[&str], line: &str) {
+    let prepare = || {
         let folder = folder();
         before.iter().for_each(|line| drop(jointplay(folder.path(), line).expect(0)));
         folder
     };
-    let clean = start();
+    let clean = prepare();
     let old = tree(clean.path());
     jointplay(clean.path(), line).expect(0);
     let new = tree(clean.path());
@@ -38,7 +38,7 @@ fn check(before: &[&str], line: &str) {
     let mut failed = 0;
     for blocks in [0, 1, 4, 16, 64, 256].into_iter().filter(|blocks| blocks * 512 < largest) {
         for trap in ["trap '' XFSZ;", ""] {
-            let folder = start();
+            let folder = prepare();
             let limited =
                 format!("{trap} ulimit -c 0; ulimit -f {blocks}; exec {} {line}", env!("CARGO_BIN_EXE_jointplay"));
             let output = Command::new("sh").args(["-c", &limited]).current_dir(folder.path()).output().unwrap();
@@ -60,42 +60,42 @@ fn check(before: &[&str], line: &str) {
 const RUN: &str = "run pendulum --duration 30ms --every 3ms --quiet";
 
 #[test]
-fn rows_and_impacts_survive_in_every_format() {
-    check(&[], &format!("{RUN} --out a.csv --impacts b.csv --wear c.csv --save-state d"));
+fn failed_runs_leave_old_or_new_files_in_every_format() {
+    check_failures(&[], &format!("{RUN} --out a.csv --impacts b.csv --wear c.csv --save-state d"));
     let old = format!("{RUN} --set contact.friction=0.3 --out a.csv --impacts b.csv");
-    check(&[&old], &format!("{RUN} --out a.csv --impacts b.csv --force"));
+    check_failures(&[&old], &format!("{RUN} --out a.csv --impacts b.csv --force"));
     for ending in ["json", "npz"] {
-        check(&[], &format!("{RUN} --out a.{ending}"));
+        check_failures(&[], &format!("{RUN} --out a.{ending}"));
     }
 }
 
 #[test]
-fn sweeps_and_merges_survive() {
-    // Without play the points cost next to nothing: this is about files.
+fn failed_sweeps_and_merges_leave_old_or_new_files() {
+    // Points without play are cheap: this test is about files.
     let sweep = "sweep spcmm --set contact.clearance=0 --vary spcmm.amplitude_x=20mm..25mm:3 --periods 1 --discard 0 --no-exponent --threads 1 --quiet";
-    check(&[], &format!("{sweep} --out a.npz"));
+    check_failures(&[], &format!("{sweep} --out a.npz"));
     let shard = |k: usize| format!("{sweep} --shard {k}/2 --out {k}.npz");
-    check(&[&shard(1), &shard(2)], "merge 1.npz 2.npz --out a.npz");
+    check_failures(&[&shard(1), &shard(2)], "merge 1.npz 2.npz --out a.npz");
 }
 
 #[cfg(feature = "gui")]
 #[test]
-fn frames_and_films_survive() {
+fn failed_renders_leave_old_or_new_files() {
     let render = "render pendulum --size 64x64 --quiet --force";
-    check(&[&format!("{render} --at 0s,1ms,3ms --out out")], &format!("{render} --at 0s,2ms --out out"));
+    check_failures(&[&format!("{render} --at 0s,1ms,3ms --out out")], &format!("{render} --at 0s,2ms --out out"));
     let film = |duration: &str| format!("{render} --duration {duration} --fps 500 --film a.mp4");
-    check(&[&film("4ms")], &film("2ms"));
+    check_failures(&[&film("4ms")], &film("2ms"));
 }
 
-/// Each file is that of one of two runs, and the checksum in metadata tells whether it and its rows are from the same run.
-fn whole_and_told(runs: [&Tree; 2], found: &Tree) {
-    assert!(found.keys().eq(["a.csv", "a.csv.meta.json"]), "{:?}", found.keys());
-    let of = |name: &str| runs.map(|run| run[name] == found[name]);
-    let (rows, account) = (of("a.csv"), of("a.csv.meta.json"));
-    assert!(rows.contains(&true) && account.contains(&true));
-    let meta: Json = serde_json::from_slice(&found["a.csv.meta.json"]).unwrap();
-    let told = meta["rows_crc32"] == format!("{:08x}", crc32fast::hash(&found["a.csv"])).as_str();
-    assert_eq!(told, rows == account);
+/// Asserts that each file is from one of two runs, and that the checksum in the metadata matches exactly if both are from the same run.
+fn assert_consistent(runs: [&Tree; 2], files: &Tree) {
+    assert!(files.keys().eq(["a.csv", "a.csv.meta.json"]), "{:?}", files.keys());
+    let matches = |name: &str| runs.map(|run| run[name] == files[name]);
+    let (rows, metadata) = (matches("a.csv"), matches("a.csv.meta.json"));
+    assert!(rows.contains(&true) && metadata.contains(&true));
+    let meta: Json = serde_json::from_slice(&files["a.csv.meta.json"]).unwrap();
+    let checksum_matches = meta["rows_crc32"] == format!("{:08x}", crc32fast::hash(&files["a.csv"])).as_str();
+    assert_eq!(checksum_matches, rows == metadata);
 }
 
 /// Two runs to the same file.
@@ -112,22 +112,22 @@ fn two_runs() -> [(String, Tree); 2] {
 fn rows_of_a_run_killed_at_any_instant_are_the_old_or_the_new_file() {
     let [(_, old), (line, new)] = two_runs();
     let work = folder();
-    let started = std::time::Instant::now();
+    let start = std::time::Instant::now();
     jointplay(work.path(), &line).expect(0);
-    crate::common::at_random_instants(started.elapsed(), 4, |instant| {
+    crate::common::at_random_instants(start.elapsed(), 4, |instant| {
         old.iter().for_each(|(name, content)| fs::write(work.path().join(name), content).unwrap());
         let mut child = command(work.path(), &line).stdout(Stdio::null()).spawn().unwrap();
         std::thread::sleep(instant);
         child.kill().unwrap();
         child.wait().unwrap();
-        whole_and_told([&old, &new], &results(work.path()));
+        assert_consistent([&old, &new], &results(work.path()));
         jointplay(work.path(), &line).expect(0);
         assert!(tree(work.path()) == new);
     });
 }
 
 #[test]
-fn two_writers_at_once_leave_whole_files() {
+fn concurrent_writers_leave_complete_files() {
     let runs = two_runs();
     let folder = folder();
     std::thread::scope(|scope| {
@@ -135,21 +135,21 @@ fn two_writers_at_once_leave_whole_files() {
             scope.spawn(|| (0..12).for_each(|_| drop(jointplay(folder.path(), line).expect(0))));
         }
     });
-    whole_and_told([&runs[0].1, &runs[1].1], &tree(folder.path()));
+    assert_consistent([&runs[0].1, &runs[1].1], &tree(folder.path()));
 }
 
 #[test]
 fn metadata_without_its_rows_can_be_replaced() {
     let folder = folder();
     let line = format!("{RUN} --out a.csv");
-    let at = |name: &str| folder.path().join(name);
+    let path = |name: &str| folder.path().join(name);
     jointplay(folder.path(), &line).expect(0);
-    fs::remove_file(at("a.csv")).unwrap();
+    fs::remove_file(path("a.csv")).unwrap();
     jointplay(folder.path(), &line).expect(0);
-    // A file that this program did not write is left alone.
-    fs::remove_file(at("a.csv")).unwrap();
-    fs::write(at("a.csv.meta.json"), "{}").unwrap();
+    // A file that this program did not write is not replaced.
+    fs::remove_file(path("a.csv")).unwrap();
+    fs::write(path("a.csv.meta.json"), "{}").unwrap();
     let failure = jointplay(folder.path(), &line).expect(1);
     assert!(failure.stderr.contains("a.csv.meta.json already exists"), "{}", failure.stderr);
-    assert!(!at("a.csv").exists());
+    assert!(!path("a.csv").exists());
 }

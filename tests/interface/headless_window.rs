@@ -1,4 +1,4 @@
-//! Frames of the whole application and of plain pictures with an overlay, without a window.
+//! Frames of the whole application, and pictures of the scene with an overlay, without a window.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -10,12 +10,12 @@ use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 use jointplay::view::{DrawList, PeakMarks, SceneView, Shot, Theme, ViewOptions};
 
-fn colours(image: &Image) -> usize {
+fn colour_count(image: &Image) -> usize {
     let pixels: HashSet<&[u8]> = image.rgba.chunks_exact(4).collect();
     pixels.len()
 }
 
-/// The application at `at`, s, in a context of its own.
+/// A frame of the application at `at`, s, drawn in a new context.
 fn app_frame(at: f64, size: [u32; 2]) -> Result<Image, RenderError> {
     let mut options = AppOptions::new(Scene::load("spcmm", &[]).expect("built in"));
     options.theme = ThemePreference::Light;
@@ -27,20 +27,20 @@ fn app_frame(at: f64, size: [u32; 2]) -> Result<Image, RenderError> {
 }
 
 #[test]
-fn a_frame_of_the_application_is_the_same_each_time_and_shows_its_instant() {
+fn frames_of_the_application_are_reproducible_and_show_their_instant() {
     let first = app_frame(7.85e-3, [900, 600]).expect("drawn");
     assert_eq!((first.width, first.height), (900, 600));
     assert_eq!(first.rgba.len(), 900 * 600 * 4);
-    assert!(colours(&first) > 500, "an empty picture has few colours: {}", colours(&first));
-    let again = app_frame(7.85e-3, [900, 600]).expect("drawn");
-    assert!(first == again, "same instant, same picture");
-    let later = app_frame(12e-3, [900, 600]).expect("drawn");
-    assert!(first != later, "another instant, another picture");
+    assert!(colour_count(&first) > 500, "an empty picture has few colours: {}", colour_count(&first));
+    let repeated = app_frame(7.85e-3, [900, 600]).expect("drawn");
+    assert!(first == repeated, "the pictures of one instant differ");
+    let other = app_frame(12e-3, [900, 600]).expect("drawn");
+    assert!(first != other, "the picture did not change with the instant");
 }
 
 #[test]
 fn a_size_that_cannot_be_drawn_is_refused() {
-    let error = app_frame(0.0, [0, 600]).expect_err("no picture is empty");
+    let error = app_frame(0.0, [0, 600]).expect_err("an empty picture");
     assert!(error.to_string().contains("0x600"), "{error}");
 }
 
@@ -77,8 +77,8 @@ fn the_overlay_adds_to_the_plain_picture() {
     let mut headless = Headless::new().expect("software Vulkan at least");
     let plain = headless.picture(&list, &Overlay::default(), Theme::Light, 1.0).expect("drawn");
     let overlay = Overlay { time: Some(7.85e-3), notes, legend: true, labels: true };
-    let written = headless.picture(&list, &overlay, Theme::Light, 1.0).expect("drawn");
-    let changed = plain.rgba.chunks_exact(4).zip(written.rgba.chunks_exact(4)).filter(|(a, b)| a != b).count();
+    let with_overlay = headless.picture(&list, &overlay, Theme::Light, 1.0).expect("drawn");
+    let changed = plain.rgba.chunks_exact(4).zip(with_overlay.rgba.chunks_exact(4)).filter(|(a, b)| a != b).count();
     let part = changed as f64 / (640.0 * 360.0);
     assert!((0.01..0.3).contains(&part), "the overlay covers {part} of the picture");
 }

@@ -1,4 +1,4 @@
-//! The window, its frames and its parts.
+//! Tests of the window: frames, panels, links and input.
 #![cfg(feature = "gui")]
 
 #[path = "../common/mod.rs"]

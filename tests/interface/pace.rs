@@ -1,4 +1,4 @@
-//! What slow frames do to the picture and to the run, and what the window says of it.
+//! Slow frames: reduced picture resolution, an unchanged run, and the displayed limit of the speed.
 
 use eframe::egui::Theme;
 use egui_kittest::{Harness, kittest::Queryable as _};
@@ -10,12 +10,12 @@ use crate::hands::paced;
 use crate::window::click;
 
 const SIZE: [f32; 2] = [1000.0, 700.0];
-const LEAST: Quality = Quality::LADDER[Quality::LADDER.len() - 1];
+const LOWEST: Quality = Quality::LADDER[Quality::LADDER.len() - 1];
 
 type Pixels = Vec<u8>;
 
-/// Red, green, blue and opacity of all that is left of `to`, points, and of the rest.
-fn parted(harness: &mut Harness<'_, App>, to: f32) -> [Pixels; 2] {
+/// RGBA pixels to the left of `to`, points, and of the rest.
+fn split_pixels(harness: &mut Harness<'_, App>, to: f32) -> [Pixels; 2] {
     let image = harness.render().expect("drawn");
     let row = 4 * image.width() as usize;
     let mut parts = [Pixels::new(), Pixels::new()];
@@ -28,11 +28,11 @@ fn parted(harness: &mut Harness<'_, App>, to: f32) -> [Pixels; 2] {
 }
 
 #[test]
-fn while_it_moves_slowly_the_picture_has_fewer_pixels_and_at_rest_all_of_them() {
-    // The same frames, ten a second, with what a window does about them and without.
-    let [mut follows, mut plain] = [true, false].map(|follows| {
+fn slow_motion_reduces_the_resolution_and_rest_restores_it() {
+    // The same frames, ten per second, with and without adaptation of the resolution.
+    let [mut adaptive, mut plain] = [true, false].map(|adaptive| {
         let mut harness = paced("spcmm", &[], SIZE, Theme::Light, ticking_clock::<10>, 0.1);
-        if follows {
+        if adaptive {
             harness.state_mut().follow_frame_rate();
         }
         harness.remove_cursor();
@@ -43,75 +43,75 @@ fn while_it_moves_slowly_the_picture_has_fewer_pixels_and_at_rest_all_of_them() 
         harness.run_steps(80);
         harness
     });
-    assert_eq!(follows.state().picture_quality(), LEAST);
+    assert_eq!(adaptive.state().picture_quality(), LOWEST);
     assert_eq!(plain.state().picture_quality(), Quality::FULL);
-    // The panel beside it is as sharp as ever.
-    let panel = follows.get_by_label("Reset").rect().left() - 30.0;
+    // The panel beside the picture keeps the full resolution.
+    let panel = adaptive.get_by_label("Reset").rect().left() - 30.0;
     assert!(panel > 200.0, "{panel}");
-    let [moving, full] = [&mut follows, &mut plain].map(|harness| parted(harness, panel));
-    assert!(moving[0] == full[0], "the panel is drawn otherwise");
-    assert!(moving[1] != full[1], "the picture is not");
+    let [moving, full] = [&mut adaptive, &mut plain].map(|harness| split_pixels(harness, panel));
+    assert!(moving[0] == full[0], "the resolution of the panel changed");
+    assert!(moving[1] != full[1], "the resolution of the picture did not change");
 
-    for harness in [&mut follows, &mut plain] {
+    for harness in [&mut adaptive, &mut plain] {
         click(harness, "Pause");
         harness.remove_cursor();
         harness.run_steps(5);
     }
-    assert_eq!(follows.state().picture_quality(), Quality::FULL);
-    let [still, full] = [&mut follows, &mut plain].map(|harness| parted(harness, panel));
-    assert!(still == full, "at rest it is drawn as ever");
-    // Shown again without anything new it stays so.
-    follows.run_steps(3);
-    assert!(parted(&mut follows, panel) == full);
+    assert_eq!(adaptive.state().picture_quality(), Quality::FULL);
+    let [still, full] = [&mut adaptive, &mut plain].map(|harness| split_pixels(harness, panel));
+    assert!(still == full, "at rest the picture lacks the full resolution");
+    // Further frames without changes keep it.
+    adaptive.run_steps(3);
+    assert!(split_pixels(&mut adaptive, panel) == full);
     let hash = |harness: &Harness<'_, App>| {
         let player = harness.state().player();
         (player.steps(), player.simulation().state_hash())
     };
-    assert_eq!(hash(&follows), hash(&plain), "no bit of the run depends on it");
+    assert_eq!(hash(&adaptive), hash(&plain), "the run depends on the resolution");
 
-    // A turn of the view is motion, too, and a change of what is shown at rest is seen.
-    follows.key_press(eframe::egui::Key::Num2);
-    follows.run_steps(2);
-    assert_eq!(follows.state().picture_quality(), LEAST);
-    follows.run_steps(60);
-    assert_eq!(follows.state().picture_quality(), Quality::FULL);
-    let turned = parted(&mut follows, panel);
+    // A rotation of the camera is motion, too; a changed option at rest changes the picture.
+    adaptive.key_press(eframe::egui::Key::Num2);
+    adaptive.run_steps(2);
+    assert_eq!(adaptive.state().picture_quality(), LOWEST);
+    adaptive.run_steps(60);
+    assert_eq!(adaptive.state().picture_quality(), Quality::FULL);
+    let turned = split_pixels(&mut adaptive, panel);
     assert!(turned[1] != full[1]);
-    follows.key_press(eframe::egui::Key::X);
-    follows.run_steps(6);
-    assert!(parted(&mut follows, panel)[1] != turned[1]);
+    adaptive.key_press(eframe::egui::Key::X);
+    adaptive.run_steps(6);
+    assert!(split_pixels(&mut adaptive, panel)[1] != turned[1]);
 }
 
-/// What stands beside the speed that is reached after `frames` frames.
+/// The limit displayed beside the speed after `frames` frames.
 fn limit(harness: &mut Harness<'_, App>, frames: usize) -> Option<&'static str> {
     harness.run_steps(frames);
     let words = ["limited by computing", "limited by drawing"];
-    let mut found = words.into_iter();
-    found.find(|words| harness.query_by_label(words).is_some())
+    let mut words = words.into_iter();
+    words.find(|words| harness.query_by_label(words).is_some())
 }
 
 #[test]
-fn beside_the_speed_reached_stands_what_limits_it() {
-    // Steps of 10 us, one for each look at the clock.
+fn the_window_states_what_limits_the_speed() {
+    // Steps of 10 us, one for each reading of the clock.
     let fixed = [("solver.method", "rk4"), ("solver.step", "10 us")];
     let window = |clock, dt| paced("spcmm", &fixed, [1280.0, 800.0], Theme::Light, clock, dt);
-    // Each takes 4 ms: three a frame.
+    // Each takes 4 ms: three per frame.
     let mut harness = window(ticking_clock::<4000>, 1.0 / 60.0);
     assert_eq!(limit(&mut harness, 3), None, "paused");
     harness.state_mut().player_mut().pacer.set_scale(1e-4);
     click(&mut harness, "Play");
-    assert_eq!(limit(&mut harness, 60), None, "it keeps up");
+    assert_eq!(limit(&mut harness, 60), None, "the run keeps up");
     harness.state_mut().player_mut().pacer.set_scale(1.0);
     assert_eq!(limit(&mut harness, 60), Some("limited by computing"));
     click(&mut harness, "Pause");
     assert_eq!(limit(&mut harness, 3), None, "paused");
 
-    // Each takes 20 us, which alone would reach half of real time, but they have a quarter of each frame of a second.
+    // Each takes 20 us, enough for half of real time, but only a quarter of each frame of one second is left for steps.
     let mut harness = window(ticking_clock::<20>, 1.0);
     harness.state_mut().player_mut().pacer.set_scale(1.0);
     harness.state_mut().player_mut().set_playing(true);
-    let found = limit(&mut harness, 5);
+    let displayed_limit = limit(&mut harness, 5);
     let player = harness.state().player();
     let speeds = (player.capacity(), player.pacer.reached_scale());
-    assert_eq!(found, Some("limited by drawing"), "{speeds:?}");
+    assert_eq!(displayed_limit, Some("limited by drawing"), "{speeds:?}");
 }

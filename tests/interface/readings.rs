@@ -1,4 +1,4 @@
-//! What the box under a plot's pointer says.
+//! The tooltip of a plot, and its spoken text.
 
 use eframe::egui::{
     self, Key, Shape,
@@ -15,18 +15,18 @@ use jointplay::simulate::{Frame, Quantity};
 use crate::hands::add_texts;
 use crate::window::sized;
 
-/// All texts of several lines on the screen.
-fn boxes(shape: &Shape, out: &mut Vec<String>) {
+/// Collects all texts of several lines on the screen.
+fn collect_tooltips(shape: &Shape, out: &mut Vec<String>) {
     match shape {
-        Shape::Vec(shapes) => shapes.iter().for_each(|shape| boxes(shape, out)),
+        Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect_tooltips(shape, out)),
         Shape::Text(text) if text.galley.text().contains('\n') => out.push(text.galley.text().to_owned()),
         _ => {}
     }
 }
 
-/// What the box of the plot of `quantity` says where it has `value` at `time`, s: the time, s, and by member the least and the
-/// greatest value, in the unit of the axis.
-fn reading(
+/// The tooltip of the plot of `quantity` at `value` and `time`, s: the time, s, and for each member the least and the greatest
+/// value, in the unit of the axis.
+fn read_tooltip(
     harness: &mut Harness<'_, App>,
     quantity: Quantity,
     time: f64,
@@ -37,23 +37,23 @@ fn reading(
     harness.run_steps(4);
     let mut texts = Vec::new();
     for part in &harness.output().shapes {
-        boxes(&part.shape, &mut texts);
+        collect_tooltips(&part.shape, &mut texts);
     }
-    let text = texts.iter().find(|text| text.contains("\nS1 ")).unwrap_or_else(|| panic!("no box: {texts:?}"));
+    let text = texts.iter().find(|text| text.contains("\nS1 ")).unwrap_or_else(|| panic!("no tooltip: {texts:?}"));
     let mut lines = text.lines();
     let numbers = |line: &str| -> Vec<f64> { line.split_whitespace().filter_map(|word| word.parse().ok()).collect() };
     let first = lines.next().expect("the time");
     assert!(first.ends_with(" ms"), "{text}");
     let members = lines.map(|line| {
         let (name, rest) = line.split_once(' ').expect("a name");
-        let found = numbers(rest);
-        (name.to_owned(), [found[0], *found.last().expect("a value")])
+        let values = numbers(rest);
+        (name.to_owned(), [values[0], *values.last().expect("a value")])
     });
     (numbers(first)[0] * 1e-3, members.collect())
 }
 
 #[test]
-fn the_box_under_the_pointer_has_the_values_of_the_run_s_rows() {
+fn tooltips_have_the_values_of_the_run() {
     let mut harness = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
     harness.state_mut().player_mut().pacer.set_scale(1e-3);
     harness.state_mut().player_mut().run_to(8.5e-3);
@@ -69,7 +69,7 @@ fn the_box_under_the_pointer_has_the_values_of_the_run_s_rows() {
         frame
     };
     let mut checked = 0;
-    // In free fall; and about the peak of the first impact.
+    // In free fall, and near the peak of the first impact.
     for (quantity, time) in
         [(Quantity::Eccentricity, 5e-3), (Quantity::Eccentricity, 6.5e-3), (Quantity::NormalForce, 7.87e-3)]
     {
@@ -77,8 +77,8 @@ fn the_box_under_the_pointer_has_the_values_of_the_run_s_rows() {
             Quantity::Eccentricity => frame.joints[joint].eccentricity.norm() * 1e3,
             _ => frame.joints[joint].normal_force.norm(),
         };
-        let there = value(&sample(time), 0) * if quantity == Quantity::Eccentricity { 1e-3 } else { 1.0 };
-        let (at, members) = reading(&mut harness, quantity, time, there);
+        let pointer_value = value(&sample(time), 0) * if quantity == Quantity::Eccentricity { 1e-3 } else { 1.0 };
+        let (at, members) = read_tooltip(&mut harness, quantity, time, pointer_value);
         assert!((at - time).abs() < 0.05e-3, "{at} {time}");
         let frame = sample(at);
         assert_eq!(members.len(), 3);
@@ -86,43 +86,43 @@ fn the_box_under_the_pointer_has_the_values_of_the_run_s_rows() {
             assert_eq!(name, format!("S{}", joint + 1));
             let run = value(&frame, joint);
             assert!(run > 0.99 * least && run < 1.01 * greatest, "{name} at {at}: {least} to {greatest}, {run}");
-            // A box that gave any range would hold any value.
+            // Only narrow ranges count: a wide one would contain any value.
             checked += usize::from(greatest < 1.015 * least);
         }
     }
     assert!(checked >= 7, "{checked}");
 
-    // The same by the keyboard: the words that are read out are those of the box, at the instant that they name.
+    // By keyboard: the spoken text is that of the tooltip, at its instant.
     harness.remove_cursor();
     harness.get_by_role_and_label(Role::Image, "Plot of Normal force").focus();
     harness.run_steps(2);
-    let mut told = Vec::new();
+    let mut times = Vec::new();
     for _ in 0..4 {
         harness.key_press(Key::ArrowLeft);
         harness.run_steps(4);
         let mut images = harness.query_all_by_role(Role::Image);
         let plot = images.find(|node| node.accesskit_node().is_focused()).expect("has the focus");
         assert_eq!(plot.accesskit_node().live(), Live::Polite);
-        let said = plot.accesskit_node().label().expect("says the values");
+        let spoken = plot.accesskit_node().label().expect("a label with the values");
         let mut texts = Vec::new();
-        harness.output().shapes.iter().for_each(|part| boxes(&part.shape, &mut texts));
-        let [text] = &texts[..] else { panic!("{said}: {texts:?}, {told:?}") };
+        harness.output().shapes.iter().for_each(|part| collect_tooltips(&part.shape, &mut texts));
+        let [text] = &texts[..] else { panic!("{spoken}: {texts:?}, {times:?}") };
         let (time, values) = text.split_once('\n').expect("values below the time");
         let words = format!("{} at {time}", values.replace('\n', ", "));
-        assert_eq!(said, words.replace(" N", " newtons").replace(" ms", " milliseconds"));
+        assert_eq!(spoken, words.replace(" N", " newtons").replace(" ms", " milliseconds"));
         let at = time.split(' ').next().and_then(|at| at.parse::<f64>().ok()).expect("a time");
         let frame = sample(1e-3 * at);
         let first = values.lines().next().expect("S1").split(' ').filter_map(|word| word.parse::<f64>().ok());
         let range = first.fold((f64::INFINITY, 0.0_f64), |all, v| (all.0.min(v), all.1.max(v)));
         let run = frame.joints[0].normal_force.norm();
         assert!(run >= 0.98 * range.0 && run <= 1.02 * range.1, "{text}: {run}");
-        told.push(at);
+        times.push(at);
     }
-    assert!(told.windows(2).all(|pair| pair[1] < pair[0]), "{told:?}");
+    assert!(times.windows(2).all(|pair| pair[1] < pair[0]), "{times:?}");
 }
 
 #[test]
-fn tall_first_peaks_are_cut_from_a_plot_of_forces_and_it_says_how_tall_they_are() {
+fn high_first_peaks_are_cut_from_a_plot_of_forces_and_their_height_is_displayed() {
     let mut harness = sized("hexapod", [1280.0, 800.0], egui::Theme::Light);
     harness.state_mut().player_mut().run_to(0.2);
     harness.state_mut().plots_mut().window = PlotWindow::Everything;
@@ -140,7 +140,7 @@ fn tall_first_peaks_are_cut_from_a_plot_of_forces_and_it_says_how_tall_they_are(
     }
     let [first, later] = largest;
     assert!(first > 4.0 * later && later > 1.0, "{first} N, {later} N");
-    // Where a force stands, measured from the upper edge of the plot upwards.
+    // Height of a force above the upper edge of the plot, points.
     let above = |harness: &mut Harness<'_, App>, force: f64| {
         let top = harness.get_by_label("Plot of Normal force").rect().top();
         top - harness.state_mut().plots_mut().place(Quantity::NormalForce, 0.1, force).expect("on show").y
@@ -150,13 +150,13 @@ fn tall_first_peaks_are_cut_from_a_plot_of_forces_and_it_says_how_tall_they_are(
     for part in &harness.output().shapes {
         add_texts(&part.shape, egui::Rect::EVERYTHING, &mut texts);
     }
-    let words = texts.lines().find(|text| text.ends_with(" N above")).expect("says so");
-    let said: f64 = words.split_whitespace().nth(1).and_then(|word| word.parse().ok()).expect("a number");
-    assert!((said / first - 1.0).abs() < 5.1e-3, "{words}: {first} N");
+    let words = texts.lines().find(|text| text.ends_with(" N above")).expect("the height of the cut peaks");
+    let displayed: f64 = words.split_whitespace().nth(1).and_then(|word| word.parse().ok()).expect("a number");
+    assert!((displayed / first - 1.0).abs() < 5.1e-3, "{words}: {first} N");
     let toggle = |harness: &Harness<'_, App>| harness.get_by_label("Cut first peaks in Normal force").click();
     toggle(&harness);
     harness.run();
-    assert!(above(&mut harness, first) < 0.0, "the whole range");
+    assert!(above(&mut harness, first) < 0.0, "the plot lacks the whole range");
     toggle(&harness);
     harness.run();
     assert!(above(&mut harness, first) > 0.0);

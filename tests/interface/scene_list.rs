@@ -1,4 +1,4 @@
-//! The list of scenes with its pictures.
+//! The list of scenes and its preview pictures.
 
 use eframe::egui::{Rect, Theme, accesskit::Role};
 use eframe::egui_wgpu::RendererOptions;
@@ -7,7 +7,7 @@ use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, AppOptions};
 use jointplay::scene::{BUILT_IN, Scene};
 
-/// A window that draws with one adapter on the screen and off it.
+/// A window that uses one adapter for on-screen and off-screen drawing.
 fn window(size: [f32; 2], theme: Theme) -> Harness<'static, App> {
     let state = create_render_state(default_wgpu_setup(), RendererOptions::PREDICTABLE);
     let renderer = WgpuTestRenderer::from_render_state(state.clone());
@@ -22,12 +22,12 @@ fn window(size: [f32; 2], theme: Theme) -> Harness<'static, App> {
 }
 
 fn entries(harness: &Harness<'_, App>) -> Vec<Rect> {
-    let of = |name: &str| harness.query_by_role_and_label(Role::Button, name).map(|entry| entry.rect());
-    BUILT_IN.iter().filter_map(|name| of(name)).collect()
+    let area = |name: &str| harness.query_by_role_and_label(Role::Button, name).map(|entry| entry.rect());
+    BUILT_IN.iter().filter_map(|name| area(name)).collect()
 }
 
-/// Colours in the left part of `entry` within the window, each with the share of pixels that have it.
-fn pictured(harness: &mut Harness<'_, App>, entry: Rect) -> usize {
+/// Number of distinct colours in the left part of `entry` within the window.
+fn count_colours(harness: &mut Harness<'_, App>, entry: Rect) -> usize {
     let image = harness.render().expect("drawn");
     let (from, to) = (entry.left_top(), entry.left_bottom());
     let mut colours = std::collections::BTreeSet::new();
@@ -40,7 +40,7 @@ fn pictured(harness: &mut Harness<'_, App>, entry: Rect) -> usize {
 }
 
 #[test]
-fn each_scene_in_the_list_has_its_picture_which_moves_nothing() {
+fn each_scene_in_the_list_has_a_picture_that_leaves_the_layout_unchanged() {
     for (size, theme) in
         [([1280.0, 800.0], Theme::Light), ([1280.0, 800.0], Theme::Dark), ([390.0, 844.0], Theme::Light)]
     {
@@ -48,7 +48,7 @@ fn each_scene_in_the_list_has_its_picture_which_moves_nothing() {
         harness.get_by_role_and_label(Role::ComboBox, "Scene").click();
         harness.run_steps(2);
         let first = entries(&harness);
-        let bare = pictured(&mut harness, first[5]);
+        let without_picture = count_colours(&mut harness, first[5]);
         harness.run_steps(BUILT_IN.len() + 2);
         assert_eq!(entries(&harness), first, "{size:?}");
         if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
@@ -56,9 +56,9 @@ fn each_scene_in_the_list_has_its_picture_which_moves_nothing() {
             harness.render().expect("drawn").save(std::path::Path::new(&keep).join(name)).expect("writable");
         }
         for entry in first.iter().filter(|entry| entry.bottom() < size[1] * 0.8) {
-            let colours = pictured(&mut harness, *entry);
+            let colours = count_colours(&mut harness, *entry);
             assert!(colours > 100, "{entry:?}: {colours}");
         }
-        assert!(bare < 20, "{bare}");
+        assert!(without_picture < 20, "{without_picture}");
     }
 }

@@ -31,7 +31,7 @@ fn redo() -> Modifiers {
 }
 
 #[test]
-fn a_drag_on_a_slider_is_one_change_that_is_undone_and_redone() {
+fn a_drag_on_a_slider_is_undone_and_redone_as_one_change() {
     let mut harness = window();
     assert_eq!(harness.state().undo_words(false), None);
     let first = friction(&harness);
@@ -39,21 +39,21 @@ fn a_drag_on_a_slider_is_one_change_that_is_undone_and_redone() {
     harness.drag_at(track.left_center() + egui::vec2(12.0, 0.0));
     for part in 1..10 {
         harness.hover_at(track.left_center() + egui::vec2(12.0 + 20.0 * part as f32, 0.0));
-        // Slower than changes that count as one by time alone.
+        // Slower than the interval within which changes are merged.
         harness.run_steps(40);
     }
     harness.drop_at(track.left_center() + egui::vec2(192.0, 0.0));
     harness.run_steps(3);
     let dragged = friction(&harness);
     assert!(dragged > first);
-    let words = harness.state().undo_words(false).expect("something");
+    let words = harness.state().undo_words(false).expect("a change to undo");
     assert_eq!(words, "Undo: Friction coefficient, to 0.15");
     press(&mut harness, UNDO);
     assert_eq!(friction(&harness), first);
-    assert_eq!(harness.state().undo_words(false), None, "one change");
+    assert_eq!(harness.state().undo_words(false), None, "the drag was recorded as several changes");
     press(&mut harness, redo());
     assert_eq!(friction(&harness), dragged);
-    // The buttons do it, too.
+    // The buttons undo and redo as well.
     click(&mut harness, "Undo");
     assert_eq!(friction(&harness), first);
     click(&mut harness, "Redo");
@@ -61,7 +61,7 @@ fn a_drag_on_a_slider_is_one_change_that_is_undone_and_redone() {
 }
 
 #[test]
-fn changes_are_undone_one_after_another_and_a_new_one_ends_what_could_be_redone() {
+fn changes_are_undone_in_reverse_order_and_a_new_change_clears_redo() {
     let mut harness = window();
     harness.get_by_role_and_label(Role::Slider, "Clearance").set_value_accesskit(0.5);
     harness.run_steps(40);
@@ -76,13 +76,13 @@ fn changes_are_undone_one_after_another_and_a_new_one_ends_what_could_be_redone(
     press(&mut harness, UNDO);
     assert!((clearance(&harness) - 0.3e-3).abs() < 1e-9);
     press(&mut harness, UNDO);
-    assert!((clearance(&harness) - 0.3e-3).abs() < 1e-9, "no more");
+    assert!((clearance(&harness) - 0.3e-3).abs() < 1e-9, "nothing left to undo");
     press(&mut harness, redo());
     assert!((clearance(&harness) - 0.5e-3).abs() < 1e-9);
     harness.get_by_role_and_label(Role::Slider, "Clearance").set_value_accesskit(0.4);
     harness.run_steps(3);
     assert_eq!(harness.state().undo_words(true), None);
-    // Going back in time changes no parameter by itself.
+    // Going back in time is not a change of parameters.
     let words = harness.state().undo_words(false);
     harness.state_mut().player_mut().run_to(20e-3);
     harness.run();
@@ -92,14 +92,14 @@ fn changes_are_undone_one_after_another_and_a_new_one_ends_what_could_be_redone(
 }
 
 #[test]
-fn the_view_and_the_choice_of_plots_are_undone_too() {
+fn changes_of_the_camera_and_of_the_plots_are_undone() {
     let mut harness = window();
     harness.run_steps(60);
     let pose = harness.state().camera_pose().expect("drawn");
     harness.key_press(Key::Num4);
     harness.run_steps(90);
-    let turned = harness.state().camera_pose().expect("drawn");
-    assert!((turned.pitch - pose.pitch).abs() > 0.1);
+    let rotated = harness.state().camera_pose().expect("drawn");
+    assert!((rotated.pitch - pose.pitch).abs() > 0.1);
     assert_eq!(harness.state().undo_words(false).as_deref(), Some("Undo: Camera"));
     harness.key_press(Key::X);
     harness.run_steps(60);
@@ -112,12 +112,15 @@ fn the_view_and_the_choice_of_plots_are_undone_too() {
     press(&mut harness, UNDO);
     press(&mut harness, UNDO);
     harness.run_steps(60);
-    let back = harness.state().camera_pose().expect("drawn");
-    assert!((back.pitch - pose.pitch).abs() < 1e-3 && (back.yaw - pose.yaw).abs() < 1e-3, "{back:?} {pose:?}");
+    let restored = harness.state().camera_pose().expect("drawn");
+    assert!(
+        (restored.pitch - pose.pitch).abs() < 1e-3 && (restored.yaw - pose.yaw).abs() < 1e-3,
+        "{restored:?} {pose:?}"
+    );
     assert_eq!(harness.state().undo_words(false), None);
     press(&mut harness, redo());
-    let again = harness.state().camera_pose().expect("drawn");
-    assert!((again.pitch - turned.pitch).abs() < 1e-3, "{again:?} {turned:?}");
+    let redone = harness.state().camera_pose().expect("drawn");
+    assert!((redone.pitch - rotated.pitch).abs() < 1e-3, "{redone:?} {rotated:?}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The mechanics: numbers, energy, contacts, methods, what stops and what is doubted.
+//! Tests of the mechanics: reference values, energy, contacts, methods, stops and doubts.
 
 #[path = "../common/mod.rs"]
 mod common;
