@@ -1,21 +1,21 @@
-//! What must hold for any bytes that are given as a scene file: shared by the fuzz target and the test that runs its corpus.
+//! Invariants of reading any bytes as a scene file, shared by the fuzz target and the test that runs its corpus.
 //!
 //! A line `#set KEY=VALUE`, a comment of the file, stands for `--set KEY=VALUE`.
 
 use jointplay::scene::{Scene, Value, visible};
 use jointplay::simulate::{Frame, Simulation};
 
-/// Bodies beyond which a scene is only started: stepping costs time, not insight.
+/// Scenes with more bodies are started but not stepped, to save time.
 const MAX_BODIES: usize = 16;
-/// Steps that are taken in each formulation.
+/// Number of steps in each formulation.
 const STEPS: usize = 4;
-/// Most changes that are applied.
+/// Largest number of changes that are applied.
 const MAX_CHANGES: usize = 8;
 
-/// What became of the bytes.
+/// How far the bytes were accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
-    /// No text, which the reader of files refuses before a scene is read.
+    /// Not UTF-8: refused before a scene is read.
     NoText,
     /// Refused as a scene.
     Refused,
@@ -38,8 +38,8 @@ fn changes(text: &str) -> Vec<(String, String)> {
 /// takes some steps.
 ///
 /// # Panics
-/// Where the program breaks a promise: an error without a place or words, words that steer a terminal, a value that does
-/// not read back, a start or a step that is not finite.
+/// Where an invariant is violated: an error without a position or a message, a message with terminal control characters, a
+/// value that does not read back, a start or a step that is not finite.
 pub fn check(bytes: &[u8]) -> Fate {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return Fate::NoText;
@@ -48,8 +48,8 @@ pub fn check(bytes: &[u8]) -> Fate {
     let scene = match Scene::parse(text, Some("fuzz.toml"), &changes) {
         Ok(scene) => scene,
         Err(error) => {
-            let words = said(&error);
-            assert!(!error.message.is_empty(), "an error says what is wrong");
+            let words = error_text(&error);
+            assert!(!error.message.is_empty(), "an error without a message");
             let changed = |key: &String| changes.iter().any(|(changed, _)| changed == key);
             if error.file.is_none() && error.key.as_ref().is_some_and(changed) {
                 return Fate::Refused;
@@ -62,8 +62,8 @@ pub fn check(bytes: &[u8]) -> Fate {
                 let length = lines[line as usize - 1].chars().count() + 1;
                 assert!((1..=length).contains(&(column as usize)), "column of: {words}");
             } else {
-                // A thing that is missing from the whole file has no line.
-                assert!(error.message.contains("missing") || error.key.is_some(), "no place: {words}");
+                // An entry that is missing from the whole file has no line.
+                assert!(error.message.contains("missing") || error.key.is_some(), "no position: {words}");
             }
             return Fate::Refused;
         }
@@ -80,10 +80,10 @@ pub fn check(bytes: &[u8]) -> Fate {
         }
     }
     if !changes.is_empty() {
-        // What is saved opens again, or is not saved.
+        // A saved scene must be readable; saving may be refused.
         match scene.to_toml() {
             Ok(saved) => assert!(Scene::parse(&saved, None, &[]).is_ok(), "{saved}"),
-            Err(error) => assert!(!said(&error).is_empty()),
+            Err(error) => assert!(!error_text(&error).is_empty()),
         }
     }
     let fate = run(&scene);
@@ -102,7 +102,7 @@ fn run(scene: &Scene) -> Fate {
     let mut simulation = match Simulation::new(&scene.machine) {
         Ok(simulation) => simulation,
         Err(error) => {
-            assert!(!said(&scene.locate(&error)).is_empty());
+            assert!(!error_text(&scene.locate(&error)).is_empty());
             return Fate::NoStart;
         }
     };
@@ -120,7 +120,7 @@ fn run(scene: &Scene) -> Fate {
             assert_eq!(visible(&stopped.to_string()), stopped.to_string());
             break;
         }
-        assert!(simulation.time() > before, "a step that takes no time");
+        assert!(simulation.time() > before, "a step that does not advance the time");
     }
     assert!(simulation.state_vector().iter().all(|x| x.is_finite()));
     let peaks = &simulation.statistics().peak_normal;
@@ -132,8 +132,8 @@ fn run(scene: &Scene) -> Fate {
     Fate::Starts
 }
 
-/// The words of an error, which steer no terminal.
-fn said(error: &impl std::fmt::Display) -> String {
+/// The text of an error, checked for terminal control characters.
+fn error_text(error: &impl std::fmt::Display) -> String {
     let words = error.to_string();
     assert_eq!(visible(&words), words);
     words

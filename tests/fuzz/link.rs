@@ -5,7 +5,7 @@ use jointplay::app::Link;
 use jointplay::scene::visible;
 use jointplay::simulate::Simulation;
 
-/// Bodies beyond which a scene is only read.
+/// Scenes with more bodies are read but not started.
 const MAX_BODIES: usize = 16;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
@@ -20,7 +20,7 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
             return;
         }
     };
-    // What is given out is what was read.
+    // Writing a link and reading it back gives the same link.
     assert_eq!(Link::parse(&link.format()).as_ref(), Ok(&link));
     match link.load() {
         Ok(scene) if scene.machine.bodies.len() <= MAX_BODIES => {

@@ -5,7 +5,7 @@ use jointplay::mesh::Format;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     for format in [Format::Stl, Format::Obj, Format::Gltf] {
-        // A buffer beside the file holds what the file does.
+        // Each referenced buffer has the bytes of the file itself.
         match format.read(bytes, &|_| Ok(bytes.to_vec())) {
             Ok(mesh) => {
                 let last = mesh.vertices().len() as u32;

@@ -1,4 +1,4 @@
-//! A scene whose drive follows functions of `[closed_form]`: its path is that of the machine.
+//! A scene whose drive follows functions of `[closed_form]`: the path must be that of the machine.
 
 use crate::common::parse;
 use jointplay::analysis::ideal_fault::{IdealFault, ideal_fault};
@@ -8,11 +8,11 @@ use jointplay::simulate::{Frame, Simulation, StopFault};
 
 /// A crank of 30 mm that turns at 2 Hz and pushes a block through a rod of `length`: x = r cos + sqrt(L^2 - r^2 sin^2).
 fn slider_crank(length: &str) -> Scene {
-    off_by("0 mm", length)
+    with_path_error("0 mm", length)
 }
 
-/// The same with a path that is wrong by `fault` in x.
-fn off_by(fault: &str, length: &str) -> Scene {
+/// The same with an error `fault` in x of the closed-form path.
+fn with_path_error(fault: &str, length: &str) -> Scene {
     let text = format!(
         r#"
         start = "ideal"
@@ -53,8 +53,8 @@ fn a_user_scene_follows_its_closed_form() {
         let time = 0.01 * f64::from(k);
         simulation.advance_to(time).expect("runs");
         simulation.sample(time, &mut frame);
-        let off = frame.probe_error.expect("is known").norm();
-        assert!(off < 1e-12, "{off:e} at {time}");
+        let error = frame.probe_error.expect("is known").norm();
+        assert!(error < 1e-12, "{error:e} at {time}");
         let x = frame.bodies[2].position.x;
         travel = (travel.0.min(x), travel.1.max(x));
     }
@@ -64,22 +64,22 @@ fn a_user_scene_follows_its_closed_form() {
 }
 
 #[test]
-fn a_closed_form_that_contradicts_the_machine_is_named() {
-    let refused =
-        Simulation::new(&off_by("5 mm", "100 mm").machine).expect_err("its tip error would be 5 mm").to_string();
+fn a_closed_form_that_contradicts_the_machine_is_reported() {
+    let message =
+        Simulation::new(&with_path_error("5 mm", "100 mm").machine).expect_err("the path is wrong by 5 mm").to_string();
     assert!(
-        refused.starts_with("where the loops close at t = 0, body block is 5 mm off its path in [closed_form]"),
-        "{refused}"
+        message.starts_with("where the loops close at t = 0, body block is 5 mm off its path in [closed_form]"),
+        "{message}"
     );
-    let mut settled = off_by("5 mm", "100 mm");
-    settled.set("contact.clearance", "0.1 mm").expect("may be loose");
+    let mut settled = with_path_error("5 mm", "100 mm");
+    settled.set("contact.clearance", "0.1 mm").expect("a clearance in range");
     settled.machine.start = StartRule::Settled;
-    assert_eq!(Simulation::new(&settled.machine).expect_err("is no nearer to it").to_string(), refused);
-    // Right at the start.
-    for loose in [false, true] {
-        let mut scene = off_by("2 mm*sin(turn)", "100 mm");
-        if loose {
-            scene.set("contact.clearance", "0.1 mm").expect("may be loose");
+    assert_eq!(Simulation::new(&settled.machine).expect_err("the path is still wrong").to_string(), message);
+    // Correct at the start, wrong later.
+    for with_play in [false, true] {
+        let mut scene = with_path_error("2 mm*sin(turn)", "100 mm");
+        if with_play {
+            scene.set("contact.clearance", "0.1 mm").expect("a clearance in range");
         }
         let Some(IdealFault::OffPath(time, distance)) = ideal_fault(&scene) else {
             panic!("the path is wrong");

@@ -1,4 +1,4 @@
-//! Corners of the friction law are events: a step ends at each, and what slides is on the piece that it holds.
+//! Corners of the friction law are events: a step ends at each, and a sliding contact stays on its branch of the law.
 
 use crate::common::{frame_now, simulation};
 use jointplay::contact::FrictionBranch;
@@ -14,10 +14,10 @@ fn settled_sliding_keeps_its_law_branch_and_corners_cost_few_rejections() {
             simulation.step().unwrap();
             let frame = frame_now(&mut simulation);
             for (j, joint) in frame.joints.iter().enumerate() {
-                let memory = simulation.contact_state(j);
-                assert!(memory.active && memory.friction_branch != FrictionBranch::Unfrozen, "{method}");
+                let contact = simulation.contact_state(j);
+                assert!(contact.active && contact.friction_branch != FrictionBranch::Unfrozen, "{method}");
                 let c = simulation.mechanism().contacts.coefficients(j);
-                let beyond = c.excess_over_branch(memory.friction_branch, joint.slip_speed);
+                let beyond = c.excess_over_branch(contact.friction_branch, joint.slip_speed);
                 assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
             }
         }
@@ -35,38 +35,38 @@ fn settled_sliding_keeps_its_law_branch_and_corners_cost_few_rejections() {
 }
 
 #[test]
-fn a_largest_rate_is_found_anywhere_within_a_step() {
-    // An impact that the spring goes on pushing: its rate rises at first. Steps of many tolerances have its maximum in many places.
-    let rate_in_memory = |tolerance: f64| {
+fn a_maximum_rate_is_found_anywhere_within_a_step() {
+    // The spring keeps pushing during the impact, so the rate rises at first. Each tolerance places its maximum elsewhere in a step.
+    let approach_speeds = |tolerance: f64| {
         let solver = [("solver.method", "dopri5"), ("solver.tolerance", &tolerance.to_string())];
         let mut simulation = simulation("suspension", &solver);
-        let (mut largest, mut found) = (0.0_f64, Vec::new());
+        let (mut largest, mut speeds) = (0.0_f64, Vec::new());
         while simulation.time() < 0.015 {
             simulation.step().unwrap();
-            let memory = simulation.contact_state(0);
-            if memory.active {
-                largest = memory.approach_speed;
+            let contact = simulation.contact_state(0);
+            if contact.active {
+                largest = contact.approach_speed;
             } else if largest > 0.0 {
-                found.push(std::mem::take(&mut largest));
+                speeds.push(std::mem::take(&mut largest));
             }
         }
-        found
+        speeds
     };
-    let reference = rate_in_memory(1e-13);
+    let reference = approach_speeds(1e-13);
     assert!(reference.len() >= 3, "{reference:?}");
     for n in 0..24 {
         let tolerance = 1e-9 * f64::powf(10.0, -f64::from(n) / 8.0);
-        let found = rate_in_memory(tolerance);
-        for (found, reference) in std::iter::zip(&found, &reference) {
-            let off = (found - reference).abs() / reference;
-            assert!(off < 300.0 * tolerance, "{tolerance:e}: {off:e}");
+        let speeds = approach_speeds(tolerance);
+        for (speed, reference) in std::iter::zip(&speeds, &reference) {
+            let error = (speed - reference).abs() / reference;
+            assert!(error < 300.0 * tolerance, "{tolerance:e}: {error:e}");
         }
     }
 }
 
 #[test]
 fn methods_agree_where_friction_depends_on_part_of_the_velocity() {
-    // Printed friction has corners of its own, at |e|/delta times the speeds of the others.
+    // Printed friction has its corners at |e|/delta times the speeds of the others.
     let printed = ("contact.friction_velocity", "printed");
     let end = 0.02;
     let run = |method: &str, tolerance: &str, formulation: &str| {
@@ -78,10 +78,10 @@ fn methods_agree_where_friction_depends_on_part_of_the_velocity() {
             simulation.step_until(end).unwrap();
             let frame = frame_now(&mut simulation);
             for (j, joint) in frame.joints.iter().enumerate() {
-                let memory = simulation.contact_state(j);
+                let contact = simulation.contact_state(j);
                 let c = simulation.mechanism().contacts.coefficients(j);
-                if memory.active && memory.friction_branch != FrictionBranch::Unfrozen && joint.slip_speed > 0.0 {
-                    let beyond = c.excess_over_branch(memory.friction_branch, joint.slip_speed);
+                if contact.active && contact.friction_branch != FrictionBranch::Unfrozen && joint.slip_speed > 0.0 {
+                    let beyond = c.excess_over_branch(contact.friction_branch, joint.slip_speed);
                     assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
                 }
             }
@@ -96,8 +96,8 @@ fn methods_agree_where_friction_depends_on_part_of_the_velocity() {
         [("dopri5", "1e-10", "lagrange", 1e-7), ("radau5", "1e-9", "tree", 1e-7), ("automatic", "1e-8", "tree", 1e-7)]
     {
         let (position, _) = run(method, tolerance, formulation);
-        let off = (position - reference).norm();
-        println!("{method} {tolerance} {formulation}: {off:e} m, {corners} corners");
-        assert!(off < bound, "{method} {formulation}: {off:e}");
+        let error = (position - reference).norm();
+        println!("{method} {tolerance} {formulation}: {error:e} m, {corners} corners");
+        assert!(error < bound, "{method} {formulation}: {error:e}");
     }
 }

@@ -8,7 +8,7 @@ use crate::common::simulation;
 use jointplay::simulate::Frame;
 
 #[test]
-fn no_ball_passes_through_its_wall_unnoticed() {
+fn no_ball_penetrates_its_wall_without_a_force() {
     let mut simulation = simulation(
         "pendulum",
         &[("contact.friction", "0"), ("contact.restitution", "1"), ("solver.tolerance", "1e-9")],

@@ -1,4 +1,4 @@
-//! A start in static equilibrium: where forces balance, nothing moves; where they cannot, it says so.
+//! A start in static equilibrium: the bodies are at rest where the forces can balance; otherwise the start is refused.
 
 use crate::common::{parse, scene};
 use jointplay::contact::{Coefficients, settled_penetration};
@@ -19,7 +19,7 @@ fn mass(start: &str, more: &str) -> String {
 }
 
 /// The frame at t = 0.
-fn first(scene: &Scene) -> Frame {
+fn frame_at_start(scene: &Scene) -> Frame {
     let mut simulation = Simulation::new(&scene.machine).unwrap_or_else(|error| panic!("{error}"));
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
@@ -27,20 +27,20 @@ fn first(scene: &Scene) -> Frame {
 }
 
 /// Largest speed of a body until `time`, s: m/s and rad/s.
-fn fastest(scene: &Scene, time: f64) -> [f64; 2] {
+fn max_speeds(scene: &Scene, time: f64) -> [f64; 2] {
     let mut live = LiveScene::new(scene).unwrap_or_else(|error| panic!("{}: {error}", scene.name));
     let mut frame = Frame::default();
-    let mut most = [0.0_f64; 2];
+    let mut max = [0.0_f64; 2];
     for n in 0..=20 {
         live.advance_to(time * f64::from(n) / 20.0).unwrap();
         let now = live.time();
         live.sample(now, &mut frame);
         for body in &frame.bodies {
-            most[0] = most[0].max(body.velocity.norm());
-            most[1] = most[1].max(body.angular_velocity.norm());
+            max[0] = max[0].max(body.velocity.norm());
+            max[1] = max[1].max(body.angular_velocity.norm());
         }
     }
-    most
+    max
 }
 
 #[test]
@@ -52,7 +52,7 @@ fn a_mass_starts_where_its_weight_and_its_springs_balance() {
                 phase = \"90 deg\" }\n";
     let bushing = "[[bushing]]\nname = \"b\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nstiffness = \"1 2 3 kN/m\"\n";
     let stop = "[[stop]]\nname = \"e\"\njoint = \"guide\"\nlower = \"-100 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n";
-    let held = "[[joint_spring]]\nname = \"j\"\njoint = \"guide\"\nstiffness = \"1 kN/m\"\n\
+    let joint_spring_and_load = "[[joint_spring]]\nname = \"j\"\njoint = \"guide\"\nstiffness = \"1 kN/m\"\n\
                 [[load]]\nname = \"l\"\non = { body = \"mass\" }\nforce = \"0 0 5 N\"\n\
                 factor = { law = \"formula\", formula = \"2 + sin(t)\" }\n";
     let weight = 2.0 * G;
@@ -61,18 +61,18 @@ fn a_mass_starts_where_its_weight_and_its_springs_balance() {
         ("tyre", tyre, 0.36 - weight / 20e3),
         ("bushing", bushing, -weight / 3e3),
         ("stop", stop, -0.1 - 1e-3 * (weight / 100.0).powf(2.0 / 3.0)),
-        ("joint spring and load", held, (10.0 - weight) / 1e3),
+        ("joint spring and load", joint_spring_and_load, (10.0 - weight) / 1e3),
     ] {
-        // From the place of the file, from one far above and, of what pushes only, from deep within.
+        // From the start of the file, from far above, and from a deep penetration of the elements that only push.
         for start in ["0 m", "0.5 m", "-0.12 m"] {
             let scene = parse(&mass(start, more), &[]);
-            let frame = first(&scene);
+            let frame = frame_at_start(&scene);
             let z = frame.bodies[0].position.z;
             assert!((z - expected).abs() < 1e-9, "{what} from {start}: {z} {expected}");
             assert_eq!(frame.bodies[0].velocity, Vec3::zeros());
         }
     }
-    // Nothing holds it.
+    // Without an element that supports the mass.
     let error = Simulation::new(&parse(&mass("0 m", ""), &[]).machine).unwrap_err().to_string();
     assert!(error.contains("no position of rest") && error.contains("body mass accelerates at 9.81 m/s^2"), "{error}");
 }
@@ -80,7 +80,7 @@ fn a_mass_starts_where_its_weight_and_its_springs_balance() {
 #[test]
 fn a_rod_with_play_hangs_at_rest() {
     let scene = scene("pendulum", &[("start", "equilibrium")]);
-    let frame = first(&scene);
+    let frame = frame_at_start(&scene);
     let contact = &scene.machine.ball_joints[0].contact;
     let weight = scene.machine.bodies.iter().map(|body| body.mass).sum::<f64>() * G;
     let depth = settled_penetration(Coefficients::new(contact, contact.clearance).stiffness, weight);
@@ -92,7 +92,7 @@ fn a_rod_with_play_hangs_at_rest() {
             "pendulum",
             &[("start", "equilibrium"), ("formulation", formulation), ("solver.method", method)],
         );
-        let [speed, spin] = fastest(&scene, 0.1);
+        let [speed, spin] = max_speeds(&scene, 0.1);
         assert!(speed < 1e-6 && spin < 1e-5, "{formulation} {method}: {speed:e} m/s, {spin:e} rad/s");
     }
 }
@@ -100,34 +100,34 @@ fn a_rod_with_play_hangs_at_rest() {
 #[test]
 fn a_loaded_suspension_starts_at_rest() {
     let scene = scene("suspension", &[("start", "equilibrium"), ("parameter.bump", "0 mm")]);
-    let [speed, spin] = fastest(&scene, 0.1);
+    let [speed, spin] = max_speeds(&scene, 0.1);
     println!("{speed:e} m/s, {spin:e} rad/s");
     assert!(speed < 1e-5 && spin < 1e-4, "{speed:e} m/s, {spin:e} rad/s");
-    // As the file gives it, it drops by the play of its balls.
-    let [given, _] = fastest(&crate::common::scene("suspension", &[("parameter.bump", "0 mm")]), 0.1);
-    assert!(given > 100.0 * speed, "{given:e} {speed:e}");
+    // With the start of the file, it drops by the play of its balls.
+    let [from_file, _] = max_speeds(&crate::common::scene("suspension", &[("parameter.bump", "0 mm")]), 0.1);
+    assert!(from_file > 100.0 * speed, "{from_file:e} {speed:e}");
 }
 
 #[test]
 fn mechanisms_without_drives_start_at_rest_wherever_their_files_begin() {
-    // From a swing, two meters of links, and a crank that is thrown.
+    // A deflected pendulum, a chain two metres long, and a spinning crank.
     for name in ["pendulum", "chain", "slider-crank"] {
         let scene = scene(name, &[("start", "equilibrium")]);
-        let [speed, spin] = fastest(&scene, 0.02);
+        let [speed, spin] = max_speeds(&scene, 0.02);
         println!("{name} {speed:e} m/s, {spin:e} rad/s");
         assert!(speed < 1e-5 && spin < 1e-4, "{name}: {speed:e} m/s, {spin:e} rad/s");
     }
 }
 
 #[test]
-fn a_row_of_links_too_long_for_the_search_is_refused() {
+fn a_chain_too_long_for_the_search_is_refused() {
     // Six velocity coordinates for each link.
-    let rests = |links: &str| {
+    let start_result = |links: &str| {
         let scene = scene("chain", &[("start", "equilibrium"), ("chain.links", links)]);
         Simulation::new(&scene.machine).map(|_| ()).map_err(|error| scene.locate(&error).to_string())
     };
-    assert_eq!(rests("40"), Ok(()));
-    let error = rests("67").unwrap_err();
+    assert_eq!(start_result("40"), Ok(()));
+    let error = start_result("67").unwrap_err();
     assert!(error.contains("402 velocity coordinates") && error.contains("at most 400"), "{error}");
     assert!(error.contains("chain.links = 67"), "{error}");
 }
@@ -137,12 +137,12 @@ fn every_built_in_machine_starts_in_equilibrium_in_both_formulations() {
     for name in BUILT_IN {
         let [tree, lagrange] = ["tree", "lagrange"].map(|formulation| {
             let scene = scene(name, &[("start", "equilibrium"), ("formulation", formulation)]);
-            first(&scene)
+            frame_at_start(&scene)
         });
         for (a, b) in tree.bodies.iter().zip(&lagrange.bodies) {
             assert!((a.position - b.position).norm() < 1e-12, "{name}");
         }
-        let pressed = tree.joints.iter().filter(|joint| joint.penetration > 0.0).count();
-        assert!(pressed > 0, "{name}: no ball is on its wall");
+        let touching = tree.joints.iter().filter(|joint| joint.penetration > 0.0).count();
+        assert!(touching > 0, "{name}: no ball touches its wall");
     }
 }

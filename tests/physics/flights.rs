@@ -1,4 +1,4 @@
-//! Free bodies that touch nothing are left out of the evaluations that impacts elsewhere need.
+//! Bodies in free flight are left out of the evaluations that impacts elsewhere need.
 
 use crate::common::{frame_now, simulation};
 use jointplay::machine::Vec3;
@@ -6,8 +6,8 @@ use jointplay::simulate::{ContactMode, Frame, Simulation};
 
 const CHAIN: [(&str, &str); 2] = [("chain.links", "8"), ("solver.tolerance", "1e-5")];
 
-/// Whether any ball or socket of body `b` touches.
-fn touches(simulation: &Simulation, frame: &Frame, b: usize) -> bool {
+/// Whether any ball joint of body `b` is in contact.
+fn in_contact(simulation: &Simulation, frame: &Frame, b: usize) -> bool {
     let joints = &simulation.machine().ball_joints;
     joints.iter().zip(&frame.joints).any(|(joint, report)| {
         (joint.ball.body == Some(b) || joint.socket.body == Some(b)) && report.state != ContactMode::Free
@@ -19,7 +19,7 @@ fn a_body_without_contact_follows_its_parabola_within_each_step() {
     let mut simulation = simulation("chain", &CHAIN);
     let gravity = simulation.conditions().gravity;
     let mut inside = Frame::default();
-    let (mut flew, mut stood) = (0, 0);
+    let (mut free_samples, mut other_samples) = (0, 0);
     while simulation.time() < 40e-3 {
         let before = frame_now(&mut simulation);
         simulation.step().expect("runs");
@@ -30,12 +30,12 @@ fn a_body_without_contact_follows_its_parabola_within_each_step() {
             simulation.sample(time, &mut inside);
             let s = time - before.time;
             for (b, body) in inside.bodies.iter().enumerate() {
-                let free = [&before, &inside, &after].iter().all(|frame| !touches(&simulation, frame, b));
+                let free = [&before, &inside, &after].iter().all(|frame| !in_contact(&simulation, frame, b));
                 if !free {
-                    stood += 1;
+                    other_samples += 1;
                     continue;
                 }
-                flew += 1;
+                free_samples += 1;
                 let start = &before.bodies[b];
                 let velocity = start.velocity + gravity * s;
                 let position = start.position + (start.velocity + gravity * (0.5 * s)) * s;
@@ -45,7 +45,7 @@ fn a_body_without_contact_follows_its_parabola_within_each_step() {
             }
         }
     }
-    assert!(flew > 1000 && stood > 1000, "{flew} {stood}");
+    assert!(free_samples > 1000 && other_samples > 1000, "{free_samples} {other_samples}");
 }
 
 #[test]
@@ -60,10 +60,10 @@ fn bodies_in_free_flight_cost_no_evaluation_and_leave_the_others_unchanged() {
         let forces: Vec<f64> = (0..5).map(|j| simulation.peak(j).0).collect();
         (forces, frame)
     };
-    let ((flown, a), (stepped, b)) = (peaks("automatic"), peaks("dopri5"));
-    assert!(flown[0] > 500.0);
-    for (a, b) in flown.iter().zip(&stepped) {
-        assert!((a - b).abs() <= 1e-5 * b, "{flown:?} {stepped:?}");
+    let ((automatic, a), (explicit, b)) = (peaks("automatic"), peaks("dopri5"));
+    assert!(automatic[0] > 500.0);
+    for (a, b) in automatic.iter().zip(&explicit) {
+        assert!((a - b).abs() <= 1e-5 * b, "{automatic:?} {explicit:?}");
     }
     for (a, b) in a.bodies.iter().zip(&b.bodies) {
         assert!((a.position - b.position).norm() < 1e-8);

@@ -12,7 +12,7 @@ use jointplay::simulate::Simulation;
 const MASS: f64 = 0.5;
 
 /// A mass at rest on a spring with a damper along x, without gravity, under a load of 2 N along x with these keys.
-fn shaken(load: &str) -> String {
+fn oscillator(load: &str) -> String {
     format!(
         "[gravity]\nx = 0\ny = 0\nz = 0\n\
          [[body]]\nname = \"mass\"\nmass = \"{MASS} kg\"\ninertia = \"2e-4 2e-4 2e-4 kg m^2\"\n\
@@ -34,10 +34,10 @@ fn samples(join: &str, point: impl Fn(f64, f64) -> String) -> String {
 }
 
 #[test]
-fn a_law_a_formula_and_a_table_of_a_sine_move_a_mass_as_the_sine_does() {
+fn a_law_a_formula_and_a_table_of_a_sine_give_the_same_motion() {
     let points = samples(", ", |t, x| format!("[\"{t:e} s\", {x:e}]"));
     let csv = "time_ms;factor\n".to_owned() + &samples("\n", |t, x| format!("{:e};{x:e}", 1e3 * t)) + "\n";
-    let beside: Texts = [("pull.csv".to_owned(), csv.into())].into();
+    let files: Texts = [("pull.csv".to_owned(), csv.into())].into();
     let laws = [
         "{ law = \"harmonic\", amplitude = 1, frequency = \"2 Hz\", phase = \"30 deg\" }".to_owned(),
         "{ law = \"harmonics\", terms = [{ amplitude = \"0.5 + 0.5\", frequency = \"2 Hz\", phase = \"30 deg\" }] }"
@@ -50,34 +50,34 @@ fn a_law_a_formula_and_a_table_of_a_sine_move_a_mass_as_the_sine_does() {
     for (method, formulation) in THREE_VARIANTS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-11"), ("formulation", formulation)];
         let mut sine =
-            Simulation::new(&parse(&shaken("frequency = \"2 Hz\"\nphase = \"30 deg\""), &changes).machine).unwrap();
+            Simulation::new(&parse(&oscillator("frequency = \"2 Hz\"\nphase = \"30 deg\""), &changes).machine).unwrap();
         let expected = frame_at(&mut sine, 1.3);
         let work = sine.ledger().unwrap().external_work;
         assert!(expected.bodies[0].position.x.abs() > 1e-3 && work > 1e-3);
-        for (place, law) in laws.iter().enumerate() {
-            let text = shaken(&format!("factor = {law}"));
+        for (index, law) in laws.iter().enumerate() {
+            let text = oscillator(&format!("factor = {law}"));
             let changes = changes.map(|(key, value)| (key.to_owned(), value.to_owned()));
-            let scene = Scene::parse_with(&text, None, &beside, &changes).unwrap();
+            let scene = Scene::parse_with(&text, None, &files, &changes).unwrap();
             let period = periods_of(&scene.machine).fold(f64::INFINITY, f64::min);
             assert_eq!((period - 0.5).abs() < 1e-12, !law.contains("formula"), "{law}: {period}");
             let mut simulation = Simulation::new(&scene.machine).unwrap();
             let frame = frame_at(&mut simulation, 1.3);
-            let off = (frame.bodies[0].position - expected.bodies[0].position).norm();
-            let label = format!("{method} {formulation} law {place}");
-            assert!(off < 1e-9, "{label}: {off:e}");
+            let error = (frame.bodies[0].position - expected.bodies[0].position).norm();
+            let label = format!("{method} {formulation} law {index}");
+            assert!(error < 1e-9, "{label}: {error:e}");
             assert!((frame.elements[1].force - expected.elements[1].force).norm() < 1e-8, "{label}");
             let ledger = simulation.ledger().unwrap();
             assert!((ledger.external_work - work).abs() < 1e-8, "{label}: {ledger:?}");
             assert!(ledger.relative_residual().abs() < 1e-8, "{label}: {ledger:?}");
-            // The law with the words of the load is the load itself.
-            assert!(place > 1 || off == 0.0, "{label}");
+            // The first two laws evaluate the same expression as the load's own keys: same bits.
+            assert!(index > 1 || error == 0.0, "{label}");
         }
     }
 }
 
 #[test]
 fn a_short_pulse_of_a_load_is_not_stepped_over() {
-    // A free mass at rest: nothing but the beginning of the pulse ends a step. Its impulse is F T 4 / (3 pi).
+    // A free mass at rest: only the start of the pulse ends a step. Its impulse is F T 4 / (3 pi).
     let text = "[gravity]\nx = 0\ny = 0\nz = 0\n\
         [[body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 2e-4 2e-4 kg m^2\"\n\
         [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = { position = [0, 0, 0] }\n\
@@ -88,8 +88,8 @@ fn a_short_pulse_of_a_load_is_not_stepped_over() {
         let mut simulation = Simulation::new(&parse(text, &changes).machine).unwrap();
         let frame = frame_at(&mut simulation, 0.7);
         let speed = Vec3::new(60.0, 0.0, 80.0) * 1e-3 * 4.0 / (3.0 * PI) / MASS;
-        let off = (frame.bodies[0].velocity - speed).norm();
-        assert!(off < 1e-8, "{method} {formulation}: {off:e}");
+        let error = (frame.bodies[0].velocity - speed).norm();
+        assert!(error < 1e-8, "{method} {formulation}: {error:e}");
         let ledger = simulation.ledger().unwrap();
         let energy = 0.5 * MASS * speed.norm_squared();
         assert!((ledger.external_work / energy - 1.0).abs() < 1e-6, "{method} {formulation}: {ledger:?}");
@@ -98,7 +98,7 @@ fn a_short_pulse_of_a_load_is_not_stepped_over() {
 
 #[test]
 fn a_torque_that_is_switched_on_smoothly_turns_with_its_body() {
-    // About z, in the axes of a body that turns about z: the torque stays, and so does the angular momentum that it gives.
+    // The torque and the body's rotation are both about z, so the torque keeps its direction.
     let text = "[gravity]\nx = 0\ny = 0\nz = 0\n\
         [[body]]\nname = \"rotor\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 2e-4 2e-4 kg m^2\"\n\
         [[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"rotor\"\naxis = [0, 0, 1]\n\
@@ -108,22 +108,23 @@ fn a_torque_that_is_switched_on_smoothly_turns_with_its_body() {
     // The ramp is odd about its middle.
     for (time, momentum) in [(0.1, 1e-4), (0.3, 1e-4), (0.4, 0.0)] {
         let frame = frame_at(&mut simulation, time);
-        let off = (frame.bodies[0].angular_velocity.z - momentum / 2e-4).abs();
-        assert!(off < 1e-7, "{time}: {off:e}");
+        let error = (frame.bodies[0].angular_velocity.z - momentum / 2e-4).abs();
+        assert!(error < 1e-7, "{time}: {error:e}");
     }
     assert!(simulation.ledger().unwrap().relative_residual().abs() < 1e-8);
 }
 
 #[test]
 fn bad_factors_are_refused_with_their_position() {
-    let beside: Texts = [
+    let files: Texts = [
         ("no-header.csv".to_owned(), "0,1\n1,2\n".into()),
         ("falls.csv".to_owned(), "time_s,factor\n0,1\n0.2,x\n".into()),
     ]
     .into();
-    let error =
-        |load: &str| -> SceneError { Scene::parse_with(&shaken(load), Some("mine.toml"), &beside, &[]).unwrap_err() };
-    for (load, said) in [
+    let error = |load: &str| -> SceneError {
+        Scene::parse_with(&oscillator(load), Some("mine.toml"), &files, &[]).unwrap_err()
+    };
+    for (load, fragments) in [
         (
             "factor = { law = \"constant\", velocity = \"1 1/s\" }\nfrequency = \"2 Hz\"",
             ["load.f.frequency", "`factor` says how"],
@@ -148,8 +149,8 @@ fn bad_factors_are_refused_with_their_position() {
         ),
     ] {
         let message = error(load).to_string();
-        for said in said {
-            assert!(message.contains(said), "{message}\nlacks {said}");
+        for fragment in fragments {
+            assert!(message.contains(fragment), "{message}\nlacks {fragment}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Each stepper shows its order on smooth motions of the mechanisms themselves.
+//! Each stepper converges with its order on smooth motions of the mechanisms.
 
 use crate::common::{run_until, scene, simulation, slope};
 use jointplay::contact::ContactState;
@@ -52,7 +52,7 @@ fn equal_discrete_steps(m: &mut Mechanism, start: &[f64], duration: f64, steps: 
     y
 }
 
-/// The platform with its rods, all contacts open, flung into a tumble: nine coupled coordinates, no event.
+/// The platform tumbles with its rods, all contacts open: nine coupled coordinates, no event.
 #[test]
 fn slopes_of_the_error_equal_the_orders() {
     const DURATION: f64 = 0.32;
@@ -79,11 +79,11 @@ fn slopes_of_the_error_equal_the_orders() {
                 (DURATION / f64::from(steps), distance(&y, &exact, &scale))
             })
             .collect();
-        let found = slope(&points);
-        println!("{name}: order {found:.3}, {points:?}");
-        assert!((found - expected).abs() < tolerance, "{name}: {found}");
+        let observed = slope(&points);
+        println!("{name}: order {observed:.3}, {points:?}");
+        assert!((observed - expected).abs() < tolerance, "{name}: {observed}");
     };
-    // The next order of the error still shows at these steps: a few hundredths of the slope.
+    // At these steps the next term of the error changes the slope by a few hundredths.
     order("semi-implicit-euler", [160, 320, 640, 1280], 1.0, 0.05);
     order("discrete-gradient", [160, 320, 640, 1280], 2.0, 0.1);
     order("rk4", [40, 80, 160, 320], 4.0, 0.2);
@@ -113,9 +113,9 @@ fn projection_keeps_the_order_of_fixed_steps() {
             let changes = [("solver.method", method), ("solver.step", &format!("{step} us"))];
             (step, projected(&changes, Some(&exact)).0)
         });
-        let found = slope(&points);
-        println!("{method}, projected: order {found:.3}, {points:?}");
-        assert!((found - expected).abs() < tolerance, "{method}: {found}");
+        let observed = slope(&points);
+        println!("{method}, projected: order {observed:.3}, {points:?}");
+        assert!((observed - expected).abs() < tolerance, "{method}: {observed}");
     }
 }
 
@@ -129,7 +129,7 @@ fn error_of_the_adaptive_method_follows_its_tolerance() {
     let by_tolerance = slope(&runs.map(|(tolerance, error, _)| (tolerance, error)));
     let by_steps = slope(&runs.map(|(_, error, steps)| (1.0 / steps, error)));
     println!("dopri5: error ~ tolerance^{by_tolerance:.3}, ~ step^{by_steps:.3}, {runs:?}");
-    // Error per step is held: with order 5 of the result and 4 of the estimate, exponent 1.
+    // The step control limits the error per step: with order 5 of the result and 4 of the estimate, the exponent is 1.
     assert!((by_tolerance - 1.0).abs() < 0.15, "{by_tolerance}");
     assert!((by_steps - 5.0).abs() < 0.75, "{by_steps}");
 }

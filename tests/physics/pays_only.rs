@@ -1,4 +1,4 @@
-//! A scene pays only for what it has, and its summary says what that is.
+//! The cost of a scene depends only on the features that it uses, and its summary lists them.
 
 use crate::common::{frame_now, scene, simulation};
 use jointplay::mechanism::{Mechanism, Summary};
@@ -27,7 +27,7 @@ fn rigid_scenes_evaluate_no_contact() {
             assert_eq!((summary.contacts, summary.frictional_contacts), (0, 0));
             assert_eq!(summary.ideal_joints, simulation.machine().ball_joints.len());
         }
-        // With play there are evaluations to count.
+        // With play the counter is not zero.
         let mut simulation = simulation(name, &[]);
         simulation.step().unwrap();
         assert!(simulation.statistics().contact_evaluations > 0, "{name}");
@@ -42,10 +42,10 @@ fn fully_driven_ideal_scenes_solve_no_differential_equation() {
     assert_eq!(summary.degrees_of_freedom, 0);
     driven.advance_to(0.5).unwrap();
     let statistics = driven.statistics().clone();
-    // One evaluation a step, for the reactions; none rejected, at whatever tolerance.
+    // One evaluation per step, for the reactions; no step is rejected at any tolerance.
     assert_eq!(statistics.evaluations, statistics.steps);
     assert_eq!(statistics.rejected, 0);
-    // The result owes nothing to the stepper: any method and step reach the same state.
+    // The result does not depend on the stepper: any method and step reach the same state.
     let mut other = simulation("spcmm", &[IDEAL, ("solver.method", "semi-implicit-euler"), ("solver.step", "10 ms")]);
     other.advance_to(0.5).unwrap();
     assert_eq!(driven.state_hash(), other.state_hash());
@@ -54,7 +54,7 @@ fn fully_driven_ideal_scenes_solve_no_differential_equation() {
         ("spcmm", vec![IDEAL, ("joint.S1.clearance", "0.1 mm")]),
         ("spcmm", vec![IDEAL, ("formulation", "lagrange")]),
         ("slider-crank", vec![IDEAL]),
-        // Its rod still spins about its own axis.
+        // Its rod is still free to spin about its axis.
         ("slider-crank-driven", vec![IDEAL]),
         ("pendulum", vec![IDEAL]),
     ] {
@@ -79,7 +79,7 @@ fn frictionless_scenes_evaluate_no_friction() {
         for method in crate::common::METHODS {
             let method = ("solver.method", method);
             assert_eq!(run(&[change, method]), 0, "{change:?}, {method:?}");
-            // With friction there are evaluations to count.
+            // With friction the counter is not zero.
             assert!(run(&[method]) > 0, "{method:?}");
         }
         let mut simulation = simulation("spcmm", &[change]);
@@ -104,7 +104,7 @@ fn links_of_a_chain_are_separate_blocks() {
         assert_eq!(chain.velocity_coordinates, 6 * count);
     }
     assert_eq!(summary("pendulum", &[]).single_body_blocks, 1);
-    // The platform carries its rods.
+    // The platform and its rods form one block.
     assert_eq!(summary("spcmm", &[]).single_body_blocks, 0);
 }
 
@@ -115,7 +115,7 @@ fn counts_of_the_built_in_scenes() {
     type Row = (&'static str, Vec<(&'static str, &'static str)>, [usize; 6], [usize; 3], usize);
     let play = |joint| (joint, "0.3 mm");
     let rows: [Row; 10] = [
-        // The platform's quaternion makes one position more than there are velocities.
+        // The platform's quaternion has one position more than velocities.
         ("spcmm", vec![], [7, 3, 3, 3, 0, 9], [9, 10, 0], 33),
         (
             "spcmm",
@@ -136,14 +136,14 @@ fn counts_of_the_built_in_scenes() {
     for (name, changes, [bodies, driven, drives, contacts, ideal, free], tree, rows) in rows {
         for form in ["tree", "lagrange"] {
             let changes = [&changes[..], &[("formulation", form)]].concat();
-            let got = summary(name, &changes);
-            let case = format!("{name} {changes:?}: {got:?}");
-            assert_eq!((got.bodies, got.driven_bodies, got.drives), (bodies, driven, drives), "{case}");
-            assert_eq!((got.contacts, got.ideal_joints), (contacts, ideal), "{case}");
-            assert_eq!(got.frictional_contacts, contacts, "{case}");
-            assert_eq!(got.degrees_of_freedom, free, "{case}");
+            let summary = summary(name, &changes);
+            let case = format!("{name} {changes:?}: {summary:?}");
+            assert_eq!((summary.bodies, summary.driven_bodies, summary.drives), (bodies, driven, drives), "{case}");
+            assert_eq!((summary.contacts, summary.ideal_joints), (contacts, ideal), "{case}");
+            assert_eq!(summary.frictional_contacts, contacts, "{case}");
+            assert_eq!(summary.degrees_of_freedom, free, "{case}");
             let expected = if form == "tree" { tree } else { [6 * bodies, 7 * bodies, rows] };
-            let counts = [got.velocity_coordinates, got.position_coordinates, got.constraint_rows];
+            let counts = [summary.velocity_coordinates, summary.position_coordinates, summary.constraint_rows];
             assert_eq!(counts, expected, "{case}");
         }
     }

@@ -1,4 +1,4 @@
-//! The sweeps of the bench that are ready to run show what they say.
+//! The ready-made sweeps of the bench show what their descriptions state.
 
 use std::ops::ControlFlow;
 
@@ -28,13 +28,13 @@ fn points(ready: &ReadySweep, vary: Option<&str>, exponent: bool) -> Vec<SweptPo
     points
 }
 
-fn named(name: &str) -> &'static ReadySweep {
-    let found = READY.iter().find(|ready| ready.name == name);
-    found.expect("a ready sweep")
+fn sweep_named(name: &str) -> &'static ReadySweep {
+    let sweep = READY.iter().find(|ready| ready.name == name);
+    sweep.expect("a ready sweep")
 }
 
 #[test]
-fn every_ready_sweep_has_a_sentence_and_a_range_that_its_scene_takes() {
+fn every_ready_sweep_has_a_description_and_a_range_that_its_scene_accepts() {
     for ready in &READY {
         assert!(ready.shows.ends_with('.') && ready.shows.len() > 60, "{}", ready.name);
         let scene = ready.scene().expect("a built-in scene");
@@ -44,15 +44,15 @@ fn every_ready_sweep_has_a_sentence_and_a_range_that_its_scene_takes() {
             scene.set(ready.key, end).expect("in range");
         }
         // Enough sections for the 0-1 test, which decides about chaos here.
-        let kept = ready.periods - ready.discard;
-        assert!(kept >= 40 || ready.name == "Clearance alone does not cause chaos", "{}", ready.name);
+        let evaluated = ready.periods - ready.discard;
+        assert!(evaluated >= 40 || ready.name == "Clearance alone does not cause chaos", "{}", ready.name);
     }
 }
 
 #[test]
 #[ignore = "full: minutes"]
-fn full_the_road_to_chaos_begins_with_knocks() {
-    let ready = named("Road to chaos");
+fn full_the_road_to_chaos_begins_with_impacts() {
+    let ready = sweep_named("Road to chaos");
     let speeds: Vec<usize> = (21..=45).collect();
     assert_eq!((ready.from, ready.to, ready.values), ("21 rad/s", "45 rad/s", speeds.len()));
     in_parallel(&speeds, |&speed| {
@@ -67,7 +67,7 @@ fn full_the_road_to_chaos_begins_with_knocks() {
         if !(23..=24).contains(&speed) {
             return;
         }
-        // Contacts that begin in the kept turns.
+        // Impacts up to the start and up to the end of the evaluated turns.
         let mut run = simulation(ready.scene, &[(ready.key, &value)]);
         let impacts = [ready.discard, ready.periods].map(|turns| {
             run.advance_to(point.first + turns as f64 * point.interval).unwrap();
@@ -76,22 +76,22 @@ fn full_the_road_to_chaos_begins_with_knocks() {
         assert_eq!(impacts[1] > impacts[0], speed >= 24, "{value}: {impacts:?}");
     });
     let ends = points(ready, Some("23 rad/s..31 rad/s:2"), true);
-    parts_from(&ends[1], &ends[0]);
+    assert_exponents(&ends[1], &ends[0]);
 }
 
 #[test]
 #[ignore = "full: ten seconds"]
 fn full_friction_ends_the_chaos_of_the_slider_crank() {
-    let ready = named("Friction ends chaos");
+    let ready = sweep_named("Friction ends chaos");
     let regime = |value: &str| points(ready, Some(&format!("{value}..{value}:1")), false)[0].regime.clone();
     assert_eq!(regime("0.003"), "chaotic");
     assert_eq!(regime("0.008"), "periodic 1");
     let ends = points(ready, Some("0..0.016:2"), true);
-    parts_from(&ends[0], &ends[1]);
+    assert_exponents(&ends[0], &ends[1]);
 }
 
-/// Neighbouring motions part in the one and do not in the other, by far more than the exponents' errors.
-fn parts_from(chaotic: &SweptPoint, regular: &SweptPoint) {
+/// Asserts that neighbouring motions diverge at the chaotic point only, by far more than the errors of the exponents.
+fn assert_exponents(chaotic: &SweptPoint, regular: &SweptPoint) {
     let exponent = |point: &SweptPoint| {
         let (exponent, error) = point.exponent.expect("measured");
         (exponent, error.expect("with its error"))
@@ -104,8 +104,8 @@ fn parts_from(chaotic: &SweptPoint, regular: &SweptPoint) {
     assert_eq!(regular.regime, "periodic 1");
 }
 
-fn repeats(vary: Option<&str>, values: usize) {
-    let points = points(named("Clearance alone does not cause chaos"), vary, false);
+fn assert_periodic(vary: Option<&str>, values: usize) {
+    let points = points(sweep_named("Clearance alone does not cause chaos"), vary, false);
     assert_eq!(points.len(), values);
     for point in points {
         assert_eq!(point.regime, "periodic 1", "{:?}", point.settings);
@@ -113,12 +113,12 @@ fn repeats(vary: Option<&str>, values: usize) {
 }
 
 #[test]
-fn the_machine_of_the_paper_repeats_with_little_play_and_with_much() {
-    repeats(Some("0.01 mm..1 mm:2"), 2);
+fn the_machine_of_the_paper_is_periodic_with_little_and_much_play() {
+    assert_periodic(Some("0.01 mm..1 mm:2"), 2);
 }
 
 #[test]
 #[ignore = "full: three seconds"]
-fn full_the_machine_of_the_paper_repeats_whatever_its_play() {
-    repeats(None, named("Clearance alone does not cause chaos").values);
+fn full_the_machine_of_the_paper_is_periodic_for_any_play() {
+    assert_periodic(None, sweep_named("Clearance alone does not cause chaos").values);
 }

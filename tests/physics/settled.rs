@@ -1,4 +1,4 @@
-//! The implicit methods on settled contacts: same forces as the explicit one, in far fewer steps, resumable bit by bit.
+//! The implicit methods on settled contacts: the forces of the explicit method in far fewer steps, and bit-identical resumption.
 
 use crate::common::{mean_forces, simulation};
 use jointplay::simulate::Simulation;
@@ -10,9 +10,9 @@ fn settled_forces_are_those_of_a_converged_explicit_run() {
     let explicit_steps = explicit.statistics().steps;
     for (method, tolerance) in [("radau5", "1e-5"), ("automatic", "1e-5")] {
         let mut implicit = simulation("spcmm", &[("solver.method", method), ("solver.tolerance", tolerance)]);
-        let got = mean_forces(&mut implicit, 1.0, 1.5);
-        for (j, (got, expected)) in got.iter().zip(&expected).enumerate() {
-            let ratio = got / expected;
+        let actual = mean_forces(&mut implicit, 1.0, 1.5);
+        for (j, (actual, expected)) in actual.iter().zip(&expected).enumerate() {
+            let ratio = actual / expected;
             println!("{method} joint {j}: {ratio:.6}");
             assert!((ratio - 1.0).abs() < 0.01, "{method}, joint {j}: {ratio}");
         }

@@ -1,4 +1,4 @@
-//! `start = "settled"`: balls begin where the machine without play presses them.
+//! `start = "settled"`: each ball starts with the penetration at which it transmits the reaction of the machine without play.
 
 use crate::common::{frame_now, scene};
 use jointplay::machine::{BallJoint, StartRule};
@@ -30,9 +30,9 @@ fn every_contact_begins_with_the_force_of_the_ideal_joint() {
             let touching = frame.joints.iter().filter(|joint| joint.penetration > 0.0);
             assert_eq!(touching.count(), loose, "{name}");
             for (joint, ideal) in frame.joints.iter().zip(reactions(name)) {
-                // Its place moves the reaction by the clearance over the machine's size.
-                let off = (joint.normal_force.norm() - ideal).abs() / ideal;
-                assert!(off < 0.02, "{name} {formulation}: {} N, {ideal} N", joint.normal_force);
+                // The displaced ball changes the reaction by the ratio of clearance to machine size.
+                let error = (joint.normal_force.norm() - ideal).abs() / ideal;
+                assert!(error < 0.02, "{name} {formulation}: {} N, {ideal} N", joint.normal_force);
                 let depth = joint.penetration;
                 assert!(depth < 1e-4, "{name}: {depth:e} m under {ideal} N");
             }
@@ -41,9 +41,9 @@ fn every_contact_begins_with_the_force_of_the_ideal_joint() {
 }
 
 #[test]
-fn a_settled_start_does_not_drop() {
+fn a_settled_start_has_no_impact_peaks() {
     for name in SCENES {
-        let most = |start: &str| {
+        let peak_ratio = |start: &str| {
             let changes = [("start", start), ("contact.friction", "0")];
             let mut simulation = start_simulation(name, &changes);
             simulation.advance_to(0.02).expect("runs");
@@ -54,14 +54,14 @@ fn a_settled_start_does_not_drop() {
             let ideal = reactions(name);
             peaks.zip(ideal).map(|(peak, ideal)| peak / ideal).fold(0.0, f64::max)
         };
-        let (dropped, settled) = (most("ideal"), most("settled"));
+        let (from_centre, settled) = (peak_ratio("ideal"), peak_ratio("settled"));
         assert!(settled < 1.3, "{name}: {settled}");
-        assert!(dropped > 3.0 * settled, "{name}: {dropped} {settled}");
+        assert!(from_centre > 3.0 * settled, "{name}: {from_centre} {settled}");
     }
 }
 
 #[test]
-fn a_hanging_pendulum_hangs_from_the_wall() {
+fn a_hanging_pendulum_rests_on_its_wall() {
     let text = jointplay::scene::built_in_text("pendulum").expect("built in");
     let scene = Scene::parse(text, None, &[]).expect("reads");
     let mut scene = scene;
@@ -71,7 +71,7 @@ fn a_hanging_pendulum_hangs_from_the_wall() {
     let frame = frame_now(&mut simulation);
     let joint = &frame.joints[0];
     let contact = &scene.machine.ball_joints[0].contact;
-    // Hertz: F = K delta^1.5, the force the ideal joint's.
+    // Hertz: F = K delta^1.5, with the force of the ideal joint.
     let stiffness = jointplay::contact::Coefficients::new(contact, contact.clearance).stiffness;
     let depth = (reactions("pendulum")[0] / stiffness).powf(2.0 / 3.0);
     assert!((joint.penetration / depth - 1.0).abs() < 0.01, "{} {depth}", joint.penetration);
@@ -84,7 +84,7 @@ fn ideal_and_unloaded_joints_stay_closed() {
     let frame = frame_now(&mut simulation);
     assert!(frame.joints[0].eccentricity.norm() < 1e-9);
     assert!(frame.joints[1].penetration > 0.0);
-    // Nothing presses a pendulum that floats.
+    // Without gravity no force presses the ball.
     let mut floating = start_simulation("pendulum", &[("start", "settled"), ("gravity.z", "0")]);
     let frame = frame_now(&mut floating);
     assert!(frame.joints[0].eccentricity.norm() < 1e-12 && frame.joints[0].normal_force.norm() == 0.0);

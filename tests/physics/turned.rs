@@ -1,4 +1,4 @@
-//! A scene that is turned and shifted as a whole, together with its gravity, moves as before.
+//! A scene that is rotated and shifted as a whole, together with its gravity, has the same motion.
 
 use crate::common::parse;
 use crate::elements::frame_at;
@@ -7,46 +7,46 @@ use jointplay::scene::{Scene, Texts, built_in_text};
 use jointplay::simulate::Simulation;
 
 const SHIFT: [f64; 3] = [0.3, -0.2, 0.1];
-const PLACE: &str = "position = \"0.3 -0.2 0.1 m\"\nrotation = { axis = [1, 2, -2], angle = \"50 deg\" }\n";
+const POSE: &str = "position = \"0.3 -0.2 0.1 m\"\nrotation = { axis = [1, 2, -2], angle = \"50 deg\" }\n";
 const GRAVITY: &str = "[gravity]\nz = \"-9.81 m/s^2\"\n";
 
-fn turn() -> Quat {
+fn rotation() -> Quat {
     Quat::from_axis_angle(&nalgebra::Unit::new_normalize(Vec3::new(1.0, 2.0, -2.0)), 50_f64.to_radians())
 }
 
-/// `text` turned by [`PLACE`], and its gravity with it.
-fn turned(text: &str) -> String {
+/// `text` rotated and shifted by [`POSE`], with its gravity rotated as well.
+fn transformed(text: &str) -> String {
     assert!(text.contains(GRAVITY));
-    let gravity = turn() * Vec3::new(0.0, 0.0, -9.81);
-    let own = |(axis, value): (&str, &f64)| format!("{axis} = \"{value:e} m/s^2\"\n");
-    let own: String = ["x", "y", "z"].into_iter().zip(gravity.iter()).map(own).collect();
-    format!("{PLACE}{}", text.replace(GRAVITY, &format!("[gravity]\n{own}")))
+    let gravity = rotation() * Vec3::new(0.0, 0.0, -9.81);
+    let component = |(axis, value): (&str, &f64)| format!("{axis} = \"{value:e} m/s^2\"\n");
+    let components: String = ["x", "y", "z"].into_iter().zip(gravity.iter()).map(component).collect();
+    format!("{POSE}{}", text.replace(GRAVITY, &format!("[gravity]\n{components}")))
 }
 
-/// Changes that leave of a step's error what rounding does.
+/// Changes that reduce the error of a step to rounding.
 const FINE: [(&str, &str); 2] = [("solver.method", "dopri5"), ("solver.tolerance", "1e-12")];
 
-/// Checks that both scenes move alike until `time`, s: bodies within 1e-9 m, forces within 1e-9 of the largest.
-fn move_alike(name: &str, [plain, turned]: [Scene; 2], time: f64) {
-    let mut both = [plain, turned].map(|scene| {
+/// Asserts the same motion of both scenes until `time`, s: bodies within 1e-9 m, forces within 1e-8 of the largest.
+fn assert_same_motion(name: &str, [plain, transformed]: [Scene; 2], time: f64) {
+    let mut both = [plain, transformed].map(|scene| {
         let simulation = Simulation::new(&scene.machine);
         simulation.unwrap_or_else(|error| panic!("{name}: {error}"))
     });
     let [a, b] = both.each_mut().map(|simulation| frame_at(simulation, time));
-    let (turn, shift) = (turn(), Vec3::from(SHIFT));
-    let mut moved: f64 = 0.0;
+    let (rotation, shift) = (rotation(), Vec3::from(SHIFT));
+    let mut max_speed: f64 = 0.0;
     for (a, b) in a.bodies.iter().zip(&b.bodies) {
-        let off = (turn * a.position + shift - b.position).norm();
-        assert!(off < 1e-9, "{name}: {off:e}");
-        let off = (turn.to_rotation_matrix().into_inner() * a.rotation - b.rotation).amax();
-        assert!(off < 1e-8, "{name}: {off:e}");
-        moved = moved.max(a.velocity.norm());
+        let error = (rotation * a.position + shift - b.position).norm();
+        assert!(error < 1e-9, "{name}: {error:e}");
+        let error = (rotation.to_rotation_matrix().into_inner() * a.rotation - b.rotation).amax();
+        assert!(error < 1e-8, "{name}: {error:e}");
+        max_speed = max_speed.max(a.velocity.norm());
     }
-    assert!(moved > 1e-3, "{name} stands still");
+    assert!(max_speed > 1e-3, "{name} does not move");
     let largest = a.elements.iter().map(|element| element.force.norm()).fold(1.0, f64::max);
     for (a, b) in a.elements.iter().zip(&b.elements) {
-        let off = (turn * a.force - b.force).norm();
-        assert!(off < 1e-8 * largest, "{name}: {off:e} of {largest}");
+        let error = (rotation * a.force - b.force).norm();
+        assert!(error < 1e-8 * largest, "{name}: {error:e} of {largest}");
     }
     for j in 0..a.joints.len() {
         let [a, b] = both.each_ref().map(|simulation| simulation.peak(j).0);
@@ -55,17 +55,17 @@ fn move_alike(name: &str, [plain, turned]: [Scene; 2], time: f64) {
 }
 
 #[test]
-fn a_built_in_scene_moves_equally_in_any_pose() {
+fn a_built_in_scene_has_the_same_motion_in_any_pose() {
     for (name, time) in
         [("pendulum", 0.01), ("slider-crank", 0.01), ("chain", 0.01), ("four-bar", 5e-3), ("suspension", 2e-3)]
     {
         let text = built_in_text(name).unwrap();
-        move_alike(name, [text.to_owned(), turned(text)].map(|text| parse(&text, &FINE)), time);
+        assert_same_motion(name, [text.to_owned(), transformed(text)].map(|text| parse(&text, &FINE)), time);
     }
 }
 
 #[test]
-fn every_element_and_kind_of_joint_turns_with_the_scene() {
+fn every_element_and_kind_of_joint_is_rotated_with_the_scene() {
     let body = "mass = \"1 kg\"\ninertia = \"0.01 0.02 0.025 kg m^2\"\n";
     let text = format!(
         "{GRAVITY}
@@ -102,12 +102,12 @@ frequency = \"3 Hz\"\nphase = \"20 deg\"
 [[fixed_shape]]\nform = \"box\"\nrole = \"frame\"\ncentre = \"0 0 0 mm\"\nsize = \"10 20 30 mm\"
 "
     );
-    move_alike("elements", [text.clone(), turned(&text)].map(|text| parse(&text, &FINE)), 0.2);
+    assert_same_motion("elements", [text.clone(), transformed(&text)].map(|text| parse(&text, &FINE)), 0.2);
 }
 
 #[test]
-fn a_file_in_a_turned_scene_turns_with_it() {
-    // The file is turned and shifted in the scene, its pattern in the file.
+fn an_included_file_is_rotated_with_its_scene() {
+    // The file is rotated and shifted in the scene, and its pattern in the file.
     let leg = "[[pattern]]\nname = \"rods\"\ncount = 3\nabout = { point = \"100 0 0 mm\", axis = [0, 0, 1] }\n\
         [[pattern.body]]\nname = \"rod\"\nmass = \"0.2 kg * i\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
         [[pattern.joint]]\nname = \"rod\"\nkind = \"revolute\"\nparent = \"base\"\nchild = \"rod\"\naxis = [0, 1, 0]\n\
@@ -120,27 +120,27 @@ fn a_file_in_a_turned_scene_turns_with_it() {
          [[body]]\nname = \"base\"\nmass = \"1 kg\"\ninertia = \"0.1 0.1 0.1 kg m^2\"\n\
          [[joint]]\nname = \"base\"\nkind = \"revolute\"\nchild = \"base\"\naxis = [1, 0, 0]\nstart = {{ velocity = \"1 rad/s\" }}\n"
     );
-    let beside = Texts::from([("leg.toml".to_owned(), leg.into())]);
+    let files = Texts::from([("leg.toml".to_owned(), leg.into())]);
     let changes = FINE.map(|(key, value)| (key.to_owned(), value.to_owned()));
-    let both = [top.clone(), turned(&top)].map(|text| Scene::parse_with(&text, None, &beside, &changes).unwrap());
+    let both = [top.clone(), transformed(&top)].map(|text| Scene::parse_with(&text, None, &files, &changes).unwrap());
     assert_eq!(both[0].machine.bodies[3].name, "left.rod3");
-    move_alike("leg", both, 0.2);
+    assert_same_motion("leg", both, 0.2);
 }
 
 #[test]
-fn a_machine_and_its_closed_form_move_equally_in_any_pose() {
+fn a_machine_and_its_closed_form_have_the_same_motion_in_any_pose() {
     let text = built_in_text("spcmm").unwrap();
     let (along_x, along_z) = ("[gravity]\nx = \"9.81 m/s^2\"\n", GRAVITY);
     assert!(text.contains(along_x));
     let plain = text.replace(along_x, along_z);
-    let both = [plain.clone(), turned(&plain)].map(|text| parse(&text, &FINE));
+    let both = [plain.clone(), transformed(&plain)].map(|text| parse(&text, &FINE));
     let probe = both[0].machine.output.probe.unwrap();
     let mut tips = both.each_ref().map(|scene| {
         let frame = frame_at(&mut Simulation::new(&scene.machine).unwrap(), 0.02);
         let body = &frame.bodies[scene.machine.output.body];
         body.position + body.rotation * probe - frame.probe_error.unwrap()
     });
-    tips[0] = turn() * tips[0] + Vec3::from(SHIFT);
+    tips[0] = rotation() * tips[0] + Vec3::from(SHIFT);
     assert!((tips[0] - tips[1]).norm() < 1e-12, "{tips:?}");
-    move_alike("spcmm", both, 0.02);
+    assert_same_motion("spcmm", both, 0.02);
 }

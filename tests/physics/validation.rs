@@ -1,16 +1,13 @@
-//! Cases whose answers are known from outside the program, and their page.
+//! Validation cases with known reference results, and their page.
 
 use jointplay::cli::validate::page;
 
 /// All cases together take about a second.
 #[test]
-fn every_case_is_within_its_bound_and_the_page_says_so() {
+fn every_case_is_within_its_bound_and_the_page_is_current() {
     let (page, missed) = page().unwrap();
     assert!(missed.is_empty(), "not within their bounds: {missed:#?}");
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation.md");
-    let kept = std::fs::read_to_string(path).unwrap_or_default();
-    assert!(
-        kept == page,
-        "docs/validation.md is not what this makes: jointplay validate --out docs/validation.md --force"
-    );
+    let stored = std::fs::read_to_string(path).unwrap_or_default();
+    assert!(stored == page, "docs/validation.md is out of date: jointplay validate --out docs/validation.md --force");
 }

@@ -1,4 +1,4 @@
-//! Contacts that begin where no sign changes: a ball that starts on its wall, or is there exactly where a search ends a piece.
+//! Contacts that begin without a sign change: a ball that starts on its wall, or is exactly on it where a search interval ends.
 
 use crate::common::{free_ball, parse};
 use jointplay::scene::LiveScene;
@@ -22,10 +22,10 @@ const METHODS: [(&str, &[(&str, &str)]); 5] = [
     ("rk4", &[("solver.method", "rk4"), ("solver.step", "2 us")]),
 ];
 
-/// One that starts on its wall, or within rounding inside it, and moves into it has begun its impact there: the law's restitution,
-/// and the peak of its closed solution (SciPy DOP853, rtol 1e-12).
+/// A ball that starts on its wall, or within rounding inside it, and moves into it begins its impact at t = 0: it has the law's
+/// restitution and the peak of the reference solution (SciPy DOP853, rtol 1e-12).
 #[test]
-fn an_impact_that_starts_on_the_wall_is_an_impact() {
+fn a_ball_that_starts_on_its_wall_begins_an_impact() {
     for place in [-0.3, -0.300_000_000_000_1] {
         let text = free_ball(place, -1.0, 0.0, r#"clearance = "0.3 mm""#);
         for (name, changes) in METHODS {
@@ -39,9 +39,9 @@ fn an_impact_that_starts_on_the_wall_is_an_impact() {
     }
 }
 
-/// Round numbers let pieces of a search end exactly on the wall: every ball comes back with the energy that it had.
+/// With round numbers, search intervals end exactly on the wall: every ball rebounds with its initial energy.
 #[test]
-fn a_ball_comes_back_from_every_round_clearance_at_every_round_speed() {
+fn a_ball_rebounds_for_every_round_clearance_and_speed() {
     for clearance in [0.01, 0.02, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 1.0] {
         for speed in [0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1.0, 2.0, 2.5, 4.0, 5.0, 10.0] {
             let contact = format!("clearance = \"{clearance} mm\"\nnormal_law = \"hertz\"");
@@ -57,7 +57,7 @@ fn a_ball_comes_back_from_every_round_clearance_at_every_round_speed() {
     }
 }
 
-/// Rows of a fixed step that ends exactly on the wall, and a live change that puts the wall where the ball is.
+/// A fixed step that ends exactly on the wall, and a live change of the clearance that moves the wall to the ball.
 #[test]
 fn a_contact_begins_where_a_step_or_a_change_ends_on_the_wall() {
     // 0.25 m/s over 2^-12 s is 2^-14 m, exactly the play.

@@ -1,12 +1,12 @@
-//! Wear maps: what the cells took adds up to what the run did, lies where it did it, and changes nothing.
+//! Wear maps: the cells add up to the totals of the run, lie at the contact points, and do not affect the run.
 
 use crate::common::{Changes, METHODS, SCENES, live, run_until, simulation};
 use jointplay::machine::Mat3;
 use jointplay::scene::LiveScene;
 use jointplay::simulate::{Cell, Frame, Simulation, Wear};
 
-/// A run over `duration` with its map; the last step is cut.
-fn after(name: &str, changes: &Changes, duration: f64) -> LiveScene {
+/// A run over `duration` with its wear map; the last step is cut at its end.
+fn run_with_map(name: &str, changes: &Changes, duration: f64) -> LiveScene {
     let mut simulation = live(name, changes);
     simulation.track_wear();
     run_until(&mut simulation, duration);
@@ -30,7 +30,7 @@ fn sum(wear: &Wear, j: usize) -> Cell {
 }
 
 #[test]
-fn friction_work_and_contacts_are_those_of_ledger_and_counters() {
+fn friction_work_and_contacts_agree_with_ledger_and_counters() {
     let check = |case: &str, simulation: &Simulation| {
         let wear = wear(simulation);
         let joints = simulation.statistics().impacts.len();
@@ -42,25 +42,25 @@ fn friction_work_and_contacts_are_those_of_ledger_and_counters() {
         let sizes = (0..joints).flat_map(|j| wear.cells(j));
         let size: f64 = sizes.map(|cell| cell.friction_work.abs()).sum();
         println!("{case}: {work:e} of {loss:e}, {:e}", work - loss);
-        // The same sums in another order.
+        // The two sums differ only in their order.
         assert!(size > 1e-7, "{case}: {size:e}");
         assert!((work - loss).abs() < 1e-11 * size, "{case}: {work:e}, {loss:e}");
     };
     for name in SCENES {
-        check(name, &after(name, &[], 0.1));
+        check(name, &run_with_map(name, &[], 0.1));
     }
     for method in METHODS {
         let changes = [("solver.method", method), ("contact.friction_velocity", "surface")];
-        check(method, &after("spcmm", &changes, 0.03));
+        check(method, &run_with_map("spcmm", &changes, 0.03));
     }
     let lagrange = ("formulation", "lagrange");
     let ideal = ("joint.S2.clearance", "0");
-    let run = after("spcmm", &[lagrange, ideal], 0.03);
+    let run = run_with_map("spcmm", &[lagrange, ideal], 0.03);
     let cells = wear(&run).cells(1);
-    assert!(cells.is_empty(), "an ideal joint has no wall to strike");
+    assert!(cells.is_empty(), "an ideal joint has no wear cells");
     check("partly ideal", &run);
     // Parameters that change in contact.
-    let mut run = after("spcmm", &[], 0.2);
+    let mut run = run_with_map("spcmm", &[], 0.2);
     for (key, value) in
         [("contact.friction", "0.3"), ("contact.youngs_modulus", "150 GPa"), ("contact.clearance", "0.25 mm")]
     {
@@ -81,12 +81,19 @@ fn impulses_are_time_integrals_of_the_normal_force() {
         while simulation.time() < 0.05 {
             simulation.step().unwrap();
             let (from, to) = (simulation.step_start(), simulation.time());
-            // Gauss's five points.
+            // Gauss quadrature with five points.
             let root = (10.0_f64 / 7.0).sqrt();
-            let (near, far) = ((5.0 - 2.0 * root).sqrt() / 3.0, (5.0 + 2.0 * root).sqrt() / 3.0);
-            let (more, less) = ((322.0 + 13.0 * 70.0_f64.sqrt()) / 1800.0, (322.0 - 13.0 * 70.0_f64.sqrt()) / 1800.0);
+            let (inner, outer) = ((5.0 - 2.0 * root).sqrt() / 3.0, (5.0 + 2.0 * root).sqrt() / 3.0);
+            let (inner_weight, outer_weight) =
+                ((322.0 + 13.0 * 70.0_f64.sqrt()) / 1800.0, (322.0 - 13.0 * 70.0_f64.sqrt()) / 1800.0);
             let middle = 64.0 / 225.0;
-            for (at, weight) in [(-far, less), (-near, more), (0.0, middle), (near, more), (far, less)] {
+            for (at, weight) in [
+                (-outer, outer_weight),
+                (-inner, inner_weight),
+                (0.0, middle),
+                (inner, inner_weight),
+                (outer, outer_weight),
+            ] {
                 simulation.sample(from + 0.5 * (1.0 + at) * (to - from), &mut frame);
                 for (expected, joint) in expected.iter_mut().zip(&frame.joints) {
                     *expected += weight * (to - from) * joint.normal_force.norm();
@@ -95,21 +102,21 @@ fn impulses_are_time_integrals_of_the_normal_force() {
         }
         simulation.commit_wear();
         for (j, expected) in expected.into_iter().enumerate() {
-            let found = sum(wear(&simulation), j).impulse;
-            println!("{method}, joint {j}: {found} N s, {:e}", found / expected - 1.0);
+            let impulse = sum(wear(&simulation), j).impulse;
+            println!("{method}, joint {j}: {impulse} N s, {:e}", impulse / expected - 1.0);
             // Simpson's rule, or Radau's, over steps that resolve an impact.
-            assert!((found / expected - 1.0).abs() < 1e-4, "{method}: {found} {expected}");
+            assert!((impulse / expected - 1.0).abs() < 1e-4, "{method}: {impulse} {expected}");
         }
     }
 }
 
 #[test]
 fn a_wear_map_needs_no_ledger_and_ends_at_a_reset() {
-    let alone = after("pendulum", &[("solver.energy_ledger", "off")], 0.05);
-    let mut paid = after("pendulum", &[], 0.05);
-    assert!(wear(&alone).cells(0) == wear(&paid).cells(0));
-    paid.reset().unwrap();
-    assert!(paid.wear().is_none());
+    let without_ledger = run_with_map("pendulum", &[("solver.energy_ledger", "off")], 0.05);
+    let mut with_ledger = run_with_map("pendulum", &[], 0.05);
+    assert!(wear(&without_ledger).cells(0) == wear(&with_ledger).cells(0));
+    with_ledger.reset().unwrap();
+    assert!(with_ledger.wear().is_none());
 }
 
 #[test]
@@ -127,12 +134,12 @@ fn a_cell_lies_where_the_ball_touches() {
             let h = simulation.time() - simulation.step_start();
             let machine = simulation.machine().clone();
             for (j, joint) in machine.ball_joints.iter().enumerate() {
-                let turn = match joint.socket.body {
+                let rotation = match joint.socket.body {
                     Some(b) => frame.bodies[b].rotation,
                     None => Mat3::identity(),
                 };
                 let report = &frame.joints[j];
-                let direction = turn.transpose() * report.eccentricity.normalize();
+                let direction = rotation.transpose() * report.eccentricity.normalize();
                 let cell = empty.grid().cell(&(empty.grid_from_body(j) * direction));
                 expected[j][cell] += h * report.normal_force.norm();
             }
@@ -143,12 +150,12 @@ fn a_cell_lies_where_the_ball_touches() {
             if wear.cells(j).is_empty() {
                 continue;
             }
-            let found = |cell: usize| wear.cells(j)[cell].impulse;
-            let whole: f64 = expected.iter().sum();
-            let apart: f64 = (0..expected.len()).map(|i| (found(i) - expected[i]).abs()).sum();
-            println!("{name}, joint {j}: {apart:e} of {whole:e}");
-            // A step on the edge of two cells gives all of its rectangle to one here.
-            assert!(whole > 0.0 && apart < 0.05 * whole, "{name}, joint {j}: {apart} of {whole}");
+            let impulse = |cell: usize| wear.cells(j)[cell].impulse;
+            let total: f64 = expected.iter().sum();
+            let difference: f64 = (0..expected.len()).map(|i| (impulse(i) - expected[i]).abs()).sum();
+            println!("{name}, joint {j}: {difference:e} of {total:e}");
+            // The reference assigns a whole step at the edge of two cells to one of them.
+            assert!(total > 0.0 && difference < 0.05 * total, "{name}, joint {j}: {difference} of {total}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The icon of the page as pixels, for what shows no SVG.
+//! The PNG icon of the page, for devices that show no SVG.
 
 use std::fs;
 
@@ -7,10 +7,10 @@ use resvg::usvg::{Options, Tree};
 
 use crate::documents::root;
 
-/// Background of the icon where none shows through, as on a phone.
-const GROUND: [u8; 3] = [0x14, 0x17, 0x1c];
+/// Background of the icon on devices without transparent icons, such as phones.
+const BACKGROUND: [u8; 3] = [0x14, 0x17, 0x1c];
 
-/// The picture as a PNG file of as many colours as it has: half as large, of a page that has to be loaded.
+/// The picture as a PNG file with a palette, half as large as without one: the page has to load it.
 fn with_palette(picture: &Pixmap) -> Vec<u8> {
     let mut colours: Vec<[u8; 3]> = Vec::new();
     let mut indices = Vec::new();
@@ -36,13 +36,13 @@ fn with_palette(picture: &Pixmap) -> Vec<u8> {
 
 #[test]
 fn the_icon_is_drawn_from_the_svg() {
-    let svg = fs::read_to_string(root().join("web/icon.svg")).expect("there");
+    let svg = fs::read_to_string(root().join("web/icon.svg")).expect("the file exists");
     let tree = Tree::from_str(&svg, &Options::default()).expect("an SVG");
     let edge = 192_u32;
     let mut picture = Pixmap::new(edge, edge).expect("not empty");
-    let [r, g, b] = GROUND;
+    let [r, g, b] = BACKGROUND;
     picture.fill(resvg::tiny_skia::Color::from_rgba8(r, g, b, 255));
-    // Phones round the corners off.
+    // Phones crop the corners.
     let margin = 0.14 * edge as f32;
     let scale = (edge as f32 - 2.0 * margin) / tree.size().width();
     resvg::render(&tree, Transform::from_translate(margin, margin).pre_scale(scale, scale), &mut picture.as_mut());
@@ -51,5 +51,5 @@ fn the_icon_is_drawn_from_the_svg() {
     if std::env::var_os("UPDATE_PAGES").is_some() {
         fs::write(&path, &drawn).expect("writable");
     }
-    assert!(fs::read(&path).expect("there") == drawn, "{}: UPDATE_PAGES=1 draws it anew", path.display());
+    assert!(fs::read(&path).expect("the file exists") == drawn, "{}: UPDATE_PAGES=1 redraws it", path.display());
 }

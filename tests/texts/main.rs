@@ -1,4 +1,4 @@
-//! What is read: scene files, documents, the sources themselves.
+//! Tests of texts: scene files, documents and the sources themselves.
 
 mod documents;
 mod drives;

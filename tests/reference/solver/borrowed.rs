@@ -9,10 +9,10 @@ use jointplay::scene::Scene;
 
 use crate::integrate::Equations;
 
-/// The program's equations under another's solver.
+/// The program's equations for the independent solver.
 pub struct Borrowed {
     mechanism: RefCell<Mechanism>,
-    memory: RefCell<Vec<ContactState>>,
+    contact_states: RefCell<Vec<ContactState>>,
     speed_floor: f64,
 }
 
@@ -20,7 +20,7 @@ impl Borrowed {
     pub fn new(scene: &Scene) -> Self {
         Self {
             mechanism: RefCell::new(Mechanism::new(&scene.machine).unwrap()),
-            memory: RefCell::new(vec![ContactState::default(); scene.machine.ball_joints.len()]),
+            contact_states: RefCell::new(vec![ContactState::default(); scene.machine.ball_joints.len()]),
             speed_floor: scene.machine.contact.impact_speed_floor,
         }
     }
@@ -32,9 +32,9 @@ impl Equations for Borrowed {
     }
 
     fn derivative(&self, t: f64, y: &[f64], dy: &mut [f64]) {
-        let memory = self.memory.borrow();
+        let contact_states = self.contact_states.borrow();
         let mut mechanism = self.mechanism.borrow_mut();
-        let mut evaluator = mechanism.evaluator(ActiveSet::Located(&memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::Located(&contact_states));
         evaluator.derivative(t, y, dy);
     }
 
@@ -56,9 +56,9 @@ impl Equations for Borrowed {
         self.speed_floor
     }
 
-    fn remember(&self, contacts: &[Option<f64>]) {
-        for (memory, speed) in self.memory.borrow_mut().iter_mut().zip(contacts) {
-            *memory = ContactState {
+    fn set_contacts(&self, contacts: &[Option<f64>]) {
+        for (state, speed) in self.contact_states.borrow_mut().iter_mut().zip(contacts) {
+            *state = ContactState {
                 active: speed.is_some(),
                 approach_speed: speed.unwrap_or(0.0),
                 floored: false,

@@ -1,12 +1,12 @@
-//! diffsol's Tsitouras 5(4) pair and its BDF integrate; its root finding says when a contact begins or ends, and the contact
-//! memory is kept here.
+//! Integration with the Tsitouras 5(4) pair and the BDF methods of diffsol. Its root finding locates the start and the end of
+//! each contact; the contact states are managed here.
 
 use diffsol::{NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason, Vector};
 
 type M = NalgebraMat<f64>;
 type Lu = NalgebraLU<f64>;
 
-/// A scene as an independent solver needs it: derivative and penetrations for contact states that it is told.
+/// Interface of a scene for the independent solver: derivative and penetrations for given contact states.
 pub trait Equations {
     fn start(&self) -> Vec<f64>;
     fn derivative(&self, t: f64, y: &[f64], dy: &mut [f64]);
@@ -15,8 +15,8 @@ pub trait Equations {
     /// Normal force for each ball joint.
     fn forces(&self, t: f64, y: &[f64]) -> Vec<f64>;
     fn speed_floor(&self) -> f64;
-    /// Approach speeds of the contacts under way.
-    fn remember(&self, contacts: &[Option<f64>]);
+    /// Sets the approach speeds of the active contacts.
+    fn set_contacts(&self, contacts: &[Option<f64>]);
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -25,14 +25,14 @@ pub enum Solver {
     Bdf,
 }
 
-/// What an independent run gives.
+/// Results of an independent run.
 pub struct Run {
     pub y: Vec<f64>,
-    /// Joint, time, approach speed, largest normal force seen, in order of beginning.
+    /// Joint, time, approach speed, largest sampled normal force, in the order of their start.
     pub contacts: Vec<(usize, f64, f64, f64)>,
 }
 
-/// A root function's own zero is not found again: a contact that just began ends this much further out, m.
+/// A contact that just began ends this much further out, m, so that the root finding does not find the same root again.
 const HYSTERESIS: f64 = 1e-14;
 
 /// Integrates to `end` with relative and absolute tolerance `tolerance`.
@@ -41,9 +41,9 @@ pub fn integrate(equations: &dyn Equations, solver: Solver, tolerance: f64, end:
     let mut t = 0.0;
     let mut active: Vec<Option<f64>> = vec![None; equations.gaps(t, &y).len()];
     let mut run = Run { y: Vec::new(), contacts: Vec::new() };
-    equations.remember(&active);
+    equations.set_contacts(&active);
     while t < end {
-        let (t_next, y_next, root) = segment(equations, solver, tolerance, t, end, &y, &active, &mut run);
+        let (t_next, y_next, root) = integrate_segment(equations, solver, tolerance, t, end, &y, &active, &mut run);
         (t, y) = (t_next, y_next);
         if let Some(j) = root {
             active[j] = match active[j] {
@@ -54,15 +54,15 @@ pub fn integrate(equations: &dyn Equations, solver: Solver, tolerance: f64, end:
                     Some(speed)
                 }
             };
-            equations.remember(&active);
+            equations.set_contacts(&active);
         }
     }
     run.y = y;
     run
 }
 
-/// To the next beginning or end of a contact, or to `end`: time, state, and the joint.
-fn segment(
+/// Integrates to the next start or end of a contact, or to `end`: time, state, and the joint.
+fn integrate_segment(
     equations: &dyn Equations,
     solver: Solver,
     tolerance: f64,
@@ -73,14 +73,14 @@ fn segment(
     run: &mut Run,
 ) -> (f64, Vec<f64>, Option<usize>) {
     let n = y.len();
-    // The implicit solver wants the product of the Jacobian and a vector: by central differences.
+    // The implicit solver needs the product of the Jacobian and a vector: by central differences.
     let product = |x: &[f64], _: &[f64], t: f64, v: &[f64], out: &mut [f64]| {
         let size = v.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
         let h = 1e-8 / size.max(1e-300);
         let at = |s: f64| {
-            let moved: Vec<f64> = x.iter().zip(v).map(|(x, v)| x + s * h * v).collect();
+            let displaced: Vec<f64> = x.iter().zip(v).map(|(x, v)| x + s * h * v).collect();
             let mut dy = vec![0.0; n];
-            equations.derivative(t, &moved, &mut dy);
+            equations.derivative(t, &displaced, &mut dy);
             dy
         };
         let (plus, minus) = (at(1.0), at(-1.0));
@@ -105,12 +105,12 @@ fn segment(
         .build()
         .unwrap();
     match solver {
-        Solver::Tsitouras => follow(problem.tsit45().unwrap(), equations, end, run),
-        Solver::Bdf => follow(problem.bdf::<Lu>().unwrap(), equations, end, run),
+        Solver::Tsitouras => step_to_event(problem.tsit45().unwrap(), equations, end, run),
+        Solver::Bdf => step_to_event(problem.bdf::<Lu>().unwrap(), equations, end, run),
     }
 }
 
-fn follow<'a, Eqn, S>(
+fn step_to_event<'a, Eqn, S>(
     mut solver: S,
     equations: &dyn Equations,
     end: f64,
@@ -128,7 +128,7 @@ where
             OdeSolverStopReason::RootFound(t, j) => (t, Some(j)),
             _ => (solver.state_vector().t, None),
         };
-        // Forces inside the step, for the peaks.
+        // Samples forces within the step for the peaks.
         for k in 1..=16 {
             let inside = before + (t - before) * f64::from(k) / 16.0;
             let y = solver.interpolate(inside).unwrap().clone_as_vec();

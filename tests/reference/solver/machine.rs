@@ -252,7 +252,7 @@ impl Equations for Machine {
         1e-3
     }
 
-    fn remember(&self, contacts: &[Option<f64>]) {
+    fn set_contacts(&self, contacts: &[Option<f64>]) {
         self.approach.borrow_mut().copy_from_slice(contacts);
     }
 }

@@ -1,5 +1,5 @@
-//! Writes tests/reference/solver.toml: runs of an independent solver crate, on the program's equations and on equations written
-//! down here a second time. Every run has its changes, its contacts in order of beginning, and its state at the end.
+//! Writes tests/reference/solver.toml: runs of an independent solver crate, on the program's equations and on equations derived
+//! independently here. Each run lists its changes, its contacts in the order of their start, and its final state.
 
 mod borrowed;
 mod integrate;
@@ -22,11 +22,11 @@ fn scene(name: &str, changes: &Changes) -> Scene {
     Scene::load(name, &changes).unwrap()
 }
 
-/// The file as far as it is written.
+/// The part of the file written so far.
 struct Rows(String);
 
 impl Rows {
-    /// Adds a run of `equations`, which are called by a word.
+    /// Adds a run of the named `equations`.
     fn add(
         &mut self,
         (word, equations): (&str, &dyn Equations),
@@ -69,7 +69,7 @@ fn main() {
     rows.borrowed("spcmm", &[], (Solver::Tsitouras, 1e-12), 0.013);
     // The first five impacts are over, the sixth has not begun.
     rows.borrowed("spcmm", &[], (Solver::Tsitouras, 1e-11), 0.0118);
-    // Nothing is projected here, so that the closing of loops is left to the equations.
+    // These solvers do not project onto the constraints, so that the equations alone keep the loops closed.
     let implicit = (Solver::Bdf, 1e-10);
     rows.borrowed("spcmm", &[("joint.S1.clearance", "0")], implicit, 0.012);
     for (name, joint, end) in [
@@ -80,7 +80,7 @@ fn main() {
         ("press", "wrist", 0.030),
     ] {
         let key = format!("joint.{joint}.clearance");
-        // The solver remembers the speed at which a contact began, not the largest one since.
+        // The solver uses the approach speed at the start of a contact, not the largest since.
         let start = ("contact.approach_speed", "start");
         let changes = [("contact.clearance", "0"), (&*key, "0.1 mm"), start];
         rows.borrowed(name, &changes, implicit, end);

@@ -1,11 +1,11 @@
-//! The pendulum written down again.
+//! Independently derived equations of the pendulum.
 
 use std::cell::RefCell;
 
 use crate::integrate::Equations;
 
-/// The pendulum written down again, from the built-in scene's description alone: it starts at rest in the XZ plane and stays
-/// there. State: x, z of the centroid, angle about +Y, and their rates; the ball is 0.1 m up the rod from the centroid.
+/// The pendulum derived from the built-in scene's description alone: it starts at rest in the XZ plane and stays in it.
+/// State: x, z of the centroid, angle about +Y, and their rates; the ball is 0.1 m up the rod from the centroid.
 #[derive(Default)]
 pub struct Pendulum {
     approach: RefCell<Option<f64>>,
@@ -28,7 +28,7 @@ impl Pendulum {
         (e, rate, n, arm)
     }
 
-    fn normal(&self, y: &[f64]) -> f64 {
+    fn normal_force(&self, y: &[f64]) -> f64 {
         let Some(approach) = *self.approach.borrow() else {
             return 0.0;
         };
@@ -41,8 +41,8 @@ impl Pendulum {
         let s = (1.0 - poisson * poisson) / young;
         let socket = Self::RADIUS + Self::CLEARANCE;
         let k = 4.0 / (3.0 * (s + s)) * (socket * Self::RADIUS / Self::CLEARANCE).sqrt();
-        let closing = n[0] * rate[0] + n[1] * rate[1];
-        let damping = 1.0 + 3.0 * (1.0 - restitution * restitution) / 4.0 * closing / approach;
+        let rate_along_normal = n[0] * rate[0] + n[1] * rate[1];
+        let damping = 1.0 + 3.0 * (1.0 - restitution * restitution) / 4.0 * rate_along_normal / approach;
         (k * depth.powf(1.5) * damping).max(0.0)
     }
 }
@@ -55,17 +55,17 @@ impl Equations for Pendulum {
 
     fn derivative(&self, _: f64, y: &[f64], dy: &mut [f64]) {
         let (_, rate, n, arm) = Self::ball(y);
-        let normal = self.normal(y);
-        // The touching point of the ball against the socket, which stands still.
-        let (turn, r) = (y[5], Self::RADIUS);
-        let slip = [rate[0] + turn * r * n[1], rate[1] - turn * r * n[0]];
+        let normal_force = self.normal_force(y);
+        // Velocity of the ball's contact point relative to the fixed socket.
+        let (angular_velocity, r) = (y[5], Self::RADIUS);
+        let slip = [rate[0] + angular_velocity * r * n[1], rate[1] - angular_velocity * r * n[0]];
         let along = slip[0] * n[0] + slip[1] * n[1];
         let slip = [slip[0] - along * n[0], slip[1] - along * n[1]];
         let speed = slip[0].hypot(slip[1]);
         let (low, high) = (1e-6, 1e-4);
         let correction = ((speed - low) / (high - low)).clamp(0.0, 1.0);
-        let friction = if speed > 0.0 { -0.15 * correction * normal / speed } else { 0.0 };
-        let force = [-normal * n[0] + friction * slip[0], -normal * n[1] + friction * slip[1]];
+        let friction = if speed > 0.0 { -0.15 * correction * normal_force / speed } else { 0.0 };
+        let force = [-normal_force * n[0] + friction * slip[0], -normal_force * n[1] + friction * slip[1]];
         let at = [arm[0] + r * n[0], arm[1] + r * n[1]];
         dy[..3].copy_from_slice(&y[3..]);
         dy[3] = force[0] / Self::MASS;
@@ -79,14 +79,14 @@ impl Equations for Pendulum {
     }
 
     fn forces(&self, _: f64, y: &[f64]) -> Vec<f64> {
-        vec![self.normal(y)]
+        vec![self.normal_force(y)]
     }
 
     fn speed_floor(&self) -> f64 {
         1e-3
     }
 
-    fn remember(&self, contacts: &[Option<f64>]) {
+    fn set_contacts(&self, contacts: &[Option<f64>]) {
         *self.approach.borrow_mut() = contacts[0];
     }
 }
