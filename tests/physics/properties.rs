@@ -186,11 +186,11 @@ proptest! {
         prop_assert_eq!(plain.state_hash(), sampled.state_hash());
         let statistics = plain.statistics();
         let unresolved = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { .. } | Doubt::Machine(MachineDoubt::Step { .. }));
-// Within a step longer than an impact the force depends on the interpolation; such runs raise a doubt.
+        // Within a step longer than an impact the force depends on the interpolation; such runs raise a doubt.
         let resolved = !plain.doubts().iter().any(unresolved);
         for (j, joint) in scene.machine.ball_joints.iter().enumerate() {
             let (row, name) = (rows[j], &joint.name);
-// Peaks as printed by a run, which has rows, and by a sweep, which has none.
+            // Peaks as printed by a run, which has rows, and by a sweep, which has none.
             let (printed, from_steps) = (sampled.peak(j).0, statistics.peak_normal[j]);
             prop_assert!(printed >= row, "{}: {} below the rows' {}", name, printed, row);
             let agrees = from_steps >= row * (1.0 - BELOW) - 1.0 && from_steps <= row * (1.0 + ABOVE) + 1.0;
@@ -224,7 +224,7 @@ proptest! {
         };
         for (key, text) in &changes {
             let last = changes.iter().rfind(|(other, _)| other == key);
-let may_be_overridden = key.starts_with("contact.") || key.starts_with("solver.");
+            let may_be_overridden = key.starts_with("contact.") || key.starts_with("solver.");
             if !may_be_overridden && last.is_some_and(|(_, other)| other == text) {
                 let row = scene.parameter(key).map_err(|error| fail(error.to_string()))?;
                 let value = scene.get(key).map_err(|error| fail(error.to_string()))?;
@@ -264,7 +264,7 @@ let may_be_overridden = key.starts_with("contact.") || key.starts_with("solver."
     #[test]
     fn any_live_changes_are_accepted_or_refused_and_stay_finite((name, changes) in changed_scenes(&SCENES)) {
         let mut simulation = LiveScene::new(built_in(name)).unwrap();
-// During the first impacts.
+        // During the first impacts.
         simulation.advance_to(8e-3).map_err(|stopped| fail(stopped.to_string()))?;
         let mut frame = Frame::default();
         for (key, value) in &changes {
@@ -284,7 +284,7 @@ let may_be_overridden = key.starts_with("contact.") || key.starts_with("solver."
                 }
             }
         }
-// Pending changes take effect at the reset, or the reset is refused and the run continues.
+        // Pending changes take effect at the reset, or the reset is refused and the run continues.
         let time = simulation.time();
         let scene = simulation.pending().clone();
         match simulation.reset() {
@@ -307,7 +307,7 @@ let may_be_overridden = key.starts_with("contact.") || key.starts_with("solver."
         match scene.set_value(row.key, &value) {
             Ok(_) => {
                 prop_assert_eq!(scene.get(row.key).unwrap(), value);
-// The recorded changes reproduce the scene.
+                // The recorded changes reproduce the scene.
                 let again = Scene::load(&scene.name, &scene.changes).unwrap();
                 prop_assert_eq!(again.get(row.key).unwrap(), scene.get(row.key).unwrap());
             }

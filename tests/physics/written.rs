@@ -291,7 +291,7 @@ proptest! {
 
     #[test]
     fn an_included_part_equals_the_same_text_in_the_scene(element in elements(), cut in 0..5_usize) {
-// The included part comes last, so that lists keep their order.
+        // The included part comes last, so that lists keep their order.
         let parts: Vec<&str> = element.split_inclusive("\n\n").collect();
         let (here, there) = parts.split_at(cut.min(parts.len()));
         let (here, there) = (here.concat(), there.concat());

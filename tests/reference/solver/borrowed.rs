@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use jointplay::contact::ContactState;
 use jointplay::integrate::System;
-use jointplay::mechanism::{Mechanism, ActiveSet};
+use jointplay::mechanism::{ActiveSet, Mechanism};
 use jointplay::scene::Scene;
 
 use crate::integrate::Equations;

@@ -13,7 +13,7 @@ use crate::integrate::Equations;
 pub struct Machine {
     clearance: f64,
     friction: f64,
-/// Whether friction uses the velocities of (13) as printed, not (15)-(16).
+    /// Whether friction uses the velocities of (13) as printed, not (15)-(16).
     printed: bool,
     start: Vec<f64>,
     approach: RefCell<Vec<Option<f64>>>,
@@ -49,12 +49,12 @@ impl Machine {
     ];
     const RADIUS: f64 = 0.010;
 
-/// Starts in the program's initial state of `scene`.
+    /// Starts in the program's initial state of `scene`.
     pub fn new(clearance: f64, friction: f64, printed: bool, scene: &Scene) -> Self {
         let mut frame = Frame::default();
         Simulation::new(&scene.machine).unwrap().sample(0.0, &mut frame);
         let mut start = Vec::new();
-// Bodies are in the order sliders, platform, rods.
+        // Bodies are in the order sliders, platform, rods.
         for body in [3, 4, 5, 6].map(|b| frame.bodies[b]) {
             let turn = nalgebra::Rotation3::from_matrix_unchecked(body.rotation);
             let q = nalgebra::UnitQuaternion::from_rotation_matrix(&turn);
@@ -101,7 +101,7 @@ impl Machine {
         [Vec3::new(plane, 0.0, f1), Vec3::new(plane, 0.0, -f2), Vec3::new(plane, f3, 0.0)]
     }
 
-/// Velocities of the socket centres, by central differences of order 8.
+    /// Velocities of the socket centres, by central differences of order 8.
     fn socket_rates(t: f64) -> [Vec3; 3] {
         let h = 1e-3;
         let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
