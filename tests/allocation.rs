@@ -70,8 +70,8 @@ fn laws_of_drives_allocate_nothing() {
         let scene = Scene::parse(text, None, &changes).unwrap();
         let mut simulation = Simulation::new(&scene.machine).unwrap();
         simulation.step().unwrap();
-        let made = allocations(|| simulation.advance_to(0.05).unwrap());
-        assert_eq!(made, 0, "{form}");
+        let count = allocations(|| simulation.advance_to(0.05).unwrap());
+        assert_eq!(count, 0, "{form}");
     }
 }
 
@@ -85,13 +85,13 @@ fn curves_tyres_and_samples_of_reactions_allocate_nothing() {
             let mut frame = Frame { reactions: Some(Vec::new()), ..Frame::default() };
             simulation.step().unwrap();
             simulation.sample(simulation.time(), &mut frame);
-            let found = allocations(|| {
+            let count = allocations(|| {
                 while simulation.time() < 0.05 {
                     simulation.step().unwrap();
                     simulation.sample(simulation.time(), &mut frame);
                 }
             });
-            assert_eq!(found, 0, "{form}");
+            assert_eq!(count, 0, "{form}");
             assert_eq!(frame.reactions.map(|all| all.len()), Some(1));
         }
     }
@@ -107,13 +107,13 @@ fn joints_with_two_degrees_of_freedom_and_closing_joints_allocate_nothing() {
                 let mut frame = Frame::default();
                 simulation.step().unwrap();
                 simulation.sample(simulation.time(), &mut frame);
-                let made = allocations(|| {
+                let count = allocations(|| {
                     while simulation.time() < 4e-3 {
                         simulation.step().unwrap();
                         simulation.sample(simulation.time(), &mut frame);
                     }
                 });
-                assert_eq!(made, 0, "{method} {form}");
+                assert_eq!(count, 0, "{method} {form}");
                 assert!(!frame.coordinates.is_empty());
             }
         }
@@ -137,7 +137,7 @@ fn steps_samples_and_peaks_allocate_nothing() {
                     simulation.take_peaks(&mut peaks);
                     simulation.track_wear();
                     let end = if form == "tree" { 0.02 } else { 0.0125 };
-                    let found = allocations(|| {
+                    let count = allocations(|| {
                         while simulation.time() < end {
                             simulation.step().unwrap();
                             let (from, to) = (simulation.step_start(), simulation.time());
@@ -149,7 +149,7 @@ fn steps_samples_and_peaks_allocate_nothing() {
                         simulation.step_until(end + 1e-6).unwrap();
                     });
                     let case = format!("{name}, {method}, {form}, clearance {clearance}");
-                    assert_eq!(found, 0, "{case}");
+                    assert_eq!(count, 0, "{case}");
                     let impacts: u64 = simulation.statistics().impacts.iter().sum();
                     assert_eq!(impacts == 0, clearance == "0", "{case}: {impacts}");
                 }
@@ -163,8 +163,8 @@ fn steps_of_the_machines_allocate_nothing() {
     for name in MACHINES {
         let mut simulation = simulation(name, &[]);
         simulation.step().unwrap();
-        let found = allocations(|| simulation.advance_to(9e-3).unwrap());
-        assert_eq!(found, 0, "{name}");
+        let count = allocations(|| simulation.advance_to(9e-3).unwrap());
+        assert_eq!(count, 0, "{name}");
         assert!(simulation.statistics().impacts.iter().any(|&n| n > 0));
     }
 }
@@ -176,8 +176,8 @@ fn a_moving_clearance_allocates_nothing() {
         simulation.advance_to(0.03).unwrap();
         simulation.set("contact.clearance", "0.25 mm").unwrap();
         simulation.set("contact.friction", "0.2").unwrap();
-        let found = allocations(|| simulation.advance_to(0.06).unwrap());
-        assert_eq!(found, 0, "{method}");
+        let count = allocations(|| simulation.advance_to(0.06).unwrap());
+        assert_eq!(count, 0, "{method}");
     }
 }
 

@@ -182,9 +182,9 @@ fn the_three_formats_hold_the_same_values_and_their_provenance() {
         let changed = changed.iter().map(|(key, value)| format!("--set {key}={}", value.as_str().unwrap()));
         let changed: Vec<String> = changed.collect();
         let line = format!("run again.toml {} --duration {}s --summary json", changed.join(" "), meta["duration_s"]);
-        let again = jointplay(folder.path(), &line).expect(0).json();
-        assert_eq!(again["state_hash"], meta["state_hash"]);
-        assert!(again["scene_text"].is_null(), "it belongs to the rows, not to a summary");
+        let repeated = jointplay(folder.path(), &line).expect(0).json();
+        assert_eq!(repeated["state_hash"], meta["state_hash"]);
+        assert!(repeated["scene_text"].is_null(), "a summary contains the text of the scene");
     }
     for (i, name) in csv.header.iter().enumerate() {
         let columns: ndarray::Array1<f64> = npz.by_name(name).unwrap();
@@ -795,9 +795,9 @@ mod frames {
         };
         jointplay(work.path(), &render("0.1")).expect(0);
         let old = film(work.path());
-        let started = std::time::Instant::now();
+        let start = std::time::Instant::now();
         jointplay(work.path(), &render("0.2")).expect(0);
-        let length = started.elapsed();
+        let length = start.elapsed();
         let new = film(work.path());
         assert!(old != new);
         crate::common::at_random_instants(length, 3, |instant| {

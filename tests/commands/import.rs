@@ -284,8 +284,8 @@ fn an_orientation_overrides_every_notation_in_its_default_class() {
         ("<geom axisangle=\"1 0 0 50\" quat=\"0.9 0.1 0.2 0.3\"/>", "euler=\"20 30 40\""),
         (inner, "class=\"turned\""),
     ] {
-        let found = inertia(defaults, own);
-        assert!((found - expected).amax() < 1e-14 * expected.amax(), "{defaults} {own}: {found}");
+        let actual = inertia(defaults, own);
+        assert!((actual - expected).amax() < 1e-14 * expected.amax(), "{defaults} {own}: {actual}");
     }
     assert!((inertia(inner, "") - expected).amax() > 0.1 * expected.amax());
 }

@@ -49,8 +49,8 @@ fn three_hinges_of_a_body_form_a_chain_that_moves_like_a_ball_joint() {
             let (a, b) = (&one.bodies[index(&chain, name)], &other.bodies[index(&ball, name)]);
             assert!((a.position - b.position).norm() < bound, "{name} at {time} s");
             assert!((a.rotation - b.rotation).amax() < 10.0 * bound, "{name} at {time} s");
-            let off = (a.angular_acceleration - b.angular_acceleration).norm() / b.angular_acceleration.norm();
-            assert!(off < 1e3 * bound, "{name} at {time} s: {off}");
+            let error = (a.angular_acceleration - b.angular_acceleration).norm() / b.angular_acceleration.norm();
+            assert!(error < 1e3 * bound, "{name} at {time} s: {error}");
         }
     }
     assert!(initial_frame(&chain).bodies[3].acceleration.norm() > 0.1);

@@ -81,13 +81,13 @@ fn every_impact_has_its_row() {
     assert!(file["meta"]["wall_s"].is_null(), "files of one run are the same");
     let joint = column(&file, "joint");
     let (approach, separation) = (column(&file, "approach_m_s"), column(&file, "separation_m_s"));
-    let (achieved, asked) = (column(&file, "restitution_given"), column(&file, "restitution_asked"));
+    let (achieved, nominal) = (column(&file, "restitution_given"), column(&file, "restitution_asked"));
     let (start, end) = (column(&file, "start_s"), column(&file, "end_s"));
     let disturbed = column(&file, "disturbed");
     assert!(joint.len() > 20, "{}", joint.len());
     for k in 0..joint.len() {
         assert!((achieved[k] - separation[k] / approach[k]).abs() < 1e-15);
-        assert!(end[k] > start[k] && asked[k] == 0.9);
+        assert!(end[k] > start[k] && nominal[k] == 0.9);
         assert!(k == 0 || end[k] >= end[k - 1]);
     }
     for name in ["restitution_law", "floored", "steps", "deepest_m", "peak_N"] {

@@ -175,9 +175,9 @@ fn full_a_quick_report_is_complete_and_its_page_agrees_with_its_data() {
     }
 
     // A report is not overwritten without --force, and --force does not replace other folders.
-    let again = jointplay(folder.path(), "reproduce --out report --quick --quiet");
-    assert_eq!(again.code, Some(1), "{}", again.stderr);
-    assert!(again.stderr.contains("--force"), "{}", again.stderr);
+    let refused = jointplay(folder.path(), "reproduce --out report --quick --quiet");
+    assert_eq!(refused.code, Some(1), "{}", refused.stderr);
+    assert!(refused.stderr.contains("--force"), "{}", refused.stderr);
     assert_eq!(all, files(&folder.path().join("report")));
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("other")).unwrap();

@@ -51,8 +51,8 @@ fn joints_in_a_straight_chain_share_the_variance_equally() {
     write_hung_chain(folder.path());
     let run = jointplay(folder.path(), &format!("{HUNG} --output link3.pose.z:end --rows 128 --out out")).expect(0);
     assert!(run.stdout.contains("joint.J2.clearance"), "{}", run.stdout);
-    let found = results(&folder.path().join("out"));
-    let output = &found["outputs"][0];
+    let results = results(&folder.path().join("out"));
+    let output = &results["outputs"][0];
     let nominal = output["value"].as_f64().unwrap();
     // The balls penetrate their walls by less than a micrometre.
     assert!((nominal - LENGTH - 0.3e-3).abs() < 1e-6, "{nominal}");
@@ -135,7 +135,7 @@ fn the_window_computes_the_same_bits_as_the_command() {
         outputs.join(",")
     );
     jointplay(folder.path(), &line).expect(0);
-    let found = results(&folder.path().join("out"));
+    let results = results(&folder.path().join("out"));
     let scene = Scene::load("spcmm", &[("spcmm.frequency".to_owned(), "5Hz".to_owned())]).unwrap();
     let ends = [0.5, 1.5].map(|part| part * scene.machine.contact.clearance);
     let task = AloneTask {
@@ -149,7 +149,7 @@ fn the_window_computes_the_same_bits_as_the_command() {
         assert!(!matches!(message, Message::Failed(_)), "{message:?}");
         if let Message::Run(run) = message {
             runs += 1;
-            for (output, value) in found["outputs"].as_array().unwrap().iter().zip(run.outputs) {
+            for (output, value) in results["outputs"].as_array().unwrap().iter().zip(run.outputs) {
                 let of_command = match run.index {
                     0 => &output["value"],
                     end => &output["parameters"][(end - 1) / 2][["alone_low", "alone_high"][(end - 1) % 2]],
@@ -171,8 +171,8 @@ fn a_screening_drops_parameters_without_influence() {
         "{HUNG} --over contact.restitution=0.5..0.9 --over gravity.x=0m/s^2..0.001m/s^2 --output link3.pose.z:end --rows 8 --screen 4 --out out"
     );
     let run = jointplay(folder.path(), &line).expect(0);
-    let found = results(&folder.path().join("out"));
-    let parameters = found["outputs"][0]["parameters"].as_array().unwrap();
+    let results = results(&folder.path().join("out"));
+    let parameters = results["outputs"][0]["parameters"].as_array().unwrap();
     let is_kept = |key: &str| {
         let parameter = parameters.iter().find(|parameter| parameter["key"] == key).unwrap();
         !parameter["total"].is_null()
@@ -277,8 +277,8 @@ damping = "1000 N s/m"
     let line = "sensitivity ./car.toml --quiet --over body.*.mass=normal(400kg,10kg) --over parameter.k=normal(20N/mm,0.5N/mm) \
                 --output heave.position:mean --duration 1ms --rows 0 --out out";
     jointplay(folder.path(), line).expect(0);
-    let found = results(&folder.path().join("out"));
-    let parameters = &found["outputs"][0]["parameters"];
+    let results = results(&folder.path().join("out"));
+    let parameters = &results["outputs"][0]["parameters"];
     // 97.5 % quantile of the normal distribution.
     let z = 1.959_963_984_540_054;
     let rest = |m: f64, k: f64| -m * 9.81 / k;

@@ -22,7 +22,7 @@ fn check_resumed(scene: &str, options: &str) {
         let line = format!("run {scene} {options} --quiet --summary json --every 0.25ms {more}");
         jointplay(folder.path(), &line).expect(0).json()
     };
-    let whole = run("--duration 20ms --out whole.csv --impacts whole-impacts.json");
+    let uninterrupted = run("--duration 20ms --out whole.csv --impacts whole-impacts.json");
     let first = run("--duration 10ms --out a.csv --save-state a --impacts a-impacts.json");
     assert_eq!(first["state_out"], "a");
     let second = run("--duration 20ms --out b.csv --from-state a --impacts b-impacts.json");
@@ -38,7 +38,7 @@ fn check_resumed(scene: &str, options: &str) {
         without_excluded.retain(|key, _| !excluded.contains(&key.as_str()));
         without_excluded
     };
-    assert_eq!(without_excluded(&whole), without_excluded(&second), "{what}");
+    assert_eq!(without_excluded(&uninterrupted), without_excluded(&second), "{what}");
     assert_eq!(second["from_time_s"], 0.01);
     // No impact is lost or reported twice.
     let impact_count = |name: &str| {
@@ -105,20 +105,20 @@ fn repeatedly_resumed_runs_and_wear_maps_equal_an_uninterrupted_run() {
         let line = format!("run spcmm --quiet --force --summary json {more}");
         jointplay(folder.path(), &line).expect(0).json()
     };
-    let whole = run("--duration 40ms --wear whole.csv");
+    let uninterrupted = run("--duration 40ms --wear whole.csv");
     run("--duration 7ms --save-state s1 --wear w.csv");
     run("--duration 7ms --from-state s1 --save-state s2");
     run("--duration 23.3ms --from-state s2 --save-state s3 --wear w.csv");
     let last = run("--duration 40ms --from-state s3 --wear last.csv");
-    assert_eq!(whole["state_hash"], last["state_hash"]);
-    assert_eq!(whole["energy_J"], last["energy_J"]);
+    assert_eq!(uninterrupted["state_hash"], last["state_hash"]);
+    assert_eq!(uninterrupted["energy_J"], last["energy_J"]);
     assert_eq!(rows(folder.path(), "whole.csv"), rows(folder.path(), "last.csv"));
     // A state saved at the start, and a wear map that begins late.
     run("--duration 0s --save-state s0");
     let line = "run spcmm --duration 40ms --from-state s0 --wear late.csv --summary json";
-    let late = jointplay(folder.path(), line).expect(0);
-    assert!(late.stderr.contains("wear map begins"), "{}", late.stderr);
-    assert_eq!(whole["state_hash"], late.json()["state_hash"]);
+    let outcome = jointplay(folder.path(), line).expect(0);
+    assert!(outcome.stderr.contains("wear map begins"), "{}", outcome.stderr);
+    assert_eq!(uninterrupted["state_hash"], outcome.json()["state_hash"]);
 }
 
 #[cfg(target_os = "linux")]
@@ -248,9 +248,9 @@ fn a_run_resumes_only_with_the_files_that_its_scene_named() {
     }
     let checksum = format!("{:08x}", crc32fast::hash(load("0.4 kg").as_bytes()));
     assert_eq!(first.json()["scene_files_crc32"]["leg.toml"], checksum);
-    let whole = run("--duration 6ms").expect(0).json();
+    let uninterrupted = run("--duration 6ms").expect(0).json();
     let last = run("--duration 6ms --from-state s").expect(0).json();
-    assert_eq!(whole["state_hash"], last["state_hash"]);
+    assert_eq!(uninterrupted["state_hash"], last["state_hash"]);
 
     write("leg.toml", &load("0.8 kg"));
     let other = run("--duration 6ms --from-state s").expect(2);
@@ -304,9 +304,9 @@ fn a_state_is_refused_if_a_mesh_of_its_scene_has_changed() {
     let first = run("--duration 3ms --save-state s").expect(0);
     let checksum = format!("{:08x}", crc32fast::hash(&stl));
     assert_eq!(first.json()["scene_files_crc32"]["fin.stl"], checksum);
-    let whole = run("--duration 6ms").expect(0).json();
+    let uninterrupted = run("--duration 6ms").expect(0).json();
     let last = run("--duration 6ms --from-state s").expect(0).json();
-    assert_eq!(whole["state_hash"], last["state_hash"]);
+    assert_eq!(uninterrupted["state_hash"], last["state_hash"]);
     stl[100] ^= 1;
     write("fin.stl", &stl);
     let other = run("--duration 6ms --from-state s").expect(2);

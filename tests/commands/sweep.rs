@@ -206,8 +206,8 @@ fn an_interrupted_sweep_resumes_and_a_damaged_partial_file_is_refused() {
             continue;
         }
         assert_eq!(output.status.code(), Some(130), "{stderr}");
-        let done = format!("of {points} points done");
-        assert!(stderr.contains(&done), "{stderr}");
+        let progress = format!("of {points} points done");
+        assert!(stderr.contains(&progress), "{stderr}");
         assert_eq!(names(folder.path()), ["a.npz.partial"]);
         break;
     }
@@ -247,8 +247,8 @@ fn an_interrupted_sweep_resumes_and_a_damaged_partial_file_is_refused() {
     assert!(fs::read(at("a.npz")).unwrap() == fs::read(at("b.npz")).unwrap());
     assert_eq!(names(folder.path()), ["a.npz", "b.npz"]);
     // A finished sweep is not overwritten without --force.
-    let again = jointplay(folder.path(), &line("a.npz")).expect(1);
-    assert!(again.stderr.contains("--force"), "{}", again.stderr);
+    let refused = jointplay(folder.path(), &line("a.npz")).expect(1);
+    assert!(refused.stderr.contains("--force"), "{}", refused.stderr);
 }
 
 #[cfg(unix)]

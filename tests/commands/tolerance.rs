@@ -153,23 +153,23 @@ fn the_cheapest_fits_equal_those_of_an_exhaustive_search() {
     for required in all {
         let search = format!("{line} --cost costs.csv --yield {required}");
         let results = jointplay(folder.path(), &search).expect(0).json();
-        let found = &results["fits"];
+        let fit = &results["fits"];
         let cost = |(a, b): &(usize, usize)| costs[0][*a] + costs[1][*b];
         let feasible = yields.iter().filter(|(_, own)| **own >= required).map(|(choice, _)| choice);
         let best = feasible.min_by(|x, y| cost(x).total_cmp(&cost(y))).unwrap();
-        assert_eq!(found["best"]["cost"], cost(best), "{yields:?} for {required}");
+        assert_eq!(fit["best"]["cost"], cost(best), "{yields:?} for {required}");
         let chosen = [best.0, best.1].map(|at| fits[at]);
-        assert_eq!([0, 1].map(|at| found["best"]["fits"][at]["fit"].as_str().unwrap()), chosen);
-        assert_close(&found["best"]["yield"]["value"], yields[best]);
-        assert_eq!(found["is_proven"], true);
+        assert_eq!([0, 1].map(|at| fit["best"]["fits"][at]["fit"].as_str().unwrap()), chosen);
+        assert_close(&fit["best"]["yield"]["value"], yields[best]);
+        assert_eq!(fit["is_proven"], true);
         let runs = runs(folder.path());
-        let evaluations = found["evaluations"].as_u64().unwrap() as usize;
+        let evaluations = fit["evaluations"].as_u64().unwrap() as usize;
         assert!((1..=4).contains(&evaluations));
         assert_eq!(runs.len(), 32 * (evaluations + 2));
         // The check uses separate units.
         let of_check: Vec<_> = runs.iter().filter(|run| run.0 == "fits-check").collect();
         let accepted = of_check.iter().filter(|run| run.1["peak-force (N)"] <= 125.0).count();
-        assert_close(&found["check"]["yield"]["value"], accepted as f64 / 32.0);
+        assert_close(&fit["check"]["yield"]["value"], accepted as f64 / 32.0);
         assert!(of_check.iter().all(|run| runs.iter().filter(|other| other.1 == run.1).count() == 1));
     }
     let none = jointplay(folder.path(), &format!("{line} --cost costs.csv --limit impacts=1000.. --yield 100%"));

@@ -29,13 +29,13 @@ const SMALL: &str = "pendulum --set contact.clearance=0 --quick --quiet";
 #[test]
 fn the_command_writes_all_files_or_none() {
     let folder = tempfile::tempdir().unwrap();
-    let out = run(folder.path(), &format!("tradeoff {SMALL} --out found"), 0);
-    assert!(out.contains("rk4") && out.contains("Settled motion"), "{out}");
-    let found = folder.path().join("found");
-    assert_eq!(names(folder.path()), ["found"], "no other file is left");
-    assert_eq!(names(&found), FILES);
+    let output = run(folder.path(), &format!("tradeoff {SMALL} --out out"), 0);
+    assert!(output.contains("rk4") && output.contains("Settled motion"), "{output}");
+    let out = folder.path().join("out");
+    assert_eq!(names(folder.path()), ["out"], "no other file is left");
+    assert_eq!(names(&out), FILES);
 
-    let csv = fs::read_to_string(found.join("tradeoff.csv")).unwrap();
+    let csv = fs::read_to_string(out.join("tradeoff.csv")).unwrap();
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{csv}");
     let column = |name: &str| rows[0].iter().position(|head| *head == name).unwrap();
@@ -57,18 +57,18 @@ fn the_command_writes_all_files_or_none() {
         }
     }
 
-    let text = fs::read_to_string(found.join("tradeoff.json")).unwrap();
+    let text = fs::read_to_string(out.join("tradeoff.json")).unwrap();
     let json: Json = serde_json::from_str(&text).unwrap();
     assert_eq!(json["points"].as_array().unwrap().len(), rows.len() - 1);
     assert_eq!(json["meta"]["changed_parameters"]["contact.clearance"], "0");
     assert!(json["meta"]["machine"].is_string());
-    let png = fs::read(found.join("tradeoff.png")).unwrap();
+    let png = fs::read(out.join("tradeoff.png")).unwrap();
     assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
-    let svg = fs::read_to_string(found.join("tradeoff.svg")).unwrap();
+    let svg = fs::read_to_string(out.join("tradeoff.svg")).unwrap();
     assert!(svg.contains("radau5") && svg.contains("Time for a simulated second"));
 
     // Existing folders are refused before any measurement and stay unchanged.
-    let message = run(folder.path(), &format!("tradeoff {SMALL} --out found"), 1);
+    let message = run(folder.path(), &format!("tradeoff {SMALL} --out out"), 1);
     assert!(message.contains("--force"), "{message}");
     fs::create_dir(folder.path().join("photos")).unwrap();
     fs::write(folder.path().join("photos/holiday"), "mine").unwrap();
@@ -101,7 +101,7 @@ fn errors_about_invalid_input_state_what_is_allowed() {
 fn an_interrupted_measurement_writes_nothing() {
     use crate::command_line::{signal, start_and_listen};
     let folder = tempfile::tempdir().unwrap();
-    let child = start_and_listen(&mut crate::program::command(folder.path(), "tradeoff chain --quiet --out found"));
+    let child = start_and_listen(&mut crate::program::command(folder.path(), "tradeoff chain --quiet --out out"));
     signal(&child, "-INT");
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
@@ -127,9 +127,9 @@ fn measure<T>(
     analysis(&mut RunContext::new(&mut clock, &mut progress))
 }
 
-fn error_at(found: &WorkPrecision, method: Method, value: f64) -> f64 {
+fn error_at(diagram: &WorkPrecision, method: Method, value: f64) -> f64 {
     let own = |p: &&jointplay::analysis::Point| p.setting.method == method && p.setting.value() == value;
-    let point = found.points.iter().find(own).unwrap();
+    let point = diagram.points.iter().find(own).unwrap();
     assert_eq!(point.impacts.end, End::Reached);
     point.errors.peak.unwrap()
 }
@@ -145,16 +145,16 @@ fn finer_steps_and_tolerances_reduce_the_error_and_raise_the_cost() {
         steps_per_impact: &[4.0, 64.0],
         seconds: f64::INFINITY,
     };
-    let found = measure(|context| work_precision(&scene, &budget, context), u64::MAX).unwrap();
+    let diagram = measure(|context| work_precision(&scene, &budget, context), u64::MAX).unwrap();
     for method in Method::ALL {
-        let own: Vec<_> = found.points.iter().filter(|p| p.setting.method == method).collect();
+        let own: Vec<_> = diagram.points.iter().filter(|p| p.setting.method == method).collect();
         assert!(own.len() >= 2, "{method}");
         let [coarse, fine] = match method.control() {
             StepControl::Fixed => [10e-6, 3e-6],
             StepControl::Error => [1e-4, 1e-8],
             StepControl::PerImpact => [4.0, 64.0],
         };
-        let (coarse_error, fine_error) = (error_at(&found, method, coarse), error_at(&found, method, fine));
+        let (coarse_error, fine_error) = (error_at(&diagram, method, coarse), error_at(&diagram, method, fine));
         println!("{method}: {coarse_error:e} {fine_error:e}");
         assert!(fine_error < 0.6 * coarse_error, "{method}");
         let evaluations = |value: f64| {
@@ -164,14 +164,14 @@ fn finer_steps_and_tolerances_reduce_the_error_and_raise_the_cost() {
         assert!(evaluations(fine) > 2 * evaluations(coarse), "{method}");
     }
     // The reference is accurate enough to distinguish all settings, and the best settings approach it.
-    let floor = found.reference.floor.peak.unwrap();
+    let floor = diagram.reference.floor.peak.unwrap();
     assert!(floor < 1e-6, "{floor}");
-    assert!(error_at(&found, Method::Radau5, 1e-8) < 1e-5);
+    assert!(error_at(&diagram, Method::Radau5, 1e-8) < 1e-5);
     // The Pareto front is not empty, and no point on it is dominated.
-    let front: Vec<_> = found.points.iter().filter(|p| p.impacts.front).collect();
+    let front: Vec<_> = diagram.points.iter().filter(|p| p.impacts.front).collect();
     assert!(!front.is_empty());
     for point in &front {
-        for other in &found.points {
+        for other in &diagram.points {
             let (Some(a), Some(b)) = (point.errors.peak, other.errors.peak) else {
                 continue;
             };

@@ -169,7 +169,7 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
     // Sections at phase 0 are at T, 2 T, …; the first was discarded, and the second kept one was clicked.
     let steps = player.steps();
     let log = player.log().clone();
-    let mut again = Player::new(scene).expect("starts");
+    let mut replayed = Player::new(scene).expect("starts");
     let link = Link {
         scene: jointplay::app::SceneText::of(scene),
         log,
@@ -178,26 +178,26 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
         ..Link::default()
     };
     let link = Link::parse(&link.format()).expect("a link");
-    let replay = Replay::new(link, &mut again).expect("an instant");
+    let replay = Replay::new(link, &mut replayed).expect("an instant");
     // The replay passes exactly the section of the sweep.
     let mut passed = false;
     let verdict = loop {
-        let verdict = replay.advance(&mut again, {
+        let verdict = replay.advance(&mut replayed, {
             let mut steps = 2;
             move || {
                 steps -= 1;
                 steps > 0
             }
         });
-        let section = observed(&again.frame().pose);
-        passed |= again.simulation().time() == 0.6000000000000001 && section[..6] == value;
+        let section = observed(&replayed.frame().pose);
+        passed |= replayed.simulation().time() == 0.6000000000000001 && section[..6] == value;
         if let Some(verdict) = verdict {
             break verdict;
         }
     };
     assert!(matches!(verdict, Verdict::Agrees(_)), "{verdict:?}");
     assert!(passed, "the clicked section, bit for bit");
-    assert!(again.simulation().time() < 0.7, "it plays from there");
+    assert!(replayed.simulation().time() < 0.7, "the link ends beyond the clicked section");
 }
 
 #[test]
@@ -210,8 +210,8 @@ fn several_workers_share_a_sweep_and_a_bad_range_is_reported_once() {
     harness.get_by_label("2 of 5 values");
     assert!(harness.state().bench().is_sweeping());
     let bar = harness.get_by_label("Swept so far");
-    let done = bar.accesskit_node().numeric_value().expect("a number");
-    assert!((40.0..100.0).contains(&done), "{done}");
+    let progress = bar.accesskit_node().numeric_value().expect("a number");
+    assert!((40.0..100.0).contains(&progress), "{progress}");
     points.set(3);
     harness.run_steps(3);
     harness.get_by_label("5 of 5 values");
@@ -525,13 +525,13 @@ fn a_ready_sweep_is_described_and_one_click_opens_its_scene_and_starts_it() {
         // The click also set the controls: the same sweep can be started by hand.
         click(&mut harness, Role::Button, "Cancel sweep");
         click(&mut harness, Role::Button, "Start sweep");
-        let Some(Job::Sweep(again, _)) = jobs.borrow_mut().pop() else {
+        let Some(Job::Sweep(repeated, _)) = jobs.borrow_mut().pop() else {
             panic!("{}: no second sweep", ready.name);
         };
-        expected.vary.clone_from(&again.vary);
-        assert_eq!(again, expected);
+        expected.vary.clone_from(&repeated.vary);
+        assert_eq!(repeated, expected);
         let range = |vary: &[String]| vary[0].replace(' ', "");
-        assert_eq!(range(&again.vary), range(&task.vary));
+        assert_eq!(range(&repeated.vary), range(&task.vary));
         click(&mut harness, Role::Button, "Cancel sweep");
     }
 }

@@ -95,11 +95,11 @@ impl Shown {
         if self.mode == Mode::Phone {
             tab(&mut self.harness, "Plots");
         }
-        let found = titles.iter().all(|title| shows_text(&self.harness, title));
+        let are_shown = titles.iter().all(|title| shows_text(&self.harness, title));
         if self.mode == Mode::Phone {
             tab(&mut self.harness, "Lesson");
         }
-        found
+        are_shown
     }
 
     fn microscope(&self, joint: usize) -> bool {
@@ -118,7 +118,7 @@ impl Shown {
             }
             self.harness.run_steps(2);
         }
-        let found = look(self);
+        let holds = look(self);
         self.harness.state_mut().show_instant(start);
         self.harness.run_steps(2);
         if self.app().course().is_some_and(|course| course.is_reached()) {
@@ -126,7 +126,7 @@ impl Shown {
             press(&mut self.harness, Key::PageDown);
             press(&mut self.harness, Key::PageUp);
         }
-        found
+        holds
     }
 }
 
@@ -339,11 +339,11 @@ fn plots_twin_distance(shown: &mut Shown) -> bool {
     if shown.mode == Mode::Phone {
         tab(&mut shown.harness, "Bench");
     }
-    let found = shows_text(&shown.harness, "Distance to twin");
+    let is_shown = shows_text(&shown.harness, "Distance to twin");
     if shown.mode == Mode::Phone {
         tab(&mut shown.harness, "Lesson");
     }
-    found
+    is_shown
 }
 
 /// Walks every lesson to its end by Page Down and Play in `mode`; returns all claims that do not hold.

@@ -157,8 +157,8 @@ pub fn compare(folder: &str, name: &str, actual: &Picture, what: &str) {
     if storing() {
         fs::create_dir_all(golden.parent().expect("has one")).expect("writable");
         actual.write(&golden);
-        let off = actual.differing(&Picture::read(&golden), PALETTE_ERROR);
-        assert!(!off.contains(&true), "{folder}/{name}.png: its colours are too many for a palette");
+        let differing = actual.differing(&Picture::read(&golden), PALETTE_ERROR);
+        assert!(!differing.contains(&true), "{folder}/{name}.png: too many colours for a palette");
         return;
     }
     if let Some((why, diff)) = picture_mismatch(actual, &Picture::read(&golden)) {

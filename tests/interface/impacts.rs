@@ -66,7 +66,7 @@ fn the_list_shows_the_impacts_of_the_run_and_a_click_seeks_to_the_peak() {
         let row = harness.get_by_label_contains(&start);
         let words = row.accesskit_node().label().expect("a label");
         let rest = words.split_once(names[impact.joint]).expect("the joint").1;
-        let found = numbers(rest);
+        let displayed = numbers(rest);
         let expected = [
             impact.start * 1e3,
             (impact.end - impact.start) * 1e6,
@@ -76,8 +76,8 @@ fn the_list_shows_the_impacts_of_the_run_and_a_click_seeks_to_the_peak() {
             impact.achieved(),
             impact.law,
         ];
-        assert_eq!(found.len(), expected.len(), "{words}");
-        assert!(found.iter().zip(expected).all(|(a, b)| is_close(*a, b)), "{words}: {expected:?}");
+        assert_eq!(displayed.len(), expected.len(), "{words}");
+        assert!(displayed.iter().zip(expected).all(|(a, b)| is_close(*a, b)), "{words}: {expected:?}");
         assert_eq!(words.contains("disturbed"), impact.disturbed, "{words}");
     }
     assert_eq!(harness.state().player().simulation().state_hash(), before);
@@ -154,7 +154,7 @@ fn the_badge_at_an_impact_shows_the_recorded_values() {
         let force = harness.state().player().frame().joints[0].normal_force.norm();
         assert!(is_close(force, impact.peak), "{force} N, {} N", impact.peak);
         assert!(badge.starts_with("Impact 1, S1: 7.80"), "{badge}");
-        let found = numbers(badge.split_once(": ").expect("numbers").1);
+        let displayed = numbers(badge.split_once(": ").expect("numbers").1);
         let expected = [
             impact.start * 1e3,
             impact.peak,
@@ -162,8 +162,8 @@ fn the_badge_at_an_impact_shows_the_recorded_values() {
             impact.approach_speed * 1e3,
             impact.separation_speed * 1e3,
         ];
-        assert_eq!(found.len(), 5, "{badge}");
-        assert!(found.iter().zip(expected).all(|(a, b)| is_close(*a, b)), "{badge}: {expected:?}");
+        assert_eq!(displayed.len(), 5, "{badge}");
+        assert!(displayed.iter().zip(expected).all(|(a, b)| is_close(*a, b)), "{badge}: {expected:?}");
         harness.key_press(Key::Space);
         harness.step();
         assert_eq!(harness.state().impact_badge(), None, "not while time passes");

@@ -49,8 +49,8 @@ fn target(harness: &Harness<'_, App>) -> [f32; 3] {
 /// Distance of the camera's target from the socket of `joint`, m.
 fn distance_to_target(harness: &Harness<'_, App>, joint: usize) -> f64 {
     let centre = harness.state().player().frame().joints[joint].socket_centre;
-    let off = [0, 1, 2].map(|i| f64::from(target(harness)[i]) - centre[i]);
-    off.iter().map(|x| x * x).sum::<f64>().sqrt()
+    let offset = [0, 1, 2].map(|i| f64::from(target(harness)[i]) - centre[i]);
+    offset.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 #[test]

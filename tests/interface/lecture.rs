@@ -166,7 +166,7 @@ fn check_link_reproduces(player: &Player) {
     let link = Link::parse(&link.format()).expect("a link");
     let mut copy = Player::new(&link.load().expect("loads")).expect("starts");
     let replay = Replay::new(link, &mut copy).expect("an instant");
-    let verdict = replay.advance(&mut copy, || true).expect("there");
+    let verdict = replay.advance(&mut copy, || true).expect("a verdict");
     assert_eq!(verdict, Verdict::Agrees(player.simulation().state_hash()));
 }
 
@@ -204,8 +204,8 @@ fn a_body_that_is_pressed_and_dragged_is_pulled_until_release() {
     check_link_reproduces(player);
     let log = player.log();
     // Outside the machine a drag orbits the view.
-    let beside = image.left_center() + vec2(30.0, 0.0);
-    drag(&mut harness, &[beside, beside + vec2(40.0, 0.0)]);
+    let outside = image.left_center() + vec2(30.0, 0.0);
+    drag(&mut harness, &[outside, outside + vec2(40.0, 0.0)]);
     assert_ne!(self::camera(&harness), camera);
     assert_eq!(pulls(&harness.state().player().log()), pulls(&log));
 }
@@ -350,7 +350,7 @@ pub(crate) fn platform(harness: &Harness<'_, App>) -> Pos2 {
     let app = harness.state();
     let scene = app.player().running();
     let platform = scene.machine.bodies.iter().position(|body| body.name == "platform");
-    let body = &app.player().frame().bodies[platform.expect("there")];
+    let body = &app.player().frame().bodies[platform.expect("a platform")];
     app.place_in_view(&body.position).expect("in sight")
 }
 
@@ -438,8 +438,8 @@ impl Lecture {
     /// Scrolls a control into view.
     fn scroll_to(&mut self, role: Role, label: &str) {
         self.gestures += 1;
-        let found = self.harness.get_by_role_and_label(role, label);
-        found.scroll_to_me();
+        let control = self.harness.get_by_role_and_label(role, label);
+        control.scroll_to_me();
         self.harness.run_steps(10);
     }
 
@@ -702,10 +702,10 @@ fn tasks_of_a_lecture_take_at_most_three_touch_gestures_on_a_phone() {
     let apart = |by: f32| [at - vec2(by, 0.0), at + vec2(by, 0.0)];
     let [one, two] = [0, 1].map(|finger| [7.0, 15.0, 30.0, 60.0].map(|by| apart(by)[finger]));
     class.fingers(&[&one, &two]);
-    let (after, there) = width(&mut class);
+    let (after, moved) = width(&mut class);
     assert!(after > 5.0 * before, "{before} {after}");
-    assert!((there.x - at.x).abs() < 10.0, "{at} {there}");
-    class.fingers(&[&[there]]);
+    assert!((moved.x - at.x).abs() < 10.0, "{at} {moved}");
+    class.fingers(&[&[moved]]);
     assert!((shown(&class.harness) - 7.8e-3).abs() < 0.1e-3);
     class.finish_task("an impact enlarged");
 
@@ -759,9 +759,9 @@ fn going_back_to_just_after_an_impact_shows_its_peak_again() {
     harness.state_mut().player_mut().pacer.set_scale(1e-3);
     harness.state_mut().show_instant(8.2e-3);
     harness.run_steps(3);
-    let there = marks(&harness);
-    assert_eq!(there.len(), 3, "{there:?}");
-    assert!(there.iter().all(|(_, force, age)| *force > 100.0 && (0.1e-3..0.5e-3).contains(age)), "{there:?}");
+    let first = marks(&harness);
+    assert_eq!(first.len(), 3, "{first:?}");
+    assert!(first.iter().all(|(_, force, age)| *force > 100.0 && (0.1e-3..0.5e-3).contains(age)), "{first:?}");
     // A step back keeps them; before the impact there are none.
     key(&mut harness, Key::ArrowLeft);
     assert_eq!(marks(&harness).len(), 3);

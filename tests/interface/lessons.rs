@@ -423,8 +423,8 @@ fn a_presented_lesson_shows_the_whole_microscope_and_its_caption_clears_the_ball
             let rect = text.visual_bounding_rect();
             if sphere.contains_rect(rect) && !rect.contains(circle.centre) {
                 labels += 1;
-                let off = rect.distance_to_pos(circle.centre);
-                assert!(off > circle.radius, "{:?} {rect:?} {circle:?}", text.galley.text());
+                let distance = rect.distance_to_pos(circle.centre);
+                assert!(distance > circle.radius, "{:?} {rect:?} {circle:?}", text.galley.text());
             }
         }
         assert!(labels > 5, "{labels}");

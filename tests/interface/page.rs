@@ -1130,9 +1130,9 @@ fn a_link_from_the_window_opens_in_every_form_and_restores_the_camera() {
     let (mut phone, _) = open(AppOptions::from_link(&full).expect("a link"), PORTRAIT);
     verdict(&mut phone);
     phone.run();
-    let there = camera(&phone).expect("a camera");
-    assert!(there.fitted.is_some_and(|aspect| aspect < 1.5), "{there:?}");
-    assert_ne!(Some(there), here.1);
+    let fitted = camera(&phone).expect("a camera");
+    assert!(fitted.fitted.is_some_and(|aspect| aspect < 1.5), "{fitted:?}");
+    assert_ne!(Some(fitted), here.1);
 }
 
 fn copy_link_from(harness: &mut Harness<'_, App>, page: &str) -> String {

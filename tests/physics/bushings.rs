@@ -37,11 +37,11 @@ fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
         let t = 0.15;
         let frame = frame_at(&mut simulation, t);
         let omega = (STIFFNESS[axis] / 0.5).sqrt();
-        let off = 0.02 * (omega * t).cos();
-        let expected = Vec3::new(0.1, 0.2, 0.3) + Vec3::ith(axis, off);
+        let displacement = 0.02 * (omega * t).cos();
+        let expected = Vec3::new(0.1, 0.2, 0.3) + Vec3::ith(axis, displacement);
         let wrong = (frame.bodies[0].position - expected).norm();
         assert!(wrong < 2.0 * bound, "{label}: {wrong:e}");
-        let force = frame.elements[0].force[axis] + STIFFNESS[axis] * off;
+        let force = frame.elements[0].force[axis] + STIFFNESS[axis] * displacement;
         assert!(force.abs() < 2e3 * bound, "{label}: {force:e}");
 
         // Rotation about one axis is linear up to any angle.
@@ -94,8 +94,8 @@ fn a_loaded_bushing_deflects_along_and_about_its_own_axes() {
                 assert!((turn - expected).norm() < 1e-6, "{label}: {turn} {expected}");
                 // The load is the first element.
                 let report = &frame.elements[1];
-                let off = (report.force + direction * 4.0).norm();
-                assert!(off < 1e-3, "{label}: {off:e}");
+                let error = (report.force + direction * 4.0).norm();
+                assert!(error < 1e-3, "{label}: {error:e}");
                 assert!((report.torque.unwrap() + direction * 0.05).norm() < 1e-5, "{label}: {report:?}");
             }
         }
@@ -142,14 +142,14 @@ fn a_tumbling_pair_on_a_soft_bushing_conserves_momentum_and_energy() {
             let frame = frame_at(&mut simulation, 1.0);
             let label = format!("{method} {formulation} {}", more.len());
             for (then, now) in momenta(&before, &machine).iter().zip(&momenta(&frame, &machine)) {
-                let off = (now - then).norm() / then.norm();
-                assert!(off < 1e-8, "{label}: {off:e}");
+                let error = (now - then).norm() / then.norm();
+                assert!(error < 1e-8, "{label}: {error:e}");
             }
             let ledger = simulation.ledger().unwrap();
             assert!(ledger.relative_residual().abs() < 1e-6, "{label}: {ledger:?}");
             if more.is_empty() {
-                let off = (frame.kinetic + frame.elastic) / (before.kinetic + before.elastic) - 1.0;
-                assert!(off.abs() < 1e-8, "{label}: {off:e}");
+                let error = (frame.kinetic + frame.elastic) / (before.kinetic + before.elastic) - 1.0;
+                assert!(error.abs() < 1e-8, "{label}: {error:e}");
             } else {
                 assert!(ledger.damping_loss > 1e-3, "{label}: {ledger:?}");
             }

@@ -157,8 +157,8 @@ fn a_spring_on_one_coordinate_has_its_natural_frequency_in_every_method_and_form
         // The other coordinate continues at its initial rate.
         if !case.closes_loop {
             let [q, rate] = frame.coordinates[1 - case.part];
-            let (off, rate_error) = (angle_difference(q, 0.3), (rate - 3.0).abs());
-            assert!(off < 20.0 * bound && rate_error < 20.0 * bound, "{label}: {off:e} {rate_error:e}");
+            let (error, rate_error) = (angle_difference(q, 0.3), (rate - 3.0).abs());
+            assert!(error < 20.0 * bound && rate_error < 20.0 * bound, "{label}: {error:e} {rate_error:e}");
         }
         let residual = simulation.ledger().unwrap().relative_residual();
         assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
@@ -250,15 +250,15 @@ fn a_drive_of_one_coordinate_leaves_the_other_free_and_exerts_the_inertia_force(
             "{label}: {other} {speed}"
         );
         let inertia_force = case.inertia() * acceleration;
-        let off = (frame.actuators[0] - inertia_force).abs() / inertia_force.abs();
-        assert!(frame.actuators.len() == 1 && off < 1e4 * bound, "{label}: {off:e}");
+        let error = (frame.actuators[0] - inertia_force).abs() / inertia_force.abs();
+        assert!(frame.actuators.len() == 1 && error < 1e4 * bound, "{label}: {error:e}");
         let ledger = simulation.ledger().unwrap();
         let residual = ledger.relative_residual();
         assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
         let w = 3.0 * std::f64::consts::PI;
         let work = 0.5 * case.inertia() * (rate * rate - (0.2 * w).powi(2));
-        let off = (ledger.drive_work / work - 1.0).abs();
-        assert!(off < 1e3 * bound.max(1e-7), "{label}: {off:e}");
+        let error = (ledger.drive_work / work - 1.0).abs();
+        assert!(error < 1e3 * bound.max(1e-7), "{label}: {error:e}");
     });
 }
 
@@ -347,8 +347,8 @@ fn elements_on_one_of_two_coordinates_conserve_momentum_and_balance_their_energy
         let label = format!("{formulation} {method}");
         let (then, now) = (momenta(&before, &machine), momenta(&frame, &machine));
         for (then, now) in then.iter().zip(&now) {
-            let off = (now - then).norm() / then.norm();
-            assert!(off < 2e-8, "{label}: {off:e}");
+            let error = (now - then).norm() / then.norm();
+            assert!(error < 2e-8, "{label}: {error:e}");
         }
         let residual = simulation.ledger().unwrap().relative_residual();
         assert!(residual.abs() < 1e-6, "{label}: {residual:e}");

@@ -81,11 +81,11 @@ fn damping_beyond_its_domain_names_joint_and_instant() {
     let changes = [("chain.links", "12"), ("contact.approach_speed", "start"), ("solver.tolerance", "1e-4")];
     let simulation = run_for("chain", &changes, 0.06);
     let doubts = simulation.doubts();
-    let found = doubts.iter().find_map(|doubt| match doubt {
+    let damping = doubts.iter().find_map(|doubt| match doubt {
         Doubt::Damping { joints, time, ratio, usual } => Some((joints, *time, *ratio, *usual)),
         _ => None,
     });
-    let (joints, time, ratio, undisturbed) = found.expect("a doubt about damping");
+    let (joints, time, ratio, undisturbed) = damping.expect("a doubt about damping");
     assert!(joints.worst.starts_with('J') && (0.0..0.06).contains(&time), "{doubts:?}");
     assert!(ratio > undisturbed + 1.0 && (undisturbed - 0.1425).abs() < 1e-6, "{doubts:?}");
 }

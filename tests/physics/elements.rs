@@ -43,8 +43,8 @@ fn a_mass_on_a_spring_has_its_natural_frequency_in_every_method_and_formulation(
         let time = 0.2;
         let frame = frame_at(&mut simulation, time);
         let expected = 0.1 + 0.03 * (omega * time).cos();
-        let off = (frame.bodies[0].position - Vec3::new(expected, 0.0, 0.0)).norm();
-        assert!(off < bound, "{variant}: {off:e}");
+        let error = (frame.bodies[0].position - Vec3::new(expected, 0.0, 0.0)).norm();
+        assert!(error < bound, "{variant}: {error:e}");
         let tension = 200.0 * (expected - 0.1);
         assert!((frame.elements[0].force.x + tension).abs() < 2e3 * bound);
         assert!((frame.elastic - 0.5 * 200.0 * (expected - 0.1f64).powi(2)).abs() < 20.0 * bound);
@@ -71,8 +71,8 @@ fn a_damper_dissipates_as_the_closed_form() {
             let (sin, cos) = (w * time).sin_cos();
             let decay = (-d * time).exp();
             let expected = 0.1 + 0.03 * decay * (cos + d / w * sin);
-            let off = (frame.bodies[0].position.x - expected).abs();
-            assert!(off < 1e-8, "{method} {formulation}: {off:e}");
+            let error = (frame.bodies[0].position.x - expected).abs();
+            assert!(error < 1e-8, "{method} {formulation}: {error:e}");
             let speed = -0.03 * decay * (w + d * d / w) * sin;
             let remaining = 0.5 * MASS * speed * speed + 0.5 * k * (expected - 0.1).powi(2);
             let lost = simulation.ledger().unwrap().damping_loss;
@@ -151,8 +151,8 @@ fn loads_accelerate_a_body_as_in_the_newton_euler_equations() {
                 x -= 3.0 * sin / MASS * time / f64::from(n);
                 y += 3.0 * cos / MASS * time / f64::from(n);
             }
-            let off = (velocity - Vec3::new(x, y, 0.0)).norm();
-            assert!(off < 1e-6, "{method} {formulation}: {off:e}");
+            let error = (velocity - Vec3::new(x, y, 0.0)).norm();
+            assert!(error < 1e-6, "{method} {formulation}: {error:e}");
         }
     }
 }
@@ -234,8 +234,8 @@ fn a_bush_that_starts_concentric_is_stiff_from_the_first_step() {
     let changes = [("solver.method", "radau5"), ("solver.tolerance", "1e-9")];
     let mut simulation = floating(bush, &changes);
     let frame = frame_at(&mut simulation, 0.1);
-    let off = (frame.bodies[0].position - Vec3::new(0.13, 8.0 / 80e6, 0.0)).norm();
-    assert!(off < 1e-10, "{off:e}");
+    let error = (frame.bodies[0].position - Vec3::new(0.13, 8.0 / 80e6, 0.0)).norm();
+    assert!(error < 1e-10, "{error:e}");
     assert!((frame.elements[0].force + Vec3::new(0.0, 8.0, 0.0)).norm() < 1e-2);
 }
 

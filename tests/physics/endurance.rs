@@ -327,14 +327,14 @@ fn write_a_thousand_seconds_of_every_kind() {
     );
     let list = long_list();
     let runs: Vec<_> = list.iter().flat_map(|of| (0..FAST.len()).map(move |preset| (of, preset))).enumerate().collect();
-    let done = Mutex::new(Vec::new());
+    let results = Mutex::new(Vec::new());
     in_parallel(&runs, |&(index, (of, preset))| {
         let drift = long_run(of, preset, 1000.0);
-        done.lock().unwrap().push((index, drift));
+        results.lock().unwrap().push((index, drift));
     });
-    let mut done = done.into_inner().unwrap();
-    done.sort_by_key(|(index, _)| *index);
-    for ((_, (of, preset)), (_, d)) in runs.into_iter().zip(done) {
+    let mut results = results.into_inner().unwrap();
+    results.sort_by_key(|(index, _)| *index);
+    for ((_, (of, preset)), (_, d)) in runs.into_iter().zip(results) {
         let force = match of.scene {
             "chain" | "pendulum" | "slider-crank" => "-".to_owned(),
             _ => format!("{:.1e}", d.force),
@@ -347,7 +347,7 @@ fn write_a_thousand_seconds_of_every_kind() {
         check_limits(of, preset, &d);
     }
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/extremes.md");
-    let kept = std::fs::read_to_string(&path).unwrap();
-    let at = kept.find("\n## 1000 simulated seconds\n").unwrap_or(kept.len());
-    std::fs::write(path, kept[..at].to_owned() + &page).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let at = text.find("\n## 1000 simulated seconds\n").unwrap_or(text.len());
+    std::fs::write(path, text[..at].to_owned() + &page).unwrap();
 }

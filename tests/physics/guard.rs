@@ -225,8 +225,8 @@ fn flat_poses_are_passed_on_the_same_branch_in_both_formulations() {
         assert!(ledger.relative_residual().abs() < 1e-6, "{formulation} {tolerance}: {ledger:?}");
         let angle = frame_now(&mut simulation).coordinates[0][0];
         // `lagrange` measures the angle only modulo a turn.
-        let off = (angle - 31.750597187).rem_euclid(std::f64::consts::TAU);
-        assert!(off.min(std::f64::consts::TAU - off) < 1e-3, "{formulation} {tolerance}: {angle}");
+        let angle_error = (angle - 31.750597187).rem_euclid(std::f64::consts::TAU);
+        assert!(angle_error.min(std::f64::consts::TAU - angle_error) < 1e-3, "{formulation} {tolerance}: {angle}");
     }
 }
 

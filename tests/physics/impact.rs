@@ -198,8 +198,8 @@ fn friction_opposes_the_slip_with_its_share_of_the_normal_force() {
             let (_, frame) = pressed(slip, Vec3::zeros(), &changes);
             let joint = &frame.joints[0];
             let expected = slip * (-0.2 * fraction * load / speed);
-            let off = (joint.friction_force - expected).norm();
-            assert!(off < 1e-8 * load, "{reading} {speed}: {}", joint.friction_force);
+            let error = (joint.friction_force - expected).norm();
+            assert!(error < 1e-8 * load, "{reading} {speed}: {}", joint.friction_force);
             assert!((joint.slip_speed - speed).abs() < 1e-12);
             let state = if speed < 1e-4 { ContactMode::Creep } else { ContactMode::Slip };
             assert_eq!(joint.state, state);

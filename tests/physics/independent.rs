@@ -32,11 +32,11 @@ fn stored_run(name: &str, changes: &Changes, equations: &str, solver: &str, end:
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/solver.toml");
     let rows: Rows = toml::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
     let mut runs = rows.run.into_iter();
-    let found = runs.find(|run| {
+    let run = runs.find(|run| {
         let same = run.changes.iter().map(|(key, value)| (&**key, &**value)).eq(changes.iter().copied());
         same && (&*run.scene, &*run.equations, &*run.solver, run.end) == (name, equations, solver, end)
     });
-    found.unwrap_or_else(|| {
+    run.unwrap_or_else(|| {
         panic!("no run of {name} with {changes:?} to {end}: add it to tests/reference/solver/main.rs")
     })
 }

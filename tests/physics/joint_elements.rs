@@ -111,14 +111,14 @@ fn a_joint_spring_has_its_natural_frequency_in_every_method_and_formulation() {
         let k = 400.0 * m;
         let mut simulation = joint.start_at([0.13, 0.0], &joint.spring(k, 0.0), &variant.close());
         let frame = frame_at(&mut simulation, 0.2);
-        let [off, rate] = damped_oscillation([m, 0.0, k], [0.03, 0.0], 0.2);
+        let [offset, rate] = damped_oscillation([m, 0.0, k], [0.03, 0.0], 0.2);
         let label = format!("{joint:?} {variant}");
-        let wrong = (joint.coordinate(&frame) - 0.1 - off).abs();
-        assert!(wrong < bound, "{label}: {wrong:e}");
+        let error = (joint.coordinate(&frame) - 0.1 - offset).abs();
+        assert!(error < bound, "{label}: {error:e}");
         assert!((joint.rate(&frame) - rate).abs() < 20.0 * bound, "{label}");
         let force = joint.force(&frame, 0);
-        assert!((force + k * off).abs() < 2.0 * k * bound, "{label}: {force}");
-        let elastic = frame.elastic - 0.5 * k * off * off;
+        assert!((force + k * offset).abs() < 2.0 * k * bound, "{label}: {force}");
+        let elastic = frame.elastic - 0.5 * k * offset * offset;
         assert!(elastic.abs() < 0.1 * k * bound, "{label}: {elastic:e}");
         let residual = simulation.ledger().unwrap().relative_residual();
         assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
@@ -138,16 +138,16 @@ fn damping_and_preload_of_a_joint_spring_match_the_closed_form() {
                 let frame = frame_at(&mut simulation, 0.25);
                 // The oscillation is about the zero-force position.
                 let rest = -preload / k;
-                let [off, rate] = damped_oscillation([m, c, k], [0.03 - rest, 0.0], 0.25);
+                let [offset, rate] = damped_oscillation([m, c, k], [0.03 - rest, 0.0], 0.25);
                 let label = format!("{joint:?} {method} {formulation}");
-                let wrong = (joint.coordinate(&frame) - 0.1 - rest - off).abs();
-                assert!(wrong < 1e-8, "{label}: {wrong:e}");
+                let error = (joint.coordinate(&frame) - 0.1 - rest - offset).abs();
+                assert!(error < 1e-8, "{label}: {error:e}");
                 let energy = |x: f64, v: f64| 0.5 * (m * v * v + k * x * x);
-                let lost = energy(0.03 - rest, 0.0) - energy(off, rate);
+                let lost = energy(0.03 - rest, 0.0) - energy(offset, rate);
                 let ledger = simulation.ledger().unwrap();
                 assert!((ledger.damping_loss / lost - 1.0).abs() < 1e-5, "{label}: {ledger:?}");
-                let off = joint.coordinate(&frame) - 0.1;
-                let stored = off * (preload + 0.5 * k * off);
+                let deflection = joint.coordinate(&frame) - 0.1;
+                let stored = deflection * (preload + 0.5 * k * deflection);
                 assert!((frame.elastic - stored).abs() < 1e-12, "{label}");
             }
         }
@@ -163,8 +163,8 @@ fn the_error_of_a_joint_spring_falls_with_the_order_of_the_method() {
         let changes = [("solver.method", method), ("formulation", formulation), (key, &*value)];
         let mut simulation = Hinge.start_at([0.13, 0.0], &Hinge.spring(k, 4.0 * m), &changes);
         let frame = frame_at(&mut simulation, 0.2);
-        let [off, _] = damped_oscillation([m, 4.0 * m, k], [0.03, 0.0], 0.2);
-        (Hinge.coordinate(&frame) - 0.1 - off).abs()
+        let [offset, _] = damped_oscillation([m, 4.0 * m, k], [0.03, 0.0], 0.2);
+        (Hinge.coordinate(&frame) - 0.1 - offset).abs()
     };
     for formulation in FORMULATIONS {
         for (method, steps, order) in [("semi-implicit-euler", [1e-4, 5e-5], 1.0), ("rk4", [4e-3, 2e-3], 4.0)] {
@@ -191,8 +191,8 @@ fn stiff_elements_on_joints_do_not_slow_implicit_methods() {
                 let changes = [("solver.method", method), ("solver.tolerance", "1e-6"), ("formulation", formulation)];
                 let mut simulation = joint.start_at([0.13, 0.0], &stiff, &changes);
                 let frame = frame_at(&mut simulation, 1.0);
-                let off = joint.coordinate(&frame) - 0.1;
-                assert!(off.abs() < 1e-6, "{joint:?} {method} {formulation}: {off:e}");
+                let error = joint.coordinate(&frame) - 0.1;
+                assert!(error.abs() < 1e-6, "{joint:?} {method} {formulation}: {error:e}");
                 simulation.statistics().evaluations
             };
             let explicit = evaluations("dopri5");
@@ -270,16 +270,16 @@ fn elements_on_joints_conserve_momentum_and_balance_their_energy() {
             assert!(damped || (stopped[0] && stopped[1]), "{label}: untouched");
             let (then, now) = (momenta(&before, &machine), momenta(&frame, &machine));
             for (then, now) in then.iter().zip(&now) {
-                let off = (now - then).norm() / then.norm();
-                assert!(off < 2e-8, "{label}: {off:e}");
+                let error = (now - then).norm() / then.norm();
+                assert!(error < 2e-8, "{label}: {error:e}");
             }
             let ledger = simulation.ledger().unwrap();
             let residual = ledger.relative_residual();
             assert!(residual.abs() < 1e-6, "{label}: {residual:e}");
             if !damped {
                 let energy = |f: &Frame| f.kinetic + f.elastic;
-                let off = energy(&frame) / energy(&before) - 1.0;
-                assert!(off.abs() < 1e-7, "{label}: {off:e}");
+                let error = energy(&frame) / energy(&before) - 1.0;
+                assert!(error.abs() < 1e-7, "{label}: {error:e}");
                 assert_eq!(ledger.damping_loss, 0.0);
             } else {
                 assert!(ledger.damping_loss > 1e-3, "{label}: {ledger:?}");
@@ -329,8 +329,8 @@ fn a_hinge_angle_is_measured_within_half_a_turn_of_the_springs_position() {
         );
         let mut simulation = Hinge.start_at([start.to_radians(), 0.0], &spring, &[]);
         let torque = Hinge.force(&frame_at(&mut simulation, 0.0), 0);
-        let wrong = torque + 2.0 * expected.to_radians();
-        assert!(wrong.abs() < 1e-12, "{start} {position}: {torque}");
+        let error = torque + 2.0 * expected.to_radians();
+        assert!(error.abs() < 1e-12, "{start} {position}: {torque}");
     }
 }
 
@@ -386,8 +386,8 @@ fn a_stop_rebounds_by_its_law_at_any_speed() {
             assert_eq!((frame.elastic, joint.force(&frame, 0)), (0.0, 0.0), "{label}");
             let lost = 0.5 * m * v * v * (1.0 - expected * expected);
             let ledger = simulation.ledger().unwrap();
-            let off = ledger.damping_loss / lost - 1.0;
-            assert!(off.abs() < 1e4 * bound.min(1e-6), "{label}: {off:e}");
+            let error = ledger.damping_loss / lost - 1.0;
+            assert!(error.abs() < 1e4 * bound.min(1e-6), "{label}: {error:e}");
             assert!(ledger.relative_residual().abs() < 2e-3, "{label}: {ledger:?}");
         }
     });
@@ -431,11 +431,11 @@ fn a_motor_follows_its_target_like_a_spring_and_its_work_counts_as_drive_work() 
         // The error relative to a target in uniform motion oscillates freely.
         let mut simulation = joint.start_at([0.0, 0.0], &constant, &variant.close());
         let frame = frame_at(&mut simulation, t);
-        let [off, rate] = damped_oscillation([m, d, k], [-0.1, -0.3], t);
-        let wrong = (joint.coordinate(&frame) - (0.1 + 0.3 * t) - off).abs();
-        assert!(wrong < 2.0 * bound, "{label}: {wrong:e}");
+        let [offset, rate] = damped_oscillation([m, d, k], [-0.1, -0.3], t);
+        let error = (joint.coordinate(&frame) - (0.1 + 0.3 * t) - offset).abs();
+        assert!(error < 2.0 * bound, "{label}: {error:e}");
         let force = joint.force(&frame, 0);
-        assert!((force + k * off + d * rate).abs() < 60.0 * k * bound, "{label}");
+        assert!((force + k * offset + d * rate).abs() < 60.0 * k * bound, "{label}");
         let kinetic = 0.5 * m * joint.rate(&frame).powi(2);
         let ledger = simulation.ledger().unwrap();
         assert!((ledger.drive_work - kinetic).abs() < 1e-4 * ledger.exchanged, "{label}: {ledger:?}");
@@ -450,8 +450,8 @@ fn a_motor_follows_its_target_like_a_spring_and_its_work_counts_as_drive_work() 
         let forced = |t: f64| [size * (w * t + phase).sin(), size * w * (w * t + phase).cos()];
         let [x, v] = forced(0.0);
         let free = damped_oscillation([m, d, k], [-x, -v], t)[0];
-        let wrong = (joint.coordinate(&frame) - forced(t)[0] - free).abs();
-        assert!(wrong < 4.0 * bound, "{label}: {wrong:e}");
+        let error = (joint.coordinate(&frame) - forced(t)[0] - free).abs();
+        assert!(error < 4.0 * bound, "{label}: {error:e}");
     });
 }
 
@@ -478,9 +478,9 @@ fn a_motor_does_not_exceed_its_limit() {
                 assert!((joint.coordinate(&frame) - 10.0 * t * t).abs() < 1e-8, "{label}");
                 let t = release_time + 0.05;
                 let frame = frame_at(&mut simulation, t);
-                let [off, _] = damped_oscillation([m, 0.0, k], [-0.2, 20.0 * release_time], 0.05);
-                let wrong = (joint.coordinate(&frame) - 1.0 - off).abs();
-                assert!(wrong < 1e-7, "{label}: {wrong:e}");
+                let [offset, _] = damped_oscillation([m, 0.0, k], [-0.2, 20.0 * release_time], 0.05);
+                let error = (joint.coordinate(&frame) - 1.0 - offset).abs();
+                assert!(error < 1e-7, "{label}: {error:e}");
             }
         }
         // A constant force alone.

@@ -275,9 +275,9 @@ fn frames_inside_a_step_balance_too() {
                 simulation.sample(from + part * (to - from), &mut frame);
                 let ledger = frame.ledger.unwrap();
                 // The energies of the row agree with its ledger.
-                let off =
+                let error =
                     ledger.kinetic_change + ledger.elastic_change - (frame.kinetic - kinetic + frame.elastic - elastic);
-                assert!(off.abs() < 1e-12, "{name}: {off:e}");
+                assert!(error.abs() < 1e-12, "{name}: {error:e}");
                 worst = worst.max(ledger.residual().abs());
             }
             assert_eq!(frame.ledger, simulation.ledger().copied());

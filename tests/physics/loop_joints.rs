@@ -125,12 +125,12 @@ fn a_body_on_a_closing_joint_moves_as_with_the_joint_in_the_tree() {
                 assert_eq!(simulation.indeterminate_forces(), Default::default(), "{label}");
                 let frame = frame_at(&mut simulation, 0.25);
                 for (a, b) in frame.bodies.iter().zip(&end.bodies) {
-                    let off = (a.position - b.position).norm();
-                    assert!(off < 2e-7, "{label}: {off:e}");
-                    let off = (a.rotation - b.rotation).amax();
-                    assert!(off < 2e-6, "{label}: {off:e}");
-                    let off = (a.angular_acceleration - b.angular_acceleration).norm();
-                    assert!(off < 2e-4 * b.angular_acceleration.norm().max(1.0), "{label}: {off:e}");
+                    let error = (a.position - b.position).norm();
+                    assert!(error < 2e-7, "{label}: {error:e}");
+                    let error = (a.rotation - b.rotation).amax();
+                    assert!(error < 2e-6, "{label}: {error:e}");
+                    let error = (a.angular_acceleration - b.angular_acceleration).norm();
+                    assert!(error < 2e-4 * b.angular_acceleration.norm().max(1.0), "{label}: {error:e}");
                 }
                 assert_eq!(frame.coordinates.len(), end.coordinates.len());
                 for (a, b) in frame.coordinates.iter().zip(&end.coordinates) {
@@ -140,8 +140,8 @@ fn a_body_on_a_closing_joint_moves_as_with_the_joint_in_the_tree() {
                     assert!((a - b).abs() < 1e-5, "{label}: {a} {b}");
                 }
                 for (own, expected) in frame.closing[0].iter().zip(joint_load(&frame.bodies[1])) {
-                    let off = (own - expected).norm();
-                    assert!(off < 2e-4, "{label}: {own} {expected}");
+                    let error = (own - expected).norm();
+                    assert!(error < 2e-4, "{label}: {own} {expected}");
                 }
                 let residual = simulation.ledger().unwrap().relative_residual();
                 assert!(residual.abs() < 1e-6, "{label}: {residual:e}");
@@ -258,8 +258,8 @@ fn a_planar_four_bar_closed_by_a_hinge_moves_as_one_closed_by_a_ball_joint() {
         let bound = if formulation == "tree" { 1e-9 } else { 1e-6 };
         assert!(loop_residual(&frame) < bound, "{formulation}: {:e}", loop_residual(&frame));
         for (a, b) in frame.bodies.iter().zip(&end.bodies) {
-            let off = (a.position - b.position).norm();
-            assert!(off < 1e-6, "{formulation}: {off:e}");
+            let error = (a.position - b.position).norm();
+            assert!(error < 1e-6, "{formulation}: {error:e}");
         }
         let residual = simulation.ledger().unwrap().relative_residual();
         assert!(residual.abs() < 1e-6, "{formulation}: {residual:e}");
@@ -280,8 +280,8 @@ fn a_planar_four_bar_closed_by_a_hinge_moves_as_one_closed_by_a_ball_joint() {
         assert!((a - b).norm() < 1e-3 * tree[0].norm(), "{a} {b}");
     }
     assert!(tree[0].y.abs() < 1e-9 * tree[0].norm() && tree[1].norm() < 1e-9);
-    let off = (tree[0] - end.joints[0].normal_force).norm();
-    assert!(off < 1e-4 * tree[0].norm(), "{off:e}");
+    let error = (tree[0] - end.joints[0].normal_force).norm();
+    assert!(error < 1e-4 * tree[0].norm(), "{error:e}");
 }
 
 /// The four-bar with a bob on a loose ball joint, which exercises contacts, implicit contacts and automatic selection.
@@ -362,8 +362,8 @@ fn a_scotch_yoke_follows_its_closed_form() {
         let frame = frame_at(&mut simulation, 0.3);
         let angle: f64 = 0.5 + 9.0 * 0.3;
         let torque = 1.5 * YOKE * YOKE * 81.0 * angle.sin() * angle.cos();
-        let off = frame.actuators[0] - torque;
-        assert!(off.abs() < 1e-5 * torque.abs().max(1.0), "{formulation}: {off:e}");
+        let error = frame.actuators[0] - torque;
+        assert!(error.abs() < 1e-5 * torque.abs().max(1.0), "{formulation}: {error:e}");
         assert_eq!(simulation.indeterminate_forces().actuators, [0; 0]);
     }
 }
@@ -404,8 +404,8 @@ fn a_universal_joint_turns_a_shaft_at_its_known_ratio() {
                 let slope =
                     -bend.cos() * 2.0 * bend.sin().powi(2) * cos * sin / (1.0 - (bend.sin() * cos).powi(2)).powi(2);
                 let torque = 2e-3 * ratio * slope * 100.0;
-                let off = (frame.actuators[0] - torque).abs();
-                assert!(off < 2e-3 * fast.max(1e-6) * 100.0, "{bearing} {formulation} {t}: {off:e}");
+                let error = (frame.actuators[0] - torque).abs();
+                assert!(error < 2e-3 * fast.max(1e-6) * 100.0, "{bearing} {formulation} {t}: {error:e}");
             }
         }
     }

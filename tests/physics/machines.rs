@@ -80,8 +80,8 @@ fn cranks_of_the_hexapod_agree_with_inverse_kinematics() {
                 let phase = f64::from(number) * PI / 3.0;
                 let driven = swing.to_radians() * (TAU * rate * frame.time + phase).sin();
                 // Error at the crank's ball, m.
-                let off = crank * (angle - driven);
-                assert!(off.abs() < 1e-9, "{number}, {} s: {off:e} m", frame.time);
+                let error = crank * (angle - driven);
+                assert!(error.abs() < 1e-9, "{number}, {} s: {error:e} m", frame.time);
             }
         });
     }
@@ -110,8 +110,8 @@ fn arms_of_the_delta_agree_with_inverse_kinematics() {
                 let angle = solve_angle(a, b, c, -1.0);
                 let phase = f64::from(arm) * TAU / 3.0;
                 let driven = lift + swing * (TAU * 1.5 * frame.time + phase).sin();
-                let off = angle - driven;
-                assert!(off.abs() < 1e-8, "arm {arm}, {} s: {off:e} rad", frame.time);
+                let error = angle - driven;
+                assert!(error.abs() < 1e-8, "arm {arm}, {} s: {error:e} rad", frame.time);
             }
             // The scene's description promises a circle; it is one within 2 %.
             let radius = centre.xy().norm();
@@ -147,8 +147,8 @@ fn the_rocker_of_the_four_bar_obeys_the_loop_equation() {
             let squares = ROCKER.powi(2) + HINGE.powi(2) + crank * crank - coupler * coupler;
             let angle = solve_angle(HINGE, -crank * cos, squares / (2.0 * ROCKER), -1.0);
             let axes = pose(scene, frame, "rocker").1;
-            let off = axes[(0, 2)].atan2(axes[(2, 2)]) - angle;
-            assert!(off.abs() < 1e-9, "{} s: {off:e} rad", frame.time);
+            let error = axes[(0, 2)].atan2(axes[(2, 2)]) - angle;
+            assert!(error.abs() < 1e-9, "{} s: {error:e} rad", frame.time);
             // The source gives this angle from the line of the hinges to a hundredth of a degree.
             if frame.time == 0.0 && crank == 0.050 {
                 assert!((180.0 + angle.to_degrees() - 112.77).abs() < 0.005);
@@ -173,15 +173,15 @@ fn the_ram_of_the_press_follows_from_two_circles() {
             let c = pin[0].powi(2) + pin[1].powi(2) + LINK.powi(2) - ROD.powi(2);
             // Angle from the vertical, positive to the right.
             let swing = solve_angle(-2.0 * LINK * pin[1], 2.0 * LINK * pin[0], c, -1.0);
-            let off = pose(scene, frame, "ram").0.z + 2.0 * LINK * swing.cos();
-            assert!(off.abs() < 1e-9, "{} s: {off:e} m", frame.time);
+            let error = pose(scene, frame, "ram").0.z + 2.0 * LINK * swing.cos();
+            assert!(error.abs() < 1e-9, "{} s: {error:e} m", frame.time);
             // The hinge that closes the loop.
             let (rod, link) = (pose(scene, frame, "connecting-rod"), pose(scene, frame, "upper-link"));
             let of_rod = rod.0 + rod.1 * Vec3::new(-ROD, 0.0, 0.0);
             let of_link = link.0 + link.1 * Vec3::new(0.0, 0.0, -LINK);
             let knee = Vec3::new(LINK * swing.sin(), 0.0, -LINK * swing.cos());
-            let off = (of_rod - knee).norm().max((of_link - knee).norm());
-            assert!(off < 1e-9, "{} s: {off:e} m", frame.time);
+            let error = (of_rod - knee).norm().max((of_link - knee).norm());
+            assert!(error < 1e-9, "{} s: {error:e} m", frame.time);
         });
     }
 }
@@ -439,22 +439,22 @@ fn the_suspension_rests_in_its_design_pose_and_play_allows_toe_change() {
         let changes = [&flat_road[..], &[("parameter.sprung", sprung)]].concat();
         let mut simulation = simulation("suspension", &changes);
         run_until(&mut simulation, 0.5);
-        let moved = frame_now(&mut simulation).pose.position;
-        assert!(moved.norm() < 1e-6, "{sprung}: {moved:?}");
+        let displacement = frame_now(&mut simulation).pose.position;
+        assert!(displacement.norm() < 1e-6, "{sprung}: {displacement:?}");
     }
     // Range of the toe angle, the upright's angle about Z.
     let toe_range = |changes: &Changes| {
         let mut simulation = simulation("suspension", changes);
-        let (mut frame, mut least, mut most) = (Frame::default(), f64::MAX, f64::MIN);
+        let (mut frame, mut min, mut max) = (Frame::default(), f64::MAX, f64::MIN);
         for n in 0..=200 {
             let time = 1e-3 * f64::from(n);
             simulation.advance_to(time).unwrap();
             simulation.sample(time, &mut frame);
             let axes = pose(simulation.machine(), &frame, "upright").1;
             let toe = axes[(1, 0)].atan2(axes[(0, 0)]);
-            (least, most) = (least.min(toe), most.max(toe));
+            (min, max) = (min.min(toe), max.max(toe));
         }
-        most - least
+        max - min
     };
     let (ideal, loose) = (toe_range(&[IDEAL]), toe_range(&[]));
     let worn = toe_range(&[("joint.outer.clearance", "1.5 mm")]);
@@ -488,9 +488,9 @@ fn each_machine_with_one_loose_joint_moves_the_same_under_another_solver() {
         // The other solver uses the speed at the onset of contact, not the largest one since.
         let start = ("contact.approach_speed", "start");
         let changes = [IDEAL, (&*key, "0.1 mm"), start];
-        let (contacts, off) = compare_with_other_solver(name, &changes, end);
+        let (contacts, error) = compare_with_other_solver(name, &changes, end);
         assert!(contacts >= 1, "{name}");
-        assert!(off < 1e-9, "{name}: {off:e}");
+        assert!(error < 1e-9, "{name}: {error:e}");
     }
 }
 
@@ -587,7 +587,7 @@ fn the_rocker_of_the_four_bar_sags_when_slow_and_leads_and_lags_when_fast() {
         let text = format!("{speed} rad/s");
         let mut runs = [&[][..], &[IDEAL]]
             .map(|more: &Changes| simulation("four-bar", &[&[("parameter.speed", &*text)], more].concat()));
-        let (mut frame, mut least, mut most) = (Frame::default(), f64::MAX, f64::MIN);
+        let (mut frame, mut min, mut max) = (Frame::default(), f64::MAX, f64::MIN);
         // From half a turn to one and a half.
         for n in 50..=150 {
             let time = TAU / speed * f64::from(n) / 100.0;
@@ -597,9 +597,9 @@ fn the_rocker_of_the_four_bar_sags_when_slow_and_leads_and_lags_when_fast() {
                 let axes = pose(run.machine(), &frame, "rocker").1;
                 0.120 * axes[(0, 2)].atan2(axes[(2, 2)])
             });
-            (least, most) = (least.min(loose - ideal), most.max(loose - ideal));
+            (min, max) = (min.min(loose - ideal), max.max(loose - ideal));
         }
-        (least, most)
+        (min, max)
     };
     let (slow, fast) = (deviation_range(5.0), deviation_range(20.0));
     assert!(slow.0 > 2e-5 && slow.1 > 1e-4 && slow.1 < 1.5e-4, "{slow:?}");

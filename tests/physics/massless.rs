@@ -21,18 +21,18 @@ fn in_series(gravity: f64) -> String {
     let (ring, rod) = joints.split_once("[[joint]]\nname = \"u\"").expect("a universal joint");
     let line = |of: &str, key: &str| of.lines().find(|line| line.starts_with(key)).expect("a key").to_owned();
     let axes = |of: &str| (line(of, "axis"), line(of, "parent_point"), line(of, "child_point"), line(of, "rotation"));
-    let (along, at, child, turned) = axes(ring);
+    let (along, at, child, rotation) = axes(ring);
     let slide = format!(
         "[[joint]]\nname = \"c1\"\nkind = \"prismatic\"\nparent = \"base\"\nchild = \"sleeve\"\n{along}\n{at}\n\
          start = {{ position = \"5 mm\", velocity = \"0.2 m/s\" }}\n\
-         [[joint]]\nname = \"c2\"\nkind = \"revolute\"\nparent = \"sleeve\"\nchild = \"ring\"\n{along}\n{child}\n{turned}\n\
+         [[joint]]\nname = \"c2\"\nkind = \"revolute\"\nparent = \"sleeve\"\nchild = \"ring\"\n{along}\n{child}\n{rotation}\n\
          start = {{ position = \"20 deg\", velocity = \"6 rad/s\" }}\n"
     );
-    let (first, at, child, turned) = axes(rod);
+    let (first, at, child, rotation) = axes(rod);
     let hinges = format!(
         "[[joint]]\nname = \"u1\"\nkind = \"revolute\"\nparent = \"ring\"\nchild = \"cross\"\n{first}\n{at}\n\
          start = {{ position = \"25 deg\", velocity = \"3 rad/s\" }}\n\
-         [[joint]]\nname = \"u2\"\nkind = \"revolute\"\nparent = \"cross\"\nchild = \"rod\"\naxis = [0, 0, 1]\n{child}\n{turned}\n\
+         [[joint]]\nname = \"u2\"\nkind = \"revolute\"\nparent = \"cross\"\nchild = \"rod\"\naxis = [0, 0, 1]\n{child}\n{rotation}\n\
          start = {{ position = \"-40 deg\", velocity = \"-5 rad/s\" }}\n"
     );
     format!("{before}{}{}{slide}{hinges}", link("sleeve"), link("cross"))
@@ -42,13 +42,13 @@ fn in_series(gravity: f64) -> String {
 fn assert_agree(frame: &Frame, other: &Frame, bodies: &[(usize, usize)], bound: f64, what: &str) {
     for &(one, two) in bodies {
         let (a, b) = (&frame.bodies[one], &other.bodies[two]);
-        let off = [
+        let errors = [
             (a.position - b.position).norm(),
             (a.rotation - b.rotation).amax(),
             (a.velocity - b.velocity).norm() / 10.0,
             (a.angular_velocity - b.angular_velocity).norm() / 10.0,
         ];
-        assert!(off.iter().all(|off| *off < bound), "{what}: body {one}: {off:?}");
+        assert!(errors.iter().all(|error| *error < bound), "{what}: body {one}: {errors:?}");
     }
 }
 
@@ -68,8 +68,8 @@ fn joints_in_series_move_as_a_cylindrical_and_a_universal_joint() {
         assert_agree(&frame_now(&mut single), &frame_now(&mut series), &pairs, 1e-13, "at the start");
         for (a, b) in pairs {
             let (own, other) = (frame_now(&mut single), frame_now(&mut series));
-            let off = (own.bodies[a].acceleration - other.bodies[b].acceleration).norm();
-            assert!(off < 1e-9, "{variant}: {off:e}");
+            let error = (own.bodies[a].acceleration - other.bodies[b].acceleration).norm();
+            assert!(error < 1e-9, "{variant}: {error:e}");
         }
         assert_agree(
             &frame_at(&mut single, 0.2),

@@ -245,21 +245,21 @@ fn a_four_bar_closed_by_an_ideal_ball_joint_obeys_geometry_and_energy() {
             last = crank;
             let expected = bar.angles(crank);
             for (body, angle) in expected.iter().enumerate() {
-                let off = angle_difference(angle_of(&frame, turn, body), *angle);
+                let error = angle_difference(angle_of(&frame, turn, body), *angle);
                 // `lagrange` only stabilises the constraints.
                 let limit = if form == "tree" { 1e-11 } else { 1e-7 };
-                assert!(off < limit, "{form}, body {body}: {off:e}");
+                assert!(error < limit, "{form}, body {body}: {error:e}");
             }
             let w = frame.bodies[0].angular_velocity.norm();
             let rate = bar.rate_squared(crank).sqrt();
             assert!((w - rate).abs() < 1e-6 * bar.rate, "{form}: {w} {rate}");
             let time = bar.time_to(bar.angle + turned);
-            let off = time - frame.time;
-            assert!(off.abs() < 1e-6, "{form}: {off:e} s at {}", frame.time);
+            let error = time - frame.time;
+            assert!(error.abs() < 1e-6, "{form}: {error:e} s at {}", frame.time);
             let force = turn.inverse() * frame.joints[0].normal_force;
             let [x, z] = bar.reaction(crank);
-            let off = (force - Vec3::new(x, 0.0, z)).norm();
-            assert!(off < 1e-5 * x.hypot(z).max(1.0), "{form}: {force} {x} {z}");
+            let error = (force - Vec3::new(x, 0.0, z)).norm();
+            assert!(error < 1e-5 * x.hypot(z).max(1.0), "{form}: {force} {x} {z}");
         }
         assert!(turned > 1.0, "the crank turns: {turned}");
     }
@@ -283,10 +283,10 @@ fn every_method_steps_a_planar_loop_ideal_driven_and_with_play() {
             let impacts = simulation.statistics().impacts[0];
             assert_eq!(impacts > 0, clearance != "0");
             for (a, b) in frame.bodies.iter().zip(&reference.bodies) {
-                let off = (a.position - b.position).norm();
+                let error = (a.position - b.position).norm();
                 // Bounds for first-order methods at 10 us; impacts amplify the differences.
                 let limit = if clearance == "0" { 2e-6 } else { 3e-4 };
-                assert!(off < limit, "{clearance}, {driven:?}, {variant}: {off:e}");
+                assert!(error < limit, "{clearance}, {driven:?}, {variant}: {error:e}");
             }
         }
     }
@@ -423,8 +423,8 @@ fn two_ball_joints_make_a_hinge() {
         assert_eq!(simulation.mechanism().summary().degrees_of_freedom, 1);
         run_until(&mut simulation, 0.5);
         let frame = frame_now(&mut simulation);
-        let off = (frame.bodies[0].position - expected.bodies[0].position).norm();
-        assert!(off < 1e-7, "{form}: {off:e}");
+        let error = (frame.bodies[0].position - expected.bodies[0].position).norm();
+        assert!(error < 1e-7, "{form}: {error:e}");
         let [low, high] = [0, 1].map(|j| frame.joints[j].normal_force);
         assert!((low + high - weight).norm() < 1e-5, "{form}: {}", low + high);
         assert!((low - high).dot(&axis).abs() < 1e-6, "{form}: {low} {high}");

@@ -300,16 +300,16 @@ proptest! {
     fn every_value_goes_through_text_and_back(
         (row, value) in rows().prop_flat_map(|row| values(row).prop_map(move |value| (row, value)))
     ) {
-        let written = row.write(&value);
-        prop_assert_eq!(row.read(&written), Ok(value.clone()), "{}", written);
+        let text = row.write(&value);
+        prop_assert_eq!(row.read(&text), Ok(value.clone()), "{}", text);
         prop_assert!(row.check(&value).is_ok());
         let mut scene = with_row(row);
         match scene.set_value(row.key, &value) {
             Ok(_) => {
                 prop_assert_eq!(scene.get(row.key).unwrap(), value);
                 // The recorded changes reproduce the scene.
-                let again = Scene::load(&scene.name, &scene.changes).unwrap();
-                prop_assert_eq!(again.get(row.key).unwrap(), scene.get(row.key).unwrap());
+                let reloaded = Scene::load(&scene.name, &scene.changes).unwrap();
+                prop_assert_eq!(reloaded.get(row.key).unwrap(), scene.get(row.key).unwrap());
             }
             Err(error) => prop_assert!(error.to_string().contains(row.key), "{}", error),
         }
@@ -329,11 +329,11 @@ proptest! {
             Kind::Choice(_) => return Ok(()),
         };
         prop_assert!(row.check(&outside).is_err());
-        let written = row.write(&outside);
+        let text = row.write(&outside);
         let mut scene = with_row(row);
         let before = scene.clone();
-        let words = scene.set(row.key, &written).unwrap_err().to_string();
-        prop_assert!(words.starts_with(&format!("{} = {written}: ", row.key)), "{}", words);
+        let words = scene.set(row.key, &text).unwrap_err().to_string();
+        prop_assert!(words.starts_with(&format!("{} = {text}: ", row.key)), "{}", words);
         prop_assert!(words.contains(&row.range()), "{}", words);
         prop_assert!(words.contains(&row.units()), "{}", words);
         prop_assert_eq!(scene.changes, before.changes);

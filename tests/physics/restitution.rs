@@ -56,8 +56,8 @@ fn an_undisturbed_impact_has_the_restitution_of_its_law() {
                 "semi-implicit-euler" => 2e-2,
                 _ => 1e-3,
             };
-            let found = impacts(&mut axial_impact(&changes), 0.02);
-            let first = found.first().unwrap();
+            let impacts = impacts(&mut axial_impact(&changes), 0.02);
+            let first = impacts.first().unwrap();
             let case = format!("{word} {restitution}, {method}: {first:?}");
             println!("{case}: gave {:.5}, law {expected:.5}", first.achieved());
             assert_eq!((first.asked, first.joint), (requested, 0), "{case}");

@@ -32,8 +32,8 @@ fn a_cylindrical_joint_slides_and_turns_independently() {
         let z = 0.02 + 0.4 * t - 0.5 * G * t * t;
         let angle = 30_f64.to_radians() + 7.0 * t;
         let body = &frame.bodies[0];
-        let off = (body.position - Vec3::new(0.0, 0.0, z)).norm();
-        assert!(off < bound, "{variant}: {off:e}");
+        let error = (body.position - Vec3::new(0.0, 0.0, z)).norm();
+        assert!(error < bound, "{variant}: {error:e}");
         let turned = body.rotation[(1, 0)].atan2(body.rotation[(0, 0)]);
         assert!(angle_difference(turned, angle) < bound, "{variant}: {turned} {angle}");
         let [[slid, speed], [turned, spin]] = frame.coordinates[..] else {
@@ -109,8 +109,8 @@ fn a_chain_of_both_joints_starts_at_its_coordinates() {
         let of_ring = base.rotation * ring_turn.to_rotation_matrix().into_inner();
         assert!((ring.rotation - of_ring).amax() < 1e-14);
         let joint = base.position + base.rotation * (Vec3::new(0.05, 0.0, 0.02) + along * 5e-3);
-        let off = joint - (ring.position + ring.rotation * Vec3::new(-0.01, 0.0, 0.03));
-        assert!(off.norm() < 1e-15, "{off}");
+        let error = joint - (ring.position + ring.rotation * Vec3::new(-0.01, 0.0, 0.03));
+        assert!(error.norm() < 1e-15, "{error}");
         let spin = base.angular_velocity + base.rotation * along * 6.0;
         assert!((ring.angular_velocity - spin).norm() < 1e-13);
         let rest = rotation_about(Vec3::new(1.0, 2.0, -1.0), 0.6);
@@ -151,8 +151,8 @@ fn a_free_chain_conserves_momenta_and_energy_in_both_formulations() {
         panic!("two formulations");
     };
     for (a, b) in tree.bodies.iter().zip(&lagrange.bodies) {
-        let off = (a.position - b.position).norm();
-        assert!(off < 1e-7, "{off:e}");
+        let error = (a.position - b.position).norm();
+        assert!(error < 1e-7, "{error:e}");
         assert!((a.angular_velocity - b.angular_velocity).norm() < 1e-5);
     }
     for (a, b) in tree.coordinates.iter().zip(&lagrange.coordinates) {
@@ -170,9 +170,9 @@ fn the_error_falls_with_the_order_of_the_method() {
     let exact = end("dopri5", "10 us", "1e-13");
     let points = [8.0, 4.0, 2.0].map(|ms| {
         let frame = end("rk4", &format!("{ms} ms"), "1e-6");
-        let off = frame.bodies.iter().zip(&exact.bodies);
-        let off = off.map(|(a, b)| (a.position - b.position).norm());
-        (ms, off.fold(0.0, f64::max))
+        let pairs = frame.bodies.iter().zip(&exact.bodies);
+        let errors = pairs.map(|(a, b)| (a.position - b.position).norm());
+        (ms, errors.fold(0.0, f64::max))
     });
     let order = slope(&points);
     assert!((3.7..4.5).contains(&order), "{order}: {points:?}");

@@ -62,8 +62,8 @@ fn a_wheel_follows_a_wavy_road_as_in_the_linear_solution() {
         let frame = frame_at(&mut simulation, time);
         let label = format!("{variant}, damping {damping}");
         let expected = ride_height(damping, waves, time);
-        let off = frame.bodies[0].position.z - REST - expected;
-        assert!(off.abs() < variant.bound(), "{label}: {off:e} of {expected:e}");
+        let error = frame.bodies[0].position.z - REST - expected;
+        assert!(error.abs() < variant.bound(), "{label}: {error:e} of {expected:e}");
         let ground = waves[0] * (waves[1] * time).sin();
         let depth = ground + RADIUS - frame.bodies[0].position.z;
         let stored = 0.5 * STIFFNESS * depth * depth;
@@ -162,10 +162,11 @@ fn up_is_opposite_to_the_gravity_of_the_file_unless_given() {
     let mut simulation = start_simulation(&text, &[]);
     simulation.set("gravity.z", "5 m/s^2").unwrap();
     assert!((frame_at(&mut simulation, 0.0).elements[0].force - weight).norm() < 1e-9);
-    let given = wheel(REST, "up = [0, 0.6, 0.8]\nground = { law = \"constant\", position = \"-50 mm\", velocity = 0 }");
+    let tilted =
+        wheel(REST, "up = [0, 0.6, 0.8]\nground = { law = \"constant\", position = \"-50 mm\", velocity = 0 }");
     let height = RADIUS - 0.05 - 0.8 * REST;
     let expected = Vec3::new(0.0, 0.6, 0.8) * (STIFFNESS * height.max(0.0));
-    assert!((push(&given, &[]) - expected).norm() < 1e-9, "{expected}");
+    assert!((push(&tilted, &[]) - expected).norm() < 1e-9, "{expected}");
 }
 
 #[test]

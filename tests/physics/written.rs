@@ -283,8 +283,8 @@ proptest! {
             let turn = Quat::from_axis_angle(&axis, angle * k as f64);
             let expected = centre + turn * (at - centre) + along * k as f64;
             prop_assert!((body.position - expected).norm() < 1e-12);
-            let turned = body.rotation - turn.to_rotation_matrix().into_inner();
-            prop_assert!(turned.amax() < 1e-12);
+            let error = body.rotation - turn.to_rotation_matrix().into_inner();
+            prop_assert!(error.amax() < 1e-12);
             prop_assert_eq!(scene.machine.bodies[k].mass, (k + 1) as f64);
         }
     }
@@ -293,12 +293,12 @@ proptest! {
     fn an_included_part_equals_the_same_text_in_the_scene(element in elements(), cut in 0..5_usize) {
         // The included part comes last, so that lists keep their order.
         let parts: Vec<&str> = element.split_inclusive("\n\n").collect();
-        let (here, there) = parts.split_at(cut.min(parts.len()));
-        let (here, there) = (here.concat(), there.concat());
-        let files = Texts::from([("part.toml".to_owned(), there.into())]);
+        let (own, included) = parts.split_at(cut.min(parts.len()));
+        let (own, included) = (own.concat(), included.concat());
+        let files = Texts::from([("part.toml".to_owned(), included.into())]);
         if Scene::parse(&element, None, &[]).is_ok() {
             let whole = format!("name = \"x\"\n{element}");
-            let split = format!("name = \"x\"\ninclude = [\"part.toml\"]\n{here}");
+            let split = format!("name = \"x\"\ninclude = [\"part.toml\"]\n{own}");
             prop_assert_eq!(without_source(&whole, &Texts::new()), without_source(&split, &files));
         }
     }
@@ -334,11 +334,11 @@ proptest! {
         };
         let plain = body(density, [0.0; 3]).unwrap();
         let heavy = body(2.0 * density, [0.0; 3]).unwrap();
-        let moved = body(density, shift).unwrap();
+        let shifted = body(density, shift).unwrap();
         prop_assert_eq!(heavy.mass, 2.0 * plain.mass);
         prop_assert_eq!(heavy.inertia, plain.inertia * 2.0);
-        prop_assert!((moved.mass / plain.mass - 1.0).abs() < 1e-9);
-        prop_assert!((moved.centre - plain.centre - Vec3::from(shift)).norm() < 1e-9);
-        prop_assert!((moved.inertia - plain.inertia).amax() < 1e-6 * plain.inertia.amax());
+        prop_assert!((shifted.mass / plain.mass - 1.0).abs() < 1e-9);
+        prop_assert!((shifted.centre - plain.centre - Vec3::from(shift)).norm() < 1e-9);
+        prop_assert!((shifted.inertia - plain.inertia).amax() < 1e-6 * plain.inertia.amax());
     }
 }

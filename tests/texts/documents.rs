@@ -38,9 +38,9 @@ fn examples() -> Vec<String> {
 
 /// The first TOML block of that page that contains `line`.
 fn example(line: &str) -> String {
-    let blocks = examples();
-    let found = blocks.into_iter().find(|block| block.contains(line));
-    found.expect("a block of TOML")
+    let mut blocks = examples().into_iter();
+    let example = blocks.find(|block| block.contains(line));
+    example.expect("a block of TOML")
 }
 
 #[test]

@@ -124,8 +124,8 @@ fn a_formula_may_be_one_of_the_scenes_parameters() {
         // Constants are folded: the derivative of asin(1) is 0, not infinite.
         ("revolute", "formula = \"asin(2 * part) * rate * t\"", 1.5 * std::f64::consts::PI * t),
     ] {
-        let found = formula(PARAMETERS, kind, &format!("law = \"formula\", {drive}"), t);
-        assert!((found - expected).abs() < 1e-14, "{drive}: {found} {expected}");
+        let value = formula(PARAMETERS, kind, &format!("law = \"formula\", {drive}"), t);
+        assert!((value - expected).abs() < 1e-14, "{drive}: {value} {expected}");
     }
     let text = format!("{PARAMETERS}{}", text("prismatic", "law = \"formula\", formula = \"stroke * t / 1 s\""));
     let mut scene = Scene::parse(&text, None, &[]).unwrap();

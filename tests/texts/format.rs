@@ -126,9 +126,9 @@ struct Contents {
 impl Contents {
     fn of(text: &str) -> Self {
         let document: DocumentMut = text.parse().unwrap();
-        let mut found = Self { keys: Vec::new(), tables: Vec::new() };
-        found.walk(document.as_item(), &FILE, Vec::new());
-        found
+        let mut contents = Self { keys: Vec::new(), tables: Vec::new() };
+        contents.walk(document.as_item(), &FILE, Vec::new());
+        contents
     }
 
     fn walk(&mut self, item: &Item, rows: &'static FileTable, path: Vec<Step>) {
@@ -190,10 +190,12 @@ fn first_occurrences() -> Vec<(String, String, Contents)> {
         path.iter().filter_map(key).collect()
     };
     let own = |(name, text): (String, String)| {
-        let mut found = Contents::of(text.trim_start_matches('\u{feff}'));
-        found.keys.retain(|(path, row, word)| keys.insert((keys_of_path(path), std::ptr::from_ref(*row), *word)));
-        found.tables.retain(|(path, rows, word)| tables.insert((keys_of_path(path), std::ptr::from_ref(*rows), *word)));
-        (name, text, found)
+        let mut contents = Contents::of(text.trim_start_matches('\u{feff}'));
+        contents.keys.retain(|(path, row, word)| keys.insert((keys_of_path(path), std::ptr::from_ref(*row), *word)));
+        contents
+            .tables
+            .retain(|(path, rows, word)| tables.insert((keys_of_path(path), std::ptr::from_ref(*rows), *word)));
+        (name, text, contents)
     };
     scenes().into_iter().map(own).collect()
 }
@@ -208,16 +210,16 @@ fn last_key(error: &SceneError) -> String {
 #[test]
 fn every_key_of_the_format_is_read_and_no_other() {
     let mut read = BTreeSet::new();
-    for (name, text, found) in first_occurrences() {
+    for (name, text, contents) in first_occurrences() {
         parse(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
-        for (path, row, _) in found.keys {
+        for (path, row, _) in contents.keys {
             // No key accepts a date, so only a key that is never read would let it pass.
             let wrong = changed(&text, &path, None);
             let error = parse(&wrong).expect_err(&format!("{name}: {path:?} is not read"));
             assert_eq!(last_key(&error), row.name, "{name}: {path:?}: {error}");
             read.insert(std::ptr::from_ref(row));
         }
-        for (path, rows, _) in found.tables {
+        for (path, rows, _) in contents.tables {
             let error = parse(&changed(&text, &path, Some("hue"))).unwrap_err();
             assert_eq!(last_key(&error), "hue", "{name}: {path:?}: {error}");
             assert!(error.message.contains("unknown key"), "{}: {error}", rows.name);
@@ -344,14 +346,14 @@ fn the_schema_accepts_whatever_the_reader_accepts() {
 #[test]
 fn the_schema_refuses_wrong_values_and_unknown_keys() {
     let schema = Schema::new();
-    for (name, text, found) in first_occurrences() {
+    for (name, text, contents) in first_occurrences() {
         let text = text.trim_start_matches('\u{feff}');
-        for (path, ..) in &found.keys {
+        for (path, ..) in &contents.keys {
             // Not a valid value of any kind.
             let wrong = changed(text, path, None).replace("1979-05-27", "{ colour = { red = 1 } }");
             assert!(schema.check(&wrong).is_err(), "{name}: {path:?}");
         }
-        for (path, ..) in &found.tables {
+        for (path, ..) in &contents.tables {
             let wrong = changed(text, path, Some("hue"));
             assert!(schema.check(&wrong).is_err(), "{name}: {path:?}");
         }

@@ -184,9 +184,9 @@ fn paths<'c>(code: &'c str, starts: &[&str]) -> Vec<(usize, Vec<&'c str>)> {
     for (at, word) in words(code) {
         let begins = !code[..at].ends_with("::") && code[at + word.len()..].starts_with("::");
         if begins && starts.contains(&word) {
-            let mut found = Vec::new();
-            parse_use_tree(&code[at..], &[], &mut found);
-            all.extend(found.into_iter().map(|path| (at, path)));
+            let mut paths = Vec::new();
+            parse_use_tree(&code[at..], &[], &mut paths);
+            all.extend(paths.into_iter().map(|path| (at, path)));
         }
     }
     all

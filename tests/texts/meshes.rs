@@ -124,10 +124,10 @@ fn a_mesh_is_read_once() {
     // The stored content is used even after the file is deleted.
     drop(folder);
     let source = &first.source;
-    let again = Scene::parse_with(&source.text, Some("scene.toml"), &source.beside, &[]).unwrap();
-    assert_eq!(again.machine.bodies, first.machine.bodies);
+    let reread = Scene::parse_with(&source.text, Some("scene.toml"), &source.beside, &[]).unwrap();
+    assert_eq!(reread.machine.bodies, first.machine.bodies);
     assert_eq!(first.to_toml().unwrap(), source.text);
-    let Geometry::Mesh { mesh, unit, .. } = &again.machine.bodies[0].shapes[0].geometry else {
+    let Geometry::Mesh { mesh, unit, .. } = &reread.machine.bodies[0].shapes[0].geometry else {
         panic!("a mesh");
     };
     assert_eq!((mesh.triangles().len(), *unit), (1, 1e-3));
