@@ -132,8 +132,8 @@ fn a_pdf_has_every_line_marker_and_letter_of_the_svg() {
     let with = |title: &str| page(&Sheet { title: title.to_owned(), ..sheet.clone() }.pdf().unwrap()).1;
     let (nothing, plain) = (with(""), with("o"));
     for letter in ["²", "µ", "·", "Δ", "ε", "°", "⁻", "−"] {
-        let own = with(letter);
-        assert!(own != plain && operations(&own, "f") == operations(&nothing, "f") + 1, "{letter}");
+        let content = with(letter);
+        assert!(content != plain && operations(&content, "f") == operations(&nothing, "f") + 1, "{letter}");
     }
 }
 
@@ -242,8 +242,9 @@ fn blue_pixels(series: Series) -> Vec<(u32, u32)> {
 fn a_bar_has_the_length_of_its_values_and_the_given_thickness() {
     let extent = |from: f64, to: f64, width: f64| {
         let pixels = blue_pixels(Series::bar("", (from, to), 5.0, width, PALETTE[1]));
-        let span = |of: fn(&(u32, u32)) -> u32| {
-            let (low, high) = (pixels.iter().map(of).min().unwrap(), pixels.iter().map(of).max().unwrap());
+        let span = |component: fn(&(u32, u32)) -> u32| {
+            let (low, high) =
+                (pixels.iter().map(component).min().unwrap(), pixels.iter().map(component).max().unwrap());
             assert!(low < high);
             high + 1 - low
         };

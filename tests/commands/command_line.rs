@@ -480,9 +480,9 @@ fn lessons_are_listed_and_a_file_is_checked() {
     assert!(printed.contains("[x]  At nearly the same time") && printed.contains("7.8 ms"), "{printed}");
     let near = jointplay(folder.path(), "lessons ratle").expect(2).stderr;
     assert!(near.contains("did you mean `rattle`?"), "{near}");
-    let own = "title = \"x\"\nscene = \"pendulum\"\n[measure]\nfirst = { impact = 1 }\n[[step]]\ntitle = \"x\"\ntext = \"\"\n\
+    let lesson = "title = \"x\"\nscene = \"pendulum\"\n[measure]\nfirst = { impact = 1 }\n[[step]]\ntitle = \"x\"\ntext = \"\"\n\
                claims = [\"first < 1 ms\"]\n";
-    fs::write(folder.path().join("own.toml"), own).unwrap();
+    fs::write(folder.path().join("own.toml"), lesson).unwrap();
     let wrong = jointplay(folder.path(), "lessons own.toml").expect(2).stderr;
     assert!(wrong.contains("step 1: `first < 1 ms` does not hold: first is 7.8"), "{wrong}");
 }
@@ -926,7 +926,7 @@ fn control_characters_of_foreign_text_do_not_reach_the_terminal() {
         fs::write(folder.path().join(name), text).unwrap();
         format!("./{name}")
     };
-    let hostile = |of: &str| good.replace(of, &format!("{} = \"{escaped}\"", of.split(' ').next().unwrap()));
+    let hostile = |line: &str| good.replace(line, &format!("{} = \"{escaped}\"", line.split(' ').next().unwrap()));
     let scenes = [
         file("title.toml", &with_title),
         file(&format!("{CONTROL}.toml"), &unnamed),

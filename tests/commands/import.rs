@@ -209,14 +209,17 @@ fn default_classes_apply_to_their_elements() {
                 <body name="c" pos="1 0 0"><joint name="three" damping="0" springref="0.5"/><geom size="0.1"/></body></body></body></worldbody></mujoco>"#;
     let (scene, _) = imported(text);
     let text = &scene.source.text;
-    let of = |joint: &str| {
+    let spring_of = |joint: &str| {
         let from = text.find(&format!("name = \"{joint}_spring\"")).unwrap();
         let section = &text[from..];
         section[..section.find("\n\n").unwrap_or(section.len())].to_owned()
     };
-    assert!(of("one").contains("stiffness = \"20 N m/rad\"") && of("one").contains("damping = \"1 N m s/rad\""));
-    assert!(of("two").contains("damping = \"1 N m s/rad\"") && !of("two").contains("stiffness"));
-    assert!(of("three").contains("position = \"0.5 rad\"") && !of("three").contains("damping"));
+    assert!(
+        spring_of("one").contains("stiffness = \"20 N m/rad\"")
+            && spring_of("one").contains("damping = \"1 N m s/rad\"")
+    );
+    assert!(spring_of("two").contains("damping = \"1 N m s/rad\"") && !spring_of("two").contains("stiffness"));
+    assert!(spring_of("three").contains("position = \"0.5 rad\"") && !spring_of("three").contains("damping"));
 }
 
 #[test]

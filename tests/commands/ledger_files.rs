@@ -95,13 +95,13 @@ fn every_impact_has_its_row() {
     }
     // No impact is lost: all that began have ended or are in progress.
     for (j, name) in ["S1", "S2", "S3"].into_iter().enumerate() {
-        let of = |k: &usize| joint[*k] == j as f64;
-        let finished = (0..joint.len()).filter(of).count() as u64;
+        let of_joint = |k: &usize| joint[*k] == j as f64;
+        let finished = (0..joint.len()).filter(of_joint).count() as u64;
         let started = summary["impacts"][name].as_u64().unwrap();
         assert!(started - finished <= 1, "{name}: {finished} of {started}");
         let entry = &summary["restitution"][name];
         assert_eq!(entry["finished"], finished);
-        let undisturbed = (0..joint.len()).filter(of).filter(|&k| disturbed[k] == 0.0).count();
+        let undisturbed = (0..joint.len()).filter(of_joint).filter(|&k| disturbed[k] == 0.0).count();
         assert!(entry["undisturbed"].as_u64().unwrap() <= undisturbed as u64);
         assert!(entry["median_excess"].as_f64().unwrap().abs() < 0.2);
     }
@@ -159,16 +159,16 @@ fn the_wear_map_adds_up_to_the_rows_and_the_ledger() {
     let (joint, impulse, work) = (get("joint"), get("impulse_N_s"), get("friction_work_J"));
     let contacts = get("contacts");
     for (j, name) in ["S1", "S2", "S3"].into_iter().enumerate() {
-        let of = |values: &[f64]| -> f64 {
-            let area_of_cell = (0..joint.len()).filter(|&k| joint[k] == j as f64);
-            area_of_cell.map(|k| values[k]).sum()
+        let sum_of_joint = |values: &[f64]| -> f64 {
+            let cells = (0..joint.len()).filter(|&k| joint[k] == j as f64);
+            cells.map(|k| values[k]).sum()
         };
         let force = column(&rows, &format!("{name}_normal_N"));
         let expected: f64 = force.windows(2).map(|f| 0.5 * (f[0] + f[1]) * 5e-6).sum();
         // The bound is the error of the trapezoidal rule with twenty rows per impact.
-        let error = of(&impulse) / expected - 1.0;
+        let error = sum_of_joint(&impulse) / expected - 1.0;
         assert!(error.abs() < 1e-3, "{name}: {error:e} of {expected} N s");
-        assert_eq!(of(&contacts), summary["impacts"][name].as_f64().unwrap());
+        assert_eq!(sum_of_joint(&contacts), summary["impacts"][name].as_f64().unwrap());
     }
     let loss = summary["energy_J"]["friction_loss"].as_f64().unwrap();
     let size: f64 = work.iter().map(|work| work.abs()).sum();

@@ -45,9 +45,9 @@ fn a_sweep_over_a_duration_needs_no_drive_and_threads_and_shards_change_no_bit()
     // The tables have the same numbers at every point.
     let table = SerializedFileReader::new(fs::File::open(folder.path().join("two.parquet")).unwrap()).unwrap();
     let file_metadata = table.metadata().file_metadata();
-    let own = file_metadata.key_value_metadata().unwrap().iter().find(|own| own.key == "meta").unwrap();
-    let own: Json = serde_json::from_str(own.value.as_ref().unwrap()).unwrap();
-    assert_eq!(own, meta);
+    let entry = file_metadata.key_value_metadata().unwrap().iter().find(|entry| entry.key == "meta").unwrap();
+    let stored: Json = serde_json::from_str(entry.value.as_ref().unwrap()).unwrap();
+    assert_eq!(stored, meta);
     let mut points = 0;
     for (i, row) in table.get_row_iter(None).unwrap().map(Result::unwrap).enumerate() {
         let columns: Vec<(&String, &Field)> = row.get_column_iter().collect();

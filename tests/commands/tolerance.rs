@@ -86,12 +86,14 @@ fn a_yield_counts_the_runs_that_hold_all_limits() {
     assert!(distances.is_sorted_by(|a, b| a >= b), "{distances:?}");
     let key = drivers[0]["key"].as_str().unwrap();
     let key = if key.ends_with("clearance") { format!("{key} (m)") } else { key.to_owned() };
-    let below = |value: f64, of: bool| {
-        let own: Vec<f64> = runs.iter().filter(|run| is_accepted(run) == of).map(|run| run.1[&key]).collect();
-        own.iter().filter(|own| **own <= value).count() as f64 / own.len() as f64
+    let fraction_below = |value: f64, accepted: bool| {
+        let values: Vec<f64> = runs.iter().filter(|run| is_accepted(run) == accepted).map(|run| run.1[&key]).collect();
+        values.iter().filter(|other| **other <= value).count() as f64 / values.len() as f64
     };
-    let distance =
-        runs.iter().map(|run| (below(run.1[&key], true) - below(run.1[&key], false)).abs()).fold(0.0, f64::max);
+    let distance = runs
+        .iter()
+        .map(|run| (fraction_below(run.1[&key], true) - fraction_below(run.1[&key], false)).abs())
+        .fold(0.0, f64::max);
     assert_close(&drivers[0]["distance"], distance);
 
     // Two threads give the same bytes; the text summary agrees with the JSON.
@@ -149,13 +151,13 @@ fn the_cheapest_fits_equal_those_of_an_exhaustive_search() {
         }
     }
     let all: Vec<f64> = yields.values().copied().collect();
-    assert!(all.iter().any(|own| own != &all[0]), "{all:?}");
+    assert!(all.iter().any(|value| value != &all[0]), "{all:?}");
     for required in all {
         let search = format!("{line} --cost costs.csv --yield {required}");
         let results = jointplay(folder.path(), &search).expect(0).json();
         let fit = &results["fits"];
         let cost = |(a, b): &(usize, usize)| costs[0][*a] + costs[1][*b];
-        let feasible = yields.iter().filter(|(_, own)| **own >= required).map(|(choice, _)| choice);
+        let feasible = yields.iter().filter(|(_, value)| **value >= required).map(|(choice, _)| choice);
         let best = feasible.min_by(|x, y| cost(x).total_cmp(&cost(y))).unwrap();
         assert_eq!(fit["best"]["cost"], cost(best), "{yields:?} for {required}");
         let chosen = [best.0, best.1].map(|at| fits[at]);

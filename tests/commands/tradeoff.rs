@@ -43,17 +43,17 @@ fn the_command_writes_all_files_or_none() {
         assert!(rows.iter().any(|row| row[0] == method.word()), "{method}");
     }
     for preset in Preset::ALL {
-        let own = |row: &&Vec<&str>| row[column("preset")] == preset.word();
-        assert_eq!(rows.iter().filter(own).count(), 1, "{preset:?}");
+        let has_preset = |row: &&Vec<&str>| row[column("preset")] == preset.word();
+        assert_eq!(rows.iter().filter(has_preset).count(), 1, "{preset:?}");
     }
     let error: f64 = rows[1][column("peak_error")].parse().unwrap();
     assert!(error >= 0.0);
     for row in rows.iter().skip(1) {
         let count = |name: &str| row[column(name)].parse::<f64>().unwrap_or(0.0);
         for phase in ["impacts", "settled"] {
-            let of = |name: &str| count(&format!("{phase}_{name}"));
-            assert!(of("steps") > 0.0 && of("simulated_s") > 0.0, "{row:?}");
-            assert!(of("evaluations") >= of("steps"), "{row:?}");
+            let phase_count = |name: &str| count(&format!("{phase}_{name}"));
+            assert!(phase_count("steps") > 0.0 && phase_count("simulated_s") > 0.0, "{row:?}");
+            assert!(phase_count("evaluations") >= phase_count("steps"), "{row:?}");
         }
     }
 
@@ -128,8 +128,8 @@ fn measure<T>(
 }
 
 fn error_at(diagram: &WorkPrecision, method: Method, value: f64) -> f64 {
-    let own = |p: &&jointplay::analysis::Point| p.setting.method == method && p.setting.value() == value;
-    let point = diagram.points.iter().find(own).unwrap();
+    let matches = |p: &&jointplay::analysis::Point| p.setting.method == method && p.setting.value() == value;
+    let point = diagram.points.iter().find(matches).unwrap();
     assert_eq!(point.impacts.end, End::Reached);
     point.errors.peak.unwrap()
 }
@@ -147,8 +147,8 @@ fn finer_steps_and_tolerances_reduce_the_error_and_raise_the_cost() {
     };
     let diagram = measure(|context| work_precision(&scene, &budget, context), u64::MAX).unwrap();
     for method in Method::ALL {
-        let own: Vec<_> = diagram.points.iter().filter(|p| p.setting.method == method).collect();
-        assert!(own.len() >= 2, "{method}");
+        let points: Vec<_> = diagram.points.iter().filter(|p| p.setting.method == method).collect();
+        assert!(points.len() >= 2, "{method}");
         let [coarse, fine] = match method.control() {
             StepControl::Fixed => [10e-6, 3e-6],
             StepControl::Error => [1e-4, 1e-8],
@@ -158,7 +158,7 @@ fn finer_steps_and_tolerances_reduce_the_error_and_raise_the_cost() {
         println!("{method}: {coarse_error:e} {fine_error:e}");
         assert!(fine_error < 0.6 * coarse_error, "{method}");
         let evaluations = |value: f64| {
-            let point = own.iter().find(|p| p.setting.value() == value).unwrap();
+            let point = points.iter().find(|p| p.setting.value() == value).unwrap();
             point.impacts.evaluations
         };
         assert!(evaluations(fine) > 2 * evaluations(coarse), "{method}");

@@ -35,8 +35,8 @@ pub const METHODS: [&str; 6] = ["semi-implicit-euler", "discrete-gradient", "rk4
 pub type Changes<'a> = [(&'a str, &'a str)];
 
 fn owned(changes: &Changes) -> Vec<(String, String)> {
-    let own = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
-    changes.iter().map(own).collect()
+    let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
+    changes.iter().map(owned).collect()
 }
 
 /// A built-in scene with changes.

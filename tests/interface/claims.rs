@@ -417,20 +417,20 @@ fn save_picture(shown: &mut Shown, name: &str) {
 
 #[test]
 fn claims_of_the_lessons_hold_in_the_window() {
-    let wrong = failed_claims(Mode::Window);
-    assert!(wrong.is_empty(), "{wrong:#?}");
+    let failed = failed_claims(Mode::Window);
+    assert!(failed.is_empty(), "{failed:#?}");
 }
 
 #[test]
 fn claims_of_the_lessons_hold_in_a_presentation() {
-    let wrong = failed_claims(Mode::Presentation);
-    assert!(wrong.is_empty(), "{wrong:#?}");
+    let failed = failed_claims(Mode::Presentation);
+    assert!(failed.is_empty(), "{failed:#?}");
 }
 
 #[test]
 fn claims_of_the_lessons_hold_on_the_page_in_a_small_window() {
-    let wrong = failed_claims(Mode::Phone);
-    assert!(wrong.is_empty(), "{wrong:#?}");
+    let failed = failed_claims(Mode::Phone);
+    assert!(failed.is_empty(), "{failed:#?}");
 }
 
 #[test]

@@ -30,9 +30,9 @@ fn targets(harness: &Harness<'_, App>) -> Vec<Target> {
     let all = CLICKABLE.into_iter().flat_map(|role| harness.query_all_by_role(role));
     all.filter(|node| !node.accesskit_node().is_disabled() && window.contains(node.rect().center()))
         .map(|node| {
-            let own = node.accesskit_node();
-            let name = own.label().or_else(|| own.value()).unwrap_or_default();
-            Target { id: own.locate().0, role: own.role(), name, rect: node.rect() }
+            let accesskit = node.accesskit_node();
+            let name = accesskit.label().or_else(|| accesskit.value()).unwrap_or_default();
+            Target { id: accesskit.locate().0, role: accesskit.role(), name, rect: node.rect() }
         })
         .collect()
 }

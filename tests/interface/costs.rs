@@ -199,7 +199,7 @@ fn a_click_on_an_end_moves_the_slider_of_its_joint_and_is_undone() {
     harness.run();
     assert_eq!(clearance(&harness, "S2"), original);
     harness.get_by_label("Of the current setting; 7 of 7 runs");
-    assert_eq!(bars(&harness).map(|own| own.len()), [3, 3]);
+    assert_eq!(bars(&harness).map(|bars| bars.len()), [3, 3]);
     // The keyboard works as well.
     bar_end(&harness, "Clearance of S3 0.15 mm:").focus();
     harness.step();
@@ -271,8 +271,8 @@ fn varied_parameters_and_ranges_can_be_chosen() {
 fn on_a_phone_the_slider_replaces_the_panel_until_it_is_reopened() {
     let mut harness = window([390.0, 844.0], egui::Theme::Light);
     compute(&mut harness);
-    let own = bar_end(&harness, "Clearance of S1 0.45 mm:");
-    own.scroll_to_me();
+    let end = bar_end(&harness, "Clearance of S1 0.45 mm:");
+    end.scroll_to_me();
     harness.run();
     bar_end(&harness, "Clearance of S1 0.45 mm:").click();
     harness.run();

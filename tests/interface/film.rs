@@ -71,10 +71,10 @@ fn decode(file: &[u8], [width, height]: [usize; 2]) -> Vec<(f64, bool, Vec<u8>)>
 }
 
 /// Peak signal-to-noise ratio of two pictures, dB.
-fn signal_to_noise(of: &[u8], rgb: &[u8]) -> f64 {
+fn signal_to_noise(signal: &[u8], rgb: &[u8]) -> f64 {
     let square = |(a, b): (&u8, &u8)| (f64::from(*a) - f64::from(*b)).powi(2);
-    let sum: f64 = of.iter().zip(rgb).map(square).sum();
-    10.0 * (255.0_f64.powi(2) * of.len() as f64 / sum).log10()
+    let sum: f64 = signal.iter().zip(rgb).map(square).sum();
+    10.0 * (255.0_f64.powi(2) * signal.len() as f64 / sum).log10()
 }
 
 #[test]

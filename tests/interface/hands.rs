@@ -55,8 +55,8 @@ pub fn paced(
     clock: fn() -> f64,
     dt: f32,
 ) -> Harness<'static, App> {
-    let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
-    let changes: Vec<_> = changes.iter().map(own).collect();
+    let owned = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+    let changes: Vec<_> = changes.iter().map(owned).collect();
     let mut options = AppOptions::new(Scene::load(scene, &changes).expect("a built-in scene"));
     options.playing = false;
     options.theme = theme.into();

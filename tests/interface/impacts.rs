@@ -193,8 +193,8 @@ fn the_file_has_the_columns_and_values_of_the_command_line() {
     let expected = impacts_of_run(harness.state(), shown(&harness));
     assert_eq!(rows.len(), expected.len());
     for (row, impact) in rows.iter().zip(&expected) {
-        let own = jointplay::analysis::impact_row::row(impact);
-        assert_eq!(row[..], own[..]);
+        let expected = jointplay::analysis::impact_row::row(impact);
+        assert_eq!(row[..], expected[..]);
     }
 }
 
@@ -245,8 +245,8 @@ fn playing_backwards_marks_the_peaks_before_the_displayed_instant() {
     while shown(&harness) > 7e-3 {
         let now = shown(&harness);
         for (joint, force, age) in harness.state().peak_marks() {
-            let own = |(impact, peak): &&(Impact, f64)| impact.joint == joint && (peak - (now - age)).abs() < 1e-9;
-            let (impact, peak) = peaks.iter().find(own).unwrap_or_else(|| panic!("none at {} s", now - age));
+            let matches = |(impact, peak): &&(Impact, f64)| impact.joint == joint && (peak - (now - age)).abs() < 1e-9;
+            let (impact, peak) = peaks.iter().find(matches).unwrap_or_else(|| panic!("none at {} s", now - age));
             assert!(*peak <= now && is_close(f64::from(force), impact.peak), "{force} N at {now} s");
             marked.insert((joint, impact.start.to_bits()));
         }

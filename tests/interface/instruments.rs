@@ -79,7 +79,9 @@ fn the_ball_centre_is_drawn_at_the_scaled_eccentricity() {
         let area = [area[0].x, area[0].y, area[1].x, area[1].y].map(|edge| edge as usize);
         let dot = picture.coloured(area, [0x1E, 0x2A, 0x36], 24);
         assert!(dot.len() > 20, "{time}: {} at {expected}", dot.len());
-        let mean = |of: fn(&(usize, usize)) -> usize| dot.iter().map(of).sum::<usize>() as f32 / dot.len() as f32 + 0.5;
+        let mean = |component: fn(&(usize, usize)) -> usize| {
+            dot.iter().map(component).sum::<usize>() as f32 / dot.len() as f32 + 0.5
+        };
         let dot_centre = Pos2::new(mean(|p| p.0), mean(|p| p.1));
         assert!(dot_centre.distance(expected) < 1.0, "{dot_centre} {expected}");
         assert!(expected.distance(circle.centre) < circle.radius + 1.0);

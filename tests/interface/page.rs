@@ -739,8 +739,8 @@ fn a_saved_picture_has_the_chosen_size_and_parts_and_matches_the_screen() {
     }
     harness.get_by_label("300 × 777 pixels");
     click(&mut harness, "Picture…");
-    let own = decoded(&next_file(&mut harness, &calls));
-    assert_eq!((own.0.width, own.0.height), (300, 777));
+    let custom = decoded(&next_file(&mut harness, &calls));
+    assert_eq!((custom.0.width, custom.0.height), (300, 777));
 
     click(&mut harness, "Save");
     let field = harness.get_by_role_and_label(Role::SpinButton, "Width of the picture");

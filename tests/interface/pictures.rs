@@ -60,8 +60,8 @@ fn examples(page: &str) -> Vec<(&str, &str)> {
 
 fn check(name: &str, file: &str) {
     let folder = tempfile::tempdir().expect("a scratch folder");
-    let own = INSTANTS.iter().find(|(of, _)| *of == name);
-    let instant = own.map_or("0.1s", |(_, instant)| instant);
+    let entry = INSTANTS.iter().find(|(scene, _)| *scene == name);
+    let instant = entry.map_or("0.1s", |(_, instant)| instant);
     let (width, height) = SIZE;
     let what = format!("{file} --at {instant} --size {width}x{height} --arrows none --hide triad,flash,peaks");
     let actual = Picture::read(&draw(folder.path(), &what));

@@ -39,8 +39,8 @@ fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
         let omega = (STIFFNESS[axis] / 0.5).sqrt();
         let displacement = 0.02 * (omega * t).cos();
         let expected = Vec3::new(0.1, 0.2, 0.3) + Vec3::ith(axis, displacement);
-        let wrong = (frame.bodies[0].position - expected).norm();
-        assert!(wrong < 2.0 * bound, "{label}: {wrong:e}");
+        let error = (frame.bodies[0].position - expected).norm();
+        assert!(error < 2.0 * bound, "{label}: {error:e}");
         let force = frame.elements[0].force[axis] + STIFFNESS[axis] * displacement;
         assert!(force.abs() < 2e3 * bound, "{label}: {force:e}");
 
@@ -52,8 +52,8 @@ fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
         let frame = frame_at(&mut simulation, t);
         let omega = (TURNING[axis] / INERTIA[axis]).sqrt();
         let angle = (omega * t).cos();
-        let wrong = (rotation_vector(&frame.bodies[0].rotation) - Vec3::ith(axis, angle)).norm();
-        assert!(wrong < 200.0 * bound, "{label}: {wrong:e}");
+        let error = (rotation_vector(&frame.bodies[0].rotation) - Vec3::ith(axis, angle)).norm();
+        assert!(error < 200.0 * bound, "{label}: {error:e}");
         let residual = simulation.ledger().unwrap().relative_residual();
         assert!(residual.abs() < 1e-3, "{label}: {residual:e}");
     });

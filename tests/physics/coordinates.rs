@@ -149,8 +149,8 @@ fn a_spring_on_one_coordinate_has_its_natural_frequency_in_every_method_and_form
         let label = format!("{case:?} {variant}");
         let [q, rate] = case.coordinate(&frame);
         let (sin, cos) = (20.0 * 0.1_f64).sin_cos();
-        let wrong = (q - 0.03 * cos).abs();
-        assert!(wrong < bound, "{label}: {wrong:e}");
+        let error = (q - 0.03 * cos).abs();
+        assert!(error < bound, "{label}: {error:e}");
         assert!((rate + 0.6 * sin).abs() < 20.0 * bound, "{label}: {rate}");
         let force = case.force(&frame) + k * q;
         assert!(force.abs() < 1e-9 * k, "{label}: {force:e}");

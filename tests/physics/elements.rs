@@ -15,8 +15,8 @@ fn floating(more: &str, changes: &[(&str, &str)]) -> Simulation {
          [[body]]\nname = \"mass\"\nmass = \"{MASS} kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
          [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = {{ position = \"130 0 0 mm\" }}\n{more}"
     );
-    let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
-    let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+    let owned = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+    let changes: Vec<(String, String)> = changes.iter().map(owned).collect();
     Simulation::new(&Scene::parse(&text, None, &changes).unwrap().machine).unwrap()
 }
 

@@ -31,16 +31,16 @@ impl Numbers {
 fn change(numbers: &mut Numbers, simulation: &Simulation) -> (String, String) {
     let joints = &simulation.machine().ball_joints;
     let joint = numbers.below(2 * joints.len());
-    let of = match joints.get(joint) {
+    let target = match joints.get(joint) {
         Some(joint) => format!("joint.{}", joint.name),
         None => "contact".to_owned(),
     };
     let x = numbers.next();
     match numbers.below(3) {
         // 0.01 mm to 3 mm.
-        0 => (format!("{of}.clearance"), format!("{:e} mm", 0.01 * 300_f64.powf(x))),
-        1 => (format!("{of}.friction"), format!("{:e}", 1.5 * x)),
-        _ => (format!("{of}.restitution"), format!("{x:e}")),
+        0 => (format!("{target}.clearance"), format!("{:e} mm", 0.01 * 300_f64.powf(x))),
+        1 => (format!("{target}.friction"), format!("{:e}", 1.5 * x)),
+        _ => (format!("{target}.restitution"), format!("{x:e}")),
     }
 }
 
@@ -231,17 +231,17 @@ fn long_list() -> Vec<LongRun> {
 const FAST: [&str; 2] = ["preview", "real-time"];
 
 /// Runs for at least `duration`, samples twice per period, and compares the ends of the periods.
-fn long_run(of: &LongRun, preset: usize, duration: f64) -> Drift {
-    let changes = [of.changes, &[("solver.preset", FAST[preset])]].concat();
-    let mut simulation = LiveScene::new(&scene(of.scene, &changes)).unwrap();
+fn long_run(case: &LongRun, preset: usize, duration: f64) -> Drift {
+    let changes = [case.changes, &[("solver.preset", FAST[preset])]].concat();
+    let mut simulation = LiveScene::new(&scene(case.scene, &changes)).unwrap();
     let mut drift = Drift::default();
     let mut kinetic = 0.0_f64;
     let mut frame = Frame::default();
     let mut first: Option<(Frame, u64)> = None;
-    let halves = 2 * (duration / of.period).ceil() as u32;
+    let halves = 2 * (duration / case.period).ceil() as u32;
     let contacts = |simulation: &Simulation| simulation.statistics().impacts.iter().sum::<u64>();
     for n in 1..=halves {
-        let now = f64::from(n) * 0.5 * of.period;
+        let now = f64::from(n) * 0.5 * case.period;
         simulation.advance_to(now).unwrap();
         simulation.sample(now, &mut frame);
         assert!(finite(&frame));
@@ -281,36 +281,36 @@ fn long_run(of: &LongRun, preset: usize, duration: f64) -> Drift {
     drift.steps = simulation.statistics().steps;
     drift.time = simulation.time();
     drift.residual = simulation.ledger().unwrap().relative_residual().abs();
-    println!("{} {changes:?}: {drift:?}", of.scene);
+    println!("{} {changes:?}: {drift:?}", case.scene);
     drift
 }
 
-fn check_limits(of: &LongRun, preset: usize, drift: &Drift) {
-    let what = format!("{} {}, {}", of.scene, of.what, FAST[preset]);
+fn check_limits(case: &LongRun, preset: usize, drift: &Drift) {
+    let what = format!("{} {}, {}", case.scene, case.what, FAST[preset]);
     assert!(drift.open < 1e-12, "{what}: open by {:e} m", drift.open);
     assert!(drift.skew < 1e-12, "{what}: orientation off by {:e}", drift.skew);
-    assert!(drift.residual < of.residual[preset], "{what}: residual {:e}", drift.residual);
-    if let Some(limit) = of.limits[preset] {
+    assert!(drift.residual < case.residual[preset], "{what}: residual {:e}", drift.residual);
+    if let Some(limit) = case.limits[preset] {
         assert!(drift.energy < limit, "{what}: energy {:e}", drift.energy);
         assert!(drift.force < 10.0 * limit, "{what}: force {:e}", drift.force);
     }
 }
 
-fn check_no_drift(of: &LongRun, duration: f64) {
-    let drift = long_run(of, 1, duration);
-    check_limits(of, 1, &drift);
-    assert_eq!(drift.contacts, 0, "{} {}: settled", of.scene, of.what);
+fn check_no_drift(case: &LongRun, duration: f64) {
+    let drift = long_run(case, 1, duration);
+    check_limits(case, 1, &drift);
+    assert_eq!(drift.contacts, 0, "{} {}: settled", case.scene, case.what);
 }
 
 #[test]
 fn a_hundred_settled_seconds_do_not_drift() {
-    short_list().iter().for_each(|of| check_no_drift(of, 100.0));
+    short_list().iter().for_each(|case| check_no_drift(case, 100.0));
 }
 
 #[test]
 #[ignore = "full: four seconds"]
 fn full_a_thousand_settled_seconds_do_not_drift() {
-    in_parallel(&short_list(), |of| check_no_drift(of, 1000.0));
+    in_parallel(&short_list(), |case| check_no_drift(case, 1000.0));
 }
 
 #[test]
@@ -326,25 +326,26 @@ fn write_a_thousand_seconds_of_every_kind() {
          |---|---|---|---|---|---|---|---|---|\n",
     );
     let list = long_list();
-    let runs: Vec<_> = list.iter().flat_map(|of| (0..FAST.len()).map(move |preset| (of, preset))).enumerate().collect();
+    let runs: Vec<_> =
+        list.iter().flat_map(|case| (0..FAST.len()).map(move |preset| (case, preset))).enumerate().collect();
     let results = Mutex::new(Vec::new());
-    in_parallel(&runs, |&(index, (of, preset))| {
-        let drift = long_run(of, preset, 1000.0);
+    in_parallel(&runs, |&(index, (case, preset))| {
+        let drift = long_run(case, preset, 1000.0);
         results.lock().unwrap().push((index, drift));
     });
     let mut results = results.into_inner().unwrap();
     results.sort_by_key(|(index, _)| *index);
-    for ((_, (of, preset)), (_, d)) in runs.into_iter().zip(results) {
-        let force = match of.scene {
+    for ((_, (case, preset)), (_, d)) in runs.into_iter().zip(results) {
+        let force = match case.scene {
             "chain" | "pendulum" | "slider-crank" => "-".to_owned(),
             _ => format!("{:.1e}", d.force),
         };
         let _ = writeln!(
             page,
             "| {}, {} | {} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {force} |",
-            of.scene, of.what, FAST[preset], d.steps, d.contacts, d.open, d.skew, d.energy, d.residual
+            case.scene, case.what, FAST[preset], d.steps, d.contacts, d.open, d.skew, d.energy, d.residual
         );
-        check_limits(of, preset, &d);
+        check_limits(case, preset, &d);
     }
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/extremes.md");
     let text = std::fs::read_to_string(&path).unwrap();

@@ -181,8 +181,8 @@ fn parameters_of_an_included_file_are_separate_and_can_be_set_by_the_scene() {
     // Both legs see a parameter of the scene, unless the file defines one of the same name.
     let heavy = read(TWO_LEGS, LEG, &[("parameter.weight", "2 kg"), ("parameter.left.length", "100 mm")]).unwrap();
     assert_eq!((mass(&heavy, "left.thigh"), mass(&heavy, "right.thigh")), (1.0, 3.0));
-    let own = format!("[[parameter]]\nname = \"weight\"\nvalue = \"4 kg\"\n{LEG}");
-    let both = read(TWO_LEGS, &own, &[("parameter.weight", "2 kg")]).unwrap();
+    let leg_with_weight = format!("[[parameter]]\nname = \"weight\"\nvalue = \"4 kg\"\n{LEG}");
+    let both = read(TWO_LEGS, &leg_with_weight, &[("parameter.weight", "2 kg")]).unwrap();
     assert_eq!(mass(&both, "left.thigh"), 4.0);
     // Values given in the scene can be saved; numbers of the included file cannot.
     let mut changed = scene.clone();

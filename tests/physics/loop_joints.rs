@@ -169,9 +169,9 @@ struct Bar {
     /// Drive rates of crank and rocker, rad/s.
     driven: [Option<f64>; 2],
     /// Offset of the rocker's hinge out of the plane, m.
-    aside: f64,
+    out_of_plane: f64,
     /// Added to the coupler's angle, rad.
-    off: f64,
+    coupler_offset: f64,
     closed_by: &'static str,
 }
 
@@ -180,7 +180,8 @@ const REVOLUTE: &str = "[[joint]]\nname = \"B\"\nkind = \"revolute\"\nparent = \
 const BALL: &str = "[[ball_joint]]\nname = \"B\"\nsocket = { body = \"coupler\", at = \"0.26 0 0 m\" }\n\
                     ball = { body = \"rocker\", at = \"0.21 0 0 m\" }\nclearance = 0\n";
 
-const PLAIN: Bar = Bar { start: "as-given", driven: [None; 2], aside: 0.0, off: 0.0, closed_by: REVOLUTE };
+const PLAIN: Bar =
+    Bar { start: "as-given", driven: [None; 2], out_of_plane: 0.0, coupler_offset: 0.0, closed_by: REVOLUTE };
 
 /// The four-bar in the world's xz plane. Hinge axes are -y, so that angles count from x to z. The crank starts at 1 rad and 12 rad/s.
 fn four_bar(bar: &Bar) -> String {
@@ -219,12 +220,12 @@ fn four_bar(bar: &Bar) -> String {
             "A",
             "coupler",
             format!("parent = \"crank\"\nparent_point = \"{a} 0 0 m\"\n"),
-            start(None, coupler - crank + bar.off, rates[0] - 12.0),
+            start(None, coupler - crank + bar.coupler_offset, rates[0] - 12.0),
         ),
         hinge(
             "D",
             "rocker",
-            format!("parent_point = \"{GROUND} {} 0 m\"\n", bar.aside),
+            format!("parent_point = \"{GROUND} {} 0 m\"\n", bar.out_of_plane),
             start(bar.driven[1], rocker, rates[1]),
         ),
         bar.closed_by.to_owned(),
@@ -592,13 +593,13 @@ fn start_error(text: &str) -> String {
 
 #[test]
 fn a_loop_that_does_not_close_is_refused_by_joint_and_direction() {
-    let aside = Bar { aside: 5e-3, ..PLAIN };
-    let error = start_error(&four_bar(&aside));
+    let out_of_plane = Bar { out_of_plane: 5e-3, ..PLAIN };
+    let error = start_error(&four_bar(&out_of_plane));
     let words = "joint B: its bodies are 5 mm apart there and turned against it by 0 deg as given, and a joint that closes a loop may be \
                  open by at most 0.01 mm and 0.00573 deg";
     assert!(error.contains(words), "{error}");
-    let aside = Bar { start: "ideal", ..aside };
-    let error = start_error(&four_bar(&aside));
+    let out_of_plane = Bar { start: "ideal", ..out_of_plane };
+    let error = start_error(&four_bar(&out_of_plane));
     let words = "as given and cannot be closed: remaining gaps: B by 5 mm along y (no joint can move that way)";
     assert!(error.contains(words), "{error}");
     // A reversed axis satisfies every constraint row, but contradicts the file.
@@ -615,16 +616,16 @@ fn a_loop_that_does_not_close_is_refused_by_joint_and_direction() {
 
 #[test]
 fn a_guessed_pose_is_assembled_and_displacements_are_reported() {
-    let off = 8_f64.to_radians();
-    let guess = Bar { start: "ideal", driven: [Some(12.0), None], off, ..PLAIN };
+    let coupler_offset = 8_f64.to_radians();
+    let guess = Bar { start: "ideal", driven: [Some(12.0), None], coupler_offset, ..PLAIN };
     for start in ["ideal", "settled"] {
         let text = four_bar(&Bar { start, ..guess });
         let mut simulation = Simulation::new(&parse(&text, &[]).machine).unwrap();
         let assembly = simulation.mechanism().assembly();
         let (joint, gap) = assembly.widest.unwrap();
-        let chord = 2.0 * BAR[1] * (0.5 * off).sin();
+        let chord = 2.0 * BAR[1] * (0.5 * coupler_offset).sin();
         assert!(joint == 0 && (gap - chord).abs() < 1e-12, "{gap} {chord}");
-        assert!((assembly.bodies[1].turned - off).abs() < 1e-9);
+        assert!((assembly.bodies[1].turned - coupler_offset).abs() < 1e-9);
         assert_eq!(assembly.bodies.len(), 3);
         // Hinges keep the bodies parallel to the plane at any angle.
         assert!(assembly.most_turned.unwrap().1 < 1e-12);

@@ -527,11 +527,11 @@ fn the_machines_raise_no_doubt_with_their_default_settings() {
 fn each_machine_assembles_at_the_ends_of_its_parameters() {
     for name in MACHINES {
         let plain = scene(name, &[]);
-        let mut own = plain.parameters();
-        own.retain(|row| row.scope == jointplay::scene::Scope::Own);
-        assert!(!own.is_empty(), "{name}");
-        for corner in 0..1_u32 << own.len() {
-            let ends = own.iter().enumerate().map(|(n, row)| {
+        let mut parameters = plain.parameters();
+        parameters.retain(|row| row.scope == jointplay::scene::Scope::Own);
+        assert!(!parameters.is_empty(), "{name}");
+        for corner in 0..1_u32 << parameters.len() {
+            let ends = parameters.iter().enumerate().map(|(n, row)| {
                 let jointplay::scene::Kind::Number { min, max, .. } = row.kind else {
                     panic!("{} is no number", row.key)
                 };

@@ -19,8 +19,10 @@ fn in_series(gravity: f64) -> String {
     let text = train(gravity);
     let (before, joints) = text.split_once("[[joint]]\nname = \"c\"").expect("a cylindrical joint");
     let (ring, rod) = joints.split_once("[[joint]]\nname = \"u\"").expect("a universal joint");
-    let line = |of: &str, key: &str| of.lines().find(|line| line.starts_with(key)).expect("a key").to_owned();
-    let axes = |of: &str| (line(of, "axis"), line(of, "parent_point"), line(of, "child_point"), line(of, "rotation"));
+    let line = |joint: &str, key: &str| joint.lines().find(|line| line.starts_with(key)).expect("a key").to_owned();
+    let axes = |joint: &str| {
+        (line(joint, "axis"), line(joint, "parent_point"), line(joint, "child_point"), line(joint, "rotation"))
+    };
     let (along, at, child, rotation) = axes(ring);
     let slide = format!(
         "[[joint]]\nname = \"c1\"\nkind = \"prismatic\"\nparent = \"base\"\nchild = \"sleeve\"\n{along}\n{at}\n\

@@ -196,12 +196,12 @@ proptest! {
             let agrees = from_steps >= row * (1.0 - BELOW) - 1.0 && from_steps <= row * (1.0 + ABOVE) + 1.0;
             prop_assert!(!resolved || agrees, "{}: {}, rows {}", name, from_steps, row);
             prop_assert!((0.0..=plain.time()).contains(&statistics.peak_time[j]));
-            let own = || impacts.iter().filter(move |impact| impact.joint == j);
-            prop_assert!(own().count() as u64 <= statistics.impacts[j], "{}", name);
-            prop_assert!(joint.contact.clearance > 0.0 || own().count() == 0, "{}", name);
+            let impacts_of_joint = || impacts.iter().filter(move |impact| impact.joint == j);
+            prop_assert!(impacts_of_joint().count() as u64 <= statistics.impacts[j], "{}", name);
+            prop_assert!(joint.contact.clearance > 0.0 || impacts_of_joint().count() == 0, "{}", name);
             let chi = jointplay::contact::damping_factor(joint.contact.normal_law, joint.contact.restitution);
             let largest = joint.contact.approach_speed == jointplay::contact::ApproachSpeed::Largest;
-            for impact in own() {
+            for impact in impacts_of_joint() {
                 prop_assert!(impact.peak <= from_steps * (1.0 + 1e-12), "{:?} beyond {}", impact, from_steps);
                 prop_assert!(impact.start < impact.end && impact.end <= plain.time(), "{:?}", impact);
                 prop_assert!(impact.damping <= statistics.damping[j], "{:?}", impact);

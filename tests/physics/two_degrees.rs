@@ -86,9 +86,9 @@ fn momenta(frame: &Frame) -> [Vec3; 2] {
     for (i, body) in frame.bodies.iter().enumerate() {
         let arm = body.rotation * Vec3::from(CENTRE[i]);
         let momentum = MASS[i] * (body.velocity + body.angular_velocity.cross(&arm));
-        let own = Vec3::from(INERTIA[i]).component_mul(&body.rotation.tr_mul(&body.angular_velocity));
+        let spin = Vec3::from(INERTIA[i]).component_mul(&body.rotation.tr_mul(&body.angular_velocity));
         sum[0] += momentum;
-        sum[1] += (body.position + arm).cross(&momentum) + body.rotation * own;
+        sum[1] += (body.position + arm).cross(&momentum) + body.rotation * spin;
     }
     sum
 }

@@ -157,7 +157,7 @@ fn elements() -> impl Strategy<Value = String> {
     let tables: Vec<&FileTable> = file_tables().into_iter().filter(|table| is_element(table)).collect();
     (0..tables.len(), any::<[bool; 2]>()).prop_flat_map(move |(place, [hinge, swings])| {
         let table = tables[place];
-        let points = table.keys.iter().filter(|key| key.table().is_some_and(|of| of.name == "point"));
+        let points = table.keys.iter().filter(|key| key.table().is_some_and(|table| table.name == "point"));
         let points: Vec<&str> = points.map(|key| key.name).collect();
         // Leaves out the key for the other kind of joint.
         let other = if hinge { "force" } else { "torque" };
@@ -244,10 +244,10 @@ proptest! {
     #[test]
     fn a_number_reads_the_same_as_an_expression_and_as_a_parameter(value in within((-1e4, 1e4))) {
         let plain = format!("{value:e} m");
-        let own = format!("[[parameter]]\nname = \"own\"\nvalue = \"{plain}\"\n");
+        let parameter = format!("[[parameter]]\nname = \"own\"\nvalue = \"{plain}\"\n");
         let scene = |text: &str| {
             let more = format!("start = {{ position = \"{text}\" }}\nparent_point = [0, \"{text}\", 0]\n");
-            without_source(&format!("{own}{}", machine(false, &more)), &Texts::new())
+            without_source(&format!("{parameter}{}", machine(false, &more)), &Texts::new())
         };
         let expected = scene(&plain);
         for other in ["own".to_owned(), format!("2 * ({plain}) / 2"), "own * 4 / 4".to_owned()] {

@@ -87,8 +87,8 @@ fn corpus(kind: &str) -> Vec<(String, String)> {
     let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
-    let own = paths.iter().filter(|path| name(path).starts_with(kind));
-    own.map(|path| (name(path), std::fs::read_to_string(path).unwrap())).collect()
+    let matching = paths.iter().filter(|path| name(path).starts_with(kind));
+    matching.map(|path| (name(path), std::fs::read_to_string(path).unwrap())).collect()
 }
 
 /// Valid scenes that together use every key.
@@ -189,7 +189,7 @@ fn first_occurrences() -> Vec<(String, String, Contents)> {
         };
         path.iter().filter_map(key).collect()
     };
-    let own = |(name, text): (String, String)| {
+    let first_keys = |(name, text): (String, String)| {
         let mut contents = Contents::of(text.trim_start_matches('\u{feff}'));
         contents.keys.retain(|(path, row, word)| keys.insert((keys_of_path(path), std::ptr::from_ref(*row), *word)));
         contents
@@ -197,7 +197,7 @@ fn first_occurrences() -> Vec<(String, String, Contents)> {
             .retain(|(path, rows, word)| tables.insert((keys_of_path(path), std::ptr::from_ref(*rows), *word)));
         (name, text, contents)
     };
-    scenes().into_iter().map(own).collect()
+    scenes().into_iter().map(first_keys).collect()
 }
 
 /// Last part of an error's key, without list indices.

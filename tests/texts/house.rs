@@ -49,15 +49,15 @@ fn files() -> Vec<(String, String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = Vec::new();
     for crate_root in ["crates/physics/src", "src"].map(|folder| root.join(folder)) {
-        let mut own = Vec::new();
-        sources(&crate_root, &mut own);
-        paths.extend(own.into_iter().map(|path| (path.strip_prefix(&crate_root).unwrap().to_owned(), path)));
+        let mut crate_files = Vec::new();
+        sources(&crate_root, &mut crate_files);
+        paths.extend(crate_files.into_iter().map(|path| (path.strip_prefix(&crate_root).unwrap().to_owned(), path)));
     }
     for name in CRATES {
         let folder = root.join(format!("crates/{name}/src"));
-        let mut own = Vec::new();
-        sources(&folder, &mut own);
-        paths.extend(own.into_iter().map(|path| {
+        let mut crate_files = Vec::new();
+        sources(&folder, &mut crate_files);
+        paths.extend(crate_files.into_iter().map(|path| {
             let local = path.strip_prefix(&folder).unwrap();
             let local = if local == Path::new("lib.rs") { Path::new("mod.rs") } else { local };
             (Path::new(name).join(local), path)

@@ -236,7 +236,7 @@ fn a_shape_without_a_role_has_the_role_of_its_body() {
     text += &joint("last", "revolute", axis);
     let scene = Scene::parse(&text, None, &[]).unwrap();
     let roles = scene.machine.body_roles();
-    let of = |name: &str| {
+    let role_of = |name: &str| {
         let body = scene.machine.bodies.iter().position(|body| body.name == name);
         roles[body.unwrap()]
     };
@@ -251,6 +251,6 @@ fn a_shape_without_a_role_has_the_role_of_its_body() {
         Role::Platform,
     ];
     for (name, expected) in names.iter().zip(expected) {
-        assert_eq!(of(name), expected, "{name}");
+        assert_eq!(role_of(name), expected, "{name}");
     }
 }

@@ -541,9 +541,9 @@ fn a_scene_beyond_a_limit_is_refused_with_its_line() {
 fn thousands_of_different_joints_do_not_raise_thousands_of_warnings() {
     for links in [30, 4000] {
         // Clearances so small that each raises a warning.
-        let own = |n: usize| (format!("joint.J{n}.clearance"), format!("{n}e-9 m"));
+        let change = |n: usize| (format!("joint.J{n}.clearance"), format!("{n}e-9 m"));
         let mut changes = vec![("chain.links".to_owned(), links.to_string())];
-        changes.extend((1..=links).map(own));
+        changes.extend((1..=links).map(change));
         let warnings = Scene::load("chain", &changes).unwrap().machine.warnings();
         assert_eq!(warnings.len(), links.min(41), "{links}");
     }

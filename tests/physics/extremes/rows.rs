@@ -33,12 +33,12 @@ pub struct Row {
 
 impl Row {
     fn new(what: &str, scene: &'static str, changes: &[(&str, &str)]) -> Self {
-        let own = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
+        let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
         Self {
             what: what.to_owned(),
             scene,
             columns: Columns::Presets,
-            changes: changes.iter().map(own).collect(),
+            changes: changes.iter().map(owned).collect(),
             edit: |_| {},
             duration: DURATION,
             passive: matches!(scene, "pendulum" | "chain" | "slider-crank"),

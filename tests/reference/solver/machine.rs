@@ -67,7 +67,7 @@ impl Machine {
     }
 
     fn bodies(y: &[f64]) -> Vec<BodyState> {
-        let of = |s: &[f64]| {
+        let body = |s: &[f64]| {
             let q = nalgebra::Quaternion::new(s[3], s[4], s[5], s[6]);
             BodyState {
                 position: Vec3::new(s[0], s[1], s[2]),
@@ -76,7 +76,7 @@ impl Machine {
                 spin: Vec3::new(s[10], s[11], s[12]),
             }
         };
-        y.chunks_exact(13).map(of).collect()
+        y.chunks_exact(13).map(body).collect()
     }
 
     /// Socket centres at `t`: the inverse kinematics of trajectory (59) with (39) as corrected.
