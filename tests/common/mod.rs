@@ -47,7 +47,7 @@ pub fn scene(name: &str, changes: &Changes) -> Scene {
 /// Pairs of method and formulation that together cover every kind of Jacobian and error control.
 pub const FOUR_VARIANTS: [(&str, &str); 4] =
     [("dopri5", "tree"), ("radau5", "lagrange"), ("automatic", "tree"), ("discrete-gradient", "lagrange")];
-/// Those of [`FOUR_WAYS`] that control the error.
+/// Those of [`FOUR_VARIANTS`] that control the error.
 pub const THREE_VARIANTS: [(&str, &str); 3] = [("dopri5", "tree"), ("radau5", "lagrange"), ("automatic", "tree")];
 
 /// A scene from its text with changes.
