@@ -375,7 +375,7 @@ impl PyStudy {
         });
         let all = PyDict::new(py);
         runner.describe("lot", &all)?;
-        all.set_item("yield", estimate_tuple(&found.lot.yielded))?;
+        all.set_item("yield", estimate_tuple(&found.lot.yield_estimate))?;
         all.set_item("accepted", &found.lot.accepted)?;
         let qualities = found.qualities.iter().map(|own| quality(py, own)).collect::<PyResult<Vec<_>>>()?;
         all.set_item("qualities", qualities)?;
@@ -387,7 +387,7 @@ impl PyStudy {
 
 fn quality<'py>(py: Python<'py>, found: &Quality) -> PyResult<Bound<'py, PyDict>> {
     let own = PyDict::new(py);
-    own.set_item("yield", estimate_tuple(&found.yielded))?;
+    own.set_item("yield", estimate_tuple(&found.yield_estimate))?;
     own.set_item("mean", found.mean)?;
     own.set_item("deviation", found.deviation)?;
     for (p, value) in PERCENTILES.iter().zip(&found.percentiles) {

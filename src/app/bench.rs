@@ -21,7 +21,7 @@ use eframe::egui::{Button, CollapsingHeader, Response, RichText, Ui};
 use super::host::Host;
 use super::player::Player;
 use super::spoken;
-use crate::analysis::ready::ReadySweep;
+use crate::analysis::ready_sweeps::ReadySweep;
 use crate::scene::Scene;
 use crate::view::Cloud;
 use coordinate::Coordinate;

@@ -8,7 +8,7 @@ use super::keys::Group;
 use super::load::Load;
 use super::player::Player;
 use super::spoken;
-use crate::analysis::ready::ReadySweep;
+use crate::analysis::ready_sweeps::ReadySweep;
 use code::SharedLink;
 
 mod code;

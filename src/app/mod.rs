@@ -68,7 +68,7 @@ use std::sync::Arc;
 use eframe::egui::{self, ThemePreference, Ui};
 use eframe::egui_wgpu;
 
-use crate::analysis::ready::{READY, ReadySweep};
+use crate::analysis::ready_sweeps::{READY_SWEEPS, ReadySweep};
 use crate::analysis::source::SceneSource;
 use crate::machine::Vec3;
 use crate::render;
@@ -602,7 +602,7 @@ impl App {
                 Ok(scene) => {
                     let lost = value::changes(self.player.pending());
                     // Changes made by another ready sweep are no loss.
-                    let opened = READY.iter().filter_map(|ready| ready.scene().ok());
+                    let opened = READY_SWEEPS.iter().filter_map(|ready| ready.scene().ok());
                     let mut known = opened.chain([scene]);
                     let same = known.any(|scene| value::differences(&scene, self.player.pending(), &[]).is_empty());
                     if same || lost.is_empty() {

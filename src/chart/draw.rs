@@ -24,7 +24,7 @@ pub struct Sheet {
     /// Note below all charts; empty for none.
     pub note: String,
     /// Gives each chart its own legend, for charts that use the same colours differently.
-    pub apart: bool,
+    pub separate_legends: bool,
 }
 
 /// Sizes of text, pixels.
@@ -82,7 +82,7 @@ impl Sheet {
             write(root, &self.note, (0.5 * width, bottom), &style)?;
             bottom -= TEXT + 8.0;
         }
-        if !self.apart {
+        if !self.separate_legends {
             bottom = draw_legends(root, &self.charts, 0.0, width, bottom)?;
         }
         let columns = self.columns.clamp(1, self.charts.len().max(1));
@@ -93,7 +93,7 @@ impl Sheet {
         }
         for (n, chart) in self.charts.iter().enumerate() {
             let (x, y) = ((n % columns) as f64 * w, top + (n / columns) as f64 * h);
-            let legend = if self.apart { std::slice::from_ref(chart) } else { &[] };
+            let legend = if self.separate_legends { std::slice::from_ref(chart) } else { &[] };
             let low = draw_legends(root, legend, x, w, y + h)?;
             let area = root.clone().shrink((fine(x), fine(y)), (fine(w), fine(low - y)));
             draw_chart(root, &area, chart)?;

@@ -6,7 +6,7 @@ use super::args::BenchArguments;
 use super::tables::{Table, yes_or_no};
 use super::tradeoff::{percent, times, value};
 use super::{DEFAULT_SCENE, Failure, machine, measuring, print};
-use crate::analysis::{GROWTH, GoalResult, LIMITS, LOOSE_MACHINES, LooseSpeed, Timed, growth, loose_speed, reach};
+use crate::analysis::{GROWTH, GoalResult, LIMITS, LOOSE_MACHINES, LooseSpeed, Timed, growth, loose_speed, measure_speed_goals};
 use crate::scene::Scene;
 use crate::units::format_quantity;
 
@@ -18,7 +18,7 @@ pub fn bench(arguments: &BenchArguments) -> Result<(), Failure> {
     let scene = Scene::load(DEFAULT_SCENE, &arguments.changes)?;
     let (rows, machines, growth) = measuring::measure(arguments.quiet, Some(&scene), |context| {
         let parts = LOOSE_MACHINES.len() + 2;
-        let rows = reach(&scene, &mut context.part(0, parts))?;
+        let rows = measure_speed_goals(&scene, &mut context.part(0, parts))?;
         let mut machines = Vec::new();
         for (n, machine) in LOOSE_MACHINES.into_iter().enumerate() {
             machines.push(loose_speed(machine, &mut context.part(n + 1, parts))?);
@@ -39,7 +39,7 @@ fn text(rows: &[GoalResult], machines: &[LooseSpeed], growth: f64) -> String {
             times(row.baseline),
             times(row.baseline.map(|other| row.speed / other)),
             percent(row.error),
-            row.goal.error_of().to_owned(),
+            row.goal.error_quantity().to_owned(),
             yes_or_no(row.is_met()),
         ]
     });

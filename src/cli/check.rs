@@ -7,8 +7,8 @@ use super::output::significant;
 use super::summary::count;
 use super::{Failure, load, print, start};
 use crate::analysis::assembly::StartReport;
-use crate::analysis::beginning::Beginning;
 use crate::analysis::ideal_fault::ideal_fault;
+use crate::analysis::initial_peaks::InitialPeaks;
 use crate::contact::FrictionLaw;
 use crate::integrate::{Method, StepControl};
 use crate::machine::{BallJoint, Body, Element, Joint, JointKind};
@@ -32,7 +32,7 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
         return print(&channels(&channels_of(&scene.machine, &frame)));
     }
     let contents = simulation.mechanism().summary();
-    let beginning = (contents.contacts > 0).then(|| Beginning::of(&mut simulation));
+    let beginning = (contents.contacts > 0).then(|| InitialPeaks::of(&mut simulation));
     print(&report(&scene, &contents, &start_report, &frame, beginning.as_ref())?)
 }
 
@@ -62,7 +62,7 @@ fn report(
     contents: &Summary,
     start_report: &StartReport,
     start: &Frame,
-    beginning: Option<&Beginning>,
+    beginning: Option<&InitialPeaks>,
 ) -> Result<String, Failure> {
     let mut out = String::new();
     // Writing to a String cannot fail.
@@ -114,7 +114,7 @@ fn report(
     start_report.lines.iter().for_each(|(label, value)| line(label, value));
     if let Some(beginning) = beginning {
         let until = format_quantity_digits(beginning.until, "ms", 4);
-        line("Beginning", &format!("largest contact forces of the first {until}"));
+        line("InitialPeaks", &format!("largest contact forces of the first {until}"));
         let loose = scene.machine.ball_joints.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
         for (joint, peak) in loose.take(MAX_LISTED) {
             line(&format!("  {}", joint.name), &first_contact(peak));

@@ -51,7 +51,7 @@ fn sheet(size: (u32, u32)) -> Sheet {
         columns: 2,
         size,
         note: "a note".to_owned(),
-        apart: false,
+        separate_legends: false,
     }
 }
 
@@ -180,7 +180,7 @@ fn a_map_has_a_cell_for_each_value_and_a_scale() {
         columns: 2,
         size: (900, 360),
         note: String::new(),
-        apart: false,
+        separate_legends: false,
     };
     let svg = sheet.svg().unwrap();
     for word in ["kN", "even", "odd", "Clearance (mm)"] {
@@ -210,7 +210,7 @@ fn a_hundred_thousand_points_produce_a_small_file() {
             columns: 1,
             size: (600, 400),
             note: String::new(),
-            apart: false,
+            separate_legends: false,
         }
         .svg()
         .unwrap()
@@ -230,7 +230,7 @@ fn blue_pixels(series: Series) -> Vec<(u32, u32)> {
         size: (500, 400),
         title: String::new(),
         note: String::new(),
-        apart: false,
+        separate_legends: false,
     };
     let png = sheet.png(2.0).unwrap();
     let picture = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();

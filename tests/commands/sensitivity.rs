@@ -4,7 +4,7 @@ use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use jointplay::analysis::alone_task::AloneTask;
+use jointplay::analysis::one_at_a_time_task::OneAtATimeTask;
 use jointplay::analysis::source::SceneSource;
 use jointplay::analysis::study::RunSpan;
 use jointplay::analysis::sweep_task::Share;
@@ -138,7 +138,7 @@ fn the_window_computes_the_same_bits_as_the_command() {
     let results = results(&folder.path().join("out"));
     let scene = Scene::load("spcmm", &[("spcmm.frequency".to_owned(), "5Hz".to_owned())]).unwrap();
     let ends = [0.5, 1.5].map(|part| part * scene.machine.contact.clearance);
-    let task = AloneTask {
+    let task = OneAtATimeTask {
         scene: SceneSource::of(&scene),
         over: ["S1", "S2", "S3"].map(|joint| (format!("joint.{joint}.clearance"), ends)).to_vec(),
         outputs: outputs.map(str::to_owned).to_vec(),

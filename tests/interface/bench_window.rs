@@ -14,7 +14,7 @@ use egui_kittest::{
     kittest::{NodeT as _, Queryable as _},
 };
 use jointplay::analysis::drive::observed;
-use jointplay::analysis::ready::READY;
+use jointplay::analysis::ready_sweeps::READY_SWEEPS;
 use jointplay::analysis::task::{Job, Message, perform};
 use jointplay::app::{App, BackgroundTask, DesktopHost, Host, Link, OpenedFile, Player, Replay, Verdict};
 
@@ -506,7 +506,7 @@ fn a_ready_sweep_is_described_and_one_click_opens_its_scene_and_starts_it() {
     let mut harness = window("pendulum", &[]);
     let jobs = Rc::new(std::cell::RefCell::new(Vec::new()));
     harness.state_mut().set_host(Box::new(RecordingHost(jobs.clone())));
-    for ready in &READY {
+    for ready in &READY_SWEEPS {
         harness.get_by_label(ready.shows);
         click(&mut harness, Role::Button, ready.name);
         harness.run_steps(2);
@@ -544,8 +544,8 @@ fn a_ready_sweep_asks_before_it_replaces_a_changed_scene() {
     let player = harness.state_mut().player_mut();
     player.set("contact.clearance", "0.5 mm").expect("in range");
     harness.run_steps(2);
-    for (answer, scene, sweeps) in [("Close", "pendulum", 0), ("Replace and sweep", READY[0].scene, 1)] {
-        click(&mut harness, Role::Button, READY[0].name);
+    for (answer, scene, sweeps) in [("Close", "pendulum", 0), ("Replace and sweep", READY_SWEEPS[0].scene, 1)] {
+        click(&mut harness, Role::Button, READY_SWEEPS[0].name);
         harness.run_steps(2);
         harness.get_by_label("Clearance 0.5 mm");
         assert_eq!(harness.state().player().running().name, "pendulum");
@@ -567,8 +567,8 @@ fn chaos_is_two_gestures_away_from_a_new_window() {
         screen.contains_rect(node.rect())
     };
     // Key B has opened the bench.
-    assert!(is_visible(&harness, READY[0].name));
-    click(&mut harness, Role::Button, READY[0].name);
+    assert!(is_visible(&harness, READY_SWEEPS[0].name));
+    click(&mut harness, Role::Button, READY_SWEEPS[0].name);
     harness.run_steps(60);
     assert_eq!(jobs.borrow().len(), 1);
     // The view has scrolled to the sweep's progress.

@@ -7,7 +7,7 @@ use egui_kittest::{
     Harness,
     kittest::{NodeT as _, Queryable as _},
 };
-use jointplay::analysis::study::{Alone, NAMED, RunSpan, StudyRuns, Uncertainty, inputs, outputs};
+use jointplay::analysis::study::{NAMED, OneAtATimePlan, RunSpan, StudyRuns, Uncertainty, inputs, outputs};
 use jointplay::app::{App, Event};
 use jointplay::scene::Value;
 
@@ -114,7 +114,7 @@ fn the_tornado_shows_the_results_of_the_study() {
     let varied = inputs(scene, &[Uncertainty::parse("--over", "joint.*.clearance")]).expect("joints");
     let names: Vec<&str> = NAMED.iter().map(|named| named.name).collect();
     let study_outputs = outputs(scene, &names.join(",")).expect("outputs");
-    let one_at_a_time = Alone::new(&varied);
+    let one_at_a_time = OneAtATimePlan::new(&varied);
     let keys: Vec<String> = varied.iter().map(|input| input.key.clone()).collect();
     let study = StudyRuns::new(scene, &keys, &study_outputs, SPAN, &one_at_a_time.rows()).expect("runs");
     let run = |index| {

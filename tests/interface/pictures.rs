@@ -167,7 +167,7 @@ fn the_laws_of_drives_are_drawn_as_curves() {
         columns: 3,
         size: (720, 480),
         note: String::new(),
-        apart: false,
+        separate_legends: false,
     };
     let folder = tempfile::tempdir().expect("a scratch folder");
     let file = folder.path().join("drives.png");

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use crate::common::matrix::in_parallel;
 use crate::common::simulation;
-use jointplay::analysis::ready::{READY, ReadySweep};
+use jointplay::analysis::ready_sweeps::{READY_SWEEPS, ReadySweep};
 use jointplay::analysis::sweep_task::{Share, SweptPoint};
 use jointplay::analysis::task::{Job, Message, perform};
 
@@ -29,13 +29,13 @@ fn points(ready: &ReadySweep, vary: Option<&str>, exponent: bool) -> Vec<SweptPo
 }
 
 fn sweep_named(name: &str) -> &'static ReadySweep {
-    let sweep = READY.iter().find(|ready| ready.name == name);
+    let sweep = READY_SWEEPS.iter().find(|ready| ready.name == name);
     sweep.expect("a ready sweep")
 }
 
 #[test]
 fn every_ready_sweep_has_a_description_and_a_range_that_its_scene_accepts() {
-    for ready in &READY {
+    for ready in &READY_SWEEPS {
         assert!(ready.shows.ends_with('.') && ready.shows.len() > 60, "{}", ready.name);
         let scene = ready.scene().expect("a built-in scene");
         assert_eq!(scene.name, ready.scene);

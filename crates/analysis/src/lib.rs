@@ -1,7 +1,7 @@
 //! Results computed from whole runs. The crate starts no threads; the caller supplies the clock ([`RunContext`]).
 //!
 //! - Sweeps: [`axis`] and [`design`] define the points, [`sweep`] runs them, [`point`], [`crossing`] and [`statistic`] record
-//!   the results; [`sweep_task`] and [`task`] describe the same work as plain data for a thread or a worker, as [`alone_task`]
+//!   the results; [`sweep_task`] and [`task`] describe the same work as plain data for a thread or a worker, as [`one_at_a_time_task`]
 //!   does for a study.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the resulting
 //!   [`regime`].
@@ -42,11 +42,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod alone_task;
 pub mod argument;
 pub mod assembly;
 pub mod axis;
-pub mod beginning;
 mod cost;
 pub mod crossing;
 pub mod design;
@@ -57,6 +55,7 @@ pub mod fits;
 pub mod ideal_fault;
 pub mod impact_row;
 pub mod indices;
+pub mod initial_peaks;
 pub mod iso286;
 pub mod layout;
 pub mod lot;
@@ -65,6 +64,7 @@ pub mod map;
 pub mod map_task;
 pub mod morris;
 mod normal;
+pub mod one_at_a_time_task;
 pub mod orbit;
 pub mod paper;
 mod pareto_front;
@@ -72,8 +72,7 @@ pub mod point;
 mod points;
 pub mod presets;
 mod random;
-mod reach;
-pub mod ready;
+pub mod ready_sweeps;
 mod reference_solution;
 pub mod regime;
 pub mod reproduction;
@@ -84,6 +83,7 @@ pub mod sampling;
 pub mod section;
 mod setting;
 pub mod source;
+mod speed_goals;
 pub mod statistic;
 pub mod study;
 pub mod sweep;
@@ -98,7 +98,7 @@ pub use cost::{CaseCost, CostCase, model_costs};
 pub use many_joints::{GROWTH, LIMITS, LOOSE_MACHINES, LooseMachine, LooseSpeed, Timed, growth, loose_speed};
 pub use pareto_front::front;
 pub use points::{PointsError, cells, read_points};
-pub use reach::{Goal, GoalResult, reach};
+pub use speed_goals::{Goal, GoalResult, measure_speed_goals};
 pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};
 pub use run_context::{AnalysisError, RunContext};
 pub use setting::Setting;

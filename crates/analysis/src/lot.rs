@@ -33,14 +33,14 @@ pub struct Lot {
     /// Whether each unit is within all limits.
     pub accepted: Vec<bool>,
     /// Yield: fraction of the units within all limits.
-    pub yielded: Estimate,
+    pub yield_estimate: Estimate,
 }
 
 /// Statistics of a limited output.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quality {
     /// Fraction of all units within this output's limits.
-    pub yielded: Estimate,
+    pub yield_estimate: Estimate,
     /// Mean of the units with a result, SI.
     pub mean: f64,
     /// Standard deviation of these units, SI.
@@ -59,7 +59,7 @@ impl Lot {
     pub fn new(outputs: Vec<Vec<f64>>, limits: &[Limit]) -> Result<Self, YieldsError> {
         let holds_all = |outputs: &Vec<f64>| limits.iter().zip(outputs).all(|(limit, &value)| limit.holds(value));
         let accepted: Vec<bool> = outputs.iter().map(holds_all).collect();
-        Ok(Self { yielded: fraction_of(&accepted)?, outputs, accepted })
+        Ok(Self { yield_estimate: fraction_of(&accepted)?, outputs, accepted })
     }
 
     /// Statistics of output `o` with its limits `limit`.
@@ -72,7 +72,7 @@ impl Lot {
         let values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
         let (mean, deviation) = mean_and_deviation(&values);
         Ok(Quality {
-            yielded: fraction_of(&accepted)?,
+            yield_estimate: fraction_of(&accepted)?,
             mean,
             deviation,
             percentiles: PERCENTILES.iter().map(|&p| percentile(&values, p, CONFIDENCE).ok()).collect(),

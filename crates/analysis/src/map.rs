@@ -41,7 +41,7 @@ pub struct MapPoint {
 
 /// Reasons why a point has no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PointFault {
+pub enum MapPointError {
     /// Parameter values that the scene does not accept together.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -89,7 +89,7 @@ impl WorkspaceMap {
     ///
     /// # Errors
     /// The scene rejects the parameter values, or the machine without play has no pose at the point.
-    pub fn point(&self, point: usize) -> Result<MapPoint, PointFault> {
+    pub fn point(&self, point: usize) -> Result<MapPoint, MapPointError> {
         let scene = self.design.scene(&self.scene, point)?;
         let mut positions = vec![None; scene.machine.driven().count()];
         for (coordinate, position) in self.design.coordinates(point) {

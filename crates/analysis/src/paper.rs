@@ -201,7 +201,7 @@ pub struct Verification {
 /// Content of a figure. Columns are named as in [`super::reproduction::COLUMNS`].
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Shows {
+pub enum FigureContent {
     /// Columns of three runs, over the whole period and during the initial impacts.
     Response { to: Series, whole: Vec<String>, early: Vec<String> },
     /// The contact forces of a run.
@@ -231,7 +231,7 @@ pub struct Figure {
     pub name: String,
     pub heading: String,
     pub caption: String,
-    pub shows: Shows,
+    pub shows: FigureContent,
     #[serde(default)]
     pub strongest_of: Vec<String>,
 }

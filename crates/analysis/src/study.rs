@@ -13,7 +13,7 @@ mod tolerance;
 
 pub use candidates::{Candidate, CandidateRequest, Candidates, candidates};
 pub use inputs::{Input, Uncertainty, inputs, matching};
-pub use one_at_a_time::{Alone, AloneOutputs, ENDS};
+pub use one_at_a_time::{ENDS, OneAtATimeOutputs, OneAtATimePlan};
 pub use outputs::{NAMED, NamedOutput, Output, outputs};
 pub use runner::StudyRunner;
 pub use sensitivity::{Screening, Sensitivity, SensitivityOptions, sensitivity};

@@ -7,8 +7,8 @@ use std::task::{Context, Waker};
 use serde::{Deserialize, Serialize};
 
 use super::RunContext;
-use super::alone_task::{self, AloneMessage, AlonePlan, AloneRun, AloneTask};
 use super::map_task::{self, MapMessage, MapTask};
+use super::one_at_a_time_task::{self, OneAtATimeMessage, OneAtATimeReport, OneAtATimeRun, OneAtATimeTask};
 use super::presets::{self, Measured};
 use super::source::{SceneSource, TaskFault};
 use super::sweep_task::{self, Range, Share, SweepMessage, SweepTask, SweptPoint};
@@ -27,7 +27,7 @@ pub enum Job {
     /// Points of a sweep, or a share of them.
     Sweep(SweepTask, Share),
     /// One-at-a-time runs of uncertain parameters, or a share of them.
-    Alone(AloneTask, Share),
+    OneAtATime(OneAtATimeTask, Share),
     /// The tip's error over the workspace.
     Map(MapTask),
 }
@@ -44,9 +44,9 @@ pub enum Message {
     /// A point of a sweep.
     Point(Box<SweptPoint>),
     /// The accepted one-at-a-time runs; their results follow.
-    Plan(AlonePlan),
+    Plan(OneAtATimeReport),
     /// A finished one-at-a-time run.
-    Run(AloneRun),
+    Run(OneAtATimeRun),
     /// A message about a map.
     Map(MapMessage),
     /// End of the results.
@@ -65,12 +65,12 @@ impl From<SweepMessage> for Message {
     }
 }
 
-impl From<AloneMessage> for Message {
-    fn from(message: AloneMessage) -> Self {
+impl From<OneAtATimeMessage> for Message {
+    fn from(message: OneAtATimeMessage) -> Self {
         match message {
-            AloneMessage::Progress(done) => Self::Progress(done),
-            AloneMessage::Plan(plan) => Self::Plan(plan),
-            AloneMessage::Run(run) => Self::Run(run),
+            OneAtATimeMessage::Progress(done) => Self::Progress(done),
+            OneAtATimeMessage::Plan(plan) => Self::Plan(plan),
+            OneAtATimeMessage::Run(run) => Self::Run(run),
         }
     }
 }
@@ -95,7 +95,9 @@ pub async fn perform_with_rests(
         Job::Presets { scene, presets } => measure_presets(scene, presets, clock, report),
         Job::Map(task) => map_task::run(task, &mut |message| report(Message::Map(message)), rest).await,
         Job::Sweep(task, share) => sweep_task::run(task, *share, &mut |message| report(message.into()), rest).await,
-        Job::Alone(task, share) => alone_task::run(task, *share, &mut |message| report(message.into()), rest).await,
+        Job::OneAtATime(task, share) => {
+            one_at_a_time_task::run(task, *share, &mut |message| report(message.into()), rest).await
+        }
     };
     let last = match outcome {
         Ok(()) => Message::Done,

@@ -42,7 +42,7 @@ pub struct Check {
     /// Measurement in the run.
     pub measure: Measure,
     /// Reference value.
-    pub right: Right,
+    pub right: ReferenceValue,
     /// Largest difference allowed, in `unit`.
     pub bound: f64,
 }
@@ -111,7 +111,7 @@ impl ImpactProperty {
 /// A reference value and its origin.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Right {
+pub enum ReferenceValue {
     /// Printed in the source of the case, SI unit.
     Published(f64),
     /// From an independent model, by table and key of `assets/validation/models.toml`.
@@ -126,7 +126,7 @@ static MODELS: LazyLock<BTreeMap<String, BTreeMap<String, f64>>> = LazyLock::new
     toml::from_str(text).expect("a test reads it")
 });
 
-impl Right {
+impl ReferenceValue {
     /// The value, SI unit.
     ///
     /// # Panics
@@ -338,7 +338,7 @@ mod tests {
     fn every_value_of_the_independent_models_is_compared() {
         let used = |name: &str| {
             let checks = CASES.iter().flat_map(|case| &case.checks);
-            checks.into_iter().any(|check| matches!(&check.right, Right::Model(model) if model == name))
+            checks.into_iter().any(|check| matches!(&check.right, ReferenceValue::Model(model) if model == name))
         };
         for (case, numbers) in &*MODELS {
             for key in numbers.keys() {

@@ -1,6 +1,6 @@
 //! Settings and results of a study of what play costs.
 
-use crate::analysis::alone_task::{AlonePlan, AloneRun, AloneTask};
+use crate::analysis::one_at_a_time_task::{OneAtATimeReport, OneAtATimeRun, OneAtATimeTask};
 use crate::analysis::source::SceneSource;
 use crate::analysis::study::{NAMED, RunSpan};
 use crate::app::player::Player;
@@ -59,7 +59,7 @@ impl CostSettings {
     ///
     /// # Errors
     /// As a message: a reversed range, or nothing that varies.
-    pub fn task(&self, scene: &Scene) -> Result<AloneTask, String> {
+    pub fn task(&self, scene: &Scene) -> Result<OneAtATimeTask, String> {
         let mut over = Vec::new();
         let reversed = |varied: &&VariedParameter| self.ranges && varied.on && varied.range[0] >= varied.range[1];
         if let Some(VariedParameter { parameter, .. }) = self.varied.iter().find(reversed) {
@@ -90,16 +90,16 @@ impl CostSettings {
             return Err("Nothing varies: choose a parameter, and a range where its value is 0".to_owned());
         }
         let outputs = NAMED.iter().map(|named| named.name.to_owned()).collect();
-        Ok(AloneTask { scene: SceneSource::of(scene), over, outputs, span: self.span })
+        Ok(OneAtATimeTask { scene: SceneSource::of(scene), over, outputs, span: self.span })
     }
 }
 
 /// A started study and its results so far.
 pub struct CostStudy {
     /// The requested task.
-    pub task: AloneTask,
+    pub task: OneAtATimeTask,
     /// The accepted runs.
-    pub plan: AlonePlan,
+    pub plan: OneAtATimeReport,
     /// Outputs of each run, SI; `None` for pending runs.
     runs: Vec<Option<Vec<Option<f64>>>>,
     /// The scene as it was at the start.
@@ -108,13 +108,13 @@ pub struct CostStudy {
 
 impl CostStudy {
     /// A study without results.
-    pub fn new(task: AloneTask, plan: AlonePlan) -> Self {
+    pub fn new(task: OneAtATimeTask, plan: OneAtATimeReport) -> Self {
         let runs = vec![None; 1 + 2 * task.over.len()];
         Self { scene: task.scene.scene().ok(), runs, task, plan }
     }
 
     /// Takes the results of a run.
-    pub fn take(&mut self, run: AloneRun) {
+    pub fn take(&mut self, run: OneAtATimeRun) {
         if let Some(slot) = self.runs.get_mut(run.index) {
             *slot = Some(run.outputs);
         }

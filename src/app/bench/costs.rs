@@ -6,7 +6,7 @@ use super::cost_study::{CostSettings, CostStudy, VariedParameter};
 use super::request::BenchRequest;
 use super::shares::SharedJob;
 use super::tornado::Tornado;
-use crate::analysis::alone_task::AloneTask;
+use crate::analysis::one_at_a_time_task::OneAtATimeTask;
 use crate::analysis::study::NAMED;
 use crate::analysis::task::{Job, Message};
 use crate::app::host::Host;
@@ -32,7 +32,7 @@ pub struct Costs {
     /// Text of the scene that the settings belong to.
     scene: String,
     settings: Option<CostSettings>,
-    asked: Option<AloneTask>,
+    asked: Option<OneAtATimeTask>,
     running: Option<RunningStudy>,
     study: Option<CostStudy>,
     problem: Option<String>,
@@ -45,7 +45,7 @@ pub struct Costs {
 
 /// A study being computed.
 struct RunningStudy {
-    task: AloneTask,
+    task: OneAtATimeTask,
     shares: SharedJob,
     begun: bool,
 }
@@ -108,7 +108,7 @@ impl Costs {
         if let Some(task) = self.asked.take() {
             self.problem = None;
             let most = 1 + 2 * task.over.len();
-            let shares = SharedJob::start(host, most, |share| Job::Alone(task.clone(), share));
+            let shares = SharedJob::start(host, most, |share| Job::OneAtATime(task.clone(), share));
             self.running = shares.map(|shares| RunningStudy { task, shares, begun: false });
             if self.running.is_none() {
                 self.problem = Some("Runs cannot be computed here".to_owned());

@@ -1,6 +1,6 @@
 //! Requests of the bench to the run.
 
-use crate::analysis::ready::ReadySweep;
+use crate::analysis::ready_sweeps::ReadySweep;
 use crate::app::load::Load;
 
 /// A request of the user to the run.

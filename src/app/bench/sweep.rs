@@ -10,7 +10,7 @@ use super::shares::SharedJob;
 use super::swept::{SweepResults, start_label};
 use crate::analysis::design::Start;
 use crate::analysis::point::MAX_EXPONENT_TOLERANCE;
-use crate::analysis::ready::{READY, ReadySweep};
+use crate::analysis::ready_sweeps::{READY_SWEEPS, ReadySweep};
 use crate::analysis::source::SceneSource;
 use crate::analysis::sweep_task::SweepTask;
 use crate::analysis::task::{Job, Message};
@@ -403,7 +403,7 @@ impl Settings {
 /// Buttons of the ready sweeps with descriptions; returns the clicked one.
 fn ready_ui(ui: &mut Ui) -> Option<&'static ReadySweep> {
     let mut chosen = None;
-    for ready in &READY {
+    for ready in &READY_SWEEPS {
         ui.horizontal_wrapped(|ui| {
             let help =
                 "Opens its scene in place of the running one, and starts the sweep; asks first if that loses changes";

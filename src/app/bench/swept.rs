@@ -67,11 +67,11 @@ pub(super) fn start_label(start: Start) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::ready::READY;
+    use crate::analysis::ready_sweeps::READY_SWEEPS;
 
     #[test]
     fn the_axis_of_a_swept_parameter_of_the_file_has_its_title_and_unit() {
-        let ready = &READY[0];
+        let ready = &READY_SWEEPS[0];
         let scene = ready.scene().expect("a built-in scene");
         let range = Range { key: ready.key.to_owned(), from: 21.0, to: 45.0, count: ready.values };
         let swept = SweepResults { task: ready.task(&scene), range, points: Vec::new(), scene: Some(scene) };

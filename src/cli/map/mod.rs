@@ -14,7 +14,7 @@ use super::args::{MapArguments, SummaryForm};
 use super::output::check_distinct;
 use super::workers::run_jobs;
 use super::{Failure, interrupt, load, print, progress, threads};
-use crate::analysis::map::{MapPoint, PointFault, WorkspaceMap};
+use crate::analysis::map::{MapPoint, MapPointError, WorkspaceMap};
 use crate::files::{OutputFile, PendingFile, publish};
 
 /// Format of an output, by its extension.
@@ -79,9 +79,9 @@ fn compute(
     map: &WorkspaceMap,
     threads: usize,
     mut done: impl FnMut(),
-) -> Result<Vec<Result<MapPoint, PointFault>>, Failure> {
+) -> Result<Vec<Result<MapPoint, MapPointError>>, Failure> {
     let todo: Vec<usize> = (0..map.design().points()).collect();
-    let mut points: Vec<Option<Result<MapPoint, PointFault>>> = todo.iter().map(|_| None).collect();
+    let mut points: Vec<Option<Result<MapPoint, MapPointError>>> = todo.iter().map(|_| None).collect();
     run_jobs(
         &todo,
         threads,

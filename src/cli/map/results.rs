@@ -3,7 +3,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use crate::analysis::axis::Axis;
-use crate::analysis::map::{MapPoint, PointFault, WorkspaceMap};
+use crate::analysis::map::{MapPoint, MapPointError, WorkspaceMap};
 use crate::cli::provenance;
 use crate::machine::Vec3;
 use crate::scene::{Kind, insert_texts};
@@ -18,7 +18,7 @@ pub const SETTLED: &str = "static equilibrium with play under gravity, springs a
 /// All points of a map, in its order.
 pub struct Results {
     pub map: WorkspaceMap,
-    pub points: Vec<Result<MapPoint, PointFault>>,
+    pub points: Vec<Result<MapPoint, MapPointError>>,
 }
 
 /// A vector without values.

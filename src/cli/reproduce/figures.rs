@@ -1,6 +1,6 @@
 //! The figures of the paper and the additional ones, as sheets.
 
-use crate::analysis::paper::{Coordinate, PAPER, Series, SeriesRow, Shows, Variant};
+use crate::analysis::paper::{Coordinate, FigureContent, PAPER, Series, SeriesRow, Variant};
 use crate::analysis::regime::Regime;
 use crate::analysis::reproduction::{COLUMNS, Findings, NO_REGIME, RecordedRun, SettledPoint, column_of, derivative};
 use crate::chart::{Axis, Chart, Level, Map, Marker, PALETTE, Series as Curve, Sheet};
@@ -19,20 +19,21 @@ pub(super) fn all(findings: &Findings) -> impl Iterator<Item = (String, Sheet)> 
     let figures = PAPER.sections.iter().flat_map(|section| &section.figures);
     figures.map(|figure| {
         let charts = match figure.shows {
-            Shows::Response { to, ref whole, ref early } => response(findings, to, whole, early),
-            Shows::Forces(case) => forces(findings.run(case)),
-            Shows::Verification(ref columns) => verification(findings, columns),
-            Shows::Drift => drift(findings),
-            Shows::Portraits(series) => portraits(findings, series),
-            Shows::Sections(series) => sections(findings, series),
-            Shows::Bifurcation(series) => bifurcation(findings, series),
-            Shows::Exponents(series) => exponents(findings, series),
-            Shows::Map => map(findings),
-            Shows::Probe => probe(findings),
+            FigureContent::Response { to, ref whole, ref early } => response(findings, to, whole, early),
+            FigureContent::Forces(case) => forces(findings.run(case)),
+            FigureContent::Verification(ref columns) => verification(findings, columns),
+            FigureContent::Drift => drift(findings),
+            FigureContent::Portraits(series) => portraits(findings, series),
+            FigureContent::Sections(series) => sections(findings, series),
+            FigureContent::Bifurcation(series) => bifurcation(findings, series),
+            FigureContent::Exponents(series) => exponents(findings, series),
+            FigureContent::Map => map(findings),
+            FigureContent::Probe => probe(findings),
         };
         // In rows of two.
         let size = (WIDTH, ROW * charts.len().div_ceil(2) as u32 + 34);
-        let sheet = Sheet { title: String::new(), charts, columns: 2, size, note: String::new(), apart: false };
+        let sheet =
+            Sheet { title: String::new(), charts, columns: 2, size, note: String::new(), separate_legends: false };
         (picture_name(findings.variant, &figure.name), sheet)
     })
 }

@@ -1,7 +1,9 @@
 //! Tables of the page and of the data files: the paper's numbers and statements beside this program's, and the tables of each
 //! figure.
 
-use crate::analysis::paper::{Agreement, Case, Comparison, Coordinate, Figure, FigureValue, PAPER, Series, Shows};
+use crate::analysis::paper::{
+    Agreement, Case, Comparison, Coordinate, Figure, FigureContent, FigureValue, PAPER, Series,
+};
 use crate::analysis::reproduction::{Findings, RecordedRun, Report, SettledPoint, Statement, exponents, regime_counts};
 use crate::cli::output::significant;
 use crate::cli::tables::{Table, yes_or_no};
@@ -41,11 +43,11 @@ fn run_of(comparison: &Comparison) -> String {
 pub(super) fn of_figure(figure: &Figure, comparisons: &[Comparison], findings: &Findings) -> Vec<Table> {
     let own: Vec<&Comparison> = comparisons.iter().filter(|c| figure.contains(&c.published.figure)).collect();
     let more = match figure.shows {
-        Shows::Verification(_) => Some(verification(findings)),
-        Shows::Drift => Some(drift(findings)),
-        Shows::Sections(series) => Some(sections(findings, series)),
-        Shows::Bifurcation(series) => Some(branches(findings, series)),
-        Shows::Probe => Some(probe(findings)),
+        FigureContent::Verification(_) => Some(verification(findings)),
+        FigureContent::Drift => Some(drift(findings)),
+        FigureContent::Sections(series) => Some(sections(findings, series)),
+        FigureContent::Bifurcation(series) => Some(branches(findings, series)),
+        FigureContent::Probe => Some(probe(findings)),
         _ => (!figure.strongest_of.is_empty()).then(|| strongest(comparisons, &figure.strongest_of)),
     };
     (!own.is_empty()).then(|| numbers(&own)).into_iter().chain(more).collect()

@@ -40,7 +40,7 @@ pub fn sheet(study: &Study, results: &Sensitivity) -> Sheet {
         charts,
         columns,
         note: format!("jointplay {}; runs of {}", crate::VERSION, study.describe()),
-        apart: true,
+        separate_legends: true,
     }
 }
 

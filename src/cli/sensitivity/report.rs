@@ -129,7 +129,7 @@ fn line(study: &Study, results: &Sensitivity, o: usize, i: usize, cell: &impl Fn
     let input = &study.inputs()[i];
     let [(low, at_low), (high, at_high)] = &results.alone.ends[i];
     let indices = results.indices_of(o);
-    let at = results.place_of(i);
+    let at = results.index_of(i);
     let [first, total] = match (indices, at) {
         (Some(indices), Some(at)) => [Some(&indices.first[at]), Some(&indices.total[at])],
         _ => [None, None],
@@ -182,7 +182,7 @@ pub fn json(study: &Study, results: &Sensitivity) -> Json {
         let indices = results.indices_of(o);
         let of_input = |(i, input): (usize, &Input)| {
             let [(low, at_low), (high, at_high)] = &results.alone.ends[i];
-            let at = results.place_of(i);
+            let at = results.index_of(i);
             let own = indices.zip(at);
             json!({
                 "key": input.key,
@@ -243,7 +243,7 @@ fn table(study: &Study, results: &Sensitivity) -> String {
         let indices = results.indices_of(o);
         for (i, input) in study.inputs().iter().enumerate() {
             let [(low, at_low), (high, at_high)] = &results.alone.ends[i];
-            let own = indices.zip(results.place_of(i));
+            let own = indices.zip(results.index_of(i));
             let both = own.map_or([None, None], |(indices, at)| [Some(indices.first[at]), Some(indices.total[at])]);
             let estimates = both.into_iter().flat_map(|e| e.map_or([f64::NAN; 3], |e| [e.value, e.low, e.high]));
             let numbers = [*low, *high, at_low[o], at_high[o]].into_iter().chain(estimates);

@@ -20,7 +20,7 @@ pub fn sheet(study: &Study, limits: &[Limit], lot: &Lot) -> Sheet {
         charts,
         columns,
         note: format!("jointplay {}; runs of {}", crate::VERSION, study.describe()),
-        apart: true,
+        separate_legends: true,
     }
 }
 

@@ -79,7 +79,7 @@ pub fn text(study: &Study, limits: &[Limit], outcome: &Tolerance, arguments: &To
         study.run_count_text(),
         count(units as u64, "unit"),
         rejects,
-        with_interval(&outcome.lot.yielded),
+        with_interval(&outcome.lot.yield_estimate),
     );
     let lost = without_result(outcome);
     if lost > 0 {
@@ -90,7 +90,7 @@ pub fn text(study: &Study, limits: &[Limit], outcome: &Tolerance, arguments: &To
             "\n{} {}: {} of the lot\n",
             output.name,
             describe(limit, output.unit),
-            with_interval(&quality.yielded)
+            with_interval(&quality.yield_estimate)
         );
         let rows = statistics(output, quality).into_iter().map(|(name, _, unit, value)| {
             let number = |of: fn(&Estimate) -> f64| {
@@ -181,7 +181,7 @@ pub fn json(study: &Study, limits: &[Limit], outcome: &Tolerance) -> Json {
         all.insert("unit".into(), json!(output.unit));
         all.insert("lower".into(), json!(limit.lower));
         all.insert("upper".into(), json!(limit.upper));
-        all.insert("yield".into(), estimate(&quality.yielded));
+        all.insert("yield".into(), estimate(&quality.yield_estimate));
         for (_, name, _, value) in statistics(output, quality) {
             let plain = value.is_some_and(|value| value.low.is_nan());
             let value = value.map(|value| if plain { number(value.value) } else { estimate(&value) });
@@ -206,7 +206,7 @@ pub fn json(study: &Study, limits: &[Limit], outcome: &Tolerance) -> Json {
         "units": outcome.lot.accepted.len(),
         "accepted": outcome.lot.accepted.iter().filter(|accepted| **accepted).count(),
         "without_result": without_result(outcome),
-        "yield": estimate(&outcome.lot.yielded),
+        "yield": estimate(&outcome.lot.yield_estimate),
         "outputs": outputs.collect::<Vec<_>>(),
         "reject_drivers": drivers,
         "fits": outcome.cheapest.as_ref().map(|cheapest| fits_json(study, cheapest)),
@@ -243,11 +243,11 @@ pub fn table(study: &Study, limits: &[Limit], outcome: &Tolerance) -> String {
     let mut line = |heads: &str, name: &str, value: &Estimate| {
         out += &format!("{heads},{name},{},{},{}\n", cell(value.value), cell(value.low), cell(value.high));
     };
-    line("all,,NaN,NaN", "yield", &outcome.lot.yielded);
+    line("all,,NaN,NaN", "yield", &outcome.lot.yield_estimate);
     for ((output, limit), quality) in study.outputs().iter().zip(limits).zip(&outcome.qualities) {
         let [lower, upper] = [limit.lower, limit.upper].map(|end| cell(end.unwrap_or(f64::NAN)));
         let heads = format!("{},{},{lower},{upper}", quoted(&output.name), output.unit);
-        line(&heads, "yield", &quality.yielded);
+        line(&heads, "yield", &quality.yield_estimate);
         let unknown = Estimate { value: f64::NAN, low: f64::NAN, high: f64::NAN };
         for (_, name, _, value) in statistics(output, quality) {
             line(&heads, &name, &value.unwrap_or(unknown));

@@ -41,7 +41,7 @@ pub(super) fn picture(results: &WorkPrecision, relative: bool, machine: &str) ->
         charts,
         columns,
         note: format!("jointplay {}, {machine}", crate::VERSION),
-        apart: false,
+        separate_legends: false,
     }
 }
 

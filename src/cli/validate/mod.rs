@@ -6,7 +6,7 @@ use super::args::ValidateArguments;
 use super::output::significant;
 use super::tables::{Table, fill};
 use super::{Failure, print};
-use crate::analysis::validation::{CASES, Case, Check, Comparison, Right};
+use crate::analysis::validation::{CASES, Case, Check, Comparison, ReferenceValue};
 use crate::files::OutputFile;
 
 /// Runs the command.
@@ -50,9 +50,9 @@ pub fn page() -> Result<(String, Vec<String>), Failure> {
 fn row(case: &Case, check: &Check, comparison: &Comparison) -> Vec<String> {
     let Comparison { right, ours, bound } = *comparison;
     let origin = match &check.right {
-        Right::Published(_) => "published".to_owned(),
-        Right::Model(name) => format!("model, `{name}`"),
-        Right::Formula(text) => format!("`{text}`"),
+        ReferenceValue::Published(_) => "published".to_owned(),
+        ReferenceValue::Model(name) => format!("model, `{name}`"),
+        ReferenceValue::Formula(text) => format!("`{text}`"),
     };
     let difference = comparison.difference();
     // Differences far below the bound may change with the compiler.

@@ -12,12 +12,12 @@ pub const ENDS: [f64; 2] = [0.025, 0.975];
 /// Plan of the one-at-a-time runs: each input at the lower and at the upper end of its distribution, with all others at their
 /// values in the scene.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Alone {
+pub struct OneAtATimePlan {
     nominal: Vec<f64>,
     ends: Vec<[f64; 2]>,
 }
 
-impl Alone {
+impl OneAtATimePlan {
     /// A plan for `inputs`. Its ends are the limits of each distribution, or the [`ENDS`] quantiles where there is no limit.
     pub fn new(inputs: &[Input]) -> Self {
         let ends = inputs.iter().map(|input| {
@@ -76,7 +76,7 @@ impl Alone {
 
 /// Outputs of the one-at-a-time runs, SI.
 #[derive(Clone, Debug, PartialEq)]
-pub struct AloneOutputs {
+pub struct OneAtATimeOutputs {
     /// Outputs with the values of the scene.
     pub nominal: Vec<f64>,
     /// Lower and upper end of each parameter, with the outputs of these runs.
@@ -85,13 +85,13 @@ pub struct AloneOutputs {
     pub together: [Vec<f64>; 2],
 }
 
-impl AloneOutputs {
+impl OneAtATimeOutputs {
     /// Executes the runs.
     ///
     /// # Errors
     /// As [`StudyRunner::run`].
     pub(super) fn compute<R: StudyRunner>(runner: &mut R) -> Result<Self, R::Error> {
-        let plan = Alone::new(runner.inputs());
+        let plan = OneAtATimePlan::new(runner.inputs());
         let mut rows = plan.rows();
         rows.extend([0, 1].map(|end| plan.ends().iter().map(|ends| ends[end]).collect()));
         let mut results = runner.run("alone", rows)?.into_iter();

@@ -1,7 +1,7 @@
 //! Which parameters influence an output most: one at a time, by screening, and by variance-based indices.
 
 use super::target::{self, TargetAnswer};
-use super::{AloneOutputs, ENDS, StudyError, StudyRunner};
+use super::{ENDS, OneAtATimeOutputs, StudyError, StudyRunner};
 use crate::argument::Argument;
 use crate::indices::{Bootstrap, IndicesError, MIN_ROWS, SaltelliDesign, SensitivityIndices};
 use crate::morris::{ElementaryEffects, MorrisPlan};
@@ -55,7 +55,7 @@ pub struct Screening {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensitivity {
     /// Effects of each parameter alone.
-    pub alone: AloneOutputs,
+    pub alone: OneAtATimeOutputs,
     /// Screening, if there was one.
     pub screening: Option<Screening>,
     /// Indices of the parameters that remain, ascending.
@@ -73,7 +73,7 @@ impl Sensitivity {
     }
 
     /// Position of parameter `i` in [`Self::kept`].
-    pub fn place_of(&self, i: usize) -> Option<usize> {
+    pub fn index_of(&self, i: usize) -> Option<usize> {
         self.kept.iter().position(|&kept| kept == i)
     }
 }
@@ -85,7 +85,7 @@ impl Sensitivity {
 /// Too few rows, before anything runs; a design that is too large; an error of `runner`.
 pub fn sensitivity<R: StudyRunner>(runner: &mut R, options: &SensitivityOptions) -> Result<Sensitivity, R::Error> {
     options.check()?;
-    let alone = AloneOutputs::compute(runner)?;
+    let alone = OneAtATimeOutputs::compute(runner)?;
     let screening = screening(runner, options)?;
     let kept = screening.as_ref().map_or_else(|| (0..runner.inputs().len()).collect(), |s| s.kept.clone());
     let indices = indices(runner, &kept, options)?;

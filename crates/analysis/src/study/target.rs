@@ -1,6 +1,6 @@
 //! Changes of parameters that bring an output down to a target.
 
-use super::{AloneOutputs, StudyRunner};
+use super::{OneAtATimeOutputs, StudyRunner};
 use crate::indices::SensitivityIndices;
 
 /// Number of steps from the value in the scene to the better end.
@@ -34,7 +34,7 @@ pub struct TargetAnswer {
 /// As [`StudyRunner::run`].
 pub(super) fn answer<R: StudyRunner>(
     runner: &mut R,
-    alone: &AloneOutputs,
+    alone: &OneAtATimeOutputs,
     indices: Option<&SensitivityIndices>,
     kept: &[usize],
     target: f64,

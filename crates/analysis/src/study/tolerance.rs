@@ -125,14 +125,17 @@ pub fn tolerance<R: StudyRunner>(
     let mut evaluations = 0;
     let search = problem.solve(|chosen| {
         evaluations += 1;
-        Ok::<_, R::Error>(self::lot(runner, limits, &format!("fits-{evaluations}"), &sample, &with(chosen))?.yielded)
+        Ok::<_, R::Error>(
+            self::lot(runner, limits, &format!("fits-{evaluations}"), &sample, &with(chosen))?.yield_estimate,
+        )
     })?;
     let check = match &search.best {
         Some(best) => {
             // The units of the search are biased in favour of the choice that they selected; the check uses independent units.
             let independent = self::sample(runner, units, Sampling::Random, seed.wrapping_add(1))?;
-            let yielded = self::lot(runner, limits, "fits-check", &independent, &with(&best.candidates))?.yielded;
-            Some((yielded, FitVerdict::of(&yielded, fits.required_yield)))
+            let yield_estimate =
+                self::lot(runner, limits, "fits-check", &independent, &with(&best.candidates))?.yield_estimate;
+            Some((yield_estimate, FitVerdict::of(&yield_estimate, fits.required_yield)))
         }
         None => None,
     };

@@ -31,7 +31,7 @@ pub struct ReadySweep {
 }
 
 /// All ready-made sweeps.
-pub const READY: [ReadySweep; 3] = [
+pub const READY_SWEEPS: [ReadySweep; 3] = [
     ReadySweep {
         name: "Road to chaos",
         shows: "The four-bar, its crank at 21 to 45 rad/s: every turn is alike until the balls knock, at 24. From there on chaos, but \

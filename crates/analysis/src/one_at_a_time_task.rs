@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use super::orbit::Orbit as _;
 use super::source::{SceneSource, TaskFault};
-use super::study::{Alone, Output, RunSpan, StudyRuns, outputs};
+use super::study::{OneAtATimePlan, Output, RunSpan, StudyRuns, outputs};
 use super::sweep_task::{STEPS, Share};
 use jointplay_physics::simulate::{MAX_RUN_DURATION, Simulation};
 
 /// A request for one-at-a-time runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AloneTask {
+pub struct OneAtATimeTask {
     /// The scene.
     pub scene: SceneSource,
     /// Keys of the varied parameters, each with its lower and its upper end, SI.
@@ -25,7 +25,7 @@ pub struct AloneTask {
 
 /// The accepted runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AlonePlan {
+pub struct OneAtATimeReport {
     /// Value of each parameter in the scene, SI.
     pub nominal: Vec<f64>,
     /// SI unit of each requested output, "" for a dimensionless number; `None` for an output that the scene does not have.
@@ -34,7 +34,7 @@ pub struct AlonePlan {
 
 /// A finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AloneRun {
+pub struct OneAtATimeRun {
     /// 0 for the run with the values of the scene; 1 + 2 i and 2 + 2 i for parameter i at its lower and at its upper end.
     pub index: usize,
     /// The requested outputs, SI; `None` for an output that the scene does not have, and if the run did not start or diverged.
@@ -42,20 +42,20 @@ pub struct AloneRun {
 }
 
 /// Messages of a running task.
-pub(super) enum AloneMessage {
+pub(super) enum OneAtATimeMessage {
     /// Fraction done, 0 to 1.
     Progress(f64),
     /// The accepted runs; their results follow.
-    Plan(AlonePlan),
+    Plan(OneAtATimeReport),
     /// A finished run.
-    Run(AloneRun),
+    Run(OneAtATimeRun),
 }
 
 /// Computes a share of the runs of `task` one after another, and awaits `rest` every [`STEPS`] steps.
 pub(super) async fn run(
-    task: &AloneTask,
+    task: &OneAtATimeTask,
     share: Share,
-    report: &mut dyn FnMut(AloneMessage) -> ControlFlow<()>,
+    report: &mut dyn FnMut(OneAtATimeMessage) -> ControlFlow<()>,
     rest: &mut impl AsyncFnMut(),
 ) -> Result<(), TaskFault> {
     let mut send = |message| match report(message) {
@@ -68,14 +68,14 @@ pub(super) async fn run(
     }
     let scene = task.scene.scene()?;
     Simulation::new(&scene.machine).map_err(|error| scene.locate(&error))?;
-    let alone = Alone::between(&scene, &task.over)?;
+    let alone = OneAtATimePlan::between(&scene, &task.over)?;
     let keys: Vec<String> = task.over.iter().map(|(key, _)| key.clone()).collect();
     // An output can be unknown in this scene: not every scene has a probe or an energy ledger.
     let known = task.outputs.iter().map(|name| outputs(&scene, name).ok().and_then(|mut outputs| outputs.pop()));
     let known: Vec<Option<Output>> = known.collect();
     let available: Vec<Output> = known.iter().flatten().cloned().collect();
     let runs = StudyRuns::new(&scene, &keys, &available, task.span, &alone.rows())?;
-    send(AloneMessage::Plan(AlonePlan {
+    send(OneAtATimeMessage::Plan(OneAtATimeReport {
         nominal: alone.nominal().to_vec(),
         units: known.iter().map(|output| output.as_ref().map(|output| output.unit.to_owned())).collect(),
     }))?;
@@ -86,13 +86,13 @@ pub(super) async fn run(
             rest().await;
             block.advance(STEPS);
             let part = block.current().map_or(0.0, |run| run.machine().time() / duration);
-            send(AloneMessage::Progress((finished as f64 + part) / all as f64))?;
+            send(OneAtATimeMessage::Progress((finished as f64 + part) / all as f64))?;
         }
         let mut values = runs.outputs_of(&block.records()).into_iter();
         let mut next =
             |output: &Option<Output>| output.as_ref().and_then(|_| values.next()).filter(|value| value.is_finite());
-        send(AloneMessage::Run(AloneRun { index, outputs: known.iter().map(&mut next).collect() }))?;
-        send(AloneMessage::Progress((finished + 1) as f64 / all as f64))?;
+        send(OneAtATimeMessage::Run(OneAtATimeRun { index, outputs: known.iter().map(&mut next).collect() }))?;
+        send(OneAtATimeMessage::Progress((finished + 1) as f64 / all as f64))?;
     }
     Ok(())
 }
@@ -107,21 +107,25 @@ mod tests {
     const OUTPUTS: [&str; 3] = ["tip-error", "peak-force", "impacts"];
 
     /// A task that varies the parameters that match a pattern by half of their values.
-    fn task(scene: &str, pattern: &str) -> AloneTask {
+    fn task(scene: &str, pattern: &str) -> OneAtATimeTask {
         let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
         let scene = Scene::load(scene, if scene == "spcmm" { &changes } else { &[] }).expect("built in");
         let varied = inputs(&scene, &[Uncertainty::parse("--over", pattern)]).expect("parameters");
-        AloneTask {
+        OneAtATimeTask {
             scene: SceneSource::of(&scene),
-            over: varied.iter().map(|input| input.key.clone()).zip(Alone::new(&varied).ends().to_vec()).collect(),
+            over: varied
+                .iter()
+                .map(|input| input.key.clone())
+                .zip(OneAtATimePlan::new(&varied).ends().to_vec())
+                .collect(),
             outputs: OUTPUTS.map(str::to_owned).to_vec(),
             span: RunSpan { duration: 0.06, from: 0.02 },
         }
     }
 
     /// The messages of a share, given by its index; the job and the messages pass through text.
-    fn messages_of(task: &AloneTask, index: usize, of: usize) -> Vec<Message> {
-        let text = serde_json::to_string(&Job::Alone(task.clone(), Share { index, of })).expect("plain data");
+    fn messages_of(task: &OneAtATimeTask, index: usize, of: usize) -> Vec<Message> {
+        let text = serde_json::to_string(&Job::OneAtATime(task.clone(), Share { index, of })).expect("plain data");
         let mut messages = Vec::new();
         perform(&serde_json::from_str(&text).expect("its own text"), &mut || 0.0, &mut |message| {
             let text = serde_json::to_string(&message).expect("plain data");
@@ -132,8 +136,8 @@ mod tests {
         messages
     }
 
-    fn runs(messages: &[Message]) -> Vec<AloneRun> {
-        let mut runs: Vec<AloneRun> = messages
+    fn runs(messages: &[Message]) -> Vec<OneAtATimeRun> {
+        let mut runs: Vec<OneAtATimeRun> = messages
             .iter()
             .filter_map(|message| match message {
                 Message::Run(run) => Some(run.clone()),
@@ -150,21 +154,21 @@ mod tests {
         let whole = messages_of(&task, 0, 1);
         assert_eq!(whole.last(), Some(&Message::Done));
         let first = whole.iter().find(|message| matches!(message, Message::Run(_)));
-        assert!(matches!(first, Some(Message::Run(AloneRun { index: 0, .. }))));
+        assert!(matches!(first, Some(Message::Run(OneAtATimeRun { index: 0, .. }))));
         let scene = task.scene.scene().expect("built in");
         let available: Vec<Output> =
             OUTPUTS.iter().flat_map(|name| outputs(&scene, name).expect("an output")).collect();
-        let alone = Alone::between(&scene, &task.over).expect("ends");
+        let alone = OneAtATimePlan::between(&scene, &task.over).expect("ends");
         let keys: Vec<String> = task.over.iter().map(|(key, _)| key.clone()).collect();
         let study = StudyRuns::new(&scene, &keys, &available, task.span, &alone.rows()).expect("runs");
-        let expected: Vec<AloneRun> = (0..study.sweep().design().blocks())
+        let expected: Vec<OneAtATimeRun> = (0..study.sweep().design().blocks())
             .map(|index| {
                 let mut block = study.sweep().begin(index);
                 while !block.is_done() {
                     block.advance(10_000);
                 }
                 let outputs = study.outputs_of(&block.records());
-                AloneRun { index, outputs: outputs.into_iter().map(Some).collect() }
+                OneAtATimeRun { index, outputs: outputs.into_iter().map(Some).collect() }
             })
             .collect();
         assert_eq!(expected.len(), 7);
@@ -208,8 +212,8 @@ mod tests {
     #[test]
     fn faults_are_reported() {
         let good = || task("spcmm", "joint.*.clearance");
-        let over = |key: &str, ends| AloneTask { over: vec![(key.to_owned(), ends)], ..good() };
-        let with_span = |duration, from| AloneTask { span: RunSpan { duration, from }, ..good() };
+        let over = |key: &str, ends| OneAtATimeTask { over: vec![(key.to_owned(), ends)], ..good() };
+        let with_span = |duration, from| OneAtATimeTask { span: RunSpan { duration, from }, ..good() };
         for (task, words) in [
             (over("joint.S9.clearance", [1e-4, 2e-4]), "joint.S9.clearance: "),
             (over("joint.S1.clearance", [4e-4, 2e-4]), "joint.S1.clearance: the lower limit"),
@@ -227,9 +231,9 @@ mod tests {
     }
 
     /// As [`messages_of`], for a task with numbers that text cannot represent.
-    fn messages_without_text(task: &AloneTask) -> Vec<Message> {
+    fn messages_without_text(task: &OneAtATimeTask) -> Vec<Message> {
         let mut messages = Vec::new();
-        perform(&Job::Alone(task.clone(), Share::WHOLE), &mut || 0.0, &mut |message| {
+        perform(&Job::OneAtATime(task.clone(), Share::WHOLE), &mut || 0.0, &mut |message| {
             messages.push(message);
             ControlFlow::Continue(())
         });
@@ -239,7 +243,7 @@ mod tests {
     #[test]
     fn a_cancelled_task_sends_no_further_messages() {
         let mut messages = 0;
-        perform(&Job::Alone(task("spcmm", "joint.*.clearance"), Share::WHOLE), &mut || 0.0, &mut |_| {
+        perform(&Job::OneAtATime(task("spcmm", "joint.*.clearance"), Share::WHOLE), &mut || 0.0, &mut |_| {
             messages += 1;
             if messages < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });

@@ -8,14 +8,14 @@ pub const LENGTH: f64 = 0.05;
 const MAX_EVALUATIONS: u64 = 2_000_000;
 
 /// Largest contact forces in the first instants of a run.
-pub struct Beginning {
+pub struct InitialPeaks {
     /// End of the examined time, s: [`LENGTH`], or less if the work limit is reached or the run stops.
     pub until: f64,
     /// Peaks of the ball joints.
     pub peaks: Vec<Peak>,
 }
 
-impl Beginning {
+impl InitialPeaks {
     /// Advances `simulation`, which must be at its start, and collects its peaks.
     pub fn of(simulation: &mut Simulation) -> Self {
         let joints = simulation.machine().ball_joints.len().max(1) as u64;

@@ -40,7 +40,7 @@ impl Goal {
     }
 
     /// Quantity whose error is measured.
-    pub fn error_of(self) -> &'static str {
+    pub fn error_quantity(self) -> &'static str {
         match self {
             Self::FirstSecond => "peaks of the first six impacts",
             Self::Settled => "mean contact forces",
@@ -93,7 +93,7 @@ impl GoalResult {
 ///
 /// # Errors
 /// As [`super::work_precision`].
-pub fn reach(scene: &Scene, context: &mut RunContext) -> Result<Vec<GoalResult>, AnalysisError> {
+pub fn measure_speed_goals(scene: &Scene, context: &mut RunContext) -> Result<Vec<GoalResult>, AnalysisError> {
     let goals = Goal::ALL.iter().enumerate();
     goals
         .map(|(n, goal)| {
