@@ -8,7 +8,7 @@ use jointplay::scene::{BENCHMARKS, BUILT_IN};
 use serde_json::Value as Json;
 
 #[cfg(target_os = "linux")]
-use crate::program::until;
+use crate::program::poll_until;
 use crate::program::{command, folder, jointplay, names};
 
 /// First columns, in the order that readers of the published reference files expect.
@@ -392,7 +392,7 @@ fn has_signal_in(child: &std::process::Child, disposition: &str, number: u32) ->
 pub fn start_and_listen(command: &mut Command) -> std::process::Child {
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let handles_hangup = || has_signal_in(&child, "SigCgt", 1) || has_signal_in(&child, "SigIgn", 1);
-    until(|| has_signal_in(&child, "SigCgt", 2) && has_signal_in(&child, "SigCgt", 15) && handles_hangup());
+    poll_until(|| has_signal_in(&child, "SigCgt", 2) && has_signal_in(&child, "SigCgt", 15) && handles_hangup());
     child
 }
 
@@ -422,9 +422,9 @@ fn a_repeated_signal_while_rows_are_written_changes_nothing() {
             let lengths = files.filter_map(|file| Some(fs::metadata(file.ok()?.path()).ok()?.len()));
             lengths.max().unwrap_or(0)
         };
-        until(|| buffered() > 4 << 20);
+        poll_until(|| buffered() > 4 << 20);
         signal(child, "-INT");
-        until(|| names(folder).iter().any(|name| name.starts_with(".jointplay-")));
+        poll_until(|| names(folder).iter().any(|name| name.starts_with(".jointplay-")));
         signal(child, "-INT");
     });
 }

@@ -51,11 +51,11 @@ fn peaks_are_at_least_those_of_the_rows() {
         let file: Json =
             serde_json::from_str(&fs::read_to_string(folder.path().join(format!("{scene}.json"))).unwrap()).unwrap();
         for &(name, element, turns) in parts {
-            let what = if element { "force" } else { "reaction" };
+            let channel = if element { "force" } else { "reaction" };
             assert!(text.contains(&format!("{} {name} ", if element { "Element" } else { "Joint" })), "{name}: {text}");
-            let loads = [("peak_force", what, "N"), ("peak_torque", "reaction_torque", "Nm")];
-            for (member, what, unit) in loads.into_iter().take(1 + usize::from(turns)) {
-                let (row, time) = largest(&file, &format!("{name}_{what}"), unit);
+            let loads = [("peak_force", channel, "N"), ("peak_torque", "reaction_torque", "Nm")];
+            for (member, channel, unit) in loads.into_iter().take(1 + usize::from(turns)) {
+                let (row, time) = largest(&file, &format!("{name}_{channel}"), unit);
                 let peak = |summary: &Json| {
                     let number =
                         |member: String| summary[member][name].as_f64().unwrap_or_else(|| panic!("{name}: {summary}"));
@@ -64,12 +64,12 @@ fn peaks_are_at_least_those_of_the_rows() {
                 let (largest, when) = peak(&with_rows);
                 // The peak between rows may be higher: a torque peaks while friction reverses, for 0.2 us.
                 let limit = if unit == "N" { 1.02 } else { 1.3 };
-                assert!(largest >= row && largest < limit * row, "{scene} {name} {what}: {largest} in rows {row}");
-                assert!((when - time).abs() < 2e-4, "{scene} {name} {what}: at {when} s, in rows {time} s");
+                assert!(largest >= row && largest < limit * row, "{scene} {name} {channel}: {largest} in rows {row}");
+                assert!((when - time).abs() < 2e-4, "{scene} {name} {channel}: at {when} s, in rows {time} s");
                 let (without_rows, _) = peak(&without);
                 assert!(
                     without_rows > 0.95 * row && without_rows <= largest,
-                    "{scene} {name} {what}: {without_rows}, with rows {largest}"
+                    "{scene} {name} {channel}: {without_rows}, with rows {largest}"
                 );
             }
         }

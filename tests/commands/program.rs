@@ -57,7 +57,7 @@ pub fn folder() -> TempDir {
 
 #[cfg(target_os = "linux")]
 /// Polls until `condition` holds, without a time limit.
-pub fn until(condition: impl Fn() -> bool) {
+pub fn poll_until(condition: impl Fn() -> bool) {
     while !condition() {
         std::thread::sleep(std::time::Duration::from_millis(2));
     }

@@ -131,8 +131,8 @@ fn full_a_quick_report_is_complete_and_its_page_agrees_with_its_data() {
         let full = number(6);
         assert!((full / number(5) - number(8)).abs() < 1e-9);
         let run = format!("{} mm, {}", published.case.clearance, published.case.friction);
-        let what = format!("{} ({})", line[3].replace("beta", "β"), line[4]);
-        let row = table.iter().find(|row| row.len() == 9 && row[0] == line[0] && row[1] == run && row[2] == what);
+        let quantity = format!("{} ({})", line[3].replace("beta", "β"), line[4]);
+        let row = table.iter().find(|row| row.len() == 9 && row[0] == line[0] && row[1] == run && row[2] == quantity);
         let row = row.unwrap_or_else(|| panic!("no row for {line:?}"));
         assert_eq!(row[3], page_number(published.value));
         assert_eq!(row[4], page_number(full));

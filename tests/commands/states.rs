@@ -26,11 +26,11 @@ fn check_resumed(scene: &str, options: &str) {
     let first = run("--duration 10ms --out a.csv --save-state a --impacts a-impacts.json");
     assert_eq!(first["state_out"], "a");
     let second = run("--duration 20ms --out b.csv --from-state a --impacts b-impacts.json");
-    let what = format!("{scene} {options}");
+    let case = format!("{scene} {options}");
     let (all, later) = (rows(folder.path(), "whole.csv"), rows(folder.path(), "b.csv"));
-    assert_eq!((all.len(), later.len()), (82, 42), "{what}");
-    assert_eq!(all[0], later[0], "{what}");
-    assert_eq!(all[41..], later[1..], "{what}");
+    assert_eq!((all.len(), later.len()), (82, 42), "{case}");
+    assert_eq!(all[0], later[0], "{case}");
+    assert_eq!(all[41..], later[1..], "{case}");
     // The summary is that of the whole run: steps, peaks, energies, doubts, state hash.
     let excluded = ["wall_s", "ratio", "slower_than_asked", "from_time_s", "rows", "out", "impacts_out", "restitution"];
     let without_excluded = |summary: &Json| {
@@ -38,7 +38,7 @@ fn check_resumed(scene: &str, options: &str) {
         without_excluded.retain(|key, _| !excluded.contains(&key.as_str()));
         without_excluded
     };
-    assert_eq!(without_excluded(&uninterrupted), without_excluded(&second), "{what}");
+    assert_eq!(without_excluded(&uninterrupted), without_excluded(&second), "{case}");
     assert_eq!(second["from_time_s"], 0.01);
     // No impact is lost or reported twice.
     let impact_count = |name: &str| {
@@ -49,7 +49,7 @@ fn check_resumed(scene: &str, options: &str) {
     assert_eq!(
         impact_count("a-impacts.json") + impact_count("b-impacts.json"),
         impact_count("whole-impacts.json"),
-        "{what}"
+        "{case}"
     );
 }
 

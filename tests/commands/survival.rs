@@ -42,15 +42,15 @@ fn check_failures(before: &[&str], line: &str) {
             let limited =
                 format!("{trap} ulimit -c 0; ulimit -f {blocks}; exec {} {line}", env!("CARGO_BIN_EXE_jointplay"));
             let output = Command::new("sh").args(["-c", &limited]).current_dir(folder.path()).output().unwrap();
-            let what = format!("{limited}: {}, {:?}", String::from_utf8_lossy(&output.stderr), names(folder.path()));
-            assert!(!output.status.success(), "{what}");
+            let case = format!("{limited}: {}, {:?}", String::from_utf8_lossy(&output.stderr), names(folder.path()));
+            assert!(!output.status.success(), "{case}");
             if !trap.is_empty() {
-                assert_eq!(output.status.code(), Some(1), "{what}");
-                assert!(!names(folder.path()).iter().any(|name| name.starts_with(".jointplay-")), "{what}");
+                assert_eq!(output.status.code(), Some(1), "{case}");
+                assert!(!names(folder.path()).iter().any(|name| name.starts_with(".jointplay-")), "{case}");
             }
-            assert!(results(folder.path()) == old, "{what}");
+            assert!(results(folder.path()) == old, "{case}");
             jointplay(folder.path(), line).expect(0);
-            assert!(tree(folder.path()) == new, "{what}, then {:?}", names(folder.path()));
+            assert!(tree(folder.path()) == new, "{case}, then {:?}", names(folder.path()));
             failed += 1;
         }
     }

@@ -39,14 +39,14 @@ fn targets(harness: &Harness<'_, App>) -> Vec<Target> {
 
 /// Moves the pointer to the centre of each target and asserts that a click would hit it.
 #[track_caller]
-fn assert_in_reach(harness: &mut Harness<'_, App>, what: &str) -> usize {
+fn assert_in_reach(harness: &mut Harness<'_, App>, label: &str) -> usize {
     let targets = targets(harness);
     for target in &targets {
         harness.hover_at(target.rect.center());
         harness.run_steps(2);
         let hit = harness.ctx.viewport(|viewport| viewport.hits.click);
         let hit = hit.map(|widget| widget.id.accesskit_id());
-        assert_eq!(hit, Some(target.id), "{what}: {:?} {} at {:?} is covered", target.role, target.name, target.rect);
+        assert_eq!(hit, Some(target.id), "{label}: {:?} {} at {:?} is covered", target.role, target.name, target.rect);
     }
     harness.remove_cursor();
     harness.run_steps(2);
@@ -73,19 +73,19 @@ fn press_on(harness: &mut Harness<'_, App>, role: Role, name: &str) {
 
 /// Presses the list or menu `name` and asserts that it opens.
 #[track_caller]
-fn assert_opens(harness: &mut Harness<'_, App>, what: &str, role: Role, name: &str) {
+fn assert_opens(harness: &mut Harness<'_, App>, label: &str, role: Role, name: &str) {
     press_on(harness, role, name);
-    assert!(Popup::is_any_open(&harness.ctx), "{what}: {name} does not open");
+    assert!(Popup::is_any_open(&harness.ctx), "{label}: {name} does not open");
     harness.key_press(Key::Escape);
     harness.run_steps(3);
-    assert!(!Popup::is_any_open(&harness.ctx), "{what}: {name} stays open");
+    assert!(!Popup::is_any_open(&harness.ctx), "{label}: {name} stays open");
 }
 
 /// Opens every visible list.
-fn open_lists(harness: &mut Harness<'_, App>, what: &str) -> usize {
+fn open_lists(harness: &mut Harness<'_, App>, label: &str) -> usize {
     let lists: Vec<Target> = targets(harness).into_iter().filter(|target| target.role == Role::ComboBox).collect();
     for list in &lists {
-        assert_opens(harness, what, list.role, &list.name);
+        assert_opens(harness, label, list.role, &list.name);
     }
     lists.len()
 }
@@ -104,13 +104,13 @@ fn presenting(size: [f32; 2]) -> Harness<'static, App> {
 fn every_button_list_and_switch_can_be_clicked_at_its_centre() {
     for (size, min_count) in [(WIDE, 30), (PORTRAIT, 10), (LANDSCAPE, 10)] {
         let mut harness = sized("spcmm", size, egui::Theme::Light);
-        let what = format!("{size:?}");
-        let count = assert_in_reach(&mut harness, &what);
-        assert!(count >= min_count, "{what}: {count}");
+        let label = format!("{size:?}");
+        let count = assert_in_reach(&mut harness, &label);
+        assert!(count >= min_count, "{label}: {count}");
         for key in [Key::C, Key::G] {
             harness.key_press(key);
             harness.run();
-            assert_in_reach(&mut harness, &format!("{what} after {key:?}"));
+            assert_in_reach(&mut harness, &format!("{label} after {key:?}"));
         }
         let mut harness = presenting(size);
         assert!(assert_in_reach(&mut harness, &format!("presentation {size:?}")) >= 4);

@@ -55,7 +55,7 @@ fn colour_at(all: &[Item<'_>], point: Pos2, background: Color32) -> Color32 {
 }
 
 /// Checks every text in the window except those of disabled controls, which WCAG excepts.
-fn check(harness: &Harness<'_, App>, theme: egui::Theme, what: &str, failures: &mut Vec<String>) {
+fn check(harness: &Harness<'_, App>, theme: egui::Theme, view: &str, failures: &mut Vec<String>) {
     let [r, g, b, _] = Palette::of(if theme == egui::Theme::Dark { Theme::Dark } else { Theme::Light }).sky.0;
     let sky = Color32::from_rgb((255.0 * r) as u8, (255.0 * g) as u8, (255.0 * b) as u8);
     let background = harness.ctx.global_style().visuals.panel_fill;
@@ -92,11 +92,11 @@ fn check(harness: &Harness<'_, App>, theme: egui::Theme, what: &str, failures: &
             let ratio = contrast(background.blend(ink), background);
             checked += 1;
             if ratio < MIN_CONTRAST {
-                failures.push(format!("{theme:?}, {what}: {words:?} {ink:?} on {background:?}: {ratio:.2}"));
+                failures.push(format!("{theme:?}, {view}: {words:?} {ink:?} on {background:?}: {ratio:.2}"));
             }
         }
     }
-    assert!(checked > 5, "{what}: {checked} texts");
+    assert!(checked > 5, "{view}: {checked} texts");
 }
 
 #[test]
@@ -108,9 +108,9 @@ fn every_text_has_enough_contrast_in_both_themes() {
         harness.state_mut().player_mut().set("contact.clearance", "0.6 mm").expect("in range");
         harness.state_mut().player_mut().run_to(60e-3);
         harness.run();
-        let mut check_view = |harness: &mut Harness<'_, App>, what: &str| {
+        let mut check_view = |harness: &mut Harness<'_, App>, view: &str| {
             harness.run_steps(3);
-            check(harness, theme, what, &mut failures);
+            check(harness, theme, view, &mut failures);
         };
         check_view(&mut harness, "panels");
         for menu in ["View options", "Save", "Lessons", "Choose plots"] {
@@ -119,7 +119,7 @@ fn every_text_has_enough_contrast_in_both_themes() {
             harness.key_press(Key::Escape);
             harness.run_steps(3);
         }
-        for (key, what) in [
+        for (key, view) in [
             (Key::L, "microscope"),
             (Key::I, "impact list"),
             (Key::B, "bench"),
@@ -127,7 +127,7 @@ fn every_text_has_enough_contrast_in_both_themes() {
             (Key::Questionmark, "keys"),
         ] {
             harness.key_press(key);
-            check_view(&mut harness, what);
+            check_view(&mut harness, view);
         }
         harness.key_press(Key::Escape);
         harness.run_steps(2);

@@ -27,21 +27,21 @@ fn plain() -> String {
 }
 
 /// Draws one frame by [`PLAIN`] steps into `folder`/frames and returns its file.
-pub fn draw(folder: &Path, what: &str) -> PathBuf {
-    jointplay(folder, &format!("render {what} {} --out frames --quiet --force", plain()));
+pub fn draw(folder: &Path, arguments: &str) -> PathBuf {
+    jointplay(folder, &format!("render {arguments} {} --out frames --quiet --force", plain()));
     folder.join("frames/frame_00000.png")
 }
 
 #[track_caller]
-fn golden(name: &str, what: &str) {
-    golden_in("tests/golden", name, what);
+fn golden(name: &str, arguments: &str) {
+    golden_in("tests/golden", name, arguments);
 }
 
 #[track_caller]
-fn golden_in(folder: &str, name: &str, what: &str) {
+fn golden_in(folder: &str, name: &str, arguments: &str) {
     let scratch = tempfile::tempdir().expect("a scratch folder");
-    let actual = Picture::read(&draw(scratch.path(), what));
-    compare(folder, name, &actual, &format!("jointplay render {what}"));
+    let actual = Picture::read(&draw(scratch.path(), arguments));
+    compare(folder, name, &actual, &format!("jointplay render {arguments}"));
 }
 
 /// The default scene in the middle of its first impacts.
@@ -76,8 +76,8 @@ fn every_scene_is_drawn_as_stored() {
 #[test]
 fn every_role_is_drawn_dark_as_stored() {
     for scene in ["press", "suspension"] {
-        let what = format!("{scene} --at 0.1s --magnification 10 --size 400x250 --theme dark");
-        golden(&format!("{scene}_dark"), &what);
+        let arguments = format!("{scene} --at 0.1s --magnification 10 --size 400x250 --theme dark");
+        golden(&format!("{scene}_dark"), &arguments);
     }
 }
 
@@ -110,10 +110,10 @@ fn a_missing_part_of_a_picture_is_detected() {
 
 #[test]
 fn a_frame_has_the_same_bytes_each_time() {
-    for what in [IMPACT, "pendulum --at 20ms --size 640x400 --ui"] {
+    for arguments in [IMPACT, "pendulum --at 20ms --size 640x400 --ui"] {
         let folders = [(); 2].map(|()| tempfile::tempdir().expect("a scratch folder"));
-        let [a, b] = folders.each_ref().map(|folder| fs::read(draw(folder.path(), what)).expect("written"));
-        assert!(a == b, "{what}");
+        let [a, b] = folders.each_ref().map(|folder| fs::read(draw(folder.path(), arguments)).expect("written"));
+        assert!(a == b, "{arguments}");
     }
 }
 

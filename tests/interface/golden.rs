@@ -145,9 +145,9 @@ pub fn picture_mismatch(actual: &Picture, golden: &Picture) -> Option<(String, O
     })
 }
 
-/// Compares a picture with the stored one `name` in `folder` of the repository; `what` describes how it is made.
+/// Compares a picture with the stored one `name` in `folder` of the repository; `source` describes how it is made.
 #[track_caller]
-pub fn compare(folder: &str, name: &str, actual: &Picture, what: &str) {
+pub fn compare(folder: &str, name: &str, actual: &Picture, source: &str) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let golden = root.join(format!("{folder}/{name}.png"));
     let output = |ending: &str| root.join(format!("tests/golden/{name}.{ending}.png"));
@@ -166,6 +166,6 @@ pub fn compare(folder: &str, name: &str, actual: &Picture, what: &str) {
         if let Some(diff) = diff {
             diff.write(&output("diff"));
         }
-        panic!("{folder}/{name}.png: {why}; see tests/golden/{name}.actual.png and .diff.png ({what})");
+        panic!("{folder}/{name}.png: {why}; see tests/golden/{name}.actual.png and .diff.png ({source})");
     }
 }

@@ -63,9 +63,9 @@ fn check(name: &str, file: &str) {
     let entry = INSTANTS.iter().find(|(scene, _)| *scene == name);
     let instant = entry.map_or("0.1s", |(_, instant)| instant);
     let (width, height) = SIZE;
-    let what = format!("{file} --at {instant} --size {width}x{height} --arrows none --hide triad,flash,peaks");
-    let actual = Picture::read(&draw(folder.path(), &what));
-    compare(FOLDER, name, &actual, &format!("jointplay render {what}"));
+    let arguments = format!("{file} --at {instant} --size {width}x{height} --arrows none --hide triad,flash,peaks");
+    let actual = Picture::read(&draw(folder.path(), &arguments));
+    compare(FOLDER, name, &actual, &format!("jointplay render {arguments}"));
 }
 
 #[test]

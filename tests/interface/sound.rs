@@ -112,10 +112,10 @@ fn clicks_during_playback_are_the_impacts_of_the_run_at_any_speed() {
 #[test]
 fn only_forward_play_with_sound_on_is_audible() {
     let (mut harness, recorded) = with_recording_host("pendulum");
-    let assert_silent = |harness: &mut Harness<'_, App>, frames: usize, what: &str| {
+    let assert_silent = |harness: &mut Harness<'_, App>, frames: usize, action: &str| {
         for _ in 0..frames {
             let (_, _, clicks) = frame(harness, &recorded);
-            assert!(clicks.is_empty(), "{what}");
+            assert!(clicks.is_empty(), "{action}");
         }
     };
     // Sound is off by default.
@@ -131,7 +131,7 @@ fn only_forward_play_with_sound_on_is_audible() {
     harness.step();
     assert!(harness.state().player().is_playing_backwards());
     assert_silent(&mut harness, 60, "backwards");
-    for (key, what) in [
+    for (key, action) in [
         (Key::End, "a jump to the end"),
         (Key::Home, "a jump to the start"),
         (Key::Period, "a seek to an impact"),
@@ -142,7 +142,7 @@ fn only_forward_play_with_sound_on_is_audible() {
         (Key::R, "a reset"),
     ] {
         harness.key_press(key);
-        assert_silent(&mut harness, 30, what);
+        assert_silent(&mut harness, 30, action);
     }
     // Replaying a shown part makes its impacts audible again.
     harness.state_mut().player_mut().set_playing(true);

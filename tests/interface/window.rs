@@ -1080,11 +1080,11 @@ fn control_rects(harness: &Harness<'_, App>) -> Vec<(Role, String, [f64; 4])> {
 }
 
 /// Runs and plays the current scene and checks that no control moves.
-fn check_layout_is_steady(harness: &mut Harness<'_, App>, what: &str) {
+fn check_layout_is_steady(harness: &mut Harness<'_, App>, label: &str) {
     harness.state_mut().player_mut().set_playing(false);
     harness.run_steps(4);
     let before = control_rects(harness);
-    assert!(before.len() > 10, "{what}: {}", before.len());
+    assert!(before.len() > 10, "{label}: {}", before.len());
     for time in [9e-3, 0.12] {
         let player = harness.state_mut().player_mut();
         player.run_to(time);
@@ -1093,9 +1093,9 @@ fn check_layout_is_steady(harness: &mut Harness<'_, App>, what: &str) {
         harness.run_steps(2);
         let now = control_rects(harness);
         for (was, is) in before.iter().zip(&now) {
-            assert_eq!(was, is, "{what} at {time} s");
+            assert_eq!(was, is, "{label} at {time} s");
         }
-        assert_eq!(before.len(), now.len(), "{what} at {time} s");
+        assert_eq!(before.len(), now.len(), "{label} at {time} s");
         harness.state_mut().player_mut().set_playing(false);
     }
 }

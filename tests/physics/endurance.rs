@@ -179,7 +179,7 @@ struct Drift {
 /// A long run: scene, changes, period (s) and bounds.
 struct LongRun {
     scene: &'static str,
-    what: &'static str,
+    label: &'static str,
     changes: &'static crate::common::Changes<'static>,
     period: f64,
     /// Bound on the change of energy, and a tenth of that on a force, with `preview` and `real-time`; none where contacts do not settle.
@@ -197,12 +197,12 @@ const SETTLED: [Option<f64>; 2] = [Some(0.02), Some(1e-3)];
 
 fn long(
     scene: &'static str,
-    what: &'static str,
+    label: &'static str,
     changes: &'static crate::common::Changes<'static>,
     period: f64,
     limits: [Option<f64>; 2],
 ) -> LongRun {
-    LongRun { scene, what, changes, period, limits, residual: RESIDUAL }
+    LongRun { scene, label, changes, period, limits, residual: RESIDUAL }
 }
 
 /// Runs that are cheap enough for every test run.
@@ -221,7 +221,7 @@ fn long_list() -> Vec<LongRun> {
     list.push(long("slider-crank-driven", "default", &[], CRANK_PERIOD, [None; 2]));
     list.push(long("pendulum", "default", &[], 1.0, [None; 2]));
     list.push(long("slider-crank", "free, ideal", &[IDEAL], 1.0, [None; 2]));
-    let many = |scene, what, changes| LongRun { residual: [1e-4; 2], ..long(scene, what, changes, 1.0, [None; 2]) };
+    let many = |scene, label, changes| LongRun { residual: [1e-4; 2], ..long(scene, label, changes, 1.0, [None; 2]) };
     list.push(many("hexapod", "default", &[]));
     list.push(many("delta", "default", &[]));
     list.push(many("chain", "16 links", &[("chain.links", "16")]));
@@ -286,20 +286,20 @@ fn long_run(case: &LongRun, preset: usize, duration: f64) -> Drift {
 }
 
 fn check_limits(case: &LongRun, preset: usize, drift: &Drift) {
-    let what = format!("{} {}, {}", case.scene, case.what, FAST[preset]);
-    assert!(drift.open < 1e-12, "{what}: open by {:e} m", drift.open);
-    assert!(drift.skew < 1e-12, "{what}: orientation off by {:e}", drift.skew);
-    assert!(drift.residual < case.residual[preset], "{what}: residual {:e}", drift.residual);
+    let label = format!("{} {}, {}", case.scene, case.label, FAST[preset]);
+    assert!(drift.open < 1e-12, "{label}: open by {:e} m", drift.open);
+    assert!(drift.skew < 1e-12, "{label}: orientation off by {:e}", drift.skew);
+    assert!(drift.residual < case.residual[preset], "{label}: residual {:e}", drift.residual);
     if let Some(limit) = case.limits[preset] {
-        assert!(drift.energy < limit, "{what}: energy {:e}", drift.energy);
-        assert!(drift.force < 10.0 * limit, "{what}: force {:e}", drift.force);
+        assert!(drift.energy < limit, "{label}: energy {:e}", drift.energy);
+        assert!(drift.force < 10.0 * limit, "{label}: force {:e}", drift.force);
     }
 }
 
 fn check_no_drift(case: &LongRun, duration: f64) {
     let drift = long_run(case, 1, duration);
     check_limits(case, 1, &drift);
-    assert_eq!(drift.contacts, 0, "{} {}: settled", case.scene, case.what);
+    assert_eq!(drift.contacts, 0, "{} {}: settled", case.scene, case.label);
 }
 
 #[test]
@@ -343,7 +343,7 @@ fn write_a_thousand_seconds_of_every_kind() {
         let _ = writeln!(
             page,
             "| {}, {} | {} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {force} |",
-            case.scene, case.what, FAST[preset], d.steps, d.contacts, d.open, d.skew, d.energy, d.residual
+            case.scene, case.label, FAST[preset], d.steps, d.contacts, d.open, d.skew, d.energy, d.residual
         );
         check_limits(case, preset, &d);
     }

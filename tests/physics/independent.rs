@@ -62,12 +62,12 @@ fn own_run(name: &str, changes: &Changes, time: f64) -> (Simulation, Vec<Contact
 }
 
 /// Checks that the contacts agree one by one.
-fn assert_same_contacts(what: &str, ours: &[Contact], expected: &[Contact]) {
-    assert_eq!(ours.len(), expected.len(), "{what}");
+fn assert_same_contacts(label: &str, ours: &[Contact], expected: &[Contact]) {
+    assert_eq!(ours.len(), expected.len(), "{label}");
     // The last contact may be in progress.
     for (n, (a, b)) in ours.iter().zip(expected).enumerate().take(ours.len() - 1) {
         println!(
-            "{what}: contact {n}: joint {}, {:.9} s, off by {:.1e} s, {:.1e} m/s; {:.3} N, off by {:.1e}",
+            "{label}: contact {n}: joint {}, {:.9} s, off by {:.1e} s, {:.1e} m/s; {:.3} N, off by {:.1e}",
             b.0,
             b.1,
             a.1 - b.1,
@@ -75,10 +75,10 @@ fn assert_same_contacts(what: &str, ours: &[Contact], expected: &[Contact]) {
             b.3,
             a.3 / b.3 - 1.0
         );
-        assert_eq!(a.0, b.0, "{what}");
-        assert!((a.1 - b.1).abs() < 1e-9, "{what}: time of contact {n}");
-        assert!((a.2 / b.2 - 1.0).abs() < 1e-6, "{what}: approach speed of contact {n}");
-        assert!((a.3 / b.3 - 1.0).abs() < 1e-5, "{what}: peak of contact {n}");
+        assert_eq!(a.0, b.0, "{label}");
+        assert!((a.1 - b.1).abs() < 1e-9, "{label}: time of contact {n}");
+        assert!((a.2 / b.2 - 1.0).abs() < 1e-6, "{label}: approach speed of contact {n}");
+        assert!((a.3 / b.3 - 1.0).abs() < 1e-5, "{label}: peak of contact {n}");
     }
 }
 
@@ -92,15 +92,15 @@ fn the_pendulum_agrees_with_other_equations_and_another_solver() {
         for method in ["dopri5", "automatic"] {
             let changes = [("solver.method", method), TIGHT];
             let (mut simulation, contacts) = own_run("pendulum", &changes, end);
-            let what = format!("{solver} and {method}");
-            assert_same_contacts(&what, &contacts, &stored_run.contacts);
+            let label = format!("{solver} and {method}");
+            assert_same_contacts(&label, &contacts, &stored_run.contacts);
             assert!(contacts.len() > 3, "only {} contacts", contacts.len());
             let body = frame_now(&mut simulation).bodies[0];
             let angle = body.rotation[(0, 2)].atan2(body.rotation[(2, 2)]);
             let [x, z, turned] = stored_run.state[..3] else { panic!() };
             let errors = [body.position.x - x, body.position.y, body.position.z - z, angle - turned];
-            println!("{what}: off by {errors:?} m, m, m, rad");
-            assert!(errors.iter().all(|error| error.abs() < 1e-9), "{what}: {errors:?}");
+            println!("{label}: off by {errors:?} m, m, m, rad");
+            assert!(errors.iter().all(|error| error.abs() < 1e-9), "{label}: {errors:?}");
         }
     }
 }

@@ -41,7 +41,7 @@ fn in_series(gravity: f64) -> String {
 }
 
 /// Checks that pairs of bodies of two frames agree within `bound` (m, rad; velocities within 10 `bound`).
-fn assert_agree(frame: &Frame, other: &Frame, bodies: &[(usize, usize)], bound: f64, what: &str) {
+fn assert_agree(frame: &Frame, other: &Frame, bodies: &[(usize, usize)], bound: f64, label: &str) {
     for &(one, two) in bodies {
         let (a, b) = (&frame.bodies[one], &other.bodies[two]);
         let errors = [
@@ -50,7 +50,7 @@ fn assert_agree(frame: &Frame, other: &Frame, bodies: &[(usize, usize)], bound: 
             (a.velocity - b.velocity).norm() / 10.0,
             (a.angular_velocity - b.angular_velocity).norm() / 10.0,
         ];
-        assert!(errors.iter().all(|error| *error < bound), "{what}: body {one}: {errors:?}");
+        assert!(errors.iter().all(|error| *error < bound), "{label}: body {one}: {errors:?}");
     }
 }
 

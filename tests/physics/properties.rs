@@ -297,7 +297,7 @@ proptest! {
     }
 
     #[test]
-    fn every_value_goes_through_text_and_back(
+    fn every_value_can_be_written_and_read_back(
         (row, value) in rows().prop_flat_map(|row| values(row).prop_map(move |value| (row, value)))
     ) {
         let text = row.write(&value);

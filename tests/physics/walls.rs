@@ -47,12 +47,12 @@ fn a_ball_rebounds_for_every_round_clearance_and_speed() {
             let contact = format!("clearance = \"{clearance} mm\"\nnormal_law = \"hertz\"");
             let (simulation, impacts) =
                 impacts_of(&free_ball(0.0, speed, 0.0, &contact), &[], 4e-3 * clearance / speed + 4e-4);
-            let what = format!("{clearance} mm, {speed} m/s");
-            assert!(!impacts.is_empty(), "{what}");
+            let case = format!("{clearance} mm, {speed} m/s");
+            assert!(!impacts.is_empty(), "{case}");
             for impact in impacts {
-                assert!((impact.achieved() - 1.0).abs() < 1e-5, "{what}: {}", impact.achieved());
+                assert!((impact.achieved() - 1.0).abs() < 1e-5, "{case}: {}", impact.achieved());
             }
-            assert_eq!(simulation.statistics().late, [0.0], "{what}");
+            assert_eq!(simulation.statistics().late, [0.0], "{case}");
         }
     }
 }

@@ -206,9 +206,9 @@ fn corpus() -> Vec<(String, Vec<u8>)> {
 }
 
 /// Checks a text; a panic is reported with the text.
-fn check_without_panic(what: &str, bytes: &[u8]) -> Fate {
+fn check_without_panic(name: &str, bytes: &[u8]) -> Fate {
     std::panic::catch_unwind(|| check(bytes))
-        .unwrap_or_else(|_| panic!("{what} breaks the reader:\n{}", String::from_utf8_lossy(bytes)))
+        .unwrap_or_else(|_| panic!("{name} breaks the reader:\n{}", String::from_utf8_lossy(bytes)))
 }
 
 #[test]

@@ -77,7 +77,7 @@ fn outcomes(rows: &Arc<Vec<Row>>, cells: Vec<Cell>) -> Vec<Outcome> {
                 let missing = outcomes.iter().position(Option::is_none).unwrap();
                 let (row, form, word) = cells[missing];
                 let row = &rows[row];
-                panic!("hangs: {}, {}, {}, {word}", row.scene, row.what, FORMS[form]);
+                panic!("hangs: {}, {}, {}, {word}", row.scene, row.label, FORMS[form]);
             }
         }
     }
@@ -133,7 +133,7 @@ fn page(table: &[(Row, Outcomes)]) -> String {
             for (row, outcomes) in rows() {
                 let words: Vec<&str> = outcomes[f].iter().map(Outcome::word).collect();
                 let words = words.join(" | ");
-                let _ = writeln!(page, "| {} | {} | {words} |", row.scene, row.what);
+                let _ = writeln!(page, "| {} | {} | {words} |", row.scene, row.label);
             }
         }
     }
@@ -146,9 +146,9 @@ fn page(table: &[(Row, Outcomes)]) -> String {
                     continue;
                 }
                 reported.push(outcome.word());
-                let (what, word, why) = (&row.what, outcome.word(), outcome.reason());
+                let (label, word, why) = (&row.label, outcome.word(), outcome.reason());
                 let why = why.lines().next().unwrap_or_default();
-                let _ = writeln!(page, "- {}, {what}, {form}, {column}: **{word}**: {why}", row.scene);
+                let _ = writeln!(page, "- {}, {label}, {form}, {column}: **{word}**: {why}", row.scene);
             }
         }
     }
@@ -177,7 +177,7 @@ fn write_the_page() {
 fn report_outcome(row: &Row, form: &str, column: &str, outcome: &Outcome) -> bool {
     let (word, why) = (outcome.word(), outcome.reason());
     if !why.is_empty() {
-        println!("{word}: {}, {}, {form}, {column}: {why}", row.scene, row.what);
+        println!("{word}: {}, {}, {form}, {column}: {why}", row.scene, row.label);
     }
     matches!(outcome, Outcome::Wrong(_))
 }
@@ -215,7 +215,7 @@ fn an_outcome_of_every_extreme_agrees_with_the_page() {
         let (row, form) = (&rows[r], FORMS[f]);
         assert!(!report_outcome(row, form, word, &outcome), "wrong outcome");
         let (_, table) = page.split_once(&row.columns.title(form)).expect("its table");
-        let head = format!("| {} | {} |", row.scene, row.what);
+        let head = format!("| {} | {} |", row.scene, row.label);
         let line = table
             .lines()
             .find_map(|line| line.strip_prefix(&*head))

@@ -91,8 +91,8 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
         Err(error) => return Outcome::Refused(error.to_string()),
     };
     let mut frame = frame_now(&mut simulation);
-    if let Some(what) = violation(&frame, &scene.machine, form) {
-        return Outcome::Wrong(format!("{what}, at the start"));
+    if let Some(violation) = violation(&frame, &scene.machine, form) {
+        return Outcome::Wrong(format!("{violation}, at the start"));
     }
     let mut balance = Balance::new(&frame);
     // `lagrange` has the coordinates of all bodies, so an evaluation costs more.
@@ -109,8 +109,8 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
             if let Err(stopped) = simulation.step_until(row.duration) {
                 let hash = simulation.state_hash();
                 frame = frame_now(&mut simulation);
-                if let Some(what) = violation(&frame, &scene.machine, form) {
-                    return Outcome::Wrong(format!("stopped ({}) too late: {what}", stopped.fault));
+                if let Some(violation) = violation(&frame, &scene.machine, form) {
+                    return Outcome::Wrong(format!("stopped ({}) too late: {violation}", stopped.fault));
                 }
                 if stopped.time != simulation.time() || simulation.state_hash() != hash {
                     return Outcome::Wrong("stopped, but not at the last good state".to_owned());
@@ -131,8 +131,8 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
                     return Outcome::Wrong(format!("not finite inside a step, t = {middle:e} s"));
                 }
                 frame = frame_now(&mut simulation);
-                if let Some(what) = violation(&frame, &scene.machine, form) {
-                    return Outcome::Wrong(what);
+                if let Some(violation) = violation(&frame, &scene.machine, form) {
+                    return Outcome::Wrong(violation);
                 }
                 balance.watch(&frame);
             }
@@ -147,11 +147,11 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
     let mut doubts: Vec<String> = doubts.iter().map(ToString::to_string).collect();
     let euler = scene.machine.solver.method == jointplay::integrate::Method::SemiImplicitEuler;
     if row.passive && balance.gain() > ALLOWED_GAIN[usize::from(!euler)] {
-        let what = format!("{:.3} of the energy created", balance.gain());
+        let message = format!("{:.3} of the energy created", balance.gain());
         if doubts.is_empty() {
-            return Outcome::Wrong(what);
+            return Outcome::Wrong(message);
         }
-        doubts.push(what);
+        doubts.push(message);
     }
     let late = simulation.time() < row.duration || frames > expected + 1.0;
     if late && !reported_slow {

@@ -20,7 +20,7 @@ pub enum Columns {
 
 /// One extreme.
 pub struct Row {
-    pub what: String,
+    pub label: String,
     pub scene: &'static str,
     pub columns: Columns,
     changes: Vec<(String, String)>,
@@ -32,10 +32,10 @@ pub struct Row {
 }
 
 impl Row {
-    fn new(what: &str, scene: &'static str, changes: &[(&str, &str)]) -> Self {
+    fn new(label: &str, scene: &'static str, changes: &[(&str, &str)]) -> Self {
         let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
         Self {
-            what: what.to_owned(),
+            label: label.to_owned(),
             scene,
             columns: Columns::Presets,
             changes: changes.iter().map(owned).collect(),
@@ -123,9 +123,9 @@ fn reach_limit(mut good: f64, mut bad: f64) -> (f64, f64) {
 pub fn rows() -> Vec<Row> {
     let mut rows = Vec::new();
     let both = ["spcmm", "pendulum"];
-    let mut each = |what: &str, changes: &[(&str, &str)]| {
+    let mut each = |label: &str, changes: &[(&str, &str)]| {
         for scene in both {
-            rows.push(Row::new(what, scene, changes));
+            rows.push(Row::new(label, scene, changes));
         }
     };
     for clearance in ["0.1 um", "1 um", "0.01 mm", "3 mm", "9.9 mm"] {
@@ -158,16 +158,16 @@ pub fn rows() -> Vec<Row> {
     );
     each("impact speed floor 1e-6 mm/s", &[("contact.impact_speed_floor", "1e-6 mm/s")]);
     each("impact speed floor 10 m/s", &[("contact.impact_speed_floor", "10 m/s")]);
-    for (what, x, z) in [
+    for (label, x, z) in [
         ("gravity 0", "0 m/s^2", "0 m/s^2"),
         ("gravity reversed", "-9.81 m/s^2", "9.81 m/s^2"),
         ("gravity 100 g", "981 m/s^2", "-981 m/s^2"),
     ] {
-        rows.push(Row::new(what, "spcmm", &[("gravity.x", x)]));
-        rows.push(Row::new(what, "pendulum", &[("gravity.z", z)]));
+        rows.push(Row::new(label, "spcmm", &[("gravity.x", x)]));
+        rows.push(Row::new(label, "pendulum", &[("gravity.z", z)]));
     }
     for scene in ["spcmm", "pendulum", "chain"] {
-        let row = |what: &str| Row::new(what, scene, &[]);
+        let row = |label: &str| Row::new(label, scene, &[]);
         rows.push(row("masses times 1e-6").edited(|s| scale_masses(s, 1e-6)));
         rows.push(row("masses times 1e3").edited(|s| scale_masses(s, 1e3)));
         rows.push(row("rods without inertia about their axis").edited(thin_rods));
@@ -189,8 +189,8 @@ pub fn rows() -> Vec<Row> {
         }
         for tolerance in ["1e-2", "1e-3", "1e-4"] {
             let changes = [("solver.tolerance", tolerance)];
-            let what = format!("tolerance {tolerance}, until settled");
-            let row = Row::new(&what, scene, &changes).with_methods();
+            let label = format!("tolerance {tolerance}, until settled");
+            let row = Row::new(&label, scene, &changes).with_methods();
             rows.push(row.until_settled());
         }
         rows.push(Row::new("default, until settled", scene, &[]).until_settled());
@@ -202,7 +202,7 @@ pub fn rows() -> Vec<Row> {
         [("lower", 0.032, 0.0, &["0.5 Hz", "10 Hz"][..]), ("upper", 0.336, 0.337, &["30 Hz"])]
     {
         let (reached, not_reached) = reach_limit(good, bad);
-        for (what, plane) in [("within", reached), ("beyond", not_reached)] {
+        for (side, plane) in [("within", reached), ("beyond", not_reached)] {
             let plane = format!("{plane} m");
             for (kind, clearance) in [("clearance 0.3 mm", "0.3 mm"), ("ideal", "0")] {
                 for frequency in frequencies {
@@ -211,8 +211,8 @@ pub fn rows() -> Vec<Row> {
                         ("contact.clearance", clearance),
                         ("spcmm.frequency", frequency),
                     ];
-                    let what = format!("1e-6 m {what} the {end} reach, {kind}, {frequency}");
-                    rows.push(Row::new(&what, "spcmm", &changes));
+                    let label = format!("1e-6 m {side} the {end} reach, {kind}, {frequency}");
+                    rows.push(Row::new(&label, "spcmm", &changes));
                 }
             }
         }
@@ -225,7 +225,7 @@ pub fn rows() -> Vec<Row> {
             rows.push(Row::new(&format!("slider plane {plane}, {kind}"), "spcmm", &changes));
         }
     }
-    for (what, changes) in [
+    for (label, changes) in [
         ("one joint ideal", &[("joint.S1.clearance", "0")][..]),
         ("two joints ideal", &[("joint.S1.clearance", "0"), ("joint.S2.clearance", "0")]),
         ("all joints ideal", &[("contact.clearance", "0")]),
@@ -247,13 +247,13 @@ pub fn rows() -> Vec<Row> {
             ],
         ),
     ] {
-        rows.push(Row::new(what, "spcmm", changes));
+        rows.push(Row::new(label, "spcmm", changes));
     }
     rows.push(Row::new("free, one joint of each kind", "slider-crank", &[]));
     rows.push(Row::new("free, both joints ideal", "slider-crank", &[("contact.clearance", "0")]));
     rows.push(Row::new("driven, one joint of each kind", "slider-crank-driven", &[]));
-    let pendulum = |what: &str| Row::new(what, "pendulum", &[]);
-    let calm = |what: &str| Row::new(what, "pendulum", &[("gravity.z", "0 m/s^2")]);
+    let pendulum = |label: &str| Row::new(label, "pendulum", &[]);
+    let calm = |label: &str| Row::new(label, "pendulum", &[("gravity.z", "0 m/s^2")]);
     rows.push(pendulum("starts on the wall").edited(|s| start_at(s, Vec3::z() * -0.3e-3)));
     rows.push(pendulum("starts 1 um inside the wall").edited(|s| start_at(s, Vec3::z() * -0.301e-3)));
     rows.push(pendulum("starts 0.09 mm inside the wall").edited(|s| start_at(s, Vec3::z() * -0.39e-3)));
