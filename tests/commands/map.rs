@@ -6,7 +6,7 @@ use std::path::Path;
 use ndarray::s;
 use serde_json::Value as Json;
 
-use crate::common::truss::{Guide, Rod, TIP, TWO, support, truss};
+use crate::common::truss::{Guide, Rod, TIP, TWO_RODS, support, truss};
 use crate::program::{folder, jointplay, names};
 use crate::sweep::archive;
 
@@ -14,7 +14,7 @@ use crate::sweep::archive;
 const MAP_COMMAND: &str = "map ./truss.toml --over base.position=-50mm,0mm,40mm,-2m";
 
 fn scene(folder: &Path) {
-    fs::write(folder.join("truss.toml"), truss(&TWO, TIP, Guide::Plane, "")).unwrap();
+    fs::write(folder.join("truss.toml"), truss(&TWO_RODS, TIP, Guide::Plane, "")).unwrap();
 }
 
 /// The `count` doubles after the line `head` of a VTK file.
@@ -51,8 +51,9 @@ fn the_files_contain_the_error_polygon_of_two_rods_at_every_position() {
     assert!(arrays["ideal_tip_m"].slice(s![3, ..]).iter().all(|x| x.is_nan()));
     for point in 0..3 {
         let tip = vector("ideal_tip_m", point);
-        let moved = Rod { from: [TWO[0].from[0] + arrays["base.position"][point], TWO[0].from[1]], ..TWO[0] };
-        let rods = [moved, TWO[1]];
+        let moved =
+            Rod { from: [TWO_RODS[0].from[0] + arrays["base.position"][point], TWO_RODS[0].from[1]], ..TWO_RODS[0] };
+        let rods = [moved, TWO_RODS[1]];
         let mut max_error = 0.0_f64;
         for direction in 0..24 {
             let u = arrays["direction"].slice(s![point, direction, ..]).to_vec();

@@ -16,7 +16,7 @@ use crate::program::{folder, jointplay};
 
 const LINKS: usize = 3;
 /// A study of the scene of [`write_hung_chain`], with runs in which nothing moves.
-const HUNG: &str = "sensitivity ./hung.toml --duration 1ms --quiet --over joint.*.clearance=0.05mm..0.15mm";
+const HUNG_CHAIN: &str = "sensitivity ./hung.toml --duration 1ms --quiet --over joint.*.clearance=0.05mm..0.15mm";
 /// Height of the middle of the last link without clearances, m.
 const LENGTH: f64 = 0.1 * LINKS as f64 - 0.05;
 
@@ -49,7 +49,8 @@ fn results(path: &Path) -> Json {
 fn joints_in_a_straight_chain_share_the_variance_equally() {
     let folder = folder();
     write_hung_chain(folder.path());
-    let run = jointplay(folder.path(), &format!("{HUNG} --output link3.pose.z:end --rows 128 --out out")).expect(0);
+    let run =
+        jointplay(folder.path(), &format!("{HUNG_CHAIN} --output link3.pose.z:end --rows 128 --out out")).expect(0);
     assert!(run.stdout.contains("joint.J2.clearance"), "{}", run.stdout);
     let results = results(&folder.path().join("out"));
     let output = &results["outputs"][0];
@@ -86,7 +87,7 @@ fn suggested_changes_for_a_target_reach_it() {
     write_hung_chain(folder.path());
     let suggestions = |excess: &str, out: &str| {
         let target = LENGTH + excess.parse::<f64>().unwrap();
-        let line = format!("{HUNG} --output link3.pose.z:end --rows 0 --target {target:.6}m --out {out}");
+        let line = format!("{HUNG_CHAIN} --output link3.pose.z:end --rows 0 --target {target:.6}m --out {out}");
         jointplay(folder.path(), &line).expect(0);
         results(&folder.path().join(out))["target"].clone()
     };
@@ -116,7 +117,8 @@ fn the_number_of_threads_changes_no_byte() {
     let folder = folder();
     write_hung_chain(folder.path());
     for (threads, out) in [(1, "a"), (2, "b")] {
-        let line = format!("{HUNG} --output link3.pose.z:end,peak-force --rows 8 --threads {threads} --out {out}");
+        let line =
+            format!("{HUNG_CHAIN} --output link3.pose.z:end,peak-force --rows 8 --threads {threads} --out {out}");
         jointplay(folder.path(), &line).expect(0);
     }
     for name in ["sensitivity.csv", "sensitivity.json", "runs.csv", "sensitivity.svg", "sensitivity.png"] {
@@ -168,7 +170,7 @@ fn a_screening_drops_parameters_without_influence() {
     let folder = folder();
     write_hung_chain(folder.path());
     let line = format!(
-        "{HUNG} --over contact.restitution=0.5..0.9 --over gravity.x=0m/s^2..0.001m/s^2 --output link3.pose.z:end --rows 8 --screen 4 --out out"
+        "{HUNG_CHAIN} --over contact.restitution=0.5..0.9 --over gravity.x=0m/s^2..0.001m/s^2 --output link3.pose.z:end --rows 8 --screen 4 --out out"
     );
     let run = jointplay(folder.path(), &line).expect(0);
     let results = results(&folder.path().join("out"));

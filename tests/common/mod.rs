@@ -124,10 +124,10 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
 /// the computer.
 pub fn ticking_clock<const MICROSECONDS: u32>() -> f64 {
     thread_local! {
-        static LOOKS: std::cell::Cell<u32> = const { std::cell::Cell::new(0) };
+        static READINGS: std::cell::Cell<u32> = const { std::cell::Cell::new(0) };
     }
-    LOOKS.set(LOOKS.get() + 1);
-    f64::from(LOOKS.get()) * f64::from(MICROSECONDS) * 1e-6
+    READINGS.set(READINGS.get() + 1);
+    f64::from(READINGS.get()) * f64::from(MICROSECONDS) * 1e-6
 }
 
 /// Mean magnitude of each contact force between `from` and `to`, N, sampled at 1001 instants.

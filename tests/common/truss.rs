@@ -87,9 +87,9 @@ pub fn truss(rods: &[Rod], tip: [f64; 2], guide: Guide, more: &str) -> String {
 }
 
 /// Two rods at about right angles.
-pub const TWO: [Rod; 2] =
+pub const TWO_RODS: [Rod; 2] =
     [Rod { from: [-0.2, 0.15], play: [0.1e-3, 0.15e-3] }, Rod { from: [0.1, 0.3], play: [0.05e-3, 0.2e-3] }];
-/// The point where the rods [`TWO`] meet, m.
+/// The point where the rods [`TWO_RODS`] meet, m.
 pub const TIP: [f64; 2] = [0.03, 0.02];
 
 /// Support function along the unit vector `u` of the errors e with |n_i . e| <= C_i, for rods with unit vectors n_i: the minimum of

@@ -14,7 +14,7 @@ const MAX_CHANGES: usize = 8;
 
 /// How far the bytes were accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fate {
+pub enum Outcome {
     /// Not UTF-8: refused before a scene is read.
     NoText,
     /// Refused as a scene.
@@ -40,9 +40,9 @@ fn changes(text: &str) -> Vec<(String, String)> {
 /// # Panics
 /// Where an invariant is violated: an error without a position or a message, a message with terminal control characters, a
 /// value that does not read back, a start or a step that is not finite.
-pub fn check(bytes: &[u8]) -> Fate {
+pub fn check(bytes: &[u8]) -> Outcome {
     let Ok(text) = std::str::from_utf8(bytes) else {
-        return Fate::NoText;
+        return Outcome::NoText;
     };
     let changes = changes(text);
     let scene = match Scene::parse(text, Some("fuzz.toml"), &changes) {
@@ -52,7 +52,7 @@ pub fn check(bytes: &[u8]) -> Fate {
             assert!(!error.message.is_empty(), "an error without a message");
             let changed = |key: &String| changes.iter().any(|(changed, _)| changed == key);
             if error.file.is_none() && error.key.as_ref().is_some_and(changed) {
-                return Fate::Refused;
+                return Outcome::Refused;
             }
             assert!(words.starts_with("fuzz.toml"), "{words}");
             if let Some((line, column)) = error.position {
@@ -65,7 +65,7 @@ pub fn check(bytes: &[u8]) -> Fate {
                 // An entry that is missing from the whole file has no line.
                 assert!(error.message.contains("missing") || error.key.is_some(), "no position: {words}");
             }
-            return Fate::Refused;
+            return Outcome::Refused;
         }
     };
     let warnings = scene.machine.warnings().into_iter().map(|w| w.to_string());
@@ -86,7 +86,7 @@ pub fn check(bytes: &[u8]) -> Fate {
             Err(error) => assert!(!error_text(&error).is_empty()),
         }
     }
-    let fate = run(&scene);
+    let outcome = run(&scene);
     let other = match scene.get("formulation") {
         Ok(Value::Choice("tree")) => "lagrange",
         _ => "tree",
@@ -94,16 +94,16 @@ pub fn check(bytes: &[u8]) -> Fate {
     let mut scene = scene;
     scene.set("formulation", other).expect("a choice of every scene");
     run(&scene);
-    fate
+    outcome
 }
 
 /// Starts `scene` and takes some steps.
-fn run(scene: &Scene) -> Fate {
+fn run(scene: &Scene) -> Outcome {
     let mut simulation = match Simulation::new(&scene.machine) {
         Ok(simulation) => simulation,
         Err(error) => {
             assert!(!error_text(&scene.locate(&error)).is_empty());
-            return Fate::NoStart;
+            return Outcome::NoStart;
         }
     };
     let mut frame = Frame::default();
@@ -112,7 +112,7 @@ fn run(scene: &Scene) -> Fate {
         assert!(body.position.iter().all(|x| x.is_finite()));
     }
     if scene.machine.bodies.len() > MAX_BODIES {
-        return Fate::Starts;
+        return Outcome::Starts;
     }
     for _ in 0..STEPS {
         let before = simulation.time();
@@ -129,7 +129,7 @@ fn run(scene: &Scene) -> Fate {
         let words = doubt.to_string();
         assert_eq!(visible(&words), words);
     }
-    Fate::Starts
+    Outcome::Starts
 }
 
 /// The text of an error, checked for terminal control characters.

@@ -233,7 +233,7 @@ fn the_diagram_comes_into_sight_when_a_sweep_starts() {
         let start = harness.get_by_role_and_label(Role::Button, "Start sweep");
         start.scroll_to_me();
         harness.run_steps(60);
-        // The diagram is not visible yet; no point arrives meanwhile.
+        // The diagram is not visible yet, and no point arrives.
         assert_eq!(harness.state().bench().diagram_seen(), 0.0);
         click(&mut harness, Role::Button, "Start sweep");
         harness.run_steps(60);

@@ -136,7 +136,7 @@ fn a_reset_keeps_the_record_of_a_run_that_was_never_changed() {
     let kept = app.comparison().kept()[0].run();
     assert!(kept.reached() >= 0.02 && force(kept, 0.0, 0.02).len() > 100);
     assert_eq!(kept.running().machine.contact.clearance, 3e-4);
-    // A run that was changed on its way restarts with its latest values.
+    // A run with live changes restarts with its latest values.
     harness.state_mut().run_to(0.01);
     set(&mut harness, "Clearance", 0.7);
     harness.state_mut().run_to(0.02);

@@ -138,7 +138,7 @@ fn play_pause_and_the_space_bar() {
     click(&mut harness, "Pause");
     let paused = shown(&harness);
     harness.run_steps(10);
-    assert_eq!(shown(&harness), paused, "paused, time stands still");
+    assert_eq!(shown(&harness), paused, "time advanced while paused");
 
     harness.key_press(Key::Space);
     harness.step();

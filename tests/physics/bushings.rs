@@ -18,7 +18,7 @@ fn bushing_scene(start: &str, more: &str) -> String {
 }
 
 const STIFFNESS: [f64; 3] = [200.0, 300.0, 500.0];
-const TURNING: [f64; 3] = [0.1, 0.2, 0.3];
+const TURNING_STIFFNESS: [f64; 3] = [0.1, 0.2, 0.3];
 const INERTIA: [f64; 3] = [2e-4, 3e-4, 4e-4];
 
 /// Rotation vector of a rotation matrix.
@@ -50,7 +50,7 @@ fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
         let start = format!("position = \"100 200 300 mm\", rotation = {{ axis = {about:?}, angle = \"1 rad\" }}");
         let mut simulation = start_simulation(&bushing_scene(&start, ""), &variant.close());
         let frame = frame_at(&mut simulation, t);
-        let omega = (TURNING[axis] / INERTIA[axis]).sqrt();
+        let omega = (TURNING_STIFFNESS[axis] / INERTIA[axis]).sqrt();
         let angle = (omega * t).cos();
         let error = (rotation_vector(&frame.bodies[0].rotation) - Vec3::ith(axis, angle)).norm();
         assert!(error < 200.0 * bound, "{label}: {error:e}");
@@ -90,7 +90,7 @@ fn a_loaded_bushing_deflects_along_and_about_its_own_axes() {
                 let expected = direction * (4.0 / STIFFNESS[axis]);
                 assert!((moved - expected).norm() < 1e-7, "{label}: {moved} {expected}");
                 let turn = rotation_vector(&(frame.bodies[0].rotation * rest.inverse().to_rotation_matrix()));
-                let expected = direction * (0.05 / TURNING[axis]);
+                let expected = direction * (0.05 / TURNING_STIFFNESS[axis]);
                 assert!((turn - expected).norm() < 1e-6, "{label}: {turn} {expected}");
                 // The load is the first element.
                 let report = &frame.elements[1];

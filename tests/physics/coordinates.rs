@@ -25,18 +25,18 @@ const fn case(kind: &'static str, coordinate: &'static str, part: usize) -> Case
     Case { kind, coordinate, part, closes_loop: false }
 }
 
-const OF_TWO: [Case; 4] = [
+const TWO_DEGREE_CASES: [Case; 4] = [
     case("cylindrical", "position", 0),
     case("cylindrical", "angle", 1),
     case("universal", "angle", 0),
     case("universal", "child_angle", 1),
 ];
 
-/// [`OF_TWO`], and all kinds of joint that close a loop.
+/// [`TWO_DEGREE_CASES`], and all kinds of joint that close a loop.
 fn cases() -> impl Iterator<Item = Case> {
     let single = [case("prismatic", "position", 0), case("revolute", "angle", 0)];
-    let closing = OF_TWO.into_iter().chain(single).map(|case| Case { closes_loop: true, ..case });
-    OF_TWO.into_iter().chain(closing)
+    let closing = TWO_DEGREE_CASES.into_iter().chain(single).map(|case| Case { closes_loop: true, ..case });
+    TWO_DEGREE_CASES.into_iter().chain(closing)
 }
 
 impl Case {
@@ -78,7 +78,7 @@ impl Case {
         };
         let joints = match (self.closes_loop, self.slides()) {
             (false, _) => {
-                let other = OF_TWO.iter().find(|c| c.kind == self.kind && c.part != self.part);
+                let other = TWO_DEGREE_CASES.iter().find(|c| c.kind == self.kind && c.part != self.part);
                 let other = other.expect("another");
                 let [_, unit, ..] = other.units();
                 format!(
@@ -227,12 +227,12 @@ fn driven() -> [f64; 3] {
 
 #[test]
 fn a_drive_of_one_coordinate_leaves_the_other_free_and_exerts_the_inertia_force() {
-    for_every(OF_TWO, |case, variant| {
+    for_every(TWO_DEGREE_CASES, |case, variant| {
         let ([length, ..], bound) = (case.units(), variant.bound());
         let text = case.text([0.0, 0.0], "");
         let start = text.find("start = ").expect("start values");
         let (before, after) = text.split_at(start);
-        let other = OF_TWO.iter().find(|c| c.kind == case.kind && c.part != case.part);
+        let other = TWO_DEGREE_CASES.iter().find(|c| c.kind == case.kind && c.part != case.part);
         let [_, unit, ..] = other.expect("another").units();
         let rate = other.expect("another").rate_key();
         let law = DRIVEN.replace("UNIT", length);
@@ -264,7 +264,7 @@ fn a_drive_of_one_coordinate_leaves_the_other_free_and_exerts_the_inertia_force(
 
 #[test]
 fn a_joint_with_both_coordinates_driven_carries_an_attached_pendulum() {
-    for [first, second] in [[OF_TWO[0], OF_TWO[1]], [OF_TWO[2], OF_TWO[3]]] {
+    for [first, second] in [[TWO_DEGREE_CASES[0], TWO_DEGREE_CASES[1]], [TWO_DEGREE_CASES[2], TWO_DEGREE_CASES[3]]] {
         let text = first.text([0.0, 0.0], "");
         let start = text.find("start = ").expect("start values");
         let drive = |case: Case, rate: &str| {

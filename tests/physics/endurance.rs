@@ -12,9 +12,9 @@ use jointplay::scene::LiveScene;
 use jointplay::simulate::{Frame, Simulation};
 
 /// Pseudo-random numbers from a seed (xorshift64*), so that every run of a test is the same.
-struct Numbers(u64);
+struct Random(u64);
 
-impl Numbers {
+impl Random {
     fn next(&mut self) -> f64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -28,15 +28,15 @@ impl Numbers {
 }
 
 /// One frame's change: a key and its value.
-fn change(numbers: &mut Numbers, simulation: &Simulation) -> (String, String) {
+fn change(random: &mut Random, simulation: &Simulation) -> (String, String) {
     let joints = &simulation.machine().ball_joints;
-    let joint = numbers.below(2 * joints.len());
+    let joint = random.below(2 * joints.len());
     let target = match joints.get(joint) {
         Some(joint) => format!("joint.{}", joint.name),
         None => "contact".to_owned(),
     };
-    let x = numbers.next();
-    match numbers.below(3) {
+    let x = random.next();
+    match random.below(3) {
         // 0.01 mm to 3 mm.
         0 => (format!("{target}.clearance"), format!("{:e} mm", 0.01 * 300_f64.powf(x))),
         1 => (format!("{target}.friction"), format!("{:e}", 1.5 * x)),
@@ -56,16 +56,16 @@ fn advance_frame(simulation: &mut Simulation, target: f64, frame: &mut Frame) {
 
 /// Runs `frames` frames at 60 frames per second and `pace` simulated seconds per second, with a random change in each.
 fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64) {
-    let mut numbers = Numbers(seed);
+    let mut random = Random(seed);
     let changes = [("solver.preset", preset)];
     let mut simulation = LiveScene::new(&scene(name, &changes)).unwrap();
     let mut frame = Frame::default();
     let mut shown = 0.0;
     let (mut restored, mut n) = (0, 0);
     while n < frames {
-        let (key, value) = change(&mut numbers, &simulation);
+        let (key, value) = change(&mut random, &simulation);
         simulation.set(&key, &value).unwrap();
-        match numbers.below(120) {
+        match random.below(120) {
             // A pause: frames are drawn, but time does not advance.
             0 => {
                 let hash = simulation.state_hash();
@@ -86,7 +86,7 @@ fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64)
                     simulation.state_hash()
                 };
                 for _ in 0..5 {
-                    path.push(change(&mut numbers, &simulation));
+                    path.push(change(&mut random, &simulation));
                 }
                 let first = replay(&mut simulation, &path);
                 simulation.restore(&snapshot);

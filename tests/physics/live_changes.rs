@@ -313,9 +313,9 @@ fn refused_values_change_nothing() {
 }
 
 /// Numerical Recipes' 64-bit linear congruential generator, upper bits.
-struct Dice(u64);
+struct Random(u64);
 
-impl Dice {
+impl Random {
     fn below(&mut self, n: usize) -> usize {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 33) as usize) % n
@@ -339,13 +339,13 @@ fn two_hundred_changes_in_half_a_second_leave_a_bounded_state() {
         ("solver.tolerance", &["1e-4", "1e-6", "1e-8"]),
     ];
     let run = |seed: u64| {
-        let mut dice = Dice(seed);
+        let mut random = Random(seed);
         let mut simulation = live("spcmm", &[("solver.step", "5 us")]);
         let (mut frame, mut peaks) = (Frame::default(), Vec::new());
         let (mut force, mut kinetic) = (0.0_f64, 0.0_f64);
         for i in 1..=200 {
-            let (key, values) = CHOICES[dice.below(CHOICES.len())];
-            let value = values[dice.below(values.len())];
+            let (key, values) = CHOICES[random.below(CHOICES.len())];
+            let value = values[random.below(values.len())];
             assert_eq!(simulation.set(key, value), Ok(Effect::Now), "{key} = {value}");
             let end = f64::from(i) * 2.5e-3;
             while simulation.time() < end {

@@ -1,6 +1,6 @@
 //! Tip errors with every ball anywhere in its clearance, and at rest, against known answers.
 
-use crate::common::truss::{Guide, Rod, TIP, TWO, support, truss};
+use crate::common::truss::{Guide, Rod, TIP, TWO_RODS, support, truss};
 use crate::common::{parse, run_until, scene};
 use jointplay::machine::{Machine, Vec3};
 use jointplay::mechanism::{Farthest, HeldError, HeldMachine};
@@ -23,9 +23,9 @@ fn error(farthest: &Farthest) -> Vec3 {
     farthest.error.unwrap_or_else(|| panic!("no pose: {farthest:?}"))
 }
 
-/// Elongation of each rod of [`TWO`] when the tip is displaced by `e`, relative to its clearance.
+/// Elongation of each rod of [`TWO_RODS`] when the tip is displaced by `e`, relative to its clearance.
 fn stretch(e: &Vec3) -> [f64; 2] {
-    TWO.map(|rod| {
+    TWO_RODS.map(|rod| {
         let (length, _) = rod.length_and_direction(TIP);
         let (now, _) = rod.length_and_direction([TIP[0] + e.x, TIP[1] + e.z]);
         (now - length) / rod.total_play()
@@ -35,7 +35,7 @@ fn stretch(e: &Vec3) -> [f64; 2] {
 #[test]
 fn two_rods_hold_the_tip_within_their_parallelogram() {
     for guide in [Guide::Plane, Guide::None] {
-        let scene = parse(&truss(&TWO, TIP, guide, "friction_law = \"none\""), &[]);
+        let scene = parse(&truss(&TWO_RODS, TIP, guide, "friction_law = \"none\""), &[]);
         // If the tip is free, the rods can rotate about the line of their fixed points; without weight they do not.
         let mut machine = scene.machine.clone();
         machine.gravity = Vec3::zeros();
@@ -49,7 +49,7 @@ fn two_rods_hold_the_tip_within_their_parallelogram() {
         let mut corners = Vec::new();
         for u in directions(60) {
             let farthest = held_machine.farthest(&u);
-            let expected = support(&TWO, TIP, [u.x, u.z]);
+            let expected = support(&TWO_RODS, TIP, [u.x, u.z]);
             assert!((farthest.support / expected - 1.0).abs() < 1e-9, "{} {expected}", farthest.support);
             // Each joint's share is proportional to its clearance.
             let shares = &farthest.shares;
@@ -75,7 +75,7 @@ fn two_rods_hold_the_tip_within_their_parallelogram() {
 
 #[test]
 fn opposite_errors_are_equal_up_to_the_square_of_the_clearance() {
-    let scene = parse(&truss(&TWO, TIP, Guide::Plane, ""), &[]);
+    let scene = parse(&truss(&TWO_RODS, TIP, Guide::Plane, ""), &[]);
     let mut held_machine = held_machine(&scene, &[]);
     for u in directions(16) {
         let [one, other] = [u, -u].map(|u| held_machine.farthest(&u));
@@ -103,7 +103,7 @@ fn the_tightest_of_parallel_rods_limits_the_error() {
         }
     }
     // In a plane two of the three strips limit the error in each direction.
-    let rods = [TWO[0], TWO[1], Rod { from: [-0.1, -0.25], play: [0.1e-3, 0.1e-3] }];
+    let rods = [TWO_RODS[0], TWO_RODS[1], Rod { from: [-0.1, -0.25], play: [0.1e-3, 0.1e-3] }];
     let mut held_machine = held_machine(&parse(&truss(&rods, TIP, Guide::Plane, ""), &[]), &[]);
     let mut inactive = 0;
     for u in directions(48) {
@@ -149,9 +149,9 @@ fn slider_crank(plays: [f64; 2]) -> Scene {
 
 #[test]
 fn the_error_of_a_slider_is_the_clearance_along_its_rod() {
-    const PLAYS: [f64; 2] = [0.2e-3, 0.3e-3];
-    let scene = slider_crank(PLAYS);
-    let (crank, rod, play) = (0.05, 0.16, PLAYS[0] + PLAYS[1]);
+    const CLEARANCES: [f64; 2] = [0.2e-3, 0.3e-3];
+    let scene = slider_crank(CLEARANCES);
+    let (crank, rod, play) = (0.05, 0.16, CLEARANCES[0] + CLEARANCES[1]);
     for angle in [0.0_f64, 0.4, 1.2, 1.57, 2.8, 4.1, -1.0, 12.0] {
         let mut held_machine = held_machine(&scene, &[Some(angle)]);
         let (sine, cosine) = libm::sincos(angle);
@@ -222,7 +222,7 @@ fn no_position_of_the_balls_exceeds_the_computed_error() {
 
 #[test]
 fn without_play_nothing_moves_and_idle_spin_has_no_effect() {
-    let tight = TWO.map(|rod| Rod { play: [0.0; 2], ..rod });
+    let tight = TWO_RODS.map(|rod| Rod { play: [0.0; 2], ..rod });
     let mut held_machine = held_machine(&parse(&truss(&tight, TIP, Guide::Plane, ""), &[]), &[]);
     let freedoms = held_machine.freedoms();
     assert!(freedoms.bounded.is_empty() && freedoms.unbounded.is_empty(), "{freedoms:?}");
@@ -234,7 +234,7 @@ fn without_play_nothing_moves_and_idle_spin_has_no_effect() {
 #[test]
 fn the_tip_rests_where_a_long_run_leaves_it() {
     let contact = "friction = 0.15\nrestitution = 0.3";
-    let scene = parse(&truss(&TWO, TIP, Guide::Plane, contact), &[]);
+    let scene = parse(&truss(&TWO_RODS, TIP, Guide::Plane, contact), &[]);
     let mut held_machine = held_machine(&scene, &[]);
     let settled = held_machine.settled_error().unwrap();
     let mut simulation = Simulation::new(&scene.machine).unwrap();
@@ -252,12 +252,12 @@ fn the_tip_rests_where_a_long_run_leaves_it() {
 
 #[test]
 fn unreachable_drive_positions_report_the_reached_fraction() {
-    let scene = parse(&truss(&TWO, TIP, Guide::Plane, ""), &[]);
+    let scene = parse(&truss(&TWO_RODS, TIP, Guide::Plane, ""), &[]);
     // The fixed end of the first rod moves 0.1 m, and the tip with it.
     let mut moved = held_machine(&scene, &[Some(0.1)]);
     let tip = [moved.ideal_tip().x, moved.ideal_tip().z];
-    let rods = [Rod { from: [TWO[0].from[0] + 0.1, TWO[0].from[1]], ..TWO[0] }, TWO[1]];
-    for (rod, own) in rods.iter().zip(TWO) {
+    let rods = [Rod { from: [TWO_RODS[0].from[0] + 0.1, TWO_RODS[0].from[1]], ..TWO_RODS[0] }, TWO_RODS[1]];
+    for (rod, own) in rods.iter().zip(TWO_RODS) {
         assert!((rod.length_and_direction(tip).0 - own.length_and_direction(TIP).0).abs() < 1e-12);
     }
     for u in directions(8) {

@@ -38,7 +38,7 @@ fn within((least, most): (f64, f64)) -> BoxedStrategy<f64> {
     signed.prop_map(move |x| x.clamp(inside.0, inside.1)).boxed()
 }
 
-/// A value of a key as in a file; `hinge` tells whether its joint is a hinge.
+/// A value of a key as in a file, for an element on a hinge (`hinge`) or on a slide.
 fn value(key: &'static FileKey, hinge: bool) -> BoxedStrategy<String> {
     let dimension = key.dimension(hinge).unwrap_or(Dimension::None);
     let example = match key.on_hinge {

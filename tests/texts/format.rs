@@ -11,7 +11,7 @@ use jointplay::scene::{
 };
 use serde_json::Value as Json;
 
-use crate::scene_corpus::{Numbers, mutate};
+use crate::scene_corpus::{Random, mutate};
 use toml_edit::{DocumentMut, Item, Value};
 
 /// A scene with a file for each key that names one.
@@ -328,7 +328,7 @@ fn the_schema_accepts_whatever_the_reader_accepts() {
     let mut accepted = 0;
     for (name, text) in scenes() {
         for seed in 1..=MUTATIONS {
-            let mutated = mutate(text.as_bytes(), &mut Numbers(seed));
+            let mutated = mutate(text.as_bytes(), &mut Random(seed));
             let Ok(mutated) = String::from_utf8(mutated) else {
                 continue;
             };

@@ -19,7 +19,7 @@ const FLOORS: [&[&str]; 12] = [
     &["main", "web"],
 ];
 /// Modules whose results must be the same bits everywhere.
-const EXACT: [&str; 9] =
+const REPRODUCIBLE: [&str; 9] =
     ["jet", "contact", "expression", "integrate", "machine", "mechanism", "scene", "simulate", "analysis"];
 /// Modules of the lowest crate.
 const PHYSICS: [&str; 10] =
@@ -410,7 +410,7 @@ fn physics_knows_no_screen_clock_or_platform_dependent_function() {
     ];
     let mut seen = 0;
     for (module, file, code) in files() {
-        if !EXACT.contains(&module.as_str()) {
+        if !REPRODUCIBLE.contains(&module.as_str()) {
             continue;
         }
         seen += 1;

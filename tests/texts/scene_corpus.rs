@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use fuzz::{Fate, check};
+use fuzz::{Outcome, check};
 use jointplay::scene::{BUILT_IN, built_in_text};
 
 /// Mutations of each file of the corpus and of each built-in scene, multiplied by the environment variable `SCENE_MUTATIONS`.
@@ -92,9 +92,9 @@ const TOKENS: [&str; 45] = [
     "1979-05-27",
 ];
 
-pub struct Numbers(pub u64);
+pub struct Random(pub u64);
 
-impl Numbers {
+impl Random {
     fn next(&mut self) -> usize {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -136,29 +136,29 @@ fn tokens(bytes: &[u8]) -> Vec<(usize, usize)> {
 }
 
 /// Mutates `text` once or twice.
-pub fn mutate(text: &[u8], numbers: &mut Numbers) -> Vec<u8> {
+pub fn mutate(text: &[u8], random: &mut Random) -> Vec<u8> {
     let mut bytes = text.to_vec();
-    for _ in 0..=numbers.below(2) {
+    for _ in 0..=random.below(2) {
         let ranges = tokens(&bytes);
         if ranges.is_empty() {
             break;
         }
-        let (from, to) = ranges[numbers.below(ranges.len())];
-        let (other_from, other_to) = ranges[numbers.below(ranges.len())];
+        let (from, to) = ranges[random.below(ranges.len())];
+        let (other_from, other_to) = ranges[random.below(ranges.len())];
         let lines: Vec<&[u8]> = bytes.split_inclusive(|b| *b == b'\n').collect();
-        let line = numbers.below(lines.len());
-        match numbers.below(12) {
+        let line = random.below(lines.len());
+        match random.below(12) {
             0 => {
-                let at = numbers.below(bytes.len());
-                bytes[at] ^= 1 << numbers.below(8);
+                let at = random.below(bytes.len());
+                bytes[at] ^= 1 << random.below(8);
             }
-            1 => bytes.truncate(numbers.below(bytes.len())),
+            1 => bytes.truncate(random.below(bytes.len())),
             2 => {
                 let other = bytes[other_from..other_to].to_vec();
                 bytes.splice(from..to, other);
             }
             3 | 4 => {
-                let token = TOKENS[numbers.below(TOKENS.len())];
+                let token = TOKENS[random.below(TOKENS.len())];
                 bytes.splice(from..to, token.bytes());
             }
             5 => {
@@ -171,22 +171,22 @@ pub fn mutate(text: &[u8], numbers: &mut Numbers) -> Vec<u8> {
             }
             7 => {
                 let mut longer = lines.clone();
-                longer.insert(numbers.below(lines.len()), lines[line]);
+                longer.insert(random.below(lines.len()), lines[line]);
                 bytes = longer.concat();
             }
             // The mutation most likely to leave a valid scene: another digit, sign or power of ten.
             _ => {
                 let digits: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i].is_ascii_digit()).collect();
-                let Some(&at) = digits.get(numbers.below(digits.len())) else {
+                let Some(&at) = digits.get(random.below(digits.len())) else {
                     continue;
                 };
-                let other = ["0", "1", "9", "-1", "1e3", "1e-3", "0.0"][numbers.below(7)];
+                let other = ["0", "1", "9", "-1", "1e3", "1e-3", "0.0"][random.below(7)];
                 bytes.splice(at..=at, other.bytes());
             }
         }
     }
-    if numbers.below(3) == 0 {
-        let change = CHANGES[numbers.below(CHANGES.len())];
+    if random.below(3) == 0 {
+        let change = CHANGES[random.below(CHANGES.len())];
         bytes.extend(format!("\n#set {change}\n").into_bytes());
     }
     bytes
@@ -206,7 +206,7 @@ fn corpus() -> Vec<(String, Vec<u8>)> {
 }
 
 /// Checks a text; a panic is reported with the text.
-fn check_without_panic(name: &str, bytes: &[u8]) -> Fate {
+fn check_without_panic(name: &str, bytes: &[u8]) -> Outcome {
     std::panic::catch_unwind(|| check(bytes))
         .unwrap_or_else(|_| panic!("{name} breaks the reader:\n{}", String::from_utf8_lossy(bytes)))
 }
@@ -218,14 +218,14 @@ fn each_scene_of_the_corpus_ends_as_its_name_states() {
     let mut wrong = Vec::new();
     for (name, bytes) in &corpus {
         let expected = match name.split('-').next() {
-            Some("good") => Fate::Starts,
-            Some("stuck") => Fate::NoStart,
-            Some("bytes") => Fate::NoText,
-            _ => Fate::Refused,
+            Some("good") => Outcome::Starts,
+            Some("stuck") => Outcome::NoStart,
+            Some("bytes") => Outcome::NoText,
+            _ => Outcome::Refused,
         };
-        let fate = check_without_panic(name, bytes);
-        if fate != expected {
-            wrong.push(format!("{name}: {fate:?}"));
+        let outcome = check_without_panic(name, bytes);
+        if outcome != expected {
+            wrong.push(format!("{name}: {outcome:?}"));
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
@@ -239,26 +239,26 @@ fn mutations_of_the_corpus_cause_no_panic() {
         corpus().into_iter().map(|(name, bytes)| (name, bytes, MUTATIONS)).collect();
     for name in BUILT_IN {
         let text = built_in_text(name).unwrap();
-        assert_eq!(check_without_panic(name, text.as_bytes()), Fate::Starts);
+        assert_eq!(check_without_panic(name, text.as_bytes()), Outcome::Starts);
         seeds.push((name.to_owned(), text.as_bytes().to_vec(), MUTATIONS_OF_BUILT_IN));
     }
     let next = AtomicUsize::new(0);
-    let fates = std::sync::Mutex::new(BTreeMap::<String, u64>::new());
+    let outcomes = std::sync::Mutex::new(BTreeMap::<String, u64>::new());
     std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
                 while let Some((name, bytes, count)) = seeds.get(next.fetch_add(1, Ordering::Relaxed)) {
                     for seed in 1..=*count * times {
-                        let mutated = mutate(bytes, &mut Numbers(seed));
-                        let fate = check_without_panic(&format!("{name}, mutation {seed}"), &mutated);
-                        *fates.lock().unwrap().entry(format!("{fate:?}")).or_default() += 1;
+                        let mutated = mutate(bytes, &mut Random(seed));
+                        let outcome = check_without_panic(&format!("{name}, mutation {seed}"), &mutated);
+                        *outcomes.lock().unwrap().entry(format!("{outcome:?}")).or_default() += 1;
                     }
                 }
             });
         }
     });
-    let fates = fates.into_inner().unwrap();
-    println!("{fates:?}");
+    let outcomes = outcomes.into_inner().unwrap();
+    println!("{outcomes:?}");
     // If all mutations failed to parse, the test would check nothing.
-    assert!(fates["Refused"] > 1000 && fates["Starts"] > 200, "{fates:?}");
+    assert!(outcomes["Refused"] > 1000 && outcomes["Starts"] > 200, "{outcomes:?}");
 }

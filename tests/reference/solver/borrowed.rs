@@ -10,13 +10,13 @@ use jointplay::scene::Scene;
 use crate::integrate::Equations;
 
 /// The program's equations for the independent solver.
-pub struct Borrowed {
+pub struct ProgramEquations {
     mechanism: RefCell<Mechanism>,
     contact_states: RefCell<Vec<ContactState>>,
     speed_floor: f64,
 }
 
-impl Borrowed {
+impl ProgramEquations {
     pub fn new(scene: &Scene) -> Self {
         Self {
             mechanism: RefCell::new(Mechanism::new(&scene.machine).unwrap()),
@@ -26,7 +26,7 @@ impl Borrowed {
     }
 }
 
-impl Equations for Borrowed {
+impl Equations for ProgramEquations {
     fn start(&self) -> Vec<f64> {
         self.mechanism.borrow_mut().start().unwrap()
     }

@@ -8,7 +8,7 @@ mod pendulum;
 
 use std::fmt::Write;
 
-use borrowed::Borrowed;
+use borrowed::ProgramEquations;
 use integrate::{Equations, Solver, integrate};
 use jointplay::scene::Scene;
 use machine::Machine;
@@ -47,7 +47,7 @@ impl Rows {
     }
 
     fn borrowed(&mut self, name: &str, changes: &Changes, with: (Solver, f64), end: f64) {
-        self.add(("borrowed", &Borrowed::new(&scene(name, changes))), (name, changes), with, end);
+        self.add(("borrowed", &ProgramEquations::new(&scene(name, changes))), (name, changes), with, end);
     }
 }
 
