@@ -81,7 +81,7 @@ fn page(pdf: &[u8]) -> (String, String) {
     let size = find(0, "/MediaBox");
     let start = find(0, "stream\n") + "stream\n".len();
     let end = find(start, "\nendstream");
-    let drawing = miniz_oxide::inflate::decompress_to_vec_zlib(&pdf[start..end]).expect("whole");
+    let drawing = miniz_oxide::inflate::decompress_to_vec_zlib(&pdf[start..end]).expect("a complete stream");
     let size = String::from_utf8_lossy(&pdf[size..find(size, "]") + 1]).into_owned();
     (size, String::from_utf8(drawing).expect("operators"))
 }

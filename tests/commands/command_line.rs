@@ -177,11 +177,11 @@ fn the_three_formats_hold_the_same_values_and_their_provenance() {
         assert_eq!(meta["status"], "done");
         // The metadata alone reproduces the run.
         let text = meta["scene_text"].as_str().unwrap();
-        fs::write(folder.path().join("again.toml"), text).unwrap();
+        fs::write(folder.path().join("repeated.toml"), text).unwrap();
         let changed = meta["changed_parameters"].as_object().unwrap();
         let changed = changed.iter().map(|(key, value)| format!("--set {key}={}", value.as_str().unwrap()));
         let changed: Vec<String> = changed.collect();
-        let line = format!("run again.toml {} --duration {}s --summary json", changed.join(" "), meta["duration_s"]);
+        let line = format!("run repeated.toml {} --duration {}s --summary json", changed.join(" "), meta["duration_s"]);
         let repeated = jointplay(folder.path(), &line).expect(0).json();
         assert_eq!(repeated["state_hash"], meta["state_hash"]);
         assert!(repeated["scene_text"].is_null(), "a summary contains the text of the scene");

@@ -184,9 +184,9 @@ fn two_machines_with_the_same_parameters_have_the_same_picture() {
     harness.run_steps(2);
     harness.drop_at(centre + egui::vec2(60.0, 20.0));
     harness.run_steps(30);
-    let turned = window_picture(&mut harness);
-    assert!(count_differing(&same, &turned, middle, 0) > 1000, "turned");
-    assert_eq!(count_differing(&turned, &turned, middle, by), 0);
+    let rotated = window_picture(&mut harness);
+    assert!(count_differing(&same, &rotated, middle, 0) > 1000, "the view did not rotate");
+    assert_eq!(count_differing(&rotated, &rotated, middle, by), 0);
 }
 
 #[test]

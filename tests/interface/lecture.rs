@@ -81,7 +81,7 @@ fn the_lanes_have_the_colours_of_past_contact_states() {
     let player = harness.state().player();
     let touch = player.contact_history().touches(0, 0.0, 1.0).next().expect("strikes");
     let until = player.contact_history().states(0, touch, 1.0).find(|state| state.2 == ContactMode::Free);
-    let until = until.expect("leaves again").0;
+    let until = until.expect("the end of the contact").0;
     let rect = strip(&harness);
     let lane = rect.height() / 3.0;
     let x = |time: f64| place(&harness, time).x as usize;

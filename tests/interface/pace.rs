@@ -75,11 +75,11 @@ fn slow_motion_reduces_the_resolution_and_rest_restores_it() {
     assert_eq!(adaptive.state().picture_quality(), LOWEST);
     adaptive.run_steps(60);
     assert_eq!(adaptive.state().picture_quality(), Quality::FULL);
-    let turned = split_pixels(&mut adaptive, panel);
-    assert!(turned[1] != full[1]);
+    let rotated = split_pixels(&mut adaptive, panel);
+    assert!(rotated[1] != full[1]);
     adaptive.key_press(eframe::egui::Key::X);
     adaptive.run_steps(6);
-    assert!(split_pixels(&mut adaptive, panel)[1] != turned[1]);
+    assert!(split_pixels(&mut adaptive, panel)[1] != rotated[1]);
 }
 
 /// The limit displayed beside the speed after `frames` frames.

@@ -328,7 +328,7 @@ fn one_finger_orbits_and_two_pan_and_zoom() {
     }
     touch(&harness, 1, TouchPhase::End, middle + vec2(60.0, 0.0));
     harness.run_steps(3);
-    let turned = camera(&harness).expect("turned");
+    let rotated = camera(&harness).expect("a camera");
     touch(&harness, 1, TouchPhase::Start, middle);
     harness.step();
     touch(&harness, 1, TouchPhase::Move, middle + vec2(30.0, 0.0));
@@ -337,10 +337,10 @@ fn one_finger_orbits_and_two_pan_and_zoom() {
     harness.step();
     touch(&harness, 1, TouchPhase::End, middle + vec2(60.0, 0.0));
     harness.run_steps(3);
-    let second = camera(&harness).expect("turned");
-    assert!((second.yaw - turned.yaw).abs() > 0.1, "{turned:?} {second:?}");
-    assert_eq!(second.target, turned.target);
-    assert_eq!(second.distance, turned.distance);
+    let second = camera(&harness).expect("a camera");
+    assert!((second.yaw - rotated.yaw).abs() > 0.1, "{rotated:?} {second:?}");
+    assert_eq!(second.target, rotated.target);
+    assert_eq!(second.distance, rotated.distance);
 
     // Both fingers move in parallel: a pan.
     let fingers = |harness: &Harness<'_, App>, phase, spread: f32, shift: f32| {
@@ -649,7 +649,7 @@ pub fn next_file(harness: &mut Harness<'_, App>, calls: &Rc<RefCell<Calls>>) -> 
 pub fn decoded(file: &SaveFile) -> (png::Info<'static>, Vec<u8>) {
     let mut reader = png::Decoder::new(std::io::Cursor::new(file.bytes.as_slice())).read_info().expect("a PNG file");
     let mut rgba = vec![0; reader.output_buffer_size().expect("fits in memory")];
-    reader.next_frame(&mut rgba).expect("whole");
+    reader.next_frame(&mut rgba).expect("a complete picture");
     (reader.info().clone(), rgba)
 }
 

@@ -641,8 +641,8 @@ fn the_wear_map_appears_with_its_scale_and_a_reset_clears_it() {
     assert_eq!(purple(&mut harness), 0);
     for name in ["Wear map: Impulse", "Wear map: Friction work"] {
         choose(&mut harness, name);
-        let seen = purple(&mut harness);
-        assert!(seen > 30, "{name}: {seen}");
+        let count = purple(&mut harness);
+        assert!(count > 30, "{name}: {count}");
     }
     click(&mut harness, "Reset");
     harness.run();

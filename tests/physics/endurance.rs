@@ -256,8 +256,8 @@ fn long_run(case: &LongRun, preset: usize, duration: f64) -> Drift {
             }
         }
         for body in &frame.bodies {
-            let turned = body.rotation.tr_mul(&body.rotation) - Mat3::identity();
-            drift.skew = drift.skew.max(turned.amax());
+            let deviation = body.rotation.tr_mul(&body.rotation) - Mat3::identity();
+            drift.skew = drift.skew.max(deviation.amax());
         }
         if n % 2 == 1 || n < 6 {
             continue;

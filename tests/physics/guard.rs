@@ -27,8 +27,8 @@ fn check_last_good_state(simulation: &mut Simulation, stopped: &Stopped) {
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
     }
     for _ in 0..3 {
-        let again = simulation.step().unwrap_err();
-        assert_eq!(again.time, stopped.time);
+        let repeated = simulation.step().unwrap_err();
+        assert_eq!(repeated.time, stopped.time);
         assert_eq!(simulation.state_hash(), hash);
         // A step truncated by output fails as well and leaves the state unchanged.
         let end = simulation.time() + simulation.machine().solver.step.max(0.005);

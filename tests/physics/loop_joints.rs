@@ -662,8 +662,8 @@ fn loops_of_a_pattern_close_in_every_instance() {
             for (k, leg) in (0..).zip(&frame.bodies[1..]) {
                 let third = rotation_about(Vec3::z(), f64::from(k) * std::f64::consts::TAU / 3.0);
                 let third: Mat3 = hub.rotation * third.to_rotation_matrix().into_inner();
-                let turned = (leg.rotation - third).amax();
-                assert!(turned < 1e-6, "{formulation} {parent} {k}: {turned:e}");
+                let error = (leg.rotation - third).amax();
+                assert!(error < 1e-6, "{formulation} {parent} {k}: {error:e}");
                 let ends = [
                     hub.position + third * Vec3::new(0.1, 0.0, 0.02),
                     leg.position + leg.rotation * Vec3::new(0.0, 0.0, -0.05),

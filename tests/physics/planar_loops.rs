@@ -232,13 +232,13 @@ fn a_four_bar_closed_by_an_ideal_ball_joint_obeys_geometry_and_energy() {
         let summary = simulation.mechanism().summary();
         assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (1, 1));
         assert_eq!(simulation.indeterminate_forces().reactions, [0]);
-        let mut turned = 0.0;
+        let mut travel = 0.0;
         let mut last = bar.angle;
         for k in 1..=12 {
             run_until(&mut simulation, 0.05 * f64::from(k));
             let frame = frame_now(&mut simulation);
             let crank = angle_of(&frame, turn, 0);
-            turned += {
+            travel += {
                 let d = crank - last;
                 d.sin().atan2(d.cos())
             };
@@ -253,7 +253,7 @@ fn a_four_bar_closed_by_an_ideal_ball_joint_obeys_geometry_and_energy() {
             let w = frame.bodies[0].angular_velocity.norm();
             let rate = bar.rate_squared(crank).sqrt();
             assert!((w - rate).abs() < 1e-6 * bar.rate, "{form}: {w} {rate}");
-            let time = bar.time_to(bar.angle + turned);
+            let time = bar.time_to(bar.angle + travel);
             let error = time - frame.time;
             assert!(error.abs() < 1e-6, "{form}: {error:e} s at {}", frame.time);
             let force = turn.inverse() * frame.joints[0].normal_force;
@@ -261,7 +261,7 @@ fn a_four_bar_closed_by_an_ideal_ball_joint_obeys_geometry_and_energy() {
             let error = (force - Vec3::new(x, 0.0, z)).norm();
             assert!(error < 1e-5 * x.hypot(z).max(1.0), "{form}: {force} {x} {z}");
         }
-        assert!(turned > 1.0, "the crank turns: {turned}");
+        assert!(travel > 1.0, "the crank turns: {travel}");
     }
 }
 
@@ -445,8 +445,8 @@ fn displacements_by_the_assembly_are_reported() {
     let chord = 2.0 * GRASHOF.lengths[1] * (4.0 * degrees).sin();
     assert!(joint == 0 && (gap - chord).abs() < 1e-12, "{gap} {chord}");
     assert_eq!(assembly.bodies[0].moved, 0.0);
-    let turned = assembly.bodies[1].turned;
-    assert!((turned - 8.0 * degrees).abs() < 1e-9, "{turned}");
+    let displacement = assembly.bodies[1].turned;
+    assert!((displacement - 8.0 * degrees).abs() < 1e-9, "{displacement}");
     assert!(assembly.bodies[2].turned < 1e-9 && !assembly.other_mode);
 }
 

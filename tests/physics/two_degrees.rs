@@ -34,13 +34,13 @@ fn a_cylindrical_joint_slides_and_turns_independently() {
         let body = &frame.bodies[0];
         let error = (body.position - Vec3::new(0.0, 0.0, z)).norm();
         assert!(error < bound, "{variant}: {error:e}");
-        let turned = body.rotation[(1, 0)].atan2(body.rotation[(0, 0)]);
-        assert!(angle_difference(turned, angle) < bound, "{variant}: {turned} {angle}");
-        let [[slid, speed], [turned, spin]] = frame.coordinates[..] else {
+        let body_angle = body.rotation[(1, 0)].atan2(body.rotation[(0, 0)]);
+        assert!(angle_difference(body_angle, angle) < bound, "{variant}: {body_angle} {angle}");
+        let [[slide_position, speed], [joint_angle, spin]] = frame.coordinates[..] else {
             panic!("{variant}: {:?}", frame.coordinates);
         };
-        assert!((slid - z).abs() < bound && (speed - 0.4 + G * t).abs() < 20.0 * bound);
-        assert!(angle_difference(turned, angle) < bound && (spin - 7.0).abs() < bound);
+        assert!((slide_position - z).abs() < bound && (speed - 0.4 + G * t).abs() < 20.0 * bound);
+        assert!(angle_difference(joint_angle, angle) < bound && (spin - 7.0).abs() < bound);
     }
 }
 

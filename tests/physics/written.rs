@@ -297,9 +297,9 @@ proptest! {
         let (own, included) = (own.concat(), included.concat());
         let files = Texts::from([("part.toml".to_owned(), included.into())]);
         if Scene::parse(&element, None, &[]).is_ok() {
-            let whole = format!("name = \"x\"\n{element}");
+            let single = format!("name = \"x\"\n{element}");
             let split = format!("name = \"x\"\ninclude = [\"part.toml\"]\n{own}");
-            prop_assert_eq!(without_source(&whole, &Texts::new()), without_source(&split, &files));
+            prop_assert_eq!(without_source(&single, &Texts::new()), without_source(&split, &files));
         }
     }
 

@@ -408,12 +408,12 @@ fn physics_knows_no_screen_clock_or_platform_dependent_function() {
         "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sin_cos", "sinh", "cosh", "tanh", "asinh", "acosh",
         "atanh", "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "cbrt", "hypot",
     ];
-    let mut seen = 0;
+    let mut checked = 0;
     for (module, file, code) in files() {
         if !REPRODUCIBLE.contains(&module.as_str()) {
             continue;
         }
-        seen += 1;
+        checked += 1;
         assert!(!code.contains("std::time"), "src/{file}: std::time");
         for (at, word) in words(&code) {
             let position = || format!("src/{file}:{}: {word}", line_of(&code, at));
@@ -433,7 +433,7 @@ fn physics_knows_no_screen_clock_or_platform_dependent_function() {
             }
         }
     }
-    assert!(seen > 20, "only {seen} files");
+    assert!(checked > 20, "only {checked} files");
 }
 
 #[test]
