@@ -6,7 +6,9 @@ use super::args::BenchArguments;
 use super::tables::{Table, yes_or_no};
 use super::tradeoff::{percent, times, value};
 use super::{DEFAULT_SCENE, Failure, machine, measuring, print};
-use crate::analysis::{GROWTH, GoalResult, LIMITS, LOOSE_MACHINES, LooseSpeed, Timed, growth, loose_speed, measure_speed_goals};
+use crate::analysis::{
+    GROWTH, GoalResult, LIMITS, LOOSE_MACHINES, LooseSpeed, Timed, growth, loose_speed, measure_speed_goals,
+};
 use crate::scene::Scene;
 use crate::units::format_quantity;
 

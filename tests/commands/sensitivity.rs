@@ -147,7 +147,7 @@ fn the_window_computes_the_same_bits_as_the_command() {
         span: RunSpan { duration: 0.06, from: 0.02 },
     };
     let mut runs = 0;
-    perform(&Job::Alone(task, Share::WHOLE), &mut || 0.0, &mut |message| {
+    perform(&Job::OneAtATime(task, Share::WHOLE), &mut || 0.0, &mut |message| {
         assert!(!matches!(message, Message::Failed(_)), "{message:?}");
         if let Message::Run(run) = message {
             runs += 1;

@@ -1,8 +1,8 @@
 //! Results computed from whole runs. The crate starts no threads; the caller supplies the clock ([`RunContext`]).
 //!
 //! - Sweeps: [`axis`] and [`design`] define the points, [`sweep`] runs them, [`point`], [`crossing`] and [`statistic`] record
-//!   the results; [`sweep_task`] and [`task`] describe the same work as plain data for a thread or a worker, as [`one_at_a_time_task`]
-//!   does for a study.
+//!   the results; [`sweep_task`] and [`task`] describe the same work as plain data for a thread or a worker, as
+//!   [`one_at_a_time_task`] does for a study.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the resulting
 //!   [`regime`].
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`],
@@ -98,9 +98,9 @@ pub use cost::{CaseCost, CostCase, model_costs};
 pub use many_joints::{GROWTH, LIMITS, LOOSE_MACHINES, LooseMachine, LooseSpeed, Timed, growth, loose_speed};
 pub use pareto_front::front;
 pub use points::{PointsError, cells, read_points};
-pub use speed_goals::{Goal, GoalResult, measure_speed_goals};
 pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};
 pub use run_context::{AnalysisError, RunContext};
 pub use setting::Setting;
+pub use speed_goals::{Goal, GoalResult, measure_speed_goals};
 pub use timing::{End, WorkBudget};
 pub use work_precision::{Phase, Point, View, WorkPrecision, work_precision};
