@@ -114,7 +114,7 @@ fn report(
     start_report.lines.iter().for_each(|(label, value)| line(label, value));
     if let Some(beginning) = beginning {
         let until = format_quantity_digits(beginning.until, "ms", 4);
-        line("InitialPeaks", &format!("largest contact forces of the first {until}"));
+        line("Beginning", &format!("largest contact forces of the first {until}"));
         let loose = scene.machine.ball_joints.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
         for (joint, peak) in loose.take(MAX_LISTED) {
             line(&format!("  {}", joint.name), &first_contact(peak));
