@@ -54,7 +54,7 @@ pub enum Command {
     /// Find which parameters influence an output most, such as the clearance with the largest effect on the tip error: each alone,
     /// and all together.
     Sensitivity(SensitivityArguments),
-    /// Find what part of a manufactured lot holds its limits, such as a tip error of at most 50 um: percentiles, yield, capability, what
+    /// Find what part of a manufactured lot meets its limits, such as a tip error of at most 50 um: percentiles, yield, capability, what
     /// drives the rejects, and the cheapest fits that hold a yield.
     Tolerance(ToleranceArguments),
     /// Print a robot description, URDF or MJCF, as a scene file: bodies, inertias, hinges, slides, ball joints, shapes and meshes. Omitted

@@ -87,7 +87,7 @@ fn a_mesh_without_a_computable_mass_is_refused_with_its_line() {
         "{missing_file}"
     );
     let shell = mujoco("<body><joint/><geom size=\"0.1\" shellinertia=\"true\"/></body>");
-    assert!(import_error(&shell).contains("shellinertia = \"true\" is not read"));
+    assert!(import_error(&shell).contains("shellinertia = \"true\" is not supported"));
 }
 
 fn link(mass: &str, [xx, yy, zz]: [&str; 3], more: &str) -> String {

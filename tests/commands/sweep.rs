@@ -353,7 +353,7 @@ fn invalid_input_is_refused_before_anything_runs() {
         (format!("{SMALL} --shard 1/2 --out a.csv"), 2, "a shard is a NumPy archive"),
         (format!("{SMALL} --period 0 --out a.npz"), 2, "--period 0: the time must be above 0"),
         (format!("{SMALL} --keep S1.nromal:max --out a.npz"), 2, "did you mean `S1.normal`?"),
-        (format!("{SMALL} --keep S1.normal:top --out a.npz"), 2, "`top` is no statistic"),
+        (format!("{SMALL} --keep S1.normal:top --out a.npz"), 2, "`top` is not a statistic"),
         (format!("{SMALL} --start cold,cold --out a.npz"), 2, "cold is given twice"),
         (format!("{SMALL} --duration 1s --out a.npz"), 2, "cannot be used with"),
         (format!("{SMALL} --points points.csv --out a.npz"), 2, "cannot be used with"),

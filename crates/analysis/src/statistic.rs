@@ -49,7 +49,7 @@ pub enum StatisticError {
         text: String,
     },
     /// An unknown statistic.
-    #[error("{text}: `{word}` is no statistic{near}; allowed: {}", Statistic::WORDS.join(", "))]
+    #[error("{text}: `{word}` is not a statistic{near}; allowed: {}", Statistic::WORDS.join(", "))]
     Unknown {
         /// The given entry.
         text: String,
@@ -320,7 +320,7 @@ mod tests {
         for (text, fragment) in [
             ("B.normal", "expected CHANNEL:STATISTIC"),
             ("", "expected CHANNEL:STATISTIC"),
-            ("B.normal:maks", "`maks` is no statistic (did you mean `max`?)"),
+            ("B.normal:maks", "`maks` is not a statistic (did you mean `max`?)"),
             ("B.nromal:max", "did you mean `B.normal`?"),
         ] {
             let error = ChannelStatistic::parse_list(&scene(), text).expect_err(text).to_string();

@@ -87,7 +87,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         help: "from one position to another: with s from 0 to 1 over the duration, from + (to - from) (10 s³ - 15 s⁴ + 6 s⁵), \
                whose rate and acceleration are 0 at both ends",
         keys: &[
-            position_key("from", "where it is before").default_zero(),
+            position_key("from", "value before the ramp").default_zero(),
             position_key("to", "where it is afterwards"),
             START,
             DURATION,
@@ -97,7 +97,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         word: "pulse",
         help: "one bump: with s from 0 to 1 over the duration, base + height sin³(π s)",
         keys: &[
-            position_key("base", "where it is before and afterwards").default_zero(),
+            position_key("base", "value before and after the pulse").default_zero(),
             position_key("height", "height of the bump above it"),
             START,
             DURATION,
@@ -146,7 +146,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
 /// Table of `drive`: its law, and the keys of each law.
 pub(super) static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
     let words: &[&str] = DRIVE_LAWS.each_ref().map(|kind| kind.word).to_vec().leak();
-    let law = key("law", ValueType::Word(words), "\"constant\"", "which motion");
+    let law = key("law", ValueType::Word(words), "\"constant\"", "law of motion");
     let keys_of_law = |(index, law): (usize, &'static DriveLaw)| {
         let keys = law.keys.iter();
         keys.map(move |key| key.of(&words[index..=index]))

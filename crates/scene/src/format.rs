@@ -637,7 +637,7 @@ static PATTERN: LazyLock<FileTable> = LazyLock::new(|| {
             "the axis about which each copy is turned from the one before",
         )
         .unless("along"),
-        key("along", vector(D::Length), "\"100 0 0 mm\"", "by which each copy is shifted from the one before")
+        key("along", vector(D::Length), "\"100 0 0 mm\"", "shift from one copy to the next")
             .unless("about")
             .frame(WORLD),
     ];

@@ -218,7 +218,7 @@ impl Description {
         let mut all: Vec<_> = self.omitted.iter().map(|(what, (line, count))| (*line, what, *count)).collect();
         all.sort();
         let others = |count: usize| if count > 1 { format!(", and {} more", count - 1) } else { String::new() };
-        all.into_iter().map(|(line, what, count)| format!("not taken: {what} (line {line}{})", others(count))).collect()
+        all.into_iter().map(|(line, what, count)| format!("omitted: {what} (line {line}{})", others(count))).collect()
     }
 
     /// Pose in the world of each body where all coordinates are 0.

@@ -252,7 +252,7 @@ impl<'n> Tree<'_, 'n, '_> {
             };
             let axis = self.source.numbers(node, "xyz")?.map_or_else(Vec3::x, Vec3::from);
             let direction = axis.try_normalize(1e-12);
-            direction.ok_or_else(|| self.source.error_in(node, "xyz", "an axis has a direction"))
+            direction.ok_or_else(|| self.source.error_in(node, "xyz", "the axis has no direction"))
         };
         let kind = match self.source.require(joint, "type")? {
             "fixed" => return Ok(None),

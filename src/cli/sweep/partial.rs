@@ -192,7 +192,7 @@ impl Partial {
         let stored: Json = serde_json::from_slice(&text).map_err(|_| self.damaged("its settings cannot be read"))?;
         if stored != *settings {
             return Err(Failure::usage(format!(
-                "{} was begun with other settings ({}); finish that sweep, delete the file, or choose another --out",
+                "{} was started with other settings ({}); finish that sweep, delete the file, or choose another --out",
                 self.path.display(),
                 difference(&stored, settings)
             )));

@@ -1,4 +1,4 @@
-//! `tolerance`: what part of a manufactured lot holds its limits, what drives the rejects, and the cheapest fits that hold a
+//! `tolerance`: what part of a manufactured lot meets its limits, what drives the rejects, and the cheapest fits that hold a
 //! yield.
 
 mod limit;

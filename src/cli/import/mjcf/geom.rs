@@ -52,7 +52,8 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         }
         let pose = self.pose(node, class)?;
         if self.attribute(node, class, "shellinertia") == Some("true") {
-            let message = "shellinertia = \"true\" is not read: give its body an <inertial>, or the geom mass = \"0\"";
+            let message =
+                "shellinertia = \"true\" is not supported: give its body an <inertial>, or the geom mass = \"0\"";
             return Err(self.source.error(node, message));
         }
         let kind = self.attribute(node, class, "type").unwrap_or("sphere");

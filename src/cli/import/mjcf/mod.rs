@@ -96,7 +96,9 @@ pub fn read<'n, 'i>(source: &Source<'_>, root: Node<'n, 'i>) -> Result<Descripti
         match node.tag_name().name() {
             "compiler" | "option" | "default" | "asset" | "worldbody" => {}
             "equality" => model.equality(node)?,
-            "include" => return Err(source.error(node, "put the contents of the file here: it is not read")),
+            "include" => {
+                return Err(source.error(node, "<include> is not supported: insert the contents of the file here"));
+            }
             other => model.description.omit(source.line(node), format!("<{other}>")),
         }
     }
@@ -130,12 +132,12 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                     return Err(self.source.error_in(
                         node,
                         "settotalmass",
-                        "is not read: scale the masses in the file",
+                        "is not supported: scale the masses in the file",
                     ));
                 }
                 ("inertiagrouprange", value) if value.split_whitespace().eq(["0", "5"]) => {}
                 ("inertiagrouprange", _) => {
-                    let message = "is not read: give the geoms of the other groups mass = \"0\"";
+                    let message = "is not supported: give the geoms of the other groups mass = \"0\"";
                     return Err(self.source.error_in(node, "inertiagrouprange", message));
                 }
                 ("coordinate", "local")
@@ -374,7 +376,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                     }
                 }
                 "frame" | "replicate" | "composite" | "flexcomp" | "attach" | "include" => {
-                    return Err(self.source.error(part, "is not read: write the bodies that it stands for"));
+                    return Err(self.source.error(part, "is not supported: write the bodies that it stands for"));
                 }
                 other => self.description.omit(line, format!("<{other}> of a body")),
             }
