@@ -256,7 +256,7 @@ fn a_description_that_changes_the_machine_if_ignored_is_refused_with_its_line() 
         (body(&format!("<joint/>{ball}<frame/>")), "frame: is not supported: write the bodies that it stands for"),
         (
             "<mujoco>\n<include file=\"x.xml\"/></mujoco>".to_owned(),
-            "robot:2: include: put the contents of the file here",
+            "robot:2: include: <include> is not supported: insert the contents of the file here",
         ),
     ] {
         let messages = import_error(&text);

@@ -107,7 +107,7 @@ fn every_impact_has_its_row() {
     }
 
     let words = stdout_of(folder.path(), "run spcmm --duration 30ms --impacts words.csv");
-    let lines: Vec<&str> = words.lines().filter(|l| l.contains("than asked")).collect();
+    let lines: Vec<&str> = words.lines().filter(|l| l.contains("than requested")).collect();
     assert!(!lines.is_empty(), "{words}");
     for line in lines {
         assert!(!line.contains(" -"), "a sign and a word: {line}");
