@@ -93,11 +93,11 @@ export function makeHost(laboratory, graphicsLost) {
 
         address: () => location.origin + location.pathname,
 
-        shared(link) {
+        publishLink(link) {
             // The renderer, which is not part of the link, stays in the query.
             history.replaceState(null, '', location.pathname + laboratory.browserQuery() + new URL(link).hash);
             copy(link).then((done) => {
-                if (!done) laboratory.page.say('The link is in the address bar: this browser does not allow the clipboard');
+                if (!done) laboratory.page.notify('The link is in the address bar: this browser does not allow the clipboard');
             });
         },
 

@@ -441,7 +441,7 @@ function recordSession() {
         if (!session) return;
         const fragment = fragmentOf(session);
         if (!fragment) {
-            if (!warned) laboratory.page.say('This scene is too large for this browser to store: a reload loses it');
+            if (!warned) laboratory.page.notify('This scene is too large for this browser to store: a reload loses it');
             warned = true;
             return;
         }

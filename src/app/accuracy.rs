@@ -66,7 +66,7 @@ struct MeasuredAccuracy {
 /// The panel: a measurement in progress, and the latest one.
 #[derive(Default)]
 pub struct Accuracy {
-    asked: Option<(Job, SceneSource, Preset)>,
+    requested: Option<(Job, SceneSource, Preset)>,
     running: Option<(Box<dyn BackgroundTask>, SceneSource, Preset)>,
     progress: f64,
     found: Option<MeasuredAccuracy>,
@@ -76,7 +76,7 @@ pub struct Accuracy {
 impl Accuracy {
     /// Starts a requested measurement and takes messages from a running one; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
-        if let Some((job, scene, preset)) = self.asked.take() {
+        if let Some((job, scene, preset)) = self.requested.take() {
             self.progress = 0.0;
             self.problem = None;
             match host.start(job) {
@@ -123,7 +123,7 @@ impl Accuracy {
     /// Reasons to doubt the result, in a space of fixed height.
     fn doubts_ui(&self, ui: &mut Ui, player: &Player) {
         // A doubt already shown beside a control is not repeated.
-        let said: Vec<&str> = player.warnings().collect();
+        let already_shown: Vec<&str> = player.warnings().collect();
         let doubts = player.simulation().doubts().into_iter();
         let mut doubts: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
         let none = if doubts.is_empty() {
@@ -132,7 +132,7 @@ impl Accuracy {
             "No warnings other than those beside the \
                                                                          controls"
         };
-        doubts.retain(|doubt| !said.contains(&&**doubt));
+        doubts.retain(|doubt| !already_shown.contains(&&**doubt));
         reserve_lines(ui, "doubts", DOUBT_LINES, |ui| {
             if let Some(problem) = &self.problem {
                 theme::error(ui, problem);
@@ -148,7 +148,7 @@ impl Accuracy {
     }
 
     fn measure_ui(&mut self, ui: &mut Ui, player: &Player, preset: Option<Preset>) {
-        let running = self.running.is_some() || self.asked.is_some();
+        let running = self.running.is_some() || self.requested.is_some();
         let (name, help) = if running {
             ("Cancel", "End the measurement")
         } else {
@@ -171,12 +171,12 @@ impl Accuracy {
             }
             match preset {
                 _ if !clicked => {}
-                _ if running => (self.running, self.asked) = (None, None),
+                _ if running => (self.running, self.requested) = (None, None),
                 None => {}
                 Some(preset) => {
                     let scene = model_of(player);
                     let job = Job::Presets { scene: scene.clone(), presets: vec![preset.word().to_owned()] };
-                    self.asked = Some((job, scene, preset));
+                    self.requested = Some((job, scene, preset));
                 }
             }
         });
@@ -298,9 +298,9 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
     let what = impact
         .map_or_else(|| "none yet".to_owned(), |impact| format!("{}, {}", joint(player, impact.joint), kind(impact)));
     let ratio = |impact: &Impact| {
-        let [given, asked] = [impact.achieved(), impact.asked].map(|ratio| value::number(ratio, 3));
+        let [measured, requested] = [impact.achieved(), impact.asked].map(|ratio| value::number(ratio, 3));
         // Only an undisturbed impact is comparable with the requested value.
-        if impact.has_own_restitution() { format!("{given}, asked {asked}") } else { given }
+        if impact.has_own_restitution() { format!("{measured}, asked {requested}") } else { measured }
     };
     let law = impact.map_or_else(String::new, |impact| {
         format!(" An undisturbed impact under its normal-force law gives {}.", value::number(impact.law, 3))

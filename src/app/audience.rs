@@ -105,7 +105,7 @@ impl App {
                     self.fill_class_screen(ctx);
                 }
                 Action::Close => {}
-                other => self.act(ctx, other),
+                other => self.perform_action(ctx, other),
             }
         }
         if seen.tapped {

@@ -27,7 +27,7 @@ impl Thread {
     pub fn start(job: Job) -> Option<Self> {
         let (sender, messages) = channel();
         let cancelled = Arc::new(AtomicBool::new(false));
-        let asked = Arc::clone(&cancelled);
+        let is_cancelled = Arc::clone(&cancelled);
         let rest = Arc::new(AtomicU64::new(0.0_f64.to_bits()));
         let resting = Arc::clone(&rest);
         let work = move || {
@@ -36,7 +36,7 @@ impl Thread {
             let mut spell = start;
             perform(&job, &mut clock, &mut |message| {
                 // A closed receiver counts as cancellation.
-                if asked.load(Ordering::Relaxed) || sender.send(message).is_err() {
+                if is_cancelled.load(Ordering::Relaxed) || sender.send(message).is_err() {
                     return ControlFlow::Break(());
                 }
                 let computed = spell.elapsed();

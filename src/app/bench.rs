@@ -9,9 +9,9 @@ mod divergence;
 mod plane;
 mod portrait;
 mod request;
-mod shares;
+mod shared_job;
 mod sweep;
-mod swept;
+mod sweep_results;
 mod throttle;
 mod tornado;
 mod workspace;
@@ -30,7 +30,7 @@ use costs::Costs;
 use portrait::Portrait;
 pub use request::BenchRequest;
 use sweep::SweepPanel;
-pub use swept::SweepResults;
+pub use sweep_results::SweepResults;
 use workspace::MapPanel;
 
 /// The panel.
@@ -102,7 +102,7 @@ impl Bench {
 
     /// The latest sweep.
     pub fn swept(&self) -> Option<&SweepResults> {
-        self.sweep.swept()
+        self.sweep.results()
     }
 
     /// Whether a sweep is running.
@@ -150,10 +150,10 @@ impl Bench {
             portrait.ui(ui, player, *coordinate);
         });
         let help = "The scene at many values of a parameter: the bifurcation diagram";
-        let asked = part(ui, "Sweep", help, true, |ui| sweep.ui(ui, player, *coordinate)).flatten();
+        let request = part(ui, "Sweep", help, true, |ui| sweep.ui(ui, player, *coordinate)).flatten();
         let help = "How far the tip is from where it would be without play, with the drives held at many positions";
         part(ui, "Tip error over the workspace", help, false, |ui| map.ui(ui, player));
-        asked
+        request
     }
 
     /// Choice between the chaos bench and what play costs; returns the chosen one, which is the heading.
@@ -184,8 +184,8 @@ fn part<R>(ui: &mut Ui, name: &str, help: &str, open: bool, content: impl FnOnce
 
 /// The error message without its command-line prefix, `option` with one of its `values`.
 fn in_words(why: &str, option: &str, values: &[String]) -> String {
-    let given = values.iter().find_map(|text| why.strip_prefix(&format!("{option} {text}: ")));
-    let words = given.or_else(|| why.strip_prefix(&format!("{option} "))).unwrap_or(why);
+    let detail = values.iter().find_map(|text| why.strip_prefix(&format!("{option} {text}: ")));
+    let words = detail.or_else(|| why.strip_prefix(&format!("{option} "))).unwrap_or(why);
     let mut letters = words.chars();
     let first = letters.next().map(|c| c.to_uppercase().collect::<String>());
     first.unwrap_or_default() + letters.as_str()

@@ -22,7 +22,7 @@ impl App {
     /// gesture that caused the change has ended.
     pub(super) fn compare(&mut self, is_over: bool) {
         let comparison = &mut self.plots.comparison;
-        let wanted = comparison.is_on() && self.course.is_none();
+        let wanted = comparison.is_on() && self.running_lesson.is_none();
         if let Some((run, key)) = self.player.take_copy_before_change(wanted, is_over).filter(|_| wanted) {
             comparison.add(run, key);
         }

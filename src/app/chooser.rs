@@ -128,7 +128,7 @@ async fn has_portal() -> zbus::Result<()> {
     let bus = zbus::connection::Builder::session()?;
     let bus = bus.method_timeout(std::time::Duration::from_secs(TIMEOUT)).build().await?;
     let (portal, object) = ("org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop");
-    let asked = ("org.freedesktop.portal.FileChooser", "version");
-    bus.call_method(Some(portal), object, Some("org.freedesktop.DBus.Properties"), "Get", &asked).await?;
+    let property = ("org.freedesktop.portal.FileChooser", "version");
+    bus.call_method(Some(portal), object, Some("org.freedesktop.DBus.Properties"), "Get", &property).await?;
     Ok(())
 }

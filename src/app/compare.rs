@@ -44,8 +44,8 @@ pub struct EarlierRun {
 impl EarlierRun {
     /// Its name; by default the changed parameter with its value in this run.
     pub fn name(&self) -> String {
-        let given = self.name.as_ref().filter(|name| !name.trim().is_empty());
-        given.cloned().unwrap_or_else(|| named(&self.run, &self.key))
+        let name = self.name.as_ref().filter(|name| !name.trim().is_empty());
+        name.cloned().unwrap_or_else(|| named(&self.run, &self.key))
     }
 
     /// The run.
@@ -274,7 +274,7 @@ impl Comparison {
         if self.kept.is_empty() {
             ui.weak("Change a parameter to compare");
         }
-        let mut wish = None;
+        let mut request = None;
         let full = self.kept.iter().filter(|kept| kept.place > 0).count() == MAX_PINNED;
         for (at, kept) in self.kept.iter_mut().enumerate() {
             ui.separator();
@@ -294,7 +294,7 @@ impl Comparison {
                     let pin = egui::Button::new("Pin").selected(pinned);
                     let help = format!("Keep this run when another parameter changes; at most {MAX_PINNED}");
                     if ui.add_enabled(pinned || !full, pin).on_hover_text(help).clicked() {
-                        wish = Some((at, Request::Pin));
+                        request = Some((at, Request::Pin));
                     }
                     let beside = self.beside == Some(kept.place);
                     let help =
@@ -304,15 +304,15 @@ impl Comparison {
                         self.beside = (!beside).then_some(kept.place);
                     }
                     if ui.button("Save").on_hover_text("Save its record as CSV").clicked() {
-                        wish = Some((at, Request::Save));
+                        request = Some((at, Request::Save));
                     }
                     if ui.button("Remove").on_hover_text("Discard this run").clicked() {
-                        wish = Some((at, Request::Remove));
+                        request = Some((at, Request::Remove));
                     }
                 });
             });
         }
-        match wish {
+        match request {
             Some((at, Request::Save)) => self.to_save = Some(self.kept[at].place),
             Some((at, Request::Pin)) => self.pin(at),
             Some((at, Request::Remove)) => {

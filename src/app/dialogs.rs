@@ -170,10 +170,10 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
             .inner;
         ui.add_space(8.0);
         ui.horizontal(|ui| {
-            if let Some((verb, asked)) = dialog.answer() {
-                let button = ui.add_enabled(asked.is_some(), egui::Button::new(verb));
+            if let Some((verb, chosen)) = dialog.answer() {
+                let button = ui.add_enabled(chosen.is_some(), egui::Button::new(verb));
                 if button.clicked() || entered {
-                    answer = asked;
+                    answer = chosen;
                 }
             }
             if ui.button("Close").clicked() {

@@ -27,7 +27,7 @@ impl App {
         self.lesson_panel(ui, bar);
         let free = !self.is_under_way();
         let wide = ui.available_width() > ui.available_height();
-        let asked = Panel::bottom("transport")
+        let reset = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 spoken::landmark(ui, "Transport");
@@ -69,16 +69,16 @@ impl App {
         }
         if panels.contains(Part::Plots) {
             let panel = Panel::bottom("plots").exact_size(PLOTS_FRACTION * ui.available_height());
-            let asked = panel.frame(bar).resizable(false).show(ui, |ui| {
+            let clicked_time = panel.frame(bar).resizable(false).show(ui, |ui| {
                 ui.take_available_space();
                 self.plots.ui(ui, &self.player)
             });
-            if let Some(time) = asked.inner.filter(|_| free) {
+            if let Some(time) = clicked_time.inner.filter(|_| free) {
                 self.player.go_to(time);
-                self.viewport.arrive(&self.player);
+                self.viewport.clear_history(&self.player);
             }
         }
-        self.central(ui, asked);
+        self.central(ui, reset);
     }
 
     /// An HTML line that embeds this state in another page, with the three most important controls.
@@ -113,7 +113,7 @@ impl App {
         match self.embedding() {
             Ok(line) => {
                 ctx.copy_text(line);
-                self.say("HTML line copied".to_owned());
+                self.notify("HTML line copied".to_owned());
             }
             Err(reason) => self.problem = Some(reason),
         }

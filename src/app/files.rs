@@ -33,7 +33,7 @@ impl App {
     /// A link to the present state.
     pub fn link(&self) -> Link {
         if let Some(replay) = &self.replay {
-            let (lesson, step) = self.course().and_then(RunningLesson::shared).unzip();
+            let (lesson, step) = self.course().and_then(RunningLesson::link_position).unzip();
             return Link { lesson, step, embedded: self.embedded.clone(), ..replay.link().clone() };
         }
         let player = &self.player;
@@ -46,7 +46,7 @@ impl App {
             ideal: player.ideal().is_some(),
             wear: self.viewport.options.wear,
         };
-        let (lesson, step) = self.course().and_then(RunningLesson::shared).unzip();
+        let (lesson, step) = self.course().and_then(RunningLesson::link_position).unzip();
         Link {
             lesson,
             step,
@@ -109,7 +109,7 @@ impl App {
         match self.link().format_short(self.player.pending()) {
             Ok((fragment, note)) => {
                 self.copy(ctx, format!("{address}#{fragment}"));
-                note.into_iter().for_each(|note| self.say(note));
+                note.into_iter().for_each(|note| self.notify(note));
             }
             Err(reason) => self.problem = Some(reason),
         }
@@ -117,14 +117,14 @@ impl App {
 
     /// Copies `link`.
     pub(super) fn copy(&mut self, ctx: &egui::Context, link: String) {
-        if !self.host.shared(&link) {
+        if !self.host.publish_link(&link) {
             ctx.copy_text(link);
         }
-        self.say("Link copied".to_owned());
+        self.notify("Link copied".to_owned());
     }
 
     /// Shows a message for a few seconds.
-    pub fn say(&mut self, text: String) {
+    pub fn notify(&mut self, text: String) {
         self.notice = Some(Notice::new(text));
     }
 
@@ -136,11 +136,11 @@ impl App {
         self.open_given(name, bytes, &FileContents::new())
     }
 
-    /// The same for a scene that may refer to the files `given` with it.
-    fn open_given(&mut self, name: &str, bytes: Vec<u8>, given: &FileContents) -> Result<(), String> {
+    /// The same for a scene that may refer to the files `companions`.
+    fn open_given(&mut self, name: &str, bytes: Vec<u8>, companions: &FileContents) -> Result<(), String> {
         let opened = String::from_utf8(bytes)
             .map_err(|_| format!("{name}: not a text file"))
-            .and_then(|text| self.parse_file(name, &text, given, &[]).map_err(|error| error.to_string()))
+            .and_then(|text| self.parse_file(name, &text, companions, &[]).map_err(|error| error.to_string()))
             .and_then(|scene| self.show_scene(&scene));
         self.problem = opened.clone().err();
         opened
@@ -212,9 +212,9 @@ impl App {
         };
         let (name, bytes) = read.swap_remove(scene);
         let own = |(name, bytes): (String, Vec<u8>)| (file_name_of(&name).to_owned(), bytes);
-        let given: FileContents = read.into_iter().map(own).collect();
-        self.open_given(&name, bytes, &given)?;
-        self.scene_file = SceneFile::opened(name, given);
+        let companions: FileContents = read.into_iter().map(own).collect();
+        self.open_given(&name, bytes, &companions)?;
+        self.scene_file = SceneFile::opened(name, companions);
         Ok(())
     }
 

@@ -204,7 +204,7 @@ impl App {
         // Impacts glow as long as in playback at this scale.
         self.player.pacer.set_scale(wanted.scale);
         self.player.go_to(wanted.span[0]);
-        self.viewport.arrive(&self.player);
+        self.viewport.clear_history(&self.player);
         self.film_wanted = Some(wanted.clone());
         self.film = Some(RunningFilm { wanted, film, canvas, pending: None, next: 0, before });
         Ok(())
@@ -227,7 +227,7 @@ impl App {
         self.player.pacer.set_scale(scale);
         self.player.go_to(shown);
         self.player.set_playing(playing);
-        self.viewport.arrive(&self.player);
+        self.viewport.clear_history(&self.player);
     }
 
     /// Draws the next frame or collects a finished one; does not block.

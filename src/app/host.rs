@@ -55,7 +55,7 @@ pub trait Host {
 
     /// Publishes a new link, e.g. in the address bar. Returns whether the host also copies it to the clipboard; otherwise egui
     /// does.
-    fn shared(&mut self, _link: &str) -> bool {
+    fn publish_link(&mut self, _link: &str) -> bool {
         false
     }
 

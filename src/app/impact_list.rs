@@ -109,7 +109,7 @@ impl ImpactList {
         let (shown, known) = (player.pacer.shown(), player.reached());
         let record = player.impact_record();
         let count = record.until(known).count();
-        let (mut asked, mut of_rows) = (None, 0.0);
+        let (mut clicked_time, mut of_rows) = (None, 0.0);
         ui.spacing_mut().interact_size.y = ROW_HEIGHT;
         ui.spacing_mut().item_spacing.y = 0.0;
         let width = COLUMNS.iter().map(|(_, width, _)| width + 4.0).sum::<f32>();
@@ -141,7 +141,7 @@ impl ImpactList {
                     let all = format!("Impact {}", words.join(", "));
                     response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &all));
                     if response.on_hover_text("Go to its peak").clicked() {
-                        asked = Some(own.force_peak.time);
+                        clicked_time = Some(own.force_peak.time);
                     }
                     row(ui, |ui, index| {
                         let mut text = RichText::new(&words[index]).small();
@@ -158,7 +158,7 @@ impl ImpactList {
             let words = format!("The first {} impacts are no longer stored", record.dropped());
             ui.label(RichText::new(words).small().weak());
         }
-        (asked, of_rows)
+        (clicked_time, of_rows)
     }
 }
 
@@ -182,7 +182,7 @@ impl App {
 
     /// The list, in a window over the lower left of the picture, never over the transport below it.
     pub(super) fn impact_list_ui(&mut self, ctx: &egui::Context) {
-        let (mut open, mut asked, mut save) = (self.impact_list.open, None, false);
+        let (mut open, mut clicked_time, mut save) = (self.impact_list.open, None, false);
         let area = self.picture_rect;
         let room = egui::Rect::from_x_y_ranges(ctx.content_rect().x_range(), area.y_range());
         let rows = ((room.height() - self.impact_list.frame) / ROW_HEIGHT).floor().clamp(1.0, MAX_VISIBLE_ROWS);
@@ -199,7 +199,7 @@ impl App {
             .constrain_to(room)
             .enabled(free)
             .show(ctx, |ui| {
-                (asked, of_rows) = ImpactList::table(ui, &self.player, rows * ROW_HEIGHT);
+                (clicked_time, of_rows) = ImpactList::table(ui, &self.player, rows * ROW_HEIGHT);
                 ui.add_space(4.0);
                 save = ui
                     .button("Save impacts…")
@@ -217,7 +217,7 @@ impl App {
         if save {
             self.save_impacts();
         }
-        if let Some(time) = asked {
+        if let Some(time) = clicked_time {
             self.show_instant(time);
         }
     }

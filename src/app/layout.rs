@@ -301,7 +301,7 @@ impl App {
         {
             spoken::splitter(ui, panel, name);
         }
-        let asked = Panel::bottom("transport")
+        let reset = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
@@ -314,7 +314,7 @@ impl App {
                 contents.inner
             })
             .inner;
-        self.central(ui, asked);
+        self.central(ui, reset);
         if present {
             self.present(ui.ctx(), true);
         }
@@ -332,21 +332,21 @@ impl App {
         }
         let free = !self.is_under_way();
         let mut present = false;
-        let asked = Panel::bottom("transport")
+        let reset = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
                 ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
-                let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player));
+                let reset = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player));
                 ui.horizontal(|ui| {
                     self.sheet_tabs(ui, false);
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
                     ui.with_layout(backwards, |ui| transport::achieved_pace_below(ui, &self.player));
                 });
-                asked.inner
+                reset.inner
             })
             .inner;
-        self.central(ui, asked);
+        self.central(ui, reset);
         if present {
             self.present(ui.ctx(), true);
         }
@@ -355,7 +355,7 @@ impl App {
     fn landscape(&mut self, ui: &mut Ui, bar: Frame) {
         let free = !self.is_under_way();
         let mut present = false;
-        let asked = Panel::bottom("transport")
+        let reset = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
@@ -366,7 +366,7 @@ impl App {
                     let folded = ui.available_width() < tabs + transport::MIN_WIDTH;
                     let tabs = if folded { 90.0 } else { tabs };
                     let room = ui.available_width() - tabs;
-                    let asked = ui
+                    let reset = ui
                         .allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| {
                             ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner
                         })
@@ -379,7 +379,7 @@ impl App {
                             self.sheet_tabs(ui, true);
                         }
                     });
-                    asked
+                    reset
                 })
                 .inner
             })
@@ -388,16 +388,16 @@ impl App {
             let width = (ui.available_width() * 0.42).clamp(260.0, 340.0).min(0.55 * ui.available_width());
             Panel::right("sheet beside").frame(bar).resizable(false).exact_size(width).show(ui, |ui| self.sheet(ui));
         }
-        self.central(ui, asked);
+        self.central(ui, reset);
         if present {
             self.present(ui.ctx(), true);
         }
     }
 
-    /// The picture in the remaining space; resets the run if that was `asked` by a panel or the picture.
-    pub(super) fn central(&mut self, ui: &mut Ui, asked: bool) {
+    /// The picture in the remaining space. Resets the run if a panel (`reset`) or the picture requests it.
+    pub(super) fn central(&mut self, ui: &mut Ui, reset: bool) {
         let picture = CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
-        if asked || picture.inner {
+        if reset || picture.inner {
             self.reset();
         }
     }
@@ -455,8 +455,8 @@ impl App {
                     spoken::landmark(ui, "Plots");
                     plots.header(ui, player);
                     let size = egui::vec2(ui.available_width(), 340.0);
-                    let asked = ui.allocate_ui(size, |ui| plots.ui(ui, player)).inner;
-                    if let Some(time) = asked.filter(|_| free) {
+                    let clicked_time = ui.allocate_ui(size, |ui| plots.ui(ui, player)).inner;
+                    if let Some(time) = clicked_time.filter(|_| free) {
                         player.go_to(time);
                         viewport.restore_marks(player);
                     }

@@ -2,11 +2,11 @@
 
 mod before;
 mod built_in;
+mod control_finder;
 mod format;
 mod measure;
 mod names;
 mod panel;
-mod spots;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -22,11 +22,11 @@ use super::{App, replay_budget};
 use crate::session::replay::Verdict;
 pub(super) use before::PreviousWindow;
 pub use built_in::{BUILT_IN_LESSONS, lesson_titles};
+use control_finder::ControlFinder;
 pub use format::Lesson;
 use format::{CameraTarget, PanelName, Step};
 use measure::LessonMeasures;
 use names::{Names, comparisons};
-use spots::ControlFinder;
 
 /// Latest time of a live change after its nominal instant, s: the longest solver step.
 const MAX_DELAY: f64 = 10e-3;
@@ -74,7 +74,7 @@ impl RunningLesson {
     }
 
     /// Name and step (counted from 1) for a link; `None` unless the lesson is built in.
-    pub(super) fn shared(&self) -> Option<(String, usize)> {
+    pub(super) fn link_position(&self) -> Option<(String, usize)> {
         let name = &self.lesson.name;
         let known = BUILT_IN_LESSONS.iter().any(|(own, _)| own == name);
         known.then(|| (name.clone(), self.step + 1))
@@ -126,11 +126,11 @@ impl RunningLesson {
         for (index, step) in self.lesson.steps.iter().enumerate() {
             let at = |what: String| format!("{}, step {}: {what}", self.lesson.name, index + 1);
             let question = step.question.as_ref();
-            let asked = question.into_iter().flat_map(|question| {
+            let question_texts = question.into_iter().flat_map(|question| {
                 let choices = question.choices.iter().map(|choice| &choice.text);
                 std::iter::once(&question.ask).chain(choices)
             });
-            for text in [&step.text, &step.seen].into_iter().chain(asked) {
+            for text in [&step.text, &step.seen].into_iter().chain(question_texts) {
                 text::fill(text, &names).map_err(at)?;
             }
             for claim in &step.claims {
@@ -230,13 +230,13 @@ fn known_values(condition: &str, names: &Names<'_>) -> String {
 impl App {
     /// The lesson in progress.
     pub fn course(&self) -> Option<&RunningLesson> {
-        self.course.as_deref()
+        self.running_lesson.as_deref()
     }
 
     /// Continues `lesson` at step `step`, counted from 0; if `begins`, the machine is set for that step.
     pub(super) fn resume_lesson(&mut self, lesson: Arc<Lesson>, step: usize, begins: bool) {
         self.remember_window();
-        self.course = Some(Box::new(RunningLesson::new(lesson, step)));
+        self.running_lesson = Some(Box::new(RunningLesson::new(lesson, step)));
         self.sheet = Some(Sheet::Lesson);
         if begins {
             self.set_step();
@@ -253,8 +253,8 @@ impl App {
 
     /// Ends the lesson and restores the window.
     pub(super) fn leave_lesson(&mut self) {
-        if let Some(course) = self.course.take() {
-            self.restore_window(&course.lesson);
+        if let Some(running) = self.running_lesson.take() {
+            self.restore_window(&running.lesson);
         }
         if self.sheet == Some(Sheet::Lesson) {
             self.sheet = None;
@@ -263,26 +263,26 @@ impl App {
 
     /// Goes to the next or the previous step of the lesson.
     pub(super) fn change_step(&mut self, forward: bool) {
-        let Some(course) = &mut self.course else {
+        let Some(running) = &mut self.running_lesson else {
             return;
         };
-        let last = course.lesson.steps.len() - 1;
+        let last = running.lesson.steps.len() - 1;
         let step = match forward {
-            true if course.step < last => course.step + 1,
-            false if course.step > 0 => course.step - 1,
+            true if running.step < last => running.step + 1,
+            false if running.step > 0 => running.step - 1,
             _ => return,
         };
         // A continuing step needs no new state if the machine is where the previous step left it: not before the previous step's
         // end, and not past the end of this one, which would reveal the answer.
         let shown = self.player.pacer.shown();
         let end = |step: usize| {
-            let until = course.lesson.steps[step].until.as_ref();
-            until.and_then(|until| course.measured.names().time(until))
+            let until = running.lesson.steps[step].until.as_ref();
+            until.and_then(|until| running.measured.names().time(until))
         };
-        let in_place = end(course.step).is_none_or(|end| shown >= end) && end(step).is_none_or(|end| shown < end);
-        let begins = course.lesson.steps[step].begins;
-        let goes_on = forward && !begins && in_place && course.is_run_of_step(&self.player);
-        (course.step, course.predicted, course.reached) = (step, None, false);
+        let in_place = end(running.step).is_none_or(|end| shown >= end) && end(step).is_none_or(|end| shown < end);
+        let begins = running.lesson.steps[step].begins;
+        let goes_on = forward && !begins && in_place && running.is_run_of_step(&self.player);
+        (running.step, running.predicted, running.reached) = (step, None, false);
         if goes_on {
             self.player.set_playing(false);
             self.apply_camera_of_step(false);
@@ -293,16 +293,16 @@ impl App {
 
     /// Sets the machine for the step: to the start of its run, or to the end of the previous step in that run.
     pub(super) fn set_step(&mut self) {
-        let Some(course) = &mut self.course else {
+        let Some(running) = &mut self.running_lesson else {
             return;
         };
-        (course.sets, course.predicted, course.reached) = (true, None, false);
-        let begin = &course.lesson.steps[course.lesson.beginning(course.step)];
-        let (scene, link) = (course.lesson.runs[begin.run].scene.clone(), begin.link.clone());
-        let before = &course.lesson.steps[course.lesson.beginning(course.step)..course.step];
-        let names = course.measured.names();
+        (running.sets, running.predicted, running.reached) = (true, None, false);
+        let begin = &running.lesson.steps[running.lesson.beginning(running.step)];
+        let (scene, link) = (running.lesson.runs[begin.run].scene.clone(), begin.link.clone());
+        let before = &running.lesson.steps[running.lesson.beginning(running.step)..running.step];
+        let names = running.measured.names();
         let mut ends = before.iter().rev().filter_map(|step| step.until.as_ref());
-        let whole = begin.twin || !course.lesson.runs[begin.run].changes.is_empty();
+        let whole = begin.twin || !running.lesson.runs[begin.run].changes.is_empty();
         let left_at = ends.find_map(|until| names.time(until)).filter(|_| !whole);
         let same = self.player.pending().source.text == scene.source.text;
         let pose = self.viewport.pose().filter(|_| same && link.camera.is_none());
@@ -331,16 +331,16 @@ impl App {
         }
     }
 
-    /// Applies the view settings of the step; the machine is unchanged. `anew`: the machine was just set, so the settings of
+    /// Applies the view settings of the step; the machine is unchanged. `is_fresh`: the machine was just set, so the settings of
     /// earlier steps apply as well.
-    fn apply_camera_of_step(&mut self, anew: bool) {
-        let Some(course) = &self.course else {
+    fn apply_camera_of_step(&mut self, is_fresh: bool) {
+        let Some(running) = &self.running_lesson else {
             return;
         };
-        let (lesson, last) = (course.lesson.clone(), course.step);
-        let first = if anew { 0 } else { last };
+        let (lesson, last) = (running.lesson.clone(), running.step);
+        let first = if is_fresh { 0 } else { last };
         let steps = &lesson.steps[first..=last];
-        let begin = if anew { lesson.beginning(last) } else { last };
+        let begin = if is_fresh { lesson.beginning(last) } else { last };
         for step in &lesson.steps[begin..=last] {
             if !step.begins && step.link != super::Link::default() {
                 // The camera continues to follow its ball joint.
@@ -355,7 +355,7 @@ impl App {
         match steps.iter().rev().find(places).and_then(|step| step.view) {
             Some(CameraTarget::From(preset)) => self.viewport.preset(preset),
             Some(CameraTarget::At(joint)) => {
-                self.viewport.close_up(&self.player, joint);
+                self.viewport.show_close_up(&self.player, joint);
             }
             None => {}
         }
@@ -369,22 +369,22 @@ impl App {
 
     /// Advances the lesson alongside the run: computes its measures, and stops the machine at the end of the step.
     pub(super) fn advance_lesson(&mut self, ctx: &egui::Context) {
-        let Some(course) = &mut self.course else {
+        let Some(running) = &mut self.running_lesson else {
             return;
         };
-        if !course.measured.advance(replay_budget(self.player.clock)) {
+        if !running.measured.advance(replay_budget(self.player.clock)) {
             ctx.request_repaint();
         }
-        if course.sets {
+        if running.sets {
             if self.replay.is_some() {
                 return;
             }
-            course.sets = false;
+            running.sets = false;
             if self.verdict == Some(Verdict::Reached) {
                 self.verdict = None;
             }
-            let begin = &course.lesson.steps[course.lesson.beginning(course.step)];
-            for (_, key, value) in &course.lesson.runs[begin.run].changes {
+            let begin = &running.lesson.steps[running.lesson.beginning(running.step)];
+            for (_, key, value) in &running.lesson.runs[begin.run].changes {
                 if let Err(error) = self.player.set(key, value) {
                     self.problem = Some(error.to_string());
                 }
@@ -398,16 +398,16 @@ impl App {
             ctx.request_repaint();
             return;
         }
-        if course.reached || self.is_under_way() {
+        if running.reached || self.is_under_way() {
             return;
         }
-        let Some(course) = &mut self.course else {
+        let Some(running) = &mut self.running_lesson else {
             return;
         };
-        if let Some(until) = course.until()
+        if let Some(until) = running.until()
             && self.player.pacer.shown() >= until
         {
-            (course.reached, course.fresh) = (true, true);
+            (running.reached, running.fresh) = (true, true);
             if self.player.is_playing() {
                 self.show_instant(until);
             }
@@ -417,7 +417,7 @@ impl App {
 
     /// Draws rings around the step's highlighted items, over everything, without affecting the layout.
     pub(super) fn ring_highlights(&self, ui: &egui::Ui) {
-        let wanted = self.course().map_or(&[][..], |course| &course.now().highlight);
+        let wanted = self.course().map_or(&[][..], |running| &running.now().highlight);
         let joints = &self.player.running().machine.ball_joints;
         let joint = |name: &String| joints.iter().position(|joint| joint.name == *name);
         let places = ControlFinder::places(ui.ctx(), &self.pointed_controls());
@@ -444,7 +444,7 @@ impl App {
 
     /// Names of the highlighted controls of the step.
     fn pointed_controls(&self) -> Vec<String> {
-        let wanted = self.course().map_or(&[][..], |course| &course.now().highlight);
+        let wanted = self.course().map_or(&[][..], |running| &running.now().highlight);
         let joints = &self.player.running().machine.ball_joints;
         wanted.iter().filter(|name| joints.iter().all(|joint| joint.name != **name)).cloned().collect()
     }

@@ -1,7 +1,7 @@
 //! The microscope: magnifies one ball joint beside the 3D view until its play is visible.
 
 mod draw;
-mod sight;
+mod magnified_joint;
 
 use eframe::egui::{self, ComboBox, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
 use glam::Vec3;
@@ -11,7 +11,7 @@ use super::{App, layout, spoken, theme, value};
 use crate::simulate::ContactMode;
 pub use draw::Circle;
 use draw::{Plane, Sheet};
-use sight::MagnifiedJoint;
+use magnified_joint::MagnifiedJoint;
 
 /// Least width and height, points.
 const MIN_SIZE: egui::Vec2 = vec2(200.0, 150.0);
@@ -134,7 +134,7 @@ impl Microscope {
             }
         });
         self.joint = chosen.unwrap_or(self.joint);
-        let Some(sight) = MagnifiedJoint::of(player, self.joint) else {
+        let Some(magnified) = MagnifiedJoint::of(player, self.joint) else {
             ui.label("This scene has no ball joint");
             return chosen;
         };
@@ -143,11 +143,11 @@ impl Microscope {
         if space.x >= MIN_WIDTH_SIDE_BY_SIDE && space.x > space.y {
             ui.horizontal_top(|ui| {
                 let side = (space.x - NUMBERS_WIDTH - 8.0).min(space.y).max(96.0);
-                self.sphere(ui, player, &sight, axes, vec2(side, side));
+                self.sphere(ui, player, &magnified, axes, vec2(side, side));
                 ui.vertical(|ui| {
                     scrolled(ui, |ui| {
-                        section(ui, &sight, SECTION_HEIGHT);
-                        numbers(ui, player, &sight, axes);
+                        section(ui, &magnified, SECTION_HEIGHT);
+                        numbers(ui, player, &magnified, axes);
                     });
                 });
             });
@@ -155,24 +155,24 @@ impl Microscope {
             scrolled(ui, |ui| {
                 let width = ui.available_width();
                 let side = draw::side(vec2(width, space.y), 150.0);
-                self.sphere(ui, player, &sight, axes, vec2(width, side));
+                self.sphere(ui, player, &magnified, axes, vec2(width, side));
                 let left = space.y - side - ui.spacing().item_spacing.y;
-                section(ui, &sight, left.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT));
-                numbers(ui, player, &sight, axes);
+                section(ui, &magnified, left.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT));
+                numbers(ui, player, &magnified, axes);
             });
         }
         chosen
     }
 
     /// The picture of the clearance sphere.
-    fn sphere(&mut self, ui: &mut Ui, player: &Player, sight: &MagnifiedJoint, axes: [Vec3; 2], size: egui::Vec2) {
+    fn sphere(&mut self, ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3; 2], size: egui::Vec2) {
         let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
-        let report = &sight.report;
+        let report = &magnified.report;
         let name = player.running().machine.ball_joints.get(self.joint);
         let words = format!(
             "Ball joint {} under the microscope. {}. Ball's centre {} from the socket's, clearance {}.",
             name.map_or("", |joint| &joint.name),
-            value::contact(sight.report.state),
+            value::contact(magnified.report.state),
             draw::length(report.eccentricity.norm(), 3),
             draw::length(report.clearance, 3)
         );
@@ -182,11 +182,11 @@ impl Microscope {
             return;
         }
         let now = player.pacer.shown();
-        let path = player.paths().between(self.joint, sight.since, now);
-        let approach = sight.impact.map_or(0.0, |impact| impact.approach_speed);
-        let fastest = sight.sliding.unwrap_or(sight.velocity).norm();
+        let path = player.paths().between(self.joint, magnified.since, now);
+        let approach = magnified.impact.map_or(0.0, |impact| impact.approach_speed);
+        let fastest = magnified.sliding.unwrap_or(magnified.velocity).norm();
         let speed = draw::round_up(approach.max(fastest).max(MIN_REFERENCE_SPEED));
-        let sheet = Sheet::new(ui, rect, sight);
+        let sheet = Sheet::new(ui, rect, magnified);
         self.circle = Some(draw::sphere(&sheet, axes, path, now, speed));
         response.on_hover_text(
             "The circle is the clearance; the ball's centre leaves it only by the penetration. The path, seen from \
@@ -207,10 +207,10 @@ fn scrolled(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
 }
 
 /// The picture of the contact, `height` points high.
-fn section(ui: &mut Ui, sight: &MagnifiedJoint, height: f32) {
+fn section(ui: &mut Ui, magnified: &MagnifiedJoint, height: f32) {
     let size = vec2(ui.available_width(), height);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
-    let Some(patch) = &sight.patch else {
+    let Some(patch) = &magnified.patch else {
         draw::empty(ui, rect, "No contact patch");
         return;
     };
@@ -223,7 +223,7 @@ fn section(ui: &mut Ui, sight: &MagnifiedJoint, height: f32) {
         format!("Section of the contact: a gap of {gap}")
     };
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));
-    draw::section(&Sheet::new(ui, rect, sight), patch);
+    draw::section(&Sheet::new(ui, rect, magnified), patch);
     response.on_hover_text(
         "Ball and wall as they would lie without pressing each other, about the point of contact: the gap grows as x²/2R, \
          R = (r + c) r / c. The overlap is taken up elastically over the contact patch, the thick line, of radius \
@@ -232,18 +232,18 @@ fn section(ui: &mut Ui, sight: &MagnifiedJoint, height: f32) {
 }
 
 /// Numeric values of the pictures' contents.
-fn numbers(ui: &mut Ui, player: &Player, sight: &MagnifiedJoint, axes: [Vec3; 2]) {
+fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3; 2]) {
     const NONE: &str = "—";
-    let report = &sight.report;
-    ui.label(RichText::new(value::contact(sight.report.state)).strong());
+    let report = &magnified.report;
+    ui.label(RichText::new(value::contact(magnified.report.state)).strong());
     let speed = |si: f64| value::quantity(si, "m/s", 3);
     let towards = crate::view::to_f32(&report.eccentricity).dot(axes[0].cross(axes[1]));
-    let (beside, pressed) = match &sight.patch {
+    let (beside, pressed) = match &magnified.patch {
         Some(patch) if patch.penetration > 0.0 => (NONE.to_owned(), value::quantity(patch.penetration, "um", 3)),
         Some(patch) => (draw::length(-patch.penetration, 3), NONE.to_owned()),
         None => (NONE.to_owned(), NONE.to_owned()),
     };
-    let patch = sight.patch.filter(|patch| patch.penetration > 0.0);
+    let patch = magnified.patch.filter(|patch| patch.penetration > 0.0);
     let rows = [
         (
             "Eccentricity",
@@ -264,18 +264,22 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &MagnifiedJoint, axes: [Vec3; 2]
         ),
         (
             "Speed of approach",
-            if sight.normal.is_some() { speed(report.penetration_rate) } else { NONE.to_owned() },
+            if magnified.normal.is_some() { speed(report.penetration_rate) } else { NONE.to_owned() },
             "Rate at which the ball approaches the wall now; negative while it recedes",
         ),
-        ("Sliding", sight.sliding.map_or(NONE.to_owned(), |v| speed(v.norm())), "Sliding speed in the friction law"),
+        (
+            "Sliding",
+            magnified.sliding.map_or(NONE.to_owned(), |v| speed(v.norm())),
+            "Sliding speed in the friction law",
+        ),
         (
             "Normal force",
             value::quantity(report.normal_force.norm(), "N", 4),
             "On the ball; of an ideal joint the whole reaction",
         ),
     ];
-    let given = |number: f64| value::number(number, 4);
-    let impact = sight.impact;
+    let ratio = |number: f64| value::number(number, 4);
+    let impact = magnified.impact;
     let of = |read: fn(&crate::simulate::Impact) -> String| impact.as_ref().map_or(NONE.to_owned(), read);
     let now = player.pacer.shown();
     let ago = impact.map_or(NONE.to_owned(), |impact| match now - impact.end {
@@ -297,17 +301,17 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &MagnifiedJoint, axes: [Vec3; 2]
         ("Deepest", of(|impact| value::quantity(impact.deepest, "um", 3)), "Its largest indentation"),
         (
             "Restitution asked",
-            impact.map_or(NONE.to_owned(), |impact| given(impact.asked)),
+            impact.map_or(NONE.to_owned(), |impact| ratio(impact.asked)),
             "Coefficient of restitution set for the joint",
         ),
         (
             "By its law",
-            impact.map_or(NONE.to_owned(), |impact| given(impact.law)),
+            impact.map_or(NONE.to_owned(), |impact| ratio(impact.law)),
             "Restitution that the normal-force law gives an undisturbed impact",
         ),
         (
             "Measured",
-            impact.map_or(NONE.to_owned(), |impact| given(impact.achieved())),
+            impact.map_or(NONE.to_owned(), |impact| ratio(impact.achieved())),
             "Speed of separation over speed of approach of the latest impact",
         ),
     ];

@@ -336,7 +336,7 @@ pub struct App {
     embedded: Option<Embedded>,
     sound: Sound,
     /// The lesson in progress.
-    course: Option<Box<RunningLesson>>,
+    running_lesson: Option<Box<RunningLesson>>,
     /// Snapshot of the window before the lesson.
     before_lesson: Option<Box<lesson::PreviousWindow>>,
     /// Area of the 3D view, points.
@@ -423,7 +423,7 @@ impl App {
             saving: Vec::new(),
             embedded: options.embedded,
             sound: Sound::default(),
-            course: None,
+            running_lesson: None,
             before_lesson: None,
             picture_rect: egui::Rect::ZERO,
             contrast: options.contrast,
@@ -513,7 +513,7 @@ impl App {
         let key = egui::Key::from_name(if name == " " { "Space" } else { name });
         match key.and_then(keys::action).filter(|_| !command) {
             None => command,
-            Some(Action::TurnPage { .. }) => self.course.is_some(),
+            Some(Action::TurnPage { .. }) => self.running_lesson.is_some(),
             Some(Action::Close) => self.dialog.is_some() || self.problem.is_some() || self.is_under_way(),
             Some(_) => true,
         }
@@ -582,8 +582,8 @@ impl App {
     }
 
     /// Handles a request of the bench.
-    fn apply_bench_request(&mut self, asked: bench::BenchRequest) {
-        match asked {
+    fn apply_bench_request(&mut self, request: bench::BenchRequest) {
+        match request {
             bench::BenchRequest::Section(load) => self.start_load(load),
             bench::BenchRequest::Value { key, text } => match self.player.set(&key, &text) {
                 Err(error) => self.problem = Some(error.to_string()),
@@ -712,13 +712,13 @@ impl App {
     fn cancel_replay(&mut self) {
         self.cancel_film();
         if self.load.take().is_some() {
-            self.viewport.arrive(&self.player);
+            self.viewport.clear_history(&self.player);
         }
         if self.replay.take().is_some() {
             self.player.drop_queued();
             let reason = "it was stopped on the way".to_owned();
             self.verdict = Some(Verdict::Failed(reason));
-            self.viewport.arrive(&self.player);
+            self.viewport.clear_history(&self.player);
         }
     }
 
@@ -770,7 +770,7 @@ impl App {
     pub fn run_to(&mut self, time: f64) {
         self.player.run_to(time);
         self.player.advance(0.0);
-        self.viewport.arrive(&self.player);
+        self.viewport.clear_history(&self.player);
     }
 
     /// Advances the state by `dt` seconds; returns whether it is still changing.
@@ -782,7 +782,7 @@ impl App {
             if self.verdict.is_some() {
                 self.verdict_shown = None;
                 self.replay = None;
-                self.viewport.arrive(&self.player);
+                self.viewport.clear_history(&self.player);
             }
             return true;
         }
@@ -797,7 +797,7 @@ impl App {
                     Err(why) => self.problem = Some(why),
                 }
                 self.load = None;
-                self.viewport.arrive(&self.player);
+                self.viewport.clear_history(&self.player);
             }
             return true;
         }
@@ -859,7 +859,7 @@ impl App {
         Ok(())
     }
 
-    fn act(&mut self, ctx: &egui::Context, action: Action) {
+    fn perform_action(&mut self, ctx: &egui::Context, action: Action) {
         // An open dialog blocks the machine's controls.
         if self.dialog.is_some() && !matches!(action, Action::Help | Action::Close) {
             return;
@@ -910,7 +910,7 @@ impl App {
             Action::CloseUp(joint) => {
                 if joint < self.player.running().machine.ball_joints.len() {
                     self.microscope.focus(joint);
-                    self.viewport.close_up(&self.player, joint);
+                    self.viewport.show_close_up(&self.player, joint);
                 }
             }
             Action::IdealGhost => self.show_ideal(self.player.ideal().is_none()),
@@ -1060,7 +1060,7 @@ impl eframe::App for App {
         }
         self.follow_changes(ctx);
         for action in keys::pressed(ctx) {
-            self.act(ctx, action);
+            self.perform_action(ctx, action);
         }
         #[cfg(not(target_arch = "wasm32"))]
         self.receive_path(ctx, _frame);

@@ -39,12 +39,12 @@ fn round(scale: f64) -> f64 {
 
 /// Initial plots of a window on `scene`.
 pub fn plots(scene: &Scene) -> Vec<Quantity> {
-    let given = scene.view.plots;
-    if given[0].is_none() {
+    let words = scene.view.plots;
+    if words[0].is_none() {
         return vec![Quantity::NormalForce, Quantity::Eccentricity];
     }
     let all = Quantity::ALL.into_iter();
-    all.filter(|quantity| given.contains(&Some(quantity.word()))).collect()
+    all.filter(|quantity| words.contains(&Some(quantity.word()))).collect()
 }
 
 /// The default scene for first-time visitors, whose joints keep rattling.
@@ -55,8 +55,8 @@ pub fn rattling() -> Scene {
 
 /// Whether `scene` is the scene of [`rattling`] without further changes.
 pub fn is_rattling(scene: &Scene) -> bool {
-    let asked = scene.changes.iter().map(|(key, value)| (key.as_str(), value.as_str()));
-    scene.name == DEFAULT_SCENE && asked.eq(RATTLING_CHANGES)
+    let changes = scene.changes.iter().map(|(key, value)| (key.as_str(), value.as_str()));
+    scene.name == DEFAULT_SCENE && changes.eq(RATTLING_CHANGES)
 }
 
 #[cfg(test)]

@@ -50,7 +50,7 @@ pub struct Picture {
     times: Option<u32>,
     own: [u32; 2],
     /// Whether a picture was requested.
-    asked: bool,
+    requested: bool,
     pending: Option<(Pending, f64)>,
     /// Contents of the current off-screen pass.
     drawn: Option<Contents>,
@@ -62,7 +62,7 @@ impl Default for Picture {
             contents: Contents::View,
             times: Some(SCALES[0]),
             own: [1920, 1080],
-            asked: false,
+            requested: false,
             pending: None,
             drawn: None,
         }
@@ -82,7 +82,7 @@ impl Picture {
 
     /// Discards a pending picture.
     pub fn forget(&mut self) {
-        (self.asked, self.pending) = (false, None);
+        (self.requested, self.pending) = (false, None);
     }
 
     /// Size of the picture in pixels, and its pixels per point, for contents of `points` on the screen.
@@ -163,14 +163,14 @@ impl App {
     /// Saves the chosen picture once it has been read back from the graphics adapter; does not block.
     pub fn save_picture(&mut self, ctx: &egui::Context) {
         self.picture.forget();
-        self.picture.asked = true;
+        self.picture.requested = true;
         ctx.request_repaint();
     }
 
     /// Draws the picture requested by [`Self::save_picture`], and collects it when available.
     pub(super) fn receive_picture(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|input| input.time);
-        if std::mem::take(&mut self.picture.asked) {
+        if std::mem::take(&mut self.picture.requested) {
             match self.draw_picture(ctx) {
                 Ok(pending) => self.picture.pending = Some((pending, now)),
                 Err(reason) => self.problem = Some(reason),

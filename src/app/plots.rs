@@ -434,7 +434,7 @@ impl Plots {
             ui.label(RichText::new("No plot chosen").weak());
             return None;
         }
-        let mut asked = None;
+        let mut clicked_time = None;
         let space = ui.available_size();
         let columns = ((space.x / 300.0).floor() as usize).clamp(1, chosen.len());
         let rows = chosen.len().div_ceil(columns);
@@ -448,12 +448,12 @@ impl Plots {
                     for panel in row {
                         let shown =
                             ui.allocate_ui(vec2(width, height), |ui| self.plot(ui, player, panel, vec2(width, height)));
-                        asked = asked.or(shown.inner);
+                        clicked_time = clicked_time.or(shown.inner);
                     }
                 });
             }
         });
-        asked
+        clicked_time
     }
 
     fn plot(&mut self, ui: &mut Ui, player: &Player, panel: &Panel<'_>, space: egui::Vec2) -> Option<f64> {
@@ -647,7 +647,7 @@ impl Plots {
             });
             let cursor = cursor.map(|time| (time, reading(time, instant(time), "\n")));
             self.move_cursor(ui, &shown.response, player);
-            let asked = self.pointer(ui, &shown.response, &transform, time_size, player);
+            let clicked_time = self.pointer(ui, &shown.response, &transform, time_size, player);
             if let Some(quantity) = panel.quantity {
                 self.places.push((quantity, Place { transform, units }));
             }
@@ -686,7 +686,7 @@ impl Plots {
             if let Some(peaks) = cut_off {
                 cut::note(ui, frame, peaks.largest, panel.unit);
             }
-            asked
+            clicked_time
         })
         .inner
     }

@@ -145,7 +145,7 @@ impl App {
         let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(12, 4));
         let free = !self.is_under_way();
         let mut leave = false;
-        let asked = Panel::bottom("presentation")
+        let reset = Panel::bottom("presentation")
             .frame(bar)
             .show(ui, |ui| {
                 leave = double_tapped(ui);
@@ -157,10 +157,10 @@ impl App {
                 let backwards = egui::Layout::right_to_left(egui::Align::Center);
                 let width = ui.available_width();
                 if width < transport::MIN_WIDTH + BUTTONS_WIDTH {
-                    let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner;
+                    let reset = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner;
                     let size = vec2(width, ui.spacing().interact_size.y);
                     ui.allocate_ui_with_layout(size, backwards, |ui| leave |= self.presentation_buttons(ui));
-                    return asked;
+                    return reset;
                 }
                 let size = vec2(width, theme::side(ui, transport::PLAY_SIDE));
                 ui.allocate_ui_with_layout(size, backwards, |ui| {
@@ -171,9 +171,9 @@ impl App {
                                 return transport::row(ui, &mut self.player);
                             }
                             ui.horizontal(|ui| {
-                                let asked = transport::least(ui, &mut self.player);
+                                let reset = transport::least(ui, &mut self.player);
                                 self.timeline_ui(ui);
-                                asked
+                                reset
                             })
                             .inner
                         })
@@ -187,7 +187,7 @@ impl App {
         self.lesson_panel(ui, bar);
         self.presented_plots(ui, bar);
         self.lesson_twin(ui, bar);
-        self.central(ui, asked);
+        self.central(ui, reset);
         if leave {
             self.present(ui.ctx(), false);
         }
@@ -217,11 +217,11 @@ impl App {
         let Self { player, plots, viewport, .. } = self;
         Panel::bottom("plots of the presentation").frame(bar).resizable(false).exact_size(height).show(ui, |ui| {
             ui.take_available_space();
-            let asked = match single {
+            let clicked_time = match single {
                 Some(index) => plots.single(ui, player, index),
                 None => plots.ui(ui, player),
             };
-            if let Some(time) = asked.filter(|_| free) {
+            if let Some(time) = clicked_time.filter(|_| free) {
                 player.go_to(time);
                 viewport.restore_marks(player);
             }

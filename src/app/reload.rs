@@ -20,7 +20,7 @@ pub(super) struct SceneFile {
     /// The referenced file with an error. The displayed scene may lack it.
     wrong: Option<String>,
     /// Files opened together with the scene file.
-    given: FileContents,
+    companions: FileContents,
     /// Changes stored in a file or delivered with the scene: those at the first check.
     saved: Option<Changes>,
     /// Whether the user saved the scene in this window.
@@ -39,9 +39,9 @@ impl SceneFile {
         Self { name, ..Self::default() }
     }
 
-    /// The file `name`, opened together with the files `given`.
-    pub(super) fn opened(name: String, given: FileContents) -> Self {
-        Self { given, ..Self::named(Some(name)) }
+    /// The file `name`, opened together with the files `companions`.
+    pub(super) fn opened(name: String, companions: FileContents) -> Self {
+        Self { companions, ..Self::named(Some(name)) }
     }
 
     /// Records that the scene was saved with `changes`.
@@ -96,16 +96,16 @@ impl App {
         }
     }
 
-    /// Parses `text`, the content of the file `name`, with the files it refers to as they are now, or as `given` with it.
+    /// Parses `text`, the content of the file `name`, with the files it refers to as they are now, or as in `companions`.
     pub(super) fn parse_file(
         &self,
         name: &str,
         text: &str,
-        given: &FileContents,
+        companions: &FileContents,
         changes: &[(String, String)],
     ) -> Result<Scene, SceneError> {
         let folder = self.host.folder(name);
-        Scene::parse_given(text, Some(name), given, folder.as_deref(), changes)
+        Scene::parse_given(text, Some(name), companions, folder.as_deref(), changes)
     }
 
     /// Shows the scene of `file` with the changes made here, except where the file now has a different value. View and plots are
@@ -118,15 +118,15 @@ impl App {
         let source = &wanted.source;
         let again = |scene: Scene| scene.source.beside == source.beside;
         let same = text == source.text;
-        let given = self.scene_file.given.clone();
-        if same && (self.parse_file(&name, &text, &given, &wanted.changes)).is_ok_and(again) {
+        let companions = self.scene_file.companions.clone();
+        if same && (self.parse_file(&name, &text, &companions, &wanted.changes)).is_ok_and(again) {
             // Saved without changes, or reverted after an error.
             self.problem = None;
             self.scene_file.wrong = None;
             return Ok(());
         }
         let before = Scene::parse_with(&source.text, Some(&name), &source.beside, &[]);
-        let after = match self.parse_file(&name, &text, &given, &[]) {
+        let after = match self.parse_file(&name, &text, &companions, &[]) {
             Ok(after) => after,
             Err(error) => {
                 let file = error.file.clone();
@@ -140,7 +140,7 @@ impl App {
         };
         let mut changes = self.player.pending().changes.clone();
         changes.retain(|(key, _)| stays(key));
-        let scene = self.parse_file(&name, &text, &given, &changes);
+        let scene = self.parse_file(&name, &text, &companions, &changes);
         let scene = scene.map_err(|error| error.to_string())?;
 
         let link = self.link();
@@ -151,7 +151,7 @@ impl App {
         self.show_scene(&scene)?;
         self.player.pacer.set_scale(scale);
         (self.plots.chosen, self.plots.window) = (chosen, window);
-        self.scene_file = SceneFile { told, ..SceneFile::opened(name, given) };
+        self.scene_file = SceneFile { told, ..SceneFile::opened(name, companions) };
         self.player.set_phase(phase);
         let (clock, start) = (self.player.clock, (self.player.clock)());
         let reached = self.player.run_towards(time, || clock() - start < MAX_REPLAY_TIME);
@@ -169,7 +169,7 @@ impl App {
             Ok(Some(joint)) => self.microscope.focus(joint),
             _ => self.microscope.set_open(false),
         }
-        self.viewport.arrive(&self.player);
+        self.viewport.clear_history(&self.player);
         let at = if reached && time > 0.0 {
             format!("at {:.3} ms", self.player.pacer.shown() * 1e3)
         } else {
@@ -180,7 +180,7 @@ impl App {
             1 => ", keeping 1 change".to_owned(),
             more => format!(", keeping {more} changes"),
         };
-        self.say(format!("Reloaded {at}{kept}"));
+        self.notify(format!("Reloaded {at}{kept}"));
         Ok(())
     }
 }

@@ -169,7 +169,7 @@ impl App {
         let file = self.scene_file.name().map(|name| absolute(Path::new(name)));
         let scene = self.player.pending();
         let built_in = built_in_text(&scene.name).is_some_and(|text| *text == *scene.source.text);
-        let teaching = self.course.is_some();
+        let teaching = self.running_lesson.is_some();
         let Some(store) = &mut self.store else {
             return;
         };

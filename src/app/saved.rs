@@ -28,14 +28,14 @@ impl Watcher {
     pub(super) fn start(name: &str, beside: &[String], changed: impl Fn() + Send + 'static) -> Option<Self> {
         let (sender, changes) = channel();
         let over = Arc::new(AtomicBool::new(false));
-        let asked = Arc::clone(&over);
+        let is_over = Arc::clone(&over);
         let (name, path) = (name.to_owned(), PathBuf::from(name));
         let others = beside.iter().map(|other| path.with_file_name(other));
         let files: Vec<PathBuf> = std::iter::once(path.clone()).chain(others).collect();
         let look = move || {
             let stamps = || -> Vec<_> { files.iter().map(|file| stamp(file)).collect() };
             let mut seen = vec![None; files.len()];
-            while !asked.load(Ordering::Relaxed) {
+            while !is_over.load(Ordering::Relaxed) {
                 let now = stamps();
                 if now != seen {
                     std::thread::sleep(UNCHANGED_TIME);

@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn values_are_said_in_words_with_the_digits_that_matter() {
-        for (shown, said) in [
+        for (shown, spoken) in [
             ("0.3 mm", "0.3 millimetres"),
             ("1 mm", "1 millimetre"),
             ("0.15", "0.15"),
@@ -139,7 +139,7 @@ mod tests {
             ("70 GPa", "70 gigapascals"),
             ("S1 410 to 412 N, S2 0 N; m", "S1 410 to 412 newtons, S2 0 newtons; m"),
         ] {
-            assert_eq!(words(shown), said);
+            assert_eq!(words(shown), spoken);
         }
     }
 

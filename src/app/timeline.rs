@@ -119,8 +119,8 @@ impl Timeline {
             self.zoomed = Some(range);
         }
         let scale = Scale { rect, range };
-        let asked = self.input(ui, &response, player, &scale);
-        if let Some(time) = asked {
+        let clicked_time = self.input(ui, &response, player, &scale);
+        if let Some(time) = clicked_time {
             player.go_to(time);
         }
         if ui.is_rect_visible(rect) {
@@ -130,15 +130,15 @@ impl Timeline {
         if let Some(pos) = response.hover_pos() {
             response.clone().on_hover_ui_at_pointer(|ui| describe(ui, player, &scale, pos));
         }
-        asked.is_some()
+        clicked_time.is_some()
     }
 
     /// Pointer and key input: returns an instant, or changes the time range.
     fn input(&mut self, ui: &Ui, response: &Response, player: &Player, scale: &Scale) -> Option<f64> {
         let (from, to) = scale.range;
         let length = to - from;
-        let asked = |action| ui.input(|input| input.num_accesskit_action_requests(response.id, action)) as f64;
-        let mut by = asked(Action::Increment) - asked(Action::Decrement);
+        let requests = |action| ui.input(|input| input.num_accesskit_action_requests(response.id, action)) as f64;
+        let mut by = requests(Action::Increment) - requests(Action::Decrement);
         if response.has_focus() {
             let arrows = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
             ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));

@@ -43,16 +43,16 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
     let narrow = ui.available_width() < 620.0;
     let row = egui::Layout::left_to_right(egui::Align::Center);
     let size = egui::vec2(ui.available_width(), theme::side(ui, PLAY_SIDE));
-    let asked = ui
+    let reset = ui
         .allocate_ui_with_layout(size, row, |ui| {
-            let asked = buttons(ui, player);
+            let reset = buttons(ui, player);
             time(ui, player);
             if !narrow {
                 ui.add_space(6.0);
                 speed(ui, player, narrow);
                 settled(ui, player);
             }
-            asked
+            reset
         })
         .inner;
     if narrow {
@@ -61,13 +61,13 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
             settled(ui, player);
         });
     }
-    asked
+    reset
 }
 
 /// The bar in one row, without items that do not fit. Returns as [`ui`].
 pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
     ui.horizontal(|ui| {
-        let asked = buttons(ui, player);
+        let reset = buttons(ui, player);
         // Otherwise the time scale would overflow; the time is also shown over the picture.
         if ui.available_width() > clock(ui).x + SCALES_WIDTH + ui.spacing().item_spacing.x {
             time(ui, player);
@@ -79,16 +79,16 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
             reached(ui, player);
         }
         settled(ui, player);
-        asked
+        reset
     })
     .inner
 }
 
 /// The buttons and the list of time scales alone. Returns as [`ui`].
 pub fn least(ui: &mut Ui, player: &mut Player) -> bool {
-    let asked = buttons(ui, player);
+    let reset = buttons(ui, player);
     scales(ui, player);
-    asked
+    reset
 }
 
 /// Hint for a settled run, at the right end, where it displaces nothing.
@@ -127,7 +127,7 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
     } else {
         "Back to t = 0 (key R)"
     };
-    let asked = icon_button(ui, Icon::Restart, "Reset", help, small, false).clicked();
+    let reset = icon_button(ui, Icon::Restart, "Reset", help, small, false).clicked();
     let (icon, name, help) = if player.is_playing() {
         (Icon::Pause, "Pause", "Pause (space)")
     } else {
@@ -148,7 +148,7 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
         }
     });
     ui.add_space(6.0);
-    asked
+    reset
 }
 
 /// Fixed size for any time, so that neighbours do not move when digits change.

@@ -205,7 +205,7 @@ impl Viewport {
     }
 
     /// Drops earlier marks and trail after a jump in time.
-    pub fn arrive(&mut self, player: &Player) {
+    pub fn clear_history(&mut self, player: &Player) {
         self.time = player.pacer.shown();
         self.marks.clear(self.time);
         self.trail.clear();
@@ -217,14 +217,14 @@ impl Viewport {
         marks.map(|mark| (mark.joint, mark.force.length(), mark.age)).collect()
     }
 
-    /// As [`Self::arrive`] for an instant reached before: shows the preceding blows as in playback.
+    /// As [`Self::clear_history`] for an instant reached before: shows the preceding blows as in playback.
     pub fn restore_marks(&mut self, player: &Player) {
-        self.arrive(player);
-        self.recall(player);
+        self.clear_history(player);
+        self.restore_recent_peaks(player);
     }
 
     /// Shows the blows before the displayed instant as in playback.
-    fn recall(&mut self, player: &Player) {
+    fn restore_recent_peaks(&mut self, player: &Player) {
         let (shown, fade) = (player.pacer.shown(), MARK_DURATION * player.pacer.scale());
         let peaks = player.impact_record().peaks(shown - fade, shown);
         let blows = peaks.map(|(joint, top)| (joint, crate::view::to_f32(&top.force), top.time));
@@ -239,7 +239,7 @@ impl Viewport {
     /// After a reset with unchanged shapes: shows t = 0.
     pub fn restart(&mut self, player: &Player) {
         self.view = SceneView::new(player.running(), player.frame());
-        self.arrive(player);
+        self.clear_history(player);
         self.followed = None;
     }
 
@@ -253,7 +253,7 @@ impl Viewport {
             if shown < self.time {
                 // Blows after the displayed instant are dropped, those before it restored.
                 self.trail.clear();
-                self.recall(player);
+                self.restore_recent_peaks(player);
             }
             self.time = shown;
             self.extend_trail(player);
@@ -298,7 +298,7 @@ impl Viewport {
     }
 
     /// Moves close to ball joint `joint`.
-    pub fn close_up(&mut self, player: &Player, joint: usize) {
+    pub fn show_close_up(&mut self, player: &Player, joint: usize) {
         if joint < player.frame().joints.len() {
             let mut goal = self.camera;
             let scene = player.running();
@@ -471,7 +471,7 @@ impl Viewport {
         let tapped = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(pick).map(|hit| hit.what);
         let on_screen = !plain && self.frozen.is_none();
         let follows = self.pace.is_some() && on_screen;
-        let said = if follows {
+        let ghost_notes = if follows {
             self.compose_paced(ui, player, &camera, &screen)
         } else {
             self.compose(player, &camera, &screen, self.options.quality)
@@ -487,7 +487,7 @@ impl Viewport {
         painter.add(render::Viewport::revised(rect, list, revision, self.place));
         // Scale of the drawn picture, which may have fewer pixels than the screen.
         let Screen { scale, .. } = screen.with_quality(self.list.quality);
-        let overlay = self.overlay(player, said);
+        let overlay = self.overlay(player, ghost_notes);
         let theme = self.options.theme;
         overlay::paint(&painter, rect, scale, &self.list, theme, &overlay, above, &mut self.places);
         if let Some(hit) = hovered {
@@ -501,13 +501,13 @@ impl Viewport {
         self.options.triad = triad;
     }
 
-    /// The overlay of the picture; `said`: notes on ghosts.
-    fn overlay(&self, player: &Player, said: Vec<String>) -> Overlay {
+    /// The overlay of the picture; `ghost_notes`: notes on ghosts.
+    fn overlay(&self, player: &Player, ghost_notes: Vec<String>) -> Overlay {
         let following = self.followed.and_then(|picked| name_of(player, picked));
         let following = following.map(|name| format!("following {name}"));
         Overlay {
             time: Some(player.pacer.shown()),
-            notes: self.title.clone().into_iter().chain(following).chain(said).collect(),
+            notes: self.title.clone().into_iter().chain(following).chain(ghost_notes).collect(),
             legend: !self.bare,
             labels: !self.bare,
         }
@@ -524,7 +524,7 @@ impl Viewport {
         let camera = self.framed_for_aspect(Some(shape), aspect(screen.size));
         let own = std::mem::replace(&mut self.options.arrows.thickness, thickness);
         let quality = self.list.quality;
-        let said = self.list_next(player, &camera, &screen, quality);
+        let ghost_notes = self.list_next(player, &camera, &screen, quality);
         self.options.arrows.thickness = own;
         let (list, revision) = &mut self.second;
         if self.next != **list {
@@ -533,7 +533,7 @@ impl Viewport {
         let painter = ui.painter_at(rect);
         painter.add(render::Viewport::revised(rect, list.clone(), Some(*revision), render::PictureSlot::Second));
         let Screen { scale, .. } = screen.with_quality(quality);
-        let overlay = self.overlay(player, said);
+        let overlay = self.overlay(player, ghost_notes);
         let (list, theme) = (&self.second.0, self.options.theme);
         overlay::paint(&painter, rect, scale, list, theme, &overlay, above.as_slice(), &mut self.second_places);
     }
@@ -547,7 +547,7 @@ impl Viewport {
         let shot = shot!(self, player, camera, drawn);
         self.view.build(&shot, &mut list);
         list.quality = quality;
-        let said = ghosts::add(&self.view, &shot, player, &mut list);
+        let ghost_notes = ghosts::add(&self.view, &shot, player, &mut list);
         if let Some(wear) = player.wear() {
             self.view.add_wear(&shot, wear, &mut list);
         }
@@ -556,24 +556,24 @@ impl Viewport {
         }
         self.options.arrows.reference = own;
         self.next = list;
-        said
+        ghost_notes
     }
 
     /// The same in `self.list`, as a new picture.
     fn compose(&mut self, player: &Player, camera: &Camera, screen: &Screen, quality: Quality) -> Vec<String> {
-        let said = self.list_next(player, camera, screen, quality);
+        let ghost_notes = self.list_next(player, camera, screen, quality);
         self.show_next();
-        said
+        ghost_notes
     }
 
     /// The same at the quality permitted by the frame times; an unchanged picture is retained.
     fn compose_paced(&mut self, ui: &Ui, player: &Player, camera: &Camera, screen: &Screen) -> Vec<String> {
         let before = self.list.quality;
-        let said = self.list_next(player, camera, screen, before);
+        let ghost_notes = self.list_next(player, camera, screen, before);
         // Compares bodies first, which differ most often.
         let moves = self.next.solid != self.list.solid || self.next != *self.list;
         let Some(pace) = &mut self.pace else {
-            return said;
+            return ghost_notes;
         };
         let (now, dt) = ui.input(|input| (input.time, f64::from(input.stable_dt)));
         let quality = pace.frame(&ShownFrame { size: screen.size, moves, now, dt, drawing: player.drawing(dt) });
@@ -586,7 +586,7 @@ impl Viewport {
         if moves {
             self.show_next();
         }
-        said
+        ghost_notes
     }
 
     fn show_next(&mut self) {

@@ -17,8 +17,8 @@ use crate::scene::{max_file_size, too_large};
 extern "C" {
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn address() -> String;
-    #[wasm_bindgen(js_namespace = jointplayHost)]
-    fn shared(link: &str);
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = publishLink)]
+    fn publish_link(link: &str);
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn save(name: &str, mime: &str, bytes: &[u8]);
     #[wasm_bindgen(js_namespace = jointplayHost)]
@@ -105,8 +105,8 @@ impl Host for WebHost {
         address()
     }
 
-    fn shared(&mut self, link: &str) -> bool {
-        shared(link);
+    fn publish_link(&mut self, link: &str) -> bool {
+        publish_link(link);
         true
     }
 

@@ -152,9 +152,9 @@ impl Page {
     }
 
     /// Shows a message for a few seconds.
-    pub fn say(&self, text: String) {
+    pub fn notify(&self, text: String) {
         self.with(|laboratory| {
-            laboratory.app.say(text);
+            laboratory.app.notify(text);
             laboratory.ctx.request_repaint();
         });
     }

@@ -48,7 +48,7 @@ impl Host for PageHost {
         "https://example.org/lab/".to_owned()
     }
 
-    fn shared(&mut self, link: &str) -> bool {
+    fn publish_link(&mut self, link: &str) -> bool {
         self.0.borrow_mut().shared.push(link.to_owned());
         false
     }

@@ -132,7 +132,7 @@ impl CostStudy {
     }
 
     /// Finished runs, and all of them.
-    pub fn counts(&self) -> (usize, usize) {
+    pub fn run_counts(&self) -> (usize, usize) {
         (self.runs.iter().flatten().count(), self.runs.len())
     }
 

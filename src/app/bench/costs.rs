@@ -4,7 +4,7 @@ use eframe::egui::{Align, Button, ComboBox, DragValue, RichText, Ui, vec2};
 
 use super::cost_study::{CostSettings, CostStudy, VariedParameter};
 use super::request::BenchRequest;
-use super::shares::SharedJob;
+use super::shared_job::SharedJob;
 use super::tornado::Tornado;
 use crate::analysis::one_at_a_time_task::OneAtATimeTask;
 use crate::analysis::study::NAMED;
@@ -32,7 +32,7 @@ pub struct Costs {
     /// Text of the scene that the settings belong to.
     scene: String,
     settings: Option<CostSettings>,
-    asked: Option<OneAtATimeTask>,
+    requested: Option<OneAtATimeTask>,
     running: Option<RunningStudy>,
     study: Option<CostStudy>,
     problem: Option<String>,
@@ -57,7 +57,7 @@ impl Default for Costs {
             aside: false,
             scene: String::new(),
             settings: None,
-            asked: None,
+            requested: None,
             running: None,
             study: None,
             problem: None,
@@ -73,7 +73,7 @@ impl Costs {
     pub fn was_shown(&mut self) -> bool {
         let drawn = std::mem::take(&mut self.drawn);
         if !drawn {
-            (self.asked, self.running) = (None, None);
+            (self.requested, self.running) = (None, None);
         }
         drawn || self.aside
     }
@@ -95,17 +95,17 @@ impl Costs {
 
     /// Whether a study is running.
     pub fn is_running(&self) -> bool {
-        self.running.is_some() || self.asked.is_some()
+        self.running.is_some() || self.requested.is_some()
     }
 
     /// Whether the latest results belong to the requested study, or none is to come.
     fn has_begun(&self) -> bool {
-        self.asked.is_none() && self.running.as_ref().is_none_or(|running| running.begun)
+        self.requested.is_none() && self.running.as_ref().is_none_or(|running| running.begun)
     }
 
     /// Starts a requested study and takes messages from a running one; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
-        if let Some(task) = self.asked.take() {
+        if let Some(task) = self.requested.take() {
             self.problem = None;
             let most = 1 + 2 * task.over.len();
             let shares = SharedJob::start(host, most, |share| Job::OneAtATime(task.clone(), share));
@@ -263,13 +263,13 @@ impl Costs {
             clicked
         });
         if clicked.inner && running {
-            (self.running, self.asked) = (None, None);
+            (self.running, self.requested) = (None, None);
         } else if clicked.inner {
-            (self.asked, self.problem) = match self.settings.as_ref().map(|settings| settings.task(scene)) {
+            (self.requested, self.problem) = match self.settings.as_ref().map(|settings| settings.task(scene)) {
                 Some(Ok(task)) => (Some(task), None),
                 refused => (None, refused.and_then(Result::err)),
             };
-            self.reveal = self.asked.is_some();
+            self.reveal = self.requested.is_some();
         }
     }
 
@@ -288,7 +288,7 @@ impl Costs {
                 theme::warning(ui, words).on_hover_text("Start the runs again for bars of the current setting");
             }
             Some(study) => {
-                let (finished, all) = study.counts();
+                let (finished, all) = study.run_counts();
                 let help = "Number of runs computed so far, all with the settings of the scene except for one value";
                 weak(ui, format!("Of the current setting; {finished} of {all} runs")).on_hover_text(help);
             }

@@ -6,7 +6,7 @@ use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, 
 use super::coordinate::Coordinate;
 use super::plane::{AxisLabel, named, plane};
 use super::portrait::title;
-use super::swept::SweepResults;
+use super::sweep_results::SweepResults;
 use crate::analysis::regime::Regime;
 use crate::analysis::sweep_task::SweptPoint;
 use crate::app::{theme, value};
@@ -108,15 +108,15 @@ impl Diagram {
         self.seen
     }
 
-    /// The diagram of `swept`; returns the clicked point and its retained section.
-    pub fn ui(&mut self, ui: &mut Ui, swept: &SweepResults, coordinate: Coordinate) -> Option<(usize, usize)> {
-        let parameter = swept.parameter();
+    /// The diagram of `results`; returns the clicked point and its retained section.
+    pub fn ui(&mut self, ui: &mut Ui, results: &SweepResults, coordinate: Coordinate) -> Option<(usize, usize)> {
+        let parameter = results.parameter();
         let unit = parameter.map_or("", |parameter| parameter.display_unit());
-        let label = parameter.map_or(swept.range.key.as_str(), |parameter| parameter.label);
+        let label = parameter.map_or(results.range.key.as_str(), |parameter| parameter.label);
         let shown = |si: f64| to_display(si, unit);
-        self.head(ui, swept);
+        self.head(ui, results);
         if self.made != Some((self.ordinate, coordinate)) {
-            self.make(swept, coordinate, &shown);
+            self.make(results, coordinate, &shown);
         }
         let across = AxisLabel::new(label.to_lowercase(), value::typeset(unit));
         let up = self.ordinate.axis(coordinate);
@@ -129,7 +129,7 @@ impl Diagram {
         let dark = ui.visuals().dark_mode;
         let (faint, bad) = (ui.visuals().weak_text_color(), ui.visuals().error_fg_color);
         let warn = ui.visuals().warn_fg_color;
-        let (from, to) = (shown(swept.range.from), shown(swept.range.to));
+        let (from, to) = (shown(results.range.from), shown(results.range.to));
         let margin = if to > from { 0.03 * (to - from) } else { 0.5 * from.abs().max(1e-3) };
         let picked = self.picked;
         let now = self.all.iter().find(|mark| picked == Some((mark.1, mark.2))).map(|mark| mark.0);
@@ -161,7 +161,7 @@ impl Diagram {
         let plane = response.response.rect;
         self.seen = plane.intersect(ui.clip_rect()).height().max(0.0) / plane.height();
         self.plane = Some(plane);
-        self.key(ui, swept, dark);
+        self.key(ui, results, dark);
         let at = pointer.filter(|_| clicked)?;
         let nearest = self
             .all
@@ -175,7 +175,7 @@ impl Diagram {
         self.picked
     }
 
-    fn head(&mut self, ui: &mut Ui, swept: &SweepResults) {
+    fn head(&mut self, ui: &mut Ui, results: &SweepResults) {
         ui.horizontal_wrapped(|ui| {
             ComboBox::from_id_salt("ordinate")
                 .width(110.0)
@@ -188,19 +188,19 @@ impl Diagram {
                 .response
                 .on_hover_text("What the diagram shows over the varied parameter")
                 .accessible_name("Diagram of");
-            let come = swept.points.iter().flatten().count();
-            let words = format!("{come} of {} values", swept.points.len());
+            let come = results.points.iter().flatten().count();
+            let words = format!("{come} of {} values", results.points.len());
             ui.label(RichText::new(words).small().weak()).on_hover_text("Values computed so far");
         });
     }
 
     /// Legend of the colours with the number of values of each kind.
-    fn key(&self, ui: &mut Ui, swept: &SweepResults, dark: bool) {
+    fn key(&self, ui: &mut Ui, results: &SweepResults, dark: bool) {
         let weak = ui.visuals().weak_text_color();
         let mut entries: Vec<_> = REGIMES
             .iter()
             .map(|(regime, colour)| {
-                let points = swept.points.iter().flatten();
+                let points = results.points.iter().flatten();
                 let count = points.filter(|point| point.regime_code == regime.code()).count();
                 let help = "Kind of motion, and at how many values it was found";
                 (count, regime.word(), theme::series_text(*colour, dark), help)
@@ -209,7 +209,7 @@ impl Diagram {
         let help = "Values at which the divergence guard stopped the run, or that could not start";
         let bad = ui.visuals().error_fg_color;
         entries.push((self.diverged.len(), "diverged", bad, help));
-        let doubtful = swept.points.iter().flatten().filter(|point| point.doubts != 0);
+        let doubtful = results.points.iter().flatten().filter(|point| point.doubts != 0);
         let kinds = doubtful.clone().fold(0, |kinds, point| kinds | point.doubts);
         let of_kind = Doubt::KINDS.iter().enumerate().filter(|(k, _)| kinds >> k & 1 == 1).map(|(_, kind)| *kind);
         let help = format!(
@@ -235,12 +235,12 @@ impl Diagram {
         });
     }
 
-    fn make(&mut self, swept: &SweepResults, coordinate: Coordinate, shown: &dyn Fn(f64) -> f64) {
+    fn make(&mut self, results: &SweepResults, coordinate: Coordinate, shown: &dyn Fn(f64) -> f64) {
         self.marks.iter_mut().for_each(Vec::clear);
         self.all.clear();
         self.doubtful.clear();
         self.diverged.clear();
-        for point in swept.points.iter().flatten() {
+        for point in results.points.iter().flatten() {
             let Some(value) = point.values.first().map(|&si| shown(si)) else {
                 continue;
             };

@@ -28,13 +28,13 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
             .on_disabled_hover_text(
                 "The motion of this scene is a function of time alone and has no neighbouring motions",
             );
-        let anew = on
+        let restarts = on
             && moves
             && ui
                 .button("Restart twin")
                 .on_hover_text("Starts a new twin from the current state, for example after the transient")
                 .clicked();
-        if switch.changed() || anew {
+        if switch.changed() || restarts {
             player.set_twin(on);
         }
     });

@@ -6,8 +6,8 @@ use super::coordinate::Coordinate;
 use super::diagram::Diagram;
 use super::in_words;
 use super::request::BenchRequest;
-use super::shares::SharedJob;
-use super::swept::{SweepResults, start_label};
+use super::shared_job::SharedJob;
+use super::sweep_results::{SweepResults, start_label};
 use crate::analysis::design::Start;
 use crate::analysis::point::MAX_EXPONENT_TOLERANCE;
 use crate::analysis::ready_sweeps::{READY_SWEEPS, ReadySweep};
@@ -53,9 +53,9 @@ struct RunningSweep {
 #[derive(Default)]
 pub struct SweepPanel {
     settings: Option<Settings>,
-    asked: Option<SweepTask>,
+    requested: Option<SweepTask>,
     running: Option<RunningSweep>,
-    swept: Option<SweepResults>,
+    results: Option<SweepResults>,
     problem: Option<String>,
     diagram: Diagram,
     /// Whether to scroll to the diagram.
@@ -65,7 +65,7 @@ pub struct SweepPanel {
 impl SweepPanel {
     /// Starts a requested sweep and takes messages from a running one; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
-        if let Some(task) = self.asked.take() {
+        if let Some(task) = self.requested.take() {
             self.problem = None;
             let shares = SharedJob::start(host, usize::MAX, |share| Job::Sweep(task.clone(), share));
             self.running = shares.map(|shares| RunningSweep { task, shares, begun: false });
@@ -79,7 +79,7 @@ impl SweepPanel {
         let polled = shares.poll(|message| match message {
             Message::Ranges(ranges) if !*begun => {
                 *begun = true;
-                self.swept = ranges.into_iter().next().map(|range| SweepResults {
+                self.results = ranges.into_iter().next().map(|range| SweepResults {
                     task: task.clone(),
                     points: vec![None; range.count],
                     scene: task.scene.scene().ok(),
@@ -88,8 +88,8 @@ impl SweepPanel {
                 self.diagram.clear();
             }
             Message::Point(point) => {
-                if let Some(swept) = &mut self.swept
-                    && let Some(slot) = swept.points.get_mut(point.index)
+                if let Some(results) = &mut self.results
+                    && let Some(slot) = results.points.get_mut(point.index)
                 {
                     *slot = Some(*point);
                     self.diagram.invalidate();
@@ -115,12 +115,12 @@ impl SweepPanel {
 
     /// Whether a sweep is running.
     pub fn is_running(&self) -> bool {
-        self.running.is_some() || self.asked.is_some()
+        self.running.is_some() || self.requested.is_some()
     }
 
     /// The latest sweep.
-    pub fn swept(&self) -> Option<&SweepResults> {
-        self.swept.as_ref()
+    pub fn results(&self) -> Option<&SweepResults> {
+        self.results.as_ref()
     }
 
     /// The diagram.
@@ -131,7 +131,7 @@ impl SweepPanel {
     /// Starts a ready sweep over its `scene`, replacing any running sweep.
     pub fn start(&mut self, ready: &'static ReadySweep, scene: &Scene) {
         self.settings = Some(Settings::of(ready));
-        self.asked = Some(ready.task(scene));
+        self.requested = Some(ready.task(scene));
         self.reveal = true;
     }
 
@@ -144,7 +144,7 @@ impl SweepPanel {
 
     /// Whether the diagram belongs to the requested sweep, or no other is to come.
     fn has_diagram(&self) -> bool {
-        self.asked.is_none() && self.running.as_ref().is_none_or(|sweeping| sweeping.begun)
+        self.requested.is_none() && self.running.as_ref().is_none_or(|sweeping| sweeping.begun)
     }
 
     fn sweep_ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Load> {
@@ -183,17 +183,17 @@ impl SweepPanel {
 
     /// The diagram; returns the clicked section.
     fn diagram_ui(&mut self, ui: &mut Ui, coordinate: Coordinate) -> Option<Load> {
-        let swept = self.swept.as_ref()?;
+        let results = self.results.as_ref()?;
         reserve_lines(ui, "sweep of", 3, |ui| {
-            ui.label(RichText::new(swept.caption()).small()).on_hover_text("Scene and settings of the diagram below");
+            ui.label(RichText::new(results.caption()).small()).on_hover_text("Scene and settings of the diagram below");
         });
-        let (index, section) = self.diagram.ui(ui, swept, coordinate)?;
+        let (index, section) = self.diagram.ui(ui, results, coordinate)?;
         Load::new(
-            &swept.task.scene,
-            |index| swept.points.get(index)?.as_ref(),
+            &results.task.scene,
+            |index| results.points.get(index)?.as_ref(),
             index,
-            swept.task.discard + section,
-            swept.task.periods,
+            results.task.discard + section,
+            results.task.periods,
         )
     }
 
@@ -205,13 +205,13 @@ impl SweepPanel {
             return;
         }
         let running = self.running.as_ref().map(|sweeping| &sweeping.task);
-        let swept = self.swept.as_ref();
-        let Some(swept) = swept.filter(|swept| running.is_none_or(|task| *task == swept.task)) else {
+        let results = self.results.as_ref();
+        let Some(results) = results.filter(|results| running.is_none_or(|task| *task == results.task)) else {
             let words = if self.is_running() { "Starting…" } else { "No results yet" };
             ui.label(small(words).weak());
             return;
         };
-        let differences = swept.differences(player);
+        let differences = results.differences(player);
         if differences.is_empty() {
             ui.label(small("This sweep belongs to the current scene").weak());
         } else {
@@ -257,7 +257,7 @@ impl SweepPanel {
             if key != settings.key
                 && let Some(parameter) = parameters.iter().find(|p| p.key == key)
             {
-                settings.vary(parameter);
+                settings.select_parameter(parameter);
             }
         });
         ui.horizontal_wrapped(|ui| {
@@ -331,7 +331,7 @@ impl SweepPanel {
         });
         let clicked = clicked.inner;
         if clicked && running {
-            (self.running, self.asked) = (None, None);
+            (self.running, self.requested) = (None, None);
         } else if clicked
             && let Some(settings) = &self.settings
             && let Ok(parameter) = player.pending().parameter(settings.key)
@@ -339,7 +339,7 @@ impl SweepPanel {
             self.reveal = true;
             let end = |text: &str| value::with_display_unit(text, &parameter.kind);
             let Settings { key, from, to, values, .. } = settings;
-            self.asked = Some(SweepTask {
+            self.requested = Some(SweepTask {
                 scene: SceneSource::of(player.pending()),
                 vary: vec![format!("{key}={}..{}:{values}", end(from), end(to))],
                 periods: settings.periods,
@@ -381,12 +381,12 @@ impl Settings {
             start: Start::Cold,
             exponent: false,
         };
-        settings.vary(first);
+        settings.select_parameter(first);
         Some(settings)
     }
 
     /// Selects another parameter, with the range of its slider.
-    fn vary(&mut self, parameter: &'static Parameter) {
+    fn select_parameter(&mut self, parameter: &'static Parameter) {
         self.key = parameter.key;
         (self.from, self.to) = match parameter.kind {
             _ if parameter.key == DEFAULT_RANGE.0 => (DEFAULT_RANGE.1.to_owned(), DEFAULT_RANGE.2.to_owned()),

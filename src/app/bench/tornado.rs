@@ -60,7 +60,7 @@ impl Tornado {
         if self.order.len() != inputs {
             self.order = (0..inputs).collect();
         }
-        let (finished, all) = study.counts();
+        let (finished, all) = study.run_counts();
         let pointed = self.area.is_some_and(|area| ui.rect_contains_pointer(area));
         if finished == all && self.sorted != Some(output) && !pointed {
             (self.order, self.sorted) = (study.ranked_by_effect(output), Some(output));

@@ -110,7 +110,7 @@ pub struct MapPanel {
     /// Name of the scene that `over` belongs to, and what varies, one axis per line.
     scene: String,
     over: String,
-    asked: Option<MapTask>,
+    requested: Option<MapTask>,
     running: Option<Box<dyn BackgroundTask>>,
     mapped: Option<PartialMap>,
     problem: Option<String>,
@@ -127,7 +127,7 @@ impl Default for MapPanel {
         Self {
             scene: String::new(),
             over: String::new(),
-            asked: None,
+            requested: None,
             running: None,
             mapped: None,
             problem: None,
@@ -142,7 +142,7 @@ impl Default for MapPanel {
 impl MapPanel {
     /// Starts a requested map and takes messages from a running one; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
-        if let Some(task) = self.asked.take() {
+        if let Some(task) = self.requested.take() {
             (self.problem, self.slice) = (None, None);
             self.running = host.start(Job::Map(task.clone()));
             match self.running {
@@ -218,7 +218,7 @@ impl MapPanel {
     }
 
     fn go_ui(&mut self, ui: &mut Ui, player: &Player) {
-        let running = self.running.is_some() || self.asked.is_some();
+        let running = self.running.is_some() || self.requested.is_some();
         ui.horizontal(|ui| {
             let (name, help) = if running {
                 ("Cancel", "End the computation; the points so far stay")
@@ -230,10 +230,10 @@ impl MapPanel {
             };
             if ui.add(Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0))).on_hover_text(help).clicked() {
                 if running {
-                    (self.running, self.asked) = (None, None);
+                    (self.running, self.requested) = (None, None);
                 } else {
                     let over = self.over.lines().map(str::trim).filter(|line| !line.is_empty());
-                    self.asked = Some(MapTask {
+                    self.requested = Some(MapTask {
                         scene: SceneSource::of(player.pending()),
                         over: over.map(str::to_owned).collect(),
                         directions: DIRECTIONS,
@@ -349,7 +349,7 @@ mod tests {
         let player = Player::new(&scene).expect("starts");
         let over = ["crank.angle=0deg..90deg:3".to_owned(), "contact.clearance=0.1mm,0.2mm".to_owned()];
         let task = MapTask { scene: SceneSource::of(&scene), over: over.to_vec(), directions: DIRECTIONS };
-        let mut panel = MapPanel { asked: Some(task), ..MapPanel::default() };
+        let mut panel = MapPanel { requested: Some(task), ..MapPanel::default() };
         assert!(!panel.update(&mut AtOnce), "it is done");
         assert_eq!(panel.take_cloud(&player), None, "the panel is closed");
         let map = WorkspaceMap::new(scene.clone(), &over, DIRECTIONS).expect("six points");

@@ -128,7 +128,7 @@ impl App {
         match self.link().format_short(self.player.pending()) {
             Ok((fragment, note)) => {
                 self.dialog = Some(Dialog::Link(SharedLink::new(fragment, self.page_address())));
-                note.into_iter().for_each(|note| self.say(note));
+                note.into_iter().for_each(|note| self.notify(note));
             }
             Err(reason) => self.problem = Some(reason),
         }

@@ -490,7 +490,7 @@ impl Lesson {
             at,
             run,
         } = row.clone();
-        let given = [
+        let kinds = [
             key.map(Kind::Parameter),
             instant.is_some().then_some(Kind::Instant),
             impact.map(|number| Kind::Impact {
@@ -505,9 +505,9 @@ impl Lesson {
             value.map(Kind::At),
             twin.is_some().then_some(Kind::Apart),
         ];
-        let given: Vec<Kind> = given.into_iter().flatten().collect();
-        let [kind] = &given[..] else {
-            return Err(format!("{} kinds of measure; allowed one: {KINDS}", given.len()));
+        let kinds: Vec<Kind> = kinds.into_iter().flatten().collect();
+        let [kind] = &kinds[..] else {
+            return Err(format!("{} kinds of measure; allowed one: {KINDS}", kinds.len()));
         };
         if matches!(kind, Kind::Impact { number: 0, .. }) {
             return Err("impact = 0: allowed 1 and more; the first impact has number 1".to_owned());

@@ -5,8 +5,8 @@ use eframe::egui::{
     text::LayoutJob,
 };
 
+use super::control_finder::ControlFinder;
 use super::names::Names;
-use super::spots::ControlFinder;
 use super::text::{self, Block, SpanStyle};
 use super::{RunningLesson, lesson_titles};
 use crate::app::bench::Bench;
@@ -43,19 +43,19 @@ impl App {
     /// The whole panel.
     pub(in crate::app) fn lesson_ui(&mut self, ui: &mut Ui) {
         let elsewhere = self.item_outside_presentation(ui.ctx());
-        let Some(course) = &mut self.course else {
+        let Some(running) = &mut self.running_lesson else {
             return;
         };
         spoken::landmark(ui, "Lesson");
-        let own = course.sets || course.is_run_of_step(&self.player);
+        let own = running.sets || running.is_run_of_step(&self.player);
         // A presentation screen is low in points but not operated by touch.
         let low = self.presentation.is_some() && !self.touched;
         let backwards = Layout::bottom_up(egui::Align::Min);
         let request = ui
             .with_layout(backwards, |ui| {
-                let request = buttons(ui, course);
+                let request = buttons(ui, running);
                 ui.with_layout(Layout::top_down(egui::Align::Min), |ui| {
-                    let id = (course.lesson.name.clone(), course.step);
+                    let id = (running.lesson.name.clone(), running.step);
                     let page = ScrollArea::vertical().id_salt(id).auto_shrink(false);
                     let set = page.show(ui, |ui| {
                         // Space for the scroll bar.
@@ -68,15 +68,15 @@ impl App {
                             // The last line of a page is repeated at the top of the next.
                             ui.scroll_with_delta(egui::vec2(0.0, 40.0 - ui.clip_rect().height()));
                         }
-                        let set = course.page(ui, own);
+                        let set = running.page(ui, own);
                         if let Some(elsewhere) = &elsewhere {
                             ui.label(RichText::new(elsewhere).weak());
                         }
                         set
                     });
                     let below = set.content_size.y - set.state.unclamped_offset().y - set.inner_rect.height();
-                    if course.more != (below > MIN_HIDDEN) {
-                        course.more = below > MIN_HIDDEN;
+                    if running.more != (below > MIN_HIDDEN) {
+                        running.more = below > MIN_HIDDEN;
                         ui.ctx().request_repaint();
                     }
                     if set.inner { Request::Set } else { request }
@@ -119,28 +119,32 @@ impl App {
 }
 
 /// Back, Next, progress, and Leave, at positions independent of the page.
-fn buttons(ui: &mut Ui, course: &RunningLesson) -> Request {
+fn buttons(ui: &mut Ui, running: &RunningLesson) -> Request {
     let mut request = Request::Nothing;
-    let last = course.lesson.steps.len() - 1;
+    let last = running.lesson.steps.len() - 1;
     ui.horizontal(|ui| {
         for (forward, name, help, possible) in [
-            (false, "Back", "Previous step (Page Up)", course.step > 0),
-            (true, "Next", "Next step (Page Down)", course.step < last),
+            (false, "Back", "Previous step (Page Up)", running.step > 0),
+            (true, "Next", "Next step (Page Down)", running.step < last),
         ] {
             let button = ui.add_enabled(possible, Button::new(name)).on_hover_text(help);
             if button.clicked() {
                 request = Request::Turn(forward);
             }
         }
-        let count = format!("{} of {}", course.step + 1, last + 1);
-        ui.label(if course.more && ui.available_width() < MIN_COUNTER_WIDTH { count } else { format!("Step {count}") });
+        let count = format!("{} of {}", running.step + 1, last + 1);
+        ui.label(if running.more && ui.available_width() < MIN_COUNTER_WIDTH {
+            count
+        } else {
+            format!("Step {count}")
+        });
         ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
             let help = "Ends the lesson and restores the window as it was before";
             let leave = ui.button("End").on_hover_text(help);
             if leave.accessible_name("Leave the lesson").clicked() {
                 request = Request::Leave;
             }
-            if course.more && ui.button("More").on_hover_text("Scroll down to the rest of the step").clicked() {
+            if running.more && ui.button("More").on_hover_text("Scroll down to the rest of the step").clicked() {
                 request = Request::More;
             }
         });

@@ -96,7 +96,7 @@ fn fault(old: &str, new: &str) -> String {
 
 #[test]
 fn what_is_wrong_in_a_lesson_is_said_with_its_place_and_what_is_allowed() {
-    for (old, new, said) in [
+    for (old, new, message_parts) in [
         ("title = \"A rod", "titel = \"A rod", &["own.toml:1:1", "titel", "expected one of", "`title`"][..]),
         ("scene = \"pendulum\"", "scene = \"pendulun\"", &["own.toml:2:9", "scene", "did you mean `pendulum`?"]),
         ("scene = \"pendulum\"", "scene = 3", &["own.toml:2:9", "scene", "expected a string"]),
@@ -124,7 +124,7 @@ fn what_is_wrong_in_a_lesson_is_said_with_its_place_and_what_is_allowed() {
         ("name = \"wide\"", "", &["measure.wide", "no step that begins a run"]),
     ] {
         let error = fault(old, new);
-        for part in said {
+        for part in message_parts {
             assert!(error.contains(part), "{new}: {error}: no `{part}`");
         }
     }

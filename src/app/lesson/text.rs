@@ -160,7 +160,7 @@ pub fn words(quantity: Quantity, unit: Option<&str>) -> Result<String, String> {
         return Err("is not a finite number".to_owned());
     }
     let chosen = match unit {
-        Some(asked) => units.iter().find(|(unit, _)| *unit == asked),
+        Some(requested) => units.iter().find(|(unit, _)| *unit == requested),
         None if value == 0.0 => units.first(),
         // Rounding makes 999.9 µm 1 mm.
         None => units.iter().find(|(_, size)| value.abs() * 1.000_6 >= *size).or(units.last()),

@@ -3,7 +3,7 @@
 use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use glam::Vec3;
 
-use super::sight::{ContactPatch, MagnifiedJoint};
+use super::magnified_joint::{ContactPatch, MagnifiedJoint};
 use crate::app::overlay::{colour, text};
 use crate::app::paths::Point;
 use crate::app::value;
@@ -103,11 +103,11 @@ pub struct Sheet<'a> {
     ink: Color32,
     faint: Color32,
     ground: Color32,
-    sight: &'a MagnifiedJoint,
+    magnified: &'a MagnifiedJoint,
 }
 
 impl<'a> Sheet<'a> {
-    pub fn new(ui: &Ui, rect: Rect, sight: &'a MagnifiedJoint) -> Self {
+    pub fn new(ui: &Ui, rect: Rect, magnified: &'a MagnifiedJoint) -> Self {
         let dark = ui.visuals().dark_mode;
         let theme = if dark { Theme::Dark } else { Theme::Light };
         let sheet = Self {
@@ -117,7 +117,7 @@ impl<'a> Sheet<'a> {
             ink: ui.visuals().text_color(),
             faint: ui.visuals().weak_text_color(),
             ground: ui.visuals().extreme_bg_color,
-            sight,
+            magnified,
         };
         sheet.painter.rect_filled(rect, 4.0, sheet.ground);
         sheet
@@ -153,8 +153,8 @@ pub struct Circle {
 /// The clearance sphere seen normal to a plane: path and centre of the ball, contact, velocity, scale. `axes` point to the right
 /// and up; `speed` is the reference speed of the velocity arrow, m/s.
 pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, speed: f64) -> Circle {
-    let Sheet { painter, rect, palette, sight, .. } = sheet;
-    let report = &sight.report;
+    let Sheet { painter, rect, palette, magnified, .. } = sheet;
+    let report = &magnified.report;
     let radius = CIRCLE_RADIUS * rect.size().min_elem();
     // To the right of the words in the left corners, as far as the scale in the right one permits.
     let off = 0.5 * rect.height() - CORNER_TEXT[1];
@@ -182,7 +182,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     let old = sheet.faint.gamma_multiply(0.45);
     let start = path.first().map_or(now, |point| point.time);
     let age = (now - start).max(f64::MIN_POSITIVE);
-    let column = |i: usize| to_f32(&sight.carrier.column(i).into_owned());
+    let column = |i: usize| to_f32(&magnified.carrier.column(i).into_owned());
     let carrier = glam::Mat3::from_cols(column(0), column(1), column(2));
     let here = place(to_f32(&report.eccentricity));
     let mut before: Option<Pos2> = None;
@@ -202,9 +202,9 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
         painter.line_segment([from, here], Stroke::new(1.8, young));
     }
 
-    let touches = sight.sliding.is_some();
+    let touches = magnified.sliding.is_some();
     let contact = colour(palette.normal);
-    if let (true, Some(normal)) = (touches, sight.normal) {
+    if let (true, Some(normal)) = (touches, magnified.normal) {
         // The clearance sphere bounds the ball's centre, so contact and normal are drawn there.
         let normal = to_f32(&normal);
         let foot = place(normal * clearance);
@@ -214,7 +214,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
         painter.line_segment([foot - across, foot + across], Stroke::new(2.0, contact));
     }
     let moving = colour(palette.friction);
-    let velocity = to_f32(&sight.sliding.unwrap_or(sight.velocity));
+    let velocity = to_f32(&magnified.sliding.unwrap_or(magnified.velocity));
     let arrow = flat(velocity) * (ARROW_LENGTH / speed as f32);
     if arrow.length() > 2.0 {
         painter.arrow(here, arrow, Stroke::new(2.0, moving));

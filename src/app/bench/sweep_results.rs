@@ -74,9 +74,9 @@ mod tests {
         let ready = &READY_SWEEPS[0];
         let scene = ready.scene().expect("a built-in scene");
         let range = Range { key: ready.key.to_owned(), from: 21.0, to: 45.0, count: ready.values };
-        let swept = SweepResults { task: ready.task(&scene), range, points: Vec::new(), scene: Some(scene) };
-        let parameter = swept.parameter().expect("a parameter of the file");
+        let results = SweepResults { task: ready.task(&scene), range, points: Vec::new(), scene: Some(scene) };
+        let parameter = results.parameter().expect("a parameter of the file");
         assert_eq!((parameter.label, parameter.display_unit()), ("Crank speed", "rad/s"));
-        assert!(swept.caption().contains("crank speed 21 rad/s to 45 rad/s, 25 values"), "{}", swept.caption());
+        assert!(results.caption().contains("crank speed 21 rad/s to 45 rad/s, 25 values"), "{}", results.caption());
     }
 }

@@ -76,9 +76,9 @@ impl MagnifiedJoint {
             let slip_velocity = law.slip_velocity(&normal, &velocity, &ball_spin, &socket_spin);
             law.sliding_velocity(&gap, &slip_velocity)
         });
-        let mut begun = player.impact_record().latest(Some(joint), shown);
-        let impact = begun.next().copied();
-        let first = begun.nth(IMPACTS - 2);
+        let mut impacts = player.impact_record().latest(Some(joint), shown);
+        let impact = impacts.next().copied();
+        let first = impacts.nth(IMPACTS - 2);
         let since = first.map_or(f64::NEG_INFINITY, |impact| impact.start);
         let (radius, clearance) = (spec.contact.ball_radius, report.clearance);
         let patch = (!ideal && clearance > 0.0).then(|| ContactPatch {
@@ -118,19 +118,19 @@ mod tests {
             let mut compared = 0;
             for _ in 0..4000 {
                 player.single_step();
-                let sight = MagnifiedJoint::of(&player, 0).expect("has a joint");
-                let rate = sight.normal.map_or(0.0, |normal| normal.dot(&sight.velocity));
-                let reported = sight.report.penetration_rate;
-                assert!((rate - reported).abs() < 1e-12 + 1e-9 * sight.velocity.norm());
+                let magnified = MagnifiedJoint::of(&player, 0).expect("has a joint");
+                let rate = magnified.normal.map_or(0.0, |normal| normal.dot(&magnified.velocity));
+                let reported = magnified.report.penetration_rate;
+                assert!((rate - reported).abs() < 1e-12 + 1e-9 * magnified.velocity.norm());
                 // The friction law has no sliding velocity where the normal force is clipped to zero.
-                let presses = sight.report.normal_force.norm() > 0.0;
-                let Some(sliding) = sight.sliding.filter(|_| presses) else {
+                let presses = magnified.report.normal_force.norm() > 0.0;
+                let Some(sliding) = magnified.sliding.filter(|_| presses) else {
                     continue;
                 };
-                let read = sight.report.slip_speed;
+                let read = magnified.report.slip_speed;
                 assert!((sliding.norm() - read).abs() < 1e-12 + 1e-9 * read, "{velocity}: {sliding} {read}");
                 // Friction opposes sliding; near the threshold speed below which it vanishes, its law is extrapolated.
-                let friction = sight.report.friction_force;
+                let friction = magnified.report.friction_force;
                 assert!(read < 1e-5 || friction.dot(&sliding) < 0.0);
                 compared += 1;
             }
@@ -144,27 +144,27 @@ mod tests {
         let (mut before, mut ends) = (None, Vec::new());
         while ends.len() < 3 {
             player.single_step();
-            let sight = MagnifiedJoint::of(&player, 0).expect("has a joint");
-            if let Some(impact) = sight.impact.filter(|_| sight.impact != before) {
+            let magnified = MagnifiedJoint::of(&player, 0).expect("has a joint");
+            if let Some(impact) = magnified.impact.filter(|_| magnified.impact != before) {
                 assert!(impact.end <= player.pacer.shown() && impact.joint == 0);
                 ends.push(impact);
-                before = sight.impact;
+                before = magnified.impact;
             }
         }
         // The first impact of S1 in `physics.md`.
         assert!((ends[0].start - 7.801_422_908e-3).abs() < 1e-6);
         assert!((ends[0].approach_speed - 0.076_909).abs() < 1e-4);
-        let given = ends[0].separation_speed / ends[0].approach_speed;
-        assert!((ends[0].achieved() - given).abs() < 1e-15 && ends[0].asked == 0.9);
+        let expected = ends[0].separation_speed / ends[0].approach_speed;
+        assert!((ends[0].achieved() - expected).abs() < 1e-15 && ends[0].asked == 0.9);
         // Going back into an impact shows its recorded outcome.
         player.step_back();
         assert_eq!(MagnifiedJoint::of(&player, 0).expect("has a joint").impact, Some(ends[2]));
         while player.pacer.shown() >= ends[2].start {
             player.step_back();
         }
-        let sight = MagnifiedJoint::of(&player, 0).expect("has a joint");
-        assert_eq!(sight.impact, Some(ends[1]));
-        assert_eq!(sight.since, f64::NEG_INFINITY, "fewer than are shown");
+        let magnified = MagnifiedJoint::of(&player, 0).expect("has a joint");
+        assert_eq!(magnified.impact, Some(ends[1]));
+        assert_eq!(magnified.since, f64::NEG_INFINITY, "fewer than are shown");
     }
 
     #[test]
@@ -172,15 +172,15 @@ mod tests {
         // Hertz: F = 4/3 E* a³ / R, E* = E / (2 (1 - nu²)); the scene's law without damping is the same number.
         let player = player("spcmm", &[]);
         let contact = player.running().machine.ball_joints[0].contact;
-        let sight = MagnifiedJoint::of(&player, 0).expect("has a joint");
-        let patch = ContactPatch { penetration: 3e-6, ..sight.patch.expect("has clearance") };
+        let magnified = MagnifiedJoint::of(&player, 0).expect("has a joint");
+        let patch = ContactPatch { penetration: 3e-6, ..magnified.patch.expect("has clearance") };
         let modulus = contact.youngs_modulus / (2.0 * (1.0 - contact.poisson_ratio.powi(2)));
         let force = 4.0 / 3.0 * modulus * patch.radius().powi(3) / patch.effective_radius;
         let law = Coefficients::new(&contact, contact.clearance);
         assert!((force / law.normal_force(3e-6, 0.0, 1.0) - 1.0).abs() < 1e-12);
         assert_eq!(patch.radius(), (patch.effective_radius * 3e-6).sqrt());
         let ideal = super::tests::player("spcmm", &[("contact.clearance", "0")]);
-        let sight = MagnifiedJoint::of(&ideal, 0).expect("has a joint");
-        assert!(sight.patch.is_none() && sight.normal.is_none() && sight.impact.is_none());
+        let magnified = MagnifiedJoint::of(&ideal, 0).expect("has a joint");
+        assert!(magnified.patch.is_none() && magnified.normal.is_none() && magnified.impact.is_none());
     }
 }

@@ -31,16 +31,16 @@ impl ControlFinder {
     /// Rectangles of the controls named in `wanted` in the previous frame; parts of one control, such as slider and field, are
     /// merged.
     pub fn places(ctx: &egui::Context, wanted: &[String]) -> Vec<(String, Rect)> {
-        let spots = ctx.plugin_or_default::<Self>();
-        let mut spots = spots.lock();
-        if *spots.wanted != *wanted {
-            spots.wanted = wanted.into();
+        let finder = ctx.plugin_or_default::<Self>();
+        let mut finder = finder.lock();
+        if *finder.wanted != *wanted {
+            finder.wanted = wanted.into();
             if !wanted.is_empty() {
                 ctx.enable_accesskit();
                 ctx.request_repaint();
             }
         }
-        spots.found.clone()
+        finder.found.clone()
     }
 
     fn find(&mut self, tree: &TreeUpdate) {
