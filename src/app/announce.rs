@@ -15,9 +15,9 @@ const MAX_JOINTS: usize = 6;
 pub struct Announcer {
     text: String,
     /// The report without impacts.
-    standing: String,
+    text_without_impacts: String,
     /// A change of this text is an event.
-    occasion: String,
+    event_key: String,
     reported: f64,
     /// Whether the latest report is about an event.
     event: bool,
@@ -48,20 +48,20 @@ impl Announcer {
     /// Makes a report at `now`, s of viewing, if one is due. Returns whether it did, and the time until the next check if a
     /// report is due later. `news` is the application's own message.
     pub fn update(&mut self, now: f64, player: &Player, news: &str) -> (bool, Option<f64>) {
-        let occasion =
+        let event_key =
             format!("{} {} {} {news}", player.running().name, player.is_playing(), player.stopped().is_some());
-        let event = occasion != self.occasion;
-        let standing = sentences(player, news, None);
-        if standing == self.standing && self.strongest.is_none() {
+        let event = event_key != self.event_key;
+        let text_without_impacts = sentences(player, news, None);
+        if text_without_impacts == self.text_without_impacts && self.strongest.is_none() {
             return (false, None);
         }
         let wait = self.reported + MIN_INTERVAL - now;
         if !event && wait > 0.0 {
             return (false, Some(wait));
         }
-        (self.occasion, self.event) = (occasion, event);
+        (self.event_key, self.event) = (event_key, event);
         self.text = sentences(player, news, self.strongest);
-        self.standing = standing;
+        self.text_without_impacts = text_without_impacts;
         self.reported = now;
         self.strongest = None;
         (true, None)

@@ -76,9 +76,9 @@ impl App {
         let Some(audience) = &self.audience else {
             return;
         };
-        let zoom = present::legible(audience.height);
+        let zoom = present::legible_zoom(audience.height);
         // In points at the initial zoom; a changed size would resize the window.
-        let size = INITIAL_SIZE / present::legible(INITIAL_SIZE.y);
+        let size = INITIAL_SIZE / present::legible_zoom(INITIAL_SIZE.y);
         let builder = ViewportBuilder::default()
             .with_title("Jointplay: window for the class")
             .with_app_id("jointplay")

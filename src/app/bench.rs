@@ -59,10 +59,10 @@ impl Bench {
     }
 
     /// Reports a frame at time `now`, s; `moves`: whether the picture is animated.
-    pub fn seen(&mut self, now: f64, moves: bool) {
-        self.sweep.seen(now, moves);
+    pub fn report_frame(&mut self, now: f64, moves: bool) {
+        self.sweep.report_frame(now, moves);
         if let Some(costs) = &mut self.costs {
-            costs.seen(now, moves);
+            costs.report_frame(now, moves);
         }
     }
 
@@ -112,7 +112,7 @@ impl Bench {
 
     /// Fraction of the diagram that was visible when it was last drawn, 0 to 1.
     pub fn diagram_seen(&self) -> f32 {
-        self.sweep.diagram().seen()
+        self.sweep.diagram().visible_fraction()
     }
 
     /// Screen position, points, where the diagram last drew a retained section of a point.

@@ -34,7 +34,7 @@ impl App {
     }
 
     /// Saves the record of a reference run on request.
-    pub(super) fn save_kept(&mut self) {
+    pub(super) fn save_earlier_run(&mut self) {
         if let Some(kept) = self.plots.comparison.take_run_to_save() {
             let files = record_files(kept.run());
             self.save(files);

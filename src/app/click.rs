@@ -51,8 +51,8 @@ pub struct TimeWindow {
 /// leaves after a second makes no bang.
 pub fn impulse(impact: &Impact, mass: f64) -> f64 {
     let energy = 0.4 * impact.peak * impact.deepest;
-    let behind = 2.0 * energy / (impact.approach_speed * impact.approach_speed);
-    behind.min(mass) * (impact.approach_speed + impact.separation_speed)
+    let effective_mass = 2.0 * energy / (impact.approach_speed * impact.approach_speed);
+    effective_mass.min(mass) * (impact.approach_speed + impact.separation_speed)
 }
 
 /// Total mass of the bodies, kg.
@@ -66,11 +66,11 @@ pub fn clicks<'a>(impacts: impl Iterator<Item = &'a Impact>, window: &TimeWindow
     let within = |impact: &&Impact| window.from < impact.end && impact.end <= window.to;
     out.extend(impacts.filter(within).map(|impact| {
         let part = (impact.end - window.from) / (window.to - window.from);
-        let lasted = impact.end - impact.start;
+        let duration = impact.end - impact.start;
         let loudness = impulse(impact, mass) / (mass * FULL_LOUDNESS_SPEED);
         Click {
             after: part * window.lasts,
-            pitch: (0.5 / lasted).clamp(PITCHES.0, PITCHES.1),
+            pitch: (0.5 / duration).clamp(PITCHES.0, PITCHES.1),
             loudness: libm::pow(loudness, COMPRESSION).min(1.0),
         }
     }));
@@ -99,13 +99,13 @@ impl Voice {
         let pitch = click.pitch.min(0.45 * rate);
         let decay = (VIBRATIONS / pitch).max(MIN_DECAY);
         let angle = std::f64::consts::TAU * pitch / rate;
-        let kept = libm::exp(-1.0 / (decay * rate));
+        let decay_factor = libm::exp(-1.0 / (decay * rate));
         Self {
-            turn: 2.0 * kept * libm::cos(angle),
-            fade: kept * kept,
+            turn: 2.0 * decay_factor * libm::cos(angle),
+            fade: decay_factor * decay_factor,
             last: 0.0,
             // Makes the next sample that of the sine.
-            before: -AMPLITUDE * click.loudness * libm::sin(angle) / kept,
+            before: -AMPLITUDE * click.loudness * libm::sin(angle) / decay_factor,
             left: (-libm::log(SILENCE) * decay * rate) as usize,
         }
     }
@@ -133,11 +133,11 @@ mod tests {
 
     const RATE: f64 = 48_000.0;
 
-    fn impact(end: f64, lasted: f64, speed: f64) -> Impact {
+    fn impact(end: f64, duration: f64, speed: f64) -> Impact {
         // Elastic impact of half a kilogram.
         let deepest = 10e-6;
         Impact {
-            start: end - lasted,
+            start: end - duration,
             end,
             approach_speed: speed,
             separation_speed: speed,

@@ -89,7 +89,7 @@ impl Controls {
 
     /// All controls.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy) {
-        self.few(ui, player);
+        self.main_controls(ui, player);
         let table = player.pending().parameters();
         ui.separator();
         self.accuracy_ui(ui, player, accuracy, &table);
@@ -104,8 +104,9 @@ impl Controls {
         }
         for group in groups {
             let rest = || {
-                let apart = |p: &Parameter| FIRST.contains(&p.key) || p.key == PRESET || is_scene_parameter(p);
-                table.iter().filter(move |p| p.group == group && !apart(p))
+                let shown_elsewhere =
+                    |p: &Parameter| FIRST.contains(&p.key) || p.key == PRESET || is_scene_parameter(p);
+                table.iter().filter(move |p| p.group == group && !shown_elsewhere(p))
             };
             if rest().next().is_none() {
                 continue;
@@ -119,7 +120,7 @@ impl Controls {
     }
 
     /// The most important controls.
-    pub fn few(&mut self, ui: &mut Ui, player: &mut Player) {
+    pub fn main_controls(&mut self, ui: &mut Ui, player: &mut Player) {
         spoken::landmark(ui, "Parameters");
         let table = player.pending().parameters();
         for key in FIRST {
@@ -205,9 +206,9 @@ impl Controls {
         if let Some(error) = self.drafts.get(key).and_then(|draft| draft.error.as_ref()) {
             theme::error(ui, value::typeset(error));
         }
-        let beats = player.keys_overriding_preset();
-        if key == PRESET && !beats.is_empty() {
-            let names: Vec<&str> = beats.iter().filter_map(|k| k.split('.').nth(1)).collect();
+        let overriding_keys = player.keys_overriding_preset();
+        if key == PRESET && !overriding_keys.is_empty() {
+            let names: Vec<&str> = overriding_keys.iter().filter_map(|k| k.split('.').nth(1)).collect();
             let words = format!("The scene file sets {}, which overrides the preset", names.join(", "));
             ui.label(RichText::new(words).small().weak());
         }
@@ -356,7 +357,7 @@ impl Controls {
     fn entry(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
         let shown = row.shown();
         let mut text = self.drafts.get(row.key).map_or_else(|| shown.clone(), |draft| draft.text.clone());
-        let font = fitting(ui, &text, ENTRY_WIDTH - 2.0 * f32::from(ENTRY_MARGIN));
+        let font = fitting_font(ui, &text, ENTRY_WIDTH - 2.0 * f32::from(ENTRY_MARGIN));
         let response = ui.add(
             TextEdit::singleline(&mut text)
                 .font(font)
@@ -394,18 +395,18 @@ impl Controls {
         let label = format!("Reset {}", row.name);
         if icon_button(ui, Icon::Undo, &label, &help, size, false).clicked() {
             let done = player.set_original(row.key);
-            self.settle(row.key, "", done);
+            self.apply_outcome(row.key, "", done);
         }
     }
 
     fn set(&mut self, player: &mut Player, key: &str, text: &str) {
         let done = player.set(key, text);
-        self.settle(key, text, done);
+        self.apply_outcome(key, text, done);
     }
 
     /// Clears the draft of an accepted value; a rejected one remains, with the reason.
-    fn settle(&mut self, key: &str, text: &str, done: Result<Effect, SetError>) {
-        match done {
+    fn apply_outcome(&mut self, key: &str, text: &str, outcome: Result<Effect, SetError>) {
+        match outcome {
             Ok(Effect::Now | Effect::AtReset) => {
                 self.drafts.remove(key);
             }
@@ -433,7 +434,7 @@ fn label(ui: &mut Ui, player: &Player, row: &Row) {
 }
 
 /// Body font, reduced so that the text fits into `room` (points): a truncated unit reads as another unit.
-fn fitting(ui: &Ui, text: &str, room: f32) -> FontId {
+fn fitting_font(ui: &Ui, text: &str, room: f32) -> FontId {
     let body = egui::TextStyle::Body.resolve(ui.style());
     let colour = ui.visuals().text_color();
     let width = ui.painter().layout_no_wrap(text.to_owned(), body.clone(), colour).size().x;
@@ -454,11 +455,11 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
     tooltip.show(|ui| {
         ui.strong(parameter.label);
         ui.label(value::typeset(parameter.help));
-        let stated = equations::law(key, player.pending());
-        if let Some(stated) = &stated {
-            ui.label(RichText::new(format!("{}: {}", stated.law, stated.formula)).small());
+        let shown_law = equations::law(key, player.pending());
+        if let Some(shown_law) = &shown_law {
+            ui.label(RichText::new(format!("{}: {}", shown_law.law, shown_law.formula)).small());
         }
-        let elsewhere = stated.and_then(|stated| stated.elsewhere).map(str::to_owned);
+        let elsewhere = shown_law.and_then(|shown_law| shown_law.elsewhere).map(str::to_owned);
         let equation = elsewhere.unwrap_or_else(|| equations::source(parameter.equation));
         if !equation.is_empty() {
             ui.label(RichText::new(equation).small());
@@ -498,7 +499,7 @@ mod tests {
         let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
             let room = ENTRY_WIDTH - 2.0 * f32::from(ENTRY_MARGIN);
             let width = |text: &str| {
-                let font = fitting(ui, text, room);
+                let font = fitting_font(ui, text, room);
                 let galley = ui.painter().layout_no_wrap(text.to_owned(), font.clone(), egui::Color32::BLACK);
                 (font.size, galley.size().x)
             };

@@ -121,17 +121,17 @@ fn paint(mesh: &mut Mesh, x: f32, scale: f32, dash: f32, group: &[(usize, Bar)],
         return;
     }
     // Alternates along the longer side, so that level and steep parts look alike.
-    let turn = |piece: i64| group[piece.rem_euclid(group.len() as i64) as usize];
+    let bar_of_piece = |piece: i64| group[piece.rem_euclid(group.len() as i64) as usize];
     let tallest = group.iter().map(|(_, bar)| bar.height()).fold(0.0, f32::max);
     if tallest <= 0.5 * dash {
-        let (index, bar) = turn((x / dash).floor() as i64);
+        let (index, bar) = bar_of_piece((x / dash).floor() as i64);
         bar.paint(mesh, x, scale, (f32::NEG_INFINITY, f32::INFINITY), colour(index));
         return;
     }
     let ends = group.iter().map(|(_, bar)| (bar.top - bar.soft_top, bar.bottom + bar.soft_bottom));
     let (low, high) = ends.fold((f32::INFINITY, f32::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
     for piece in (low / dash).floor() as i64..=(high / dash).floor() as i64 {
-        let (index, bar) = turn(piece);
+        let (index, bar) = bar_of_piece(piece);
         let ends = (piece as f32 * dash, (piece + 1) as f32 * dash);
         bar.paint(mesh, x, scale, ends, colour(index));
     }
@@ -147,7 +147,7 @@ struct Span {
 impl Span {
     const EMPTY: Self = Self { top: f32::INFINITY, bottom: f32::NEG_INFINITY };
 
-    fn reach(&mut self, y: f64) {
+    fn include(&mut self, y: f64) {
         self.top = self.top.min(y as f32);
         self.bottom = self.bottom.max(y as f32);
     }
@@ -170,8 +170,8 @@ fn spans(bins: &[Bin], place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: 
         for at in (xa.floor() as i64).max(first)..=(xb.floor() as i64).min(last - 1) {
             let span = &mut spans[(at - first) as usize];
             let (left, right) = (at as f64, (at + 1) as f64);
-            span.reach(if left <= xa { ya } else { ya + (left - xa) * slope });
-            span.reach(if right >= xb { yb } else { ya + (right - xa) * slope });
+            span.include(if left <= xa { ya } else { ya + (left - xa) * slope });
+            span.include(if right >= xb { yb } else { ya + (right - xa) * slope });
         }
     };
     // The pen passes through every bin: from its junction with the previous bin, over its middle, to its junction with the next.
@@ -210,7 +210,7 @@ fn spans(bins: &[Bin], place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: 
     for (time, value) in extremes {
         let [x, y] = place(time, value);
         if let Some(at) = column(x) {
-            spans[at].reach(y);
+            spans[at].include(y);
         }
     }
     spans
@@ -270,22 +270,22 @@ fn bars(spans: &[Span], width: f32) -> Vec<Bar> {
     // Full columns on either side; the rest of the width softens the ends.
     let beside = (0.5 * (width - 1.0) + 0.25).floor().max(0.0) as usize;
     let rest = (width - 2.0 * beside as f32 - 1.0).max(0.0);
-    let wide = |at: usize| {
+    let widened = |at: usize| {
         let last = spans.len() - 1;
         let near = spans[at.saturating_sub(beside)..=(at + beside).min(last)].iter();
         near.fold(Span::EMPTY, |all, span| all.join(*span))
     };
-    let wide: Vec<Span> = (0..spans.len()).map(wide).collect();
+    let widened: Vec<Span> = (0..spans.len()).map(widened).collect();
     let bar = |at: usize| {
-        let Span { top, bottom } = wide[at];
+        let Span { top, bottom } = widened[at];
         if top > bottom {
             return Bar::EMPTY;
         }
-        let before = at.checked_sub(1).map_or(Span::EMPTY, |at| wide[at]);
-        let around = before.join(wide.get(at + 1).copied().unwrap_or(Span::EMPTY));
+        let before = at.checked_sub(1).map_or(Span::EMPTY, |at| widened[at]);
+        let around = before.join(widened.get(at + 1).copied().unwrap_or(Span::EMPTY));
         // Extent of the curve beyond this column, limited to its slope here.
-        let goes_on = |by: f32| by.clamp(0.0, (bottom - top).min(MAX_FADE));
-        let (up, down) = (goes_on(top - around.top), goes_on(around.bottom - bottom));
+        let extension = |by: f32| by.clamp(0.0, (bottom - top).min(MAX_FADE));
+        let (up, down) = (extension(top - around.top), extension(around.bottom - bottom));
         let more = |beyond: f32| (0.5 * rest * beyond).min(1.0);
         let (mut top, mut bottom) = (top - more(up), bottom + more(down));
         if bottom - top < width {

@@ -155,7 +155,7 @@ impl Host for DesktopHost {
 
     #[cfg(feature = "sound")]
     fn no_sound(&mut self) -> Option<String> {
-        self.speaker.as_ref()?.failed()
+        self.speaker.as_ref()?.failure()
     }
 
     #[cfg(not(feature = "sound"))]

@@ -47,7 +47,7 @@ pub enum Dialog {
     /// Settings of a film.
     Film {
         /// Settings so far.
-        wanted: FilmSettings,
+        settings: FilmSettings,
     },
     /// Runs to a section of a sweep whose scene differs from the displayed one.
     Load {
@@ -92,8 +92,8 @@ impl Dialog {
             Self::Link(shared) => Some(("Copy", shared.can_be_copied().then_some(Answer::Copy))),
             Self::Open { path, .. } => Some(("Open", typed(path).map(Answer::Open))),
             Self::Save { path, .. } => Some(("Save", typed(path).map(Answer::Save))),
-            Self::Film { wanted } => {
-                let possible = wanted.objection().is_none();
+            Self::Film { settings } => {
+                let possible = settings.objection().is_none();
                 Some(("Make film", possible.then_some(Answer::Film)))
             }
             Self::Load { .. } => Some(("Change and run", Some(Answer::Load))),
@@ -152,7 +152,7 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
                 Dialog::Open { path, error } => open(ui, path, error.as_deref()),
                 Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
                 Dialog::Link(shared) => code::ui(ui, shared, most),
-                Dialog::Film { wanted } => film::choose(ui, wanted, player.reached()),
+                Dialog::Film { settings } => film::settings_ui(ui, settings, player.reached()),
                 Dialog::Load { changes, .. } => {
                     list(ui, "The sweep was made from a different scene. Running to this section changes:", changes)
                 }

@@ -46,7 +46,7 @@ impl App {
             panel.frame(bar).resizable(false).show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                     ui.set_max_width(ui.available_width() - 10.0);
-                    ui.add_enabled_ui(free, |ui| self.controls.few(ui, &mut self.player));
+                    ui.add_enabled_ui(free, |ui| self.controls.main_controls(ui, &mut self.player));
                 });
             });
         }
@@ -95,7 +95,7 @@ impl App {
         let mut link = self.link();
         link.embedded = Some(panels.unwrap_or_else(Embedded::with_controls));
         let (fragment, _) = link.format_short(self.player.pending())?;
-        let text = |text: &str| {
+        let escaped = |text: &str| {
             let text = text.replace('&', "&amp;").replace('"', "&quot;");
             text.replace('<', "&lt;")
         };
@@ -103,8 +103,8 @@ impl App {
         Ok(format!(
             "<iframe src=\"{}\" width=\"{width}\" height=\"{height}\" style=\"border: 0\" loading=\"lazy\" \
              allow=\"fullscreen; clipboard-write\" title=\"{}\"></iframe>",
-            text(&format!("{address}#{fragment}")),
-            text(&self.player.running().title)
+            escaped(&format!("{address}#{fragment}")),
+            escaped(&self.player.running().title)
         ))
     }
 

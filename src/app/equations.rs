@@ -41,23 +41,23 @@ pub fn law(key: &str, scene: &Scene) -> Option<ShownLaw> {
 
 /// The same for the last part of its key.
 fn law_of(last: &str, contact: &Parameters) -> Option<ShownLaw> {
-    let without = contact.friction_law == FrictionLaw::None;
+    let is_frictionless = contact.friction_law == FrictionLaw::None;
     Some(match last {
         "clearance" | "ball_radius" | "youngs_modulus" | "poisson_ratio" => {
             ShownLaw::new("Stiffness of the contact", HERTZ)
         }
-        "friction" | "friction_law" | "slip_speed_low" | "slip_speed_high" if without => {
+        "friction" | "friction_law" | "slip_speed_low" | "slip_speed_high" if is_frictionless => {
             ShownLaw::new("No friction", "F = 0")
         }
         "friction" | "friction_law" => ShownLaw::new("Coulomb friction with dynamic correction", COULOMB),
         "slip_speed_low" | "slip_speed_high" => ShownLaw::new("Dynamic correction of friction", CORRECTION),
-        "restitution" | "normal_law" => normal(contact.normal_law),
+        "restitution" | "normal_law" => normal_force_law(contact.normal_law),
         _ => return None,
     })
 }
 
 /// The damping factors match `contact::damping_factor`.
-fn normal(law: NormalLaw) -> ShownLaw {
+fn normal_force_law(law: NormalLaw) -> ShownLaw {
     let (law, formula, elsewhere) = match law {
         NormalLaw::LankaraniNikravesh => (
             "Lankarani–Nikravesh normal force",
@@ -135,7 +135,7 @@ mod tests {
         let changes = changes.map(|(key, value)| (key.to_owned(), value.to_owned()));
         let scene = Scene::load("spcmm", &changes).expect("built in");
         assert_eq!(law("joint.S1.restitution", &scene), law("contact.restitution", &scene));
-        assert_eq!(law("joint.S2.restitution", &scene), Some(normal(NormalLaw::Hertz)));
+        assert_eq!(law("joint.S2.restitution", &scene), Some(normal_force_law(NormalLaw::Hertz)));
         assert_eq!(law("contact.friction", &scene).expect("stated").formula, "F = 0");
         assert_eq!(law("spcmm.frequency", &scene), None);
     }

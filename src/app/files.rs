@@ -86,11 +86,11 @@ impl App {
     /// Whether closing this window would lose changes to the user's own scene: not for built-in scenes, nor for changes saved in
     /// a file or received with a link. `None` until something is changed or saved after opening a link.
     pub fn unsaved(&self) -> Option<bool> {
-        let wanted = self.player.pending();
-        if matches!(SceneText::of(wanted), SceneText::BuiltIn(_)) {
+        let pending = self.player.pending();
+        if matches!(SceneText::of(pending), SceneText::BuiltIn(_)) {
             return Some(false);
         }
-        let changed = !self.scene_file.is_saved_with(&wanted.changes)?;
+        let changed = !self.scene_file.is_saved_with(&pending.changes)?;
         (changed || self.scene_file.has_file()).then_some(changed)
     }
 
@@ -434,10 +434,10 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
         "state_time_s": player.simulation().time(),
         "state_hash": format!("{:016x}", player.simulation().state_hash()),
     });
-    let wanted = player.pending();
-    if wanted.source.beside.is_empty() {
+    let pending = player.pending();
+    if pending.source.beside.is_empty() {
         let link = Link {
-            scene: SceneText::of(wanted),
+            scene: SceneText::of(pending),
             log: player.log(),
             steps: Some(player.steps()),
             time: Some(player.pacer.shown()),
@@ -447,9 +447,9 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
         meta["link"] = json!(link.format());
     } else {
         // A link can carry only one text.
-        let texts = wanted.source.beside.iter();
+        let texts = pending.source.beside.iter();
         let texts = texts.map(|(name, text)| (name.clone(), json!(**text)));
-        meta["scene_text"] = json!(wanted.source.text);
+        meta["scene_text"] = json!(pending.source.text);
         meta["scene_files"] = texts.collect();
     }
     for (key, value) in more {

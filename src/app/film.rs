@@ -77,7 +77,7 @@ impl FilmSettings {
 
 /// A film being made.
 pub struct RunningFilm {
-    wanted: FilmSettings,
+    settings: FilmSettings,
     film: Film,
     canvas: Canvas,
     pending: Option<Pending>,
@@ -90,18 +90,18 @@ pub struct RunningFilm {
 impl RunningFilm {
     /// Progress, 0 to 1.
     pub fn fraction(&self) -> f32 {
-        (self.film.frames() as f64 / self.wanted.frames()) as f32
+        (self.film.frames() as f64 / self.settings.frames()) as f32
     }
 }
 
 /// Controls of the settings.
-pub fn choose(ui: &mut Ui, wanted: &mut FilmSettings, reached: f64) -> bool {
+pub fn settings_ui(ui: &mut Ui, settings: &mut FilmSettings, reached: f64) -> bool {
     egui::Grid::new("film").num_columns(2).show(ui, |ui| {
         let ends = [
             ("From", "First instant of the film, on the timeline"),
             ("To", "Last instant, at most what was shown of the run"),
         ];
-        for (end, (name, help)) in wanted.span.iter_mut().zip(ends) {
+        for (end, (name, help)) in settings.span.iter_mut().zip(ends) {
             ui.label(name);
             let mut milliseconds = *end * 1e3;
             let field = DragValue::new(&mut milliseconds)
@@ -117,20 +117,20 @@ pub fn choose(ui: &mut Ui, wanted: &mut FilmSettings, reached: f64) -> bool {
         ui.label("Time scale");
         let scales = transport::SCALES.map(|scale| (scale, value::time_scale(scale)));
         let help = "Simulated seconds per second of film";
-        choice(ui, "Time scale of the film", help, &mut wanted.scale, &scales);
+        choice(ui, "Time scale of the film", help, &mut settings.scale, &scales);
         ui.end_row();
         ui.label("Frames");
         let rates = RATES.map(|rate| (rate, format!("{rate} a second")));
-        choice(ui, "Frames of the film", "Per second of film", &mut wanted.rate, &rates);
+        choice(ui, "Frames of the film", "Per second of film", &mut settings.rate, &rates);
         ui.end_row();
         ui.label("Size");
         let sizes = SIZES.map(|(size, name)| (size, name.to_owned()));
-        choice(ui, "Size of the film", "Pixels", &mut wanted.size, &sizes);
+        choice(ui, "Size of the film", "Pixels", &mut settings.size, &sizes);
         ui.end_row();
         ui.label("Shows");
         ui.horizontal(|ui| {
             for (plots, name) in [(false, "View only"), (true, "View and plots")] {
-                ui.selectable_value(&mut wanted.plots, plots, name).on_hover_text("The plots lie below the view");
+                ui.selectable_value(&mut settings.plots, plots, name).on_hover_text("The plots lie below the view");
             }
         });
         ui.end_row();
@@ -141,21 +141,21 @@ pub fn choose(ui: &mut Ui, wanted: &mut FilmSettings, reached: f64) -> bool {
                 (Format::Gif, "GIF", "Plays by itself in slides; 256 colours, at most 50 frames a second"),
             ];
             for (format, name, help) in formats {
-                ui.selectable_value(&mut wanted.format, format, name).on_hover_text(help);
+                ui.selectable_value(&mut settings.format, format, name).on_hover_text(help);
             }
         });
         ui.end_row();
     });
-    let frames = wanted.frames();
-    let told = match wanted.objection() {
+    let frames = settings.frames();
+    let summary = match settings.objection() {
         Some(objection) => RichText::new(objection).color(ui.visuals().error_fg_color),
         None => {
-            let length = frames / wanted.rate;
+            let length = frames / settings.rate;
             let plural = if frames == 1.0 { "" } else { "s" };
             RichText::new(format!("{frames} frame{plural}, {length:.1} s of film")).weak()
         }
     };
-    ui.label(told);
+    ui.label(summary);
     false
 }
 
@@ -179,34 +179,34 @@ impl App {
     pub(super) fn film_to_make(&self) -> FilmSettings {
         let reached = self.player.reached();
         let all = FilmSettings::all(reached, self.player.pacer.scale());
-        let mut wanted = self.film_wanted.clone().unwrap_or(all);
-        wanted.span = wanted.span.map(|end| end.min(reached));
-        if wanted.span[0] == wanted.span[1] {
-            wanted.span = [0.0, reached];
+        let mut settings = self.film_settings.clone().unwrap_or(all);
+        settings.span = settings.span.map(|end| end.min(reached));
+        if settings.span[0] == settings.span[1] {
+            settings.span = [0.0, reached];
         }
-        wanted
+        settings
     }
 
     /// Starts making the film; it is saved when complete.
     ///
     /// # Errors
     /// Why it cannot be made, as a message.
-    pub fn make_film(&mut self, wanted: FilmSettings) -> Result<(), String> {
-        if let Some(objection) = wanted.objection() {
+    pub fn make_film(&mut self, settings: FilmSettings) -> Result<(), String> {
+        if let Some(objection) = settings.objection() {
             return Err(format!("No film: {objection}"));
         }
         let state = self.graphics.as_ref().ok_or("No film: there is no graphics adapter")?;
-        let film = Film::new(wanted.format, wanted.size, wanted.rate);
+        let film = Film::new(settings.format, settings.size, settings.rate);
         let film = film.map_err(|error| format!("No film: {error}"))?;
         let pacer = &self.player.pacer;
         let before = (pacer.shown(), pacer.scale(), self.player.is_playing());
         let canvas = Canvas::beside(state);
         // Impacts glow as long as in playback at this scale.
-        self.player.pacer.set_scale(wanted.scale);
-        self.player.go_to(wanted.span[0]);
+        self.player.pacer.set_scale(settings.scale);
+        self.player.go_to(settings.span[0]);
         self.viewport.clear_history(&self.player);
-        self.film_wanted = Some(wanted.clone());
-        self.film = Some(RunningFilm { wanted, film, canvas, pending: None, next: 0, before });
+        self.film_settings = Some(settings.clone());
+        self.film = Some(RunningFilm { settings, film, canvas, pending: None, next: 0, before });
         Ok(())
     }
 
@@ -236,15 +236,15 @@ impl App {
             return;
         };
         ctx.request_repaint();
-        let going_on = self.film_on(ctx, &mut making);
-        if going_on == Ok(true) {
+        let continues = self.advance_frame(ctx, &mut making);
+        if continues == Ok(true) {
             self.film = Some(making);
             return;
         }
         self.return_from_film(making.before);
-        let format = making.wanted.format;
+        let format = making.settings.format;
         let finish = |_| making.film.finish().map_err(|error| error.to_string());
-        match going_on.and_then(finish) {
+        match continues.and_then(finish) {
             Ok(bytes) => {
                 self.save(vec![SaveFile {
                     name: format!("{}.{format}", self.player.running().name),
@@ -257,7 +257,7 @@ impl App {
     }
 
     /// One pass over `making`; returns whether frames are missing.
-    fn film_on(&mut self, ctx: &egui::Context, making: &mut RunningFilm) -> Result<bool, String> {
+    fn advance_frame(&mut self, ctx: &egui::Context, making: &mut RunningFilm) -> Result<bool, String> {
         if let Some(pending) = &mut making.pending {
             let Some(image) = pending.take() else {
                 return Ok(true);
@@ -267,17 +267,17 @@ impl App {
             let added = making.film.add(&image.rgba);
             added.map_err(|error| error.to_string())?;
         }
-        if making.next as f64 >= making.wanted.frames() {
+        if making.next as f64 >= making.settings.frames() {
             return Ok(false);
         }
-        let instant = making.wanted.instant(making.next);
+        let instant = making.settings.instant(making.next);
         self.player.go_to(instant);
         // Collects the peaks since the previous frame.
         self.player.advance(0.0);
-        self.viewport.advance(&self.player, (1.0 / making.wanted.rate) as f32);
-        let contents = if making.wanted.plots { Contents::Plots } else { Contents::View };
+        self.viewport.advance(&self.player, (1.0 / making.settings.rate) as f32);
+        let contents = if making.settings.plots { Contents::Plots } else { Contents::View };
         let first = making.next == 0;
-        let size = making.wanted.size;
+        let size = making.settings.size;
         making.pending = Some(self.draw_frame(ctx, &mut making.canvas, contents, size, first)?);
         making.next += 1;
         Ok(true)

@@ -198,8 +198,8 @@ impl App {
         ui.separator();
         let help = "A film of a range of the timeline, MP4 or GIF";
         if ui.button("Film…").on_hover_text(help).clicked() {
-            let wanted = self.film_to_make();
-            self.dialog = Some(Dialog::Film { wanted });
+            let settings = self.film_to_make();
+            self.dialog = Some(Dialog::Film { settings });
             layout::close_menu(ui);
         }
         #[cfg(not(target_arch = "wasm32"))]
@@ -299,9 +299,9 @@ impl App {
 
     /// Whether the verdict on a link is displayed. An embedded window omits verdicts that need no action, to save space.
     fn shows_verdict(&self) -> bool {
-        let framed = self.embedded().is_some();
-        let told = self.verdict.as_ref().is_some_and(|verdict| !(framed && needs_no_action(verdict)));
-        told && self.verdict_shown != Some(f64::NEG_INFINITY)
+        let is_embedded = self.embedded().is_some();
+        let is_relevant = self.verdict.as_ref().is_some_and(|verdict| !(is_embedded && needs_no_action(verdict)));
+        is_relevant && self.verdict_shown != Some(f64::NEG_INFINITY)
     }
 
     /// Errors, the progress of a replay, and the verdict on a link.
@@ -316,12 +316,12 @@ impl App {
             }
         }
         let replay = self.replay.as_ref();
-        let ways = [
+        let tasks = [
             ("Reproducing the state of the link…", replay.map(|replay| replay.fraction(&self.player))),
             ("Running to the chosen section…", self.loading()),
             ("Making the film…", self.filming()),
         ];
-        for (words, fraction) in ways {
+        for (words, fraction) in tasks {
             let stop = if self.filming().is_some() {
                 ("Cancel", "Cancels the film; the run returns to where it was (Esc)")
             } else {

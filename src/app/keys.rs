@@ -228,23 +228,23 @@ enum Finger {
 /// Leaves a touch that started on the slider `own` to the enclosing scroll area, unless it moves sideways. `place`: ID of the
 /// stored state. Call it before adding the slider; returns whether the slider may receive the touch.
 fn slider_receives_touch(ui: &Ui, place: Id, own: Id) -> bool {
-    let (touched, origin, way) = ui.input(|input| {
+    let (touched, origin, travel) = ui.input(|input| {
         let pointer = &input.pointer;
-        let way = pointer.total_drag_delta().unwrap_or_default();
-        (input.any_touches(), pointer.press_origin(), way)
+        let travel = pointer.total_drag_delta().unwrap_or_default();
+        (input.any_touches(), pointer.press_origin(), travel)
     });
     if !touched {
         ui.data_mut(|data| data.remove::<Finger>(place));
         return true;
     }
     let ctx = ui.ctx();
-    let (now, hears) = match ui.data(|data| data.get_temp(place)) {
+    let (now, receives_touch) = match ui.data(|data| data.get_temp(place)) {
         None if ctx.is_being_dragged(own) => {
             ctx.stop_dragging();
             (Finger::Waits, false)
         }
-        Some(Finger::Waits) if way.length() >= DRAG_THRESHOLD => {
-            let sideways = way.x.abs() >= way.y.abs();
+        Some(Finger::Waits) if travel.length() >= DRAG_THRESHOLD => {
+            let sideways = travel.x.abs() >= travel.y.abs();
             let below = origin.filter(|_| !sideways);
             let below = below.and_then(|origin| scrolling_at(ui, origin));
             if let Some(drawn) = below.or(sideways.then_some(own)) {
@@ -255,7 +255,7 @@ fn slider_receives_touch(ui: &Ui, place: Id, own: Id) -> bool {
         _ => return true,
     };
     ui.data_mut(|data| data.insert_temp(place, now));
-    hears
+    receives_touch
 }
 
 /// ID of the area around `ui` that scrolls under a finger at `point`.
@@ -278,8 +278,8 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
     let place = ui.next_auto_id().with("finger");
     let own = place.with("slider");
     let before: Option<Id> = ui.data(|data| data.get_temp(own));
-    let hears = before.is_none_or(|before| slider_receives_touch(ui, place, before));
-    let response = if hears {
+    let receives_touch = before.is_none_or(|before| slider_receives_touch(ui, place, before));
+    let response = if receives_touch {
         ui.add(slider)
     } else {
         // Disabled without fading.
@@ -326,7 +326,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
             }
         });
     }
-    let held_back = |key: Key| match key {
+    let is_captured = |key: Key| match key {
         Key::Space => focused.is_some() && !slider,
         Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight | Key::Home | Key::End => focused.is_some(),
         _ => false,
@@ -339,7 +339,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
                 egui::Event::Key { key, pressed: true, repeat, modifiers, .. }
                     if !modifiers.command && !modifiers.alt =>
                 {
-                    let binding = BINDINGS.iter().find(|b| b.key == *key && !held_back(*key))?;
+                    let binding = BINDINGS.iter().find(|b| b.key == *key && !is_captured(*key))?;
                     // Only these actions repeat while the key is held.
                     let repeats =
                         matches!(binding.action, Action::Step | Action::StepBack | Action::Faster | Action::Slower);

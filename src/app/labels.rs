@@ -119,13 +119,13 @@ fn crosses([from, to]: [Pos2; 2], plate: Rect) -> bool {
     (0..=POINTS).any(|k| plate.contains(from.lerp(to, k as f32 / POINTS as f32)))
 }
 
-/// Draws names of joints and axes at their places in `rect`, avoiding the rectangles `taken`.
+/// Draws names of joints and axes at their places in `rect`, avoiding the rectangles `occupied`.
 pub(super) fn paint(
     painter: &Painter,
     rect: Rect,
     scale: f32,
     list: &DrawList,
-    mut taken: Vec<Rect>,
+    mut occupied: Vec<Rect>,
     places: &mut LabelPositions,
 ) {
     if !fits_labels(rect) {
@@ -146,46 +146,48 @@ pub(super) fn paint(
     let is_peak = |label: &&Label| matches!(label.kind, LabelKind::Peak(_));
     // Peaks are short-lived, so names have priority.
     let labels = list.labels.iter().filter(|label| !is_peak(label)).chain(list.labels.iter().filter(is_peak));
-    let most = taken.len() + MAX_PLATES;
-    let mut may_miss = MAX_UNPLACED;
+    let most = occupied.len() + MAX_PLATES;
+    let mut failures_left = MAX_UNPLACED;
     let mut leaders: Vec<[Pos2; 2]> = Vec::new();
     // Labels with a previous place come first, so that a new label displaces none.
-    let mut wanted: Vec<_> = labels.filter_map(|label| LabelRequest::of(label, rect, scale)).collect();
-    wanted.sort_by_key(|wanted| (is_peak(&wanted.label), !before.contains_key(&wanted.label.kind)));
-    for wanted in wanted {
-        if taken.len() == most || may_miss == 0 {
+    let mut requests: Vec<_> = labels.filter_map(|label| LabelRequest::of(label, rect, scale)).collect();
+    requests.sort_by_key(|request| (is_peak(&request.label), !before.contains_key(&request.label.kind)));
+    for request in requests {
+        if occupied.len() == most || failures_left == 0 {
             break;
         }
-        let LabelRequest { label, at, .. } = wanted;
+        let LabelRequest { label, at, .. } = request;
         // A mark that fades with age has legible words until it is gone.
         let ink = colour(label.colour.with_opacity(1.0));
-        let words = painter.layout_no_wrap(label.text.to_string(), FontId::proportional(wanted.size), ink);
+        let words = painter.layout_no_wrap(label.text.to_string(), FontId::proportional(request.size), ink);
         let size = words.size() + 2.0 * PADDING;
         let free = |place: Place| {
-            let plate = wanted.plate(size, place);
-            let clear = rect.contains_rect(plate) && !taken.iter().any(|other| other.intersects(plate));
+            let plate = request.plate(size, place);
+            let clear = rect.contains_rect(plate) && !occupied.iter().any(|other| other.intersects(plate));
             let crosses = || {
                 let own = leader(at, plate);
-                let over = own.is_some_and(|line| taken.iter().any(|other| crosses(line, *other)));
+                let over = own.is_some_and(|line| occupied.iter().any(|other| crosses(line, *other)));
                 over || leaders.iter().any(|line| crosses(*line, plate))
             };
             clear.then(|| (cost(plate, place) + if crosses() { CROSSING_COST } else { 0.0 }, place, plate))
         };
-        let stays = before.get(&label.kind).and_then(|place| free(*place));
+        let previous = before.get(&label.kind).and_then(|place| free(*place));
         let all = || (0..GAPS.len()).flat_map(|gap| (0..DIRECTIONS.len()).map(move |turn| (gap, turn)));
         let best = || all().filter_map(free).min_by(|a, b| a.0.total_cmp(&b.0));
-        let found = match stays {
-            // No place can be better by more than `BETTER`.
-            Some(there) if there.0 <= MOVING_THRESHOLD => Some(there),
-            Some(there) => best().filter(|best| best.0 < there.0 - MOVING_THRESHOLD).or(Some(there)),
+        let found = match previous {
+            // No place can be better by more than `MOVING_THRESHOLD`.
+            Some(previous_place) if previous_place.0 <= MOVING_THRESHOLD => Some(previous_place),
+            Some(previous_place) => {
+                best().filter(|best| best.0 < previous_place.0 - MOVING_THRESHOLD).or(Some(previous_place))
+            }
             None => best(),
         };
         let Some((_, place, plate)) = found else {
-            may_miss -= 1;
+            failures_left -= 1;
             continue;
         };
         places.0.insert(label.kind, place);
-        taken.push(plate);
+        occupied.push(plate);
         if let Some(line) = leader(at, plate) {
             leaders.push(line);
             painter.line_segment(line, Stroke::new(1.0, ink.gamma_multiply(0.7)));

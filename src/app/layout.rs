@@ -202,7 +202,7 @@ impl App {
 
     /// Elements above all panels.
     fn floating_elements(&mut self, ui: &Ui) {
-        self.save_kept();
+        self.save_earlier_run();
         self.impact_list_ui(ui.ctx());
         self.ring_highlights(ui);
         self.dialog_ui(ui.ctx());
@@ -225,7 +225,7 @@ impl App {
     fn side_by_side(&mut self, ui: &mut Ui, bar: Frame) {
         self.lesson_panel(ui, bar);
         let free = !self.is_under_way();
-        let teaching = self.course().is_some();
+        let in_lesson = self.course().is_some();
         let Self {
             player,
             controls,
@@ -265,7 +265,7 @@ impl App {
             .show_collapsible(ui, show_bench, |ui| {
                 ScrollArea::vertical()
                     // A lesson has its own scroll position.
-                    .id_salt(("bench", teaching))
+                    .id_salt(("bench", in_lesson))
                     .auto_shrink(false)
                     .show(ui, |ui| {
                         ui.set_max_width(ui.available_width() - 10.0);
@@ -498,7 +498,7 @@ impl App {
         let cameras: f32 = Preset::ALL.into_iter().map(Preset::label).chain(["Fit"]).map(width).sum();
         // The time is to the left of the buttons.
         let gap = ui.spacing().item_spacing.x;
-        let narrow = area.width() < overlay::reach(ui.painter()) + cameras + options - gap + 10.0;
+        let narrow = area.width() < overlay::time_extent(ui.painter()) + cameras + options - gap + 10.0;
         // Beside the microscope on a phone, the time needs the full upper edge.
         let edge = if area.width() < MIN_WIDTH_SIDE_BY_SIDE { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
         if !plain && !presenting {

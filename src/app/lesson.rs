@@ -36,15 +36,15 @@ pub struct RunningLesson {
     lesson: Arc<Lesson>,
     step: usize,
     /// The machine is being brought to the state of the step.
-    sets: bool,
+    is_setting_machine: bool,
     /// Index of the predicted choice.
     predicted: Option<usize>,
     /// The machine has reached the end of the step.
     reached: bool,
     /// The result has not been drawn yet.
-    fresh: bool,
+    has_new_result: bool,
     /// Whether the panel hides the lower part of the step.
-    more: bool,
+    hides_rest: bool,
     measured: LessonMeasures,
 }
 
@@ -53,11 +53,11 @@ impl RunningLesson {
     pub fn new(lesson: Arc<Lesson>, step: usize) -> Self {
         Self {
             step: step.min(lesson.steps.len() - 1),
-            sets: false,
+            is_setting_machine: false,
             predicted: None,
             reached: false,
-            fresh: false,
-            more: false,
+            has_new_result: false,
+            hides_rest: false,
             measured: LessonMeasures::new(lesson.clone()),
             lesson,
         }
@@ -80,7 +80,7 @@ impl RunningLesson {
         known.then(|| (name.clone(), self.step + 1))
     }
 
-    fn now(&self) -> &Step {
+    fn current_step(&self) -> &Step {
         &self.lesson.steps[self.step]
     }
 
@@ -91,7 +91,7 @@ impl RunningLesson {
 
     /// Whether the machine is still being brought to the state of the step.
     pub fn is_busy(&self) -> bool {
-        self.sets
+        self.is_setting_machine
     }
 
     /// Computes all measures of the lesson without a time limit.
@@ -104,15 +104,15 @@ impl RunningLesson {
     }
 
     /// Index of the correct choice of this step's question; `None` while unknown.
-    pub fn right(&self) -> Option<usize> {
+    pub fn correct_choice(&self) -> Option<usize> {
         let names = self.measured.names();
-        let choices = &self.now().question.as_ref()?.choices;
+        let choices = &self.current_step().question.as_ref()?.choices;
         choices.iter().position(|choice| names.holds(&choice.when) == Some(true))
     }
 
     /// The instant at which the step ends, s.
     pub fn until(&self) -> Option<f64> {
-        self.measured.names().time(self.now().until.as_ref()?)
+        self.measured.names().time(self.current_step().until.as_ref()?)
     }
 
     /// Checks the lesson: every text can be filled in, every claim holds, and every question has exactly one correct choice.
@@ -140,16 +140,16 @@ impl RunningLesson {
                 }
             }
             if let Some(question) = question {
-                let right = question.choices.iter().filter(|c| names.holds(&c.when) == Some(true));
-                let right: Vec<&str> = right.map(|choice| &*choice.text).collect();
-                if right.len() != 1 {
+                let correct = question.choices.iter().filter(|c| names.holds(&c.when) == Some(true));
+                let correct: Vec<&str> = correct.map(|choice| &*choice.text).collect();
+                if correct.len() != 1 {
                     let values: Vec<String> = question.choices.iter().map(|c| known_values(&c.when, &names)).collect();
                     let values = values.join("; ");
-                    return Err(at(format!("{} choices are correct, not one: {right:?}: {values}", right.len())));
+                    return Err(at(format!("{} choices are correct, not one: {correct:?}: {values}", correct.len())));
                 }
             }
             if let Some(until) = &step.until {
-                let begin = self.lesson.steps[self.lesson.beginning(index)].link.time;
+                let begin = self.lesson.steps[self.lesson.run_start_step(index)].link.time;
                 if !names.time(until).is_some_and(|until| Some(until) > begin) {
                     return Err(at(format!("`{until}` is not an instant after the beginning of the step")));
                 }
@@ -160,7 +160,7 @@ impl RunningLesson {
 
     /// Text of the correct choice; `None` while unknown.
     pub fn answer(&self) -> Option<String> {
-        let choice = &self.now().question.as_ref()?.choices[self.right()?];
+        let choice = &self.current_step().question.as_ref()?.choices[self.correct_choice()?];
         text::fill(&choice.text, &self.measured.names()).ok()
     }
 
@@ -188,7 +188,7 @@ impl RunningLesson {
             if let Some(question) = &step.question {
                 out += &words(&question.ask);
                 for (index, choice) in question.choices.iter().enumerate() {
-                    let mark = if self.right() == Some(index) { "x" } else { " " };
+                    let mark = if self.correct_choice() == Some(index) { "x" } else { " " };
                     out += &format!("  [{mark}]{}", words(&choice.text));
                 }
             }
@@ -199,9 +199,9 @@ impl RunningLesson {
 
     /// Whether the displayed run belongs to the step, i.e. the user has not changed the machine.
     fn is_run_of_step(&self, player: &Player) -> bool {
-        let run = &self.lesson.runs[self.now().run];
+        let run = &self.lesson.runs[self.current_step().run];
         let log = player.log();
-        let begin = &self.lesson.steps[self.lesson.beginning(self.step)];
+        let begin = &self.lesson.steps[self.lesson.run_start_step(self.step)];
         let same = (!begin.twin || player.twin().is_some())
             && log.base == run.scene.changes
             && player.running().source.text == run.scene.source.text
@@ -281,9 +281,9 @@ impl App {
         };
         let in_place = end(running.step).is_none_or(|end| shown >= end) && end(step).is_none_or(|end| shown < end);
         let begins = running.lesson.steps[step].begins;
-        let goes_on = forward && !begins && in_place && running.is_run_of_step(&self.player);
+        let continues = forward && !begins && in_place && running.is_run_of_step(&self.player);
         (running.step, running.predicted, running.reached) = (step, None, false);
-        if goes_on {
+        if continues {
             self.player.set_playing(false);
             self.apply_camera_of_step(false);
         } else {
@@ -296,10 +296,10 @@ impl App {
         let Some(running) = &mut self.running_lesson else {
             return;
         };
-        (running.sets, running.predicted, running.reached) = (true, None, false);
-        let begin = &running.lesson.steps[running.lesson.beginning(running.step)];
+        (running.is_setting_machine, running.predicted, running.reached) = (true, None, false);
+        let begin = &running.lesson.steps[running.lesson.run_start_step(running.step)];
         let (scene, link) = (running.lesson.runs[begin.run].scene.clone(), begin.link.clone());
-        let before = &running.lesson.steps[running.lesson.beginning(running.step)..running.step];
+        let before = &running.lesson.steps[running.lesson.run_start_step(running.step)..running.step];
         let names = running.measured.names();
         let mut ends = before.iter().rev().filter_map(|step| step.until.as_ref());
         let whole = begin.twin || !running.lesson.runs[begin.run].changes.is_empty();
@@ -340,7 +340,7 @@ impl App {
         let (lesson, last) = (running.lesson.clone(), running.step);
         let first = if is_fresh { 0 } else { last };
         let steps = &lesson.steps[first..=last];
-        let begin = if is_fresh { lesson.beginning(last) } else { last };
+        let begin = if is_fresh { lesson.run_start_step(last) } else { last };
         for step in &lesson.steps[begin..=last] {
             if !step.begins && step.link != super::Link::default() {
                 // The camera continues to follow its ball joint.
@@ -375,15 +375,15 @@ impl App {
         if !running.measured.advance(replay_budget(self.player.clock)) {
             ctx.request_repaint();
         }
-        if running.sets {
+        if running.is_setting_machine {
             if self.replay.is_some() {
                 return;
             }
-            running.sets = false;
+            running.is_setting_machine = false;
             if self.verdict == Some(Verdict::Reached) {
                 self.verdict = None;
             }
-            let begin = &running.lesson.steps[running.lesson.beginning(running.step)];
+            let begin = &running.lesson.steps[running.lesson.run_start_step(running.step)];
             for (_, key, value) in &running.lesson.runs[begin.run].changes {
                 if let Err(error) = self.player.set(key, value) {
                     self.problem = Some(error.to_string());
@@ -407,7 +407,7 @@ impl App {
         if let Some(until) = running.until()
             && self.player.pacer.shown() >= until
         {
-            (running.reached, running.fresh) = (true, true);
+            (running.reached, running.has_new_result) = (true, true);
             if self.player.is_playing() {
                 self.show_instant(until);
             }
@@ -417,7 +417,7 @@ impl App {
 
     /// Draws rings around the step's highlighted items, over everything, without affecting the layout.
     pub(super) fn ring_highlights(&self, ui: &egui::Ui) {
-        let wanted = self.course().map_or(&[][..], |running| &running.now().highlight);
+        let wanted = self.course().map_or(&[][..], |running| &running.current_step().highlight);
         let joints = &self.player.running().machine.ball_joints;
         let joint = |name: &String| joints.iter().position(|joint| joint.name == *name);
         let places = ControlFinder::places(ui.ctx(), &self.pointed_controls());
@@ -444,7 +444,7 @@ impl App {
 
     /// Names of the highlighted controls of the step.
     fn pointed_controls(&self) -> Vec<String> {
-        let wanted = self.course().map_or(&[][..], |running| &running.now().highlight);
+        let wanted = self.course().map_or(&[][..], |running| &running.current_step().highlight);
         let joints = &self.player.running().machine.ball_joints;
         wanted.iter().filter(|name| joints.iter().all(|joint| joint.name != **name)).cloned().collect()
     }

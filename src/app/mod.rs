@@ -318,7 +318,7 @@ pub struct App {
     /// The film in progress.
     film: Option<film::RunningFilm>,
     /// Settings of the last film.
-    film_wanted: Option<film::FilmSettings>,
+    film_settings: Option<film::FilmSettings>,
     presentation: Option<present::Presentation>,
     /// The zoom before it was reduced for a tiny window.
     squeezed: Option<f32>,
@@ -411,7 +411,7 @@ impl App {
             picture: Picture::default(),
             scene_pictures: ScenePictures::default(),
             film: None,
-            film_wanted: None,
+            film_settings: None,
             presentation: None,
             squeezed: None,
             single_plot: None,
@@ -600,15 +600,16 @@ impl App {
             bench::BenchRequest::Ready(sweep) => match sweep.scene() {
                 Err(error) => self.problem = Some(error.to_string()),
                 Ok(scene) => {
-                    let lost = value::changes(self.player.pending());
+                    let lost_changes = value::changes(self.player.pending());
                     // Changes made by another ready sweep are no loss.
-                    let opened = READY_SWEEPS.iter().filter_map(|ready| ready.scene().ok());
-                    let mut known = opened.chain([scene]);
-                    let same = known.any(|scene| value::differences(&scene, self.player.pending(), &[]).is_empty());
-                    if same || lost.is_empty() {
+                    let ready_scenes = READY_SWEEPS.iter().filter_map(|ready| ready.scene().ok());
+                    let mut known_scenes = ready_scenes.chain([scene]);
+                    let same =
+                        known_scenes.any(|scene| value::differences(&scene, self.player.pending(), &[]).is_empty());
+                    if same || lost_changes.is_empty() {
                         self.start_ready_sweep(sweep);
                     } else {
-                        self.dialog = Some(Dialog::Ready { sweep, lost });
+                        self.dialog = Some(Dialog::Ready { sweep, lost: lost_changes });
                     }
                 }
             },
@@ -645,8 +646,8 @@ impl App {
         let phase = self.player.watch().phase();
         let twin = self.player.twin().is_some();
         let pose = self.viewport.pose();
-        let (there, here) = (&load.scene, SceneSource::of(self.player.pending()));
-        let same = (&there.text, &there.beside) == (&here.text, &here.beside);
+        let (target, current) = (&load.scene, SceneSource::of(self.player.pending()));
+        let same = (&target.text, &target.beside) == (&current.text, &current.beside);
         let file = self.scene_file.name().map(str::to_owned).filter(|_| same);
         let scene = load.scene.scene().map_err(|error| error.to_string());
         self.problem = scene.and_then(|scene| self.show_scene(&scene)).err();
@@ -804,17 +805,17 @@ impl App {
         if self.film.is_some() {
             return true;
         }
-        let sought = self.player.is_seeking();
+        let was_seeking = self.player.is_seeking();
         // Two machines side by side show the same instant: the current one waits for the other.
         let waits = self.plots.comparison.is_behind(&self.player);
         self.advance_with_sound(if waits { 0.0 } else { dt });
-        if sought && !self.player.is_seeking() {
+        if was_seeking && !self.player.is_seeking() {
             self.viewport.restore_marks(&self.player);
         }
         self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
         let moves = self.advance_earlier_runs(dt as f32) || moves;
-        moves || sought || self.player.is_seeking() || self.player.is_playing() || self.player.is_ideal_behind()
+        moves || was_seeking || self.player.is_seeking() || self.player.is_playing() || self.player.is_ideal_behind()
     }
 
     /// Steps the runs between two frames, as [`Player::step_between`].
@@ -834,8 +835,8 @@ impl App {
         // Cancelled first, because a film uses another time scale.
         self.cancel_film();
         player.clock = self.player.clock;
-        let another = scene.source.text != self.player.pending().source.text;
-        let scale = if another { opening::time_scale(scene) } else { self.player.pacer.scale() };
+        let is_other_scene = scene.source.text != self.player.pending().source.text;
+        let scale = if is_other_scene { opening::time_scale(scene) } else { self.player.pacer.scale() };
         player.pacer.set_scale(scale);
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
         player.set_ideal(self.player.ideal().is_some());
@@ -846,7 +847,7 @@ impl App {
         self.timeline.reset();
         self.plots.reset();
         self.plots.comparison.clear();
-        if another {
+        if is_other_scene {
             self.plots.begin(scene);
         }
         self.controls.clear();
@@ -854,7 +855,7 @@ impl App {
         (self.problem, self.refused) = (None, false);
         self.replay = None;
         self.load = None;
-        self.film_wanted = None;
+        self.film_settings = None;
         (self.verdict, self.verdict_shown) = (None, None);
         Ok(())
     }
@@ -981,8 +982,8 @@ impl App {
     /// Makes an announcement if one is due.
     fn announce(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|input| input.time);
-        let (told, wait) = self.announcer.update(now, &self.player, &self.current_message());
-        if told {
+        let (announced, wait) = self.announcer.update(now, &self.player, &self.current_message());
+        if announced {
             let event = self.announcer.is_event();
             self.host.announce(self.announcer.text(), event);
             ctx.request_repaint();
@@ -1024,8 +1025,8 @@ impl App {
                 }
             }
             Some(Answer::Film) => {
-                if let Dialog::Film { wanted } = dialog {
-                    self.problem = self.make_film(wanted).err();
+                if let Dialog::Film { settings } = dialog {
+                    self.problem = self.make_film(settings).err();
                 }
             }
             Some(Answer::Sweep) => {
@@ -1081,7 +1082,7 @@ impl eframe::App for App {
         if moves {
             ctx.request_repaint();
         }
-        self.bench.seen(now, moves);
+        self.bench.report_frame(now, moves);
         self.advance_lesson(ctx);
         self.expire_verdict(ctx);
         self.announce(ctx);

@@ -23,17 +23,17 @@ pub fn time_scale(scene: &Scene) -> f64 {
         Err(NoPeriod::Different { first, second, .. }) => Some(first.max(second)),
         Err(NoPeriod::None { .. }) => None,
     };
-    let own = || period.map_or(UNDRIVEN_SCALE, |period| round(period / PERIOD_VIEWING_TIME));
-    scene.view.time_scale.unwrap_or_else(own).clamp(SCALE_RANGE.0, SCALE_RANGE.1)
+    let from_period = || period.map_or(UNDRIVEN_SCALE, |period| round(period / PERIOD_VIEWING_TIME));
+    scene.view.time_scale.unwrap_or_else(from_period).clamp(SCALE_RANGE.0, SCALE_RANGE.1)
 }
 
 /// The nearest of 1, 1:1.5, 1:2, 1:3, 1:4, 1:5, 1:6, 1:8, 1:10, 1:15, ….
 fn round(scale: f64) -> f64 {
     let slower = 1.0 / scale.max(f64::MIN_POSITIVE);
     let decade = libm::pow(10.0, libm::log10(slower).floor());
-    let apart = |k: &f64| libm::log(k * decade / slower).abs();
+    let distance = |k: &f64| libm::log(k * decade / slower).abs();
     let steps = [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
-    let nearest = steps.into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    let nearest = steps.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
     1.0 / (nearest.unwrap_or(1.0) * decade)
 }
 

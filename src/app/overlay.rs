@@ -49,23 +49,23 @@ pub fn paint(
     above: &[Rect],
     places: &mut LabelPositions,
 ) {
-    let mut taken = above.to_vec();
+    let mut occupied = above.to_vec();
     if !list.overlay.is_empty() {
-        taken.push(triad(rect));
+        occupied.push(triad(rect));
     }
     if let Some(scale) = &list.wear_scale {
-        taken.extend(wear_scale(painter, rect, scale, theme));
+        occupied.extend(wear_scale(painter, rect, scale, theme));
     }
     if let Some(shown) = list.legend.as_ref().filter(|_| overlay.legend && fits_labels(rect)) {
-        taken.push(legend(painter, rect, scale, shown, theme));
+        occupied.push(legend(painter, rect, scale, shown, theme));
     }
     if let Some(at) = overlay.time {
         let notes = [Some(list.magnification_text.clone()), wear_note(list)];
         let notes = notes.into_iter().flatten().chain(overlay.notes.clone());
-        taken.push(time(painter, rect, at, notes, theme));
+        occupied.push(time(painter, rect, at, notes, theme));
     }
     if overlay.labels {
-        labels::paint(painter, rect, scale, list, taken, places);
+        labels::paint(painter, rect, scale, list, occupied, places);
     }
 }
 
@@ -101,7 +101,7 @@ fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = St
 }
 
 /// Right edge of the longest possible time in a picture, points.
-pub fn reach(painter: &Painter) -> f32 {
+pub fn time_extent(painter: &Painter) -> f32 {
     let longest = format!("t = {} ms", "0".repeat(value::MAX_TIME_CHARACTERS - 3));
     let words =
         painter.layout_no_wrap(longest, FontId::proportional(TIME_FONT_SIZE), colour(Palette::of(Theme::Light).text));

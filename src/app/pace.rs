@@ -69,24 +69,24 @@ impl Default for Pace {
 
 impl Pace {
     /// Takes a frame; returns the quality to draw it with.
-    pub fn frame(&mut self, seen: &ShownFrame) -> Quality {
-        if seen.size != self.size {
+    pub fn frame(&mut self, shown: &ShownFrame) -> Quality {
+        if shown.size != self.size {
             // Another size may have more headroom.
-            (self.size, self.wait) = (seen.size, RAISE_AFTER.0);
+            (self.size, self.wait) = (shown.size, RAISE_AFTER.0);
         }
-        if seen.now > self.latest {
-            let goes_on = self.moved == self.latest;
-            if seen.moves && goes_on && seen.dt < REST {
-                self.count(seen.dt, seen.drawing);
+        if shown.now > self.latest {
+            let is_consecutive = self.moved == self.latest;
+            if shown.moves && is_consecutive && shown.dt < REST {
+                self.count_frame(shown.dt, shown.drawing);
             } else {
                 self.slow = (0, 0.0);
             }
-            self.latest = seen.now;
+            self.latest = shown.now;
         }
-        if seen.moves {
-            self.moved = seen.now;
+        if shown.moves {
+            self.moved = shown.now;
         }
-        match self.time_to_rest(seen.now) {
+        match self.time_to_rest(shown.now) {
             Some(_) => Quality::LADDER[self.row],
             None => Quality::FULL,
         }
@@ -99,7 +99,7 @@ impl Pace {
     }
 
     /// Counts a frame between moving frames.
-    fn count(&mut self, dt: f64, drawing: f64) {
+    fn count_frame(&mut self, dt: f64, drawing: f64) {
         self.slow = if dt > SLOW_FRAME && 2.0 * drawing >= dt { (self.slow.0 + 1, self.slow.1 + dt) } else { (0, 0.0) };
         self.room = if drawing < HEADROOM_FRAME { self.room + dt } else { (self.room - HEADROOM_LOSS * dt).max(0.0) };
         let trial = self.trial.map(|trial| trial + dt);
@@ -113,14 +113,14 @@ impl Pace {
             if self.trial.take().is_some() {
                 self.wait = (RAISE_AFTER_GROWTH * self.wait).min(RAISE_AFTER.1);
             }
-            self.go_to((self.row + 1).min(Quality::LADDER.len() - 1));
+            self.set_row((self.row + 1).min(Quality::LADDER.len() - 1));
         } else if self.row > 0 && self.room >= self.wait {
             self.trial = Some(0.0);
-            self.go_to(self.row - 1);
+            self.set_row(self.row - 1);
         }
     }
 
-    fn go_to(&mut self, row: usize) {
+    fn set_row(&mut self, row: usize) {
         (self.row, self.slow, self.room) = (row, (0, 0.0), 0.0);
     }
 }

@@ -46,9 +46,9 @@ impl Contents {
 /// Settings of the next picture, and a pending picture.
 pub struct Picture {
     contents: Contents,
-    /// Multiple of the size on the screen; `None`: the typed size `own`.
+    /// Multiple of the size on the screen; `None`: the typed size `own_size`.
     times: Option<u32>,
-    own: [u32; 2],
+    own_size: [u32; 2],
     /// Whether a picture was requested.
     requested: bool,
     pending: Option<(Pending, f64)>,
@@ -61,7 +61,7 @@ impl Default for Picture {
         Self {
             contents: Contents::View,
             times: Some(SCALES[0]),
-            own: [1920, 1080],
+            own_size: [1920, 1080],
             requested: false,
             pending: None,
             drawn: None,
@@ -93,8 +93,8 @@ impl Picture {
                 (pixels.map(|edge| edge * times), screen * times as f32)
             }
             None => {
-                let [across, down] = self.own.map(|edge| edge as f32);
-                (self.own, (across / points.x).min(down / points.y))
+                let [across, down] = self.own_size.map(|edge| edge as f32);
+                (self.own_size, (across / points.x).min(down / points.y))
             }
         };
         if self.times == Some(1) {
@@ -130,14 +130,14 @@ impl App {
                 let help = format!("{times} times as many pixels along each edge as on the screen");
                 ui.selectable_value(&mut picture.times, Some(times), format!("{times}×")).on_hover_text(help);
             }
-            let own = Button::selectable(picture.times.is_none(), "Own size");
-            if ui.add(own).on_hover_text("Choose width and height").clicked() {
+            let own_size = Button::selectable(picture.times.is_none(), "Own size");
+            if ui.add(own_size).on_hover_text("Choose width and height").clicked() {
                 picture.times = None;
             }
         });
         ui.add_enabled_ui(picture.times.is_none(), |ui| {
             ui.horizontal(|ui| {
-                for (edge, name) in picture.own.iter_mut().zip(["Width", "Height"]) {
+                for (edge, name) in picture.own_size.iter_mut().zip(["Width", "Height"]) {
                     ui.label(name);
                     ui.add(DragValue::new(edge).range(EDGE_RANGE).suffix(" px"))
                         .on_hover_text("Edge of the picture, pixels")
@@ -206,9 +206,9 @@ impl App {
     fn draw_picture(&mut self, ctx: &egui::Context) -> Result<Pending, String> {
         let state: RenderState =
             self.graphics.clone().ok_or("The picture cannot be drawn: there is no graphics adapter")?;
-        let measures = self.picture.size(self.picture_points(ctx), ctx.pixels_per_point());
+        let resolution = self.picture.size(self.picture_points(ctx), ctx.pixels_per_point());
         let contents = self.picture.contents;
-        let drawn = self.draw_off_screen(ctx, &mut Canvas::beside(&state), contents, measures, true);
+        let drawn = self.draw_off_screen(ctx, &mut Canvas::beside(&state), contents, resolution, true);
         drawn.map_err(|error| format!("The picture cannot be drawn: {error}"))
     }
 
@@ -224,11 +224,11 @@ impl App {
         size: [u32; 2],
         first: bool,
     ) -> Result<Pending, String> {
-        let kept = (self.picture.contents, self.picture.times, self.picture.own);
-        (self.picture.contents, self.picture.times, self.picture.own) = (contents, None, size);
-        let measures = self.picture.size(self.picture_points(ctx), ctx.pixels_per_point());
-        (self.picture.contents, self.picture.times, self.picture.own) = kept;
-        let drawn = self.draw_off_screen(ctx, canvas, contents, measures, first);
+        let saved = (self.picture.contents, self.picture.times, self.picture.own_size);
+        (self.picture.contents, self.picture.times, self.picture.own_size) = (contents, None, size);
+        let resolution = self.picture.size(self.picture_points(ctx), ctx.pixels_per_point());
+        (self.picture.contents, self.picture.times, self.picture.own_size) = saved;
+        let drawn = self.draw_off_screen(ctx, canvas, contents, resolution, first);
         drawn.map_err(|error| error.to_string())
     }
 
@@ -251,7 +251,7 @@ impl App {
             canvas.ctx.set_theme(ctx.theme());
             canvas.time = ctx.input(|input| input.time);
         }
-        let kept = (self.picture_rect, self.compact, self.fingers);
+        let saved = (self.picture_rect, self.compact, self.fingers);
         self.viewport.freeze(Some(self.picture_rect.aspect_ratio()));
         self.picture.drawn = Some(contents);
         // egui settles new layouts over a few passes.
@@ -264,7 +264,7 @@ impl App {
         }
         self.picture.drawn = None;
         self.viewport.freeze(None);
-        (self.picture_rect, self.compact, self.fingers) = kept;
+        (self.picture_rect, self.compact, self.fingers) = saved;
         Ok(canvas.paint(output?, size, scale))
     }
 
@@ -289,8 +289,8 @@ mod tests {
 
     #[test]
     fn a_larger_picture_is_sharper_and_a_small_view_gets_room_for_its_names() {
-        let of = |times, own, points, screen| {
-            let picture = Picture { times, own, ..Picture::default() };
+        let of = |times, own_size, points, screen| {
+            let picture = Picture { times, own_size, ..Picture::default() };
             picture.size(points, screen)
         };
         let view = vec2(980.0, 470.0);

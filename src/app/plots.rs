@@ -59,7 +59,7 @@ pub struct Plots {
     levels: Vec<Trace>,
     readings: Vec<Vec<PlotPoint>>,
     /// Traces of the same plot in the runs before a change.
-    before: Vec<Vec<Trace>>,
+    earlier: Vec<Vec<Trace>>,
     /// Runs before a change; their curves are drawn as well.
     pub comparison: Comparison,
     /// Latest screen position of each quantity's plot.
@@ -223,7 +223,7 @@ impl Plots {
             traces: Vec::new(),
             levels: Vec::new(),
             readings: Vec::new(),
-            before: Vec::new(),
+            earlier: Vec::new(),
             comparison: Comparison::default(),
             places: Vec::new(),
             zoomed: None,
@@ -318,12 +318,12 @@ impl Plots {
         }
         let Self { picked, found, .. } = self;
         let found = found.as_ref().map_or(&[][..], |(_, entries)| entries);
-        let own = picked.iter().filter(|name| !found.iter().any(|entry| entry.name == **name));
-        let own: Vec<String> = own.cloned().collect();
+        let unlisted = picked.iter().filter(|name| !found.iter().any(|entry| entry.name == **name));
+        let unlisted: Vec<String> = unlisted.cloned().collect();
         let mut toggled = None;
         ScrollArea::vertical().id_salt("channels").max_height(180.0).show(ui, |ui| {
             let listed = found.iter().map(|entry| (&entry.name, &*entry.units));
-            for (name, units) in own.iter().map(|name| (name, "")).chain(listed) {
+            for (name, units) in unlisted.iter().map(|name| (name, "")).chain(listed) {
                 let mut on = picked.contains(name);
                 let label = match units {
                     "" => name.clone(),
@@ -482,10 +482,11 @@ impl Plots {
             }
         }
         let kind = panel.kind;
-        self.before.clear();
+        self.earlier.clear();
         if kind != PlotKind::Bands {
             let shown = self.comparison.shown();
-            self.before.extend(shown.map(|kept| before(kept, player, panel, &self.hidden, dark, (from, to, bins))));
+            self.earlier
+                .extend(shown.map(|kept| earlier_traces(kept, player, panel, &self.hidden, dark, (from, to, bins))));
         }
         self.levels.clear();
         if kind == PlotKind::FromZeroWithClearances {
@@ -502,13 +503,13 @@ impl Plots {
         let bands = if kind == PlotKind::Bands { self.bands(members, units) } else { Vec::new() };
         let from_zero = matches!(kind, PlotKind::FromZero | PlotKind::FromZeroWithClearances);
         let values = if bands.is_empty() {
-            extremes(self.traces.iter().chain(&self.levels).chain(self.before.iter().flatten()), size)
+            extremes(self.traces.iter().chain(&self.levels).chain(self.earlier.iter().flatten()), size)
         } else {
             let edges = bands.iter().flat_map(|band| band.low.iter().chain(&band.high));
-            edges.fold(None, |all, &edge| widened(all, edge, edge))
+            edges.fold(None, |all, &edge| extended(all, edge, edge))
         };
         let first_peaks = (kind == PlotKind::FromZero && self.zoomed.is_none())
-            .then(|| cut::peaks(self.traces.iter().chain(self.before.iter().flatten())))
+            .then(|| cut::peaks(self.traces.iter().chain(self.earlier.iter().flatten())))
             .flatten();
         let cut_off = first_peaks.filter(|peaks| self.cut.unwrap_or(peaks.brief));
         let values = values.map(|(least, most)| (least, cut_off.map_or(most, |peaks| peaks.most() / size)));
@@ -531,7 +532,7 @@ impl Plots {
             let time_mark =
                 move |mark: &GridMark| format!("{} {time_unit}", tick(mark.value, mark.step_size, to / time_size));
             let frame = f64::from(width - 52.0);
-            let across = axis(AxisHints::new_x()).label_spacing(Rangef::new(0.0, 1.0)).formatter(move |mark, range| {
+            let x_axis = axis(AxisHints::new_x()).label_spacing(Rangef::new(0.0, 1.0)).formatter(move |mark, range| {
                 let words = time_mark(&mark);
                 let beyond = (range.end() - mark.value) / (range.end() - range.start()) * frame;
                 // Omits a mark that would extend into the next plot.
@@ -540,22 +541,22 @@ impl Plots {
                 }
                 words
             });
-            let up = axis(AxisHints::new_y()).min_thickness(40.0).label_spacing(Rangef::new(0.0, 1.0)).formatter(
+            let y_axis = axis(AxisHints::new_y()).min_thickness(40.0).label_spacing(Rangef::new(0.0, 1.0)).formatter(
                 |mark, range| {
                     let most = range.start().abs().max(range.end().abs());
                     short_tick(mark.value, mark.step_size, most)
                 },
             );
             // Marks at late times have long labels, so fewer fit side by side.
-            let letters = |mark: &GridMark| time_mark(mark).chars().count();
+            let label_length = |mark: &GridMark| time_mark(mark).chars().count();
             let marks_across = move |input: GridInput| {
                 let marks = marks(&input, MAX_MARKS);
-                let longest = marks.iter().map(letters).max().unwrap_or(1);
+                let longest = marks.iter().map(label_length).max().unwrap_or(1);
                 let room = frame / (LETTER_WIDTH * longest as f64 + 8.0);
                 if room < MAX_MARKS { self::marks(&input, room.max(1.0)) } else { marks }
             };
-            let finest = value::digits_within(greatest - least, least.abs().max(greatest.abs()));
-            let earliest = value::digits_within(length, to);
+            let value_digits = value::digits_within(greatest - least, least.abs().max(greatest.abs()));
+            let time_digits = value::digits_within(length, to);
             let plot = Plot::new(("plot", panel.label, unit))
                 .width(width)
                 .height((space.y - 20.0 - theme::side(ui, 18.0)).max(60.0))
@@ -566,22 +567,22 @@ impl Plots {
                 .allow_axis_zoom_drag(false)
                 .allow_double_click_reset(false)
                 .auto_bounds(Vec2b::FALSE)
-                .custom_x_axes(vec![across])
-                .custom_y_axes(vec![up])
+                .custom_x_axes(vec![x_axis])
+                .custom_y_axes(vec![y_axis])
                 .x_grid_spacer(marks_across)
                 .y_grid_spacer(|input| marks(&input, MAX_MARKS))
                 .grid_spacing(Rangef::new(MIN_MARK_DISTANCE, 300.0))
                 .grid_color(faint.gamma_multiply(0.35))
                 .grid_fade(0.0);
-            let Self { traces, levels, readings, hidden, comparison, before, .. } = &*self;
-            let instant = |time: f64| format!("{} {time_unit}", value::number(time / time_size, earliest));
+            let Self { traces, levels, readings, hidden, comparison, earlier, .. } = &*self;
+            let instant = |time: f64| format!("{} {time_unit}", value::number(time / time_size, time_digits));
             // All curves at an instant, appended to `words`.
             let reading = |time: f64, mut words: String, between: &str| {
                 for ((_, member), trace) in members.iter().zip(traces) {
                     let Some((least, greatest)) = trace.at(time) else {
                         continue;
                     };
-                    let [least, greatest] = [least, greatest].map(|v| value::number(v / size, finest));
+                    let [least, greatest] = [least, greatest].map(|v| value::number(v / size, value_digits));
                     words += &if least == greatest {
                         format!("{between}{member} {least} {unit}")
                     } else {
@@ -610,7 +611,7 @@ impl Plots {
                     return;
                 }
                 plot.add(Curves::new(levels, units).dashed(1.0, curve::DASH));
-                for (kept, traces) in comparison.shown().zip(before) {
+                for (kept, traces) in comparison.shown().zip(earlier) {
                     let curves = Curves::new(traces, units);
                     plot.add(match kept.dashes() {
                         Some(length) => curves.dashed(curve::WIDTH, length),
@@ -637,9 +638,9 @@ impl Plots {
                     let values = values.trim_start_matches(", ");
                     node.set_label(spoken::words(&format!("{values} at {}", instant(time))));
                 } else {
-                    let mut words = format!("{} to {}", value::number(from / time_size, earliest), instant(to));
+                    let mut words = format!("{} to {}", value::number(from / time_size, time_digits), instant(to));
                     if let Some((member, least, most, time)) = largest(members, traces) {
-                        let [least, most] = [least, most].map(|v| value::number(v / size, finest));
+                        let [least, most] = [least, most].map(|v| value::number(v / size, value_digits));
                         words += &format!(", from {least} to {most} {unit}, largest in {member} at {}", instant(time));
                     }
                     node.set_value(spoken::words(&words));
@@ -657,7 +658,7 @@ impl Plots {
             };
             let frame = *transform.frame();
             if cut_off.is_some() {
-                for trace in self.before.iter().flatten().chain(&self.traces) {
+                for trace in self.earlier.iter().flatten().chain(&self.traces) {
                     cut::mark(ui, frame, trace, greatest * size, x);
                 }
             }
@@ -837,7 +838,7 @@ fn largest<'a>(members: &[(usize, &'a str)], traces: &[Trace]) -> Option<(&'a st
 }
 
 /// Record of the members of `panel` in `kept` between two instants, s, with a limited number of bins.
-fn before(
+fn earlier_traces(
     kept: &EarlierRun,
     player: &Player,
     panel: &Panel<'_>,
@@ -872,7 +873,7 @@ struct Band<'a> {
     high: Vec<f64>,
 }
 
-fn widened(all: Option<(f64, f64)>, least: f64, greatest: f64) -> Option<(f64, f64)> {
+fn extended(all: Option<(f64, f64)>, least: f64, greatest: f64) -> Option<(f64, f64)> {
     let (a, b) = all.unwrap_or((least, greatest));
     Some((a.min(least), b.max(greatest)))
 }
@@ -880,7 +881,7 @@ fn widened(all: Option<(f64, f64)>, least: f64, greatest: f64) -> Option<(f64, f
 /// Least and greatest value in `traces`, in units of `size`.
 fn extremes<'a>(traces: impl Iterator<Item = &'a Trace>, size: f64) -> Option<(f64, f64)> {
     let bins = traces.flat_map(|trace| &trace.bins);
-    bins.fold(None, |all, bin| widened(all, bin.least / size, bin.greatest / size))
+    bins.fold(None, |all, bin| extended(all, bin.least / size, bin.greatest / size))
 }
 
 /// Axis range for a range of values, or for none: with a margin, or wide enough to look flat if the values differ only by
@@ -962,16 +963,16 @@ fn time_axis_until(length: f64, to: f64) -> (&'static str, f64) {
 
 /// Label of a mark on an axis up to `most` with mark distance `step`: enough digits to distinguish neighbours.
 pub(super) fn tick(mark: f64, step: f64, most: f64) -> String {
-    written(mark, step, (1e-4..1e9).contains(&most))
+    format_mark(mark, step, (1e-4..1e9).contains(&most))
 }
 
 /// The same beside a plot, with room for four digits: `2e4`. More digits would move the plot at a high peak.
 fn short_tick(mark: f64, step: f64, most: f64) -> String {
-    written(mark, step, (1e-4..1e4).contains(&most))
+    format_mark(mark, step, (1e-4..1e4).contains(&most))
 }
 
 /// A mark's label in plain digits or with a power of ten.
-fn written(mark: f64, step: f64, in_digits: bool) -> String {
+fn format_mark(mark: f64, step: f64, in_digits: bool) -> String {
     if mark.abs() < 1e-6 * step {
         return "0".to_owned();
     }

@@ -55,7 +55,7 @@ pub(super) fn screen_height(ctx: &egui::Context) -> f32 {
 }
 
 /// Zoom at which the smallest type is legible from the last row of a screen `height` points high.
-pub(super) fn legible(height: f32) -> f32 {
+pub(super) fn legible_zoom(height: f32) -> f32 {
     (height * MIN_TEXT_HEIGHT / SMALLEST_FONT).max(1.0)
 }
 
@@ -78,7 +78,7 @@ impl App {
                     thickness: self.viewport.options.arrows.thickness,
                     height,
                 });
-                ctx.set_zoom_factor(legible(height));
+                ctx.set_zoom_factor(legible_zoom(height));
                 self.viewport.options.arrows.thickness = ARROW_THICKNESS;
             }
         }
@@ -116,20 +116,20 @@ impl App {
     /// Sizes the type for the screen after a size change, e.g. when entering or leaving full screen.
     pub(super) fn follow_screen(&mut self, ctx: &egui::Context) {
         let Some(presentation) = &mut self.presentation else {
-            return self.squeeze(ctx);
+            return self.reduce_zoom(ctx);
         };
         let height = screen_height(ctx);
         let change = (height - presentation.height).abs();
         // The new zoom takes effect a pass later; only then the height is that of the screen.
-        let settled = (ctx.zoom_factor() - legible(presentation.height)).abs() < 1e-3;
+        let settled = (ctx.zoom_factor() - legible_zoom(presentation.height)).abs() < 1e-3;
         if settled && change > MIN_HEIGHT_CHANGE * presentation.height {
             presentation.height = height;
-            ctx.set_zoom_factor(legible(height));
+            ctx.set_zoom_factor(legible_zoom(height));
         }
     }
 
     /// Reduces the zoom in a window that is too small for its controls, e.g. on a page zoomed to four times the size.
-    fn squeeze(&mut self, ctx: &egui::Context) {
+    fn reduce_zoom(&mut self, ctx: &egui::Context) {
         let now = ctx.zoom_factor();
         let own = self.squeezed.unwrap_or(now);
         let room = ctx.content_rect().size() * now / MIN_WINDOW_SIZE;
@@ -150,8 +150,8 @@ impl App {
             .show(ui, |ui| {
                 leave = double_tapped(ui);
                 // A lesson needs the height, so the timeline gets the rest of the row.
-                let teaching = self.course().is_some();
-                if !teaching {
+                let in_lesson = self.course().is_some();
+                if !in_lesson {
                     ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 }
                 let backwards = egui::Layout::right_to_left(egui::Align::Center);
@@ -167,11 +167,11 @@ impl App {
                     leave |= self.presentation_buttons(ui);
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                         ui.add_enabled_ui(free, |ui| {
-                            if !teaching || width < MIN_BAR_WIDTH {
+                            if !in_lesson || width < MIN_BAR_WIDTH {
                                 return transport::row(ui, &mut self.player);
                             }
                             ui.horizontal(|ui| {
-                                let reset = transport::least(ui, &mut self.player);
+                                let reset = transport::minimal(ui, &mut self.player);
                                 self.timeline_ui(ui);
                                 reset
                             })
@@ -207,9 +207,9 @@ impl App {
 
     /// The selected plot; in a lesson that refers to plots, all of them.
     fn presented_plots(&mut self, ui: &mut Ui, bar: egui::Frame) {
-        let teaching = self.course().is_some();
-        let single = self.single_plot().filter(|_| !teaching);
-        if single.is_none() && !(teaching && self.show_plots) {
+        let in_lesson = self.course().is_some();
+        let single = self.single_plot().filter(|_| !in_lesson);
+        if single.is_none() && !(in_lesson && self.show_plots) {
             return;
         }
         let free = !self.is_under_way();
@@ -235,8 +235,8 @@ impl App {
         let impact = player.impact_record().last_ended(shown, shown)?;
         let name = &player.running().machine.ball_joints[impact.joint].name;
         let force = value::quantity(impact.peak, "N", 3);
-        let lasted = (impact.end - impact.start) * 1e3;
-        Some(format!("{name}, {force}, {} ms", value::number(lasted, 2)))
+        let duration_ms = (impact.end - impact.start) * 1e3;
+        Some(format!("{name}, {force}, {} ms", value::number(duration_ms, 2)))
     }
 
     /// Text of the caption and its plate in the picture's `area`: the impact at the inspected instant; when `presenting`,

@@ -16,9 +16,9 @@ const MAX_REPLAY_TIME: f64 = 0.4;
 pub(super) struct SceneFile {
     name: Option<String>,
     /// Referenced files that the host also watches; `None` until the host is told.
-    told: Option<Vec<String>>,
+    watched: Option<Vec<String>>,
     /// The referenced file with an error. The displayed scene may lack it.
-    wrong: Option<String>,
+    faulty: Option<String>,
     /// Files opened together with the scene file.
     companions: FileContents,
     /// Changes stored in a file or delivered with the scene: those at the first check.
@@ -70,21 +70,21 @@ impl App {
     /// Makes the host watch the files of the scene, and reloads the scene after a save.
     pub(super) fn receive_saved_scene(&mut self, ctx: &egui::Context) {
         // The changes of a link arrive with its replay.
-        let there = self.replay.is_none();
+        let has_changes = self.replay.is_none();
         let file = &mut self.scene_file;
-        let wanted = self.player.pending();
-        if there && file.saved.is_none() {
-            file.saved = Some(wanted.changes.clone());
+        let pending = self.player.pending();
+        if has_changes && file.saved.is_none() {
+            file.saved = Some(pending.changes.clone());
         }
-        let beside = &wanted.source.beside;
-        let wrong = file.wrong.as_ref();
-        let wrong = wrong.filter(|wrong| !beside.contains_key(*wrong));
-        let names = beside.keys().chain(wrong).filter(|_| file.name.is_some());
-        let told = file.told.as_ref();
-        if told.is_none_or(|told| !names.clone().eq(told)) {
+        let beside = &pending.source.beside;
+        let faulty = file.faulty.as_ref();
+        let faulty = faulty.filter(|faulty| !beside.contains_key(*faulty));
+        let names = beside.keys().chain(faulty).filter(|_| file.name.is_some());
+        let watched = file.watched.as_ref();
+        if watched.is_none_or(|watched| !names.clone().eq(watched)) {
             let names: Vec<String> = names.cloned().collect();
             self.host.watch(ctx, file.name.as_deref(), &names);
-            file.told = Some(names);
+            file.watched = Some(names);
         }
         while let Some(file) = self.host.saved_elsewhere() {
             // The latest message may concern a file that is no longer displayed.
@@ -114,15 +114,15 @@ impl App {
         let name = file.name;
         let bytes = file.content.map_err(|reason| format!("{name}: {reason}"))?;
         let text = String::from_utf8(bytes).map_err(|_| format!("{name}: not a text file"))?;
-        let wanted = self.player.pending();
-        let source = &wanted.source;
-        let again = |scene: Scene| scene.source.beside == source.beside;
+        let pending = self.player.pending();
+        let source = &pending.source;
+        let has_same_files = |scene: Scene| scene.source.beside == source.beside;
         let same = text == source.text;
         let companions = self.scene_file.companions.clone();
-        if same && (self.parse_file(&name, &text, &companions, &wanted.changes)).is_ok_and(again) {
+        if same && (self.parse_file(&name, &text, &companions, &pending.changes)).is_ok_and(has_same_files) {
             // Saved without changes, or reverted after an error.
             self.problem = None;
-            self.scene_file.wrong = None;
+            self.scene_file.faulty = None;
             return Ok(());
         }
         let before = Scene::parse_with(&source.text, Some(&name), &source.beside, &[]);
@@ -130,28 +130,28 @@ impl App {
             Ok(after) => after,
             Err(error) => {
                 let file = error.file.clone();
-                self.scene_file.wrong = file.filter(|file| *file != name);
+                self.scene_file.faulty = file.filter(|file| *file != name);
                 return Err(error.to_string());
             }
         };
-        let stays = |key: &str| {
+        let is_unchanged_in_file = |key: &str| {
             let before = before.as_ref().ok().and_then(|scene| scene.get(key).ok());
             before.is_some() && before == after.get(key).ok()
         };
         let mut changes = self.player.pending().changes.clone();
-        changes.retain(|(key, _)| stays(key));
+        changes.retain(|(key, _)| is_unchanged_in_file(key));
         let scene = self.parse_file(&name, &text, &companions, &changes);
         let scene = scene.map_err(|error| error.to_string())?;
 
         let link = self.link();
         let (playing, twin) = (self.player.is_playing(), self.player.twin().is_some());
         let (phase, time) = (self.player.watch().phase(), self.player.pacer.shown());
-        let told = self.scene_file.told.clone();
+        let watched = self.scene_file.watched.clone();
         let (scale, chosen, window) = (self.player.pacer.scale(), self.plots.chosen.clone(), self.plots.window);
         self.show_scene(&scene)?;
         self.player.pacer.set_scale(scale);
         (self.plots.chosen, self.plots.window) = (chosen, window);
-        self.scene_file = SceneFile { told, ..SceneFile::opened(name, companions) };
+        self.scene_file = SceneFile { watched, ..SceneFile::opened(name, companions) };
         self.player.set_phase(phase);
         let (clock, start) = (self.player.clock, (self.player.clock)());
         let reached = self.player.run_towards(time, || clock() - start < MAX_REPLAY_TIME);

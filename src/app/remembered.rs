@@ -165,11 +165,11 @@ impl App {
     /// Records the settings of the window.
     pub(super) fn remember(&mut self, ctx: &egui::Context) {
         let (scale, zoom) = (ctx.zoom_factor(), self.own_zoom(ctx));
-        let whole_screen = self.is_presenting();
+        let is_full_screen = self.is_presenting();
         let file = self.scene_file.name().map(|name| absolute(Path::new(name)));
         let scene = self.player.pending();
         let built_in = built_in_text(&scene.name).is_some_and(|text| *text == *scene.source.text);
-        let teaching = self.running_lesson.is_some();
+        let in_lesson = self.running_lesson.is_some();
         let Some(store) = &mut self.store else {
             return;
         };
@@ -181,7 +181,7 @@ impl App {
             let window = input.viewport();
             let is = |state: Option<bool>| state == Some(true);
             now.maximized = is(window.maximized);
-            if !settled || now.maximized || whole_screen || is(window.fullscreen) || is(window.minimized) {
+            if !settled || now.maximized || is_full_screen || is(window.fullscreen) || is(window.minimized) {
                 return;
             }
             if let Some(inner) = window.inner_rect {
@@ -195,12 +195,12 @@ impl App {
         let choice = ThemeChoice::ALL.into_iter().find(|choice| theme::preference(*choice) == theme);
         now.theme = choice.map(|choice| choice.word().to_owned());
         now.zoom = Some(zoom);
-        if let Some(file) = file.filter(|_| !teaching) {
+        if let Some(file) = file.filter(|_| !in_lesson) {
             if now.scene.as_ref() != Some(&file) {
                 now.add_recent(file.clone());
                 now.scene = Some(file);
             }
-        } else if built_in && !teaching {
+        } else if built_in && !in_lesson {
             let first = scene.name == DEFAULT_SCENE && opening::is_rattling(scene);
             now.scene = (!first).then(|| scene.name.clone());
         }

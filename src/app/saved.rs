@@ -32,7 +32,7 @@ impl Watcher {
         let (name, path) = (name.to_owned(), PathBuf::from(name));
         let others = beside.iter().map(|other| path.with_file_name(other));
         let files: Vec<PathBuf> = std::iter::once(path.clone()).chain(others).collect();
-        let look = move || {
+        let watch_files = move || {
             let stamps = || -> Vec<_> { files.iter().map(|file| stamp(file)).collect() };
             let mut seen = vec![None; files.len()];
             while !is_over.load(Ordering::Relaxed) {
@@ -43,8 +43,8 @@ impl Watcher {
                         continue;
                     }
                     // Some editors replace a file, which is briefly missing then.
-                    let there = |(now, seen): (&Option<_>, &Option<_>)| now.is_some() && now != seen;
-                    let saved = now[0].is_some() && now.iter().zip(&seen).any(there);
+                    let was_written = |(now, seen): (&Option<_>, &Option<_>)| now.is_some() && now != seen;
+                    let saved = now[0].is_some() && now.iter().zip(&seen).any(was_written);
                     seen = now;
                     if saved {
                         let (name, content) = (name.clone(), read(&path));
@@ -58,7 +58,7 @@ impl Watcher {
             }
         };
         let builder = std::thread::Builder::new().name("scene file".to_owned());
-        builder.spawn(look).ok()?;
+        builder.spawn(watch_files).ok()?;
         Some(Self { changes, over })
     }
 

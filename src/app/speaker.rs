@@ -27,14 +27,14 @@ impl Speaker {
         let (clicks, to_play) = channel();
         let (fail, failed) = channel();
         let (open, closed) = channel::<()>();
-        let told = fail.clone();
-        let begun =
-            std::thread::Builder::new().name("sound".to_owned()).spawn(move || match stream(to_play, told.clone()) {
+        let report = fail.clone();
+        let spawned =
+            std::thread::Builder::new().name("sound".to_owned()).spawn(move || match stream(to_play, report.clone()) {
                 // Blocks until the other end is dropped.
                 Ok(_stream) => drop(closed.recv()),
-                Err(why) => drop(told.send(why)),
+                Err(why) => drop(report.send(why)),
             });
-        if let Err(error) = begun {
+        if let Err(error) = spawned {
             let _ = fail.send(error.to_string());
         }
         Self { clicks, failed, _open: open }
@@ -45,13 +45,13 @@ impl Speaker {
         let now = Instant::now() + LATENCY;
         for click in clicks {
             let due = now + Duration::from_secs_f64(click.after.max(0.0));
-            // `failed` reports a lost device.
+            // `failure` reports a lost device.
             let _ = self.clicks.send((due, *click));
         }
     }
 
     /// The error that silences the device, once known.
-    pub fn failed(&self) -> Option<String> {
+    pub fn failure(&self) -> Option<String> {
         self.failed.try_recv().ok()
     }
 }

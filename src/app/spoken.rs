@@ -37,8 +37,8 @@ pub fn words(text: &str) -> String {
         }
         // In a product only the last factor is plural: newton metres.
         let factor = |next: &&str| end.is_empty() && unit(next, true).is_some();
-        let one = number == Some(1.0) || rest.peek().is_some_and(factor);
-        match number.and_then(|_| unit(symbol, one)) {
+        let singular = number == Some(1.0) || rest.peek().is_some_and(factor);
+        match number.and_then(|_| unit(symbol, singular)) {
             Some(name) => {
                 number = number.filter(|_| end.is_empty());
                 parts.push(name + end);
@@ -53,13 +53,13 @@ pub fn words(text: &str) -> String {
 }
 
 /// Name of the unit `symbol`, singular or plural; `None` if it is not a unit.
-pub fn unit(symbol: &str, one: bool) -> Option<String> {
+pub fn unit(symbol: &str, singular: bool) -> Option<String> {
     if let Some((above, below)) = symbol.split_once('/') {
-        return Some(format!("{} per {}", unit(above, one)?, unit(below, true)?));
+        return Some(format!("{} per {}", unit(above, singular)?, unit(below, true)?));
     }
     for (power, words) in [('²', " squared"), ('³', " cubed")] {
         if let Some(symbol) = symbol.strip_suffix(power) {
-            return Some(unit(symbol, one)? + words);
+            return Some(unit(symbol, singular)? + words);
         }
     }
     let of = |symbol: &str| UNITS.iter().find(|(own, _)| *own == symbol).map(|(_, name)| *name);
@@ -67,18 +67,18 @@ pub fn unit(symbol: &str, one: bool) -> Option<String> {
         let (prefix, words) = PREFIXES.iter().find(|(prefix, _)| symbol.starts_with(*prefix))?;
         Some((*words, of(&symbol[prefix.len_utf8()..])?))
     })?;
-    let end = if one || name == "hertz" || name == "percent" { "" } else { "s" };
+    let end = if singular || name == "hertz" || name == "percent" { "" } else { "s" };
     Some(format!("{prefix}{name}{end}"))
 }
 
 /// Sets `text`, with units spelled out, as the spoken value of a slider.
-pub fn value(of: &Response, text: &str) {
-    of.ctx.accesskit_node_builder(of.id, |node| node.set_value(words(text)));
+pub fn value(response: &Response, text: &str) {
+    response.ctx.accesskit_node_builder(response.id, |node| node.set_value(words(text)));
 }
 
 /// Marks the label of text `title` as a heading.
-pub fn heading(of: &Response, title: &str) {
-    of.ctx.accesskit_node_builder(of.id, |node| {
+pub fn heading(response: &Response, title: &str) {
+    response.ctx.accesskit_node_builder(response.id, |node| {
         node.set_role(Role::Heading);
         node.set_level(2);
         node.set_label(title);
@@ -93,12 +93,12 @@ pub fn landmark(ui: &Ui, name: &str) {
     });
 }
 
-/// The same for `ui` with a title: the label `of`, which becomes a heading.
-pub fn titled(ui: &Ui, of: &Response, title: &str) {
-    heading(of, title);
+/// The same for `ui` with a title: the label `response`, which becomes a heading.
+pub fn titled(ui: &Ui, response: &Response, title: &str) {
+    heading(response, title);
     ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
         node.set_role(Role::Region);
-        node.set_labelled_by(vec![of.id.accesskit_id()]);
+        node.set_labelled_by(vec![response.id.accesskit_id()]);
     });
 }
 

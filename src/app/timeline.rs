@@ -51,11 +51,11 @@ impl Timeline {
         let mut moved = false;
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            let of = focus.and_then(|joint| player.running().machine.ball_joints.get(joint));
-            let of = of.map_or("any ball joint".to_owned(), |joint| joint.name.clone());
+            let target = focus.and_then(|joint| player.running().machine.ball_joints.get(joint));
+            let target = target.map_or("any ball joint".to_owned(), |joint| joint.name.clone());
             let past = player.pacer.shown() > 0.0;
             ui.add_enabled_ui(past, |ui| {
-                let help = format!("To the peak of the previous impact of {of} (key ,)");
+                let help = format!("To the peak of the previous impact of {target} (key ,)");
                 if icon_button(ui, Icon::Before, "Previous impact", &help, side, false).clicked() {
                     player.go_to_impact(focus, false);
                     moved = true;
@@ -74,7 +74,7 @@ impl Timeline {
                 }
             });
             ui.add_enabled_ui(player.stopped().is_none() || player.has_future(), |ui| {
-                let help = format!("To the peak of the next impact of {of} (key .)");
+                let help = format!("To the peak of the next impact of {target} (key .)");
                 if icon_button(ui, Icon::After, "Next impact", &help, side, false).clicked() {
                     player.go_to_impact(focus, true);
                     moved = true;
@@ -220,8 +220,8 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     let flags = |flags: &mut dyn Iterator<Item = Flag>, pale: bool| {
         for flag in flags {
             let later = pale || flag.time > shown;
-            let part = if later { PALE_OPACITY } else { 1.0 };
-            flag_at(ui, scale, flag.time, part);
+            let opacity = if later { PALE_OPACITY } else { 1.0 };
+            flag_at(ui, scale, flag.time, opacity);
         }
     };
     flags(&mut player.flags(), false);
@@ -242,7 +242,7 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
 
 /// The lanes between two times, s: sliding in half the joint's colour, creep in full colour, and a mark at each contact onset.
 /// The colour of a pixel column is proportional to the time in each state.
-fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f64, f64), part: f32) {
+fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f64, f64), opacity: f32) {
     let dark = ui.visuals().dark_mode;
     let pixel = 1.0 / ui.ctx().pixels_per_point();
     let from = between.0.max(scale.range.0);
@@ -253,12 +253,12 @@ fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f6
     let joints = contacts.joints().min(RECORDED_JOINTS);
     let columns = (scale.rect.width() / pixel).ceil() as usize;
     let per_second = columns as f64 / (scale.range.1 - scale.range.0);
-    let mut shares = vec![0.0_f32; columns + 1];
+    let mut coverage = vec![0.0_f32; columns + 1];
     let mut mesh = Mesh::default();
     for joint in 0..joints {
         let lane = scale.lane(joint, joints);
-        let colour = theme::series(joint, dark).gamma_multiply(part);
-        shares.fill(0.0);
+        let colour = theme::series(joint, dark).gamma_multiply(opacity);
+        coverage.fill(0.0);
         for (begins, ends, state) in contacts.states(joint, from, to) {
             let weight = match state {
                 ContactMode::Free => continue,
@@ -269,23 +269,23 @@ fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f6
             let b = (ends.min(to) - scale.range.0) * per_second;
             let last = (b.floor() as usize).min(columns);
             let first = (a.floor() as usize).min(last);
-            for (index, share) in shares[first..=last].iter_mut().enumerate() {
+            for (index, covered_part) in coverage[first..=last].iter_mut().enumerate() {
                 let left = (first + index) as f64;
                 let covered = b.min(left + 1.0) - a.max(left);
-                *share += weight * covered.max(0.0) as f32;
+                *covered_part += weight * covered.max(0.0) as f32;
             }
         }
         // Adjacent columns of one colour are merged.
         let mut start = 0;
         while start < columns {
-            let share = shares[start];
-            let same = shares[start..columns].iter();
-            let count = same.take_while(|other| (*other - share).abs() < 0.01).count();
-            if share > 0.0 {
+            let covered_part = coverage[start];
+            let same = coverage[start..columns].iter();
+            let count = same.take_while(|other| (*other - covered_part).abs() < 0.01).count();
+            if covered_part > 0.0 {
                 let left = scale.rect.left() + start as f32 * pixel;
                 let place = Rect::from_x_y_ranges(left..=left + count as f32 * pixel, lane.y_range());
                 // Even the shortest contact stays visible.
-                mesh.add_colored_rect(place, colour.gamma_multiply(share.clamp(0.12, 1.0)));
+                mesh.add_colored_rect(place, colour.gamma_multiply(covered_part.clamp(0.12, 1.0)));
             }
             start += count.max(1);
         }
@@ -302,12 +302,12 @@ fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f6
     ui.painter().add(Shape::mesh(mesh));
 }
 
-fn flag_at(ui: &Ui, scale: &Scale, time: f64, part: f32) {
+fn flag_at(ui: &Ui, scale: &Scale, time: f64, opacity: f32) {
     let x = scale.x(time);
     if !scale.rect.x_range().contains(x) {
         return;
     }
-    let colour = ui.visuals().warn_fg_color.gamma_multiply(part);
+    let colour = ui.visuals().warn_fg_color.gamma_multiply(opacity);
     let (top, low) = (scale.rect.top(), scale.rect.bottom());
     let painter = ui.painter();
     painter.vline(x, top..=low, Stroke::new(1.0, colour));
@@ -320,13 +320,13 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
     let time = scale.time(pos.x);
     ui.strong(value::time(time));
     let joints = player.contact_history().joints().min(RECORDED_JOINTS);
-    let under = (0..joints).find(|&joint| scale.lane(joint, joints).y_range().contains(pos.y));
+    let pointed_joint = (0..joints).find(|&joint| scale.lane(joint, joints).y_range().contains(pos.y));
     let contacts = if time > player.reached() {
         player.abandoned_future().map(|left| &left.contact_history)
     } else {
         Some(player.contact_history())
     };
-    if let (Some(joint), Some(contacts)) = (under, contacts) {
+    if let (Some(joint), Some(contacts)) = (pointed_joint, contacts) {
         let name = &player.running().machine.ball_joints[joint].name;
         let state = contacts.states(joint, time, time + MIN_RANGE).next();
         let words = match state {

@@ -50,7 +50,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
             if !narrow {
                 ui.add_space(6.0);
                 speed(ui, player, narrow);
-                settled(ui, player);
+                settled_hint(ui, player);
             }
             reset
         })
@@ -58,7 +58,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
     if narrow {
         ui.horizontal(|ui| {
             speed(ui, player, narrow);
-            settled(ui, player);
+            settled_hint(ui, player);
         });
     }
     reset
@@ -76,23 +76,23 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
             scales(ui, player);
         }
         if ui.available_width() > PACE_WIDTH {
-            reached(ui, player);
+            achieved_scale(ui, player);
         }
-        settled(ui, player);
+        settled_hint(ui, player);
         reset
     })
     .inner
 }
 
 /// The buttons and the list of time scales alone. Returns as [`ui`].
-pub fn least(ui: &mut Ui, player: &mut Player) -> bool {
+pub fn minimal(ui: &mut Ui, player: &mut Player) -> bool {
     let reset = buttons(ui, player);
     scales(ui, player);
     reset
 }
 
 /// Hint for a settled run, at the right end, where it displaces nothing.
-fn settled(ui: &mut Ui, player: &Player) {
+fn settled_hint(ui: &mut Ui, player: &Player) {
     if !player.is_playing() || !player.has_settled() || ui.available_width() < 180.0 {
         return;
     }
@@ -180,7 +180,7 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     spoken::value(&response, &value::time_scale(scale).replace(':', " to "));
     response.accessible_name("Time scale");
     scales(ui, player);
-    reached(ui, player);
+    achieved_scale(ui, player);
 }
 
 /// Selection of the time scale: the list, or a drag across it.
@@ -208,11 +208,11 @@ fn scales(ui: &mut Ui, player: &mut Player) {
     // Part of the drag already used by passed time scales.
     let used: Option<f32> = ui.data(|data| data.get_temp(drag.id));
     let mut used = used.filter(|_| !drag.drag_started()).unwrap_or(0.0);
-    let way = drag.total_drag_delta().unwrap_or_default().x;
-    while (way - used).abs() >= SCALE_DISTANCE {
-        let faster = way > used;
+    let travel = drag.total_drag_delta().unwrap_or_default().x;
+    while (travel - used).abs() >= SCALE_DISTANCE {
+        let faster = travel > used;
         player.pacer.set_scale(next_scale(player.pacer.scale(), faster));
-        used += SCALE_DISTANCE.copysign(way - used);
+        used += SCALE_DISTANCE.copysign(travel - used);
     }
     ui.data_mut(|data| data.insert_temp(drag.id, used));
 }
@@ -226,18 +226,18 @@ pub fn achieved_pace_below(ui: &mut Ui, player: &Player) {
             styles.insert(egui::TextStyle::Body, small);
         }
     }
-    reached(ui, player);
+    achieved_scale(ui, player);
 }
 
 /// The achieved time scale, and the cause if it is below the requested one.
-fn reached(ui: &mut Ui, player: &Player) {
+fn achieved_scale(ui: &mut Ui, player: &Player) {
     if !player.is_playing() {
         return;
     }
-    let Some(reached) = player.pacer.reached_scale() else {
+    let Some(achieved) = player.pacer.reached_scale() else {
         return;
     };
-    let words = format!("reached {}", value::time_scale(reached));
+    let words = format!("reached {}", value::time_scale(achieved));
     let Some(limit) = player.limit() else {
         ui.label(RichText::new(words).weak()).on_hover_text("Simulated time over real time, as measured");
         return;

@@ -153,7 +153,7 @@ impl Undo {
         *self = Self::default();
     }
 
-    fn note(&mut self, entry: Entry, held: bool) {
+    fn record(&mut self, entry: Entry, held: bool) {
         self.undone.clear();
         let last = self.done.last_mut().filter(|last| last.is_continued_by(&entry));
         match last.filter(|last| self.held || entry.at - last.at < MERGE_TIME) {
@@ -176,17 +176,17 @@ impl Undo {
     pub fn words(&self, redo: bool) -> Option<String> {
         let entry = if redo { &self.undone } else { &self.done }.last()?;
         let value = &entry.values[usize::from(redo)];
-        let act = if redo { "Redo" } else { "Undo" };
+        let verb = if redo { "Redo" } else { "Undo" };
         Some(if value.is_empty() {
-            format!("{act}: {}", entry.name)
+            format!("{verb}: {}", entry.name)
         } else {
-            format!("{act}: {}, to {value}", entry.name)
+            format!("{verb}: {}, to {value}", entry.name)
         })
     }
 }
 
 /// Name of the parameter `key` and the displayed form of `text`, or of the scene file's value if that is `None`.
-fn described(scene: &Scene, original: Option<String>, key: &str, text: Option<&str>) -> (String, String) {
+fn name_and_value(scene: &Scene, original: Option<String>, key: &str, text: Option<&str>) -> (String, String) {
     let name = value::named(scene, key).map_or_else(|| key.to_owned(), |(name, _)| name);
     let value = text.map(value::typeset).or(original).unwrap_or_default();
     (name, value)
@@ -254,8 +254,8 @@ impl App {
             let original = original.zip(kind).map(|(value, kind)| value::shown(&value, kind));
             let ends = [&edit.before, &edit.after];
             let [(name, before), (_, after)] =
-                ends.map(|text| described(scene, original.clone(), &edit.key, text.as_deref()));
-            self.undo.note(Entry { name, values: [before, after], change: Change::Parameters(edits), at: now }, held);
+                ends.map(|text| name_and_value(scene, original.clone(), &edit.key, text.as_deref()));
+            self.undo.record(Entry { name, values: [before, after], change: Change::Parameters(edits), at: now }, held);
         }
         self.follow_view(now, held);
         self.undo.held &= held;
@@ -289,7 +289,7 @@ impl App {
             Some(name) => {
                 let ends = [std::mem::replace(before, view.clone()), view];
                 let change = Change::View(Box::new(ends));
-                self.undo.note(Entry { name: name.to_owned(), values: Default::default(), change, at: now }, held);
+                self.undo.record(Entry { name: name.to_owned(), values: Default::default(), change, at: now }, held);
             }
         }
     }

@@ -303,7 +303,7 @@ impl Viewport {
             let mut goal = self.camera;
             let scene = player.running();
             self.view.close_up(&mut goal, joint, scene, player.frame(), &self.options);
-            self.glide(player, goal, joint);
+            self.move_and_follow(player, goal, joint);
         }
     }
 
@@ -312,12 +312,12 @@ impl Viewport {
         if let Some(centre) = self.view.anchor(player.frame(), ScenePart::Joint(joint)) {
             let mut goal = self.goal.unwrap_or(self.camera);
             goal.target = centre;
-            self.glide(player, goal, joint);
+            self.move_and_follow(player, goal, joint);
         }
     }
 
     /// Moves to `goal` and follows ball joint `joint`.
-    fn glide(&mut self, player: &Player, goal: Camera, joint: usize) {
+    fn move_and_follow(&mut self, player: &Player, goal: Camera, joint: usize) {
         self.goal = Some(goal);
         (self.fit_pending, self.fits, self.moved) = (false, false, true);
         let picked = ScenePart::Joint(joint);
@@ -522,10 +522,10 @@ impl Viewport {
         let aspect = |[width, height]: [u32; 2]| width as f32 / height.max(1) as f32;
         let shape = self.frozen.unwrap_or(aspect(self.list.size));
         let camera = self.framed_for_aspect(Some(shape), aspect(screen.size));
-        let own = std::mem::replace(&mut self.options.arrows.thickness, thickness);
+        let own_thickness = std::mem::replace(&mut self.options.arrows.thickness, thickness);
         let quality = self.list.quality;
         let ghost_notes = self.list_next(player, &camera, &screen, quality);
-        self.options.arrows.thickness = own;
+        self.options.arrows.thickness = own_thickness;
         let (list, revision) = &mut self.second;
         if self.next != **list {
             show_next(list, &mut self.next, revision);
@@ -542,8 +542,8 @@ impl Viewport {
     fn list_next(&mut self, player: &Player, camera: &Camera, screen: &Screen, quality: Quality) -> Vec<String> {
         let mut list = std::mem::take(&mut self.next);
         let drawn = screen.with_quality(quality);
-        let own = self.options.arrows.reference;
-        self.options.arrows.reference = own.or(self.common);
+        let own_reference = self.options.arrows.reference;
+        self.options.arrows.reference = own_reference.or(self.common);
         let shot = shot!(self, player, camera, drawn);
         self.view.build(&shot, &mut list);
         list.quality = quality;
@@ -554,7 +554,7 @@ impl Viewport {
         if let Some(cloud) = &self.cloud {
             self.view.add_cloud(&shot, cloud, &mut list);
         }
-        self.options.arrows.reference = own;
+        self.options.arrows.reference = own_reference;
         self.next = list;
         ghost_notes
     }
@@ -630,9 +630,9 @@ impl Viewport {
     /// Grips a body by press and drag or by a long touch; returns whether the pointer grips one.
     fn pull(&mut self, ui: &Ui, response: &egui::Response, player: &Player, screen: &Screen) -> bool {
         let (finger, shift, origin) = ui.input(|i| (i.any_touches(), i.modifiers.shift, i.pointer.press_origin()));
-        let taken =
+        let starts_grip =
             if finger { self.is_long_touch(ui, response) } else { response.drag_started_by(PointerButton::Primary) };
-        if let Some(origin) = origin.filter(|_| taken) {
+        if let Some(origin) = origin.filter(|_| starts_grip) {
             let camera = self.framed(screen.aspect());
             let shot = shot!(self, player, &camera, screen);
             let hit = self.view.pick(&shot, screen.pixel(origin));
@@ -644,15 +644,15 @@ impl Viewport {
             return false;
         };
         // Not from the response: egui takes the pointer from it after a long touch.
-        let held = ui.input(|i| i.pointer.latest_pos().filter(|_| i.pointer.primary_down()));
-        match held {
+        let pointer = ui.input(|i| i.pointer.latest_pos().filter(|_| i.pointer.primary_down()));
+        match pointer {
             None => {
                 self.grip = None;
                 self.grip_changed = true;
             }
             Some(pos) => {
                 let moved = ui.input(|i| i.pointer.delta()) * screen.scale;
-                if moved != egui::Vec2::ZERO || taken {
+                if moved != egui::Vec2::ZERO || starts_grip {
                     let moved = Vec2::new(moved.x, moved.y);
                     grip.drag(&camera, screen.pixel(pos), moved, screen.size, shift);
                     self.grip_changed = true;
@@ -668,12 +668,12 @@ impl Viewport {
             self.finger_since = None;
             return false;
         }
-        let (now, way) = ui.input(|i| {
-            let way = i.pointer.latest_pos().zip(i.pointer.press_origin());
-            (i.time, way.map_or(0.0, |(pos, origin)| pos.distance(origin)))
+        let (now, travel) = ui.input(|i| {
+            let travel = i.pointer.latest_pos().zip(i.pointer.press_origin());
+            (i.time, travel.map_or(0.0, |(pos, origin)| pos.distance(origin)))
         });
         let since = self.finger_since.get_or_insert(now);
-        if way > GRIP_DISTANCE {
+        if travel > GRIP_DISTANCE {
             *since = f64::INFINITY;
         }
         let left = *since + GRIP_TIME - now;
@@ -699,13 +699,13 @@ impl Viewport {
         // Over the background, zooming is about the whole machine, which stays in view at both limits.
         let point = hit.map_or(bounds.centre, |hit| hit.point);
         let from = self.camera.eye().distance(bounds.centre);
-        let lost = match hit {
+        let at_limit = match hit {
             _ if factor < 1.0 => from > MAX_CAMERA_DISTANCE * bounds.radius,
             Some(_) => false,
             None => from < bounds.radius,
         };
         self.move_camera_manually(screen.size, |camera| {
-            if !lost {
+            if !at_limit {
                 camera.zoom_about(factor, point, screen.size);
             }
         });
@@ -1022,22 +1022,22 @@ mod tests {
         // Largest hidden share of a plate, from the cell size of the cover; names are placed on coarser cells.
         const HIDDEN: [f32; 2] = [0.005, 0.08];
         let mut watched = Watched::<{ PICTURES.len() }>::new(scene);
-        let mut stood: [HashMap<LabelKind, _>; PICTURES.len()] = Default::default();
+        let mut previous_places: [HashMap<LabelKind, _>; PICTURES.len()] = Default::default();
         let mut moves = [0; PICTURES.len()];
         for frame in 0..FRAMES {
             for (at, size) in PICTURES.into_iter().enumerate() {
                 let seen = watched.draw(at, size);
-                let what = format!("{scene}, {size}, frame {frame}");
+                let context = format!("{scene}, {size}, frame {frame}");
                 let [time, legend] = [seen.time, seen.legend].map(|plate| plate.expect("written"));
                 let all: Vec<Rect> = seen.labels.iter().copied().chain([time, legend]).collect();
                 for (i, plate) in all.iter().enumerate() {
-                    assert!(!all[i + 1..].iter().any(|other| other.intersects(*plate)), "{what}");
+                    assert!(!all[i + 1..].iter().any(|other| other.intersects(*plate)), "{context}");
                 }
                 let mut now = watched.viewports[at].places.0.clone();
                 now.retain(|kind, _| matches!(kind, LabelKind::Joint(_)));
-                let before = std::mem::replace(&mut stood[at], now);
+                let before = std::mem::replace(&mut previous_places[at], now);
                 let moved = |(kind, place)| before.get(kind).is_some_and(|was| was != place);
-                moves[at] += stood[at].iter().filter(|label| moved(*label)).count();
+                moves[at] += previous_places[at].iter().filter(|label| moved(*label)).count();
                 if frame % 2 > 0 {
                     continue;
                 }
@@ -1048,18 +1048,18 @@ mod tests {
                 };
                 for plate in [time, legend] {
                     let hidden: f32 = under(plate).iter().sum();
-                    assert!(hidden < HIDDEN[0], "{what}: {hidden} of {plate}");
+                    assert!(hidden < HIDDEN[0], "{context}: {hidden} of {plate}");
                 }
                 for plate in &seen.labels {
                     let [_, balls] = under(*plate);
-                    assert!(balls < HIDDEN[1], "{what}: balls under {balls} of {plate}");
+                    assert!(balls < HIDDEN[1], "{context}: balls under {balls} of {plate}");
                 }
             }
             watched.pass(10.0 / FRAMES as f32);
         }
         for (at, size) in PICTURES.into_iter().enumerate() {
             // On average a name moves at most once in two seconds, whatever passes behind it.
-            let (moves, names) = (moves[at], stood[at].len());
+            let (moves, names) = (moves[at], previous_places[at].len());
             assert!(names > 0 && moves <= 5 * names, "{scene}, {size}: {moves} of {names}");
         }
     }

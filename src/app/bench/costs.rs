@@ -28,7 +28,7 @@ pub struct Costs {
     /// Whether it was drawn since the last frame, or will be.
     drawn: bool,
     /// Whether something else has its place, and its results are kept.
-    aside: bool,
+    is_set_aside: bool,
     /// Text of the scene that the settings belong to.
     scene: String,
     settings: Option<CostSettings>,
@@ -46,15 +46,15 @@ pub struct Costs {
 /// A study being computed.
 struct RunningStudy {
     task: OneAtATimeTask,
-    shares: SharedJob,
-    begun: bool,
+    job: SharedJob,
+    has_plan: bool,
 }
 
 impl Default for Costs {
     fn default() -> Self {
         Self {
             drawn: true,
-            aside: false,
+            is_set_aside: false,
             scene: String::new(),
             settings: None,
             requested: None,
@@ -75,17 +75,17 @@ impl Costs {
         if !drawn {
             (self.requested, self.running) = (None, None);
         }
-        drawn || self.aside
+        drawn || self.is_set_aside
     }
 
     /// Leaves its place to something else until it is drawn again.
     pub fn set_aside(&mut self) {
-        self.aside = true;
+        self.is_set_aside = true;
     }
 
     /// Whether something else has its place.
     pub fn is_set_aside(&self) -> bool {
-        self.aside
+        self.is_set_aside
     }
 
     /// The latest study.
@@ -99,8 +99,8 @@ impl Costs {
     }
 
     /// Whether the latest results belong to the requested study, or none is to come.
-    fn has_begun(&self) -> bool {
-        self.requested.is_none() && self.running.as_ref().is_none_or(|running| running.begun)
+    fn has_current_results(&self) -> bool {
+        self.requested.is_none() && self.running.as_ref().is_none_or(|running| running.has_plan)
     }
 
     /// Starts a requested study and takes messages from a running one; returns whether one is running.
@@ -108,18 +108,18 @@ impl Costs {
         if let Some(task) = self.requested.take() {
             self.problem = None;
             let most = 1 + 2 * task.over.len();
-            let shares = SharedJob::start(host, most, |share| Job::OneAtATime(task.clone(), share));
-            self.running = shares.map(|shares| RunningStudy { task, shares, begun: false });
+            let job = SharedJob::start(host, most, |share| Job::OneAtATime(task.clone(), share));
+            self.running = job.map(|job| RunningStudy { task, job, has_plan: false });
             if self.running.is_none() {
                 self.problem = Some("Runs cannot be computed here".to_owned());
             }
         }
-        let Some(RunningStudy { task, shares, begun }) = &mut self.running else {
+        let Some(RunningStudy { task, job, has_plan }) = &mut self.running else {
             return false;
         };
-        let polled = shares.poll(|message| match message {
-            Message::Plan(plan) if !*begun => {
-                *begun = true;
+        let polled = job.poll(|message| match message {
+            Message::Plan(plan) if !*has_plan => {
+                *has_plan = true;
                 // An output that the scene does not have gives way to the first that it has.
                 let has = |output: &usize| plan.units[*output].is_some();
                 self.output = Some(self.output).filter(has).or((0..NAMED.len()).find(has)).unwrap_or_default();
@@ -143,15 +143,15 @@ impl Costs {
     }
 
     /// Reports a frame at `now`, s, so that a running study yields time to the picture; `moves`: whether the picture is animated.
-    pub fn seen(&mut self, now: f64, moves: bool) {
+    pub fn report_frame(&mut self, now: f64, moves: bool) {
         if let Some(running) = &mut self.running {
-            running.shares.seen(now, moves);
+            running.job.report_frame(now, moves);
         }
     }
 
     /// Settings, progress and tornado; returns the user's request to the run.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<BenchRequest> {
-        (self.drawn, self.aside) = (true, false);
+        (self.drawn, self.is_set_aside) = (true, false);
         let scene = player.pending();
         if self.scene != scene.source.text {
             let output = self.output;
@@ -167,7 +167,7 @@ impl Costs {
             self.settings_ui(ui, scene);
         });
         let progress = ui.cursor().top();
-        self.go_ui(ui, scene);
+        self.start_ui(ui, scene);
         let differences = self.study.as_ref().map_or_else(Vec::new, |study| study.differences(player));
         reserve_lines(ui, "costs say", 3, |ui| self.state_ui(ui, &differences));
         let study = self.study.as_ref()?;
@@ -175,7 +175,7 @@ impl Costs {
         output_ui(ui, &mut self.output, study);
         let tornado = ui.cursor().top();
         let clicked = self.tornado.ui(ui, study, self.output, player, !differences.is_empty());
-        if self.reveal && self.has_begun() {
+        if self.reveal && self.has_current_results() {
             self.reveal = false;
             let (all, room) = (ui.min_rect(), ui.clip_rect().height());
             let fits = [progress, choice, tornado].into_iter().find(|top| all.bottom() - top <= room);
@@ -244,7 +244,7 @@ impl Costs {
         });
     }
 
-    fn go_ui(&mut self, ui: &mut Ui, scene: &Scene) {
+    fn start_ui(&mut self, ui: &mut Ui, scene: &Scene) {
         let running = self.is_running();
         let (name, help) = if running {
             ("Stop runs", "Ends the computation; bars so far remain")
@@ -258,7 +258,7 @@ impl Costs {
         let clicked = ui.horizontal(|ui| {
             let clicked = ui.add(Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0))).on_hover_text(help).clicked();
             if let Some(running) = &self.running {
-                running.shares.ui(ui, "Computed so far", "runs");
+                running.job.ui(ui, "Computed so far", "runs");
             }
             clicked
         });
@@ -280,7 +280,7 @@ impl Costs {
             theme::error(ui, value::typeset(problem));
             return;
         }
-        match self.study.as_ref().filter(|_| self.has_begun()) {
+        match self.study.as_ref().filter(|_| self.has_current_results()) {
             None if self.is_running() => drop(weak(ui, "Starting…".to_owned())),
             None => drop(weak(ui, "No results yet".to_owned())),
             Some(_) if !differences.is_empty() => {

@@ -66,7 +66,7 @@ type Mark = (PlotPoint, usize, usize);
 pub struct Diagram {
     ordinate: Ordinate,
     /// The settings of the present marks; `None` if they must be rebuilt.
-    made: Option<(Ordinate, Coordinate)>,
+    mark_settings: Option<(Ordinate, Coordinate)>,
     marks: [Vec<PlotPoint>; REGIMES.len()],
     all: Vec<Mark>,
     /// Marks of unreliable points.
@@ -75,7 +75,7 @@ pub struct Diagram {
     transform: Option<PlotTransform>,
     /// Position of the last drawing, points of the screen, and its visible fraction.
     plane: Option<Rect>,
-    seen: f32,
+    visible_fraction: f32,
     /// The latest selection.
     picked: Option<(usize, usize)>,
 }
@@ -83,12 +83,12 @@ pub struct Diagram {
 impl Diagram {
     /// Clears it for a new sweep.
     pub fn clear(&mut self) {
-        (self.made, self.picked, self.transform) = (None, None, None);
+        (self.mark_settings, self.picked, self.transform) = (None, None, None);
     }
 
     /// Invalidates the marks after a point has arrived.
     pub fn invalidate(&mut self) {
-        self.made = None;
+        self.mark_settings = None;
     }
 
     /// Position of a section in the last drawing, points of the screen.
@@ -104,8 +104,8 @@ impl Diagram {
     }
 
     /// Visible fraction of that area.
-    pub fn seen(&self) -> f32 {
-        self.seen
+    pub fn visible_fraction(&self) -> f32 {
+        self.visible_fraction
     }
 
     /// The diagram of `results`; returns the clicked point and its retained section.
@@ -114,9 +114,9 @@ impl Diagram {
         let unit = parameter.map_or("", |parameter| parameter.display_unit());
         let label = parameter.map_or(results.range.key.as_str(), |parameter| parameter.label);
         let shown = |si: f64| to_display(si, unit);
-        self.head(ui, results);
-        if self.made != Some((self.ordinate, coordinate)) {
-            self.make(results, coordinate, &shown);
+        self.heading_ui(ui, results);
+        if self.mark_settings != Some((self.ordinate, coordinate)) {
+            self.rebuild_marks(results, coordinate, &shown);
         }
         let across = AxisLabel::new(label.to_lowercase(), value::typeset(unit));
         let up = self.ordinate.axis(coordinate);
@@ -159,9 +159,9 @@ impl Diagram {
         let pointer = response.response.interact_pointer_pos();
         self.transform = Some(response.transform);
         let plane = response.response.rect;
-        self.seen = plane.intersect(ui.clip_rect()).height().max(0.0) / plane.height();
+        self.visible_fraction = plane.intersect(ui.clip_rect()).height().max(0.0) / plane.height();
         self.plane = Some(plane);
-        self.key(ui, results, dark);
+        self.legend_ui(ui, results, dark);
         let at = pointer.filter(|_| clicked)?;
         let nearest = self
             .all
@@ -175,7 +175,7 @@ impl Diagram {
         self.picked
     }
 
-    fn head(&mut self, ui: &mut Ui, results: &SweepResults) {
+    fn heading_ui(&mut self, ui: &mut Ui, results: &SweepResults) {
         ui.horizontal_wrapped(|ui| {
             ComboBox::from_id_salt("ordinate")
                 .width(110.0)
@@ -188,14 +188,14 @@ impl Diagram {
                 .response
                 .on_hover_text("What the diagram shows over the varied parameter")
                 .accessible_name("Diagram of");
-            let come = results.points.iter().flatten().count();
-            let words = format!("{come} of {} values", results.points.len());
+            let computed = results.points.iter().flatten().count();
+            let words = format!("{computed} of {} values", results.points.len());
             ui.label(RichText::new(words).small().weak()).on_hover_text("Values computed so far");
         });
     }
 
     /// Legend of the colours with the number of values of each kind.
-    fn key(&self, ui: &mut Ui, results: &SweepResults, dark: bool) {
+    fn legend_ui(&self, ui: &mut Ui, results: &SweepResults, dark: bool) {
         let weak = ui.visuals().weak_text_color();
         let mut entries: Vec<_> = REGIMES
             .iter()
@@ -235,7 +235,7 @@ impl Diagram {
         });
     }
 
-    fn make(&mut self, results: &SweepResults, coordinate: Coordinate, shown: &dyn Fn(f64) -> f64) {
+    fn rebuild_marks(&mut self, results: &SweepResults, coordinate: Coordinate, shown: &dyn Fn(f64) -> f64) {
         self.marks.iter_mut().for_each(Vec::clear);
         self.all.clear();
         self.doubtful.clear();
@@ -271,7 +271,7 @@ impl Diagram {
                 }
             }
         }
-        self.made = Some((self.ordinate, coordinate));
+        self.mark_settings = Some((self.ordinate, coordinate));
     }
 }
 

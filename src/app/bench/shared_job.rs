@@ -57,7 +57,7 @@ impl SharedJob {
     }
 
     /// Reports a frame at `now`, s, so that the workers yield time to the picture; `moves`: whether the picture is animated.
-    pub fn seen(&mut self, now: f64, moves: bool) {
+    pub fn report_frame(&mut self, now: f64, moves: bool) {
         self.since.get_or_insert(now);
         self.now = now;
         if let Some(rest) = self.throttle.frame(now, moves) {

@@ -44,9 +44,9 @@ struct Settings {
 /// A running sweep.
 struct RunningSweep {
     task: SweepTask,
-    shares: SharedJob,
+    job: SharedJob,
     /// Whether its ranges are known.
-    begun: bool,
+    has_ranges: bool,
 }
 
 /// The panel.
@@ -67,18 +67,18 @@ impl SweepPanel {
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
         if let Some(task) = self.requested.take() {
             self.problem = None;
-            let shares = SharedJob::start(host, usize::MAX, |share| Job::Sweep(task.clone(), share));
-            self.running = shares.map(|shares| RunningSweep { task, shares, begun: false });
+            let job = SharedJob::start(host, usize::MAX, |share| Job::Sweep(task.clone(), share));
+            self.running = job.map(|job| RunningSweep { task, job, has_ranges: false });
             if self.running.is_none() {
                 self.problem = Some("Sweeps cannot be computed here".to_owned());
             }
         }
-        let Some(RunningSweep { task, shares, begun }) = &mut self.running else {
+        let Some(RunningSweep { task, job, has_ranges }) = &mut self.running else {
             return false;
         };
-        let polled = shares.poll(|message| match message {
-            Message::Ranges(ranges) if !*begun => {
-                *begun = true;
+        let polled = job.poll(|message| match message {
+            Message::Ranges(ranges) if !*has_ranges => {
+                *has_ranges = true;
                 self.results = ranges.into_iter().next().map(|range| SweepResults {
                     task: task.clone(),
                     points: vec![None; range.count],
@@ -107,9 +107,9 @@ impl SweepPanel {
     }
 
     /// Reports a frame at `now`, s, so that a running sweep yields time to the picture; `moves`: whether the picture is animated.
-    pub fn seen(&mut self, now: f64, moves: bool) {
+    pub fn report_frame(&mut self, now: f64, moves: bool) {
         if let Some(sweeping) = &mut self.running {
-            sweeping.shares.seen(now, moves);
+            sweeping.job.report_frame(now, moves);
         }
     }
 
@@ -144,7 +144,7 @@ impl SweepPanel {
 
     /// Whether the diagram belongs to the requested sweep, or no other is to come.
     fn has_diagram(&self) -> bool {
-        self.requested.is_none() && self.running.as_ref().is_none_or(|sweeping| sweeping.begun)
+        self.requested.is_none() && self.running.as_ref().is_none_or(|sweeping| sweeping.has_ranges)
     }
 
     fn sweep_ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Load> {
@@ -153,13 +153,13 @@ impl SweepPanel {
             Err(why) => {
                 ui.label(RichText::new(format!("No sweep: {why}")).weak());
                 if self.is_running() {
-                    self.go_ui(ui, player);
+                    self.start_ui(ui, player);
                 }
             }
             Ok(_) => {
                 self.settings_ui(ui, player);
                 progress = ui.cursor().top();
-                self.go_ui(ui, player);
+                self.start_ui(ui, player);
             }
         }
         reserve_lines(ui, "sweep says", 2, |ui| self.state_ui(ui, player));
@@ -310,7 +310,7 @@ impl SweepPanel {
         }
     }
 
-    fn go_ui(&mut self, ui: &mut Ui, player: &Player) {
+    fn start_ui(&mut self, ui: &mut Ui, player: &Player) {
         let running = self.is_running();
         let (name, help) = if running {
             ("Cancel sweep", "Stops the sweep; points computed so far remain")
@@ -325,7 +325,7 @@ impl SweepPanel {
             let button = Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0));
             let clicked = ui.add(button).on_hover_text(help).clicked();
             if let Some(sweeping) = &self.running {
-                sweeping.shares.ui(ui, "Swept so far", "points");
+                sweeping.job.ui(ui, "Swept so far", "points");
             }
             clicked
         });

@@ -45,7 +45,7 @@ struct End {
     /// Full description.
     words: String,
     /// Whether the slider is there.
-    here: bool,
+    is_current: bool,
 }
 
 impl Tornado {
@@ -61,8 +61,8 @@ impl Tornado {
             self.order = (0..inputs).collect();
         }
         let (finished, all) = study.run_counts();
-        let pointed = self.area.is_some_and(|area| ui.rect_contains_pointer(area));
-        if finished == all && self.sorted != Some(output) && !pointed {
+        let is_pointed_at = self.area.is_some_and(|area| ui.rect_contains_pointer(area));
+        if finished == all && self.sorted != Some(output) && !is_pointed_at {
             (self.order, self.sorted) = (study.ranked_by_effect(output), Some(output));
         }
     }
@@ -171,7 +171,7 @@ impl Place {
         let response = ui.interact(strip, id, Sense::click());
         response.widget_info(|| WidgetInfo::labeled(Role::Button, ui.is_enabled(), &own.words));
         let (painter, visuals) = (ui.painter(), ui.visuals());
-        if own.here {
+        if own.is_current {
             painter.rect_filled(strip, 3.0, visuals.selection.bg_fill);
         } else if response.hovered() {
             painter.rect_filled(strip, 3.0, visuals.widgets.hovered.weak_bg_fill);
@@ -205,7 +205,7 @@ impl End {
         shown: &dyn Fn(f64) -> String,
     ) -> Self {
         let (key, ends) = &study.task.over[input];
-        let there = ends[end];
+        let si_value = ends[end];
         let parameter = study.parameter(input);
         let unit = parameter.map_or("", |parameter| parameter.display_unit());
         let of_input = |si: f64| value::quantity(si, unit, DIGITS);
@@ -217,9 +217,9 @@ impl End {
             Some(Some(si)) => shown(si),
         };
         let [joint, _] = name(key);
-        let at = of_input(there);
+        let at = of_input(si_value);
         let nominal = study.plan.nominal[input];
-        let more = match (value.flatten(), study.base(output)) {
+        let difference = match (value.flatten(), study.base(output)) {
             (Some(si), Some(base)) if si != base => {
                 let than = if si > base { "more" } else { "less" };
                 format!(", {} {than} than with {}", shown((si - base).abs()), of_input(nominal))
@@ -229,8 +229,8 @@ impl End {
             _ => String::new(),
         };
         Self {
-            words: format!("{label} of {joint} {at}: {what} {of_output}{more}"),
-            here: player.pending().get(key) == Ok(Value::Number(there)),
+            words: format!("{label} of {joint} {at}: {what} {of_output}{difference}"),
+            is_current: player.pending().get(key) == Ok(Value::Number(si_value)),
             texts: [at, of_output],
             value: value.flatten(),
         }

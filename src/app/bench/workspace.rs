@@ -72,10 +72,10 @@ impl ShownError {
 /// Axes of the first drives, one per line: around their positions at t = 0, or a whole turn where a crank that goes round is alone.
 fn default_axes(machine: &Machine) -> String {
     let driven = || machine.joints.iter().flat_map(|joint| joint.drives().map(move |drive| (joint, drive)));
-    let alone = driven().nth(1).is_none();
+    let is_only_drive = driven().nth(1).is_none();
     let axes = driven().zip(drive_positions(machine)).take(MAX_DRIVES).map(|((joint, (freedom, drive)), at)| {
-        let round = alone && matches!(drive, Drive::Constant { velocity, .. } if *velocity != 0.0);
-        let (unit, ends, count) = match (freedom.turns(), round) {
+        let full_turn = is_only_drive && matches!(drive, Drive::Constant { velocity, .. } if *velocity != 0.0);
+        let (unit, ends, count) = match (freedom.turns(), full_turn) {
             (true, true) => ("deg", [0.0, 345.0_f64.to_radians()], 24),
             (true, false) => ("deg", [-1.0, 1.0].map(|side: f64| side * 10.0_f64.to_radians()), 5),
             (false, _) => ("mm", [-0.01, 0.01], 5),
@@ -114,7 +114,7 @@ pub struct MapPanel {
     running: Option<Box<dyn BackgroundTask>>,
     mapped: Option<PartialMap>,
     problem: Option<String>,
-    which: ShownError,
+    shown_error: ShownError,
     scale: f32,
     /// The axis that is fixed, and at which of its values.
     slice: Option<(usize, usize)>,
@@ -131,7 +131,7 @@ impl Default for MapPanel {
             running: None,
             mapped: None,
             problem: None,
-            which: ShownError::default(),
+            shown_error: ShownError::default(),
             scale: INITIAL_SCALE,
             slice: None,
             shown: false,
@@ -178,9 +178,14 @@ impl MapPanel {
         let points = points.filter(|(point, _)| self.slice.is_none_or(|(axis, at)| mapped.index(axis, *point) == at));
         let arrows = points.filter_map(|(_, errors)| {
             let errors = errors.as_ref()?;
-            Some([vector(errors.tip), vector(self.which.of(errors)?)])
+            Some([vector(errors.tip), vector(self.shown_error.of(errors)?)])
         });
-        Some(Cloud { arrows: arrows.collect(), factor: self.scale, name: self.which.name(), note: self.which.note() })
+        Some(Cloud {
+            arrows: arrows.collect(),
+            factor: self.scale,
+            name: self.shown_error.name(),
+            note: self.shown_error.note(),
+        })
     }
 
     /// Axes, progress, and what is shown.
@@ -197,13 +202,13 @@ impl MapPanel {
         ui.add(TextEdit::multiline(&mut self.over).desired_rows(3).desired_width(f32::INFINITY))
             .on_hover_text("What varies, as in `jointplay map --over`")
             .accessible_name("Axes of the map");
-        self.go_ui(ui, player);
+        self.start_ui(ui, player);
         reserve_lines(ui, "map says", 2, |ui| self.state_ui(ui, player));
         ui.horizontal_wrapped(|ui| {
-            for which in ShownError::ALL {
-                let mut name = which.name().to_owned();
+            for shown_error in ShownError::ALL {
+                let mut name = shown_error.name().to_owned();
                 name[..1].make_ascii_uppercase();
-                ui.selectable_value(&mut self.which, which, name).on_hover_text(which.help());
+                ui.selectable_value(&mut self.shown_error, shown_error, name).on_hover_text(shown_error.help());
             }
         });
         ui.horizontal(|ui| {
@@ -217,7 +222,7 @@ impl MapPanel {
         self.slice_ui(ui);
     }
 
-    fn go_ui(&mut self, ui: &mut Ui, player: &Player) {
+    fn start_ui(&mut self, ui: &mut Ui, player: &Player) {
         let running = self.running.is_some() || self.requested.is_some();
         ui.horizontal(|ui| {
             let (name, help) = if running {
@@ -357,13 +362,13 @@ mod tests {
             panel.shown = true;
             panel.take_cloud(&player).expect("the map is of this scene")
         };
-        for which in ShownError::ALL {
-            panel.which = which;
+        for shown_error in ShownError::ALL {
+            panel.shown_error = shown_error;
             let cloud = shown(&mut panel);
             assert_eq!((cloud.arrows.len(), cloud.factor), (6, INITIAL_SCALE));
             for (point, [tip, error]) in cloud.arrows.iter().enumerate() {
                 let own = map.point(point).expect("a pose");
-                let expected = match which {
+                let expected = match shown_error {
                     ShownError::Largest => own.largest.and_then(|largest| largest.error).expect("an error"),
                     ShownError::Settled => own.settled.expect("a position of rest"),
                 };

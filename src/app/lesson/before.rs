@@ -83,7 +83,7 @@ impl App {
         if !lesson.runs.iter().any(|run| run.scene.source.text == *text) {
             return;
         }
-        (self.replay, self.load, self.verdict, self.problem, self.film_wanted) = (None, None, None, None, None);
+        (self.replay, self.load, self.verdict, self.problem, self.film_settings) = (None, None, None, None, None);
         let thickness = self.viewport.options.arrows.thickness;
         self.viewport.options = before.options;
         // A presentation may still be active.

@@ -278,7 +278,7 @@ impl Source<'_> {
     }
 
     /// An error at `part` within `span`.
-    fn within(&self, span: Range<usize>, part: &str, key: &str, message: String) -> SceneError {
+    fn error_within(&self, span: Range<usize>, part: &str, key: &str, message: String) -> SceneError {
         let inside = self.text.get(span.clone()).unwrap_or_default();
         let at = span.start + inside.find(part).unwrap_or(0);
         SceneError::in_text(self.file, self.text, at, Some(key), None, message)
@@ -298,7 +298,7 @@ impl Lesson {
     /// # Errors
     /// The file cannot be read, or any error of [`Self::parse`].
     pub fn read(path: &str) -> Result<Self, SceneError> {
-        let wrong = |message: String| SceneError {
+        let fault = |message: String| SceneError {
             file: Some(path.to_owned()),
             message,
             unreadable: true,
@@ -308,9 +308,9 @@ impl Lesson {
         // One byte above the limit: a pipe does not report its size.
         std::fs::File::open(path)
             .and_then(|file| file.take(MAX_FILE_SIZE + 1).read_to_string(&mut text))
-            .map_err(|why| wrong(format!("cannot read this lesson: {why}")))?;
+            .map_err(|why| fault(format!("cannot read this lesson: {why}")))?;
         if text.len() as u64 > MAX_FILE_SIZE {
-            return Err(wrong(format!("larger than {} MiB: not a lesson", MAX_FILE_SIZE >> 20)));
+            return Err(fault(format!("larger than {} MiB: not a lesson", MAX_FILE_SIZE >> 20)));
         }
         Self::parse(path, &text, Some(path))
     }
@@ -325,14 +325,14 @@ impl Lesson {
             let at = error.span().map_or(0, |span| span.start);
             SceneError::in_text(file, text, at, key_at(text, at), None, error.message())
         })?;
-        let whole = || rows.scene.span();
+        let scene_span = || rows.scene.span();
         if !(1..=MAX_STEPS).contains(&rows.step.len()) {
             let message = format!("{} steps; allowed 1 to {MAX_STEPS}", rows.step.len());
-            return Err(source.error(whole(), "step", message));
+            return Err(source.error(scene_span(), "step", message));
         }
         if rows.measure.len() > MAX_MEASURES {
             let message = format!("{} measures; allowed {MAX_MEASURES}", rows.measure.len());
-            return Err(source.error(whole(), "measure", message));
+            return Err(source.error(scene_span(), "measure", message));
         }
         let mut lesson = Self {
             name: name.to_owned(),
@@ -363,7 +363,7 @@ impl Lesson {
     }
 
     /// The last step up to `step` that starts a run; the machine is set for it.
-    pub fn beginning(&self, step: usize) -> usize {
+    pub fn run_start_step(&self, step: usize) -> usize {
         let before = self.steps[..=step].iter();
         before.rev().position(|step| step.begins).map_or(0, |back| step - back)
     }
@@ -380,15 +380,15 @@ impl Lesson {
         let row = row.get_ref();
         let state = row.state.as_ref();
         let words = state.map_or("", |state| state.get_ref());
-        let wrong = |message: String| {
+        let fault = |message: String| {
             let span = state.map_or(span.clone(), Spanned::span);
             source.error(span, &key("state"), message)
         };
         let mut link = Link::parse(&format!("?{}", words.trim_start_matches(['?', '#'])))
-            .map_err(|error| wrong(error.to_string()))?;
+            .map_err(|error| fault(error.to_string()))?;
         if !link.log.entries.is_empty() {
             let message = "contains live changes, packed in `log`; write them as `change` of a step";
-            return Err(wrong(message.to_owned()));
+            return Err(fault(message.to_owned()));
         }
         (link.steps, link.hash) = (None, None);
         let named = words.split(['&', '?']).any(|word| word.starts_with("scene="));
@@ -397,17 +397,17 @@ impl Lesson {
         if begins {
             let argument = match &link.scene {
                 SceneText::BuiltIn(name) if named => name.clone(),
-                SceneText::BuiltIn(_) => beside(scene.get_ref(), source.file),
+                SceneText::BuiltIn(_) => resolve_scene_path(scene.get_ref(), source.file),
                 SceneText::File { .. } => {
                     let message = "contains a scene file; name the file as `scene` of the lesson";
-                    return Err(wrong(message.to_owned()));
+                    return Err(fault(message.to_owned()));
                 }
             };
             let loaded =
                 Scene::load(&argument, &[]).map_err(|error| source.error(scene.span(), "scene", error.to_string()))?;
             let loaded = match &link.log.base[..] {
                 [] => loaded,
-                base => Scene::load(&argument, base).map_err(|error| wrong(error.to_string()))?,
+                base => Scene::load(&argument, base).map_err(|error| fault(error.to_string()))?,
             };
             link.time.get_or_insert(0.0);
             // A link copied while the machine is being set uses this scene.
@@ -427,31 +427,32 @@ impl Lesson {
         let run = &mut self.runs[index];
         let scene = run.scene.clone();
         if let Some(change) = &row.change {
-            let wrong = |message: String| source.error(change.span(), &key("change"), message);
+            let fault = |message: String| source.error(change.span(), &key("change"), message);
             let Some(time) = link.time.filter(|_| begins) else {
-                return Err(wrong("needs a state with an instant, such as `t=20ms`".to_owned()));
+                return Err(fault("needs a state with an instant, such as `t=20ms`".to_owned()));
             };
             let mut changed = scene.clone();
             for (key, value) in change.get_ref() {
                 let done = changed.set(key, value);
-                done.map_err(|error| wrong(error.to_string()))?;
+                done.map_err(|error| fault(error.to_string()))?;
                 run.changes.push((time, key.clone(), value.clone()));
             }
         }
         let followed = link.followed_part(&scene).and(link.microscope_joint(&scene));
-        followed.map_err(|error| wrong(error.to_string()))?;
+        followed.map_err(|error| fault(error.to_string()))?;
         let view = row.view.as_ref().map(|view| {
-            look(view.get_ref(), &scene).map_err(|message| source.error(view.span(), &key("view"), message))
+            parse_camera_target(view.get_ref(), &scene)
+                .map_err(|message| source.error(view.span(), &key("view"), message))
         });
         let view = view.transpose()?;
         if let Some(question) = &row.question {
-            let wrong = |message: String| source.error(question.span(), &key("question"), message);
+            let fault = |message: String| source.error(question.span(), &key("question"), message);
             let count = question.get_ref().choices.len();
             if !(2..=MAX_CHOICES).contains(&count) {
-                return Err(wrong(format!("{count} choices; allowed 2 to {MAX_CHOICES}")));
+                return Err(fault(format!("{count} choices; allowed 2 to {MAX_CHOICES}")));
             }
             if row.until.is_none() {
-                return Err(wrong("needs `until`, the instant at which the answer is shown".to_owned()));
+                return Err(fault("needs `until`, the instant at which the answer is shown".to_owned()));
             }
         }
         Ok(Step {
@@ -561,7 +562,7 @@ impl Lesson {
             for text in &measure.times {
                 names.check(text).map_err(|why| {
                     let key = format!("measure.{}", measure.name);
-                    source.within(row.span(), text, &key, format!("`{text}` {why}"))
+                    source.error_within(row.span(), text, &key, format!("`{text}` {why}"))
                 })?;
             }
         }
@@ -578,7 +579,7 @@ impl Lesson {
                 if let Some(text) = text {
                     prose(text.get_ref()).map_err(|why| {
                         let part = why.split(':').next().unwrap_or_default();
-                        source.within(text.span(), part, &key(name), why.clone())
+                        source.error_within(text.span(), part, &key(name), why.clone())
                     })?;
                 }
             }
@@ -591,12 +592,12 @@ impl Lesson {
                 checked.map_err(|why| source.error(claim.span(), &key("claims"), why))?;
             }
             if let Some(question) = &row.question {
-                let wrong = |part: &str, why| source.within(question.span(), part, &key("question"), why);
+                let fault = |part: &str, why| source.error_within(question.span(), part, &key("question"), why);
                 let Question { ask, choices } = question.get_ref();
-                prose(ask).map_err(|why| wrong(ask, why))?;
+                prose(ask).map_err(|why| fault(ask, why))?;
                 for Choice { text, when } in choices {
-                    prose(text).map_err(|why| wrong(text, why))?;
-                    condition(when).map_err(|why| wrong(when, why))?;
+                    prose(text).map_err(|why| fault(text, why))?;
+                    condition(when).map_err(|why| fault(when, why))?;
                 }
             }
         }
@@ -605,7 +606,7 @@ impl Lesson {
 }
 
 /// Resolves a scene file relative to the lesson file.
-fn beside(scene: &str, file: Option<&str>) -> String {
+fn resolve_scene_path(scene: &str, file: Option<&str>) -> String {
     let is_file = scene.contains('/') || scene.ends_with(".toml");
     let folder = file.and_then(|file| std::path::Path::new(file).parent());
     match folder.filter(|_| is_file) {
@@ -616,7 +617,7 @@ fn beside(scene: &str, file: Option<&str>) -> String {
 }
 
 /// Parses a camera target.
-fn look(word: &str, scene: &Scene) -> Result<CameraTarget, String> {
+fn parse_camera_target(word: &str, scene: &Scene) -> Result<CameraTarget, String> {
     let joints = || scene.machine.ball_joints.iter().map(|joint| &*joint.name);
     if let Some(joint) = joints().position(|name| name == word) {
         return Ok(CameraTarget::At(joint));

@@ -73,27 +73,27 @@ impl LessonMeasures {
     /// The next run: that of the first pending measure, with all measures of that run whose instants are known.
     fn next_pass(&self) -> Result<Option<MeasuringRun>, String> {
         let measures = self.lesson.measures.iter().enumerate();
-        let open = measures.filter(|(index, _)| self.values[*index].is_none());
+        let pending = measures.filter(|(index, _)| self.values[*index].is_none());
         let mut pass: Option<MeasuringRun> = None;
-        let (mut run, mut waits) = (None, None);
+        let (mut run, mut unresolved) = (None, None);
         let names = self.names();
-        for (index, measure) in open {
+        for (index, measure) in pending {
             let own = measure.run;
             if run.is_some_and(|run| run != own) {
                 continue;
             }
             let times = measure.times.each_ref().map(|text| names.time(text));
             let [Some(from), Some(to)] = times else {
-                waits.get_or_insert(&measure.name);
+                unresolved.get_or_insert(&measure.name);
                 continue;
             };
             run = Some(own);
-            let wrong = |why: String| format!("measure {}: {why}", measure.name);
+            let fault = |why: String| format!("measure {}: {why}", measure.name);
             let pass = match &mut pass {
                 Some(pass) => pass,
-                none => none.insert(MeasuringRun::new(&self.lesson.runs[own]).map_err(wrong)?),
+                none => none.insert(MeasuringRun::new(&self.lesson.runs[own]).map_err(fault)?),
             };
-            let gauge = pass.gauge(measure, from, to).map_err(wrong)?;
+            let gauge = pass.gauge(measure, from, to).map_err(fault)?;
             // A run has one twin at a time; a twin with another start waits for a later pass.
             let of_other_twin =
                 |(_, other): &(usize, RunningMeasure)| other.measures_twin_distance() && other.from != from;
@@ -102,7 +102,7 @@ impl LessonMeasures {
             }
             pass.gauges.push((index, gauge));
         }
-        if let (None, Some(name)) = (&pass, waits) {
+        if let (None, Some(name)) = (&pass, unresolved) {
             return Err(format!("measure {name}: its instants are not times"));
         }
         Ok(pass)
@@ -160,8 +160,8 @@ impl MeasuringRun {
         if to > MAX_TIME {
             return Err(format!("ends at {to} s; allowed up to {MAX_TIME} s"));
         }
-        let over_stretch = matches!(measure.kind, Kind::Peak(_) | Kind::Least(_) | Kind::Mean(_));
-        if over_stretch && from >= to {
+        let needs_interval = matches!(measure.kind, Kind::Peak(_) | Kind::Least(_) | Kind::Mean(_));
+        if needs_interval && from >= to {
             return Err(format!("ends at {to} s, not after its start at {from} s"));
         }
         let kind = measure.kind.clone();
@@ -244,8 +244,8 @@ impl MeasuringRun {
             let done = self.simulation.set(&key, &value);
             done.map_err(|error| error.to_string())?;
         }
-        let apart = |(_, gauge): &(usize, RunningMeasure)| gauge.measures_twin_distance() && gauge.from <= now;
-        if self.twin.is_none() && self.gauges.iter().any(apart) {
+        let starts_twin = |(_, gauge): &(usize, RunningMeasure)| gauge.measures_twin_distance() && gauge.from <= now;
+        if self.twin.is_none() && self.gauges.iter().any(starts_twin) {
             self.twin = Some(Twin::new(&self.simulation));
         }
         let stepped = self.simulation.step();

@@ -47,7 +47,7 @@ impl App {
             return;
         };
         spoken::landmark(ui, "Lesson");
-        let own = running.sets || running.is_run_of_step(&self.player);
+        let own = running.is_setting_machine || running.is_run_of_step(&self.player);
         // A presentation screen is low in points but not operated by touch.
         let low = self.presentation.is_some() && !self.touched;
         let backwards = Layout::bottom_up(egui::Align::Min);
@@ -75,8 +75,8 @@ impl App {
                         set
                     });
                     let below = set.content_size.y - set.state.unclamped_offset().y - set.inner_rect.height();
-                    if running.more != (below > MIN_HIDDEN) {
-                        running.more = below > MIN_HIDDEN;
+                    if running.hides_rest != (below > MIN_HIDDEN) {
+                        running.hides_rest = below > MIN_HIDDEN;
                         ui.ctx().request_repaint();
                     }
                     if set.inner { Request::Set } else { request }
@@ -133,7 +133,7 @@ fn buttons(ui: &mut Ui, running: &RunningLesson) -> Request {
             }
         }
         let count = format!("{} of {}", running.step + 1, last + 1);
-        ui.label(if running.more && ui.available_width() < MIN_COUNTER_WIDTH {
+        ui.label(if running.hides_rest && ui.available_width() < MIN_COUNTER_WIDTH {
             count
         } else {
             format!("Step {count}")
@@ -144,7 +144,7 @@ fn buttons(ui: &mut Ui, running: &RunningLesson) -> Request {
             if leave.accessible_name("Leave the lesson").clicked() {
                 request = Request::Leave;
             }
-            if running.more && ui.button("More").on_hover_text("Scroll down to the rest of the step").clicked() {
+            if running.hides_rest && ui.button("More").on_hover_text("Scroll down to the rest of the step").clicked() {
                 request = Request::More;
             }
         });
@@ -169,7 +169,7 @@ impl RunningLesson {
         }
         if let Some(question) = &step.question {
             theme::use_dense_rows(ui);
-            let (right, names) = (self.right(), self.measured.names());
+            let (correct, names) = (self.correct_choice(), self.measured.names());
             let shows = self.reached && own;
             let mut predicted = self.predicted;
             ui.separator();
@@ -177,7 +177,7 @@ impl RunningLesson {
             for (index, choice) in question.choices.iter().enumerate() {
                 let words = filled(&choice.text, &names);
                 let colour = ui.visuals().selection.stroke.color;
-                let words = match (shows, right == Some(index)) {
+                let words = match (shows, correct == Some(index)) {
                     (true, true) => RichText::new(words).strong().color(colour),
                     (true, false) => RichText::new(words).weak(),
                     (false, _) => RichText::new(words),
@@ -195,11 +195,11 @@ impl RunningLesson {
                     predicted = Some(index).filter(|_| !chosen);
                 }
             }
-            if shows && let Some(right) = right {
-                let words = filled(&question.choices[right].text, &names);
+            if shows && let Some(correct) = correct {
+                let words = filled(&question.choices[correct].text, &names);
                 let colour = ui.visuals().selection.stroke.color;
                 let verdict = match predicted {
-                    Some(choice) if choice == right => format!("As predicted: {words}"),
+                    Some(choice) if choice == correct => format!("As predicted: {words}"),
                     Some(_) => format!("Not as predicted. Answer: {words}"),
                     None => format!("Answer: {words}"),
                 };
@@ -224,7 +224,7 @@ impl RunningLesson {
             ui.label(RichText::new("What you saw").small().weak());
             prose(ui, &step.seen, &self.measured.names());
         }
-        if std::mem::take(&mut self.fresh) {
+        if std::mem::take(&mut self.has_new_result) {
             // The answer may lie below the visible part.
             ui.scroll_to_cursor(Some(egui::Align::BOTTOM));
         }

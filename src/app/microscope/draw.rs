@@ -102,7 +102,7 @@ pub struct Sheet<'a> {
     palette: Palette,
     ink: Color32,
     faint: Color32,
-    ground: Color32,
+    background: Color32,
     magnified: &'a MagnifiedJoint,
 }
 
@@ -116,15 +116,15 @@ impl<'a> Sheet<'a> {
             palette: Palette::of(theme),
             ink: ui.visuals().text_color(),
             faint: ui.visuals().weak_text_color(),
-            ground: ui.visuals().extreme_bg_color,
+            background: ui.visuals().extreme_bg_color,
             magnified,
         };
-        sheet.painter.rect_filled(rect, 4.0, sheet.ground);
+        sheet.painter.rect_filled(rect, 4.0, sheet.background);
         sheet
     }
 
     fn words(&self, at: Pos2, anchor: Align2, words: &str, ink: Color32) -> Rect {
-        text(&self.painter, at, anchor, words, 11.0, ink, self.ground)
+        text(&self.painter, at, anchor, words, 11.0, ink, self.background)
     }
 
     /// A scale bar with its length; the right end is at `end`.
@@ -164,12 +164,12 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     let circle = Circle { centre: rect.center() + vec2(shift, 0.0), radius };
     let clearance = report.clearance as f32;
     let scale = circle.radius / clearance;
-    let flat = |v: Vec3| vec2(v.dot(axes[0]), -v.dot(axes[1]));
+    let project = |v: Vec3| vec2(v.dot(axes[0]), -v.dot(axes[1]));
 
-    let hair = Stroke::new(1.0, sheet.faint.gamma_multiply(0.5));
+    let hairline = Stroke::new(1.0, sheet.faint.gamma_multiply(0.5));
     for reach in [vec2(1.0, 0.0), vec2(0.0, 1.0)] {
         let end = reach * circle.radius;
-        painter.line_segment([circle.centre - end, circle.centre + end], hair);
+        painter.line_segment([circle.centre - end, circle.centre + end], hairline);
     }
     painter.circle_stroke(
         circle.centre,
@@ -177,14 +177,14 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
         Stroke::new(1.5, colour(palette.socket.colour.with_opacity(0.9))),
     );
 
-    let place = |v: Vec3| circle.centre + flat(v) * scale;
-    let young = colour(palette.trail);
-    let old = sheet.faint.gamma_multiply(0.45);
+    let place = |v: Vec3| circle.centre + project(v) * scale;
+    let new_colour = colour(palette.trail);
+    let old_colour = sheet.faint.gamma_multiply(0.45);
     let start = path.first().map_or(now, |point| point.time);
     let age = (now - start).max(f64::MIN_POSITIVE);
     let column = |i: usize| to_f32(&magnified.carrier.column(i).into_owned());
     let carrier = glam::Mat3::from_cols(column(0), column(1), column(2));
-    let here = place(to_f32(&report.eccentricity));
+    let ball_centre = place(to_f32(&report.eccentricity));
     let mut before: Option<Pos2> = None;
     for point in path {
         let at = place(carrier * Vec3::from_array(point.position));
@@ -192,14 +192,14 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
             if from.distance(at) < MIN_DISTANCE {
                 continue;
             }
-            let share = ((point.time - start) / age) as f32;
-            let stroke = Stroke::new(1.2 + 0.6 * share, old.lerp_to_gamma(young, share));
+            let fraction = ((point.time - start) / age) as f32;
+            let stroke = Stroke::new(1.2 + 0.6 * fraction, old_colour.lerp_to_gamma(new_colour, fraction));
             painter.line_segment([from, at], stroke);
         }
         before = Some(at);
     }
     if let Some(from) = before {
-        painter.line_segment([from, here], Stroke::new(1.8, young));
+        painter.line_segment([from, ball_centre], Stroke::new(1.8, new_colour));
     }
 
     let touches = magnified.sliding.is_some();
@@ -208,19 +208,19 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
         // The clearance sphere bounds the ball's centre, so contact and normal are drawn there.
         let normal = to_f32(&normal);
         let foot = place(normal * clearance);
-        let out = flat(normal);
+        let out = project(normal);
         painter.line_segment([foot, foot + out * 22.0], Stroke::new(2.0, contact));
         let across = vec2(-out.y, out.x) * 9.0;
         painter.line_segment([foot - across, foot + across], Stroke::new(2.0, contact));
     }
     let moving = colour(palette.friction);
     let velocity = to_f32(&magnified.sliding.unwrap_or(magnified.velocity));
-    let arrow = flat(velocity) * (ARROW_LENGTH / speed as f32);
+    let arrow = project(velocity) * (ARROW_LENGTH / speed as f32);
     if arrow.length() > 2.0 {
-        painter.arrow(here, arrow, Stroke::new(2.0, moving));
+        painter.arrow(ball_centre, arrow, Stroke::new(2.0, moving));
     }
     let fill = if touches { contact } else { sheet.ink };
-    painter.circle(here, CENTRE_RADIUS, fill, Stroke::new(1.5, sheet.ground));
+    painter.circle(ball_centre, CENTRE_RADIUS, fill, Stroke::new(1.5, sheet.background));
 
     triad(sheet, axes);
     let bar = round_down(f64::from(clearance) * 0.9);
@@ -234,7 +234,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     if path.len() > 1 {
         let words = format!("path of {}", value::quantity(now - start, "ms", 3));
         let below = ruler + vec2(0.0, 9.0);
-        sheet.words(below, Align2::LEFT_TOP, &words, young);
+        sheet.words(below, Align2::LEFT_TOP, &words, new_colour);
     }
     circle
 }
@@ -262,13 +262,13 @@ pub fn section(sheet: &Sheet<'_>, patch: &ContactPatch) {
     let depth = round_up(1.1 * patch.penetration.max(patch.deepest).max(MIN_DEPTH_SCALE));
     let radius = patch.effective_radius;
     let half = 1.3 * (2.0 * radius * depth).sqrt();
-    let wide = f64::from(rect.width()) / (2.0 * half);
+    let width_scale = f64::from(rect.width()) / (2.0 * half);
     let wall = rect.top() + 0.55 * rect.height();
-    let deep = 0.36 * f64::from(rect.height()) / depth;
+    let depth_scale = 0.36 * f64::from(rect.height()) / depth;
     let middle = f64::from(rect.center().x);
     let ball = |x: f64| {
-        let below = (patch.penetration - x * x / (2.0 * radius)) * deep;
-        pos2((middle + x * wide) as f32, wall + below as f32)
+        let below = (patch.penetration - x * x / (2.0 * radius)) * depth_scale;
+        pos2((middle + x * width_scale) as f32, wall + below as f32)
     };
     let steps = 48;
     let points: Vec<Pos2> = (0..=steps).map(|i| ball(half * (2.0 * f64::from(i) / f64::from(steps) - 1.0))).collect();
@@ -281,13 +281,13 @@ pub fn section(sheet: &Sheet<'_>, patch: &ContactPatch) {
             painter.add(Shape::convex_polygon(corners, fill, Stroke::NONE));
         }
     }
-    let blue = colour(palette.socket.colour.with_opacity(0.9));
-    painter.hline(rect.x_range(), wall, Stroke::new(1.5, blue));
+    let wall_colour = colour(palette.socket.colour.with_opacity(0.9));
+    painter.hline(rect.x_range(), wall, Stroke::new(1.5, wall_colour));
     painter.line(points, Stroke::new(1.5, sheet.ink));
-    let patched = (patch.radius() * wide) as f32;
-    if patched > 0.0 {
+    let patch_radius = (patch.radius() * width_scale) as f32;
+    if patch_radius > 0.0 {
         let centre = pos2(rect.center().x, wall);
-        let reach = vec2(patched, 0.0);
+        let reach = vec2(patch_radius, 0.0);
         let stroke = Stroke::new(3.5, contact);
         painter.line_segment([centre - reach, centre + reach], stroke);
     }
@@ -295,7 +295,7 @@ pub fn section(sheet: &Sheet<'_>, patch: &ContactPatch) {
     sheet.words(above, Align2::CENTER_TOP, "ball", sheet.ink);
     let below = pos2(rect.left() + 8.0, wall + 3.0);
     sheet.words(below, Align2::LEFT_TOP, "wall", sheet.ink);
-    let times = value::number(deep / wide, 2);
+    let times = value::number(depth_scale / width_scale, 2);
     let words = format!("depths ×{times}");
     // Inside the ball during penetration; otherwise beside its lowest point.
     if patch.penetration > 0.0 {
@@ -306,12 +306,12 @@ pub fn section(sheet: &Sheet<'_>, patch: &ContactPatch) {
     }
     let bar = round_down(0.5 * half);
     let end = pos2(rect.right() - 10.0, rect.bottom() - 8.0);
-    sheet.bar(end, (bar * wide) as f32, &length(bar, 3));
+    sheet.bar(end, (bar * width_scale) as f32, &length(bar, 3));
     // Vertical, at the left edge, downward from the wall line.
     let down = round_down(depth);
     let stroke = Stroke::new(1.5, sheet.ink);
     let top = pos2(rect.left() + 48.0, wall);
-    let foot = top + vec2(0.0, (down * deep) as f32);
+    let foot = top + vec2(0.0, (down * depth_scale) as f32);
     painter.line_segment([top, foot], stroke);
     for at in [top, foot] {
         painter.line_segment([at - vec2(3.5, 0.0), at + vec2(3.5, 0.0)], stroke);

@@ -2,7 +2,7 @@
 
 use eframe::egui::Ui;
 
-use super::{Panel, Plots, before, time_axis};
+use super::{Panel, Plots, earlier_traces, time_axis};
 use crate::app::host::SaveFile;
 use crate::app::player::Player;
 use crate::app::{App, layout};
@@ -127,7 +127,7 @@ impl Plots {
         }
         if panel.kind != PlotKind::Bands {
             for kept in self.comparison.shown() {
-                let traces = before(kept, player, panel, &self.hidden, false, (from, to, MAX_INSTANTS));
+                let traces = earlier_traces(kept, player, panel, &self.hidden, false, (from, to, MAX_INSTANTS));
                 for (index, trace) in traces.iter().enumerate() {
                     let [r, g, b, _] = trace.colour.to_array();
                     let label = if index == 0 { kept.name() } else { String::new() };
