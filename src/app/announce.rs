@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_report_says_what_goes_on_and_how_hard_it_hit() {
+    fn a_report_states_the_activity_and_the_strongest_impact() {
         let mut player = player("pendulum");
         let mut announcer = Announcer::default();
         assert_eq!(announcer.update(0.0, &player, ""), (true, None));
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn settled_joints_and_long_chains_are_told_in_short() {
+    fn settled_joints_and_long_chains_are_reported_briefly() {
         let mut rests = player("spcmm");
         rests.pacer.set_scale(1.0);
         rests.set_playing(true);

@@ -156,7 +156,7 @@ mod tests {
     const SECOND: TimeWindow = TimeWindow { from: 1.0, to: 2.0, lasts: 0.05 };
 
     #[test]
-    fn a_stretch_has_the_impacts_that_ended_in_it_at_their_times() {
+    fn a_time_window_has_the_impacts_that_ended_in_it_at_their_times() {
         let ends = [0.5, 1.0, 1.25, 2.0, 2.5];
         let impacts = ends.map(|end| impact(end, 1e-4, 0.01));
         let heard = of(&impacts, SECOND);
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pitch_is_that_of_the_contact_at_any_speed_of_the_play() {
+    fn the_pitch_is_that_of_the_contact_at_any_time_scale() {
         for lasted in [2e-4, 1e-3] {
             for lasts in [1e-3, 50.0] {
                 let window = TimeWindow { lasts, ..SECOND };
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn the_loudness_rises_with_the_impulse_by_less_and_has_an_end() {
+    fn the_loudness_rises_less_than_the_impulse_and_is_bounded() {
         let loudness = |speed: f64| of(&[impact(1.5, 1e-4, speed)], SECOND)[0].loudness;
         // 0.5 kg rebounding at 0.01 m/s, relative to 5 kg at 0.1 m/s.
         assert!((loudness(0.01) - 0.02_f64.powf(0.4)).abs() < 1e-12);
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_device_gets_what_it_can_sound() {
+    fn a_device_with_a_low_sample_rate_plays_an_audible_click() {
         let click = Click { after: 0.0, pitch: 8000.0, loudness: 1.0 };
         let samples: Vec<f32> = Voice::new(&click, 8000.0).collect();
         assert!(samples.iter().any(|sample| sample.abs() > 0.1));

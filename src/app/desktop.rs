@@ -172,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_the_dialog_has_asked_about_is_replaced_and_what_goes_with_it() {
+    fn only_the_file_confirmed_in_the_dialog_and_its_companions_are_replaced() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("data.csv");
         let read = || std::fs::read_to_string(&path).expect("there");

@@ -125,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_say_which_panels_there_are() {
+    fn panel_words_are_read_and_written() {
         for words in ["", "controls", "controls,timeline,plots,bench"] {
             assert_eq!(Embedded::read(words).expect("read").write(), words);
         }

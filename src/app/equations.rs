@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_enters_the_law_of_its_own_joint() {
+    fn a_parameter_shows_the_law_of_its_own_joint() {
         let changes = [("contact.friction_law", "none"), ("joint.S2.normal_law", "hertz")];
         let changes = changes.map(|(key, value)| (key.to_owned(), value.to_owned()));
         let scene = Scene::load("spcmm", &changes).expect("built in");
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn the_normal_force_stated_is_the_one_of_the_law_in_use() {
+    fn the_displayed_normal_force_is_that_of_the_active_law() {
         let ce = 0.7;
         for normal_law in NormalLaw::ALL {
             let contact = Parameters { normal_law, ..Parameters::default() };

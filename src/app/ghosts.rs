@@ -72,7 +72,7 @@ mod tests {
     use crate::view::{LabelKind, PeakMarks, ViewOptions, output_point, to_f32};
 
     #[test]
-    fn the_arrow_and_its_words_are_the_distance_of_two_runs_apart() {
+    fn the_arrow_and_its_note_are_the_distance_of_two_separate_runs() {
         let scene = Scene::load("slider-crank", &[]).expect("built in");
         let mut player = Player::new(&scene).expect("starts");
         player.set_ideal(true);

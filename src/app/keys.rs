@@ -356,7 +356,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_overlay_names_every_key_that_acts() {
+    fn the_overlay_lists_every_bound_key() {
         let mut written = "";
         for binding in &BINDINGS {
             if !binding.written.is_empty() {

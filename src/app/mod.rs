@@ -948,7 +948,7 @@ impl App {
         }
     }
 
-    /// Closes what lies innermost: a menu, the dialog, what is under way, the message, the presentation, the microscope.
+    /// Closes the innermost element: menu, dialog, operation in progress, message, presentation or microscope.
     fn close_innermost(&mut self, ctx: &egui::Context) {
         // A menu and a list close themselves.
         if egui::Popup::is_any_open(ctx) || self.dialog.take().is_some() {

@@ -66,7 +66,7 @@ mod tests {
     use crate::simulate::Simulation;
 
     #[test]
-    fn every_built_in_machine_has_a_pace_at_which_a_turn_takes_three_to_six_seconds() {
+    fn every_driven_built_in_machine_takes_three_to_six_seconds_per_turn() {
         for name in BUILT_IN {
             let scene = Scene::load(name, &[]).expect("built in");
             let scale = time_scale(&scene);
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn in_every_built_in_machine_something_touches_within_a_second_of_viewing() {
+    fn every_built_in_machine_has_an_impact_within_a_second_of_viewing() {
         for name in BUILT_IN {
             let scene = Scene::load(name, &[]).expect("built in");
             let end = time_scale(&scene);
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn the_words_of_scene_files_are_those_of_the_plots() {
+    fn plot_words_of_scene_files_match_the_plots() {
         // Two of them as named in links made before the plots were renamed.
         let words = Quantity::ALL.map(|quantity| match quantity {
             Quantity::Penetration => "penetration".to_owned(),
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_visitor_meets_strikes_at_every_turn_for_ever() {
+    fn the_first_time_scene_has_impacts_in_every_period() {
         let scene = rattling();
         assert!(is_rattling(&scene));
         let period = drive_period(&scene).expect("driven");

@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn names_of_six_and_of_twelve_joints_lie_beside_each_other_and_lines_lead_from_them() {
+    fn names_of_twelve_joints_do_not_overlap_and_distant_ones_have_leaders() {
         for (scene, joints) in [("hexapod", 12), ("delta", 12)] {
             let scene = Scene::load(scene, &[]).expect("built in");
             let mut frame = Frame::default();
@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_stands_by_its_joint_or_not_at_all() {
+    fn a_name_is_near_its_joint_or_omitted() {
         let names = painted(8, 40.0);
         assert_eq!(names.len(), 8, "each has room");
         // 4096 joints on 400 points.

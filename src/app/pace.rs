@@ -169,7 +169,7 @@ mod tests {
     const FREE: f64 = 1e-6;
 
     #[test]
-    fn the_ladder_leaves_out_one_thing_more_in_each_row_in_the_order_that_is_promised() {
+    fn each_row_of_the_ladder_drops_one_more_feature_in_the_documented_order() {
         let order = |q: &Quality| {
             let light = [q.occlusion, q.samples > 1, q.fine_shadows];
             let left_out = light.map(|kept| !kept);
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn under_an_even_load_it_settles_and_does_not_swing() {
+    fn under_a_constant_load_it_settles_and_does_not_oscillate() {
         const MINUTES: f64 = 600.0;
         // Drawing times by row; the largest jumps in software rendering are from four samples to one.
         let loads = [
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn at_rest_the_picture_has_everything_and_is_asked_for_once() {
+    fn at_rest_the_picture_has_full_quality_and_is_requested_once() {
         let mut window = Window::default();
         window.run(20.0, FREE, 0.0, |_| 0.1);
         window.now += 0.1;

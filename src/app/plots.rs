@@ -1014,7 +1014,7 @@ mod tests {
     }
 
     #[test]
-    fn marks_are_round_few_and_told_apart() {
+    fn marks_are_round_few_and_distinguishable() {
         assert_eq!(words(0.0, 871.0, 120.0), ["0", "200", "400", "600", "800"]);
         assert_eq!(words(-0.015, 0.315, 120.0), ["0", "0.1", "0.2", "0.3"]);
         assert_eq!(words(203.44080, 203.44120, 120.0), ["203.4408", "203.4409", "203.4410", "203.4411", "203.4412"]);
@@ -1056,7 +1056,7 @@ mod tests {
     }
 
     #[test]
-    fn windows_are_told_in_the_unit_that_suits() {
+    fn windows_are_labelled_in_a_suitable_unit() {
         let all = WINDOWS.map(|length| PlotWindow::Last(length).label());
         assert_eq!(all, ["1 ms", "10 ms", "50 ms", "100 ms", "1 s", "10 s"]);
     }

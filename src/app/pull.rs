@@ -58,7 +58,7 @@ mod tests {
     use crate::view::{SceneView, to_f32};
 
     #[test]
-    fn what_is_held_follows_the_hand_and_only_bodies_are_held() {
+    fn a_gripped_body_follows_the_hand_and_only_bodies_can_be_gripped() {
         let scene = Scene::load("pendulum", &[]).expect("built in");
         let mut player = Player::new(&scene).expect("starts");
         let place = player.frame().bodies[0].position;

@@ -297,7 +297,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read_again_and_what_is_broken_or_out_of_range_is_not() {
+    fn settings_are_read_back_and_broken_or_implausible_ones_are_dropped() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("deep").join("window.json");
         let mut store = Store::at(path.clone());

@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn more_than_a_device_takes_is_cut_off_and_more_than_are_heard_are_left_out() {
+    fn loud_sums_are_clipped_and_surplus_clicks_are_dropped() {
         let (send, clicks) = channel();
         let mut mixer = Mixer::new(clicks, 48_000.0);
         let now = Instant::now();

@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_said_in_words_with_the_digits_that_matter() {
+    fn values_are_spoken_with_unit_names_and_significant_digits() {
         for (shown, spoken) in [
             ("0.3 mm", "0.3 millimetres"),
             ("1 mm", "1 millimetre"),

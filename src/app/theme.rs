@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn the_face_has_every_character_that_is_shown() {
+    fn the_font_has_every_displayed_character() {
         let ctx = eframe::egui::Context::default();
         apply(&ctx, false);
         let mut output = ctx.run_ui(Default::default(), |_| {});
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tables_left_out_of_the_face_change_no_pixel() {
+    fn the_tables_removed_from_the_font_change_no_pixel() {
         let picture = |face: &'static [u8]| {
             let mut fonts = fonts();
             for data in fonts.font_data.values_mut() {

@@ -1006,13 +1006,13 @@ mod tests {
     const LONGEST: &str = "hexapod";
 
     #[test]
-    fn what_is_written_over_a_machine_hides_none_of_it_and_stays_where_it_is() {
+    fn overlays_hide_no_part_of_a_machine_and_stay_in_place() {
         crate::scene::BUILT_IN.into_iter().filter(|scene| *scene != LONGEST).for_each(watch);
     }
 
     #[test]
     #[ignore = "full: half a minute"]
-    fn full_what_is_written_over_the_longest_hides_none_of_it_and_stays_where_it_is() {
+    fn full_overlays_hide_no_part_of_the_slowest_machine_and_stay_in_place() {
         watch(LONGEST);
     }
 
@@ -1065,7 +1065,7 @@ mod tests {
     }
 
     #[test]
-    fn another_shape_is_fitted_anew_until_the_camera_is_moved_and_then_shows_as_much_across() {
+    fn a_new_aspect_ratio_is_refitted_until_the_camera_is_moved_and_then_shows_no_less() {
         let (wide, narrow) = (vec2(980.0, 432.0), vec2(420.0, 432.0));
         let settled = |watched: &mut Watched<1>, size| {
             watched.draw(0, size);

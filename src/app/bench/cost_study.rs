@@ -8,7 +8,7 @@ use crate::app::{controls, value};
 use crate::scene::{Kind, Parameter, Scene, Value};
 use crate::units::{from_display, to_display};
 
-/// Parts of its value by which a parameter varies at first, per cent.
+/// Initial variation of a parameter, percent of its value.
 const INITIAL_VARIATION: f64 = 50.0;
 
 /// A contact parameter that every ball joint has.
@@ -17,7 +17,7 @@ pub struct VariedParameter {
     pub parameter: &'static Parameter,
     /// Whether it varies.
     pub on: bool,
-    /// Ends of its range in the unit on show.
+    /// Ends of its range in the display unit.
     pub range: [f64; 2],
 }
 
@@ -25,9 +25,9 @@ pub struct VariedParameter {
 pub struct CostSettings {
     /// Parameters to choose from.
     pub varied: Vec<VariedParameter>,
-    /// Whether every joint takes the same range, in place of a part of its own value.
+    /// Whether every joint takes the same range instead of a percentage of its own value.
     pub ranges: bool,
-    /// That part, per cent.
+    /// The percentage.
     pub percent: f64,
     /// Observed part of each run.
     pub span: RunSpan,
@@ -55,7 +55,7 @@ impl CostSettings {
         Self { varied, ranges: false, percent: INITIAL_VARIATION, span: RunSpan::of(scene) }
     }
 
-    /// The study that they describe.
+    /// The study with these settings.
     ///
     /// # Errors
     /// As a message: a reversed range, or nothing that varies.
@@ -131,7 +131,7 @@ impl CostStudy {
         Some(run.get(output).copied().flatten())
     }
 
-    /// Finished runs, and all of them.
+    /// Numbers of finished runs and of all runs.
     pub fn run_counts(&self) -> (usize, usize) {
         (self.runs.iter().flatten().count(), self.runs.len())
     }

@@ -27,7 +27,7 @@ const MIN_DURATION: f64 = 1e-3;
 pub struct Costs {
     /// Whether it was drawn since the last frame, or will be.
     drawn: bool,
-    /// Whether something else has its place, and its results are kept.
+    /// Whether another panel takes its place while the results are retained.
     is_set_aside: bool,
     /// Text of the scene that the settings belong to.
     scene: String,
@@ -36,7 +36,7 @@ pub struct Costs {
     running: Option<RunningStudy>,
     study: Option<CostStudy>,
     problem: Option<String>,
-    /// Index of the output on show.
+    /// Index of the displayed output.
     output: usize,
     /// Whether to scroll to the tornado.
     reveal: bool,
@@ -69,7 +69,7 @@ impl Default for Costs {
 }
 
 impl Costs {
-    /// Whether it is still open: drawn since the last call, or aside. What is not drawn computes nothing.
+    /// Whether it is still open: drawn since the last call, or set aside. A hidden panel computes nothing.
     pub fn was_shown(&mut self) -> bool {
         let drawn = std::mem::take(&mut self.drawn);
         if !drawn {
@@ -78,12 +78,12 @@ impl Costs {
         drawn || self.is_set_aside
     }
 
-    /// Leaves its place to something else until it is drawn again.
+    /// Retains the results while another panel takes its place, until it is drawn again.
     pub fn set_aside(&mut self) {
         self.is_set_aside = true;
     }
 
-    /// Whether something else has its place.
+    /// Whether another panel takes its place.
     pub fn is_set_aside(&self) -> bool {
         self.is_set_aside
     }
@@ -98,7 +98,7 @@ impl Costs {
         self.running.is_some() || self.requested.is_some()
     }
 
-    /// Whether the latest results belong to the requested study, or none is to come.
+    /// Whether the latest results belong to the requested study, or no study is pending.
     fn has_current_results(&self) -> bool {
         self.requested.is_none() && self.running.as_ref().is_none_or(|running| running.has_plan)
     }
@@ -120,7 +120,7 @@ impl Costs {
         let polled = job.poll(|message| match message {
             Message::Plan(plan) if !*has_plan => {
                 *has_plan = true;
-                // An output that the scene does not have gives way to the first that it has.
+                // An output missing from the scene is replaced by the first available one.
                 let has = |output: &usize| plan.units[*output].is_some();
                 self.output = Some(self.output).filter(has).or((0..NAMED.len()).find(has)).unwrap_or_default();
                 self.study = Some(CostStudy::new(task.clone(), plan));
@@ -296,7 +296,7 @@ impl Costs {
     }
 }
 
-/// Choice of the output on show.
+/// Selection of the displayed output.
 fn output_ui(ui: &mut Ui, output: &mut usize, study: &CostStudy) {
     ui.horizontal(|ui| {
         ui.label("Effect on");

@@ -65,7 +65,7 @@ type Mark = (PlotPoint, usize, usize);
 #[derive(Default)]
 pub struct Diagram {
     ordinate: Ordinate,
-    /// The settings of the present marks; `None` if they must be rebuilt.
+    /// The settings of the current marks; `None` if they must be rebuilt.
     mark_settings: Option<(Ordinate, Coordinate)>,
     marks: [Vec<PlotPoint>; REGIMES.len()],
     all: Vec<Mark>,

@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_time_left_is_told_no_finer_than_it_is_known() {
+    fn the_remaining_time_is_shown_no_finer_than_it_is_known() {
         for (left, words) in [
             (3.0, "a few seconds left"),
             (42.0, "about 40 s left"),

@@ -142,7 +142,7 @@ impl SweepPanel {
         ready.or(load.map(BenchRequest::Section))
     }
 
-    /// Whether the diagram belongs to the requested sweep, or no other is to come.
+    /// Whether the diagram belongs to the requested sweep, or no sweep is pending.
     fn has_diagram(&self) -> bool {
         self.requested.is_none() && self.running.as_ref().is_none_or(|sweeping| sweeping.has_ranges)
     }

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_that_was_fast_enough_stays_so_and_the_sweep_goes_on() {
+    fn a_picture_that_was_fast_enough_stays_so_and_the_sweep_continues() {
         // Expected rest: the smallest power of two r for which (busy + r free) / (1 + r) suffices.
         for (free, busy, most) in [(23.0, 15.0, 4.0), (40.0, 5.0, 1.0), (60.0, 19.0, 1.0), (21.5, 15.0, 8.0)] {
             let mut page = Page::new(free, busy);
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_given_up_where_that_is_of_no_use_or_of_no_need() {
+    fn a_sweep_does_not_rest_where_that_is_useless_or_needless() {
         let mut slow = Page::new(13.0, 9.0);
         slow.draw(12.0);
         for _ in 0..60 {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sweep_has_the_machine_while_the_picture_rests() {
+    fn a_sweep_does_not_rest_while_the_picture_is_still() {
         let mut page = Page::new(23.0, 15.0);
         page.draw(10.0);
         assert!(page.rest > 0.0);

@@ -22,7 +22,7 @@ const MARGIN: f32 = 2.0;
 const MAX_NAMES_FRACTION: f32 = 0.3;
 /// Opacity of the bars of an earlier setting.
 const PALE_OPACITY: f32 = 0.45;
-/// Digits of a value on show.
+/// Digits of a displayed value.
 const DIGITS: usize = 4;
 
 /// Rows of the drawing.
@@ -38,13 +38,13 @@ pub struct Tornado {
 
 /// An end of an input.
 struct End {
-    /// The value of the input and the output there, as shown.
+    /// Displayed values of the input and of the output at this end.
     texts: [String; 2],
     /// Output, SI.
     value: Option<f64>,
     /// Full description.
     words: String,
-    /// Whether the slider is there.
+    /// Whether the slider is at this end.
     is_current: bool,
 }
 
@@ -125,7 +125,7 @@ impl Tornado {
     }
 }
 
-/// Where things are drawn.
+/// Layout of the drawing.
 struct Place {
     area: Rect,
     /// Height of a bar.
@@ -134,7 +134,7 @@ struct Place {
     names: f32,
     /// Left and right edge of the bars.
     plane: [f32; 2],
-    /// The values there, SI.
+    /// The values at those edges, SI.
     values: [f64; 2],
     /// The value from which the bars begin, SI.
     base: Option<f64>,

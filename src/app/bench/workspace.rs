@@ -15,14 +15,14 @@ use crate::mechanism::drive_positions;
 use crate::units::format_quantity_digits;
 use crate::view::{Cloud, to_f32};
 
-/// Directions at each point: enough for the largest error, which is improved from the largest of them.
+/// Number of directions searched at each point; the search for the largest error starts from the best of them.
 const DIRECTIONS: usize = 16;
 /// Width of the start button, points; fixed, so that it does not move.
 const BUTTON_WIDTH: f32 = 120.0;
-/// Range of the scale, and that at first.
+/// Range and initial value of the scale.
 const SCALE_RANGE: std::ops::RangeInclusive<f32> = 1.0..=1000.0;
 const INITIAL_SCALE: f32 = 100.0;
-/// Largest number of drives that vary at first.
+/// Largest number of drives that vary initially.
 const MAX_DRIVES: usize = 3;
 
 /// The error that the map shows.
@@ -69,7 +69,7 @@ impl ShownError {
     }
 }
 
-/// Axes of the first drives, one per line: around their positions at t = 0, or a whole turn where a crank that goes round is alone.
+/// Axes of the first drives, one per line: around their positions at t = 0, or a full turn if the only drive is a rotating crank.
 fn default_axes(machine: &Machine) -> String {
     let driven = || machine.joints.iter().flat_map(|joint| joint.drives().map(move |drive| (joint, drive)));
     let is_only_drive = driven().nth(1).is_none();
@@ -116,7 +116,7 @@ pub struct MapPanel {
     problem: Option<String>,
     shown_error: ShownError,
     scale: f32,
-    /// The axis that is fixed, and at which of its values.
+    /// Indices of the fixed axis and of its value.
     slice: Option<(usize, usize)>,
     /// Whether the panel was open when it was last drawn.
     shown: bool,
@@ -166,7 +166,7 @@ impl MapPanel {
         self.running.is_some()
     }
 
-    /// The arrows of the map of the scene on show; `None` if the panel was closed in the latest frame.
+    /// The arrows of the map of the displayed scene; `None` if the panel was closed in the latest frame.
     pub fn take_cloud(&mut self, player: &Player) -> Option<Cloud> {
         let shown = std::mem::take(&mut self.shown);
         let mapped = self.mapped.as_ref().filter(|_| shown)?;
@@ -188,7 +188,7 @@ impl MapPanel {
         })
     }
 
-    /// Axes, progress, and what is shown.
+    /// Axes, progress, and display options.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
         self.shown = true;
         let scene = player.pending();
@@ -273,7 +273,7 @@ impl MapPanel {
         ui.label(RichText::new(words).small()).on_hover_text("Arrows begin at the tip of the machine without play");
     }
 
-    /// Selection of the axis that is fixed, and of its value.
+    /// Selection of the fixed axis and its value.
     fn slice_ui(&mut self, ui: &mut Ui) {
         let Some(mapped) = self.mapped.as_ref().filter(|mapped| mapped.axes.len() > 1) else {
             return;
@@ -380,7 +380,7 @@ mod tests {
         assert_eq!(shown(&mut panel).arrows, [all[1], all[3], all[5]]);
         panel.slice = Some((0, 2));
         assert_eq!(shown(&mut panel).arrows, all[4..]);
-        // Of other values, nothing is drawn.
+        // A map of other parameter values is not drawn.
         let other =
             Scene::load("four-bar", &[("contact.clearance".to_owned(), "0.3 mm".to_owned())]).expect("built in");
         let other = Player::new(&other).expect("starts");
@@ -389,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn axes_at_first_are_positions_of_the_first_drives() {
+    fn default_axes_are_positions_of_the_first_drives() {
         let scene = Scene::load("hexapod", &[]).expect("built in");
         let over: Vec<String> = default_axes(&scene.machine).lines().map(str::to_owned).collect();
         assert_eq!(over.len(), MAX_DRIVES);

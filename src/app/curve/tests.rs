@@ -80,7 +80,7 @@ fn around(x: f64) -> [usize; 4] {
 }
 
 #[test]
-fn a_spike_is_as_high_as_it_was_recorded_the_newest_included() {
+fn every_spike_including_the_newest_has_its_recorded_height() {
     let spikes = [(200, 0, 621.0), (430, 1, 333.0), (431, 1, 101.0), (700, 2, 87.0), (1000, 0, 379.0)];
     let history = record(|n, channel| {
         let found = spikes.iter().find(|spike| (spike.0, spike.1) == (n, channel));
@@ -98,7 +98,7 @@ fn a_spike_is_as_high_as_it_was_recorded_the_newest_included() {
 }
 
 #[test]
-fn coincident_spikes_are_all_seen_of_different_height_and_of_the_same() {
+fn coincident_spikes_of_different_or_equal_height_are_all_visible() {
     let all = [[621.0, 561.0, 533.0], [533.0, 561.0, 621.0], [400.0; 3], [0.0; 3]];
     for (heights, (size, scale)) in all.into_iter().zip(SIZES.into_iter().cycle()) {
         let history = record(|n, channel| if n == 500 { heights[channel] } else { 0.0 });
@@ -156,7 +156,7 @@ fn a_curve_is_whole_and_stays_in_the_range_of_its_values() {
 }
 
 #[test]
-fn sharp_corners_have_no_join() {
+fn lines_are_split_at_sharp_corners() {
     let points = [(0.0, 0.0), (1.0, 0.1), (1.0, 0.1), (2.0, 0.0), (2.5, 50.0), (3.0, 0.0), (4.0, 0.0)];
     let parts = parts(points.into_iter().map(|(x, y)| pos2(x, y)));
     let ends: Vec<usize> = parts.iter().map(Vec::len).collect();

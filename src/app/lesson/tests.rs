@@ -46,7 +46,7 @@ fn written_number(text: &str) -> Option<&str> {
 }
 
 #[test]
-fn every_lesson_holds_what_it_says() {
+fn every_built_in_lesson_is_correct() {
     let mut names = std::collections::BTreeSet::new();
     for (name, _) in BUILT_IN_LESSONS {
         let lesson = Lesson::built_in(name).unwrap_or_else(|error| panic!("{name}: {error}"));
@@ -95,7 +95,7 @@ fn fault(old: &str, new: &str) -> String {
 }
 
 #[test]
-fn what_is_wrong_in_a_lesson_is_said_with_its_place_and_what_is_allowed() {
+fn errors_in_a_lesson_name_their_position_and_the_allowed_values() {
     for (old, new, message_parts) in [
         ("title = \"A rod", "titel = \"A rod", &["own.toml:1:1", "titel", "expected one of", "`title`"][..]),
         ("scene = \"pendulum\"", "scene = \"pendulun\"", &["own.toml:2:9", "scene", "did you mean `pendulum`?"]),

@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn values_have_a_unit_that_suits_them() {
+    fn values_have_a_suitable_unit() {
         let write = |value, dimension, unit| words(Quantity::new(value, dimension), unit);
         for (value, dimension, unit, expected) in [
             (7.801_42e-3, Dimension::Time, None, "7.8 ms"),

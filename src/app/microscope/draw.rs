@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_down_in_the_scene_is_down_in_the_plane() {
+    fn gravity_points_down_in_the_plane() {
         for down in [SignedAxis::PlusX, SignedAxis::MinusZ, SignedAxis::PlusY] {
             for plane in [Plane::Xy, Plane::Yz, Plane::Zx] {
                 let [right, up] = plane.axes(down, [Vec3::X, Vec3::Y]);

@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sliding_velocity_is_the_one_that_friction_read() {
+    fn the_sliding_velocity_is_that_of_the_friction_law() {
         for velocity in ["centres", "surface", "printed"] {
             let mut player = player("pendulum", &[("contact.friction_velocity", velocity)]);
             let mut compared = 0;
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn an_impact_is_told_once_its_end_is_known_and_not_before_its_beginning() {
+    fn an_impact_is_shown_once_its_end_is_known_and_not_before_its_onset() {
         let mut player = player("spcmm", &[]);
         let (mut before, mut ends) = (None, Vec::new());
         while ends.len() < 3 {

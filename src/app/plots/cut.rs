@@ -1,10 +1,10 @@
-//! Peaks cut off: tall blows as a run begins must not flatten the rest of a plot. Each is marked, and none is cut without a word.
+//! Cuts off tall peaks at the start of a run, which would flatten the rest of a plot. Each is marked, and a note states the height.
 
 use eframe::egui::{self, Align2, Button, Pos2, Rect, RichText, Shape, Stroke, TextStyle, Ui, vec2};
 
 use super::{ROUNDING, Trace, value};
 
-/// Shares of the recorded time in view, from its beginning: peaks that come within the first are cut, within the second they can be.
+/// Initial fractions of the visible record: peaks within the first are cut by default, those within the second on request.
 const EARLY_FRACTIONS: [f64; 2] = [0.25, 0.5];
 /// Least ratio of such a peak to the largest later value.
 const MIN_PEAK_RATIO: f64 = 4.0;
@@ -23,7 +23,7 @@ pub struct Peaks {
     /// The largest, and the largest later value, SI.
     pub largest: f64,
     pub later: f64,
-    /// Whether all come so early that they are cut unless the user wants to see them.
+    /// Whether all are so early that they are cut by default.
     pub brief: bool,
 }
 
@@ -56,7 +56,7 @@ impl Peaks {
     }
 }
 
-/// Marks in `colour` at the upper edge of `frame` above what `trace` has beyond `most`, SI; `x` places an instant.
+/// Draws marks at the upper edge of `frame` where `trace` exceeds `most`, SI; `x` maps an instant to its position.
 pub fn mark(ui: &Ui, frame: Rect, trace: &Trace, most: f64, x: impl Fn(f64) -> f32) {
     let mut last = f32::NEG_INFINITY;
     for bin in trace.bins.iter().filter(|bin| bin.greatest > most) {
@@ -71,7 +71,7 @@ pub fn mark(ui: &Ui, frame: Rect, trace: &Trace, most: f64, x: impl Fn(f64) -> f
     }
 }
 
-/// Says at the upper right of `frame` how high the `peak` is, in units of `unit`.
+/// Notes the height of the `peak` at the upper right of `frame`, in units of `unit`.
 pub fn note(ui: &Ui, frame: Rect, peak: f64, unit: (&str, f64)) {
     let words = format!("Peak {} {} above", value::number(peak / unit.1, 3), unit.0);
     let ink = ui.visuals().strong_text_color();
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn only_blows_far_above_all_that_follows_are_cut_and_only_as_the_range_begins() {
+    fn only_early_peaks_far_above_all_later_values_are_cut() {
         assert_eq!(
             found(&[0.0, 900.0, 30.0, 20.0, 35.0, 30.0, 30.0, 30.0]),
             Some(Peaks { largest: 900.0, later: 35.0, brief: true })
