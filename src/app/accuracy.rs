@@ -69,7 +69,7 @@ pub struct Accuracy {
     requested: Option<(Job, SceneSource, Preset)>,
     running: Option<(Box<dyn BackgroundTask>, SceneSource, Preset)>,
     progress: f64,
-    found: Option<MeasuredAccuracy>,
+    latest: Option<MeasuredAccuracy>,
     problem: Option<String>,
 }
 
@@ -89,7 +89,7 @@ impl Accuracy {
                 None => return true,
                 Some(Message::Progress(done)) => self.progress = done,
                 Some(Message::Presets(list)) => {
-                    self.found = list.first().map(|(_, measured)| MeasuredAccuracy {
+                    self.latest = list.first().map(|(_, measured)| MeasuredAccuracy {
                         scene: scene.clone(),
                         preset: *preset,
                         measured: *measured,
@@ -185,10 +185,10 @@ impl Accuracy {
     /// Measured accuracy of `preset` on the present scene.
     fn measured(&self, player: &Player, preset: Option<Preset>) -> [AccuracyLine; 2] {
         let scene = model_of(player);
-        let own = self.found.as_ref();
-        let here = own.filter(|found| Some(found.preset) == preset && found.scene == scene);
-        let (measured, place) = match (here, preset) {
-            (Some(found), _) => (Some(found.measured), "on this scene with its current values"),
+        let latest_measurement = self.latest.as_ref();
+        let applicable = latest_measurement.filter(|latest| Some(latest.preset) == preset && latest.scene == scene);
+        let (measured, place) = match (applicable, preset) {
+            (Some(latest), _) => (Some(latest.measured), "on this scene with its current values"),
             (None, Some(preset)) if scene.changes.is_empty() && player.pending().source.file.is_none() => {
                 (presets::measured(&player.pending().name, preset), "on this built-in scene with its default values")
             }
@@ -231,7 +231,7 @@ impl Accuracy {
 pub fn preset_of(player: &Player) -> Option<Preset> {
     let machine = &player.pending().machine;
     let solver = &machine.solver;
-    let is = |preset: &Preset| {
+    let matches_solver = |preset: &Preset| {
         let own = preset.solver(machine.joints_with_clearance());
         own.method == solver.method
             && match own.method.control() {
@@ -240,15 +240,15 @@ pub fn preset_of(player: &Player) -> Option<Preset> {
                 StepControl::PerImpact => own.steps_per_impact == solver.steps_per_impact,
             }
     };
-    let chosen = solver.preset.filter(|preset| is(preset));
-    chosen.or_else(|| Preset::ALL.into_iter().find(is))
+    let chosen = solver.preset.filter(|preset| matches_solver(preset));
+    chosen.or_else(|| Preset::ALL.into_iter().find(matches_solver))
 }
 
 /// The scene without solver and view settings, i.e. the model whose motion is computed.
 fn model_of(player: &Player) -> SceneSource {
     let mut scene = SceneSource::of(player.pending());
-    let kept = |key: &str| !key.starts_with("solver.") && !key.starts_with("view.");
-    scene.changes.retain(|(key, _)| kept(key));
+    let affects_model = |key: &str| !key.starts_with("solver.") && !key.starts_with("view.");
+    scene.changes.retain(|(key, _)| affects_model(key));
     scene
 }
 

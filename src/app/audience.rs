@@ -87,16 +87,16 @@ impl App {
         // egui has one zoom for all windows. This window is drawn immediately with its own zoom, which keys do not change.
         let own = ctx.options(|options| (options.zoom_factor, options.zoom_with_keyboard));
         ctx.options_mut(|options| (options.zoom_factor, options.zoom_with_keyboard) = (zoom, false));
-        let seen = ctx.show_viewport_immediate(id(), builder, |ui, _| self.audience_contents(ui));
+        let results = ctx.show_viewport_immediate(id(), builder, |ui, _| self.audience_contents(ui));
         ctx.options_mut(|options| (options.zoom_factor, options.zoom_with_keyboard) = own);
         let Some(audience) = &mut self.audience else {
             return;
         };
-        if audience.height != seen.height {
-            audience.height = seen.height;
+        if audience.height != results.height {
+            audience.height = results.height;
             ctx.request_repaint();
         }
-        for key in seen.keys {
+        for key in results.keys {
             match key {
                 Action::Present => self.fill_class_screen(ctx),
                 Action::Plots => self.show_next_plot(),
@@ -108,10 +108,10 @@ impl App {
                 other => self.perform_action(ctx, other),
             }
         }
-        if seen.tapped {
+        if results.tapped {
             self.fill_class_screen(ctx);
         }
-        if seen.closed {
+        if results.closed {
             self.show_audience(false);
         }
     }
@@ -126,14 +126,14 @@ impl App {
     /// Contents of the window.
     fn audience_contents(&mut self, ui: &mut Ui) -> FrameResults {
         let ctx = ui.ctx().clone();
-        let seen = ctx.input(|input| {
+        let results = ctx.input(|input| {
             let tapped = input.pointer.button_double_clicked(PointerButton::Primary);
             (input.viewport().close_requested(), tapped)
         });
-        let seen = FrameResults {
+        let results = FrameResults {
             height: present::screen_height(&ctx),
-            closed: seen.0,
-            tapped: seen.1,
+            closed: results.0,
+            tapped: results.1,
             keys: keys::pressed(&ctx),
         };
         ui.visuals_mut().disabled_alpha = 1.0;
@@ -154,6 +154,6 @@ impl App {
             self.viewport.second_ui(ui, &self.player, present::ARROW_THICKNESS, above);
             self.caption(ui, area, caption);
         });
-        seen
+        results
     }
 }

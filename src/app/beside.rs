@@ -35,8 +35,8 @@ impl App {
 
     /// Saves the record of a reference run on request.
     pub(super) fn save_earlier_run(&mut self) {
-        if let Some(kept) = self.plots.comparison.take_run_to_save() {
-            let files = record_files(kept.run());
+        if let Some(earlier) = self.plots.comparison.take_run_to_save() {
+            let files = record_files(earlier.run());
             self.save(files);
         }
     }
@@ -45,12 +45,12 @@ impl App {
     /// behind.
     pub(super) fn advance_earlier_runs(&mut self, dt: f32) -> bool {
         let Self { plots, player, beside, .. } = self;
-        let before = plots.comparison.beside().map(|(kept, _)| kept.run().pacer.shown());
+        let before = plots.comparison.beside().map(|(earlier, _)| earlier.run().pacer.shown());
         let lags = plots.comparison.advance(player, f64::from(dt));
-        if let (Some((kept, _)), Some((_, picture))) = (plots.comparison.beside(), beside) {
-            picture.advance(kept.run(), dt);
-            if !player.is_playing() && before != Some(kept.run().pacer.shown()) {
-                picture.restore_marks(kept.run());
+        if let (Some((earlier, _)), Some((_, picture))) = (plots.comparison.beside(), beside) {
+            picture.advance(earlier.run(), dt);
+            if !player.is_playing() && before != Some(earlier.run().pacer.shown()) {
+                picture.restore_marks(earlier.run());
             }
         }
         lags
@@ -59,37 +59,37 @@ impl App {
     /// Shows the machine before the change beside the current one on request; returns the remaining part of `area`.
     pub(super) fn picture_before(&mut self, ui: &mut Ui, area: Rect, plain: bool) -> Rect {
         let Self { plots, player, viewport, beside, .. } = self;
-        let Some((kept, number)) = plots.comparison.beside() else {
+        let Some((earlier, number)) = plots.comparison.beside() else {
             (viewport.title, viewport.common, *beside) = (None, None, None);
             return area;
         };
         let (before, now) = halves(area);
         if plain {
-            kept.run_mut().follow(player.pacer.shown(), || true);
-            kept.run_mut().publish_peaks();
+            earlier.run_mut().follow(player.pacer.shown(), || true);
+            earlier.run_mut().publish_peaks();
         }
         let (_, picture) = match beside.take().filter(|(of, _)| *of == number) {
             Some(shown) => beside.insert(shown),
             None => {
-                let mut picture = Box::new(Viewport::beside(kept.run()));
-                picture.restore_marks(kept.run());
+                let mut picture = Box::new(Viewport::beside(earlier.run()));
+                picture.restore_marks(earlier.run());
                 beside.insert((number, picture))
             }
         };
-        picture.link(viewport);
+        picture.copy_view(viewport);
         let common = viewport.reference().max(picture.reference());
         (viewport.common, picture.common) = (Some(common), Some(common));
-        picture.title = Some(format!("before: {}", kept.name()));
-        viewport.title = Some(format!("now: {}", kept.named_in(player)));
+        picture.title = Some(format!("before: {}", earlier.name()));
+        viewport.title = Some(format!("now: {}", earlier.named_in(player)));
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(before).id_salt("before"));
         let close =
             Rect::from_min_size(before.right_top() + vec2(-80.0, 10.0), vec2(70.0, ui.spacing().interact_size.y));
-        picture.ui(&mut place, kept.run(), plain, if plain { &[] } else { std::slice::from_ref(&close) });
+        picture.ui(&mut place, earlier.run(), plain, if plain { &[] } else { std::slice::from_ref(&close) });
         viewport.copy_camera(picture);
         picture.take_clicked();
         if let Some(pull) = picture.take_pull() {
             // A body that cannot be pulled stays unchanged.
-            let _ = kept.run_mut().pull(pull);
+            let _ = earlier.run_mut().pull(pull);
         }
         if !plain && ui.put(close, Button::new("Close")).on_hover_text("Show only the current machine").clicked() {
             plots.comparison.hide_comparison();

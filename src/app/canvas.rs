@@ -136,8 +136,8 @@ impl Canvas {
     pub fn paint(&mut self, output: egui::FullOutput, size: [u32; 2], scale: f32) -> Pending {
         let device = self.state.device.clone();
         // Without these scopes, a picture that exceeds the adapter's memory would abort the program.
-        let short = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let wrong = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let memory_scope = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let validation_scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let (mut commands, texture) = self.encode(output, size, scale);
         let readback = Readback::new(&device, size);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -145,9 +145,9 @@ impl Canvas {
         commands.push(encoder.finish());
         self.state.queue.submit(commands);
         let arrival = readback.request();
-        let wrong = wrong.pop();
-        let short = short.pop();
-        Pending { device, readback, arrival, faults: vec![Box::pin(short), Box::pin(wrong)] }
+        let validation_scope = validation_scope.pop();
+        let memory_scope = memory_scope.pop();
+        Pending { device, readback, arrival, faults: vec![Box::pin(memory_scope), Box::pin(validation_scope)] }
     }
 }
 
@@ -168,18 +168,18 @@ impl Pending {
         if let Err(error) = self.device.poll(wgpu::PollType::Poll) {
             return Some(Err(device_error(error)));
         }
-        let mut found = None;
+        let mut first_error = None;
         self.faults.retain_mut(|fault| {
             let state = fault.as_mut().poll(&mut Context::from_waker(Waker::noop()));
             match state {
                 Poll::Pending => true,
                 Poll::Ready(error) => {
-                    found = found.take().or(error);
+                    first_error = first_error.take().or(error);
                     false
                 }
             }
         });
-        if let Some(error) = found {
+        if let Some(error) = first_error {
             let reason = match error {
                 wgpu::Error::OutOfMemory { .. } => {
                     let [width, height] = self.readback.size();
@@ -203,8 +203,8 @@ impl Pending {
     #[cfg(not(target_arch = "wasm32"))]
     pub fn wait(mut self) -> Result<Image, RenderError> {
         self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
-        let never = || Err(device_error("the picture could not be read back"));
-        self.take().unwrap_or_else(never)
+        let unavailable = || Err(device_error("the picture could not be read back"));
+        self.take().unwrap_or_else(unavailable)
     }
 
     fn read(&self) -> Result<Image, RenderError> {

@@ -36,10 +36,10 @@ impl Chooser {
     /// Checks in the background whether the system has dialogs.
     pub fn new() -> Self {
         let available = Arc::new(OnceLock::new());
-        let found = available.clone();
+        let availability = available.clone();
         std::thread::spawn(move || {
             // No other thread sets it.
-            let _ = found.set(has_dialogs());
+            let _ = availability.set(has_dialogs());
         });
         Self { available, question: None, answer: None }
     }
@@ -84,7 +84,7 @@ impl Chooser {
         }
         let (send, receive) = channel();
         let ctx = ctx.clone();
-        let tell = move |chosen: Option<FileHandle>, answer: fn(PathBuf) -> Answer| {
+        let send_answer = move |chosen: Option<FileHandle>, answer: fn(PathBuf) -> Answer| {
             let chosen = chosen.map(|file| file.path().to_owned());
             // The window may have been closed.
             let _ = send.send(chosen.map_or(Answer::Cancelled, answer));
@@ -94,13 +94,13 @@ impl Chooser {
         match question {
             Question::Open => {
                 let chosen = dialog.set_title("Open a scene").add_filter("Scenes", &["toml"]).pick_file();
-                std::thread::spawn(move || tell(pollster::block_on(chosen), Answer::Open));
+                std::thread::spawn(move || send_answer(pollster::block_on(chosen), Answer::Open));
             }
             Question::Save(name) => {
                 let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending).to_owned();
                 let chosen =
                     dialog.set_title("Save as").set_file_name(name).add_filter(&*ending, &[&ending]).save_file();
-                std::thread::spawn(move || tell(pollster::block_on(chosen), Answer::Save));
+                std::thread::spawn(move || send_answer(pollster::block_on(chosen), Answer::Save));
             }
         }
         self.answer = Some(receive);

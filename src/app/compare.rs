@@ -109,7 +109,7 @@ fn named(run: &Player, key: &str) -> String {
 pub struct Comparison {
     /// Whether the run before a change is retained.
     on: bool,
-    kept: Vec<EarlierRun>,
+    runs: Vec<EarlierRun>,
     /// Place of the run displayed beside the picture, and of the run whose record is to be saved.
     beside: Option<usize>,
     to_save: Option<usize>,
@@ -119,7 +119,7 @@ pub struct Comparison {
 
 impl Default for Comparison {
     fn default() -> Self {
-        Self { on: true, kept: Vec::new(), beside: None, to_save: None, count: 0 }
+        Self { on: true, runs: Vec::new(), beside: None, to_save: None, count: 0 }
     }
 }
 
@@ -133,7 +133,7 @@ enum Request {
 impl Comparison {
     /// Discards all runs for a new scene.
     pub fn clear(&mut self) {
-        (self.kept, self.beside) = (Vec::new(), None);
+        (self.runs, self.beside) = (Vec::new(), None);
     }
 
     /// Whether the run before a change is retained.
@@ -143,25 +143,25 @@ impl Comparison {
 
     /// Stores `run`, from before `key` was changed, as the latest.
     pub fn add(&mut self, run: Box<Player>, key: String) {
-        self.kept.retain(|kept| kept.place != 0);
-        self.kept.insert(0, EarlierRun { key, name: None, place: 0, shown: true, run, number: self.count });
+        self.runs.retain(|earlier| earlier.place != 0);
+        self.runs.insert(0, EarlierRun { key, name: None, place: 0, shown: true, run, number: self.count });
         self.count += 1;
     }
 
     /// The stored runs, latest first.
     pub fn kept(&self) -> &[EarlierRun] {
-        &self.kept
+        &self.runs
     }
 
     /// The runs with visible curves.
     pub fn shown(&self) -> impl Iterator<Item = &EarlierRun> {
-        self.kept.iter().filter(|kept| kept.shown)
+        self.runs.iter().filter(|earlier| earlier.shown)
     }
 
     /// Whether the run displayed beside that of `player` has not reached the displayed instant.
     pub fn is_behind(&self, player: &Player) -> bool {
-        let beside = self.kept.iter().find(|kept| Some(kept.place) == self.beside);
-        beside.is_some_and(|kept| kept.lags(player))
+        let beside = self.runs.iter().find(|earlier| Some(earlier.place) == self.beside);
+        beside.is_some_and(|earlier| earlier.lags(player))
     }
 
     /// Advances the runs to the time of `player` in a frame of `dt` seconds; returns whether one of them still lags behind.
@@ -169,9 +169,9 @@ impl Comparison {
         let waited = !player.is_playing() || self.is_behind(player);
         let budget = (BUDGET_FRACTION * dt).max(MIN_BUDGET) * if waited { WAITING_FACTOR } else { 1.0 };
         let lags = self.follow(player, budget.min(MAX_BUDGET));
-        for kept in &mut self.kept {
-            kept.run.publish_peaks();
-            kept.run.update_ghosts();
+        for earlier in &mut self.runs {
+            earlier.run.publish_peaks();
+            earlier.run.update_ghosts();
         }
         lags
     }
@@ -181,15 +181,15 @@ impl Comparison {
         let start = (player.clock)();
         let may_step = || (player.clock)() - start < budget;
         let mut lags = false;
-        for kept in &mut self.kept {
-            let run = &mut kept.run;
+        for earlier in &mut self.runs {
+            let run = &mut earlier.run;
             run.pick(player.picks());
             run.pacer.set_scale(player.pacer.scale());
             if run.ideal().is_some() != player.ideal().is_some() {
                 run.set_ideal(player.ideal().is_some());
             }
             let shown = player.pacer.shown();
-            if self.beside == Some(kept.place) || shown > run.reached() {
+            if self.beside == Some(earlier.place) || shown > run.reached() {
                 lags |= !run.follow(shown, may_step);
             }
         }
@@ -198,48 +198,48 @@ impl Comparison {
 
     /// Follows a reset: a run whose parameters have changed since its start is restarted, because its record is no longer valid.
     pub fn reset(&mut self) {
-        self.kept.retain_mut(|kept| kept.run.is_unchanged_since_start() || kept.run.reset().is_ok());
-        for kept in &mut self.kept {
-            kept.run.follow(0.0, || true);
-            kept.run.publish_peaks();
+        self.runs.retain_mut(|earlier| earlier.run.is_unchanged_since_start() || earlier.run.reset().is_ok());
+        for earlier in &mut self.runs {
+            earlier.run.follow(0.0, || true);
+            earlier.run.publish_peaks();
         }
     }
 
     fn pin(&mut self, at: usize) {
-        let free = (1..=MAX_PINNED).find(|place| self.kept.iter().all(|kept| kept.place != *place));
-        let Some(kept) = self.kept.get_mut(at) else {
+        let free = (1..=MAX_PINNED).find(|place| self.runs.iter().all(|earlier| earlier.place != *place));
+        let Some(earlier) = self.runs.get_mut(at) else {
             return;
         };
-        let place = if kept.place == 0 { free } else { Some(0) };
+        let place = if earlier.place == 0 { free } else { Some(0) };
         if let Some(place) = place {
-            if self.beside == Some(kept.place) {
+            if self.beside == Some(earlier.place) {
                 self.beside = Some(place);
             }
-            kept.place = place;
+            earlier.place = place;
         }
         // An unpinned run becomes the latest.
         if place == Some(0) {
-            let kept = self.kept.remove(at);
-            self.kept.retain(|kept| kept.place != 0);
-            self.kept.insert(0, kept);
+            let earlier = self.runs.remove(at);
+            self.runs.retain(|earlier| earlier.place != 0);
+            self.runs.insert(0, earlier);
         }
     }
 
     /// Legend of a plot's grey curves, in the rest of a row `height` points high.
     pub fn legend(&mut self, ui: &mut Ui, player: &Player, height: f32, plot: &str) {
-        let count = self.kept.len().max(1) as f32;
+        let count = self.runs.len().max(1) as f32;
         let width = (ui.available_width() / count - 6.0).min(170.0);
         if width < MIN_LEGEND_WIDTH {
             return;
         }
-        for kept in &mut self.kept {
-            let mut text = format!("{} {}", LINE_SYMBOLS[kept.place], kept.name());
-            if kept.lags(player) {
-                text += &format!(" (computed to {})", value::time(kept.run.reached()));
+        for earlier in &mut self.runs {
+            let mut text = format!("{} {}", LINE_SYMBOLS[earlier.place], earlier.name());
+            if earlier.lags(player) {
+                text += &format!(" (computed to {})", value::time(earlier.run.reached()));
             }
             let name = format!("{text} in {plot}");
             let mut text = RichText::new(text).small().weak();
-            if !kept.shown {
+            if !earlier.shown {
                 text = text.strikethrough();
             }
             let button = egui::Button::new(text).frame(false).truncate();
@@ -249,18 +249,18 @@ impl Comparison {
             });
             let response = response.inner;
             ui.ctx().accesskit_node_builder(response.id, |node| {
-                node.set_toggled(kept.shown.into());
+                node.set_toggled(earlier.shown.into());
                 node.set_label(name);
             });
             if response.on_hover_text("Show or hide the curves of the run before the change").clicked() {
-                kept.shown = !kept.shown;
+                earlier.shown = !earlier.shown;
             }
         }
     }
 
     /// The menu.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
-        let name = match self.kept.len() {
+        let name = match self.runs.len() {
             0 => "Before and after".to_owned(),
             count => format!("Before and after ({count})"),
         };
@@ -271,37 +271,37 @@ impl Comparison {
     fn entries(&mut self, ui: &mut Ui, player: &Player) {
         ui.checkbox(&mut self.on, "Keep the run before a change")
             .on_hover_text("When a parameter changes, a second run continues with the old value; its curves are grey");
-        if self.kept.is_empty() {
+        if self.runs.is_empty() {
             ui.weak("Change a parameter to compare");
         }
         let mut request = None;
-        let full = self.kept.iter().filter(|kept| kept.place > 0).count() == MAX_PINNED;
-        for (at, kept) in self.kept.iter_mut().enumerate() {
+        let full = self.runs.iter().filter(|earlier| earlier.place > 0).count() == MAX_PINNED;
+        for (at, earlier) in self.runs.iter_mut().enumerate() {
             ui.separator();
             ui.push_id(at, |ui| {
-                let differences = kept.differences(player);
-                let own = named(&kept.run, &kept.key);
-                let name = kept.name.get_or_insert_with(|| own.clone());
+                let differences = earlier.differences(player);
+                let own = named(&earlier.run, &earlier.key);
+                let name = earlier.name.get_or_insert_with(|| own.clone());
                 ui.add(TextEdit::singleline(name).desired_width(240.0))
                     .on_hover_text(format!("Name of this run in the legends\n{differences}"))
                     .accessible_name("Name");
                 if *name == own {
-                    kept.name = None;
+                    earlier.name = None;
                 }
                 ui.horizontal(|ui| {
-                    ui.checkbox(&mut kept.shown, "Curves").on_hover_text("Show its curves in the plots, in grey");
-                    let pinned = kept.place > 0;
+                    ui.checkbox(&mut earlier.shown, "Curves").on_hover_text("Show its curves in the plots, in grey");
+                    let pinned = earlier.place > 0;
                     let pin = egui::Button::new("Pin").selected(pinned);
                     let help = format!("Keep this run when another parameter changes; at most {MAX_PINNED}");
                     if ui.add_enabled(pinned || !full, pin).on_hover_text(help).clicked() {
                         request = Some((at, Request::Pin));
                     }
-                    let beside = self.beside == Some(kept.place);
+                    let beside = self.beside == Some(earlier.place);
                     let help =
                         "Show this machine beside the current one, at the same instant and from the same point of view";
                     let switch = egui::Button::new("Side by side").selected(beside);
                     if ui.add(switch).on_hover_text(help).clicked() {
-                        self.beside = (!beside).then_some(kept.place);
+                        self.beside = (!beside).then_some(earlier.place);
                     }
                     if ui.button("Save").on_hover_text("Save its record as CSV").clicked() {
                         request = Some((at, Request::Save));
@@ -313,10 +313,10 @@ impl Comparison {
             });
         }
         match request {
-            Some((at, Request::Save)) => self.to_save = Some(self.kept[at].place),
+            Some((at, Request::Save)) => self.to_save = Some(self.runs[at].place),
             Some((at, Request::Pin)) => self.pin(at),
             Some((at, Request::Remove)) => {
-                let removed = self.kept.remove(at);
+                let removed = self.runs.remove(at);
                 self.beside = self.beside.filter(|place| *place != removed.place);
             }
             None => {}
@@ -331,14 +331,14 @@ impl Comparison {
     /// The run whose machine is displayed beside the current one, and its number.
     pub fn beside(&mut self) -> Option<(&mut EarlierRun, u64)> {
         let place = self.beside?;
-        let kept = self.kept.iter_mut().find(|kept| kept.place == place)?;
-        let number = kept.number;
-        Some((kept, number))
+        let earlier = self.runs.iter_mut().find(|earlier| earlier.place == place)?;
+        let number = earlier.number;
+        Some((earlier, number))
     }
 
     /// The run whose record is to be saved; clears the request.
     pub fn take_run_to_save(&mut self) -> Option<&EarlierRun> {
         let place = self.to_save.take()?;
-        self.kept.iter().find(|kept| kept.place == place)
+        self.runs.iter().find(|earlier| earlier.place == place)
     }
 }

@@ -130,9 +130,9 @@ pub enum Answer {
 pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &str) -> Option<Answer> {
     let mut answer = None;
     // Title, buttons and frame stay visible on a low screen and when the text grows.
-    let most = (ctx.content_rect().height() - 140.0).max(80.0);
+    let max_height = (ctx.content_rect().height() - 140.0).max(80.0);
     let width = match dialog {
-        Dialog::Link(_) => most.clamp(200.0, 720.0),
+        Dialog::Link(_) => max_height.clamp(200.0, 720.0),
         Dialog::Help => 1120.0,
         _ => 520.0,
     };
@@ -144,14 +144,14 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
         ui.set_width(widest);
         spoken::heading(&ui.heading(dialog.title()), dialog.title());
         ui.add_space(6.0);
-        let scrolled = ScrollArea::vertical().max_height(most).min_scrolled_height(most);
+        let scrolled = ScrollArea::vertical().max_height(max_height).min_scrolled_height(max_height);
         let entered = scrolled
             .show(ui, |ui| match dialog {
                 Dialog::Help => help(ui),
                 Dialog::About => about(ui, player, renderer),
                 Dialog::Open { path, error } => open(ui, path, error.as_deref()),
                 Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
-                Dialog::Link(shared) => code::ui(ui, shared, most),
+                Dialog::Link(shared) => code::ui(ui, shared, max_height),
                 Dialog::Film { settings } => film::settings_ui(ui, settings, player.reached()),
                 Dialog::Load { changes, .. } => {
                     list(ui, "The sweep was made from a different scene. Running to this section changes:", changes)

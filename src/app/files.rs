@@ -37,7 +37,7 @@ impl App {
             return Link { lesson, step, embedded: self.embedded.clone(), ..replay.link().clone() };
         }
         let player = &self.player;
-        let (plots, window) = self.plots.changed(player.pending());
+        let (plots, window) = self.plots.changes_from_initial(player.pending());
         let followed = self.viewport.followed();
         let joints = &player.running().machine.ball_joints;
         let under_microscope = joints.get(self.microscope.joint());

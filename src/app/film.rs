@@ -217,8 +217,8 @@ impl App {
 
     /// Cancels the film; no file remains.
     pub(super) fn cancel_film(&mut self) {
-        if let Some(making) = self.film.take() {
-            self.return_from_film(making.before);
+        if let Some(running) = self.film.take() {
+            self.return_from_film(running.before);
         }
     }
 
@@ -232,18 +232,18 @@ impl App {
 
     /// Draws the next frame or collects a finished one; does not block.
     pub(super) fn advance_film(&mut self, ctx: &egui::Context) {
-        let Some(mut making) = self.film.take() else {
+        let Some(mut running) = self.film.take() else {
             return;
         };
         ctx.request_repaint();
-        let continues = self.advance_frame(ctx, &mut making);
+        let continues = self.advance_frame(ctx, &mut running);
         if continues == Ok(true) {
-            self.film = Some(making);
+            self.film = Some(running);
             return;
         }
-        self.return_from_film(making.before);
-        let format = making.settings.format;
-        let finish = |_| making.film.finish().map_err(|error| error.to_string());
+        self.return_from_film(running.before);
+        let format = running.settings.format;
+        let finish = |_| running.film.finish().map_err(|error| error.to_string());
         match continues.and_then(finish) {
             Ok(bytes) => {
                 self.save(vec![SaveFile {
@@ -256,30 +256,30 @@ impl App {
         }
     }
 
-    /// One pass over `making`; returns whether frames are missing.
-    fn advance_frame(&mut self, ctx: &egui::Context, making: &mut RunningFilm) -> Result<bool, String> {
-        if let Some(pending) = &mut making.pending {
+    /// One pass over `running`; returns whether frames are missing.
+    fn advance_frame(&mut self, ctx: &egui::Context, running: &mut RunningFilm) -> Result<bool, String> {
+        if let Some(pending) = &mut running.pending {
             let Some(image) = pending.take() else {
                 return Ok(true);
             };
-            making.pending = None;
+            running.pending = None;
             let image = image.map_err(|error| error.to_string())?;
-            let added = making.film.add(&image.rgba);
+            let added = running.film.add(&image.rgba);
             added.map_err(|error| error.to_string())?;
         }
-        if making.next as f64 >= making.settings.frames() {
+        if running.next as f64 >= running.settings.frames() {
             return Ok(false);
         }
-        let instant = making.settings.instant(making.next);
+        let instant = running.settings.instant(running.next);
         self.player.go_to(instant);
         // Collects the peaks since the previous frame.
         self.player.advance(0.0);
-        self.viewport.advance(&self.player, (1.0 / making.settings.rate) as f32);
-        let contents = if making.settings.plots { Contents::Plots } else { Contents::View };
-        let first = making.next == 0;
-        let size = making.settings.size;
-        making.pending = Some(self.draw_frame(ctx, &mut making.canvas, contents, size, first)?);
-        making.next += 1;
+        self.viewport.advance(&self.player, (1.0 / running.settings.rate) as f32);
+        let contents = if running.settings.plots { Contents::Plots } else { Contents::View };
+        let first = running.next == 0;
+        let size = running.settings.size;
+        running.pending = Some(self.draw_frame(ctx, &mut running.canvas, contents, size, first)?);
+        running.next += 1;
         Ok(true)
     }
 }

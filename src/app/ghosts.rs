@@ -10,23 +10,23 @@ use crate::view::{DrawList, Ghost, SceneView, Shot};
 /// Adds the ghosts at the displayed instant to the draw list built from `shot`; returns a note on each.
 pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawList) -> Vec<String> {
     let mut notes = Vec::new();
-    let mut note = |ghost: &str, apart: bool| {
-        let near = if apart { "" } else { ", less than a pixel away" };
+    let mut note = |ghost: &str, is_apart: bool| {
+        let near = if is_apart { "" } else { ", less than a pixel away" };
         notes.push(format!("{ghost}{near}"));
     };
     let now = player.frame().time;
     // A twin that starts at the end of the displayed step is not visible yet.
     if let Some(twin) = player.twin().filter(|twin| twin.frame().time <= now) {
-        let apart = view.add_ghost(shot, twin.frame(), Ghost::Twin, list);
-        note("violet ghost: the twin run", apart);
+        let is_apart = view.add_ghost(shot, twin.frame(), Ghost::Twin, list);
+        note("violet ghost: the twin run", is_apart);
     }
     let Some(ideal) = player.ideal() else {
         return notes;
     };
     if let Some(frame) = ideal.frame(now) {
-        let apart = view.add_ghost(shot, frame, Ghost::Ideal, list);
+        let is_apart = view.add_ghost(shot, frame, Ghost::Ideal, list);
         view.add_output_error(shot, frame, list);
-        note("pale ghost: ideal joints", apart);
+        note("pale ghost: ideal joints", is_apart);
         if let Some(error) = ideal.output_error(player.frame()) {
             let length = value::quantity(error.norm(), "um", 4);
             notes.push(format!("tip error {length}"));

@@ -109,7 +109,7 @@ impl ImpactList {
         let (shown, known) = (player.pacer.shown(), player.reached());
         let record = player.impact_record();
         let count = record.until(known).count();
-        let (mut clicked_time, mut of_rows) = (None, 0.0);
+        let (mut clicked_time, mut rows_height) = (None, 0.0);
         ui.spacing_mut().interact_size.y = ROW_HEIGHT;
         ui.spacing_mut().item_spacing.y = 0.0;
         let width = COLUMNS.iter().map(|(_, width, _)| width + 4.0).sum::<f32>();
@@ -152,13 +152,13 @@ impl ImpactList {
                     });
                 }
             });
-            of_rows = seen.inner_rect.height();
+            rows_height = seen.inner_rect.height();
         });
         if record.dropped() > 0 {
             let words = format!("The first {} impacts are no longer stored", record.dropped());
             ui.label(RichText::new(words).small().weak());
         }
-        (clicked_time, of_rows)
+        (clicked_time, rows_height)
     }
 }
 
@@ -186,7 +186,7 @@ impl App {
         let area = self.picture_rect;
         let room = egui::Rect::from_x_y_ranges(ctx.content_rect().x_range(), area.y_range());
         let rows = ((room.height() - self.impact_list.frame) / ROW_HEIGHT).floor().clamp(1.0, MAX_VISIBLE_ROWS);
-        let mut of_rows = 0.0;
+        let mut rows_height = 0.0;
         let free = !self.is_under_way() && self.dialog.is_none();
         let shown = egui::Window::new("Impacts")
             .id(egui::Id::unique("impact list"))
@@ -199,7 +199,7 @@ impl App {
             .constrain_to(room)
             .enabled(free)
             .show(ctx, |ui| {
-                (clicked_time, of_rows) = ImpactList::table(ui, &self.player, rows * ROW_HEIGHT);
+                (clicked_time, rows_height) = ImpactList::table(ui, &self.player, rows * ROW_HEIGHT);
                 ui.add_space(4.0);
                 save = ui
                     .button("Save impacts…")
@@ -208,7 +208,7 @@ impl App {
             });
         self.impact_list.open = open;
         if let Some(shown) = shown {
-            let frame = shown.response.rect.height() - of_rows;
+            let frame = shown.response.rect.height() - rows_height;
             if (frame - self.impact_list.frame).abs() > 0.5 {
                 self.impact_list.frame = frame;
                 ctx.request_repaint();
@@ -264,14 +264,14 @@ impl App {
             let _ = writeln!(text, "{}", values.join(","));
         }
         let names: Vec<&str> = player.running().machine.ball_joints.iter().map(|joint| joint.name.as_str()).collect();
-        let more = [
+        let extra = [
             ("rows", json!(rows)),
             // Indices in the column `joint` start at 0.
             ("ball_joints", json!(names)),
             ("impacts_no_longer_kept", json!(player.impact_record().dropped())),
         ];
         let name = format!("{}-impacts.csv", self.file_stem());
-        let meta = super::files::meta(player, more);
+        let meta = super::files::meta(player, extra);
         self.save(vec![
             SaveFile { name: name.clone(), mime: "text/csv", bytes: text.into_bytes() },
             SaveFile { name: format!("{name}.meta.json"), mime: "application/json", bytes: meta.into_bytes() },

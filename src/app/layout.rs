@@ -85,11 +85,11 @@ pub(super) fn menu(ui: &mut Ui, name: &str, stays: bool, add: impl FnOnce(&mut U
         }
         let focused = ui.memory(egui::Memory::focused);
         // A widget focused when a click opened the menu, such as the last slider, may stay focused.
-        let kept = response.id.with("focus when opened");
+        let focus_key = response.id.with("focus when opened");
         if response.clicked() {
-            ui.data_mut(|data| data.insert_temp(kept, focused));
+            ui.data_mut(|data| data.insert_temp(focus_key, focused));
         }
-        let before = ui.data(|data| data.get_temp::<Option<Id>>(kept)).flatten();
+        let before = ui.data(|data| data.get_temp::<Option<Id>>(focus_key)).flatten();
         let elsewhere = focused
             .filter(|focused| *focused != response.id && Some(*focused) != before)
             .and_then(|focused| ui.ctx().read_response(focused))

@@ -238,7 +238,7 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
     ui.label(RichText::new(value::contact(magnified.report.state)).strong());
     let speed = |si: f64| value::quantity(si, "m/s", 3);
     let towards = crate::view::to_f32(&report.eccentricity).dot(axes[0].cross(axes[1]));
-    let (beside, pressed) = match &magnified.patch {
+    let (gap, indentation) = match &magnified.patch {
         Some(patch) if patch.penetration > 0.0 => (NONE.to_owned(), value::quantity(patch.penetration, "um", 3)),
         Some(patch) => (draw::length(-patch.penetration, 3), NONE.to_owned()),
         None => (NONE.to_owned(), NONE.to_owned()),
@@ -255,8 +255,8 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
             draw::length(f64::from(towards), 3),
             "Its component along the line of sight, which the picture does not show",
         ),
-        ("Gap", beside, "Between ball and wall, where they are nearest"),
-        ("Indentation", pressed, "How deep the ball presses into the wall"),
+        ("Gap", gap, "Between ball and wall, where they are nearest"),
+        ("Indentation", indentation, "How deep the ball presses into the wall"),
         (
             "Elastic patch",
             patch.map_or(NONE.to_owned(), |patch| format!("radius {}", draw::length(patch.radius(), 3))),
@@ -280,7 +280,7 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
     ];
     let ratio = |number: f64| value::number(number, 4);
     let impact = magnified.impact;
-    let of = |read: fn(&crate::simulate::Impact) -> String| impact.as_ref().map_or(NONE.to_owned(), read);
+    let formatted = |read: fn(&crate::simulate::Impact) -> String| impact.as_ref().map_or(NONE.to_owned(), read);
     let now = player.pacer.shown();
     let ago = impact.map_or(NONE.to_owned(), |impact| match now - impact.end {
         ago if ago < 0.0 => "under way".to_owned(),
@@ -290,15 +290,15 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
         ("Latest impact", ago, "When its contact ended"),
         (
             "Approach speed",
-            of(|impact| value::quantity(impact.approach_speed, "m/s", 4)),
+            formatted(|impact| value::quantity(impact.approach_speed, "m/s", 4)),
             "Speed of approach when the latest impact began",
         ),
         (
             "Separation speed",
-            of(|impact| value::quantity(impact.separation_speed, "m/s", 4)),
+            formatted(|impact| value::quantity(impact.separation_speed, "m/s", 4)),
             "Speed of separation when it ended",
         ),
-        ("Deepest", of(|impact| value::quantity(impact.deepest, "um", 3)), "Its largest indentation"),
+        ("Deepest", formatted(|impact| value::quantity(impact.deepest, "um", 3)), "Its largest indentation"),
         (
             "Restitution asked",
             impact.map_or(NONE.to_owned(), |impact| ratio(impact.asked)),
@@ -354,7 +354,7 @@ impl App {
 
     /// The microscope beside the picture, which gets the rest of `ui`.
     pub(super) fn microscope_beside(&mut self, ui: &mut Ui) {
-        let view = self.viewport.across();
+        let view = self.viewport.picture_axes();
         if let Some(joint) = self.microscope.ui(ui, &self.player, view) {
             self.focus(joint);
         }

@@ -848,7 +848,7 @@ impl App {
         self.plots.reset();
         self.plots.comparison.clear();
         if is_other_scene {
-            self.plots.begin(scene);
+            self.plots.restore_initial(scene);
         }
         self.controls.clear();
         self.undo.clear();

@@ -170,7 +170,7 @@ fn axis_unit(channel: &ChannelInfo) -> (&'static str, f64) {
 const MAX_LISTED: usize = 60;
 
 /// Names of channels that contain `search` or match it as a pattern; all component groups if it is empty.
-fn find(player: &Player, search: &str) -> Vec<Entry> {
+fn find_channels(player: &Player, search: &str) -> Vec<Entry> {
     let list = channels_of(&player.running().machine, player.frame());
     let wanted = search.to_lowercase();
     let mut entries: Vec<Entry> = Vec::new();
@@ -205,7 +205,7 @@ struct Place {
 
 impl Plots {
     /// The chosen quantities and the window, where they differ from the initial ones of a window on `scene`.
-    pub fn changed(&self, scene: &Scene) -> (Option<Vec<Quantity>>, Option<PlotWindow>) {
+    pub fn changes_from_initial(&self, scene: &Scene) -> (Option<Vec<Quantity>>, Option<PlotWindow>) {
         let first = Self::of(scene);
         let chosen = (self.chosen != first.chosen).then(|| self.chosen.clone());
         (chosen, (self.window != first.window).then_some(self.window))
@@ -233,7 +233,7 @@ impl Plots {
     }
 
     /// Restores the initial plots of a window on `scene`; picked channels stay.
-    pub fn begin(&mut self, scene: &Scene) {
+    pub fn restore_initial(&mut self, scene: &Scene) {
         let picked = std::mem::take(&mut self.picked);
         *self = Self { picked, ..Self::of(scene) };
     }
@@ -314,7 +314,7 @@ impl Plots {
         .accessible_name("Search channels");
         let search = self.search.trim().to_owned();
         if self.found.as_ref().is_none_or(|(of, _)| *of != search) {
-            self.found = Some((search.clone(), find(player, &search)));
+            self.found = Some((search.clone(), find_channels(player, &search)));
         }
         let Self { picked, found, .. } = self;
         let found = found.as_ref().map_or(&[][..], |(_, entries)| entries);
@@ -359,7 +359,7 @@ impl Plots {
     }
 
     /// Restores a selection.
-    pub fn choose(&mut self, choice: PlotChoice) {
+    pub fn restore_choice(&mut self, choice: PlotChoice) {
         PlotChoice { chosen: self.chosen, picked: self.picked, window: self.window, hidden: self.hidden } = choice;
         self.reset();
     }
@@ -486,7 +486,7 @@ impl Plots {
         if kind != PlotKind::Bands {
             let shown = self.comparison.shown();
             self.earlier
-                .extend(shown.map(|kept| earlier_traces(kept, player, panel, &self.hidden, dark, (from, to, bins))));
+                .extend(shown.map(|run| earlier_traces(run, player, panel, &self.hidden, dark, (from, to, bins))));
         }
         self.levels.clear();
         if kind == PlotKind::FromZeroWithClearances {
@@ -611,9 +611,9 @@ impl Plots {
                     return;
                 }
                 plot.add(Curves::new(levels, units).dashed(1.0, curve::DASH));
-                for (kept, traces) in comparison.shown().zip(earlier) {
+                for (run, traces) in comparison.shown().zip(earlier) {
                     let curves = Curves::new(traces, units);
-                    plot.add(match kept.dashes() {
+                    plot.add(match run.dashes() {
                         Some(length) => curves.dashed(curve::WIDTH, length),
                         None => curves,
                     });
@@ -737,14 +737,14 @@ impl Plots {
             let width = transform.frame().width();
             let range = zoom.apply((from, to), time(zoom.place), width, MIN_WINDOW);
             let part = range.1 - range.0 < end.max(self.window_length(player));
-            self.zoomed = part.then(|| zoom::within(range, f64::INFINITY));
+            self.zoomed = part.then(|| zoom::clamp_range(range, f64::INFINITY));
         }
         if zoom::drags(ui, response) {
             let width = f64::from(transform.frame().width());
             let length = to - from;
             let by = f64::from(response.drag_delta().x) / width * length;
             if by != 0.0 {
-                self.zoomed = Some(zoom::within((from - by, to - by), end));
+                self.zoomed = Some(zoom::clamp_range((from - by, to - by), end));
             }
         }
         let clicked = response.clicked().then(|| response.interact_pointer_pos());
@@ -837,9 +837,9 @@ fn largest<'a>(members: &[(usize, &'a str)], traces: &[Trace]) -> Option<(&'a st
     found
 }
 
-/// Record of the members of `panel` in `kept` between two instants, s, with a limited number of bins.
+/// Record of the members of `panel` in `run` between two instants, s, with a limited number of bins.
 fn earlier_traces(
-    kept: &EarlierRun,
+    run: &EarlierRun,
     player: &Player,
     panel: &Panel<'_>,
     hidden: &[usize],
@@ -848,9 +848,9 @@ fn earlier_traces(
 ) -> Vec<Trace> {
     let seen = panel.members.iter().enumerate().filter(|(_, (channel, _))| !hidden.contains(channel));
     let trace = |(index, (channel, _)): (usize, &(usize, &str))| {
-        let mut trace = Trace { colour: kept.colour(theme::series(index, dark), dark), ..Trace::default() };
-        if let Some(channel) = kept.channel(player, *channel) {
-            kept.run().bins(channel, from, to, bins, &mut trace.bins);
+        let mut trace = Trace { colour: run.colour(theme::series(index, dark), dark), ..Trace::default() };
+        if let Some(channel) = run.channel(player, *channel) {
+            run.run().bins(channel, from, to, bins, &mut trace.bins);
         }
         trace
     };

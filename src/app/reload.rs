@@ -175,12 +175,12 @@ impl App {
         } else {
             "from the start".to_owned()
         };
-        let kept = match changes.len() {
+        let kept_changes = match changes.len() {
             0 => String::new(),
             1 => ", keeping 1 change".to_owned(),
             more => format!(", keeping {more} changes"),
         };
-        self.notify(format!("Reloaded {at}{kept}"));
+        self.notify(format!("Reloaded {at}{kept_changes}"));
         Ok(())
     }
 }

@@ -114,7 +114,7 @@ impl Store {
 
     /// Options of a window without arguments: the last scene. If that is missing or invalid, the message names it, and the
     /// first-time scene is opened.
-    pub fn begin(&self) -> AppOptions {
+    pub fn start_options(&self) -> AppOptions {
         let Some(name) = &self.now.scene else {
             return AppOptions::first();
         };
@@ -331,7 +331,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let mut store = Store::at(folder.path().join("window.json"));
         let opens = |store: &Store| {
-            let options = store.begin();
+            let options = store.start_options();
             (options.scene.name.clone(), opening::is_rattling(&options.scene), options.problem)
         };
         assert_eq!(opens(&store), (DEFAULT_SCENE.to_owned(), true, None));

@@ -63,8 +63,8 @@ impl ScenePictures {
         let theme = if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light };
         let scale = ui.pixels_per_point();
         let size = [SIZE.x, SIZE.y].map(|edge| (edge * scale).round() as u32);
-        let one = |drawn: &&Drawn| drawn.name == name && drawn.theme == theme;
-        if let Some(drawn) = self.drawn.iter().find(|drawn| one(drawn) && drawn.size == size) {
+        let has_key = |drawn: &&Drawn| drawn.name == name && drawn.theme == theme;
+        if let Some(drawn) = self.drawn.iter().find(|drawn| has_key(drawn) && drawn.size == size) {
             return drawn.texture;
         }
         let pass = Some(ui.ctx().cumulative_pass_nr());
@@ -74,7 +74,7 @@ impl ScenePictures {
         }
         self.pass = pass;
         // The pixel size changed, e.g. on another screen.
-        let old = self.drawn.iter().position(|drawn| one(&drawn));
+        let old = self.drawn.iter().position(|drawn| has_key(&drawn));
         if let Some(texture) = old.and_then(|old| self.drawn.swap_remove(old).texture) {
             state.renderer.write().free_texture(&texture);
         }

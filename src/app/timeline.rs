@@ -95,7 +95,7 @@ impl Timeline {
         let (shown, length) = (player.pacer.shown(), to - from);
         if player.is_playing() && !(from..=to).contains(&shown) {
             let from = shown - 0.8 * length;
-            return zoom::within((from, from + length), end);
+            return zoom::clamp_range((from, from + length), end);
         }
         (from, to)
     }
@@ -162,7 +162,7 @@ impl Timeline {
             let (end, width) = (player.known_to(), scale.rect.width());
             let range = zoom.apply(scale.range, scale.time(zoom.place.x), width, MIN_RANGE);
             let part = range.1 - range.0 < end;
-            self.zoomed = part.then(|| zoom::within(range, end));
+            self.zoomed = part.then(|| zoom::clamp_range(range, end));
         }
         if response.double_clicked() {
             self.zoomed = None;
@@ -212,8 +212,8 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     painter.rect_filled(lanes, 3.0, visuals.extreme_bg_color);
     let shown = player.pacer.shown();
     let (_, end) = scale.range;
-    if let Some(left) = player.abandoned_future() {
-        contact_lanes(ui, &left.contact_history, scale, (player.reached(), end), PALE_OPACITY);
+    if let Some(abandoned) = player.abandoned_future() {
+        contact_lanes(ui, &abandoned.contact_history, scale, (player.reached(), end), PALE_OPACITY);
     }
     contact_lanes(ui, player.contact_history(), scale, (0.0, shown), 1.0);
     contact_lanes(ui, player.contact_history(), scale, (shown, player.reached()), PALE_OPACITY);
@@ -225,8 +225,8 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
         }
     };
     flags(&mut player.flags(), false);
-    if let Some(left) = player.abandoned_future() {
-        let ahead = left.flags.iter().filter(|flag| flag.time > player.reached());
+    if let Some(abandoned) = player.abandoned_future() {
+        let ahead = abandoned.flags.iter().filter(|flag| flag.time > player.reached());
         flags(&mut ahead.cloned(), true);
     }
     let x = scale.x(shown);
@@ -322,7 +322,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
     let joints = player.contact_history().joints().min(RECORDED_JOINTS);
     let pointed_joint = (0..joints).find(|&joint| scale.lane(joint, joints).y_range().contains(pos.y));
     let contacts = if time > player.reached() {
-        player.abandoned_future().map(|left| &left.contact_history)
+        player.abandoned_future().map(|abandoned| &abandoned.contact_history)
     } else {
         Some(player.contact_history())
     };
@@ -338,8 +338,8 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         };
         ui.label(format!("{name}: {words}"));
     }
-    let left = player.abandoned_future().into_iter().flat_map(|left| left.flags.iter().cloned());
-    for flag in player.flags().chain(left) {
+    let abandoned = player.abandoned_future().into_iter().flat_map(|abandoned| abandoned.flags.iter().cloned());
+    for flag in player.flags().chain(abandoned) {
         if (scale.x(flag.time) - pos.x).abs() <= HIT_DISTANCE {
             ui.label(format!("{}: {}", value::time(flag.time), flag.text));
         }

@@ -163,7 +163,7 @@ impl Viewport {
     }
 
     /// Copies the camera and the effective options of `other`.
-    pub fn link(&mut self, other: &Self) {
+    pub fn copy_view(&mut self, other: &Self) {
         self.options.clone_from(&other.options);
         self.options.quality = other.quality();
         self.copy_camera(other);
@@ -183,14 +183,14 @@ impl Viewport {
     }
 
     /// Aspect ratio for which the camera was placed.
-    pub fn shape(&self) -> f32 {
+    pub fn fitted_aspect(&self) -> f32 {
         self.fitted
     }
 
-    /// As [`Self::set_pose`], for a picture of aspect ratio [`Self::shape`].
-    pub fn set_pose_for(&mut self, pose: CameraPose, shape: f32) {
+    /// As [`Self::set_pose`], for a picture of aspect ratio [`Self::fitted_aspect`].
+    pub fn set_pose_for(&mut self, pose: CameraPose, aspect: f32) {
         self.set_pose(pose);
-        self.fitted = shape;
+        self.fitted = aspect;
     }
 
     /// Sets the camera pose.
@@ -340,7 +340,7 @@ impl Viewport {
     }
 
     /// World vectors to the right and up in the picture.
-    pub fn across(&self) -> [Vec3; 2] {
+    pub fn picture_axes(&self) -> [Vec3; 2] {
         let (right, up, _) = self.camera.axes();
         [right, up]
     }

@@ -39,8 +39,8 @@ pub fn run_native(options: Option<AppOptions>, page: String, store: Option<Store
         viewport = viewport.with_position(position);
     }
     let native = eframe::NativeOptions { viewport, ..Default::default() };
-    let begin = || store.as_ref().map_or_else(AppOptions::first, Store::begin);
-    let mut options = options.unwrap_or_else(begin);
+    let start_options = || store.as_ref().map_or_else(AppOptions::first, Store::start_options);
+    let mut options = options.unwrap_or_else(start_options);
     options.embedded = None;
     // Keeps a scene error typed instead of wrapping it in a window error.
     Player::new(&options.scene).map_err(|error| options.scene.locate(&error))?;

@@ -48,7 +48,7 @@ pub fn drags(ui: &Ui, response: &Response) -> bool {
 }
 
 /// (`from`, `to`) shifted into (0, `end`) with its length unchanged.
-pub fn within((from, to): (f64, f64), end: f64) -> (f64, f64) {
+pub fn clamp_range((from, to): (f64, f64), end: f64) -> (f64, f64) {
     let length = to - from;
     let from = from.clamp(0.0, (end - length).max(0.0));
     (from, from + length)

@@ -67,8 +67,8 @@ impl CostSettings {
         }
         for joint in &scene.machine.ball_joints {
             for VariedParameter { parameter, range, .. } in self.varied.iter().filter(|varied| varied.on) {
-                let part = parameter.key.rsplit('.').next().unwrap_or_default();
-                let key = format!("joint.{}.{part}", joint.name);
+                let last = parameter.key.rsplit('.').next().unwrap_or_default();
+                let key = format!("joint.{}.{last}", joint.name);
                 let (Ok(Value::Number(now)), Kind::Number { min, max, display, .. }) =
                     (scene.get(&key), parameter.kind)
                 else {
@@ -80,7 +80,7 @@ impl CostSettings {
                 } else {
                     [1.0 - part, 1.0 + part].map(|part| (part * now).clamp(min, max))
                 };
-                // Of nothing, a part is nothing.
+                // A percentage of zero gives an empty range.
                 if ends[0] < ends[1] {
                     over.push((key, ends));
                 }

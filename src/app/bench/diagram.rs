@@ -4,7 +4,7 @@ use eframe::egui::{ComboBox, Grid, Pos2, Rect, RichText, Sense, Ui};
 use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
 
 use super::coordinate::Coordinate;
-use super::plane::{AxisLabel, named, plane};
+use super::plane::{AxisLabel, plane, set_accessible_name};
 use super::portrait::title;
 use super::sweep_results::SweepResults;
 use crate::analysis::regime::Regime;
@@ -154,7 +154,7 @@ impl Diagram {
                 plot.points(ring.color(faint).filled(false).radius(6.0));
             }
         });
-        named(&response, "the sweep", &across, &up);
+        set_accessible_name(&response, "the sweep", &across, &up);
         let clicked = response.response.clicked();
         let pointer = response.response.interact_pointer_pos();
         self.transform = Some(response.transform);

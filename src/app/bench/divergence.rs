@@ -3,7 +3,7 @@
 use eframe::egui::{Checkbox, Ui};
 use egui_plot::{GridMark, PlotPoint};
 
-use super::plane::{AxisLabel, named, plane};
+use super::plane::{AxisLabel, plane, set_accessible_name};
 use super::portrait::title;
 use crate::app::curve::Path;
 use crate::app::layout::reserve_lines;
@@ -95,7 +95,7 @@ pub fn distance(ui: &mut Ui, player: &Player, twin: &Twin, height: f32) {
         .show(ui, |plot| {
             plot.add(Path::line("Distance", &points, theme::series(5, dark), 1.4));
         });
-    named(&shown, "the distance to the twin", &across, &up);
+    set_accessible_name(&shown, "the distance to the twin", &across, &up);
 }
 
 /// Grid marks at whole powers of ten, at most a few.

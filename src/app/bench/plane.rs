@@ -33,13 +33,13 @@ fn with_unit(text: &str, unit: &str, between: &str) -> String {
 }
 
 /// The tick label of a mark.
-fn word(mark: GridMark, range: &std::ops::RangeInclusive<f64>) -> String {
+fn tick_label(mark: GridMark, range: &std::ops::RangeInclusive<f64>) -> String {
     let most = range.start().abs().max(range.end().abs());
     tick(mark.value, mark.step_size, most)
 }
 
 /// Labels the plot `shown` of `up` over `across` as `what` for screen readers, with the visible ranges.
-pub fn named<R>(shown: &PlotResponse<R>, what: &str, across: &AxisLabel, up: &AxisLabel) {
+pub fn set_accessible_name<R>(shown: &PlotResponse<R>, what: &str, across: &AxisLabel, up: &AxisLabel) {
     let bounds = shown.transform.bounds();
     let range = |axis: &AxisLabel, d: usize| {
         let [least, most] = [bounds.min()[d], bounds.max()[d]].map(|end| value::number(end, 3));
@@ -58,8 +58,9 @@ pub fn plane<'a>(ui: &Ui, id: &'static str, across: &AxisLabel, up: &AxisLabel, 
     let unit = across.unit.clone();
     let below = hints(AxisHints::new_x())
         .label_spacing(Rangef::new(24.0, 28.0))
-        .formatter(move |mark, range| with_unit(&word(mark, range), &unit, " "));
-    let beside = hints(AxisHints::new_y()).min_thickness(46.0).label_spacing(Rangef::new(14.0, 18.0)).formatter(word);
+        .formatter(move |mark, range| with_unit(&tick_label(mark, range), &unit, " "));
+    let beside =
+        hints(AxisHints::new_y()).min_thickness(46.0).label_spacing(Rangef::new(14.0, 18.0)).formatter(tick_label);
     let (across, up) = (across.clone(), up.clone());
     Plot::new(id)
         .width(ui.available_width() - 12.0)

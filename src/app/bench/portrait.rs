@@ -4,7 +4,7 @@ use eframe::egui::{RichText, Slider, SliderClamping, Ui};
 use egui_plot::{PlotPoint, PlotPoints, Points};
 
 use super::coordinate::Coordinate;
-use super::plane::{AxisLabel, named, plane};
+use super::plane::{AxisLabel, plane, set_accessible_name};
 use crate::analysis::drive::observed;
 use crate::app::curve::Path;
 use crate::app::layout::reserve_lines;
@@ -25,7 +25,7 @@ pub struct Portrait {
 impl Portrait {
     /// Phase portrait (rate over coordinate): the orbit of the last periods and the sections.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, coordinate: Coordinate) {
-        self.read(player, coordinate);
+        self.update_points(player, coordinate);
         let (across, up) = (coordinate.axis(), coordinate.rate_axis());
         let dark = ui.visuals().dark_mode;
         reserve_lines(ui, "portrait of", 2, |ui| {
@@ -53,7 +53,7 @@ impl Portrait {
                 plot.points(Points::new("State on show", now).color(line).radius(4.0));
             }
         });
-        named(&shown, "the orbit", &across, &up);
+        set_accessible_name(&shown, "the orbit", &across, &up);
         match player.watch().period().map_err(ToOwned::to_owned) {
             Err(why) => {
                 ui.label(RichText::new(format!("No Poincaré section: {why}")).weak());
@@ -74,7 +74,7 @@ impl Portrait {
             let series = PlotPoints::Borrowed(&self.sections);
             plot.points(Points::new("Section", series).color(mark).radius(2.5));
         });
-        named(&shown, "the sections", across, up);
+        set_accessible_name(&shown, "the sections", across, up);
         ui.horizontal_wrapped(|ui| {
             ui.label("Drive phase");
             let mut degrees = 360.0 * player.watch().phase();
@@ -102,7 +102,7 @@ impl Portrait {
         );
     }
 
-    fn read(&mut self, player: &Player, coordinate: Coordinate) {
+    fn update_points(&mut self, player: &Player, coordinate: Coordinate) {
         let watch = player.watch();
         let point = |(_, state): &(f64, Observed)| {
             let [across, up] = coordinate.of(state);

@@ -135,8 +135,8 @@ impl App {
     }
 }
 
-/// Address and QR code within a height of `most`, points; returns whether Enter was pressed.
-pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, most: f32) -> bool {
+/// Address and QR code within a height of `max_height`, points; returns whether Enter was pressed.
+pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, max_height: f32) -> bool {
     let top = ui.cursor().top();
     let mut entered = false;
     if shared.typed {
@@ -153,7 +153,7 @@ pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, most: f32) -> bool {
     }
     let line = ui.text_style_height(&egui::TextStyle::Body) + 2.0 * ui.spacing().item_spacing.y;
     // Reserves the same size before and after drawing.
-    let side = (most - (ui.cursor().top() - top) - line).min(ui.available_width()).max(1.0);
+    let side = (max_height - (ui.cursor().top() - top) - line).min(ui.available_width()).max(1.0);
     match &shared.code {
         Ok(code) => draw(ui, code, side),
         Err(reason) => {

@@ -20,7 +20,7 @@ pub struct PreviousWindow {
     bench: Bench,
     options: ViewOptions,
     pose: Option<CameraPose>,
-    shape: f32,
+    fitted_aspect: f32,
     followed: Option<ScenePart>,
     /// Whether the microscope was open, and its ball joint.
     microscope: (bool, usize),
@@ -48,7 +48,7 @@ impl App {
             bench: std::mem::take(&mut self.bench),
             options: self.viewport.options.clone(),
             pose: self.viewport.pose(),
-            shape: self.viewport.shape(),
+            fitted_aspect: self.viewport.fitted_aspect(),
             followed: self.viewport.followed(),
             microscope: (self.microscope.is_open(), self.microscope.joint()),
             ideal: self.player.ideal().is_some(),
@@ -76,7 +76,7 @@ impl App {
         self.cancel_film();
         [self.show_controls, self.show_plots, self.show_bench] = before.panels;
         self.sheet = before.sheet;
-        self.plots.choose(before.plots);
+        self.plots.restore_choice(before.plots);
         self.bench = before.bench;
         self.microscope.set_open(before.microscope.0);
         let text = &self.player.pending().source.text;
@@ -99,7 +99,7 @@ impl App {
             self.show_ideal(before.ideal);
         }
         if let Some(pose) = before.pose {
-            self.viewport.set_pose_for(pose, before.shape);
+            self.viewport.set_pose_for(pose, before.fitted_aspect);
         }
         self.viewport.follow(before.followed);
         self.microscope.focus(before.microscope.1);

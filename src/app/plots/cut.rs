@@ -116,7 +116,7 @@ mod tests {
         );
         let until_the_middle = found(&[0.0, 900.0, 30.0, 700.0, 35.0, 30.0, 30.0, 30.0]);
         assert_eq!(until_the_middle, Some(Peaks { largest: 900.0, later: 35.0, brief: false }));
-        // Blows that go on are what the plot shows.
+        // Continuing impacts are not cut.
         assert_eq!(found(&[0.0, 900.0, 30.0, 20.0, 300.0, 30.0, 30.0, 30.0]), None);
         assert_eq!(found(&[0.0, 30.0, 30.0, 30.0, 900.0, 30.0, 30.0, 30.0]), None);
         // A single blow with nothing after it.

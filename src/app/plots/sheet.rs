@@ -126,11 +126,11 @@ impl Plots {
             }
         }
         if panel.kind != PlotKind::Bands {
-            for kept in self.comparison.shown() {
-                let traces = earlier_traces(kept, player, panel, &self.hidden, false, (from, to, MAX_INSTANTS));
+            for run in self.comparison.shown() {
+                let traces = earlier_traces(run, player, panel, &self.hidden, false, (from, to, MAX_INSTANTS));
                 for (index, trace) in traces.iter().enumerate() {
                     let [r, g, b, _] = trace.colour.to_array();
-                    let label = if index == 0 { kept.name() } else { String::new() };
+                    let label = if index == 0 { run.name() } else { String::new() };
                     series.push(Series::line(&label, ends(&trace.bins), (r, g, b)));
                 }
             }
