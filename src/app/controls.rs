@@ -34,7 +34,7 @@ const ENTRY_MARGIN: i8 = 6;
 pub struct Controls {
     drafts: HashMap<String, Draft>,
     joint: usize,
-    /// Key of a joint whose slider comes into sight, with the focus.
+    /// Key of a joint whose slider is scrolled into view and focused.
     revealed: Option<String>,
 }
 
@@ -67,7 +67,7 @@ impl Controls {
         self.joint = 0;
     }
 
-    /// Brings the slider of `key`, which belongs to a ball joint, into sight and focuses it.
+    /// Brings the slider of `key`, which belongs to a ball joint, into view and focuses it.
     pub fn reveal(&mut self, key: &str) {
         self.drafts.remove(key);
         self.revealed = Some(key.to_owned());
