@@ -187,8 +187,8 @@ mod tests {
         assert!(announcer.update(2.2, &player, "").0);
         assert!(!announcer.update(9.0, &player, "").0, "nothing new");
         player.single_step();
-        let (told, wait) = announcer.update(2.3, &player, "");
-        assert!(!told && wait.is_some_and(|wait| wait > 0.8));
+        let (announced, wait) = announcer.update(2.3, &player, "");
+        assert!(!announced && wait.is_some_and(|wait| wait > 0.8));
         assert!(announcer.update(3.3, &player, "").0);
         assert!(announcer.update(3.4, &player, "Link copied").0);
         assert!(announcer.text().starts_with("Link copied. Pendulum"));

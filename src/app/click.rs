@@ -159,8 +159,8 @@ mod tests {
     fn a_time_window_has_the_impacts_that_ended_in_it_at_their_times() {
         let ends = [0.5, 1.0, 1.25, 2.0, 2.5];
         let impacts = ends.map(|end| impact(end, 1e-4, 0.01));
-        let heard = of(&impacts, SECOND);
-        let times: Vec<f64> = heard.iter().map(|click| click.after).collect();
+        let played = of(&impacts, SECOND);
+        let times: Vec<f64> = played.iter().map(|click| click.after).collect();
         assert_eq!(times, [0.0125, 0.05]);
         // Adjacent windows neither repeat nor lose an impact.
         let next = TimeWindow { from: 2.0, to: 3.0, ..SECOND };
@@ -196,14 +196,14 @@ mod tests {
     fn of_many_impacts_the_loudest_are_heard_in_their_order() {
         let impacts: Vec<Impact> =
             (1..=40).map(|k| impact(1.0 + f64::from(k) / 50.0, 1e-4, 1e-3 * f64::from(k * 7 % 41))).collect();
-        let heard = of(&impacts, SECOND);
-        assert_eq!(heard.len(), MAX_CLICKS);
-        assert!(heard.is_sorted_by(|a, b| a.after < b.after));
-        let alone: Vec<Click> = impacts.iter().flat_map(|i| of(&[*i], SECOND)).collect();
-        let softest = heard.iter().map(|c| c.loudness).fold(1.0, f64::min);
-        let louder = alone.iter().filter(|click| click.loudness >= softest);
+        let played = of(&impacts, SECOND);
+        assert_eq!(played.len(), MAX_CLICKS);
+        assert!(played.is_sorted_by(|a, b| a.after < b.after));
+        let separate: Vec<Click> = impacts.iter().flat_map(|i| of(&[*i], SECOND)).collect();
+        let softest = played.iter().map(|c| c.loudness).fold(1.0, f64::min);
+        let louder = separate.iter().filter(|click| click.loudness >= softest);
         assert_eq!(louder.count(), MAX_CLICKS);
-        assert!(heard.iter().all(|click| alone.contains(click)));
+        assert!(played.iter().all(|click| separate.contains(click)));
     }
 
     #[test]

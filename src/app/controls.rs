@@ -394,14 +394,14 @@ impl Controls {
         let help = format!("Back to {}", value::shown(&original, &row.parameter.kind));
         let label = format!("Reset {}", row.name);
         if icon_button(ui, Icon::Undo, &label, &help, size, false).clicked() {
-            let done = player.set_original(row.key);
-            self.apply_outcome(row.key, "", done);
+            let outcome = player.set_original(row.key);
+            self.apply_outcome(row.key, "", outcome);
         }
     }
 
     fn set(&mut self, player: &mut Player, key: &str, text: &str) {
-        let done = player.set(key, text);
-        self.apply_outcome(key, text, done);
+        let outcome = player.set(key, text);
+        self.apply_outcome(key, text, outcome);
     }
 
     /// Clears the draft of an accepted value; a rejected one remains, with the reason.

@@ -83,23 +83,23 @@ impl<'a> Curves<'a> {
             self.traces.iter().map(|trace| bars(&spans(&trace.bins, place, first, count), width)).collect();
         let dash = (DASH * scale).round().max(1.0);
         let mut mesh = Mesh::default();
-        let mut here: Vec<(usize, Bar)> = Vec::new();
+        let mut column_bars: Vec<(usize, Bar)> = Vec::new();
         let mut groups: Vec<Vec<(usize, Bar)>> = Vec::new();
         for column in 0..count {
-            here.clear();
+            column_bars.clear();
             let present = all.iter().enumerate().map(|(index, bars)| (index, bars[column]));
-            here.extend(present.filter(|(_, bar)| bar.height() > 0.0));
+            column_bars.extend(present.filter(|(_, bar)| bar.height() > 0.0));
             if let Some(length) = self.dashes {
                 let gap = (column as f32 / (length * scale).max(1.0)) as usize % 2 == 1;
-                here.retain(|(_, bar)| !gap || bar.height() > 3.0 * width);
+                column_bars.retain(|(_, bar)| !gap || bar.height() > 3.0 * width);
             }
             // Parallel curves keep their order, whichever is steeper in this column.
             let rank = |bar: &Bar| {
                 if bar.height() > 3.0 * width { bar.height() } else { 0.0 }
             };
-            here.sort_by(|a, b| rank(&b.1).total_cmp(&rank(&a.1)));
+            column_bars.sort_by(|a, b| rank(&b.1).total_cmp(&rank(&a.1)));
             groups.clear();
-            for &(index, bar) in &here {
+            for &(index, bar) in &column_bars {
                 match groups.iter_mut().find(|group| group[0].1.coincides(&bar)) {
                     Some(group) => group.push((index, bar)),
                     None => groups.push(vec![(index, bar)]),

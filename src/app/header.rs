@@ -266,8 +266,8 @@ impl App {
 
     /// Whether the first-time scene is displayed and its notice not yet dismissed.
     fn shows_first_notice(&self) -> bool {
-        let here = self.embedded().is_none() && self.course().is_none() && !self.is_presenting();
-        here && !self.changes_seen && opening::is_rattling(self.player.pending())
+        let is_ordinary_window = self.embedded().is_none() && self.course().is_none() && !self.is_presenting();
+        is_ordinary_window && !self.changes_seen && opening::is_rattling(self.player.pending())
     }
 
     /// Notice of the changes the window started with; one click reverts them.

@@ -126,9 +126,9 @@ impl ImpactList {
             }
             let place = ScrollArea::vertical().id_salt("impacts").auto_shrink([false, true]);
             let place = place.max_height(height).min_scrolled_height(height);
-            let seen = place.show_rows(ui, ROW_HEIGHT, count, |ui, rows| {
-                let seen = record.until(known).rev().skip(rows.start).take(rows.len());
-                for (number, own, impact) in seen {
+            let output = place.show_rows(ui, ROW_HEIGHT, count, |ui, rows| {
+                let visible = record.until(known).rev().skip(rows.start).take(rows.len());
+                for (number, own, impact) in visible {
                     let words = cells(player, number, impact);
                     let later = impact.end > shown;
                     let top = ui.cursor().min;
@@ -152,7 +152,7 @@ impl ImpactList {
                     });
                 }
             });
-            rows_height = seen.inner_rect.height();
+            rows_height = output.inner_rect.height();
         });
         if record.dropped() > 0 {
             let words = format!("The first {} impacts are no longer stored", record.dropped());
@@ -236,18 +236,18 @@ impl App {
             |joint: &usize| player.frame().joints.get(*joint).is_some_and(|own| own.state != ContactMode::Free);
         let (number, own) = record.in_progress(self.viewport.focus().filter(touches), shown)?;
         let report = player.frame().joints.get(own.joint)?;
-        let begins = format!("Impact {number}, {}: {}", joint(player, own.joint), value::time(own.start));
+        let onset = format!("Impact {number}, {}: {}", joint(player, own.joint), value::time(own.start));
         let peak = value::quantity(own.force_peak.force.norm(), "N", 3);
         Some(match own.finished() {
             Some(impact) => format!(
-                "{begins}, peak {peak}, {}, approach {}, rebound {} mm/s",
+                "{onset}, peak {peak}, {}, approach {}, rebound {} mm/s",
                 duration(impact.end - impact.start),
                 millimetres(impact.approach_speed),
                 millimetres(impact.separation_speed)
             ),
             // A change may have removed the wall.
             None if report.state == ContactMode::Free => return None,
-            None => format!("{begins}, peak {peak}, stays in contact"),
+            None => format!("{onset}, peak {peak}, stays in contact"),
         })
     }
 

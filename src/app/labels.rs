@@ -256,14 +256,14 @@ mod tests {
         assert_ne!(beside, free, "a body is where it would stand");
         // A body that approaches slowly and jitters.
         let mut places = LabelPositions::default();
-        let mut seen = Vec::new();
+        let mut places_seen = Vec::new();
         for frame in 0..120 {
             let shake = [-3.0, 3.0][frame % 2];
             let at = [300.0 - 0.55 * frame as f32 + shake, 130.0 + shake];
-            seen.push(place(&list(name, at), &mut places));
+            places_seen.push(place(&list(name, at), &mut places));
         }
-        seen.dedup();
-        assert_eq!((seen[0], seen.len()), (free, 2), "{seen:?}");
+        places_seen.dedup();
+        assert_eq!((places_seen[0], places_seen.len()), (free, 2), "{places_seen:?}");
         // The same pictures give the same places.
         assert_eq!(place(&over, &mut LabelPositions::default()), beside);
     }

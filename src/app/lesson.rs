@@ -280,8 +280,8 @@ impl App {
             until.and_then(|until| running.measured.names().time(until))
         };
         let in_place = end(running.step).is_none_or(|end| shown >= end) && end(step).is_none_or(|end| shown < end);
-        let begins = running.lesson.steps[step].begins;
-        let continues = forward && !begins && in_place && running.is_run_of_step(&self.player);
+        let starts_run = running.lesson.steps[step].begins;
+        let continues = forward && !starts_run && in_place && running.is_run_of_step(&self.player);
         (running.step, running.predicted, running.reached) = (step, None, false);
         if continues {
             self.player.set_playing(false);

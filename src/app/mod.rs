@@ -431,12 +431,12 @@ impl App {
             graphics: None,
             player,
         };
-        let begins = options.link.is_none();
+        let starts_step = options.link.is_none();
         if let Some(link) = options.link {
             app.show_link(link);
         }
         if let Some((lesson, step)) = options.lesson {
-            app.resume_lesson(lesson, step, begins);
+            app.resume_lesson(lesson, step, starts_step);
         }
         app.attach(ctx, state, options.theme);
         Ok(app)
@@ -733,7 +733,7 @@ impl App {
                 self.remember_window();
             }
             self.show_scene(&options.scene)?;
-            let begins = options.link.is_none();
+            let starts_step = options.link.is_none();
             self.player.pacer.set_scale(options.time_scale);
             self.player.set_playing(options.playing);
             // A stand-alone window remains one.
@@ -748,7 +748,7 @@ impl App {
                 self.show_link(link);
             }
             if let Some((lesson, step)) = options.lesson {
-                self.resume_lesson(lesson, step, begins);
+                self.resume_lesson(lesson, step, starts_step);
             }
             Ok(())
         });

@@ -460,8 +460,8 @@ mod tests {
             }
         }
         // Alone, the labels would overlap the time.
-        let alone = texts(&Overlay { labels: true, ..Overlay::default() });
-        assert!(alone[0].1.intersects(others.iter().find(|(text, _)| text.starts_with("t =")).expect("time").1));
+        let labels_only = texts(&Overlay { labels: true, ..Overlay::default() });
+        assert!(labels_only[0].1.intersects(others.iter().find(|(text, _)| text.starts_with("t =")).expect("time").1));
     }
 
     #[test]

@@ -208,8 +208,8 @@ impl App {
             self.graphics.clone().ok_or("The picture cannot be drawn: there is no graphics adapter")?;
         let resolution = self.picture.size(self.picture_points(ctx), ctx.pixels_per_point());
         let contents = self.picture.contents;
-        let drawn = self.draw_off_screen(ctx, &mut Canvas::beside(&state), contents, resolution, true);
-        drawn.map_err(|error| format!("The picture cannot be drawn: {error}"))
+        let pending = self.draw_off_screen(ctx, &mut Canvas::beside(&state), contents, resolution, true);
+        pending.map_err(|error| format!("The picture cannot be drawn: {error}"))
     }
 
     /// Draws a film frame of `size` pixels; the `first` one settles the layout.
@@ -228,8 +228,8 @@ impl App {
         (self.picture.contents, self.picture.times, self.picture.own_size) = (contents, None, size);
         let resolution = self.picture.size(self.picture_points(ctx), ctx.pixels_per_point());
         (self.picture.contents, self.picture.times, self.picture.own_size) = saved;
-        let drawn = self.draw_off_screen(ctx, canvas, contents, resolution, first);
-        drawn.map_err(|error| error.to_string())
+        let pending = self.draw_off_screen(ctx, canvas, contents, resolution, first);
+        pending.map_err(|error| error.to_string())
     }
 
     /// Draws `contents` with (pixels, pixels per point) on `canvas`; `new` if it has not drawn these contents before.

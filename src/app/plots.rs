@@ -846,7 +846,7 @@ fn earlier_traces(
     dark: bool,
     (from, to, bins): (f64, f64, usize),
 ) -> Vec<Trace> {
-    let seen = panel.members.iter().enumerate().filter(|(_, (channel, _))| !hidden.contains(channel));
+    let visible_members = panel.members.iter().enumerate().filter(|(_, (channel, _))| !hidden.contains(channel));
     let trace = |(index, (channel, _)): (usize, &(usize, &str))| {
         let mut trace = Trace { colour: run.colour(theme::series(index, dark), dark), ..Trace::default() };
         if let Some(channel) = run.channel(player, *channel) {
@@ -854,7 +854,7 @@ fn earlier_traces(
         }
         trace
     };
-    seen.map(trace).collect()
+    visible_members.map(trace).collect()
 }
 
 /// Panels of the `chosen` quantities and of the channels `picked` by name.
@@ -999,8 +999,8 @@ mod tests {
         let most = least.abs().max(greatest.abs());
         let marks = marks(&input, MAX_MARKS);
         assert!(marks.iter().all(|m| (least..=greatest).contains(&m.value)));
-        let apart = marks.windows(2).all(|w| w[1].value - w[0].value >= 0.99 * input.base_step_size);
-        assert!(apart, "{marks:?}");
+        let are_spaced = marks.windows(2).all(|w| w[1].value - w[0].value >= 0.99 * input.base_step_size);
+        assert!(are_spaced, "{marks:?}");
         marks.iter().map(|m| tick(m.value, m.step_size, most)).collect()
     }
 

@@ -77,14 +77,14 @@ mod tests {
         let camera = view.camera();
         let size = [800, 600];
         let pixel = camera.project(grip.hand, size).expect("seen");
-        let aside = pixel + Vec2::new(120.0, 0.0);
-        grip.drag(&camera, aside, Vec2::ZERO, size, false);
-        let seen = camera.project(grip.hand, size).expect("seen");
-        assert!(seen.distance(aside) < 0.1, "the hand is under the pointer");
+        let displaced = pixel + Vec2::new(120.0, 0.0);
+        grip.drag(&camera, displaced, Vec2::ZERO, size, false);
+        let projected = camera.project(grip.hand, size).expect("seen");
+        assert!(projected.distance(displaced) < 0.1, "the hand is under the pointer");
         let (_, _, back) = camera.axes();
         assert!((grip.hand - to_f32(&place)).dot(back).abs() < 1e-5, "no depth");
         let before = grip.hand;
-        grip.drag(&camera, aside, Vec2::new(0.0, -30.0), size, true);
+        grip.drag(&camera, displaced, Vec2::new(0.0, -30.0), size, true);
         let moved = grip.hand - before;
         assert!(moved.dot(back) < 0.0 && moved.cross(back).length() < 1e-6);
 

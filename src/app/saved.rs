@@ -34,18 +34,18 @@ impl Watcher {
         let files: Vec<PathBuf> = std::iter::once(path.clone()).chain(others).collect();
         let watch_files = move || {
             let stamps = || -> Vec<_> { files.iter().map(|file| stamp(file)).collect() };
-            let mut seen = vec![None; files.len()];
+            let mut known = vec![None; files.len()];
             while !is_over.load(Ordering::Relaxed) {
                 let now = stamps();
-                if now != seen {
+                if now != known {
                     std::thread::sleep(UNCHANGED_TIME);
                     if stamps() != now {
                         continue;
                     }
                     // Some editors replace a file, which is briefly missing then.
-                    let was_written = |(now, seen): (&Option<_>, &Option<_>)| now.is_some() && now != seen;
-                    let saved = now[0].is_some() && now.iter().zip(&seen).any(was_written);
-                    seen = now;
+                    let was_written = |(now, known): (&Option<_>, &Option<_>)| now.is_some() && now != known;
+                    let saved = now[0].is_some() && now.iter().zip(&known).any(was_written);
+                    known = now;
                     if saved {
                         let (name, content) = (name.clone(), read(&path));
                         if sender.send(OpenedFile { name, content }).is_err() {

@@ -289,13 +289,13 @@ fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f6
             }
             start += count.max(1);
         }
-        let mut drawn = f32::NEG_INFINITY;
+        let mut last_mark = f32::NEG_INFINITY;
         for time in contacts.touches(joint, from, to) {
             let x = scale.x(time);
-            if x - drawn >= pixel {
+            if x - last_mark >= pixel {
                 let mark = Rect::from_min_size(pos2(x, lane.top()), vec2(1.0, lane.height()));
                 mesh.add_colored_rect(mark, colour);
-                drawn = x;
+                last_mark = x;
             }
         }
     }

@@ -57,9 +57,9 @@ impl View {
         let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * (1.0 + a.abs());
         let fits = a.fitted.is_some() && b.fitted.is_some();
         let follows = self.followed.is_some() && self.followed == other.followed;
-        let there = || near(a.distance, b.distance) && a.target.iter().zip(b.target).all(|(a, b)| near(*a, b));
-        let stays = self.followed == other.followed && near(a.yaw, b.yaw) && near(a.pitch, b.pitch);
-        stays && (fits || (follows && near(a.distance, b.distance)) || there())
+        let same_place = || near(a.distance, b.distance) && a.target.iter().zip(b.target).all(|(a, b)| near(*a, b));
+        let same_direction = self.followed == other.followed && near(a.yaw, b.yaw) && near(a.pitch, b.pitch);
+        same_direction && (fits || (follows && near(a.distance, b.distance)) || same_place())
     }
 
     /// Name of the difference from `other`; `None` if equal.

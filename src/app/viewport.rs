@@ -541,10 +541,10 @@ impl Viewport {
     /// Builds the draw list for `screen` at `quality` in `self.next`; returns the notes on ghosts.
     fn list_next(&mut self, player: &Player, camera: &Camera, screen: &Screen, quality: Quality) -> Vec<String> {
         let mut list = std::mem::take(&mut self.next);
-        let drawn = screen.with_quality(quality);
+        let reduced_screen = screen.with_quality(quality);
         let own_reference = self.options.arrows.reference;
         self.options.arrows.reference = own_reference.or(self.common);
-        let shot = shot!(self, player, camera, drawn);
+        let shot = shot!(self, player, camera, reduced_screen);
         self.view.build(&shot, &mut list);
         list.quality = quality;
         let ghost_notes = ghosts::add(&self.view, &shot, player, &mut list);
@@ -975,20 +975,20 @@ mod tests {
             };
             let mut output = ctx.run_ui(input, |ui| viewport.ui(ui, player, false, &[]));
             output.textures_delta.clear();
-            let mut seen = Plates { list: viewport.list.clone(), ..Plates::default() };
+            let mut plates = Plates { list: viewport.list.clone(), ..Plates::default() };
             for shape in output.shapes {
                 let egui::Shape::Rect(plate) = shape.shape else {
                     continue;
                 };
                 let (place, middle) = (plate.rect, plate.rect.center());
                 match plate.corner_radius.nw {
-                    6 if middle.x < size.x / 2.0 => seen.time = Some(place),
-                    6 => seen.legend = Some(place),
-                    4 => seen.labels.push(place),
+                    6 if middle.x < size.x / 2.0 => plates.time = Some(place),
+                    6 => plates.legend = Some(place),
+                    4 => plates.labels.push(place),
                     _ => {}
                 }
             }
-            seen
+            plates
         }
 
         fn pass(&mut self, dt: f32) {
@@ -1026,10 +1026,10 @@ mod tests {
         let mut moves = [0; PICTURES.len()];
         for frame in 0..FRAMES {
             for (at, size) in PICTURES.into_iter().enumerate() {
-                let seen = watched.draw(at, size);
+                let plates = watched.draw(at, size);
                 let context = format!("{scene}, {size}, frame {frame}");
-                let [time, legend] = [seen.time, seen.legend].map(|plate| plate.expect("written"));
-                let all: Vec<Rect> = seen.labels.iter().copied().chain([time, legend]).collect();
+                let [time, legend] = [plates.time, plates.legend].map(|plate| plate.expect("written"));
+                let all: Vec<Rect> = plates.labels.iter().copied().chain([time, legend]).collect();
                 for (i, plate) in all.iter().enumerate() {
                     assert!(!all[i + 1..].iter().any(|other| other.intersects(*plate)), "{context}");
                 }
@@ -1041,7 +1041,7 @@ mod tests {
                 if frame % 2 > 0 {
                     continue;
                 }
-                let cover = Cover::of(&seen.list, 2.0);
+                let cover = Cover::of(&plates.list, 2.0);
                 let under = |plate: Rect| {
                     let [min, max] = [plate.min, plate.max].map(|corner| Vec2::new(corner.x, corner.y));
                     cover.covered_fractions(min, max)
@@ -1050,7 +1050,7 @@ mod tests {
                     let hidden: f32 = under(plate).iter().sum();
                     assert!(hidden < HIDDEN[0], "{context}: {hidden} of {plate}");
                 }
-                for plate in &seen.labels {
+                for plate in &plates.labels {
                     let [_, balls] = under(*plate);
                     assert!(balls < HIDDEN[1], "{context}: balls under {balls} of {plate}");
                 }

@@ -73,11 +73,11 @@ fn move_onto_screen(cc: &eframe::CreationContext<'_>) {
     let mut screens = window.available_monitors().peekable();
     let first = screens.peek().map(|screen| screen.position());
     let inside = |start: i32, length: u32, at: i32| at >= start && at < start + length as i32;
-    let seen = screens.any(|screen| {
+    let is_visible = screens.any(|screen| {
         let (corner, size) = (screen.position(), screen.size());
         inside(corner.x, size.width, middle) && inside(corner.y, size.height, place.y.max(corner.y))
     });
-    if let Some(corner) = first.filter(|_| !seen) {
+    if let Some(corner) = first.filter(|_| !is_visible) {
         window.set_outer_position(corner);
     }
 }

@@ -69,7 +69,7 @@ impl SharedJob {
 
     /// Progress in the rest of the row, with accessible `name`, for `what` is computed.
     pub fn ui(&self, ui: &mut Ui, name: &str, what: &str) {
-        let done = self.done();
+        let done = self.completed_fraction();
         let mut words = format!("{} %", (100.0 * done).floor());
         if let Some(left) = self.remaining_time() {
             words += &format!(", {left}");
@@ -83,13 +83,13 @@ impl SharedJob {
     }
 
     /// Completed fraction, 0 to 1.
-    fn done(&self) -> f64 {
+    fn completed_fraction(&self) -> f64 {
         self.workers.iter().map(|worker| worker.done).sum()
     }
 
     /// Estimated remaining time at the average speed so far; `None` while too little is known.
     fn remaining_time(&self) -> Option<String> {
-        let (spent, done) = (self.now - self.since?, self.done());
+        let (spent, done) = (self.now - self.since?, self.completed_fraction());
         (spent >= MIN_ELAPSED && done > 0.0).then(|| remaining_time_text(spent * (1.0 - done).max(0.0) / done))
     }
 }

@@ -38,8 +38,8 @@ fn drawn(
             Trace { bins, colour: Color32::from_rgb(*r, *g, *b) }
         })
         .collect();
-    let seen = Rc::new(Cell::new(None));
-    let keep = seen.clone();
+    let transform_cell = Rc::new(Cell::new(None));
+    let transform_sink = transform_cell.clone();
     let mut harness =
         Harness::builder().with_size(size).with_pixels_per_point(scale).with_theme(Theme::Light).wgpu().build_ui(
             move |ui| {
@@ -53,12 +53,12 @@ fn drawn(
                     plot.set_plot_bounds_y(-50.0..=750.0);
                     plot.add(Curves::new(&traces, [1.0, 1.0]));
                 });
-                keep.set(Some(shown.transform));
+                transform_sink.set(Some(shown.transform));
             },
         );
     harness.run();
     let image = harness.render().expect("drawn");
-    let transform: PlotTransform = seen.get().expect("shown");
+    let transform: PlotTransform = transform_cell.get().expect("shown");
     let place = move |time: f64, value: f64| {
         let at = transform.position_from_point(&PlotPoint::new(time, value)) * scale;
         [f64::from(at.x), f64::from(at.y)]

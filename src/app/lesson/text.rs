@@ -64,13 +64,13 @@ pub fn blocks(markdown: &str) -> Vec<Block> {
     let (mut blocks, mut lines) = (Vec::new(), Vec::new());
     let mut entry = false;
     for line in markdown.lines().map(str::trim).chain([""]) {
-        let begins = line.strip_prefix("- ");
-        if (line.is_empty() || begins.is_some()) && !lines.is_empty() {
+        let item = line.strip_prefix("- ");
+        if (line.is_empty() || item.is_some()) && !lines.is_empty() {
             let pieces = pieces(&std::mem::take(&mut lines).join(" "));
             blocks.push(Block { entry, pieces });
         }
-        entry = begins.is_some() || (entry && !line.is_empty());
-        lines.extend(Some(begins.unwrap_or(line)).filter(|line| !line.is_empty()));
+        entry = item.is_some() || (entry && !line.is_empty());
+        lines.extend(Some(item.unwrap_or(line)).filter(|line| !line.is_empty()));
     }
     blocks
 }
