@@ -233,12 +233,12 @@ impl App {
         self.running_lesson.as_deref()
     }
 
-    /// Continues `lesson` at step `step`, counted from 0; if `begins`, the machine is set for that step.
-    pub(super) fn resume_lesson(&mut self, lesson: Arc<Lesson>, step: usize, begins: bool) {
+    /// Continues `lesson` at step `step`, counted from 0; if `starts_step`, the machine is set for that step.
+    pub(super) fn resume_lesson(&mut self, lesson: Arc<Lesson>, step: usize, starts_step: bool) {
         self.remember_window();
         self.running_lesson = Some(Box::new(RunningLesson::new(lesson, step)));
         self.sheet = Some(Sheet::Lesson);
-        if begins {
+        if starts_step {
             self.set_step();
         }
     }
