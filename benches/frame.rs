@@ -1,10 +1,10 @@
 //! CPU cost of one frame of the window without stepping: interface, draw list, tessellation, encoding; of the draw list
-//! alone, and of recording it, also for the longest chain; and of what is heard of a frame. Targets: at most 2 ms for the
+//! alone, and of recording it, also for the longest chain; and of the sound of a frame. Targets: at most 2 ms for the
 //! default scene, of which a presentation and sound take less than 0.5 ms each.
 //!
 //! `cargo bench --bench frame`; without a GPU, drawing itself runs on the same processor and is waited for outside the
-//! measured time, but leaves cold caches and a driver that is part of the frame. Our own share alone, with a device that
-//! does nothing: `WGPU_BACKEND=noop WGPU_NOOP_BACKEND=1 cargo bench --bench frame`.
+//! measured time, but leaves cold caches and a driver that is part of the frame. To measure only our own part, use a device
+//! that does nothing: `WGPU_BACKEND=noop WGPU_NOOP_BACKEND=1 cargo bench --bench frame`.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -27,7 +27,7 @@ fn default_scene() -> Scene {
     Scene::load("spcmm", &[]).expect("built in")
 }
 
-/// As the window opens, with the longest chain, and with every instrument on: microscope, ideal ghost, twin, wear map, an
+/// The window as it opens, as a presentation, with the longest chain, and with every instrument on: microscope, ideal ghost, twin, wear map, an
 /// abandoned future, over a second of simulation.
 fn frames(watch: &Stopwatch) {
     frame(watch, "frame of the window", default_scene(), |app, _| {
@@ -86,7 +86,7 @@ impl Stage {
         Self { view: SceneView::new(&scene, &frame), scene, frame, marks }
     }
 
-    /// What a picture of `size` asks for, passed to `then` to be built.
+    /// Passes the shot of a picture of `size` to `then`.
     fn shot(&self, size: [u32; 2], then: impl FnOnce(&Shot<'_>)) {
         let options = ViewOptions { magnification: 20.0, ..ViewOptions::default() };
         let mut camera = self.view.camera();
@@ -127,7 +127,7 @@ fn longest_chain() -> Scene {
     Scene::load("chain", &[links]).expect("as many are allowed")
 }
 
-/// What is done before the adapter begins to draw a list: a frame of the longest chain has 16 ms for that and its draw list.
+/// CPU time before the adapter begins to draw a list. A frame of the longest chain has 16 ms for this and for its draw list.
 fn recording(watch: &Stopwatch) {
     let mut offscreen = Offscreen::new().expect("a graphics adapter");
     let stage = Stage::new(longest_chain(), 0.0);
@@ -136,8 +136,8 @@ fn recording(watch: &Stopwatch) {
     watch.time_part("recording the longest chain", || offscreen.time_to_record(&list).expect("drawn"));
 }
 
-/// The most that a frame can ask for: every impact that a run keeps, all as low and therefore as long as can be. The page computes
-/// the samples in its frame, the desktop in a thread of the system's.
+/// The worst case of a frame: every impact that a run stores, all at the lowest pitch and therefore longest. The page computes
+/// the samples within the frame, the desktop in the system's audio thread.
 fn sound(watch: &Stopwatch) {
     let impacts: Vec<Impact> = (1..=64)
         .map(|k| Impact {
@@ -150,10 +150,10 @@ fn sound(watch: &Stopwatch) {
             ..Impact::default()
         })
         .collect();
-    let stretch = TimeWindow { from: TIME, to: 2.0 * TIME, lasts: 1.0 / 60.0 };
+    let window = TimeWindow { from: TIME, to: 2.0 * TIME, lasts: 1.0 / 60.0 };
     let mut heard: Vec<Click> = Vec::new();
-    watch.time("clicks of a frame", || clicks(black_box(&impacts).iter(), &stretch, 1.0, &mut heard));
-    clicks(impacts.iter(), &stretch, 1.0, &mut heard);
+    watch.time("clicks of a frame", || clicks(black_box(&impacts).iter(), &window, 1.0, &mut heard));
+    clicks(impacts.iter(), &window, 1.0, &mut heard);
     assert_eq!(heard.len(), MAX_CLICKS);
     watch.time("samples of the clicks of a frame", || -> usize {
         let samples = |click| Voice::new(click, 48_000.0).collect::<Vec<f32>>().len();
@@ -161,7 +161,7 @@ fn sound(watch: &Stopwatch) {
     });
 }
 
-/// Time of the graphics adapter alone, by scene and size, where it has timestamps. A software adapter's is the processor's.
+/// Time of the graphics adapter alone, by scene and size, if it has timestamps. For a software adapter this is processor time.
 fn pictures(watch: &Stopwatch) {
     let mut offscreen = Offscreen::new().expect("a graphics adapter");
     println!("drawn by {}", offscreen.adapter());

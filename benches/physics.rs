@@ -33,8 +33,8 @@ fn evaluation(watch: &Stopwatch, label: &str, scene: &Scene, time: f64) {
     let y = simulation.state_vector().to_vec();
     let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
     let joints = 0..mechanism.contacts.len();
-    let memory: Vec<_> = joints.map(|j| simulation.contact_state(j)).collect();
-    let mut mechanism = mechanism.evaluator(ActiveSet::Located(&memory));
+    let states: Vec<_> = joints.map(|j| simulation.contact_state(j)).collect();
+    let mut mechanism = mechanism.evaluator(ActiveSet::Located(&states));
     let mut dy = vec![0.0; y.len()];
     let mut n = 0.0;
     watch.time(&format!("{label}: new instant"), || {
@@ -79,7 +79,7 @@ fn snapshots(watch: &Stopwatch) {
     }
 }
 
-/// Simulated spans with the methods that are meant for them, beside Runge-Kutta 4 at 10 us, which runs a tenth of each.
+/// Time spans with the methods meant for them, compared with Runge-Kutta 4 at 10 us, which runs a tenth of each.
 fn spans(watch: &Stopwatch) {
     let span = |name: &str, changes: &Changes, from: f64, to: f64, rk4_to: f64| {
         let methods: [(&str, &Changes, f64); 2] = [
@@ -114,8 +114,8 @@ fn chain(watch: &Stopwatch) {
         let y = simulation.state_vector().to_vec();
         let t = simulation.time();
         let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
-        let memory = vec![ContactState::default(); mechanism.contacts.len()];
-        let mut mechanism = mechanism.evaluator(ActiveSet::Located(&memory));
+        let states = vec![ContactState::default(); mechanism.contacts.len()];
+        let mut mechanism = mechanism.evaluator(ActiveSet::Located(&states));
         let mut dy = vec![0.0; y.len()];
         let name = format!("chain, one evaluation/{links}");
         let median = watch.time(&name, || mechanism.derivative(black_box(t), black_box(&y), &mut dy));

@@ -10,9 +10,9 @@ fn main() -> std::process::ExitCode {
         env_logger::Builder::from_default_env()
             .format(|out, record| {
                 use std::io::Write;
-                let words = record.args().to_string();
-                let (level, from) = (record.level(), record.target());
-                writeln!(out, "[{level} {from}] {}", visible(&words))
+                let message = record.args().to_string();
+                let (level, target) = (record.level(), record.target());
+                writeln!(out, "[{level} {target}] {}", visible(&message))
             })
             .init();
     }
@@ -36,14 +36,14 @@ fn explain_panics() {
         if std::env::var_os("RUST_BACKTRACE").is_some() {
             trace(info);
         }
-        let what = info.payload_as_str().unwrap_or("unknown cause");
+        let cause = info.payload_as_str().unwrap_or("unknown cause");
         let place = info.location().map(|place| format!(" ({}:{})", place.file(), place.line())).unwrap_or_default();
         let _ = writeln!(
             std::io::stderr(),
             "internal error in jointplay {}: {}{place}. This is a bug in the program; please report this line and the \
              command that led to it.",
             jointplay::VERSION,
-            visible_line(what),
+            visible_line(cause),
         );
     }));
 }

@@ -26,7 +26,7 @@ export function makeHost(laboratory, graphicsLost) {
             // The address is not secure, or permission is denied: use the older interface.
             const field = document.createElement('textarea');
             field.value = text;
-            field.className = 'apart';
+            field.className = 'visually-hidden';
             document.body.append(field);
             field.select();
             const done = document.execCommand('copy');

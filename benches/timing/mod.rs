@@ -7,9 +7,9 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 const WARM_UP: Duration = Duration::from_millis(500);
-/// How long each measurement takes, s, if its fewest samples do not take longer.
-const MEASURED: f64 = 3.0;
-/// Fewest and most samples.
+/// Duration of a measurement, s, unless its minimum number of samples takes longer.
+const DURATION: f64 = 3.0;
+/// Minimum and maximum number of samples.
 const SAMPLES: (f64, f64) = (10.0, 50.0);
 
 pub struct Stopwatch {
@@ -18,13 +18,13 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// As the command line says.
+    /// Reads the command line.
     pub fn new() -> Self {
         let (options, words): (Vec<_>, _) = std::env::args().skip(1).partition(|word| word.starts_with('-'));
         Self { words, once: !options.iter().any(|option| option == "--bench") }
     }
 
-    /// Times `call`, and gives the median in s if it is measured.
+    /// Times `call`; returns the median, s, if it was measured.
     pub fn time<R>(&self, name: &str, mut call: impl FnMut() -> R) -> Option<f64> {
         self.measure(name, |calls| {
             let clock = Instant::now();
@@ -35,12 +35,12 @@ impl Stopwatch {
         })
     }
 
-    /// The same for a `call` that does other things besides and returns its time.
+    /// As [`Self::time`], for a `call` that returns the time to count, because it also does other things.
     pub fn time_part(&self, name: &str, mut call: impl FnMut() -> Duration) -> Option<f64> {
         self.measure(name, |calls| (0..calls).map(|_| call()).sum())
     }
 
-    /// `run` calls so many times and returns the time of all.
+    /// `run` makes the given number of calls and returns their total time.
     fn measure(&self, name: &str, mut run: impl FnMut(u64) -> Duration) -> Option<f64> {
         if !self.words.is_empty() && !self.words.iter().any(|word| name.contains(&**word)) {
             return None;
@@ -56,7 +56,7 @@ impl Stopwatch {
             clock = Instant::now();
             run(calls);
         }
-        let all = MEASURED / clock.elapsed().as_secs_f64() * calls as f64;
+        let all = DURATION / clock.elapsed().as_secs_f64() * calls as f64;
         let samples = all.clamp(SAMPLES.0, SAMPLES.1).floor();
         let calls = (all / samples).max(1.0) as u64;
         let sample = |_| run(calls).as_secs_f64() / calls as f64;

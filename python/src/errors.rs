@@ -8,8 +8,8 @@ use pyo3::types::PyDict;
 /// The exception `class` with the text `message` and the attributes `details`.
 pub fn exception(py: Python<'_>, class: &str, message: &str, details: Option<&Bound<'_, PyDict>>) -> PyErr {
     let module = py.import("jointplay.errors");
-    let made = module.and_then(|module| module.getattr(class)?.call((message,), details));
-    made.map_or_else(|error| error, PyErr::from_value)
+    let created = module.and_then(|module| module.getattr(class)?.call((message,), details));
+    created.map_or_else(|error| error, PyErr::from_value)
 }
 
 /// An argument that is invalid: `message` names it, its value and what is allowed.
@@ -17,7 +17,7 @@ pub fn option_error(py: Python<'_>, message: &str) -> PyErr {
     exception(py, "OptionError", message, None)
 }
 
-/// An invalid scene or parameter, with its place and the values allowed for its key; `scene` knows the keys of its own.
+/// An invalid scene or parameter, with its location and the values allowed for its key; `scene` defines further keys.
 pub fn scene_error(py: Python<'_>, scene: Option<&Scene>, error: &SceneError) -> PyErr {
     let details = || {
         let details = PyDict::new(py);
@@ -32,14 +32,14 @@ pub fn scene_error(py: Python<'_>, scene: Option<&Scene>, error: &SceneError) ->
     details().map_or_else(|failed| failed, |details| exception(py, "SceneError", &error.to_string(), Some(&details)))
 }
 
-/// Values and units that the parameter `key` accepts, in words; `None` for a key that is no parameter.
+/// Values and units that the parameter `key` accepts, in words; `None` for a key that is not a parameter.
 fn allowed(scene: Option<&Scene>, key: &str) -> Option<String> {
     if let Some(parameter) = scene.and_then(|scene| scene.parameter(key).ok()) {
         return Some(parameter.allowed());
     }
-    let of_joint = key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.'));
-    let of_joint = of_joint.map(|(_, part)| format!("contact.{part}"));
-    find(of_joint.as_deref().unwrap_or(key)).map(|parameter| parameter.allowed())
+    let contact_key = key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.'));
+    let contact_key = contact_key.map(|(_, part)| format!("contact.{part}"));
+    find(contact_key.as_deref().unwrap_or(key)).map(|parameter| parameter.allowed())
 }
 
 /// A live change that was refused.

@@ -15,11 +15,11 @@ pub const STEPS_BETWEEN_CHECKS: u32 = 4096;
 /// # Errors
 /// A panic in `work`, which is a bug, as `InternalError`.
 pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    // What a panic leaves behind is reported as a bug, not used further by the program.
+    // After a panic, which is reported as a bug, the values it interrupted are not used again.
     py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| internal_error(py, &*panic))
 }
 
-/// Runs `work` with the interpreter's lock: for work that is short or that calls Python.
+/// Runs `work` while holding the interpreter's lock: for short work, or work that calls Python.
 ///
 /// # Errors
 /// A panic in `work`, which is a bug, as `InternalError`.
@@ -28,12 +28,12 @@ pub fn guarded<T>(py: Python<'_>, work: impl FnOnce() -> T) -> PyResult<T> {
 }
 
 fn internal_error(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
-    let words = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
+    let cause = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
     let message = format!(
         "internal error in jointplay {}: {}. This is a bug in the program; please report this line and the call that led \
          to it.",
         env!("CARGO_PKG_VERSION"),
-        words.unwrap_or("unknown cause"),
+        cause.unwrap_or("unknown cause"),
     );
     exception(py, "InternalError", &message, None)
 }
@@ -42,10 +42,10 @@ fn internal_error(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
 ///
 /// # Errors
 /// `KeyboardInterrupt`, or what `progress` raises.
-pub fn report_progress(py: Python<'_>, progress: Option<&Bound<'_, PyAny>>, part: f64) -> PyResult<()> {
+pub fn report_progress(py: Python<'_>, progress: Option<&Bound<'_, PyAny>>, fraction: f64) -> PyResult<()> {
     py.check_signals()?;
     if let Some(progress) = progress {
-        progress.call1((part.clamp(0.0, 1.0),))?;
+        progress.call1((fraction.clamp(0.0, 1.0),))?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! The module `jointplay._native`: scenes, runs, simulations and sweeps for the package in `python/jointplay`, which documents
 //! them. SI units everywhere; text with a unit is accepted where a number is.
 //!
-//! Work runs without the interpreter's lock and asks for Ctrl-C between steps (`interpreter`). Errors become the exceptions of
+//! Work runs without the interpreter's lock and checks for Ctrl-C between steps (`interpreter`). Errors become the exceptions of
 //! `jointplay.errors`.
 
 mod errors;

@@ -1,4 +1,4 @@
-//! A machine described by Python's dictionaries and lists, as the text of a scene file. A number in place of a quantity is SI.
+//! A machine described by Python's dictionaries and lists, as the text of a scene file. Plain numbers are in SI units.
 
 use jointplay_physics::units::{Dimension, exact_quantity, si_unit};
 use jointplay_scene::{FILE, FileKey, FileTable, Kind, Value, ValueType, Variants, find};
@@ -8,26 +8,26 @@ use toml::{Table, Value as Toml};
 
 use crate::errors::option_error;
 
-/// Where a value stands: the whole machine, and whether the coordinate that it belongs to is an angle, if that is known.
+/// Context of a value: the whole machine, and whether the coordinate that the value belongs to is an angle, if known.
 #[derive(Clone, Copy)]
 struct Context<'a, 'py> {
     machine: &'a Bound<'py, PyDict>,
-    turns: Option<bool>,
+    is_angle: Option<bool>,
 }
 
-/// Text of a scene file with the sections `machine`.
+/// Scene file text with the sections in `machine`.
 ///
 /// # Errors
-/// `OptionError` with the place of what TOML cannot hold, or of a number whose unit depends on a joint that is not in `machine`.
+/// `OptionError` that locates a value without a TOML form, or a number whose unit depends on a joint missing from `machine`.
 pub fn text_of(machine: &Bound<'_, PyDict>) -> PyResult<String> {
-    let table = table(machine, Some(&FILE), "", Context { machine, turns: None })?;
+    let table = table(machine, Some(&FILE), "", Context { machine, is_angle: None })?;
     toml::to_string(&table).map_err(|error| option_error(machine.py(), &error.to_string()))
 }
 
-/// `row` describes the keys of the table; `place` names it in errors.
+/// `rows` describe the keys of the table; `place` names it in errors.
 fn table(own: &Bound<'_, PyDict>, rows: Option<&FileTable>, place: &str, context: Context<'_, '_>) -> PyResult<Table> {
     let variant = rows.and_then(|rows| variant(own, rows));
-    let turns = has_angle_coordinate(own, context.machine).or(context.turns);
+    let is_angle = has_angle_coordinate(own, context.machine).or(context.is_angle);
     let mut all = Table::new();
     for (key, value) in own.iter() {
         let key: String = key.extract()?;
@@ -35,11 +35,14 @@ fn table(own: &Bound<'_, PyDict>, rows: Option<&FileTable>, place: &str, context
         if value.is_none() {
             continue;
         }
-        // The reader of the text refuses unknown keys, with the nearest one.
+        // Unknown keys are refused later, when the text is read; that error suggests the nearest key.
         let row = rows.and_then(|rows| row(rows, &key, variant));
-        // Drives and starts of a joint with two coordinates have a table or a number for each, by its name.
-        let turns = turns.or_else(|| is_angle_name(&key));
-        all.insert(key, to_toml(&value, row.map(|row| (row, row.value_type)), &place, Context { turns, ..context })?);
+        // Drives and initial values of a joint with two coordinates have an entry for each, named after the coordinate.
+        let is_angle = is_angle.or_else(|| is_angle_name(&key));
+        all.insert(
+            key,
+            to_toml(&value, row.map(|row| (row, row.value_type)), &place, Context { is_angle, ..context })?,
+        );
     }
     Ok(all)
 }
@@ -87,7 +90,7 @@ fn is_angle_name(word: &str) -> Option<bool> {
     }
 }
 
-/// `value` in TOML; of a known key, as its row and its type say.
+/// `value` as TOML; for a known key, in the form that its row and type require.
 fn to_toml(
     value: &Bound<'_, PyAny>,
     row: Option<(&FileKey, ValueType)>,
@@ -109,12 +112,12 @@ fn to_toml(
         for (i, entry) in entries.enumerate() {
             let entry = entry?;
             let is_list = !entry.is_instance_of::<PyString>() && entry.try_iter().is_ok();
-            let of_entry = row.map(|(row, takes)| (row, entry_of(takes, i, is_list)));
+            let of_entry = row.map(|(row, value_type)| (row, entry_of(value_type, i, is_list)));
             all.push(to_toml(&entry, of_entry, &format!("{place}[{i}]"), context)?);
         }
         return Ok(Toml::Array(all));
     }
-    let is_whole =
+    let is_integer =
         value.is_instance_of::<PyInt>() || !value.is_instance_of::<PyFloat>() && value.extract::<i64>().is_ok();
     let Ok(number) = value.extract::<f64>() else {
         return wrong("expected a number, text, a list or a dictionary");
@@ -122,27 +125,27 @@ fn to_toml(
     if !number.is_finite() {
         return wrong("expected a finite number");
     }
-    if let Some((row, takes)) = row {
-        if let Some(dimension) = dimension(takes) {
-            let dimension = match (row.on_hinge, context.turns) {
+    if let Some((row, value_type)) = row {
+        if let Some(dimension) = dimension(value_type) {
+            let dimension = match (row.on_hinge, context.is_angle) {
                 (None, _) | (_, Some(false)) => dimension,
                 (Some((on_hinge, _)), Some(true)) => on_hinge,
                 (Some(_), None) => return wrong("the unit depends on the joint: give it, as in \"0.1 rad\""),
             };
             return Ok(Toml::String(exact_quantity(number, si_unit(dimension), dimension)));
         }
-        if let ValueType::Parameter(key) = takes
+        if let ValueType::Parameter(key) = value_type
             && let Some(parameter) = find(key).filter(|parameter| matches!(parameter.kind, Kind::Number { .. }))
         {
             return Ok(Toml::String(parameter.write(&Value::Number(number))));
         }
     }
-    if is_whole { Ok(Toml::Integer(value.extract()?)) } else { Ok(Toml::Float(number)) }
+    if is_integer { Ok(Toml::Integer(value.extract()?)) } else { Ok(Toml::Float(number)) }
 }
 
-/// Type of entry `i` of a list of the type `takes`; the entry may be a list itself.
-fn entry_of(takes: ValueType, i: usize, is_list: bool) -> ValueType {
-    match takes {
+/// Type of entry `i` of a list of the type `value_type`; the entry may be a list itself.
+fn entry_of(value_type: ValueType, i: usize, is_list: bool) -> ValueType {
+    match value_type {
         ValueType::Vector(dimension, range) => ValueType::Number(dimension, range),
         ValueType::Numbers(_, dimension) => ValueType::Number(dimension, (f64::NEG_INFINITY, f64::INFINITY)),
         ValueType::Vectors(dimension, _) => ValueType::Numbers(3, dimension),
@@ -151,9 +154,9 @@ fn entry_of(takes: ValueType, i: usize, is_list: bool) -> ValueType {
     }
 }
 
-/// Dimension of a number of the type `takes`; `None` for what is written as it is.
-fn dimension(takes: ValueType) -> Option<Dimension> {
-    match takes {
+/// Dimension of a number of the type `value_type`; `None` for values written without a unit.
+fn dimension(value_type: ValueType) -> Option<Dimension> {
+    match value_type {
         ValueType::Number(dimension, _) | ValueType::Numbers(1, dimension) if !si_unit(dimension).is_empty() => {
             Some(dimension)
         }

@@ -1,4 +1,4 @@
-//! Numbers and texts of Python as values of parameters and as times.
+//! Conversion between Python numbers and strings and the values of parameters and times.
 
 use jointplay_physics::simulate::MAX_RUN_DURATION;
 use jointplay_physics::units::{Dimension, parse_quantity};
@@ -34,17 +34,17 @@ pub fn duration(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     Ok(seconds)
 }
 
-/// `value` for messages.
+/// `value` as messages show it.
 fn repr_of(value: &Bound<'_, PyAny>) -> String {
-    value.repr().map_or_else(|_| "?".to_owned(), |words| words.to_string())
+    value.repr().map_or_else(|_| "?".to_owned(), |text| text.to_string())
 }
 
-/// A real number; booleans are none.
+/// A real number; booleans do not count as numbers.
 fn number(value: &Bound<'_, PyAny>) -> Option<f64> {
     if value.is_instance_of::<PyBool>() { None } else { value.extract().ok() }
 }
 
-/// `value` as a user writes it for `parameter`: text as it is, a number in SI units; `None` stands for the value of the file.
+/// `value` as a user writes it for `parameter`: text unchanged, a number in SI units; `None` stands for the value of the file.
 ///
 /// # Errors
 /// `OptionError`: neither text nor a number of this parameter.

@@ -48,11 +48,11 @@ pub fn render<'py>(
     Ok(PyArray3::from_owned_array(py, pixels.map_err(|error| option_error(py, &error.to_string()))?))
 }
 
-/// What is drawn of the instant at which `simulation` is.
+/// Builds the draw list of the current instant of `simulation`.
 fn draw(simulation: &mut PySimulation, size: [u32; 2], list: &mut DrawList) {
     let (scene, [start, frame]) = simulation.running_and_frames();
     let view = SceneView::new(scene, start);
-    // A simulation keeps no path and no peaks.
+    // A simulation records no path and no peaks.
     let options = ViewOptions { quality: Quality::FULL, trail: false, ..ViewOptions::default() };
     let mut marks = PeakMarks::new();
     marks.update(frame, &[], f64::INFINITY);

@@ -1,4 +1,4 @@
-//! What a simulation has found so far, as plain Python data.
+//! Results of a simulation so far, as plain Python data.
 
 use jointplay_analysis::impact_row::{COLUMNS, row};
 use jointplay_physics::simulate::{Impact, Simulation};
@@ -7,7 +7,7 @@ use numpy::{PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// An array that Python cannot change; it owns its memory.
+/// An array that is read-only in Python and owns its memory.
 pub fn constant(py: Python<'_>, values: Array2<f64>) -> PyResult<Bound<'_, PyArray2<f64>>> {
     let array = PyArray2::from_owned_array(py, values);
     array.try_readwrite()?.make_nonwriteable();

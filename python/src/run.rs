@@ -14,7 +14,7 @@ use crate::quantity::duration as read_duration;
 use crate::report;
 use crate::scene::{PyScene, channels_at_start};
 
-/// Rows if no interval is given.
+/// Number of intervals if their length is not given.
 const INTERVALS: f64 = 1000.0;
 
 /// Why a run ended before its time.
@@ -83,8 +83,8 @@ impl Recorder {
     }
 }
 
-/// Runs `scene` for `duration` with a row every `every`, and returns everything that the run found. `channels` are names or
-/// patterns; without any, those that the program writes.
+/// Runs `scene` for `duration` with a row every `every`, and returns all results. `channels` are names or
+/// patterns; by default, those that `jointplay run` writes.
 #[pyfunction]
 #[pyo3(signature = (scene, duration, every=None, channels=Vec::new(), progress=None))]
 pub fn run<'py>(
@@ -122,10 +122,10 @@ pub fn run<'py>(
         }
     };
     report_progress(py, progress, if fault.is_none() { 1.0 } else { run.live.time() / duration })?;
-    describe(py, run, fault.as_ref())
+    results_dict(py, run, fault.as_ref())
 }
 
-/// The channels that match one of `patterns`, and the time; without patterns, those that are written unasked.
+/// The channels that match one of `patterns`, and the time; without patterns, those recorded by default.
 fn select_channels(py: Python<'_>, all: Vec<ChannelInfo>, patterns: &[String]) -> PyResult<Vec<ChannelInfo>> {
     for pattern in patterns {
         let failed = |error| option_error(py, &format!("channels: {error}; Scene.channels() lists them"));
@@ -143,14 +143,14 @@ fn allocate(rows: usize, columns: usize) -> PyResult<Vec<f64>> {
     let count = rows.checked_mul(columns);
     if count.is_none_or(|count| values.try_reserve_exact(count).is_err()) {
         return Err(PyMemoryError::new_err(format!(
-            "{rows} rows of {columns} channels do not fit into memory: fewer channels, or a longer interval in `every`"
+            "{rows} rows of {columns} channels do not fit into memory; use fewer channels or a longer interval `every`"
         )));
     }
     values.resize(rows * columns, f64::NAN);
     Ok(values)
 }
 
-fn describe<'py>(py: Python<'py>, run: Recorder, fault: Option<&Fault>) -> PyResult<Bound<'py, PyDict>> {
+fn results_dict<'py>(py: Python<'py>, run: Recorder, fault: Option<&Fault>) -> PyResult<Bound<'py, PyDict>> {
     let live = &run.live;
     let all = PyDict::new(py);
     let channels: Vec<_> = run.channels.iter().map(|c| (&c.name[..], &c.column[..], c.unit, c.help)).collect();
@@ -170,7 +170,7 @@ fn describe<'py>(py: Python<'py>, run: Recorder, fault: Option<&Fault>) -> PyRes
     all.set_item("advice", advice)?;
     let shape = (run.channels.len(), run.capacity);
     let values = Array2::from_shape_vec(shape, run.values);
-    // The shape is that of the allocation.
+    // Cannot fail: the shape is that of the allocation.
     let values = values.map_err(|error| PyMemoryError::new_err(error.to_string()))?;
     all.set_item("values", report::constant(py, values)?)?;
     Ok(all)

@@ -29,11 +29,11 @@ pub struct PyScene {
     pub scene: Arc<Scene>,
 }
 
-/// What a scene is read from again: its text, its file, the files it names, its changes.
+/// Source of a scene: its text, its file, the files that it references, its changes.
 type Origin = (String, Option<String>, BTreeMap<String, String>, Vec<(String, String)>);
 
 impl PyScene {
-    fn of(py: Python<'_>, read: impl FnOnce() -> Result<Scene, SceneError> + Send) -> PyResult<Self> {
+    fn load_with(py: Python<'_>, read: impl FnOnce() -> Result<Scene, SceneError> + Send) -> PyResult<Self> {
         let scene = detached(py, read)?.map_err(|error| scene_error(py, None, &error))?;
         Ok(Self { scene: Arc::new(scene) })
     }
@@ -41,7 +41,7 @@ impl PyScene {
     /// The scene started at t = 0.
     ///
     /// # Errors
-    /// `SceneError` with the line and the change concerned: it cannot start.
+    /// `SceneError` with the line or the change at fault, if the scene cannot start.
     pub fn start(&self, py: Python<'_>) -> PyResult<LiveScene> {
         let live = detached(py, || LiveScene::new(&self.scene))?;
         live.map_err(|error| scene_error(py, Some(&self.scene), &self.scene.locate(&error)))
@@ -60,17 +60,17 @@ impl PyScene {
     /// A built-in scene or benchmark by name, or a file.
     #[staticmethod]
     fn load(py: Python<'_>, name: PathBuf) -> PyResult<Self> {
-        Self::of(py, || Scene::load(name, &[]))
+        Self::load_with(py, || Scene::load(name, &[]))
     }
 
-    /// A scene from its text. Files that it names are read in `folder`.
+    /// A scene from its text. Files that it references are read from `folder`.
     #[staticmethod]
     #[pyo3(signature = (text, file=None, folder=None))]
     fn parse(py: Python<'_>, text: &str, file: Option<&str>, folder: Option<PathBuf>) -> PyResult<Self> {
-        Self::of(py, || Scene::parse_given(text, file, &BTreeMap::new(), folder.as_deref(), &[]))
+        Self::load_with(py, || Scene::parse_given(text, file, &BTreeMap::new(), folder.as_deref(), &[]))
     }
 
-    /// Text of a scene file with the sections `machine`.
+    /// Scene file text with the sections in `machine`.
     #[staticmethod]
     fn text_of(machine: &Bound<'_, PyDict>) -> PyResult<String> {
         text_of(machine)
@@ -79,16 +79,16 @@ impl PyScene {
     /// The scene that [`Self::origin`] describes.
     #[staticmethod]
     fn read_again(py: Python<'_>, origin: Origin) -> PyResult<Self> {
-        let (text, file, beside, changes) = origin;
-        let beside: Texts = beside.into_iter().map(|(name, text)| (name, text.into())).collect();
-        Self::of(py, || Scene::parse_with(&text, file.as_deref(), &beside, &changes))
+        let (text, file, references, changes) = origin;
+        let references: Texts = references.into_iter().map(|(name, text)| (name, text.into())).collect();
+        Self::load_with(py, || Scene::parse_with(&text, file.as_deref(), &references, &changes))
     }
 
-    /// What the scene is read from again.
+    /// Source of the scene, from which [`Self::read_again`] restores it.
     fn origin(&self) -> Origin {
         let source = &self.scene.source;
-        let beside = source.beside.iter().map(|(name, text)| (name.clone(), text.to_string())).collect();
-        (source.text.clone(), source.file.clone(), beside, self.scene.changes.clone())
+        let references = source.beside.iter().map(|(name, text)| (name.clone(), text.to_string())).collect();
+        (source.text.clone(), source.file.clone(), references, self.scene.changes.clone())
     }
 
     /// Short name.
@@ -97,13 +97,13 @@ impl PyScene {
         &self.scene.name
     }
 
-    /// Title of one line.
+    /// One-line title.
     #[getter]
     fn title(&self) -> &str {
         &self.scene.title
     }
 
-    /// A paragraph for the user.
+    /// Description for the user, one paragraph.
     #[getter]
     fn description(&self) -> &str {
         &self.scene.description
@@ -130,7 +130,7 @@ impl PyScene {
         own.chain(of_joints).collect()
     }
 
-    /// What is known about the parameter `key`.
+    /// Properties of the parameter `key`.
     fn parameter<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyDict>> {
         let failed = |error: SceneError| scene_error(py, Some(&self.scene), &error);
         let parameter = self.scene.parameter(key).map_err(failed)?;
@@ -160,7 +160,7 @@ impl PyScene {
         Ok(all)
     }
 
-    /// Another scene with `changes`, each a key and a value; `None` returns to the value of the file.
+    /// A copy with `changes`, each a key and a value; `None` returns to the value of the file.
     fn set(&self, py: Python<'_>, changes: Vec<(String, Bound<'_, PyAny>)>) -> PyResult<Self> {
         let failed = |error: SceneError| scene_error(py, Some(&self.scene), &error);
         let mut texts = Vec::new();
@@ -197,7 +197,7 @@ impl PyScene {
         Ok(all)
     }
 
-    /// Its channels: name, column, unit, description, and whether a run records it if none are named.
+    /// Its channels: name, column, unit, description, and whether a run records the channel by default.
     fn channels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let mut live = self.start(py)?;
         let (rows, _) = detached(py, || channels_at_start(&mut live))?;
@@ -221,7 +221,7 @@ fn with_changes(scene: &Scene, changes: &[(String, Option<String>)]) -> Result<S
         }
         Ok(scene)
     };
-    // On the way there may be values that the scene accepts only together, such as a large clearance and a larger ball.
+    // Some changes are valid only together, such as a large clearance and a larger ball.
     let together = |error| {
         let is_changed = |key: &String| changes.iter().any(|(changed, _)| changed == key);
         let earlier = scene.changes.iter().filter(|(key, _)| !is_changed(key)).cloned();

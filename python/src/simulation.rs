@@ -26,15 +26,15 @@ type Changes = Vec<(String, String)>;
 /// What a pickle holds: the text of a state file, and the changes of the scene as it was given, at the start, and in effect.
 type Pickled<'a> = (String, [&'a Changes; 3]);
 
-/// A machine as it started.
+/// Channels and first instant of a machine since its latest start.
 struct Layout {
-    /// The changes of its scene at the start.
+    /// Changes of the scene at the start.
     changes: Changes,
     channels: Vec<ChannelInfo>,
     /// Index of each channel by name and by column.
-    places: HashMap<String, usize>,
+    indices: HashMap<String, usize>,
     /// The first instant.
-    #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "pictures are composed around it"))]
+    #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "only rendering uses it"))]
     start: Frame,
 }
 
@@ -44,8 +44,8 @@ impl Layout {
         let (channels, start) = channels_at_start(live);
         let names = channels.iter().map(|channel| &channel.name);
         let both = channels.iter().map(|channel| &channel.column).zip(0..).chain(names.zip(0..));
-        let places = both.map(|(name, place)| (name.clone(), place)).collect();
-        Self { changes: live.running().changes.clone(), places, channels, start }
+        let indices = both.map(|(name, index)| (name.clone(), index)).collect();
+        Self { changes: live.running().changes.clone(), indices, channels, start }
     }
 }
 
@@ -71,8 +71,8 @@ impl PyState {
             let with = |changes: &Changes| -> Result<Scene, SceneError> {
                 Scene::parse_with(&source.text, source.file.as_deref(), &source.beside, changes)
             };
-            let [scene, began, running] = [with(&changes[0])?, with(&changes[1])?, with(&changes[2])?];
-            let live = LiveScene::new(&began).map_err(|error| began.locate(&error))?;
+            let [scene, initial, running] = [with(&changes[0])?, with(&changes[1])?, with(&changes[2])?];
+            let live = LiveScene::new(&initial).map_err(|error| initial.locate(&error))?;
             Ok((scene, live, running, pending))
         };
         let read = detached(py, read)?.map_err(|error: SceneError| scene_error(py, None, &error))?;
@@ -83,7 +83,7 @@ impl PyState {
         Ok(Self { scene: Arc::new(scene), snapshot: live.snapshot(), layout: Arc::new(layout) })
     }
 
-    /// What a pickle makes it from again.
+    /// Constructor and arguments that restore the state from a pickle.
     #[pyo3(name = "__reduce__")]
     fn reduce<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Pickled<'_>)> {
         let snapshot = &self.snapshot;
@@ -93,12 +93,12 @@ impl PyState {
         Ok((py.get_type::<Self>(), (text, changes)))
     }
 
-    /// Itself, since it never changes.
+    /// The state itself, since it never changes.
     fn __copy__(slf: Py<Self>) -> Py<Self> {
         slf
     }
 
-    /// The same.
+    /// As [`Self::__copy__`].
     fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
         slf
     }
@@ -127,7 +127,7 @@ pub struct PySimulation {
 }
 
 impl PySimulation {
-    /// Takes steps until `is_over`; looks for Ctrl-C between them.
+    /// Takes steps until `is_over`; checks for Ctrl-C between them.
     fn advance(
         &mut self,
         py: Python<'_>,
@@ -215,8 +215,7 @@ impl PySimulation {
     fn restore(&mut self, py: Python<'_>, state: &PyState) -> PyResult<()> {
         if !Arc::ptr_eq(&state.scene, &self.scene) && state.scene != self.scene {
             let (own, other) = (&self.scene.name, &state.scene.name);
-            let message =
-                format!("state: one of the scene `{other}`, and this is a simulation of another one, `{own}`");
+            let message = format!("state: one of the scene `{other}`, but this simulation runs `{own}`");
             return Err(option_error(py, &message));
         }
         self.live.restore(&state.snapshot);
@@ -257,7 +256,7 @@ impl PySimulation {
     /// Value of a channel now, SI; NaN if it has none.
     #[pyo3(name = "_read")]
     fn read(&mut self, py: Python<'_>, channel: &str) -> PyResult<f64> {
-        let Some(&place) = self.layout.places.get(channel) else {
+        let Some(&index) = self.layout.indices.get(channel) else {
             let known = matching(&self.layout.channels, channel);
             let message = match known {
                 Ok(several) => {
@@ -269,10 +268,10 @@ impl PySimulation {
             return Err(exception(py, "ChannelError", &message, None));
         };
         guarded(py, || self.sample())?;
-        Ok(self.layout.channels[place].reading().read(&self.frame).unwrap_or(f64::NAN))
+        Ok(self.layout.channels[index].reading().read(&self.frame).unwrap_or(f64::NAN))
     }
 
-    /// Everything about this instant.
+    /// All channels and vectors of this instant.
     #[pyo3(name = "_instant")]
     fn instant<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         guarded(py, || self.sample())?;
@@ -299,7 +298,7 @@ impl PySimulation {
         PyArray1::from_slice(py, self.live.state_vector())
     }
 
-    /// The finished impacts that were not taken before.
+    /// Impacts finished since the last call.
     #[pyo3(name = "_take_impacts")]
     fn take_impacts<'py>(&mut self, py: Python<'py>) -> PyResult<report::Impacts<'py>> {
         let mut impacts = Vec::new();

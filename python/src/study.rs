@@ -66,7 +66,7 @@ struct Stage {
     results: Vec<Vec<f64>>,
 }
 
-/// Makes the runs of a study for Python.
+/// Performs the runs of a study and stores them by stage.
 struct Runner<'a, 'py> {
     study: &'a PyStudy,
     py: Python<'py>,
@@ -118,7 +118,7 @@ fn estimate_tuple(estimate: &Estimate) -> (f64, f64, f64) {
     (estimate.value, estimate.low, estimate.high)
 }
 
-/// Keys and values of changed parameters, with the output there.
+/// Keys and values of changed parameters, with the resulting output.
 type Changed<'a> = (Vec<(&'a str, f64)>, f64);
 
 impl PyStudy {
@@ -142,19 +142,22 @@ impl PyStudy {
         Ok(all)
     }
 
-    fn fits<'py>(&self, py: Python<'py>, found: &CheapestFits) -> PyResult<Bound<'py, PyDict>> {
+    fn fits<'py>(&self, py: Python<'py>, cheapest: &CheapestFits) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
-        let of_candidates = || found.options.candidates.iter();
-        let best = found.search.best.as_ref().map(|best| {
-            let chosen = of_candidates().zip(&best.candidates);
-            let chosen = chosen.map(|(of, &chosen)| (&self.inputs[of.input].key[..], &of.list[chosen].text[..]));
+        let all_candidates = || cheapest.options.candidates.iter();
+        let best = cheapest.search.best.as_ref().map(|best| {
+            let chosen = all_candidates().zip(&best.candidates);
+            let chosen = chosen
+                .map(|(candidate, &chosen)| (&self.inputs[candidate.input].key[..], &candidate.list[chosen].text[..]));
             (best.cost, chosen.collect::<Vec<_>>(), estimate_tuple(&best.estimate))
         });
-        let unchecked = of_candidates().filter(|of| !of.is_ordered()).map(|of| &self.inputs[of.input].key[..]);
+        let unchecked = all_candidates()
+            .filter(|candidate| !candidate.is_ordered())
+            .map(|candidate| &self.inputs[candidate.input].key[..]);
         all.set_item("best", best)?;
-        all.set_item("is_proven", found.search.is_proven)?;
-        all.set_item("evaluations", found.search.evaluations)?;
-        all.set_item("check", found.check.as_ref().map(|(check, verdict)| (estimate_tuple(check), verdict.word())))?;
+        all.set_item("is_proven", cheapest.search.is_proven)?;
+        all.set_item("evaluations", cheapest.search.evaluations)?;
+        all.set_item("check", cheapest.check.as_ref().map(|(check, verdict)| (estimate_tuple(check), verdict.word())))?;
         all.set_item("order_not_checked", unchecked.collect::<Vec<_>>())?;
         Ok(all)
     }
@@ -167,7 +170,7 @@ fn array<'py>(py: Python<'py>, rows: &[Vec<f64>], length: usize) -> PyResult<Bou
     constant(py, values.map_err(|error| PyMemoryError::new_err(error.to_string()))?)
 }
 
-/// A value of `output`: a number, SI, or text; `None` for none.
+/// Reads a limit or target of `output`: a number in SI units, text with a unit, or `None`.
 fn quantity(output: &Output, value: &Bound<'_, PyAny>) -> Result<Option<f64>, String> {
     if value.is_none() {
         return Ok(None);
@@ -264,7 +267,7 @@ impl PyStudy {
         array(py, &results.map_err(|ended| ended.raise(py))?, self.outputs.len())
     }
 
-    /// Each parameter alone, a screening of many, indices, and changes that reach a target.
+    /// One-at-a-time ranges, a screening of many parameters, indices, and changes that reach a target.
     #[pyo3(signature = (rows, screen, target, seed, threads, progress=None))]
     fn sensitivity<'py>(
         &self,
@@ -283,39 +286,39 @@ impl PyStudy {
         };
         let mut runner = Runner::new(self, py, threads, progress);
         let options = SensitivityOptions { rows, screen, target, seed };
-        let found = guarded(py, || sensitivity(&mut runner, &options))?.map_err(|ended| ended.raise(py))?;
+        let result = guarded(py, || sensitivity(&mut runner, &options))?.map_err(|ended| ended.raise(py))?;
         let all = PyDict::new(py);
         runner.describe("indices", &all)?;
-        all.set_item("kept", &found.kept)?;
-        all.set_item("nominal", &found.alone.nominal)?;
-        all.set_item("together", &found.alone.together)?;
-        all.set_item("alone", &found.alone.ends)?;
-        let effects = found.screening.as_ref().map(|screening| {
+        all.set_item("kept", &result.kept)?;
+        all.set_item("nominal", &result.alone.nominal)?;
+        all.set_item("together", &result.alone.together)?;
+        all.set_item("alone", &result.alone.ends)?;
+        let effects = result.screening.as_ref().map(|screening| {
             let of_input = screening.effects.iter();
             let numbers = of_input.map(|effects| effects.map(|e| (e.mean, e.mean_magnitude, e.deviation)));
             numbers.collect::<Vec<_>>()
         });
         all.set_item("screening", effects)?;
         let mut indices = Vec::new();
-        for own in found.indices.iter().flatten() {
+        for own in result.indices.iter().flatten() {
             let entry = PyDict::new(py);
             match own {
-                Ok(found) => {
-                    entry.set_item("mean", found.mean)?;
-                    entry.set_item("variance", found.variance)?;
-                    entry.set_item("first", found.first.iter().map(estimate_tuple).collect::<Vec<_>>())?;
-                    entry.set_item("total", found.total.iter().map(estimate_tuple).collect::<Vec<_>>())?;
+                Ok(own) => {
+                    entry.set_item("mean", own.mean)?;
+                    entry.set_item("variance", own.variance)?;
+                    entry.set_item("first", own.first.iter().map(estimate_tuple).collect::<Vec<_>>())?;
+                    entry.set_item("total", own.total.iter().map(estimate_tuple).collect::<Vec<_>>())?;
                 }
                 Err(error) => entry.set_item("fault", error.to_string())?,
             }
             indices.push(entry);
         }
         all.set_item("indices", indices)?;
-        all.set_item("target", found.target.as_ref().map(|answer| self.target(py, answer)).transpose()?)?;
+        all.set_item("target", result.target.as_ref().map(|answer| self.target(py, answer)).transpose()?)?;
         Ok(all)
     }
 
-    /// A lot of `units` units: which hold the `limits`, a lower and an upper one for each output, and what drives the rejects.
+    /// A lot of `units` units: which meet the `limits`, a lower and an upper one for each output, and what drives the rejects.
     /// `cost` has a pattern, a fit and its cost for each candidate; without any, no fits are searched.
     #[pyo3(signature = (limits, units, sampling, seed, cost, required_yield, evaluations, threads, progress=None))]
     fn tolerance<'py>(
@@ -369,31 +372,31 @@ impl PyStudy {
         let fits = fits.transpose()?;
         let mut runner = Runner::new(self, py, threads, progress);
         let options = ToleranceOptions { units, sampling, seed, fits };
-        let found = guarded(py, || tolerance(&mut runner, &ends, options))?.map_err(|ended| ended.raise(py))?;
-        let drivers = found.drivers.as_ref().map(|drivers| {
+        let result = guarded(py, || tolerance(&mut runner, &ends, options))?.map_err(|ended| ended.raise(py))?;
+        let drivers = result.drivers.as_ref().map(|drivers| {
             drivers.iter().map(|driver| (driver.mean_shift, driver.distance, driver.p_value)).collect::<Vec<_>>()
         });
         let all = PyDict::new(py);
         runner.describe("lot", &all)?;
-        all.set_item("yield", estimate_tuple(&found.lot.yield_estimate))?;
-        all.set_item("accepted", &found.lot.accepted)?;
-        let qualities = found.qualities.iter().map(|own| quality(py, own)).collect::<PyResult<Vec<_>>>()?;
+        all.set_item("yield", estimate_tuple(&result.lot.yield_estimate))?;
+        all.set_item("accepted", &result.lot.accepted)?;
+        let qualities = result.qualities.iter().map(|own| quality(py, own)).collect::<PyResult<Vec<_>>>()?;
         all.set_item("qualities", qualities)?;
         all.set_item("drivers", drivers)?;
-        all.set_item("fits", found.cheapest.as_ref().map(|cheapest| self.fits(py, cheapest)).transpose()?)?;
+        all.set_item("fits", result.cheapest.as_ref().map(|cheapest| self.fits(py, cheapest)).transpose()?)?;
         Ok(all)
     }
 }
 
-fn quality<'py>(py: Python<'py>, found: &Quality) -> PyResult<Bound<'py, PyDict>> {
+fn quality<'py>(py: Python<'py>, quality: &Quality) -> PyResult<Bound<'py, PyDict>> {
     let own = PyDict::new(py);
-    own.set_item("yield", estimate_tuple(&found.yield_estimate))?;
-    own.set_item("mean", found.mean)?;
-    own.set_item("deviation", found.deviation)?;
-    for (p, value) in PERCENTILES.iter().zip(&found.percentiles) {
+    own.set_item("yield", estimate_tuple(&quality.yield_estimate))?;
+    own.set_item("mean", quality.mean)?;
+    own.set_item("deviation", quality.deviation)?;
+    for (p, value) in PERCENTILES.iter().zip(&quality.percentiles) {
         own.set_item(format!("percentile_{:.0}", 100.0 * p), value.as_ref().map(estimate_tuple))?;
     }
-    own.set_item("cp", found.capability.as_ref().and_then(|capability| capability.cp))?;
-    own.set_item("cpk", found.capability.as_ref().map(|capability| estimate_tuple(&capability.cpk)))?;
+    own.set_item("cp", quality.capability.as_ref().and_then(|capability| capability.cp))?;
+    own.set_item("cpk", quality.capability.as_ref().map(|capability| estimate_tuple(&capability.cpk)))?;
     Ok(own)
 }

@@ -26,10 +26,10 @@ use crate::quantity::{duration, to_python, to_text};
 use crate::report::constant;
 use crate::scene::PyScene;
 
-/// Time between two looks for Ctrl-C while threads compute.
+/// Time between two checks for Ctrl-C while threads compute.
 const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
-/// A sweep that is ready to be computed.
+/// A sweep of which any block can be computed.
 #[pyclass(frozen, name = "Sweep", module = "jointplay._native")]
 pub struct PySweep {
     sweep: Sweep,
@@ -128,7 +128,7 @@ fn span(py: Python<'_>, scene: &Scene, options: &Bound<'_, PyDict>) -> PyResult<
 #[pymethods]
 impl PySweep {
     /// A sweep of `scene`. `vary` has a key and its values for each varied parameter; `options` are those of `jointplay.Sweep`.
-    /// The points are tried first, unless they were `tried` elsewhere.
+    /// All points are checked first, unless `tried`: they were checked elsewhere.
     #[new]
     fn new(
         py: Python<'_>,
@@ -189,7 +189,7 @@ impl PySweep {
         axes.map(|axis| Ok((axis.key(), values(axis)?))).collect()
     }
 
-    /// Name of each array of the result, whether its values are whole, and how many of them a point has.
+    /// Name of each array of the result, whether its values are integers, and its number of values per point.
     fn columns(&self) -> Vec<(&str, bool, usize)> {
         let layout = self.sweep.layout();
         layout.columns().iter().map(|column| (&column.name[..], column.whole, layout.values_in(column))).collect()
@@ -214,7 +214,7 @@ impl PySweep {
         settings.map(|(key, value)| Ok((key.to_owned(), to_python(py, &value)?))).collect()
     }
 
-    /// Parameters of a point in words.
+    /// Description of a point by its parameters.
     fn describe(&self, py: Python<'_>, point: usize) -> PyResult<String> {
         self.check_point(py, point)?;
         Ok(self.sweep.describe(point))
@@ -231,7 +231,7 @@ impl PySweep {
         rows(py, run.records(), self.sweep.layout().record_length())
     }
 
-    /// Computes all blocks on `threads` threads: one row per point. `progress` is called with the part that is done.
+    /// Computes all blocks on `threads` threads: one row per point. `progress` is called with the completed fraction.
     #[pyo3(signature = (threads, progress=None))]
     fn run<'py>(
         &self,
@@ -259,7 +259,7 @@ impl PySweep {
     }
 }
 
-/// The records of all points of `sweep`, computed on `threads` threads. `progress` is called with the part that is done.
+/// The records of all points of `sweep`, computed on `threads` threads. `progress` is called with the completed fraction.
 ///
 /// # Errors
 /// `KeyboardInterrupt`, what `progress` raises, `MemoryError`, and `InternalError` for a panic.
@@ -276,8 +276,9 @@ pub fn records(
     }
     records.resize(points * length, f64::NAN);
     let progress: Option<Py<PyAny>> = progress.map(Bound::unbind);
-    let report =
-        |part: f64| Python::attach(|py| report_progress(py, progress.as_ref().map(|progress| progress.bind(py)), part));
+    let report = |fraction: f64| {
+        Python::attach(|py| report_progress(py, progress.as_ref().map(|progress| progress.bind(py)), fraction))
+    };
     let outcome = detached(py, || {
         compute(sweep, threads, report, |block, own| {
             let points = sweep.design().block(block);
@@ -302,8 +303,8 @@ enum EarlyEnd {
     Panicked,
 }
 
-/// Computes every block of `sweep` and passes its records to `receive`; `report` is called now and then with the part that is
-/// done, and ends the sweep by an error.
+/// Computes every block of `sweep` and passes its records to `receive`. `report` is called regularly with the completed
+/// fraction; an error that it returns ends the sweep.
 fn compute(
     sweep: &Sweep,
     threads: usize,

@@ -23,11 +23,11 @@ pub fn tradeoff(
     let scene = &*scene.scene;
     let budget = if quick { WorkBudget::QUICK } else { WorkBudget::FULL };
     let mut raised = None;
-    let found = detached(py, || {
+    let measured = detached(py, || {
         let mut now = || Python::attach(|py| clock.call0(py)?.extract::<f64>(py)).unwrap_or(f64::NAN);
-        let mut report = |part: f64| {
+        let mut report = |fraction: f64| {
             let outcome =
-                Python::attach(|py| report_progress(py, progress.as_ref().map(|progress| progress.bind(py)), part));
+                Python::attach(|py| report_progress(py, progress.as_ref().map(|progress| progress.bind(py)), fraction));
             match outcome {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(error) => {
@@ -41,11 +41,11 @@ pub fn tradeoff(
     if let Some(error) = raised {
         return Err(error);
     }
-    let found = found.map_err(|error| match error {
+    let measured = measured.map_err(|error| match error {
         AnalysisError::Start(error) => scene_error(py, Some(scene), &scene.locate(&error)),
         AnalysisError::Scene(error) => scene_error(py, Some(scene), &error),
         AnalysisError::Stopped(error) => stopped(py, &error),
         other => option_error(py, &other.to_string()),
     })?;
-    serde_json::to_string(&found.points).map_err(|error| option_error(py, &error.to_string()))
+    serde_json::to_string(&measured.points).map_err(|error| option_error(py, &error.to_string()))
 }

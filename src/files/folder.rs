@@ -52,8 +52,8 @@ impl Folder {
         if location.exists() && !location.is_dir() {
             return Err(FileError::cannot(path, "it is a file, not a folder"));
         }
-        let here = std::env::current_dir().and_then(fs::canonicalize);
-        if here.is_ok_and(|here| here.starts_with(&location)) {
+        let current = std::env::current_dir().and_then(fs::canonicalize);
+        if current.is_ok_and(|current| current.starts_with(&location)) {
             return Err(FileError::cannot(path, "the command runs in it; name a folder in it"));
         }
         if has_content(&location) {

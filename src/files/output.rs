@@ -39,7 +39,7 @@ impl OutputFile {
         if !replace && is_taken(path) {
             return Err(FileError::Exists(path.to_owned()));
         }
-        if path.metadata().is_ok_and(|it| !it.is_file()) {
+        if path.metadata().is_ok_and(|metadata| !metadata.is_file()) {
             return Err(FileError::cannot(path, "it exists and is not a regular file"));
         }
         temporary::file(&location).map_err(failed)?;
@@ -117,15 +117,15 @@ pub fn publish(files: Vec<PendingFile>) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Opens a file that is visible while it grows; if it is missing or empty, creates it with `beginning` in it.
+/// Opens a file that is visible while it grows; if it is missing or empty, creates it with `header` in it.
 ///
 /// # Errors
 /// Input/output.
-pub fn open_or_create(path: &Path, beginning: &[u8]) -> Result<File, FileError> {
-    let length = path.metadata().map(|it| it.len()).ok();
+pub fn open_or_create(path: &Path, header: &[u8]) -> Result<File, FileError> {
+    let length = path.metadata().map(|metadata| metadata.len()).ok();
     if matches!(length, None | Some(0)) {
         let target = OutputFile::claim(path, length.is_some());
-        match target.and_then(|target| target.write(|file| file.write_all(beginning))) {
+        match target.and_then(|target| target.write(|file| file.write_all(header))) {
             // Another run created it first.
             Ok(()) | Err(FileError::Exists(_)) => {}
             Err(error) => return Err(error),

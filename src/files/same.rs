@@ -14,17 +14,17 @@ pub fn same_file(path: &Path, others: &[&Path]) -> Option<usize> {
     if let Some(same) = others.iter().position(|other| other.as_ref() == Some(&own)) {
         return Some(same);
     }
-    let beside = |other: &Option<PathBuf>| other.clone().filter(|other| parent(other) == parent(&own));
-    let beside: Vec<_> = others.iter().map(beside).collect();
-    if beside.iter().all(Option::is_none) {
+    let siblings = |other: &Option<PathBuf>| other.clone().filter(|other| parent(other) == parent(&own));
+    let siblings: Vec<_> = others.iter().map(siblings).collect();
+    if siblings.iter().all(Option::is_none) {
         return None;
     }
-    // Only the file system knows how it compares names: ask it. A failure to write here is reported elsewhere.
+    // Only the file system knows how it compares names, so try. A failure to write here is reported elsewhere.
     let (trial, _lock) = temporary::folder(&own).ok()?;
-    // One level down, where no name means anything to the run that removes what a killed one left.
+    // In a subfolder, where no run mistakes a name for a leftover and removes it.
     let names = trial.path().join("names");
     fs::create_dir(&names).ok()?;
     let at = |location: &Path| location.file_name().map(|name| names.join(name));
     File::create_new(at(&own)?).ok()?;
-    beside.iter().position(|other| other.as_deref().and_then(at).is_some_and(|trial| trial.exists()))
+    siblings.iter().position(|other| other.as_deref().and_then(at).is_some_and(|trial| trial.exists()))
 }

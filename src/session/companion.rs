@@ -1,5 +1,5 @@
-//! A simulation beside the run: it is stepped as far as the run is displayed, sampled at the same instants, and goes back with
-//! it. It never affects the run. The twin and the ideal motion are companions. The run from before a change has its own record,
+//! A simulation that accompanies the run: it is stepped up to the displayed instant, sampled at the same instants, and rewound
+//! with the run. It never affects the run. The twin and the ideal motion are companions. The run from before a change has its own record,
 //! so it is a copy of the player (`player/before_change.rs`).
 
 use crate::simulate::{Frame, Simulation, State, Stopped};
@@ -26,7 +26,7 @@ pub(super) fn drop_every_second<T>(list: &mut Vec<T>) {
     });
 }
 
-/// A simulation beside the run.
+/// A simulation that accompanies the run.
 #[derive(Clone)]
 pub struct Companion {
     /// May be ahead of the displayed instant by part of its latest step.
@@ -41,7 +41,7 @@ pub struct Companion {
 }
 
 impl Companion {
-    /// Begins with the present state of `simulation`.
+    /// Starts from the current state of `simulation`.
     pub fn new(mut simulation: Simulation) -> Self {
         let mut frame = Frame::default();
         simulation.sample(simulation.time(), &mut frame);
@@ -70,12 +70,12 @@ impl Companion {
         self.simulation.sample(time, &mut self.frame);
     }
 
-    /// The present state.
+    /// The current state.
     pub fn state(&self) -> CompanionState {
         CompanionState { start_time: self.start_time(), state: self.simulation.state().clone() }
     }
 
-    /// Restores a state, or the start if there is none. Returns false if the state is that of another companion.
+    /// Restores a state, or the start if there is none. Returns false if the state belongs to another companion.
     pub fn restore(&mut self, state: Option<&CompanionState>) -> bool {
         let own_state = state.filter(|state| state.start_time == self.start_time());
         self.simulation.restore(own_state.map_or(&self.states[0], |state| &state.state));
@@ -83,7 +83,7 @@ impl Companion {
         own_state.is_some()
     }
 
-    /// Saves the present state if at least one interval has passed since the last saved state.
+    /// Saves the current state if at least one interval has passed since the last saved state.
     pub fn save_state(&mut self) {
         let newest = self.states.last().map_or(f64::NEG_INFINITY, State::time);
         if self.simulation.time() < newest + self.interval {

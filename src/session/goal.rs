@@ -1,4 +1,4 @@
-//! An instant of a run to go to, and why the run may not reach it.
+//! A target instant of a run, and why the run may not reach it.
 
 use crate::scene::SetError;
 use crate::simulate::{Simulation, Stopped};

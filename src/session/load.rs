@@ -16,7 +16,7 @@ pub struct Load {
     pub scene: SceneSource,
     /// Keys that the sweep varied.
     varied: Vec<String>,
-    /// Legs to come: what is set at the beginning of each, and its end, s.
+    /// Remaining legs: the events at the start of each, and its end, s.
     legs: VecDeque<(Vec<Event>, f64)>,
     /// End of the current leg, s, and of the last.
     leg_end: f64,
@@ -45,9 +45,9 @@ impl Load {
         let leg = |(at, point): (usize, &&SweptPoint)| {
             let sections = if at == 0 { section + 1 } else { periods };
             let schedule = Schedule { first: point.first, interval: point.interval, sections, discard: 0 };
-            let set = point.settings.iter().filter(|_| at + 1 < chain.len());
-            let set = set.map(|(key, value)| Event::set(key, value));
-            (set.chain([schedule.into()]).collect(), schedule.time(sections.saturating_sub(1)))
+            let changes = point.settings.iter().filter(|_| at + 1 < chain.len());
+            let changes = changes.map(|(key, value)| Event::set(key, value));
+            (changes.chain([schedule.into()]).collect(), schedule.time(sections.saturating_sub(1)))
         };
         let legs: VecDeque<_> = chain.iter().enumerate().map(leg).rev().collect();
         let varied = first.iter().map(|(key, _)| key.clone()).collect();
@@ -66,7 +66,7 @@ impl Load {
         (player.simulation().time() / self.end_time).clamp(0.0, 1.0) as f32
     }
 
-    /// Continues while `may_step`; returns how it ended, once there.
+    /// Continues while `may_step` allows it; returns the outcome once the load has ended.
     pub fn advance(&mut self, player: &mut Player, mut may_step: impl FnMut() -> bool) -> Option<Arrival> {
         loop {
             match player.continue_to(Goal::at(self.leg_end), &mut may_step) {

@@ -123,9 +123,9 @@ impl From<Pull> for LoggedPull {
 }
 
 impl From<LoggedPull> for Pull {
-    fn from(pulled: LoggedPull) -> Self {
-        let [px, py, pz, hx, hy, hz, stiffness, damping] = pulled.numbers.map(|n| n.0);
-        Self { body: pulled.body, point: Vec3::new(px, py, pz), hand: Vec3::new(hx, hy, hz), stiffness, damping }
+    fn from(pull: LoggedPull) -> Self {
+        let [px, py, pz, hx, hy, hz, stiffness, damping] = pull.numbers.map(|n| n.0);
+        Self { body: pull.body, point: Vec3::new(px, py, pz), hand: Vec3::new(hx, hy, hz), stiffness, damping }
     }
 }
 
@@ -189,9 +189,9 @@ impl Log {
                     format!("{steps} |{} {} {sections}\n", first.0, interval.0)
                 }
                 Event::Pull(None) => format!("{steps} @\n"),
-                Event::Pull(Some(pulled)) => {
-                    let numbers = pulled.numbers.map(|number| number.0.to_string());
-                    format!("{steps} @{} {}\n", pulled.body, numbers.join(" "))
+                Event::Pull(Some(pull)) => {
+                    let numbers = pull.numbers.map(|number| number.0.to_string());
+                    format!("{steps} @{} {}\n", pull.body, numbers.join(" "))
                 }
                 Event::Stop => format!("{steps} !\n"),
             });
@@ -312,7 +312,7 @@ impl Script {
         self.sections.map_or(f64::INFINITY, |schedule| schedule.next(now))
     }
 
-    /// Time, s, and description of every event ever passed; a pull has only its start and end.
+    /// Time, s, and description of every event ever passed; of a pull, only the start and the end.
     pub fn flags(&self) -> impl Iterator<Item = (f64, String)> {
         let entries = &self.log.entries;
         let is_pull = |at: usize| matches!(entries[at].event, Event::Pull(Some(_)));

@@ -51,8 +51,8 @@ impl Paths {
             while points.last().is_some_and(|last| last.time > frame.time) {
                 points.pop();
             }
-            let here = axes_of(frame, path.carrier).tr_mul(&joint.eccentricity);
-            let position = [here.x as f32, here.y as f32, here.z as f32];
+            let local = axes_of(frame, path.carrier).tr_mul(&joint.eccentricity);
+            let position = [local.x as f32, local.y as f32, local.z as f32];
             let resolution = RESOLUTION * joint.clearance as f32;
             let has_moved = |last: &Point| {
                 let squares = last.position.iter().zip(&position).map(|(a, b)| (a - b) * (a - b));

@@ -46,7 +46,7 @@ pub struct Player {
     unchanged: Option<Box<LiveScene>>,
     /// The scene as loaded from its file.
     original: Scene,
-    /// Key and sentence of each warning about settings that are valid but may surprise the user.
+    /// Key and text of each warning about settings that are valid but may surprise the user.
     warnings: Vec<(Option<&'static str>, String)>,
     playing: bool,
     /// Time runs backwards while it plays.
@@ -101,7 +101,7 @@ const MIN_AVERAGING_TIME: f64 = 1e-3;
 /// Largest number of instants recorded within one step.
 const MAX_RECORDED_PER_STEP: f64 = 64.0;
 
-/// The key, as [`Warning::key`], and the sentence of every warning about `scene` before it runs.
+/// Key, as in [`Warning::key`], and text of every warning about `scene` before it runs.
 fn warnings_of(scene: &Scene) -> Vec<(Option<&'static str>, String)> {
     let entry = |warning: Warning| (warning.key(), warning.to_string());
     let slow = too_slow(scene).map(|slow| (Some("solver.preset"), slow.to_string()));
@@ -114,7 +114,7 @@ impl Player {
     /// # Errors
     /// As [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
-        // The text has been parsed before. Should it fail now, the default of a control is its present value.
+        // The text has been parsed before. Should it fail now, the default of a control is its current value.
         let original = Scene::parse_with(&scene.source.text, scene.source.file.as_deref(), &scene.source.beside, &[])
             .unwrap_or_else(|_| scene.clone());
         let mut player = Self::with_simulation(LiveScene::new(scene)?, original);
@@ -207,15 +207,15 @@ impl Player {
         let (first, channels) = (self.clearances().end, self.record.history.channels());
         let old = self.record.channels.clone();
         self.record.channels.pick(&self.simulation.running().machine, &self.frame, patterns);
-        let place = |new: &ChannelInfo| {
+        let old_index = |new: &ChannelInfo| {
             let same = |old: &ChannelInfo| old.column == new.column;
             old.picked().iter().position(same).map(|at| first + at)
         };
-        let picked = self.record.channels.picked().iter().map(place);
+        let picked = self.record.channels.picked().iter().map(old_index);
         let from: Vec<Option<usize>> = (0..first).map(Some).chain(picked).collect();
-        let left = self.abandoned.as_mut().map(|left| &mut left.history);
-        let near = self.record.detailed.as_deref_mut();
-        for record in std::iter::once(&mut self.record.history).chain(near).chain(left) {
+        let abandoned = self.abandoned.as_mut().map(|future| &mut future.history);
+        let detailed = self.record.detailed.as_deref_mut();
+        for record in std::iter::once(&mut self.record.history).chain(detailed).chain(abandoned) {
             *record = record.rearranged(&from);
         }
         self.keyframes.rearrange(channels, &from);
@@ -285,12 +285,12 @@ impl Player {
         self.ideal = on.then(|| Box::new(Ideal::new(&self.simulation.running().machine)));
     }
 
-    /// Starts a twin run from the present state, or ends it. This never affects the run itself.
+    /// Starts a twin run from the current state, or ends it. This never affects the run itself.
     pub fn set_twin(&mut self, on: bool) {
         self.twin = on.then(|| Box::new(Twin::new(&self.simulation)));
     }
 
-    /// Restarts the twin from the present state if `is_wrong` for its start, s.
+    /// Restarts the twin from the current state if `is_wrong` for its start, s.
     fn restart_twin(&mut self, is_wrong: impl Fn(f64) -> bool) {
         if let Some(twin) = self.twin.as_mut().filter(|twin| is_wrong(twin.start_time())) {
             twin.restart(&self.simulation);
@@ -307,7 +307,7 @@ impl Player {
         self.script.drop_ahead();
     }
 
-    /// Logs an event at the present step.
+    /// Logs an event at the current step.
     fn log_event(&mut self, event: Event) {
         self.script.record(self.steps(), event, self.simulation.time());
     }
@@ -416,7 +416,7 @@ impl Player {
         (self.stepping > MIN_AVERAGING_TIME).then(|| self.stepped / self.stepping)
     }
 
-    /// What holds the run below the requested time scale; `None` while it keeps up.
+    /// What limits the run to less than the requested time scale; `None` while it keeps up.
     pub fn limit(&self) -> Option<Limit> {
         self.pacer.limit(self.capacity())
     }
@@ -447,7 +447,7 @@ impl Player {
         self.continue_to(Goal::at(time), may_step) != Ok(false)
     }
 
-    /// Back to t = 0 with every change applied.
+    /// Restarts at t = 0 with every change applied.
     ///
     /// # Errors
     /// As [`Simulation::new`]; the run is left unchanged.
@@ -593,16 +593,16 @@ impl Player {
         self.pending().changes.iter().any(|(key, _)| self.is_pending(key))
     }
 
-    /// Warnings, as sentences, about settings that are valid but may surprise the user.
+    /// Texts of the warnings about settings that are valid but may surprise the user.
     pub fn warnings(&self) -> impl Iterator<Item = &str> {
-        self.warnings.iter().map(|(_, sentence)| &**sentence)
+        self.warnings.iter().map(|(_, text)| &**text)
     }
 
-    /// Warning about the present value of `key`, if any.
+    /// Warning about the current value of `key`, if any.
     pub fn warning(&self, key: &str) -> Option<&str> {
         let last = key.strip_prefix("contact.").or_else(|| key.strip_prefix("joint.")?.rsplit('.').next());
         let mut warnings = self.warnings.iter();
-        warnings.find(|(own, _)| own.is_some_and(|own| own == last.unwrap_or(key))).map(|(_, sentence)| &**sentence)
+        warnings.find(|(own, _)| own.is_some_and(|own| own == last.unwrap_or(key))).map(|(_, text)| &**text)
     }
 
     /// Value of `key` in the scene file.
@@ -742,7 +742,7 @@ impl Player {
         }
     }
 
-    /// Hands out the peaks since the previous call.
+    /// Makes the peaks since the previous call available to [`Self::peaks`].
     pub(crate) fn publish_peaks(&mut self) {
         std::mem::swap(&mut self.record.peaks, &mut self.record.passed_peaks);
         self.record.passed_peaks.clear();

@@ -177,8 +177,8 @@ pub fn find_followed(scene: &Scene, text: &str) -> Result<ScenePart, String> {
 }
 
 /// The reverse of [`find_followed`].
-pub fn name_followed(scene: &Scene, picked: ScenePart) -> Option<String> {
-    match picked {
+pub fn name_followed(scene: &Scene, part: ScenePart) -> Option<String> {
+    match part {
         ScenePart::Joint(index) => {
             let joint = scene.machine.ball_joints.get(index)?;
             Some(format!("joint.{}", joint.name))

@@ -63,8 +63,8 @@ impl Record {
     }
     /// As [`History::bins`], from the window last retraced where possible.
     pub fn bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
-        let near = self.detailed.as_ref().and_then(|near| near.span());
-        let Some((start, end)) = near.filter(|(start, end)| *start < to && *end > from) else {
+        let detailed = self.detailed.as_ref().and_then(|detailed| detailed.span());
+        let Some((start, end)) = detailed.filter(|(start, end)| *start < to && *end > from) else {
             return self.history.bins(channel, from, to, most_bins, out);
         };
         if from < start {
@@ -74,8 +74,8 @@ impl Record {
             let whole = out[first..].iter().filter(|bin| bin.to <= start).count();
             out.truncate(first + whole);
         }
-        if let Some(near) = &self.detailed {
-            near.bins(channel, from.max(start), to.min(end), most_bins, out);
+        if let Some(detailed) = &self.detailed {
+            detailed.bins(channel, from.max(start), to.min(end), most_bins, out);
         }
         if to > end {
             let first = out.len();
@@ -87,7 +87,7 @@ impl Record {
     /// Begins another full-resolution record.
     pub fn begin_detailed(&mut self) {
         match &mut self.detailed {
-            Some(near) => near.clear(),
+            Some(detailed) => detailed.clear(),
             none => *none = Some(Box::new(History::new(self.history.channels(), FINEST_BIN))),
         }
     }

@@ -64,12 +64,12 @@ impl Player {
 
     /// The abandoned future, while it extends beyond the run.
     pub fn abandoned_future(&self) -> Option<&AbandonedFuture> {
-        self.abandoned.as_deref().filter(|left| left.to > self.reached)
+        self.abandoned.as_deref().filter(|future| future.to > self.reached)
     }
 
     /// Time up to which the run, or its abandoned future, is known, s.
     pub fn known_to(&self) -> f64 {
-        self.abandoned_future().map_or(self.reached, |left| left.to)
+        self.abandoned_future().map_or(self.reached, |future| future.to)
     }
 
     /// Contact states of the ball joints over time.
@@ -82,7 +82,7 @@ impl Player {
         &self.record.impact_record
     }
 
-    /// Events of the run, its future included; a pull has only its start and end.
+    /// Events of the run, its future included; of a pull, only the start and the end.
     pub fn flags(&self) -> impl Iterator<Item = Flag> {
         self.script.flags().map(|(time, text)| Flag { time, text })
     }
@@ -92,10 +92,10 @@ impl Player {
     pub fn bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
         self.record.bins(channel, from, to, most_bins, out);
         let reached = self.reached;
-        if let Some(left) = self.abandoned_future().filter(|_| to > reached) {
+        if let Some(future) = self.abandoned_future().filter(|_| to > reached) {
             let first = out.len();
             let from = from.max(reached);
-            left.history.bins(channel, from, to, most_bins, out);
+            future.history.bins(channel, from, to, most_bins, out);
             drop_before(out, first, reached);
         }
     }
@@ -239,10 +239,10 @@ impl Player {
         applied
     }
 
-    /// Restores the keyframe at `start`, s, after `steps` steps, or an earlier one if the history of the instant `seen`, s, must
-    /// be recorded in detail.
+    /// Restores the keyframe at `start`, s, after `steps` steps, or an earlier one if the history up to the instant `seen`, s,
+    /// must be recorded in detail.
     fn restore_before(&mut self, start: f64, steps: u64, seen: f64) {
-        let span = self.record.detailed.as_ref().and_then(|near| near.span());
+        let span = self.record.detailed.as_ref().and_then(|detailed| detailed.span());
         if span.is_some_and(|(from, to)| from <= start && start <= to) {
             return self.restore(start, false);
         }

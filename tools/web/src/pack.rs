@@ -10,12 +10,12 @@ use flate2::{Compression, write::GzEncoder};
 use sha2::{Digest as _, Sha256};
 use wasm_bindgen_cli_support::Bindgen;
 
-/// Name of the files that the glue's generator writes.
+/// Base name of the files that wasm-bindgen generates.
 const NAME: &str = "jointplay";
 /// The page's own files, from the root of the project.
 const PAGE: &str = "index.html";
-/// What keeps the page for when there is no network: knows all its files.
-const KEEPER: &str = "web/offline.js";
+/// Service worker that stores the page for offline use; it lists all its files.
+const SERVICE_WORKER: &str = "web/offline.js";
 /// Scripts, style and icons beside it, copied as they are.
 const PARTS: [&str; 11] = [
     "web/stuck.js",
@@ -31,14 +31,14 @@ const PARTS: [&str; 11] = [
     "web/page.webmanifest",
 ];
 
-/// What other sites show of the page; nobody who opens the page loads it.
+/// Preview picture that other sites show; opening the page does not load it.
 const PREVIEW: &str = "web/preview.png";
 
-/// Codings in which a file may lie beside itself, best first, with the ending that each has there.
+/// Content codings of the precompressed copies beside a file, best first, each with its file extension.
 pub const CODINGS: [(&str, &str); 2] = [("br", "br"), ("gzip", "gz")];
 
-/// Writes the page into `folder`, which is made anew and replaced only as a whole: each file, and beside it
-/// `<file>.gz`. `compress`: also `<file>.br`, with a table of what weighs how much.
+/// Writes the page into `folder`, which is built from scratch and replaced only as a whole: each file, and beside it
+/// `<file>.gz`. `compress`: also `<file>.br`, and a table of sizes is printed.
 pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     check_replaceable(folder)?;
@@ -71,10 +71,10 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
     }
     let from = root.join(PAGE);
     let page = fs::read_to_string(&from).map_err(|e| failed(&from, &e))?;
-    let from = root.join(KEEPER);
-    let keeper = fs::read_to_string(&from).map_err(|e| failed(&from, &e))?;
-    all.extend(page.bytes().chain(keeper.bytes()));
-    // The build in every address: a browser never joins new scripts to old code from its cache.
+    let from = root.join(SERVICE_WORKER);
+    let worker = fs::read_to_string(&from).map_err(|e| failed(&from, &e))?;
+    all.extend(page.bytes().chain(worker.bytes()));
+    // Every address contains the build, so that a browser never combines new scripts with old code from its cache.
     let build = format!("{:016x}", hash(&all));
     let page = page.replace("{{build}}", &build).replace("{{wasm_bytes}}", &code.len().to_string());
     let to = scratch.join(PAGE);
@@ -85,9 +85,9 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
             fs::write(&file, without_comments(&text)).map_err(|e| failed(&file, &e))?;
         }
     }
-    let keeper = without_comments(&keeper).replace("{{build}}", &build).replace("{{files}}", &integrity(&scratch)?);
+    let worker = without_comments(&worker).replace("{{build}}", &build).replace("{{files}}", &integrity(&scratch)?);
     let to = scratch.join(from.file_name().expect("a file"));
-    fs::write(&to, keeper).map_err(|e| failed(&to, &e))?;
+    fs::write(&to, worker).map_err(|e| failed(&to, &e))?;
     compress_all(&scratch, compress)?;
     let from = root.join(PREVIEW);
     fs::copy(&from, scratch.join(from.file_name().expect("a file"))).map_err(|e| failed(&from, &e))?;
@@ -95,7 +95,7 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
     fs::rename(&scratch, folder).map_err(|e| failed(folder, &e))
 }
 
-/// A script or a style sheet without lines that are blank or comments alone: they are for who reads the sources, and weigh 6 kB.
+/// A script or a style sheet without blank lines and lines of comments, which would add 6 kB to the download.
 fn without_comments(text: &str) -> String {
     let mut inside = false;
     let code = text.lines().filter(|line| {
@@ -107,7 +107,7 @@ fn without_comments(text: &str) -> String {
     code.flat_map(|line| [line, "\n"]).collect()
 }
 
-/// A folder that nobody has, on the same disk.
+/// An unused folder on the same disk.
 fn scratch_beside(folder: &Path) -> Result<PathBuf, String> {
     let name = folder.file_name().ok_or_else(|| {
         let folder = folder.display();
@@ -115,21 +115,21 @@ fn scratch_beside(folder: &Path) -> Result<PathBuf, String> {
     })?;
     let name = format!(".{}.{}", name.to_string_lossy(), std::process::id());
     let scratch = folder.with_file_name(name);
-    // Left by a tool that was killed and had the same number.
+    // Left by a killed process that had the same ID.
     remove(&scratch)?;
     Ok(scratch)
 }
 
-/// Only a page of ours, or nothing, may be replaced.
+/// Only an earlier page or an empty folder may be replaced.
 fn check_replaceable(folder: &Path) -> Result<(), String> {
     let Ok(mut entries) = fs::read_dir(folder) else {
         return Ok(());
     };
-    let ours = folder.join(format!("{NAME}_bg.wasm")).exists();
-    if ours || entries.next().is_none() {
+    let is_page = folder.join(format!("{NAME}_bg.wasm")).exists();
+    if is_page || entries.next().is_none() {
         return Ok(());
     }
-    Err(format!("{}: holds something else than this page; name an empty or a new folder", folder.display()))
+    Err(format!("{}: contains something other than this page; name an empty or a new folder", folder.display()))
 }
 
 /// The files of `folder`, in order.
@@ -140,19 +140,19 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(files)
 }
 
-/// What each file of `folder` must hold, in the words of the fields of a script's object.
+/// Integrity hash of each file in `folder`, as properties of a JavaScript object.
 fn integrity(folder: &Path) -> Result<String, String> {
-    let mut words = Vec::new();
+    let mut properties = Vec::new();
     for file in files(folder)? {
         let bytes = fs::read(&file).map_err(|e| failed(&file, &e))?;
         let name = file.file_name().expect("a file").to_string_lossy();
         let sum = BASE64_STANDARD.encode(Sha256::digest(&bytes));
-        words.push(format!("    '{name}': 'sha256-{sum}',"));
+        properties.push(format!("    '{name}': 'sha256-{sum}',"));
     }
-    Ok(words.join("\n"))
+    Ok(properties.join("\n"))
 }
 
-/// Writes every file of `folder` in the codings that browsers accept; brotli, which takes a minute, only where it is asked for.
+/// Writes every file of `folder` in the codings that browsers accept; brotli, which takes a minute, only `with_brotli`.
 fn compress_all(folder: &Path, with_brotli: bool) -> Result<(), String> {
     let (mut raw, mut small) = (0, 0);
     if with_brotli {

@@ -1,4 +1,4 @@
-//! A static server: for this machine, or for a room.
+//! A static file server for this machine or for a classroom.
 
 use std::fs;
 use std::io::{self, Write as _};
@@ -14,61 +14,62 @@ use tokio::net::TcpListener;
 
 use crate::pack::{CODINGS, hash};
 
-/// Serves `folder` on an address of this machine and prints the link; port 0 takes any free one. An address that others reach is
-/// printed as a QR code, too.
+/// Serves `folder` on an address of this machine and prints the link; port 0 takes any free entry. An address that
+/// other machines can reach is also printed as a QR code.
 pub fn serve(folder: &Path, host: IpAddr, port: u16) -> Result<(), String> {
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_io().build();
     let runtime = runtime.map_err(|e| format!("cannot serve: {e}"))?;
-    runtime.block_on(give_out(folder, host, port))
+    runtime.block_on(serve_files(folder, host, port))
 }
 
-async fn give_out(folder: &Path, host: IpAddr, port: u16) -> Result<(), String> {
+async fn serve_files(folder: &Path, host: IpAddr, port: u16) -> Result<(), String> {
     let folder = fs::canonicalize(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let listener =
         TcpListener::bind((host, port)).await.map_err(|e| format!("cannot serve on {host}, port {port}: {e}"))?;
     let bound = listener.local_addr();
     let port = bound.map_or(port, |address| address.port());
-    let seen = seen_from_outside(host);
-    let link = format!("http://{}/", SocketAddr::new(seen, port));
-    let code = if seen.is_loopback() { String::new() } else { qr(&link)? };
-    // In one piece, for a program that reads it.
-    let said = io::stdout().write_all(format!("{link}\n{code}").as_bytes());
-    said.map_err(|e| format!("standard output: {e}"))?;
+    let address = reachable_address(host);
+    let link = format!("http://{}/", SocketAddr::new(address, port));
+    let code = if address.is_loopback() { String::new() } else { qr(&link)? };
+    // In one write, so that a program reading the output gets it whole.
+    let printed = io::stdout().write_all(format!("{link}\n{code}").as_bytes());
+    printed.map_err(|e| format!("standard output: {e}"))?;
     let files = Router::new().fallback(async move |request: Request| answer(&folder, &request));
-    axum::serve(listener, files).await.map_err(|e| format!("cannot serve any longer: {e}"))
+    axum::serve(listener, files).await.map_err(|e| format!("the server stopped: {e}"))
 }
 
-/// The address at which others find a server on `host`: of every address of this machine, the one that leads out.
-fn seen_from_outside(host: IpAddr) -> IpAddr {
+/// The address at which other machines reach a server on `host`. If that stands for every address of this machine, it is the
+/// one of the outgoing route.
+fn reachable_address(host: IpAddr) -> IpAddr {
     if !host.is_unspecified() {
         return host;
     }
-    // Nothing is sent: the system only looks up which way it would go. The addresses are those kept for documentation.
+    // Nothing is sent: the system only looks up the route. The targets are addresses reserved for documentation.
     let (any, out): (IpAddr, IpAddr) = match host {
         IpAddr::V4(_) => (Ipv4Addr::UNSPECIFIED.into(), Ipv4Addr::new(192, 0, 2, 1).into()),
         IpAddr::V6(_) => (Ipv6Addr::UNSPECIFIED.into(), Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1).into()),
     };
-    let way = UdpSocket::bind((any, 0)).and_then(|socket| {
+    let local = UdpSocket::bind((any, 0)).and_then(|socket| {
         socket.connect((out, 9))?;
         socket.local_addr()
     });
-    match (way, host) {
+    match (local, host) {
         (Ok(address), _) => address.ip(),
         (Err(_), IpAddr::V4(_)) => Ipv4Addr::LOCALHOST.into(),
         (Err(_), IpAddr::V6(_)) => Ipv6Addr::LOCALHOST.into(),
     }
 }
 
-/// `text` as a QR code for a terminal: two rows of modules in a line, light ones drawn, so that it is read on a dark ground.
+/// `text` as a QR code for a terminal with a dark background: each line has two rows of modules, and light modules are drawn.
 fn qr(text: &str) -> Result<String, String> {
-    /// Light modules around it, which a reader needs.
-    const QUIET: i32 = 4;
+    /// Width of the light margin that scanners need, in modules.
+    const QUIET_ZONE: i32 = 4;
     let code = QrCode::encode_text(text, QrCodeEcc::Medium).map_err(|e| format!("no QR code of {text}: {e}"))?;
     let size = code.size();
     let light = |x, y| !code.get_module(x, y);
     let mut lines = String::new();
-    for y in (-QUIET..size + QUIET).step_by(2) {
-        lines.extend((-QUIET..size + QUIET).map(|x| match (light(x, y), light(x, y + 1)) {
+    for y in (-QUIET_ZONE..size + QUIET_ZONE).step_by(2) {
+        lines.extend((-QUIET_ZONE..size + QUIET_ZONE).map(|x| match (light(x, y), light(x, y + 1)) {
             (true, true) => '█',
             (true, false) => '▀',
             (false, true) => '▄',
@@ -82,24 +83,24 @@ fn qr(text: &str) -> Result<String, String> {
 fn answer(folder: &Path, request: &Request) -> Response {
     const MISSING: (StatusCode, &str) = (StatusCode::NOT_FOUND, "no such file");
     if !matches!(*request.method(), Method::GET | Method::HEAD) {
-        let refused = "this server only gives files out";
+        let refused = "this server only serves files";
         return (StatusCode::METHOD_NOT_ALLOWED, refused).into_response();
     }
-    given(folder, request).unwrap_or_else(|| MISSING.into_response())
+    file_response(folder, request).unwrap_or_else(|| MISSING.into_response())
 }
 
-/// The file that `request` asks for; `None` if there is none.
-fn given(folder: &Path, request: &Request) -> Option<Response> {
+/// The requested file; `None` if there is none.
+fn file_response(folder: &Path, request: &Request) -> Option<Response> {
     let file = locate(folder, request.uri().path())?;
     let mut packed = CODINGS.iter().filter_map(|(coding, ending)| {
         let packed = file.with_added_extension(ending);
         (accepts(request, coding) && packed.is_file()).then_some((*coding, packed))
     });
-    let (coding, from) = match packed.next() {
+    let (coding, source) = match packed.next() {
         Some((coding, packed)) => (Some(coding), packed),
         None => (None, file.clone()),
     };
-    let bytes = fs::read(from).ok()?;
+    let bytes = fs::read(source).ok()?;
     let tag = format!("\"{:016x}\"", hash(&bytes));
     let known =
         field(request, header::IF_NONE_MATCH).is_some_and(|known| known.split(',').any(|known| known.trim() == tag));
@@ -121,16 +122,16 @@ fn given(folder: &Path, request: &Request) -> Option<Response> {
     })
 }
 
-/// The file that `path` names inside `folder`; a folder's is its `index.html`.
+/// The file that `path` names inside `folder`; for a folder, its `index.html`.
 fn locate(folder: &Path, path: &str) -> Option<PathBuf> {
     let relative = Path::new(path.trim_start_matches('/'));
-    let plain = relative.components().all(|part| matches!(part, Component::Normal(_)));
-    if !plain {
+    let is_plain = relative.components().all(|part| matches!(part, Component::Normal(_)));
+    if !is_plain {
         return None;
     }
     let mut file = folder.join(relative);
     if file.is_dir() {
-        // Without the slash the page's own relative addresses would miss.
+        // Without the slash, relative addresses in the page would not resolve.
         if !path.ends_with('/') {
             return None;
         }
@@ -139,15 +140,15 @@ fn locate(folder: &Path, path: &str) -> Option<PathBuf> {
     file.is_file().then_some(file)
 }
 
-/// What `request` says in the field `name`.
+/// Value of the header field `name`.
 fn field(request: &Request, name: HeaderName) -> Option<&str> {
     request.headers().get(name)?.to_str().ok()
 }
 
 fn accepts(request: &Request, coding: &str) -> bool {
     field(request, header::ACCEPT_ENCODING).is_some_and(|accepted| {
-        accepted.split(',').any(|one| {
-            let (name, weight) = one.split_once(';').unwrap_or((one, ""));
+        accepted.split(',').any(|entry| {
+            let (name, weight) = entry.split_once(';').unwrap_or((entry, ""));
             name.trim() == coding && !matches!(weight.trim(), "q=0" | "q=0.0")
         })
     })
