@@ -27,8 +27,8 @@ fn default_scene() -> Scene {
     Scene::load("spcmm", &[]).expect("built in")
 }
 
-/// The window as it opens, as a presentation, with the longest chain, and with every instrument on: microscope, ideal ghost, twin, wear map, an
-/// abandoned future, over a second of simulation.
+/// The window as it opens, as a presentation, with the longest chain, and with every instrument on: microscope, ideal ghost,
+/// twin, wear map and an abandoned future, after about a second of simulation.
 fn frames(watch: &Stopwatch) {
     frame(watch, "frame of the window", default_scene(), |app, _| {
         app.player_mut().run_to(TIME);

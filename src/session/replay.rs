@@ -42,11 +42,11 @@ impl fmt::Display for Verdict {
         match self {
             Self::Agrees(hash) => write!(f, "State reproduced: hash {hash:016x} agrees"),
             Self::Differs { expected, found, version } => {
-                let made =
+                let origin =
                     version.as_ref().map_or("another version".to_owned(), |version| format!("version {version}"));
                 write!(
                     f,
-                    "State differs: hash {found:016x}, the link says {expected:016x}. It was made by {made}, this is {}",
+                    "State differs: hash {found:016x}, the link says {expected:016x}. It was made by {origin}, this is {}",
                     crate::VERSION
                 )
             }
@@ -78,15 +78,15 @@ impl Replay {
 
     /// Fraction of the way completed, 0 to 1.
     pub fn fraction(&self, player: &Player) -> f32 {
-        let part = match (self.link.steps, self.link.time) {
+        let fraction = match (self.link.steps, self.link.time) {
             (Some(steps), _) if steps > 0 => player.steps() as f64 / steps as f64,
             (None, Some(time)) if time > 0.0 => player.simulation().time() / time,
             _ => 1.0,
         };
-        part.clamp(0.0, 1.0) as f32
+        fraction.clamp(0.0, 1.0) as f32
     }
 
-    /// Continues while `may_step`; returns the verdict once there.
+    /// Continues while `may_step` allows it; returns the verdict once the instant is reached.
     pub fn advance(&self, player: &mut Player, may_step: impl FnMut() -> bool) -> Option<Verdict> {
         match player.continue_to(self.link.goal(), may_step) {
             Ok(true) => {

@@ -1,14 +1,14 @@
 //! Whether the motion of a run relative to its drives has ended.
 //!
 //! - A scene with moving drives has settled when every ball with play has, over the last eighth of the drives' period, stayed
-//!   in contact, moved in its socket by no more than [`MAX_DISPLACEMENT`] of the clearance (at that rate, hardly once across its
-//!   play in a period), and borne the same load within [`MAX_LOAD_CHANGE`]. If motion resumes after such a stretch, the next one
-//!   must last a whole period: a ball that crosses its play once per turn is quiet in between.
+//!   in contact, moved in its socket by no more than [`MAX_DISPLACEMENT`] of the clearance (at that rate, it hardly crosses its
+//!   play once per period), and carried the same load within [`MAX_LOAD_CHANGE`]. If motion resumes after such an interval, the
+//!   next one must last a whole period: a ball that crosses its play once per turn is quiet in between.
 //! - A scene without a moving drive is at rest when no point of a body has moved by more than [`MAX_DISPLACEMENT`] of the
-//!   least clearance for [`REST_TIME`]. A pendulum also stops at the end of each swing, but not for so long.
+//!   smallest clearance for [`REST_TIME`]. A pendulum also stops at the end of each swing, but only briefly.
 //! - A scene without play never settles: nothing in it rattles.
 //!
-//! All of this is judged from the frames of the run.
+//! The criteria use only the frames of the run.
 
 use crate::analysis::drive::{NoPeriod, drive_period};
 use crate::machine::Vec3;
@@ -23,10 +23,10 @@ const REST_TIME: f64 = 0.5;
 const MAX_DISPLACEMENT: f64 = 0.15;
 /// Largest relative change of a contact force over that time.
 const MAX_LOAD_CHANGE: f64 = 0.25;
-/// Instants stored per stretch.
+/// Instants stored per observation interval.
 const INSTANTS: f64 = 16.0;
 
-/// One instant to compare with.
+/// An earlier instant, for comparison.
 #[derive(Clone, Debug, Default)]
 struct Instant {
     time: f64,
@@ -85,9 +85,9 @@ impl Settling {
 
     /// Records the next instant of the run.
     pub fn record(&mut self, frame: &Frame) {
-        let least = self.joints.iter().flatten().map(|(_, c)| *c);
-        let least = least.fold(f64::INFINITY, f64::min);
-        if !least.is_finite() || frame.joints.len() != self.joints.len() {
+        let smallest = self.joints.iter().flatten().map(|(_, c)| *c);
+        let smallest = smallest.fold(f64::INFINITY, f64::min);
+        if !smallest.is_finite() || frame.joints.len() != self.joints.len() {
             return;
         }
         let is_free = |(play, now): (&Option<_>, &JointReport)| play.is_some() && now.state == ContactMode::Free;
@@ -96,28 +96,28 @@ impl Settling {
             self.past.clear();
         }
         self.sample(frame);
-        let stretch = self.period.map_or(REST_TIME, |period| period * WATCHED_FRACTION);
+        let interval = self.period.map_or(REST_TIME, |period| period * WATCHED_FRACTION);
         let Self { joints, latest, .. } = self;
         self.past.retain(|then| {
             let mut points = then.points.iter().zip(&latest.points).enumerate();
             let is_still = points.all(|(i, (a, b))| {
-                let clearance = if is_driven { joints[i].map(|(_, clearance)| clearance) } else { Some(least) };
+                let clearance = if is_driven { joints[i].map(|(_, clearance)| clearance) } else { Some(smallest) };
                 clearance.is_none_or(|clearance| (a - b).norm() <= MAX_DISPLACEMENT * clearance)
             });
             let mut loads = then.loads.iter().zip(&latest.loads);
-            // Those older than two stretches are no longer needed.
+            // Instants older than two intervals are no longer needed.
             is_still
-                && latest.time - then.time < 2.0 * stretch
+                && latest.time - then.time < 2.0 * interval
                 && loads.all(|(a, b)| (a - b).abs() <= MAX_LOAD_CHANGE * a)
         });
         let age_of = |then: Option<&Instant>| then.map(|then| latest.time - then.time);
-        let is_quiet = age_of(self.past.first()).is_some_and(|age| age >= stretch);
+        let is_quiet = age_of(self.past.first()).is_some_and(|age| age >= interval);
         match (is_quiet, self.quiet_since) {
             (true, None) => self.quiet_since = Some(latest.time),
             (false, Some(_)) => (self.quiet_since, self.has_resumed) = (None, true),
             _ => {}
         }
-        if age_of(self.past.last()).is_none_or(|age| age >= stretch / INSTANTS) {
+        if age_of(self.past.last()).is_none_or(|age| age >= interval / INSTANTS) {
             self.past.push(latest.clone());
         }
     }

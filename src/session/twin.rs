@@ -1,4 +1,4 @@
-//! A twin run, minimally displaced and never renormalised, and a renormalised one that yields the largest Lyapunov exponent as
+//! A twin run, slightly displaced and never renormalised, and a renormalised one that yields the largest Lyapunov exponent as
 //! in a sweep. Neither affects the run.
 
 use super::companion::{Companion, CompanionState, drop_every_second};
@@ -35,7 +35,7 @@ struct Growth {
 }
 
 impl Growth {
-    /// Measures the growth from the present state of `run` on.
+    /// Measures the growth from the current state of `run` on.
     fn new(run: &Simulation) -> Self {
         let machine = &run.changed_machine();
         let interval = common_period(machine).ok().flatten().unwrap_or(UNDRIVEN_INTERVAL);
@@ -69,7 +69,7 @@ pub struct Twin {
     distances: Vec<[f64; 2]>,
     /// Only every `stride`-th step is stored.
     stride: u64,
-    /// Time that the run has reached, s, its steps, and its state there: the twin catches up when it is displayed.
+    /// Time that the run has reached, s, with its steps and its state; the twin catches up when it is displayed.
     goal: f64,
     goal_steps: u64,
     goal_state: Vec<f64>,
@@ -78,7 +78,7 @@ pub struct Twin {
 }
 
 impl Twin {
-    /// A displaced copy of `run` in its present state.
+    /// A displaced copy of `run` in its current state.
     pub fn new(run: &Simulation) -> Self {
         let mut simulation = run.twin();
         let offsets: Vec<f64> = offset(run.scales(), DISPLACEMENT).collect();
@@ -98,7 +98,7 @@ impl Twin {
         twin
     }
 
-    /// Restarts from the present state of `run`. Keeps the known distances if the start is the same.
+    /// Restarts from the current state of `run`. Keeps the known distances if the start is the same.
     pub fn restart(&mut self, run: &Simulation) {
         let before = std::mem::replace(self, Self::new(run));
         if before.start_time() == self.start_time() {

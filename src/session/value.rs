@@ -1,4 +1,4 @@
-//! Values as text for the screen: the names of files and the command line, with typeset units.
+//! Values as text for the screen: the words of files and the command line, with typeset units.
 
 use crate::integrate::StepControl;
 use crate::scene::{Kind, Scene, Value};
@@ -19,7 +19,7 @@ pub fn contact(state: ContactMode) -> &'static str {
 pub fn typeset(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut word = String::new();
-    // A final separator, so that the last word is handled.
+    // The final separator makes the loop handle the last word.
     for letter in text.chars().chain(['\0']) {
         if letter.is_alphanumeric() {
             word.push(letter);
@@ -106,10 +106,10 @@ pub fn changes(scene: &Scene) -> Vec<String> {
     changed.map(|(name, value)| format!("{name} {value}")).collect()
 }
 
-/// Differences of `there` from `here`, one phrase each, without the keys `except`; empty if the motion is the same.
-pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String> {
-    if there.source.text != here.source.text || there.source.beside != here.source.beside {
-        let (new, old) = (&there.name, &here.name);
+/// Differences of `new_scene` from `old_scene`, one phrase each, without the keys `except`; empty if the motion is the same.
+pub fn differences(new_scene: &Scene, old_scene: &Scene, except: &[String]) -> Vec<String> {
+    if new_scene.source.text != old_scene.source.text || new_scene.source.beside != old_scene.source.beside {
+        let (new, old) = (&new_scene.name, &old_scene.name);
         return vec![if new == old {
             format!("Scene: another file of the name {new}")
         } else {
@@ -117,22 +117,22 @@ pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String
         }];
     }
     let mut keys: Vec<&String> = Vec::new();
-    for (key, _) in there.changes.iter().chain(&here.changes) {
+    for (key, _) in new_scene.changes.iter().chain(&old_scene.changes) {
         if !keys.contains(&key) && !except.contains(key) && !is_solver_or_view_key(key) {
             keys.push(key);
         }
     }
     let mut all: Vec<String> = keys
         .into_iter()
-        .filter(|key| there.get(key).ok() != here.get(key).ok())
+        .filter(|key| new_scene.get(key).ok() != old_scene.get(key).ok())
         .map(|key| {
             let value = |scene| named(scene, key).map_or_else(|| "none".to_owned(), |n| n.1);
-            let name = named(there, key).or_else(|| named(here, key));
+            let name = named(new_scene, key).or_else(|| named(old_scene, key));
             let name = name.map_or_else(|| key.clone(), |n| n.0);
-            format!("{name}: {} instead of {}", value(there), value(here))
+            format!("{name}: {} instead of {}", value(new_scene), value(old_scene))
         })
         .collect();
-    let (new, old) = (solver(there), solver(here));
+    let (new, old) = (solver(new_scene), solver(old_scene));
     if new != old {
         all.push(format!("Solver: {new} instead of {old}"));
     }
@@ -168,14 +168,18 @@ pub fn decimals(span: f64) -> usize {
     if decimals.is_finite() { (decimals - 1e-9).ceil().clamp(0.0, 15.0) as usize } else { 15 }
 }
 
-/// A small share, as a power of ten where a decimal would hide its size: `2e-6`.
-pub fn power_of_ten(share: f64) -> String {
-    if share == 0.0 || (1e-3..1e4).contains(&share.abs()) { number(share, 2) } else { format!("{share:.0e}") }
+/// A small fraction, as a power of ten where a decimal would hide its size: `2e-6`.
+pub fn power_of_ten(fraction: f64) -> String {
+    if fraction == 0.0 || (1e-3..1e4).contains(&fraction.abs()) {
+        number(fraction, 2)
+    } else {
+        format!("{fraction:.0e}")
+    }
 }
 
-/// A share in per cent, two digits, however small.
-pub fn percent(share: f64) -> String {
-    let percent = 100.0 * share;
+/// A fraction as a percentage with two digits, however small.
+pub fn percent(fraction: f64) -> String {
+    let percent = 100.0 * fraction;
     if percent == 0.0 || percent >= 0.01 { format!("{} %", number(percent, 2)) } else { format!("{percent:.0e} %") }
 }
 
@@ -187,13 +191,14 @@ pub fn time(seconds: f64) -> String {
     let size = seconds.abs();
     for (unit, name, decimals) in [(1e-6, "µs", 3), (1e-3, "ms", 4)] {
         // A value that rounds up to the next unit is written in that unit.
-        let whole = 1000.0 - 0.5 * libm::pow(10.0, -f64::from(decimals));
-        if size > 0.0 && size / unit < whole {
+        let limit = 1000.0 - 0.5 * libm::pow(10.0, -f64::from(decimals));
+        if size > 0.0 && size / unit < limit {
             return format!("{:.*} {name}", decimals as usize, seconds / unit);
         }
     }
-    let decimals =
-        (0..4).find(|taken| size < libm::pow(10.0, f64::from(4 + taken)) - 0.5).map_or(0, |taken| 4 - taken as usize);
+    let decimals = (0..4)
+        .find(|digits| size < libm::pow(10.0, f64::from(4 + digits)) - 0.5)
+        .map_or(0, |digits| 4 - digits as usize);
     format!("{seconds:.decimals$} s")
 }
 
@@ -286,7 +291,7 @@ mod tests {
         assert_eq!(time(999.999_9e-6), "1.0000 ms");
         assert_eq!(time(12_345.678_9), "12345.679 s");
         let longest = (-90..90).map(|k| time(libm::pow(10.0, f64::from(k) / 10.0) * 0.999_999_99));
-        let longest = longest.map(|words| words.chars().count()).max();
+        let longest = longest.map(|text| text.chars().count()).max();
         assert_eq!(longest, Some(MAX_TIME_CHARACTERS));
         assert_eq!(time_scale(1.0), "1:1");
         assert_eq!(time_scale(0.4), "1:2.5");

@@ -54,10 +54,10 @@ impl Arrow {
         }
         let material = Material { colour, roughness: 0.55, metal: 0.0 };
         let (neck, radius) = (self.neck(), self.radius);
-        let pieces = if self.is_broken { &BREAK[..] } else { &[[0.0, 1.0]][..] };
-        for [from, to] in pieces {
-            let piece = bar(self.tail + neck * *from, neck * (to - from), radius, material);
-            layer.push(Mesh::Cylinder, piece);
+        let segments = if self.is_broken { &BREAK[..] } else { &[[0.0, 1.0]][..] };
+        for [from, to] in segments {
+            let segment = bar(self.tail + neck * *from, neck * (to - from), radius, material);
+            layer.push(Mesh::Cylinder, segment);
         }
         let head = bar(self.tail + neck, self.along - neck, HEAD[1] * radius, material);
         layer.push(Mesh::Cone, head);
@@ -136,7 +136,7 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
     let options = &shot.options.arrows;
     let draws_joint_forces = (options.normal || options.friction) && !joints.is_empty();
     let elements = shot.scene.machine.elements.iter().zip(&shot.frame.elements);
-    let loads = elements.filter(|(of, _)| options.normal && matches!(of.kind, ElementKind::Load(_)));
+    let loads = elements.filter(|(element, _)| options.normal && matches!(element.kind, ElementKind::Load(_)));
     let loads = loads.map(|(_, report)| report);
     let mut external = loads.chain(&shot.frame.pull).peekable();
     if !draws_joint_forces && external.peek().is_none() {
@@ -235,7 +235,7 @@ pub(super) fn push_error(
     push_label(out, text, LabelKind::Error, tail + along, colour);
 }
 
-/// The same without a label.
+/// As [`push_error`], without a label.
 pub(super) fn push_error_arrow(shot: &Shot<'_>, tail: Vec3, along: Vec3, colour: Colour, out: &mut DrawList) {
     let ruler = Ruler::new(shot.camera, shot.size);
     let height = shot.size[1] as f32;

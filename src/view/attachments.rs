@@ -57,7 +57,7 @@ fn rotation(quat: &machine::Quat) -> Mat3 {
 pub(super) fn push_bushing(bushing: &Bushing, report: &ElementReport, frame: &Frame, style: &Style, layer: &mut Layer) {
     let axes = Pose::in_frame(frame, bushing.from.body).rotation * rotation(&bushing.axes);
     let stiffness = &bushing.turning_stiffness;
-    // Of equally soft axes the last is taken: the axis of a rotationally symmetric part is z.
+    // Among equally soft axes the last wins: the axis of a rotationally symmetric part is z.
     let softest = (0..3).rev().min_by(|&a, &b| stiffness[a].total_cmp(&stiffness[b])).unwrap_or(2);
     let along = axes.col(softest) * style.radius;
     let [outer, inner] = report.points.map(|point| to_f32(&point));
@@ -80,9 +80,9 @@ struct Axis<'a> {
 }
 
 impl<'a> Axis<'a> {
-    fn of(on: JointCoordinate, report: &ElementReport, scene: &'a Scene, frame: &Frame) -> Option<Self> {
-        let freedom = on.freedom;
-        let joint = scene.machine.kinematic_joints().nth(on.joint)?;
+    fn of(coordinate: JointCoordinate, report: &ElementReport, scene: &'a Scene, frame: &Frame) -> Option<Self> {
+        let freedom = coordinate.freedom;
+        let joint = scene.machine.kinematic_joints().nth(coordinate.joint)?;
         let parent = Pose::in_frame(frame, joint.parent);
         let (pose, axis) = match freedom {
             Freedom::SecondTurn => (Pose::in_frame(frame, Some(joint.child)), &joint.child_axis),
@@ -119,9 +119,9 @@ pub(super) fn push_stop(
             continue;
         }
         let solid = if axis.freedom.turns() {
-            let out = axis.direction(scene, limit).unwrap_or_else(|| axis.along.any_orthonormal_vector());
+            let outwards = axis.direction(scene, limit).unwrap_or_else(|| axis.along.any_orthonormal_vector());
             let [from, to, radius] = PEG.map(|part| part * style.radius);
-            bar(axis.origin + out * from, axis.origin + out * to, radius)
+            bar(axis.origin + outwards * from, axis.origin + outwards * to, radius)
         } else {
             let [thickness, radius] = BUFFER.map(|part| part * style.radius);
             let from = axis.origin + axis.along * limit;

@@ -1,4 +1,4 @@
-//! From scene and frame to draw list.
+//! Builds the draw list from a scene and a frame.
 
 use std::sync::Arc;
 
@@ -129,8 +129,8 @@ impl SceneView {
         self.fit_around(camera, scene, frame, options, size, &[]);
     }
 
-    /// As [`Self::fit`], with the machine clear of `plates` (least and greatest corner, pixels), which overlay the picture.
-    /// Selects the largest such view, or the one with the least area under plates.
+    /// As [`Self::fit`], with the machine clear of `plates` (minimum and maximum corner, pixels), which overlay the picture.
+    /// Selects the view with the largest machine, or the one with the least area under plates.
     pub fn fit_around(
         &self,
         camera: &mut Camera,
@@ -140,9 +140,9 @@ impl SceneView {
         size: [u32; 2],
         plates: &[[Vec2; 2]],
     ) {
-        // Fractions of the room taken by the plates at a side, from none to all.
+        // Fractions of the width of the plates at a side that are kept clear.
         const SHARES: [f32; 4] = [0.0, 0.35, 0.7, 1.0];
-        // Cells along the shorter edge, and gap between machine and plates in them.
+        // Cells along the shorter edge, and gap between machine and plates, in cells.
         const CELLS: f32 = 80.0;
         const GAP: f32 = 1.5;
         // Most solids compared with the plates; beyond that some are skipped.
@@ -169,9 +169,9 @@ impl SceneView {
             for right in shares(reserved[1]) {
                 for top in shares(reserved[2]) {
                     for bottom in shares(reserved[3]) {
-                        let (mut moved, free) = (*camera, [left, right, top, bottom]);
-                        moved.fit_balls(&balls, size, free);
-                        candidates.push((free, moved));
+                        let (mut candidate, free) = (*camera, [left, right, top, bottom]);
+                        candidate.fit_balls(&balls, size, free);
+                        candidates.push((free, candidate));
                     }
                 }
             }
@@ -183,9 +183,9 @@ impl SceneView {
         let step = solids.len().div_ceil(MAX_SOLIDS).max(1);
         let mut least = f32::INFINITY;
         let mut best = *camera;
-        for (_, moved) in candidates {
+        for (_, candidate) in candidates {
             let mut cover = Cover::new(size, cell);
-            let eye = moved.view(size);
+            let eye = candidate.view(size);
             for solid in solids.iter().step_by(step).filter(|_| !plates.is_empty()) {
                 cover.add(&eye, size, solid.iter().copied(), CoverKind::Body);
             }
@@ -193,7 +193,7 @@ impl SceneView {
             let covered = |[low, high]: &[Vec2; 2]| cover.covered_fractions(*low - gap, *high + gap)[0];
             let covered: f32 = plates.iter().map(covered).sum();
             if covered < least {
-                (least, best) = (covered, moved);
+                (least, best) = (covered, candidate);
             }
             if covered == 0.0 {
                 break;
@@ -408,7 +408,7 @@ impl SceneView {
         let across = 2.0 * key.dot(up) * up - key;
         out.light = Light {
             direction: key,
-            // Low on the other side.
+            // From the opposite side, low.
             strip: (across - 0.5 * up).normalize(),
             up,
             radius,

@@ -59,8 +59,8 @@ impl Camera {
     /// Isometric view of `bounds` with `down` pointing down on the screen.
     pub fn new(down: SignedAxis, bounds: Bounds) -> Self {
         let down = super::to_f32(&down.unit());
-        // The horizontal axis that runs to the right in the front view: Z for the paper's X-down scene (its sliders 1
-        // and 2 move along Z), X for the usual Z-up and Y-up ones.
+        // The axis that points right in the front view: Z for the paper's X-down scene, whose sliders 1 and 2 move along Z;
+        // X for the usual Z-up and Y-up scenes.
         let right = if down.x == 0.0 { Vec3::X } else { Vec3::Z };
         let mut camera = Self {
             target: bounds.centre,
@@ -78,14 +78,14 @@ impl Camera {
         camera
     }
 
-    /// Sets an isometric view with other than the default yaw and pitch, rad.
+    /// Replaces the yaw and pitch, rad, of the isometric view, and turns to it.
     pub fn with_isometric(mut self, yaw: f32, pitch: f32) -> Self {
         self.isometric = (yaw, pitch.clamp(-MAX_PITCH, MAX_PITCH));
         self.preset(Preset::Isometric);
         self
     }
 
-    /// Turns to a named viewpoint; target and distance are kept.
+    /// Turns to a named viewpoint; target and distance stay the same.
     pub fn preset(&mut self, preset: Preset) {
         (self.yaw, self.pitch) = match preset {
             Preset::Front => (0.0, 0.0),
@@ -95,7 +95,7 @@ impl Camera {
         };
     }
 
-    /// Moves so that all of `bounds` is in a picture of the given aspect ratio (width by height); the direction is kept.
+    /// Moves so that all of `bounds` fits into a picture of the given aspect ratio (width by height); the direction stays the same.
     pub fn fit(&mut self, bounds: Bounds, aspect: f32) {
         let half = (self.field_of_view / 2.0).tan();
         let half_angle = (half * aspect.min(1.0)).atan();
@@ -103,7 +103,7 @@ impl Camera {
         self.distance = (bounds.radius.max(1e-6) / half_angle.sin()) * 1.02;
     }
 
-    /// Moves so that the spheres (centre, radius) just fill a picture of `size`, with a small margin; the direction is kept.
+    /// Moves so that the spheres (centre, radius) just fill a picture of `size`, with a small margin; the direction stays the same.
     /// The given numbers of pixels at the left, right, top and bottom stay free.
     pub(super) fn fit_balls(&mut self, balls: &[(Vec3, f32)], size: [u32; 2], [left, right, top, bottom]: [f32; 4]) {
         const MARGIN: f32 = 1.16;
@@ -112,8 +112,8 @@ impl Camera {
         // Slope of one pixel. The reserved space is limited so that most of the picture remains.
         let pixel = 2.0 * (self.field_of_view / 2.0).tan() / height;
         let free_of = |edge: f32, low: f32, high: f32| {
-            let kept_share = (0.6 * edge / (low + high).max(1e-3)).min(1.0);
-            let (middle, half) = (kept_share * (low - high) / 2.0, (edge - kept_share * (low + high)) / 2.0 / MARGIN);
+            let limit = (0.6 * edge / (low + high).max(1e-3)).min(1.0);
+            let (middle, half) = (limit * (low - high) / 2.0, (edge - limit * (low + high)) / 2.0 / MARGIN);
             (pixel * (half - middle), pixel * (half + middle))
         };
         // Along one screen axis, up to slopes `low` and `high`: a sphere at (x, depth z towards the eye) is inside both
@@ -146,7 +146,7 @@ impl Camera {
     pub fn close_up(&mut self, centre: Vec3, opening: Vec3, radius: f32) {
         let out = opening.normalize_or(self.back_at(0.0));
         let level = Vec2::new(out.dot(self.right), out.dot(self.back_at(0.0)));
-        // An opening straight up or down does not determine the yaw, which is then kept.
+        // An opening straight up or down does not determine the yaw, which then stays the same.
         if level.length() > 1e-3 {
             self.yaw = level.x.atan2(level.y) + 0.25;
         }
@@ -181,8 +181,8 @@ impl Camera {
         self.target += (right * off_centre.x - up * off_centre.y) * shrink;
     }
 
-    /// Zooms by `factor` about a point of the scene, which stays where it is on the screen. The target takes its depth, so
-    /// that zooming in never passes it.
+    /// Zooms by `factor` about a point of the scene, which stays where it is on the screen. The target moves to its depth,
+    /// so that zooming in never passes it.
     pub fn zoom_about(&mut self, factor: f32, point: Vec3, size: [u32; 2]) {
         let (eye, back) = (self.eye(), self.axes().2);
         let depth = (eye - point).dot(back);

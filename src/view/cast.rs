@@ -21,7 +21,7 @@ pub(super) fn distance(solid: &Solid<'_>, point: Vec3) -> Option<f32> {
 
 /// Queries the solid's placed shape; `None` if it has none.
 fn with_shape<T>(solid: &Solid<'_>, query: impl FnOnce(&dyn Shape, &ParryPose) -> T) -> Option<T> {
-    // A broken frame must not reach parry's iterations.
+    // parry's iterations need finite numbers.
     let mut finite = true;
     solid.extent(|centre, radius| finite &= centre.is_finite() && radius.is_finite());
     if !finite {

@@ -1,4 +1,4 @@
-//! Errors of the tip at many positions of the machine, as a cloud of arrows to one scale.
+//! Tip errors at many positions of the machine, as a cloud of arrows with a common scale.
 
 use glam::Vec3;
 
@@ -12,13 +12,13 @@ use crate::units::format_quantity_digits;
 /// A cloud of arrows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cloud {
-    /// Tip without play, and the error there, world axes, m.
+    /// Ideal tip position, and the error there, world axes, m.
     pub arrows: Vec<[Vec3; 2]>,
-    /// Length of an arrow, over that of the error.
+    /// Length of an arrow relative to its error.
     pub factor: f32,
-    /// Name of the errors.
+    /// Name of the error quantity.
     pub name: &'static str,
-    /// Remark on them, for the label.
+    /// Remark for the label.
     pub note: &'static str,
 }
 

@@ -18,12 +18,12 @@ pub(super) fn push_coil(from: Vec3, to: Vec3, radius: f32, width: f32, colour: C
     };
     let side = along.any_orthonormal_vector();
     let other = along.cross(side);
-    let point = |part: f32| {
-        let inside = ((part - STRAIGHT) / (1.0 - 2.0 * STRAIGHT)).clamp(0.0, 1.0);
+    let point = |fraction: f32| {
+        let inside = ((fraction - STRAIGHT) / (1.0 - 2.0 * STRAIGHT)).clamp(0.0, 1.0);
         let (sin, cos) = (TAU * TURNS * inside).sin_cos();
         // The wire reaches its full radius within a turn.
         let out = radius * (TURNS * inside.min(1.0 - inside)).min(1.0);
-        from + (to - from) * part + (side * cos + other * sin) * out
+        from + (to - from) * fraction + (side * cos + other * sin) * out
     };
     let at = |k: u16| point(f32::from(k) / f32::from(SEGMENTS));
     lines.extend((0..SEGMENTS).map(|k| Line::new(at(k), at(k + 1), width, [colour; 2])));

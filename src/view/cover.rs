@@ -1,4 +1,4 @@
-//! Coarse cells of a picture that drawn bodies cover: text is placed clear of them.
+//! A coarse grid of the picture cells that bodies cover, so that text is placed clear of them.
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
@@ -49,16 +49,16 @@ impl Cover {
         for layer in [&list.faded, &list.solid] {
             for (mesh, instances) in layer.by_mesh.iter().enumerate() {
                 // Only balls of joints have a facing sphere.
-                let kind = |one: &Instance| {
-                    if mesh == sphere && one.other != [0.0; 4] { CoverKind::Ball } else { CoverKind::Body }
+                let kind = |instance: &Instance| {
+                    if mesh == sphere && instance.other != [0.0; 4] { CoverKind::Ball } else { CoverKind::Body }
                 };
-                for one in instances.iter().step_by(step) {
-                    cover.mark(one, mesh, list, kind(one));
+                for instance in instances.iter().step_by(step) {
+                    cover.mark(instance, mesh, list, kind(instance));
                 }
             }
         }
-        for one in list.sockets.iter().chain(&list.clear_balls).step_by(step) {
-            cover.mark(one, sphere, list, CoverKind::Ball);
+        for instance in list.sockets.iter().chain(&list.clear_balls).step_by(step) {
+            cover.mark(instance, sphere, list, CoverKind::Ball);
         }
         cover
     }
@@ -139,8 +139,8 @@ impl Cover {
                 if from.y.max(to.y) < band[0] || from.y.min(to.y) > band[1] {
                     continue;
                 }
-                let level = from.y == to.y;
-                for x in if level { [from.x, to.x] } else { band.map(|y| at(y).x) } {
+                let is_level = from.y == to.y;
+                for x in if is_level { [from.x, to.x] } else { band.map(|y| at(y).x) } {
                     (left, right) = (left.min(x), right.max(x));
                 }
             }
@@ -176,7 +176,7 @@ impl Cover {
 
 /// Range of cells between two positions, in cells, out of `count`.
 fn span(from: f32, to: f32, count: usize) -> Option<std::ops::Range<usize>> {
-    // Negated, so that NaN is rejected, too.
+    // The negation also rejects NaN.
     if !(to >= 0.0 && from < count as f32) {
         return None;
     }

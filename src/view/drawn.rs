@@ -2,7 +2,7 @@
 //!
 //! With a magnification m of the play, the ball of a joint is drawn at Z_i + m e in a socket of inner radius r + m c, so
 //! that it touches the drawn wall exactly when it touches the real one. Bodies are drawn in place; only the end of a bar
-//! that carries a ball moves with it, so that nothing comes apart.
+//! that carries a ball moves with the ball, so that no gap opens between them.
 
 use std::sync::Arc;
 
@@ -90,7 +90,7 @@ pub(super) struct DrawnJoint {
 }
 
 impl DrawnJoint {
-    /// From the ball's centre to the socket's, m.
+    /// Vector from the ball's centre to the socket's, m.
     pub fn ball_to_socket(&self) -> Vec3 {
         self.socket_centre - self.ball_centre
     }
@@ -180,8 +180,8 @@ pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
             });
         }
     }
-    let probe_drawn = parts.iter().any(|part| part.role == Role::Probe);
-    if let (Some(tip), false) = (&scene.machine.output.probe, probe_drawn) {
+    let is_probe_drawn = parts.iter().any(|part| part.role == Role::Probe);
+    if let (Some(tip), false) = (&scene.machine.output.probe, is_probe_drawn) {
         let size = scene.machine.ball_joints.first().map_or(0.01, |joint| joint.contact.ball_radius) as f32;
         let form = Form::Ball { centre: to_f32(tip), radius: 0.4 * size };
         parts.push(DrawnShape {
@@ -255,7 +255,7 @@ impl Meshes {
         Some(Mesh::Plate(id))
     }
 
-    /// The mesh of a file: one for all shapes that name it.
+    /// The mesh of a file, shared by all shapes that use it.
     fn file_mesh(&mut self, file: &Arc<mesh::Mesh>, unit: f64) -> Option<SceneMesh> {
         let same =
             |(other, length, _): &&(Arc<mesh::Mesh>, f64, SceneMesh)| Arc::ptr_eq(other, file) && *length == unit;
@@ -359,8 +359,8 @@ pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
 impl DrawnShape {
     /// Its colour and finish.
     pub fn material(&self, palette: &Palette) -> Material {
-        let of_role = palette.material(self.role);
-        Material { colour: self.colour.unwrap_or(of_role.colour), ..of_role }
+        let material = palette.material(self.role);
+        Material { colour: self.colour.unwrap_or(material.colour), ..material }
     }
 
     /// Whether it is a bar.

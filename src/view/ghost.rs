@@ -35,7 +35,7 @@ pub fn output_point(output: &Output, frame: &Frame) -> Option<crate::machine::Ve
 
 impl SceneView {
     /// Adds the moving parts of the scene in the state `ghost` to the list built from `shot`. The farther a part is from
-    /// its position in `shot`, the more visible it is. Returns whether any differs by a pixel or more.
+    /// its position in `shot`, the more visible it is. Returns whether any part is far enough to be visible.
     pub fn add_ghost(&self, shot: &Shot<'_>, ghost: &Frame, which: Ghost, out: &mut DrawList) -> bool {
         let relative = RelativeShot::of(shot);
         let relative_ghost = relative.as_ref().map(|relative| relative.frame(ghost));
@@ -46,7 +46,7 @@ impl SceneView {
         let (shown_joints, ghost_joints) = (at(shot.frame), at(ghost));
         let (eye, back) = (shot.camera.eye(), shot.camera.axes().2);
         let target = shot.camera.metres_per_pixel(shot.size) / shot.camera.distance;
-        // Fades in from one pixel to three.
+        // Fades in as the distance grows from half a point to three.
         let materials = |from: Vec3, to: Vec3| {
             let pixel = target * (eye - to).dot(back);
             let visibility = (from.distance(to) / pixel / shot.pixels_per_point - 0.5) / 2.5;
@@ -86,9 +86,9 @@ impl SceneView {
     /// that does not fit. Its label gives the length and, if magnified, the factor.
     pub fn add_output_error(&self, shot: &Shot<'_>, ideal: &Frame, out: &mut DrawList) {
         let relative = RelativeShot::of(shot);
-        let relative_ghost = relative.as_ref().map(|relative| relative.frame(ideal));
+        let relative_ideal = relative.as_ref().map(|relative| relative.frame(ideal));
         let shot = &relative.as_ref().map_or(*shot, |relative| relative.shot(shot));
-        let ideal = relative_ghost.as_ref().unwrap_or(ideal);
+        let ideal = relative_ideal.as_ref().unwrap_or(ideal);
         let output = &shot.scene.machine.output;
         let (Some(from), Some(to)) = (output_point(output, ideal), output_point(output, shot.frame)) else {
             return;

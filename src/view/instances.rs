@@ -1,4 +1,4 @@
-//! Placing meshes and labels.
+//! Placement of meshes and labels.
 
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
-//! Turns a scene at one instant into a plain list of solids, lines and labels; camera and picking. No GPU here.
+//! Turns a scene at one instant into a plain list of solids, lines and labels. Also has the camera and picking, but no GPU code.
 //!
 //! Lengths are metres in world axes, f32. The view recomputes no physics: forces, gaps and contact points are
-//! those that the step reported. Usage, once per frame:
+//! those reported by the step. Usage, once per frame:
 //!
 //! ```ignore
 //! let view = SceneView::new(&scene, &first_frame);            // once per scene

@@ -1,13 +1,13 @@
-//! The user's choices about the picture.
+//! The user's settings for the picture.
 
 use super::Theme;
 
-/// All user choices about the picture.
+/// All user settings for the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewOptions {
     /// Light or dark.
     pub theme: Theme,
-    /// Factor on eccentricity and clearance together, 1..=100. It may be reduced where the socket would outgrow the picture
+    /// Factor on eccentricity and clearance together, 1..=100. It is reduced where a socket would become too large
     /// ([`super::DrawList::magnification`]).
     pub magnification: f32,
     /// Contact-force arrows.
@@ -65,7 +65,7 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// Everything.
+    /// All features.
     pub const FULL: Self = Self::LADDER[0];
 
     /// Quality levels for a slow window: each row drops one more feature.

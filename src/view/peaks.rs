@@ -103,7 +103,7 @@ impl PeakMarks {
     /// `fade` seconds of simulated time after its peak. If time has gone back, all impacts are dropped.
     pub fn update(&mut self, frame: &Frame, peaks: &[Peak], fade: f64) {
         if frame.time < self.now {
-            // The scale is kept: it is the same run.
+            // The scale stays: it is the same run.
             let largest = self.largest;
             self.clear(frame.time);
             self.largest = largest;
@@ -147,10 +147,10 @@ impl PeakMarks {
                 continue;
             }
             joint.upcoming = Some(impact(force, peak.time));
-            let present = to_f32(&report.normal_force);
-            if present.is_finite() && present != Vec3::ZERO {
+            let current = to_f32(&report.normal_force);
+            if current.is_finite() && current != Vec3::ZERO {
                 // The contact has begun: show it with its current force.
-                joint.add_impact(impact(present, now), self.fade);
+                joint.add_impact(impact(current, now), self.fade);
             }
         }
         self.processed_to = peaks.iter().map(|peak| peak.time).fold(processed_to, f64::max);
@@ -158,10 +158,10 @@ impl PeakMarks {
             joint.impact = joint.impact.filter(|impact| now - impact.time < self.fade);
         }
         let half_lives = passed / (SCALE_HALF_LIFE * self.fade);
-        let present =
+        let current =
             frame.joints.iter().map(|joint| joint.normal_force.norm() as f32).filter(|force| force.is_finite());
         let marked = self.joints.iter().filter_map(|joint| joint.impact);
-        self.largest = present
+        self.largest = current
             .chain(marked.map(|impact| impact.force.length()))
             .fold(self.largest * (-half_lives as f32).exp2(), f32::max);
     }
@@ -192,7 +192,7 @@ impl PeakMarks {
         })
     }
 
-    /// Force of the reference length: the option's, or the largest recent one, rounded up to 1, 2 or 5 times a power of
+    /// Force of the reference length: the one set in `options`, or the largest recent force rounded up to 1, 2 or 5 times a power of
     /// ten.
     pub fn reference(&self, options: &ArrowOptions) -> f32 {
         match options.reference {

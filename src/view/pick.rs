@@ -54,8 +54,8 @@ impl SceneView {
     }
 
     /// Point to follow: a body's origin or a joint's socket centre, m; `None` for fixed shapes.
-    pub fn anchor(&self, frame: &Frame, picked: ScenePart) -> Option<Vec3> {
-        match picked {
+    pub fn anchor(&self, frame: &Frame, part: ScenePart) -> Option<Vec3> {
+        match part {
             ScenePart::Body(i) => frame.bodies.get(i).map(|body| super::to_f32(&body.position)),
             ScenePart::Joint(i) => frame.joints.get(i).map(|joint| super::to_f32(&joint.socket_centre)),
             ScenePart::Fixed(_) => None,

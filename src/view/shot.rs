@@ -15,7 +15,7 @@ pub struct Shot<'a> {
     pub frame: &'a Frame,
     /// Past peaks.
     pub marks: &'a PeakMarks,
-    /// User choices.
+    /// User settings.
     pub options: &'a ViewOptions,
     /// Viewpoint.
     pub camera: &'a Camera,

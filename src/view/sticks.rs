@@ -5,17 +5,17 @@ use std::collections::BTreeMap;
 use crate::machine::{Geometry, JointKind, Shape, Vec3};
 use crate::scene::Scene;
 
-/// Radii of the bars and of the ball at the centroid, in lengths of the longest bar.
+/// Radii of the bars and of the ball at the centroid, relative to the length of the longest bar.
 const BAR: f64 = 0.03;
 const BALL: f64 = 0.08;
 
-/// Default shapes of the bodies without shapes, by body.
+/// Default shapes of all bodies without shapes, by body index.
 pub(super) fn sticks(scene: &Scene) -> BTreeMap<usize, Vec<Shape>> {
     let bodies_without_shapes = scene.machine.bodies.iter().enumerate();
     let bodies_without_shapes = bodies_without_shapes.filter(|(_, body)| body.shapes.is_empty());
     let mut points: BTreeMap<usize, Vec<Vec3>> = bodies_without_shapes.map(|(i, _)| (i, Vec::new())).collect();
-    let bound = scene.machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
-    let tree = bound.flat_map(|joint| joint.points());
+    let constrained = scene.machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
+    let tree = constrained.flat_map(|joint| joint.points());
     let balls = scene.machine.ball_joints.iter();
     let balls = balls.flat_map(|joint| [joint.socket, joint.ball]);
     for end in tree.chain(balls) {

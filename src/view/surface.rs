@@ -15,7 +15,7 @@ pub(super) fn surface(mesh: &Mesh, unit: f64) -> MeshData {
     let position = |p: &[f32; 3]| Vec3::from(p.map(|x| (f64::from(x) * unit) as f32));
     let positions: Vec<Vec3> = mesh.vertices().iter().map(position).collect();
     let corners = |triangle: &[u32; 3]| triangle.map(|i| positions[i as usize]);
-    // In units of the file: in metres, areas of small triangles would vanish in f32.
+    // In units of the file: in square metres, areas of small triangles would underflow in f32.
     let area = |triangle: &[u32; 3]| {
         let [a, b, c] = corners(triangle).map(|position| position / unit as f32);
         (b - a).cross(c - a)
@@ -23,7 +23,7 @@ pub(super) fn surface(mesh: &Mesh, unit: f64) -> MeshData {
     let areas: Vec<Vec3> = mesh.triangles().iter().map(area).collect();
     let normals: Vec<Vec3> = areas.iter().map(|area| area.normalize_or_zero()).collect();
 
-    // Triangles about each corner: those of corner i are `about[first[i]..first[i + 1]]`.
+    // Triangles around each vertex: those of vertex i are `about[first[i]..first[i + 1]]`.
     let mut first = vec![0; positions.len() + 1];
     for corner in mesh.triangles().iter().flatten() {
         first[*corner as usize + 1] += 1;
@@ -42,7 +42,7 @@ pub(super) fn surface(mesh: &Mesh, unit: f64) -> MeshData {
     }
 
     let mut out = MeshData::default();
-    // Vertices made for each corner, with their normals.
+    // Output vertices created for each vertex of the mesh, with their normals.
     let mut created: Vec<Vec<(Vec3, u32)>> = vec![Vec::new(); positions.len()];
     for (t, triangle) in mesh.triangles().iter().enumerate() {
         if normals[t] == Vec3::ZERO {
@@ -57,8 +57,8 @@ pub(super) fn surface(mesh: &Mesh, unit: f64) -> MeshData {
                 let smooth = around.iter().filter(|&&other| normals[other].dot(normals[t]) > CREASE);
                 smooth.map(|&other| areas[other]).sum::<Vec3>().normalize_or(normals[t])
             };
-            let near = |(of, _): &&(Vec3, u32)| of.distance_squared(normal) < 1e-8;
-            let known = created[i].iter().take(MAX_SMOOTHED).find(near);
+            let is_same = |(known, _): &&(Vec3, u32)| known.distance_squared(normal) < 1e-8;
+            let known = created[i].iter().take(MAX_SMOOTHED).find(is_same);
             let index = match known {
                 Some((_, index)) => *index,
                 None => {
@@ -105,8 +105,8 @@ mod tests {
             text += &format!("f{}\n", ring(1).collect::<String>());
             text += &format!("f{}\n", ring(0).rev().collect::<String>());
         }
-        let alone = |_: &str| Err(String::new().into());
-        Format::Obj.read(text.as_bytes(), &alone).unwrap()
+        let no_files = |_: &str| Err(String::new().into());
+        Format::Obj.read(text.as_bytes(), &no_files).unwrap()
     }
 
     #[test]

@@ -79,7 +79,7 @@ pub(super) fn symbols(
     let joined = scene.machine.joints.iter().chain(&scene.machine.closing_joints);
     for joint in joined.filter(|joint| joint.drawn) {
         let (parent, child) = (Pose::in_frame(frame, joint.parent), Pose::in_frame(frame, Some(joint.child)));
-        let own: &[_] = match joint.parent {
+        let parent_shapes: &[_] = match joint.parent {
             Some(parent) => &shapes[parent],
             None => &[],
         };
@@ -87,7 +87,7 @@ pub(super) fn symbols(
             joint,
             point: child.apply(to_f32(&joint.child_point)),
             axis: (parent.rotation * to_f32(&joint.axis)).normalize_or(Vec3::X),
-            shapes: [&shapes[index_of(None)], own, &shapes[joint.child]],
+            shapes: [&shapes[index_of(None)], parent_shapes, &shapes[joint.child]],
         };
         if !placement.point.is_finite() || !placement.axis.is_finite() {
             continue;
@@ -174,7 +174,7 @@ impl JointPlacement<'_> {
         bar(Some(self.joint.child), ends, sleeve, Role::Slider);
     }
 
-    /// Radius of a bar among `shapes`, not a disc, that lies on the joint's axis, m.
+    /// Radius of a bar (not a disc) among `shapes` that lies on the joint's axis, m.
     fn bar_on_axis(&self, shapes: &[(Role, Solid<'_>)]) -> Option<f32> {
         let along = |(_, solid): &(Role, Solid<'_>)| match *solid {
             Solid::Bar { from, to, radius, .. } => {
@@ -196,8 +196,8 @@ impl JointPlacement<'_> {
         shapes.any(|shapes| self.bar_on_axis(shapes).is_some())
     }
 
-    /// Shapes of the parent, or of the world in its place.
-    fn of_parent(&self) -> &[(Role, Solid<'_>)] {
+    /// Shapes of the parent, or of the world without one.
+    fn parent_shapes(&self) -> &[(Role, Solid<'_>)] {
         self.shapes[usize::from(self.joint.parent.is_some())]
     }
 
@@ -206,14 +206,14 @@ impl JointPlacement<'_> {
         self.parent_has_rail() || self.has_pin()
     }
 
-    /// The same, counting only shapes of the parent.
+    /// As [`Self::has_rail`], counting only shapes of the parent.
     fn parent_has_rail(&self) -> bool {
-        let parent = self.of_parent();
+        let parent = self.parent_shapes();
         parent.iter().any(|(role, _)| *role == Role::Rail) || self.bar_on_axis(parent).is_some()
     }
 
-    /// Extent of the shapes of both bodies along the axis, from the joint, m; seen from a distance of `most`, m.
-    fn hub(&self, most: f32) -> Option<[f32; 2]> {
+    /// Extent of the shapes of both bodies along the axis, from the joint, m. Rays start at the distance `start`, m.
+    fn hub(&self, start: f32) -> Option<[f32; 2]> {
         let mut ends: Option<[f32; 2]> = None;
         for (_, solid) in self.shapes[1].iter().chain(self.shapes[2]) {
             let (mut sum, mut count) = (Vec3::ZERO, 0.0);
@@ -222,10 +222,10 @@ impl JointPlacement<'_> {
             // The joint may lie on the very edge of its hub.
             for point in [self.point, self.point + inwards * 0.05] {
                 let reach = |out: Vec3| {
-                    let ray = Ray::new(point + out * most, -out);
-                    // A shape that begins farther out is no hub.
+                    let ray = Ray::new(point + out * start, -out);
+                    // A shape that contains the start of the ray is not a hub.
                     let hit_distance = cast(solid, &ray).filter(|distance| *distance > 0.0)?;
-                    Some(most - hit_distance)
+                    Some(start - hit_distance)
                 };
                 if let (Some(high), Some(low)) = (reach(self.axis), reach(-self.axis)) {
                     let [lowest, highest] = ends.unwrap_or([-low, high]);

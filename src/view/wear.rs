@@ -15,7 +15,7 @@ const DECADES: f32 = 3.0;
 const CELL_RADIUS: f32 = 0.99;
 
 impl WearMap {
-    /// Value of a cell per square millimetre of its `area` (m^2), without sign.
+    /// Magnitude of the value of a cell per square millimetre of its `area` (m^2).
     fn value(self, cell: &Cell, area: f64) -> f32 {
         let value = match self {
             Self::Off => 0.0,
@@ -55,8 +55,8 @@ impl WearScale {
         let at = position.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f32;
         let lower = (at as usize).min(VIRIDIS.len() - 2);
         let [from, to] = [lower, lower + 1].map(|i| Colour::hex(VIRIDIS[i]).0);
-        let part = at - lower as f32;
-        Colour(std::array::from_fn(|i| from[i] + part * (to[i] - from[i])))
+        let fraction = at - lower as f32;
+        Colour(std::array::from_fn(|i| from[i] + fraction * (to[i] - from[i])))
     }
 }
 
