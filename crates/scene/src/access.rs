@@ -69,8 +69,8 @@ impl Scene {
             if is_fixed_in_file(key) {
                 return "only in the scene file: it cannot be changed from outside it".to_owned();
             }
-            let here = self.parameters();
-            let table = here.iter().map(|parameter| parameter.key);
+            let parameters = self.parameters();
+            let table = parameters.iter().map(|parameter| parameter.key);
             // A longer search would cost more than the hint is worth.
             let near = nearest_parameter(key, table.chain(numbers.take(MAX_CHANGES)), &[]);
             return format!("unknown key{near}");
@@ -82,10 +82,10 @@ impl Scene {
             return format!("unknown key{}", did_you_mean(near.as_deref()));
         }
         // The name of a joint in an included file has dots.
-        let begins = |joint: &&Joint| {
+        let matches_start = |joint: &&Joint| {
             name.strip_prefix(&*joint.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         };
-        let Some(first) = self.machine.kinematic_joints().find(begins).map(|joint| &*joint.name) else {
+        let Some(first) = self.machine.kinematic_joints().find(matches_start).map(|joint| &*joint.name) else {
             return no_ball_joint(name, balls);
         };
         // Its numbers are keys only if they are in the file.
@@ -211,26 +211,26 @@ impl Scene {
         Ok(parameter)
     }
 
-    /// Gives the solver what its preset stands for on this machine, but for what the text or a change sets by name.
+    /// Applies the solver's preset to this machine, except for keys that the text or a change sets by name.
     pub(super) fn apply_preset(&mut self) {
         let Some(preset) = self.machine.solver.preset else {
             return;
         };
-        let own = preset.solver(self.machine.joints_with_clearance());
+        let preset = preset.solver(self.machine.joints_with_clearance());
         let given = |key: &str| self.source.places.contains_key(key) || self.changes.iter().any(|(own, _)| own == key);
         let [method, step, tolerance, steps_per_impact] = SOLVER_KEYS.map(given);
         let solver = &mut self.machine.solver;
         if !method {
-            solver.method = own.method;
+            solver.method = preset.method;
         }
         if !step {
-            solver.step = own.step;
+            solver.step = preset.step;
         }
         if !tolerance {
-            solver.tolerance = own.tolerance;
+            solver.tolerance = preset.tolerance;
         }
         if !steps_per_impact {
-            solver.steps_per_impact = own.steps_per_impact;
+            solver.steps_per_impact = preset.steps_per_impact;
         }
     }
 

@@ -166,12 +166,12 @@ impl<'d> AssetResolver<'d> {
     }
 
     /// Encoded content of the file `name`.
-    fn content(&self, name: &str, what: FileKind) -> Result<Arc<str>, AssetFault> {
+    fn content(&self, name: &str, kind: FileKind) -> Result<Arc<str>, AssetFault> {
         let found = self.requested.borrow().get(name).cloned();
         let found = found.or_else(|| self.known?.get(name).cloned());
         let text = match found {
             Some(text) => text,
-            None => self.read(name, what)?,
+            None => self.read(name, kind)?,
         };
         let mut requested = self.requested.borrow_mut();
         requested.insert(name.to_owned(), text.clone());
@@ -183,16 +183,16 @@ impl<'d> AssetResolver<'d> {
         self.requested.into_inner()
     }
 
-    fn read(&self, name: &str, what: FileKind) -> Result<Arc<str>, AssetFault> {
+    fn read(&self, name: &str, kind: FileKind) -> Result<Arc<str>, AssetFault> {
         let is_plain = |part: Component<'_>| matches!(part, Component::Normal(_));
         if name.is_empty() || !Path::new(name).components().all(is_plain) {
             return Err(AssetFault::NotBeside);
         }
-        let (limit, files) = match what {
+        let (limit, files) = match kind {
             FileKind::Text => (MAX_FILE_SIZE, "files"),
             FileKind::Mesh => (MAX_MESH_SIZE, "meshes"),
         };
-        let bytes_read = &self.bytes_read[what as usize];
+        let bytes_read = &self.bytes_read[kind as usize];
         let remaining = limit.saturating_sub(bytes_read.get());
         // One byte more than allowed: a pipe or a device does not report its size.
         let bytes = self.bytes(Path::new(name), remaining + 1)?;

@@ -11,7 +11,7 @@ impl Scene {
     pub fn locate(&self, error: &StartError) -> SceneError {
         let own = self.source.own.iter();
         let counts = own.clone().filter(|own| matches!(own.kind, Kind::Count { .. }));
-        let one = |joint: &str, parts: &[&str]| {
+        let joint_keys = |joint: &str, parts: &[&str]| {
             let mut keys = ["parameter.", "formulation", "start"].map(str::to_owned).to_vec();
             keys.extend(own.clone().map(|own| own.key.to_owned()));
             for part in parts {
@@ -26,16 +26,17 @@ impl Scene {
             }
             MechanismError::Open { given: gap }
             | MechanismError::NoClosure { given: gap, .. }
-            | MechanismError::InconsistentDrives { rate: gap } => one(&gap.joint, &["clearance"]),
-            MechanismError::OutsideSocket { joint, .. } => one(joint, &["clearance", "ball_radius"]),
+            | MechanismError::InconsistentDrives { rate: gap } => joint_keys(&gap.joint, &["clearance"]),
+            MechanismError::OutsideSocket { joint, .. } => joint_keys(joint, &["clearance", "ball_radius"]),
             MechanismError::TooLarge { .. } | MechanismError::TooCostly { .. } => {
-                let of_form = matches!(error.0, MechanismError::TooCostly { of: CostlyTask::Formulation(_), .. });
-                let title = if of_form { "formulation" } else { "solver.method" };
+                let concerns_formulation =
+                    matches!(error.0, MechanismError::TooCostly { of: CostlyTask::Formulation(_), .. });
+                let title = if concerns_formulation { "formulation" } else { "solver.method" };
                 let keys = ["solver.method", "formulation"].into_iter().chain(counts.map(|own| own.key));
                 (title.to_owned(), keys.map(str::to_owned).collect())
             }
             MechanismError::NeedsMass { .. } => ("formulation".to_owned(), vec!["formulation".to_owned()]),
-            MechanismError::Undetermined { joint } => one(joint, &[]),
+            MechanismError::Undetermined { joint } => joint_keys(joint, &[]),
             MechanismError::NoRest { .. } => ("start".to_owned(), vec!["start".to_owned()]),
             MechanismError::TooLargeForRest { .. } => {
                 let keys = std::iter::once("start").chain(counts.map(|own| own.key));
@@ -43,7 +44,9 @@ impl Scene {
             }
             // The reader builds only consistent machines.
             MechanismError::Machine(_) => ("body".to_owned(), Vec::new()),
-            MechanismError::Branching { joints } => one(joints.first().map_or("", String::as_str), &["clearance"]),
+            MechanismError::Branching { joints } => {
+                joint_keys(joints.first().map_or("", String::as_str), &["clearance"])
+            }
         };
         self.start_error(&title, &keys, error.to_string())
     }
@@ -155,8 +158,8 @@ mod tests {
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
         let eccentricities = frame.joints.iter().map(|joint| joint.eccentricity.norm());
-        let most = eccentricities.fold(0.0, f64::max);
+        let largest = eccentricities.fold(0.0, f64::max);
         // Half a milliradian at the end of a rod of 200 mm.
-        assert!((most / 0.1e-3 - 1.0).abs() < 0.01, "{most}");
+        assert!((largest / 0.1e-3 - 1.0).abs() < 0.01, "{largest}");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::assets::AssetResolver;
 use super::error::place_of;
-use super::given::{FileNumber, Place};
+use super::file_number::{FileNumber, Place};
 use super::instance::Instance;
 use super::key::{ABOVE_ZERO, ANY, DefaultRule, FileKey, FileTable, ListLimit, MAX_SI, UNCHECKED, ValueType, Variants};
 use super::parameters::{Kind, ValueFault};
@@ -36,10 +36,10 @@ pub(super) struct Document<'d> {
     /// Whether the values belong to a hinge, which changes some dimensions.
     pub on_hinge: bool,
     /// Resolver of the files it names.
-    pub beside: &'d AssetResolver<'d>,
+    pub assets: &'d AssetResolver<'d>,
 }
 
-/// How a scene includes a file: the values that it gives to the file's parameters, by their names in it.
+/// How a scene includes a file: the values that it passes to the file's parameters, by their names in the file.
 #[derive(Default)]
 pub(super) struct Inclusion<'d> {
     pub values: BTreeMap<&'d str, Node<'d>>,
@@ -238,7 +238,7 @@ impl<'d> Section<'d> {
         self.document.error(self.span.clone(), &key, None, message)
     }
 
-    /// Rejects a key that makes no sense here.
+    /// Rejects a key that is not allowed here.
     pub fn refuse(&self, name: &str, why: &str) -> Result<(), SceneError> {
         self.get(name).map_or(Ok(()), |node| Err(node.error(format!("not allowed here: {why}"))))
     }
@@ -327,17 +327,17 @@ impl<'d> Node<'d> {
         self.quantity_in(dimension, UNCHECKED)
     }
 
-    /// The same, recorded with the range that its reader allows.
+    /// As [`Self::quantity`], recorded with the range that its reader allows.
     fn quantity_in(&self, dimension: Dimension, range: (f64, f64)) -> Result<f64, SceneError> {
         let place = self.place_of(Place::Value);
         self.evaluate_text(self.scalar()?, dimension, range, place)
     }
 
     /// Location of this value in the scene's text.
-    fn place_of(&self, here: fn(Range<usize>) -> Place) -> Place {
+    fn place_of(&self, in_text: fn(Range<usize>) -> Place) -> Place {
         match &self.written {
             _ if self.document.include.is_some() => Place::Included,
-            Some(written) => here(written.clone()),
+            Some(written) => in_text(written.clone()),
             None => Place::ChangedDefault,
         }
     }
@@ -440,12 +440,12 @@ impl<'d> Node<'d> {
         Ok(T::of_word(word).expect("the row has the words of the enum"))
     }
 
-    /// A name: letters, digits, `_` and `-`, because keys and column names are built from it; in full, with the number of
-    /// a pattern copy and after the name of an included file.
+    /// A name: letters, digits, `_` and `-`, because keys and column names are built from it. The result is
+    /// the full name, with the number of a pattern copy and the prefix of an included file.
     pub fn name(&self) -> Result<Cow<'d, str>, SceneError> {
         let name = self.text()?;
-        let fine = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
-        if !name.is_empty() && name.len() <= 40 && name.chars().all(fine) {
+        let is_allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+        if !name.is_empty() && name.len() <= 40 && name.chars().all(is_allowed) {
             return Ok(self.full(name));
         }
         Err(self.error("is not a name; allowed 1 to 40 letters (a to z), digits, `_` and `-`"))
@@ -454,11 +454,11 @@ impl<'d> Node<'d> {
     /// The name of `what`, such as a parameter, as it stands in expressions.
     pub fn identifier(&self, what: &str) -> Result<&'d str, SceneError> {
         let name = self.text()?;
-        let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        let is_allowed = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let reserved = ["i", "pi", "e", "t"].contains(&name)
             || all_units().any(|(unit, ..)| unit == name)
-            || !name.starts_with(|c: char| letters(c) && !c.is_ascii_digit());
-        if reserved || name.len() > 40 || !name.chars().all(letters) {
+            || !name.starts_with(|c: char| is_allowed(c) && !c.is_ascii_digit());
+        if reserved || name.len() > 40 || !name.chars().all(is_allowed) {
             return Err(self.error(format!(
                 "cannot name {what}, as expressions use it; allowed letters (a to z), digits and `_`, a letter first, but not i, \
                  pi, e, t or a unit"
@@ -467,7 +467,7 @@ impl<'d> Node<'d> {
         Ok(name)
     }
 
-    /// The full name of a body: numbered in a copy of a pattern that has it, after the name of an included file that has it.
+    /// The full name of a body: with the number of the pattern copy, and the prefix of the included file, that it belongs to.
     pub fn body(&self) -> Result<Cow<'d, str>, SceneError> {
         let name = self.text()?;
         Ok(self.document.instance.map_or(Cow::Borrowed(name), |instance| instance.body(name)))
@@ -487,7 +487,7 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// The values of a table with any names.
+    /// The values of a table whose keys are arbitrary names.
     pub fn named_values(&self) -> Result<BTreeMap<&'d str, Node<'d>>, SceneError> {
         let table = self.value.get_ref().as_table().ok_or_else(|| self.wrong_type("a table"))?;
         let node = |(name, value): (&'d Spanned<Cow<'d, str>>, &'d Spanned<DeValue<'d>>)| {

@@ -125,18 +125,18 @@ pub(super) fn nearest_parameter<'a>(
 }
 
 /// "No such body", with the nearest name and all names.
-pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
-    no_such(["body", "bodies"], wanted, names)
+pub(super) fn no_body<'a>(name: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
+    no_such(["body", "bodies"], name, names)
 }
 
 /// "No such ball joint", with the nearest name and all names.
-pub(super) fn no_ball_joint(wanted: &str, joints: &[super::BallJoint]) -> String {
-    no_such(["ball joint", "ball joints"], wanted, joints.iter().map(|joint| joint.name.as_str()))
+pub(super) fn no_ball_joint(name: &str, joints: &[super::BallJoint]) -> String {
+    no_such(["ball joint", "ball joints"], name, joints.iter().map(|joint| joint.name.as_str()))
 }
 
-fn no_such<'a>([what, plural]: [&str; 2], wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
-    let near = nearest(wanted, names.clone());
+fn no_such<'a>([what, plural]: [&str; 2], name: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
+    let near = nearest(name, names.clone());
     let listed: Vec<&str> = names.clone().take(12).collect();
     let more = if names.count() > listed.len() { ", …" } else { "" };
-    format!("no {what} `{}`{near}; {plural}: {}{more}", brief(wanted), listed.join(", "))
+    format!("no {what} `{}`{near}; {plural}: {}{more}", brief(name), listed.join(", "))
 }

@@ -14,7 +14,7 @@ pub(super) fn read_formula(
 ) -> Result<(Program, f64), SceneError> {
     let text = node.text()?;
     let document = node.document;
-    let (program, of_quantities) = document
+    let (program, has_units) = document
         .reading
         .formula(text, dimension, document.instance)
         .map_err(|error| error_within(node, text, error.at(), &error.to_string()))?;
@@ -31,7 +31,7 @@ pub(super) fn read_formula(
     }
     let scale = match unit {
         None => 1.0,
-        Some(unit) if of_quantities => {
+        Some(unit) if has_units => {
             let why =
                 "not allowed here: a formula with quantities has its own unit; a parameter without one is a number";
             return Err(unit.error(why));
@@ -59,8 +59,8 @@ pub(super) fn error_within(node: &Node<'_>, text: &str, at: usize, message: &str
     let span = node.value.span();
     let inner = span.start + 1;
     // A string with escapes or triple quotes is marked as a whole, because its offsets differ from the source.
-    let plain = node.document.text.get(inner..).is_some_and(|rest| rest.starts_with(text));
-    let start = if plain { inner + at } else { span.start };
+    let is_literal = node.document.text.get(inner..).is_some_and(|rest| rest.starts_with(text));
+    let start = if is_literal { inner + at } else { span.start };
     let excerpt = node.document.excerpt(span.clone());
     node.document.error(start..span.end, &node.key, Some(&excerpt), message)
 }

@@ -14,7 +14,7 @@ use jointplay_physics::suggest::nearest;
 
 /// An included file.
 pub(super) struct Include<'d> {
-    /// Its name, and that of its parts in the scene; the second is empty if they keep theirs.
+    /// File name, and prefix of the names of its parts in the scene; empty if the names are unchanged.
     pub file: &'d str,
     prefix: String,
     pub text: Arc<str>,
@@ -49,7 +49,7 @@ pub(super) fn read_includes<'d>(top: &Section<'d>) -> Result<Vec<Include<'d>>, S
         if let (Some(node), Some(first)) = (&name, first.and_then(|first| first.entry.as_ref()?.get("name"))) {
             return Err(node.duplicate_error(&first, "file", node.text()?));
         }
-        let text = file.document.beside.text(file.text()?).map_err(|fault| file.error(fault.to_string()))?;
+        let text = file.document.assets.text(file.text()?).map_err(|fault| file.error(fault.to_string()))?;
         if *text == *node.document.text {
             return Err(file.error("this is the scene's own file, which cannot include itself; name another or none"));
         }
@@ -60,7 +60,7 @@ pub(super) fn read_includes<'d>(top: &Section<'d>) -> Result<Vec<Include<'d>>, S
     Ok(includes)
 }
 
-/// Beginning of the names in a file with this `name`.
+/// Prefix of the names in a file that is included under this `name`.
 fn read_prefix(name: &Node<'_>) -> Result<String, SceneError> {
     let own = name.name()?;
     let reserved = *own == *"world" || PREVIOUS.strip_suffix('.') == Some(&*own) || FILE.key(&own, None).is_some();
@@ -76,7 +76,7 @@ impl<'d> Include<'d> {
         Document { file: Some(self.file), text: &self.text, include: Some(&self.inclusion), ..of }
     }
 
-    /// The group of its parts, not yet placed; `None` if the scene names the file and nothing more.
+    /// The group of its parts, not yet placed; `None` if the scene gives only the file name.
     pub fn named(&self, parsed: &Spanned<DeTable<'_>>) -> Option<Instance<'d>> {
         self.entry.as_ref()?;
         let names = Arc::new(names_of(parsed.get_ref()));
@@ -101,10 +101,10 @@ impl<'d> Include<'d> {
     }
 }
 
-/// Checks that every value for `file`, the section of an included file, is that of one of its parameters.
+/// Checks that every value passed to `file`, the section of an included file, belongs to one of its parameters.
 ///
 /// # Errors
-/// A value for no parameter.
+/// A value without such a parameter.
 pub(super) fn check_values(file: &Section<'_>) -> Result<(), SceneError> {
     let Some(include) = file.document.include else {
         return Ok(());

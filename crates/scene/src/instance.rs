@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use jointplay_physics::machine::{Quat, Vec3};
 
-/// Begins a reference to a body or a joint of the previous copy.
+/// Prefix of a reference to a body or a joint of the previous copy.
 pub(super) const PREVIOUS: &str = "previous.";
 
 /// A group of parts: its names, and the transform of its attachments to the outside. Coordinates in the frame of the world, or of
@@ -22,15 +22,15 @@ pub(super) struct Instance<'d> {
 /// Which parts belong to a group, and how their names begin or end.
 #[derive(Clone, Debug)]
 pub(super) enum Group {
-    /// A copy of a pattern: its one-based index, which ends the names.
+    /// A copy of a pattern: its one-based index, the suffix of its names.
     Copy { number: u32, names: Arc<Names> },
-    /// An included file: the beginning of its names.
+    /// An included file: the prefix of its names.
     File { prefix: String, names: Arc<Names> },
     /// Everything but the world.
     Scene,
 }
 
-/// Names in a group, as its text has them.
+/// Names in a group, as written in its text.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Names {
     pub bodies: BTreeSet<String>,
@@ -48,7 +48,7 @@ pub(super) struct Placement {
 }
 
 impl Placement {
-    /// The place as it is in the file.
+    /// No rotation and no translation.
     pub const fn identity() -> Self {
         Self {
             centre: Vec3::new(0.0, 0.0, 0.0),
@@ -69,7 +69,7 @@ impl Names {
 }
 
 impl Instance<'_> {
-    /// Beginning of the names of an included file; empty elsewhere.
+    /// Prefix of the names in an included file; empty elsewhere.
     pub fn prefix(&self) -> &str {
         match &self.group {
             Group::File { prefix, .. } => prefix,
@@ -77,7 +77,7 @@ impl Instance<'_> {
         }
     }
 
-    /// Number of the pattern's copy, if it is one.
+    /// Number of the copy, if the group is a copy of a pattern.
     pub fn number(&self) -> Option<u32> {
         match self.group {
             Group::Copy { number, .. } => Some(number),
@@ -85,7 +85,7 @@ impl Instance<'_> {
         }
     }
 
-    /// Full name of a part of the group whose text calls it `name`.
+    /// Full name of a part that the text of the group calls `name`.
     pub fn name(&self, name: &str) -> String {
         let own = match &self.group {
             Group::Copy { number, .. } => format!("{name}{number}"),
@@ -132,7 +132,7 @@ impl Instance<'_> {
         })
     }
 
-    /// Placements of what is attached to `body`, a full name or `None` for the world: those of the groups, from this one
+    /// Placements that apply to attachments on `body`, a full name or `None` for the world: those of the groups, from this one
     /// outwards, that do not contain the body.
     fn placements(&self, body: Option<&str>) -> impl Iterator<Item = &Placement> {
         let groups = std::iter::successors(Some(self), |group| group.outer);
@@ -155,12 +155,12 @@ impl Instance<'_> {
         self.placements(body).fold(rotation, |rotation, placement| placement.turn * rotation)
     }
 
-    /// Transforms the orientation of the frame of `body` in another one.
+    /// Transforms the orientation of the frame of `body` relative to another one.
     pub fn rotation_of(&self, body: Option<&str>, rotation: Quat) -> Quat {
         self.placements(body).fold(rotation, |rotation, placement| rotation * placement.turn.inverse())
     }
 
-    /// Whether what is attached to the world is only shifted, so that axis-aligned boxes can follow.
+    /// Whether attachments on the world are only translated, so that boxes stay parallel to the axes.
     pub fn preserves_axes(&self) -> bool {
         self.placements(None).all(|placement| placement.turn.angle() == 0.0)
     }

@@ -132,7 +132,7 @@ impl LiveScene {
         Ok(())
     }
 
-    /// Continues from a state that was read, of a run that began as this one. `running` and `pending` are the scenes in effect
+    /// Continues from a stored state of a run that started like this one. `running` and `pending` are the scenes in effect
     /// and with all changes at that time.
     ///
     /// # Errors
@@ -159,7 +159,7 @@ impl LiveScene {
         }
     }
 
-    /// Restores a state of this scene, which costs a copy, or of any other.
+    /// Restores a state of this scene, at the cost of a copy, or of any other scene.
     pub fn restore(&mut self, snapshot: &SceneSnapshot) {
         if Arc::ptr_eq(self.simulation.model(), &snapshot.model) {
             self.simulation.restore(&snapshot.state);

@@ -54,7 +54,7 @@ pub fn too_large() -> String {
     format!("too large for a scene file: more than {} MiB", MAX_FILE_SIZE >> 20)
 }
 
-/// A question with the built-in scene or benchmark nearest to `name`, and the list of both.
+/// A suggestion of the built-in scene or benchmark nearest to `name`, and the list of all of them.
 fn known_names(name: &str) -> (String, String) {
     let near = nearest(name, BUILT_IN.into_iter().chain(BENCHMARKS));
     (near, format!("{}; benchmarks: {}", BUILT_IN.join(", "), BENCHMARKS.join(", ")))
@@ -73,7 +73,7 @@ impl Scene {
         if argument.contains('/') || argument.ends_with(".toml") {
             let text = read_file(Path::new(path), argument)?;
             let folder = Path::new(path).parent().unwrap_or(Path::new(""));
-            return Self::parse_beside(&text, Some(argument), AssetResolver::in_folder(folder), changes);
+            return Self::parse_with_assets(&text, Some(argument), AssetResolver::in_folder(folder), changes);
         }
         match built_in_text(argument) {
             Some(text) => Self::parse(text, None, changes),
@@ -113,12 +113,12 @@ fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
         return Err(SceneError { unreadable: false, ..error(too_large()) });
     }
     String::from_utf8(bytes).map_err(|cause| {
-        let good = &cause.as_bytes()[..cause.utf8_error().valid_up_to()];
-        let good = std::str::from_utf8(good).unwrap_or("");
+        let valid = &cause.as_bytes()[..cause.utf8_error().valid_up_to()];
+        let valid = std::str::from_utf8(valid).unwrap_or("");
         SceneError {
-            position: Some(line_and_column(good)),
+            position: Some(line_and_column(valid)),
             unreadable: false,
-            ..error("not a text file: this byte is not valid UTF-8, so it is no scene file".to_owned())
+            ..error("not a text file: this byte is not valid UTF-8, so it is not a scene file".to_owned())
         }
     })
 }

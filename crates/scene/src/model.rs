@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::Parameter;
-use super::given::FileNumber;
+use super::file_number::FileNumber;
 use jointplay_physics::machine::{Machine, Vec3};
 use jointplay_physics::words::words;
 

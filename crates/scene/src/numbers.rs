@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
 use super::field::Access;
-use super::given::FileNumber;
+use super::file_number::FileNumber;
 use super::parameters::{Kind, Parameter, Scope};
 use super::value::Value;
 
@@ -14,7 +14,7 @@ pub(super) const MAX_NUMBER: f64 = 1e13;
 /// Group of the parameters of a file that names none; a window shows them first.
 pub const OWN_GROUP: &str = "Machine";
 
-/// Row of a number of the file. What depends on other numbers, the reader checks when the scene is read again.
+/// Row of a number of the file. Limits that depend on other numbers are checked when the scene is read again.
 pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Parameter {
     let kind = Kind::Number {
         dimension: number.dimension,

@@ -99,8 +99,8 @@ pub(super) fn read_rotation(node: Option<Node<'_>>) -> Result<Quat, SceneError> 
     }
 }
 
-/// Reads where the parts in `section` lie: a turn by its `rotation` about the origin, then a shift by its `position`; `None` if it
-/// has neither.
+/// Reads the placement in `section`: a rotation by `rotation` about the origin, then a translation by `position`; `None` without
+/// either key.
 pub(super) fn read_placement(section: &Section<'_>) -> Result<Option<Placement>, SceneError> {
     let (position, rotation) = (section.get("position"), section.get("rotation"));
     if position.is_none() && rotation.is_none() {
@@ -119,17 +119,17 @@ pub(super) fn read_attachment(
 ) -> Result<Attachment, SceneError> {
     let part = section.require(key)?.section()?;
     let body_node = part.require("body")?;
-    let wanted = &*body_node.body()?;
-    let body = match (wanted, bodies.get(wanted)) {
+    let name = &*body_node.body()?;
+    let body = match (name, bodies.get(name)) {
         ("world", _) => None,
         (_, Some(&index)) => Some(index),
         (_, None) => {
             let names = scene.machine.bodies.iter().map(|body| body.name.as_str());
-            return Err(body_node.error(no_body(wanted, std::iter::once("world").chain(names))));
+            return Err(body_node.error(no_body(name, std::iter::once("world").chain(names))));
         }
     };
     let point = part.vector("at")?;
-    let on = body.map(|_| wanted);
+    let on = body.map(|_| name);
     let point = section.document.instance.map_or(point, |instance| instance.point(on, point));
     Ok(Attachment { body, point })
 }

@@ -127,8 +127,7 @@ pub(super) fn read_points(node: &Node<'_>, graph: &Graph) -> Result<Points, Scen
 pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneError> {
     let [first, second] = graph.axes;
     let name = node.text()?;
-    let beside = node.document.beside;
-    let text = beside.text(name);
+    let text = node.document.assets.text(name);
     let text = text.map_err(|fault| node.error(fault.to_string()))?;
     let file = Document { file: Some(name), text: &text, ..node.document };
     let mut columns = None;

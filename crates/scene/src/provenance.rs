@@ -38,10 +38,10 @@ pub fn insert_texts(meta: &mut Map<String, Json>, scene: &Scene) {
     insert_files(meta, "scene_files", scene, |text| json!(text));
 }
 
-/// Adds under `key` the value of `of` for the text of each file that `scene` names, if any.
-fn insert_files(meta: &mut Map<String, Json>, key: &str, scene: &Scene, of: impl Fn(&str) -> Json) {
+/// Adds under `key` the value that `value_of` returns for the text of each file that `scene` names, if any.
+fn insert_files(meta: &mut Map<String, Json>, key: &str, scene: &Scene, value_of: impl Fn(&str) -> Json) {
     let texts = scene.source.beside.iter();
-    let files: Map<String, Json> = texts.map(|(name, text)| (name.clone(), of(text))).collect();
+    let files: Map<String, Json> = texts.map(|(name, text)| (name.clone(), value_of(text))).collect();
     if !files.is_empty() {
         meta.insert(key.into(), Json::Object(files));
     }

@@ -45,7 +45,7 @@ impl Quantity {
         Self { value, powers: Ok(powers(dimension)) }
     }
 
-    /// Its SI value, whatever its dimension.
+    /// Its SI value, regardless of its dimension.
     pub fn value(&self) -> f64 {
         self.value
     }

@@ -8,13 +8,13 @@ use super::error::{no_ball_joint, no_body};
 use super::format::FILE;
 use super::include::{self, read_includes};
 use super::instance::{Group, Instance};
-use super::own::read_user_parameters;
 use super::pattern::{Pattern, read_patterns};
 use super::placement::read_placement;
 use super::read_bodies::{read_body, read_shape};
 use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, read_own_contact, sort_forest};
 use super::reading::Reading;
 use super::table::joint_part;
+use super::user_parameters::read_user_parameters;
 use super::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,7 +29,7 @@ impl Scene {
     /// # Errors
     /// Same as [`Self::load`].
     pub fn parse(text: &str, file: Option<&str>, changes: &[(String, String)]) -> Result<Self, SceneError> {
-        Self::parse_beside(text, file, AssetResolver::default(), changes)
+        Self::parse_with_assets(text, file, AssetResolver::default(), changes)
     }
 
     /// Like [`Self::parse`], for a text opened together with other files, `given` by name without folder. A file that also
@@ -44,7 +44,7 @@ impl Scene {
         folder: Option<&Path>,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        Self::parse_beside(text, file, AssetResolver::given(given, folder), changes)
+        Self::parse_with_assets(text, file, AssetResolver::given(given, folder), changes)
     }
 
     /// Like [`Self::parse`], with the contents of the named files in `beside`.
@@ -57,33 +57,33 @@ impl Scene {
         beside: &Texts,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        Self::parse_beside(text, file, AssetResolver::known(beside), changes)
+        Self::parse_with_assets(text, file, AssetResolver::known(beside), changes)
     }
 
-    /// Parses a scene; `beside` resolves the files it names.
-    pub(super) fn parse_beside(
+    /// Parses a scene; `assets` resolves the files it names.
+    pub(super) fn parse_with_assets(
         text: &str,
         file: Option<&str>,
-        beside: AssetResolver<'_>,
+        assets: AssetResolver<'_>,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        Self::read(text, file, beside, changes, |_, _| true)
+        Self::read(text, file, assets, changes, |_, _| true)
     }
 
-    /// Like [`Self::parse_beside`], without the changes of keys that `retains` rejects once the bodies and joints are read.
+    /// Like [`Self::parse_with_assets`], without the changes of keys that `retains` rejects once the bodies and joints are read.
     pub(super) fn read(
         text: &str,
         file: Option<&str>,
-        beside: AssetResolver<'_>,
+        assets: AssetResolver<'_>,
         changes: &[(String, String)],
         retains: fn(&Self, &str) -> bool,
     ) -> Result<Self, SceneError> {
         let of_text = changes.iter().filter(|(key, _)| replaces_text(key));
         let reading = Reading::new(of_text);
         let document =
-            Document { file, text, reading: &reading, beside: &beside, include: None, instance: None, on_hinge: false };
+            Document { file, text, reading: &reading, assets: &assets, include: None, instance: None, on_hinge: false };
         let mut scene = Self::read_document(document, changes, retains)?;
-        scene.source.beside = beside.into_texts();
+        scene.source.beside = assets.into_texts();
         Ok(scene)
     }
 
@@ -102,7 +102,7 @@ impl Scene {
         let documents: Vec<Document<'_>> = includes.iter().map(|include| include.document(document)).collect();
         let tables = documents.iter().map(Document::parse);
         let tables = tables.collect::<Result<Vec<_>, _>>()?;
-        // The places of the files may depend on parameters, whose names depend on the file.
+        // Placements may depend on parameters, whose names depend on the file: names come first.
         let named = includes.iter().zip(&tables).map(|(include, table)| include.named(table));
         let named: Vec<Option<Instance<'_>>> = named.collect();
         let included = documents.iter().zip(&tables).zip(&named).map(|((document, table), instance)| {
@@ -155,7 +155,7 @@ impl Scene {
     }
 }
 
-/// The scene as a group with a place of its own, if the file gives one.
+/// The scene as a group with its own placement, if the file gives one.
 ///
 /// # Errors
 /// An invalid place.
@@ -165,7 +165,7 @@ fn read_scene_instance<'d>(top: &Section<'_>) -> Result<Option<Instance<'d>>, Sc
 }
 
 /// Whether a change of a key replaces a value of the text, which is read again: a number of the text, the parameter that places
-/// bodies, or the preset, which gives way to other settings. Other parameters of the table are changed in the machine.
+/// bodies, or the preset, which other settings override. Other parameters of the table are changed in the machine.
 pub(super) fn replaces_text(key: &str) -> bool {
     let in_table = |(_, part): (&str, &str)| find(&format!("contact.{part}")).is_some();
     key == "solver.preset" || find(key).is_none() && !joint_part(key).is_some_and(in_table) && !is_fixed_in_file(key)
@@ -261,7 +261,7 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
 }
 
 fn default_of(parameter: &Parameter, sections: &BTreeMap<&str, Section<'_>>) -> Value {
-    // A partly defaulted gravity vector would surprise: if a section gives one component, the others are 0.
+    // A partly defaulted gravity vector would be surprising: if a section gives one component, the others are 0.
     if parameter.key.starts_with("gravity.") && sections.contains_key("gravity") {
         Value::Number(0.0)
     } else {
@@ -393,12 +393,12 @@ fn read_output(top: &Section<'_>, scene: &mut Scene, file_order: &[String]) -> R
     let last = file_order.last().map_or("", String::as_str);
     let section = top.get("output").map(|node| node.section()).transpose()?;
     let node = section.as_ref().and_then(|section| section.get("body"));
-    let wanted = node.as_ref().map_or(Ok(last), |node| node.text())?;
-    let found = scene.machine.bodies.iter().position(|body| body.name == wanted);
+    let output_name = node.as_ref().map_or(Ok(last), |node| node.text())?;
+    let found = scene.machine.bodies.iter().position(|body| body.name == output_name);
     let names = || scene.machine.bodies.iter().map(|body| body.name.as_str());
     let body = match (found, node) {
         (Some(body), _) => body,
-        (None, Some(node)) => return Err(node.error(no_body(wanted, names()))),
+        (None, Some(node)) => return Err(node.error(no_body(output_name, names()))),
         (None, None) => 0,
     };
     let probe = section.and_then(|section| section.get("probe")).map(|node| node.vector()).transpose()?;
@@ -406,7 +406,7 @@ fn read_output(top: &Section<'_>, scene: &mut Scene, file_order: &[String]) -> R
     Ok(())
 }
 
-/// Names read so far, with their nodes: they must be unique.
+/// Names read so far, which must be unique, with their nodes.
 #[derive(Default)]
 struct Names<'d> {
     places: BTreeMap<String, Node<'d>>,

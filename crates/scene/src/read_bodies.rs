@@ -110,7 +110,7 @@ fn read_solid(section: &Section<'_>, node: &Node<'_>, name: String, shapes: Vec<
     Ok(Body { name, mass, centre: solid.centre, inertia, shapes, density: Some(density) })
 }
 
-/// Whether a body without mass has no inertia, either, as one that only connects joints.
+/// Whether a body without mass also has no inertia, because it only connects joints.
 fn has_no_inertia(section: &Section<'_>) -> Result<bool, SceneError> {
     let moments: [f64; 3] = section.require("inertia")?.numbers()?;
     Ok(moments == [0.0; 3] && section.vector("products")? == Vec3::zeros())
@@ -199,7 +199,7 @@ fn read_mesh(section: &Section<'_>) -> Result<Geometry, SceneError> {
     let file = section.require("file")?;
     let name = file.text()?;
     let document = &file.document;
-    let mesh = document.beside.mesh(name);
+    let mesh = document.assets.mesh(name);
     let mesh = mesh.map_err(|why| match why {
         MeshError::Unavailable(fault) => file.error(fault.to_string()),
         MeshError::Invalid { text, fault } => error_in(name, text.as_deref(), fault, document),
@@ -257,8 +257,8 @@ fn read_colour(node: &Node<'_>) -> Result<[u8; 3], SceneError> {
     let parts = [0, 2, 4].map(|at| {
         let digits = digits?.get(at..at + 2)?;
         // `from_str_radix` would also accept a sign.
-        let plain = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
-        u8::from_str_radix(digits, 16).ok().filter(|_| plain)
+        let is_hexadecimal = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+        u8::from_str_radix(digits, 16).ok().filter(|_| is_hexadecimal)
     });
     match parts {
         [Some(red), Some(green), Some(blue)] => Ok([red, green, blue]),
@@ -269,7 +269,7 @@ fn read_colour(node: &Node<'_>) -> Result<[u8; 3], SceneError> {
     }
 }
 
-/// Transforms a fixed shape of the group `instance`. A box that turns becomes the plate of its shape.
+/// Transforms a fixed shape of the group `instance`. A rotated box becomes a plate of the same shape.
 fn place_shape(shape: &mut Shape, instance: &Instance<'_>) {
     let point = |point: Vec3| instance.point(None, point);
     match &mut shape.geometry {

@@ -41,10 +41,10 @@ pub(super) fn read_joint<'d>(
     let kind: JointKind = section.require("kind")?.word()?;
     let child_node = section.require("child")?;
     let place = |node: &Node<'_>, also| {
-        let wanted = &*node.body()?;
+        let name = &*node.body()?;
         let names = || Option::into_iter(also).chain(bodies.iter().map(String::as_str));
-        let place = places.get(wanted).copied();
-        place.ok_or_else(|| node.error(no_body(wanted, names())))
+        let place = places.get(name).copied();
+        place.ok_or_else(|| node.error(no_body(name, names())))
     };
     let child = place(&child_node, None)?;
     let parent_node = section.get("parent");
@@ -279,8 +279,8 @@ pub(super) fn read_coordinate(
 ) -> Result<(usize, Freedom), SceneError> {
     const LISTED: usize = 12;
     let node = section.require("joint")?;
-    let wanted = &*node.joint()?;
-    let found = joints.get(wanted).copied();
+    let name = &*node.joint()?;
+    let found = joints.get(name).copied();
     let joint = found.and_then(|index| scene.machine.kinematic_joints().nth(index));
     let freedoms = joint.map_or(&[][..], |joint| joint.kind.freedoms());
     let (Some(index), Some(joint), Some(first)) = (found, joint, freedoms.first()) else {
@@ -290,7 +290,7 @@ pub(super) fn read_coordinate(
         };
         let moving = scene.machine.kinematic_joints().filter(|joint| !joint.kind.freedoms().is_empty());
         let names = moving.map(|joint| joint.name.as_str());
-        let near = nearest(wanted, names.clone());
+        let near = nearest(name, names.clone());
         let mut listed: Vec<&str> = names.take(LISTED + 1).collect();
         if listed.len() > LISTED {
             listed[LISTED] = "…";

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::DeValue;
 
-use super::given::FileNumber;
+use super::file_number::FileNumber;
 use super::instance::Instance;
 use super::quantity::{DimensionError, Quantity};
 use jointplay_physics::expression::{ExpressionError, Number as _, Program};
@@ -38,7 +38,7 @@ impl ReadingError {
 pub(super) struct Reading<'d> {
     /// Changes of keys outside the parameter table: they replace values in the text.
     changes: BTreeMap<&'d str, Spanned<DeValue<'d>>>,
-    /// User-defined parameters, by their full names: after the name of an included file that defines them.
+    /// User-defined parameters, by their full names: with the prefix of the included file that defines them.
     own: RefCell<BTreeMap<String, Quantity>>,
     numbers: RefCell<BTreeMap<String, FileNumber>>,
     /// Functions of the scene's closed form read so far, with their values at t = 0.
@@ -123,7 +123,7 @@ impl<'d> Reading<'d> {
         Ok((program, has_units))
     }
 
-    /// The same for a function of the scene's closed form, or an expression of its functions, which are variables after t. The
+    /// As [`Self::formula`], for a function of the scene's closed form, or an expression of its functions, which are variables after t. The
     /// quantity is the value at t = 0, which need not be finite.
     ///
     /// # Errors
@@ -187,7 +187,7 @@ impl<'d> Reading<'d> {
         self.own.borrow_mut().insert(name.to_owned(), value);
     }
 
-    /// Whether `name` is that of a parameter of the scene or of a function.
+    /// Whether a parameter of the scene or a function has this name.
     pub fn is_defined(&self, name: &str) -> bool {
         self.own.borrow().contains_key(name) || self.functions.borrow().iter().any(|(own, _)| own == name)
     }
@@ -218,20 +218,20 @@ fn named<'a>(own: &'a BTreeMap<String, Quantity>, instance: Option<&Instance<'_>
     let prefix = instance.map_or("", Instance::prefix);
     let local = |name: &'a str| name.strip_prefix(prefix).filter(|name| !name.contains('.'));
     let shadowed = |name: &str| !prefix.is_empty() && own.contains_key(&format!("{prefix}{name}"));
-    let seen = own.iter().filter_map(|(name, value)| {
+    let visible = own.iter().filter_map(|(name, value)| {
         let common = || Some(&**name).filter(|name| !name.contains('.') && !shadowed(name));
         Some((local(name).or_else(common)?, *value))
     });
     let number = instance.and_then(Instance::number).map(|number| ("i", Quantity::constant(f64::from(number))));
-    seen.chain(number).unzip()
+    visible.chain(number).unzip()
 }
 
 /// Whether a text has operators beyond those of a number with its unit.
 fn has_operators(text: &str) -> bool {
     let rest = split_unit(text);
     // In a unit, letters follow the slash: `m/s`.
-    let number = |part: &str| part.trim_start().starts_with(|c: char| c.is_ascii_digit());
-    let divides = rest.split('/').skip(1).any(number);
+    let starts_with_digit = |part: &str| part.trim_start().starts_with(|c: char| c.is_ascii_digit());
+    let divides = rest.split('/').skip(1).any(starts_with_digit);
     divides || rest.starts_with(['/', '^']) || rest.contains(['*', '+', '-', '('])
 }
 

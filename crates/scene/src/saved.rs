@@ -1,4 +1,4 @@
-//! States of runs as text: what `run --save-state` writes into a file, and Python into a pickle.
+//! States of runs as text, which `run --save-state` writes to a file and Python to a pickle.
 
 use super::{Scene, SceneError, Texts, insert_texts, provenance};
 use jointplay_physics::simulate::State;
@@ -19,7 +19,7 @@ pub struct SavedState {
     pub time: f64,
 }
 
-/// Why a text is no state that can be resumed, or a state has no text.
+/// Why a text is not a resumable state, or a state cannot be written as text.
 #[derive(Debug, thiserror::Error)]
 pub enum SavedStateError {
     /// A number that JSON cannot represent.
@@ -55,7 +55,7 @@ pub enum SavedStateError {
     /// Parts are missing.
     #[error("incomplete: the state or its time is missing")]
     Incomplete,
-    /// The state is none.
+    /// The content is not a state.
     #[error("not a state: {0}")]
     State(serde_json::Error),
 }
@@ -114,7 +114,7 @@ impl SavedState {
     /// The scene of the run, with its changes, from the texts beside the state.
     ///
     /// # Errors
-    /// Texts that are no scene.
+    /// The texts are not a scene.
     pub fn scene(&self) -> Result<Scene, SceneError> {
         let texts = |key: &str| {
             let all = self.meta[key].as_object().into_iter().flatten();

@@ -4,7 +4,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, TableLike, Value as Tom
 
 use std::collections::BTreeMap;
 
-use super::given::{FileNumber, Place};
+use super::file_number::{FileNumber, Place};
 use super::table::joint_part;
 use super::{Scene, SceneError, Value};
 use jointplay_physics::units::exact_quantity;
@@ -55,8 +55,8 @@ impl Scene {
             };
             let text =
                 |number: &FileNumber| toml_of(&exact_quantity(number.value, number.unit, number.dimension)).to_string();
-            let here = |other: &&FileNumber| other.place == number.place;
-            let same: Vec<&FileNumber> = numbers.values().filter(here).collect();
+            let is_same_place = |other: &&FileNumber| other.place == number.place;
+            let same: Vec<&FileNumber> = numbers.values().filter(is_same_place).collect();
             let (span, text) = match &number.place {
                 Place::Included => {
                     return Err(refuse("it is in another file, which this one includes"));

@@ -11,7 +11,7 @@ pub struct FileNumber {
     pub value: f64,
     /// Physical dimension.
     pub dimension: Dimension,
-    /// Closed range that the reader allows whatever the other numbers are, SI; infinite for no limit of its own.
+    /// Closed range that the reader allows independently of other numbers, SI; infinite without a limit.
     pub(super) range: (f64, f64),
     pub(super) place: Place,
     /// Unit used in the file, or the SI unit if the text names none.

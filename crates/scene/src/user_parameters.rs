@@ -55,11 +55,11 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     let unit = section.get("unit").map(|node| node.text()).transpose()?;
     // The dimension is that of `unit`, or else of the unit written in the value of this file.
     let own_text = own_node.scalar()?;
-    let wanted = unit.unwrap_or_else(|| split_unit(own_text));
-    let found = all_units().find(|(of, ..)| same_unit(of, wanted));
+    let unit_text = unit.unwrap_or_else(|| split_unit(own_text));
+    let found = all_units().find(|(of, ..)| same_unit(of, unit_text));
     let (unit, dimension) = match found {
         Some((unit, dimension, _)) => (unit, dimension),
-        None if wanted.is_empty() => ("", Dimension::None),
+        None if unit_text.is_empty() => ("", Dimension::None),
         None => {
             let (at, key) = match section.get("unit") {
                 Some(node) => (node, "unknown unit"),
@@ -74,8 +74,8 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     let prefix = document.instance.map_or("", Instance::prefix);
     let key = section.get("key").map(|node| Ok(format!("{prefix}{}", read_key(&node, file)?)));
     let key = key.unwrap_or(Ok(title))?;
-    let whole = section.get("whole").map_or(Ok(false), |node| node.flag())?;
-    if let (true, Some(node), false) = (whole, section.get("whole"), dimension == Dimension::None) {
+    let is_integer = section.get("whole").map_or(Ok(false), |node| node.flag())?;
+    if let (true, Some(node), false) = (is_integer, section.get("whole"), dimension == Dimension::None) {
         return Err(node.error("a whole number has no unit"));
     }
     let value_node = value_node.with_key(key.clone());
@@ -94,14 +94,15 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     };
     let (min, max) = range.unwrap_or((-MAX_NUMBER, MAX_NUMBER));
     let slider = pair("slider")?.or(range).unwrap_or(around);
-    let kind = match whole {
+    let kind = match is_integer {
         true => Kind::Count { min: min as u64, max: max as u64 },
         false => Kind::Number { dimension, min, max, display: unit, slider, logarithmic: false },
     };
     let given = default.map_or(Value::Unset, |default| kind.value_of(default));
     let shown = visible_line;
     let row = row_of_file([&key, &shown(label), &shown(help), &shown(equation), &shown(group)], kind, given);
-    let checked = if whole { row.read(value_node.scalar()?).map(|_| ()) } else { row.check(&Value::Number(value)) };
+    let checked =
+        if is_integer { row.read(value_node.scalar()?).map(|_| ()) } else { row.check(&Value::Number(value)) };
     checked.map_err(|error| {
         let place = passed.map(|_| {
             let (line, _) = place_of(document.text, section.offset());
@@ -115,7 +116,7 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     Ok((row, default.is_some() || range.is_some()))
 }
 
-/// Reads a range: two quantities of this dimension, the lesser first.
+/// Reads a range: two quantities of this dimension, the smaller first.
 fn read_range(node: &Node<'_>, dimension: Dimension) -> Result<(f64, f64), SceneError> {
     let [least, most] = node.quantities::<2>(dimension)?;
     if least >= most {
@@ -124,13 +125,13 @@ fn read_range(node: &Node<'_>, dimension: Dimension) -> Result<(f64, f64), Scene
     Ok((least, most))
 }
 
-/// Reads the key by which a parameter is changed: names with dots between them, the first of which is no key of the `file`.
+/// Reads the key by which a parameter is changed: dot-separated names, the first of which is not a key of the `file`.
 fn read_key(node: &Node<'_>, file: &FileTable) -> Result<String, SceneError> {
     let key = node.text()?;
     let letters = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
     let name = |part: &str| !part.is_empty() && part.chars().all(letters);
-    let taken = key.split('.').next().is_some_and(|first| file.key(first, None).is_some());
-    if key.len() > 40 || taken || !key.split('.').all(name) {
+    let is_file_key = key.split('.').next().is_some_and(|first| file.key(first, None).is_some());
+    if key.len() > 40 || is_file_key || !key.split('.').all(name) {
         return Err(node.error(
             "is not a key; allowed 1 to 40 letters (a to z), digits, `_`, `-`, and dots between them, and not first a key of the file",
         ));
