@@ -174,11 +174,11 @@ struct SignalValue<'a> {
 }
 
 /// Calls `add` with the values of all signals that have a place, in order of place. Signals that share a place and are repeated
-/// for the same parts are laid out part by part. Only the first `most` parts are used.
+/// for the same parts are laid out part by part. Only the first `max_parts` parts are used.
 fn lay_out(
     machine: &Machine,
     first: Option<&Frame>,
-    most: usize,
+    max_parts: usize,
     place: impl Fn(&Signal) -> Option<u8>,
     mut add: impl FnMut(SignalValue<'_>),
 ) {
@@ -187,9 +187,9 @@ fn lay_out(
     let key = |signal: &Signal| (place(signal), signal.source.repetition());
     for group in signals.chunk_by(|a, b| key(a) == key(b)) {
         let parts = parts_of(machine, group[0].source.repetition());
-        for (part, (name, freedom)) in parts.into_iter().take(most).enumerate() {
-            let here = |signal: &&&Signal| has_signal(machine, first, signal, part, freedom);
-            for signal in group.iter().filter(here) {
+        for (part, (name, freedom)) in parts.into_iter().take(max_parts).enumerate() {
+            let exists = |signal: &&&Signal| has_signal(machine, first, signal, part, freedom);
+            for signal in group.iter().filter(exists) {
                 let source = signal.source;
                 for (component, &(symbol, word)) in source.components().iter().enumerate() {
                     let members = [source.member(), symbol, name];
@@ -274,11 +274,14 @@ mod tests {
             assert!(plots.any(|plot| plot == quantity), "{quantity:?}");
         }
         for in_run in [false, true] {
-            let here = |signal: &&Signal| {
+            let is_listed = |signal: &&Signal| {
                 if in_run { signal.run.is_some() } else { signal.plot.is_some() }
             };
-            let mut columns: Vec<(&str, usize)> =
-                TABLE.iter().filter(here).map(|signal| (signal.column, signal.source.repetition() as usize)).collect();
+            let mut columns: Vec<(&str, usize)> = TABLE
+                .iter()
+                .filter(is_listed)
+                .map(|signal| (signal.column, signal.source.repetition() as usize))
+                .collect();
             let all = columns.len();
             columns.sort_unstable();
             columns.dedup();

@@ -424,8 +424,8 @@ mod tests {
         let range = bins(&history, 0, 0.0, 1e-2, 1000);
         assert_eq!(range.len(), 1000);
         for (n, bin) in range.iter().enumerate() {
-            let wanted = 0.203_441 + 1e-12 * wave(n as u64);
-            assert!((bin.least - wanted).abs() < 1e-15, "{n}: {bin:?}");
+            let expected = 0.203_441 + 1e-12 * wave(n as u64);
+            assert!((bin.least - expected).abs() < 1e-15, "{n}: {bin:?}");
         }
         let range = bins(&history, 1, 0.0, 1e-2, 1000);
         assert_eq!(range[range.len() - 1].greatest, 0.0);

@@ -193,8 +193,8 @@ impl Impacts {
 
     fn since(&self, first: u64) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
         let length = self.finished.len() as u64;
-        let most = (self.count - first) as usize;
-        (0..most).map(move |n| &self.finished[((first + n as u64) % length) as usize])
+        let count = (self.count - first) as usize;
+        (0..count).map(move |n| &self.finished[((first + n as u64) % length) as usize])
     }
 
     /// Appends the impacts not yet handed out.

@@ -387,17 +387,17 @@ mod tests {
     #[test]
     fn steps_between_slow_frames_come_in_short_spells_and_reach_the_requested_scale() {
         // At speed 0.5 at most half a second per second is possible, less the time for drawing.
-        for (speed, wanted) in [(0.5, 0.1), (0.5, 1.0), (10.0, 1.0)] {
+        for (speed, requested) in [(0.5, 0.1), (0.5, 1.0), (10.0, 1.0)] {
             let mut pacer = Pacer::default();
-            pacer.set_scale(wanted);
+            pacer.set_scale(requested);
             // The first frames do not know yet that they cannot keep up.
             stepped_between(&mut pacer, 20, 0.03, 0.12, speed);
             let longest = stepped_between(&mut pacer, 100, 0.03, 0.12, speed);
-            assert!(longest <= SPELL + 1e-5 / speed + 1e-12, "{speed} {wanted}: {longest}");
+            assert!(longest <= SPELL + 1e-5 / speed + 1e-12, "{speed} {requested}: {longest}");
             let reached = pacer.reached_scale().expect("measured");
             // Stepping takes nearly as much time as everything else.
-            let least = wanted.min(0.45 * speed);
-            assert!(reached > 0.98 * least && reached < 1.01 * wanted, "{speed} {wanted}: {reached}");
+            let least = requested.min(0.45 * speed);
+            assert!(reached > 0.98 * least && reached < 1.01 * requested, "{speed} {requested}: {reached}");
         }
     }
 

@@ -217,7 +217,7 @@ pub struct Workspace {
 }
 
 /// Identifies the workspace that a state is attached to: both hold the same number, a new one each time a workspace is attached
-/// to a state. A clone of a state, and a state that was read, are attached to none. The numbers do not enter any computation.
+/// to a state. Clones of a state and states read from files are attached to none. The numbers do not enter any computation.
 #[derive(Debug, Default)]
 struct WorkspaceId(u64);
 
@@ -359,7 +359,7 @@ impl Simulation {
         self.workspace.attach_to(&self.model, &mut self.state);
     }
 
-    /// Continues from a state that was read from a file.
+    /// Continues from a state read from a file.
     ///
     /// # Errors
     /// If the state cannot belong to this model; the simulation is then unchanged.
@@ -574,10 +574,10 @@ impl Simulation {
     }
 
     /// Moves the stored approach speeds of the contacts towards those of `other`, a run in nearly the same state, by the fraction
-    /// `part` of their difference.
-    pub fn blend_approach_speeds(&mut self, other: &Self, part: f64) {
+    /// `fraction` of their difference.
+    pub fn blend_approach_speeds(&mut self, other: &Self, fraction: f64) {
         for (own, other) in self.state.now.contact_states.iter_mut().zip(&other.state.now.contact_states) {
-            own.approach_speed += part * (other.approach_speed - own.approach_speed);
+            own.approach_speed += fraction * (other.approach_speed - own.approach_speed);
         }
     }
 

@@ -22,25 +22,25 @@ pub enum StopFault {
     /// An ideal motion at a pose beyond which its loops could close on another branch.
     #[error("the loops through the ideal ball joints pass a singular pose")]
     SingularLoops,
-    /// An ideal motion that is not where the closed form has the output body.
+    /// An ideal motion whose output body has left the path in closed form.
     #[error(
         "the output body is {distance:.1e} m off its path in [closed_form]: the path does not fit the drives here, or the loops \
          have closed on another branch"
     )]
     OffPath {
-        /// Of the probe's tip, or of the body's origin if there is no probe, m.
+        /// Distance of the probe's tip, or of the body's origin without a probe, from the path, m.
         distance: f64,
     },
     /// Loops left open by projection.
     #[error("the loops through the ideal ball joints came apart by {open:.1e} m")]
     OpenLoops {
-        /// m.
+        /// Largest gap, m.
         open: f64,
     },
     /// Stabilised constraints that have drifted too far to hold the mechanism together.
     #[error("the constraints of formulation lagrange drifted by {drift:.1e} m")]
     Drift {
-        /// m, or rad.
+        /// Largest constraint error, m or rad.
         drift: f64,
     },
     /// Constraint rows of the `lagrange` form that become dependent.
