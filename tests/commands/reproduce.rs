@@ -246,7 +246,7 @@ fn interrupt(folder: &Path) {
     fs::write(&first, &intact).unwrap();
     let other = jointplay(folder, "reproduce --out report");
     assert_eq!(other.code, Some(2), "{}", other.stderr);
-    assert!(other.stderr.contains("begun with other settings"), "{}", other.stderr);
+    assert!(other.stderr.contains("started with other settings"), "{}", other.stderr);
     assert!(entries() == left, "the partial report is unchanged");
 }
 
