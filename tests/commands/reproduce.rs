@@ -75,16 +75,16 @@ fn quick_report() -> &'static (tempfile::TempDir, Outcome) {
 
 #[cfg(unix)]
 #[test]
-#[ignore = "half a minute for the report, part of `./test full`"]
-fn full_ctrl_c_leaves_no_incomplete_report_and_the_same_command_resumes() {
+#[ignore = "long: half a minute for the report"]
+fn long_ctrl_c_leaves_no_incomplete_report_and_the_same_command_resumes() {
     let (folder, run) = quick_report();
     assert!(run.stderr.contains("resuming where report.partial stopped"), "{}", run.stderr);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing but the report is left");
 }
 
 #[test]
-#[ignore = "half a minute for the report, part of `./test full`"]
-fn full_a_quick_report_is_complete_and_its_page_agrees_with_its_data() {
+#[ignore = "long: half a minute for the report"]
+fn long_a_quick_report_is_complete_and_its_page_agrees_with_its_data() {
     let (folder, run) = quick_report();
     assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
     assert!(run.stdout.contains("Statements") && run.stdout.contains("report/index.html"));
@@ -252,8 +252,8 @@ fn interrupt(folder: &Path) {
 
 #[cfg(unix)]
 #[test]
-#[ignore = "full: a minute"]
-fn full_neither_interruptions_nor_threads_change_a_byte_of_the_report() {
+#[ignore = "long: a minute"]
+fn long_neither_interruptions_nor_threads_change_a_byte_of_the_report() {
     let folder = tempfile::tempdir().unwrap();
     jointplay(folder.path(), "reproduce --out report --quick --quiet --threads 1").expect(0);
     let (one, other) = (files(&folder.path().join("report")), files(&quick_report().0.path().join("report")));

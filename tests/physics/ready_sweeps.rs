@@ -50,8 +50,8 @@ fn every_ready_sweep_has_a_description_and_a_range_that_its_scene_accepts() {
 }
 
 #[test]
-#[ignore = "full: minutes"]
-fn full_the_road_to_chaos_begins_with_impacts() {
+#[ignore = "long: minutes"]
+fn long_the_road_to_chaos_begins_with_impacts() {
     let ready = sweep_named("Road to chaos");
     let speeds: Vec<usize> = (21..=45).collect();
     assert_eq!((ready.from, ready.to, ready.values), ("21 rad/s", "45 rad/s", speeds.len()));
