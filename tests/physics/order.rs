@@ -41,7 +41,8 @@ fn equal_discrete_steps(m: &mut Mechanism, start: &[f64], duration: f64, steps: 
     m.evaluator(ActiveSet::Nothing).derivative(0.0, &y, &mut k);
     let h = duration / f64::from(steps);
     for i in 0..steps {
-        let from = StepStart { t: f64::from(i) * h, h, y: &y, k: &k, contact_states: &contact_states };
+        let (t, rebounds) = (f64::from(i) * h, &vec![None; contact_states.len()]);
+        let from = StepStart { t, h, y: &y, k: &k, contact_states: &contact_states, rebounds };
         let mut m = m.evaluator(ActiveSet::Nothing);
         assert!(m.discrete_step(&from, false, &mut end));
         for (k, (end, start)) in k.iter_mut().zip(end.iter().zip(&y)) {

@@ -25,6 +25,8 @@ pub struct ContactStep {
     pub slip: Vec3,
     /// Approach speed in the damping term so far, m/s.
     pub approach: f64,
+    /// Force over elastic force with which the ball rebounds, in place of the law's damping: see [`Coefficients::rebound`].
+    pub rebound: Option<f64>,
 }
 
 /// The force of a contact over one step, and its derivatives.
@@ -57,6 +59,14 @@ impl StepForce {
 }
 
 impl Coefficients {
+    /// Force over elastic force with which a ball of the effective mass `mass` (kg), `penetration` (m) deep at the penetration
+    /// `rate` (m/s), leaves its wall at the speed `separation`, m/s. Few steps in an impact lose too little energy by the damping
+    /// at their mean rates; this returns what the law leaves, and never creates any.
+    pub fn rebound(&self, mass: f64, penetration: f64, rate: f64, separation: f64) -> f64 {
+        let missing = 0.5 * mass * (separation * separation - rate * rate);
+        (missing / self.elastic_energy(penetration)).clamp(0.0, 1.0)
+    }
+
     /// Force over `step` for the mean velocity `velocity` of the centres (m/s), so that e1 = e0 + h u, and the mean velocity
     /// `slip` used by friction (m/s). `slip_change` is the change of `slip` by the latest iteration, m/s, infinite before the first:
     /// the derivatives depend on it, the force does not.
@@ -77,12 +87,13 @@ impl Coefficients {
         let rate = (d1 - d0) / h;
         let rising = self.uses_largest_rate && rate > step.approach;
         let approach = if rising { rate } else { step.approach };
-        let damping = 1.0 + self.damping * rate / approach;
+        let damping = step.rebound.unwrap_or(1.0 + self.damping * rate / approach);
         if elastic <= 0.0 || damping <= 0.0 {
             return StepForce::none(normal);
         }
         let force = elastic * damping;
-        let by_rate = h * stiffness * damping + if rising { 0.0 } else { elastic * self.damping / approach };
+        let damping_slope = if rising || step.rebound.is_some() { 0.0 } else { elastic * self.damping / approach };
+        let by_rate = h * stiffness * damping + damping_slope;
         let tangent = Mat3::identity() - normal * normal.transpose();
         let mut direction = -normal;
         let mut by_slip = Mat3::zeros();
@@ -147,6 +158,7 @@ mod tests {
             clearances: [3e-4; 2],
             slip: Vec3::new(0.01, 0.03, 0.0),
             approach: 0.05,
+            rebound: None,
         }
     }
 

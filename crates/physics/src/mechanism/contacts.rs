@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::elements::{ActiveSet, At, Contact, ForceElement, Gap, Loads};
 use super::kinematics::Kinematics;
-use super::model::Model;
+use super::model::{BallJoint, Model};
 use crate::contact::{Coefficients, Parameters};
 use crate::machine::{Machine, Vec3};
 
@@ -20,6 +20,44 @@ pub struct Ramp {
     pub rate: f64,
     /// Clearance at the end, m.
     pub to: f64,
+}
+
+/// Group of each ball joint of `machine`: a tree of bodies, with all trees that joints and force elements connect to it.
+fn groups(machine: &Machine, model: &Model) -> Vec<usize> {
+    fn root(above: &mut [usize], mut block: usize) -> usize {
+        while above[block] != block {
+            above[block] = above[above[block]];
+            block = above[block];
+        }
+        block
+    }
+    let block_of = |body: usize| {
+        let moves = model.bodies.get(body).is_some_and(|body| !body.driven_only);
+        moves.then(|| model.block_of[body])
+    };
+    let mut above: Vec<usize> = (0..model.blocks.len()).collect();
+    let mut connect = |bodies: &mut dyn Iterator<Item = usize>| {
+        let mut blocks = bodies.filter_map(block_of);
+        let Some(first) = blocks.next() else { return };
+        for block in blocks {
+            let (a, b) = (root(&mut above, first), root(&mut above, block));
+            above[b] = a;
+        }
+    };
+    for joint in &model.joints {
+        connect(&mut [joint.ball.body, joint.socket.body].into_iter());
+    }
+    for pair in &model.closures {
+        connect(&mut [pair.child.body, pair.parent.body].into_iter());
+    }
+    for element in &machine.elements {
+        connect(&mut element.points(machine).iter().filter_map(|point| point.body));
+    }
+    let group = |joint: &BallJoint| {
+        let block = block_of(joint.ball.body).or_else(|| block_of(joint.socket.body));
+        block.map_or(usize::MAX, |block| root(&mut above, block))
+    };
+    model.joints.iter().map(group).collect()
 }
 
 impl Ramp {
@@ -37,6 +75,8 @@ pub struct Contacts {
     ramps: Vec<Option<Ramp>>,
     has_ramps: bool,
     has_contacts: bool,
+    /// Joints of the same group act on one another.
+    groups: Vec<usize>,
     /// Evaluations skip joints without contact, because some of their bodies are suspended.
     pub(super) skips_inactive_joints: bool,
 }
@@ -57,6 +97,7 @@ impl Contacts {
             ramps: vec![None; joints.len()],
             joints,
             parameters,
+            groups: groups(machine, model),
             has_ramps: false,
             skips_inactive_joints: false,
         }
@@ -75,6 +116,12 @@ impl Contacts {
     /// Whether joint `i` has a clearance.
     pub fn has_clearance(&self, i: usize) -> bool {
         self.joints[i].has_clearance()
+    }
+
+    /// Whether the forces of joints `i` and `j` act on one another: their bodies are connected, however far, other than through
+    /// the world and driven bodies.
+    pub fn interact(&self, i: usize, j: usize) -> bool {
+        self.groups[i] == self.groups[j]
     }
 
     /// Joints with clearance.

@@ -182,6 +182,8 @@ pub struct StepStart<'a> {
     pub k: &'a [f64],
     /// Contact states.
     pub contact_states: &'a [ContactState],
+    /// [`ContactStep::rebound`] of each ball joint.
+    pub rebounds: &'a [Option<f64>],
 }
 
 impl DiscreteGradient {
@@ -267,6 +269,7 @@ impl DiscreteGradient {
                 } else {
                     law.speed_floor.max(start.rate)
                 },
+                rebound: from.rebounds[j],
             };
             let mean = (end - start.eccentricity) / from.h;
             let normal = step.mean_normal(&mean);
@@ -806,7 +809,8 @@ mod tests {
 
         /// Takes a step of size `h`, s; contact states follow the penetrations.
         fn step(&mut self, h: f64) {
-            let from = StepStart { t: self.t, h, y: &self.y, k: &self.k, contact_states: &self.contact_states };
+            let (contact_states, rebounds) = (&self.contact_states, &vec![None; self.contact_states.len()]);
+            let from = StepStart { t: self.t, h, y: &self.y, k: &self.k, contact_states, rebounds };
             let mut end = self.y.clone();
             let mut evaluator = self.mechanism.evaluator(ActiveSet::Immediate(&self.contact_states));
             assert!(evaluator.discrete_step(&from, false, &mut end), "converges");

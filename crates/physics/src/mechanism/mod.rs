@@ -531,6 +531,14 @@ impl Mechanism {
         self.equations.positions(&self.model)
     }
 
+    /// Rounding error of the distance between two points of the machine in the state `y`, m: a few units in the last place of
+    /// their coordinates.
+    pub fn rounding(&self, y: &[f64]) -> f64 {
+        const UNITS: f64 = 32.0;
+        let farthest = y[..self.positions()].iter().fold(self.model.extent, |most, q| most.max(q.abs()));
+        UNITS * f64::EPSILON * farthest
+    }
+
     /// Absolute scale of each component of a state.
     pub fn scale(&self) -> &[f64] {
         self.equations.scale(&self.model)

@@ -178,6 +178,8 @@ pub struct Model {
     pub scale: Vec<f64>,
     /// Length from which the position scales are derived, m.
     pub length_scale: f64,
+    /// Bound on the distance from the origin of every point of the machine with all coordinates at zero, m.
+    pub extent: f64,
     pub output_body: BodyIndex,
     /// Probe tip from the output body's centroid, body axes.
     pub probe: Option<Vec3>,
@@ -329,6 +331,7 @@ impl Model {
             start_state: Vec::new(),
             scale: Vec::new(),
             length_scale: Scales::of(machine).length,
+            extent: 0.0,
             output_body: machine.output.body,
             probe: machine.output.probe.map(|p| p - machine.bodies[machine.output.body].centre),
             shortest_period,
@@ -352,7 +355,23 @@ impl Model {
             let [parent, child] = joint.points().map(|point| model.anchor(machine, &point));
             model.closures.push(Pair::new(joint, child, parent));
         }
+        model.extent = model.distances().fold(0.0, f64::max);
         model
+    }
+
+    /// Bounds on the distances of the anchors of cut joints, and of all centroids, from the origin with all coordinates at zero,
+    /// m.
+    fn distances(&self) -> impl Iterator<Item = f64> {
+        // The world, the last, has no offset.
+        let mut centroids = vec![0.0; self.bodies.len() + 1];
+        for &b in &self.order {
+            let body = &self.bodies[b];
+            centroids[b] = centroids[body.parent] + body.from_parent.norm() + body.to_centroid.norm();
+        }
+        let balls = self.joints.iter().flat_map(|joint| [joint.socket, joint.ball]);
+        let closures = self.closures.iter().flat_map(|pair| [pair.child, pair.parent]);
+        let anchors: Vec<f64> = balls.chain(closures).map(|at| centroids[at.body] + at.offset.norm()).collect();
+        anchors.into_iter().chain(centroids)
     }
 
     /// The two-degree joint whose link or child is body `b`, and which of its coordinates moves `b`.

@@ -30,7 +30,7 @@ pub struct Impact {
     pub law: f64,
     /// Whether it began slower than `impact_speed_floor`: it then rebounds higher than requested.
     pub floored: bool,
-    /// Whether another ball joint was in contact meanwhile, or a live change altered the contact: the law alone then does not
+    /// Whether another ball joint that acts on the same bodies was in contact meanwhile, or a live change altered the contact: the law alone then does not
     /// determine its restitution.
     pub disturbed: bool,
     /// Accepted steps from its beginning to its end; with fixed steps, including those in which it begins and ends.
@@ -114,7 +114,7 @@ impl Impacts {
     }
 
     /// Records that a contact of `joint` begins at `time` with penetration rate `speed` (m/s), which was changing at `push`
-    /// (m/s^2); `in_contact` if another joint is in contact.
+    /// (m/s^2); `in_contact` if another joint is in contact that `interacts` with it.
     pub(super) fn begin(
         &mut self,
         joint: usize,
@@ -124,8 +124,9 @@ impl Impacts {
         push: f64,
         coefficients: &Coefficients,
         in_contact: bool,
+        interacts: impl Fn(usize) -> bool,
     ) {
-        for other in self.under_way.iter_mut().flatten() {
+        for other in self.under_way.iter_mut().flatten().filter(|other| interacts(other.joint)) {
             other.disturbed = true;
         }
         let law = &mut self.laws[joint];
@@ -154,6 +155,14 @@ impl Impacts {
             impact.deepest = impact.deepest.max(cubic.deepest());
             impact.peak = impact.peak.max(force);
         }
+    }
+
+    /// Approach speed of the undisturbed impact of `joint` under way, and the speed with which its law lets it separate, m/s. Below
+    /// `floor` (m/s) the damping is less by the ratio of the speeds, and so is the loss, to first order.
+    pub(super) fn speeds_under_way(&self, joint: usize, floor: f64) -> Option<[f64; 2]> {
+        let impact = self.under_way[joint].as_ref().filter(|impact| !impact.disturbed)?;
+        let (speed, law) = (impact.approach_speed, impact.law);
+        Some([speed, speed * (1.0 - (1.0 - law) * (speed / floor).min(1.0))])
     }
 
     /// Largest normal force so far in the current impact of `joint`, N; infinite without one.

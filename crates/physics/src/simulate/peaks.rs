@@ -53,25 +53,33 @@ impl Recent {
     }
 }
 
-/// Cubic Hermite polynomial of the penetration over one step.
+/// Cubic Hermite polynomial of the penetration over one step; over a step so short that its rise is known better from the rates
+/// than from the penetrations, the parabola of the rates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PenetrationCubic {
     start: Approach,
     end: Approach,
+    /// Change of the penetration over the step, m.
+    rise: f64,
     h: f64,
 }
 
 impl PenetrationCubic {
-    pub(super) fn new(start: Approach, end: Approach, h: f64) -> Self {
-        Self { start, end, h }
+    /// The cubic of a step of `h` seconds, for penetrations known to within `rounding`, m. A step between two events may last
+    /// 1e-15 s: the difference of its penetrations is then rounding error, and its slope arbitrary.
+    pub(super) fn new(start: Approach, end: Approach, h: f64, rounding: f64) -> Self {
+        let rise = end.penetration - start.penetration;
+        let rise_of_rates = 0.5 * h * (start.rate + end.rate);
+        let rise = if (rise - rise_of_rates).abs() > rounding { rise } else { rise_of_rates };
+        Self { start, end, rise, h }
     }
 
     /// Penetration, rate and second derivative at `theta` in 0..=1.
     pub(super) fn at(&self, theta: f64) -> (f64, f64, f64) {
-        let (p0, p1) = (self.start.penetration, self.end.penetration);
+        let p0 = self.start.penetration;
         let (m0, m1) = (self.h * self.start.rate, self.h * self.end.rate);
         // p0 + m0 s + a s^2 + b s^3
-        let d = p1 - p0;
+        let d = self.rise;
         let (a, b) = (3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d);
         let s = theta;
         (
@@ -118,7 +126,7 @@ impl PenetrationCubic {
     pub(super) fn fastest(&self, from: f64) -> (f64, f64) {
         let start = if from > 0.0 { self.at(from).1 } else { self.start.rate };
         let ends = if self.end.rate > start { (self.end.rate, 1.0) } else { (start, from) };
-        let d = self.end.penetration - self.start.penetration;
+        let d = self.rise;
         let (m0, m1) = (self.h * self.start.rate, self.h * self.end.rate);
         let (a, b) = (3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d);
         let vertex = -a / (3.0 * b);
@@ -151,7 +159,7 @@ impl PenetrationCubic {
         let (v0, v1) = (self.start.rate, self.end.rate);
         let third = self.h / 3.0;
         let penetration = p0.max(p1).max(p0 + v0 * third).max(p1 - v1 * third);
-        let rate = v0.max(v1).max((p1 - p0) / third - v0 - v1);
+        let rate = v0.max(v1).max(self.rise / third - v0 - v1);
         c.normal_force(penetration, rate, contact_state.approach(c, rate))
     }
 
@@ -212,7 +220,7 @@ mod tests {
             let state = ContactState::at_onset(&c, 0.06);
             for (start, end) in ends.iter().flat_map(|start| ends.iter().map(move |end| (*start, *end))) {
                 for h in [1e-6, 2e-5, 2e-4] {
-                    let cubic = PenetrationCubic::new(start, end, h);
+                    let cubic = PenetrationCubic::new(start, end, h, 0.0);
                     let bound = cubic.force_bound(&c, &state);
                     for theta in (0..=100).map(|i| 0.01 * f64::from(i)) {
                         let (p, v, _) = cubic.at(theta);
@@ -235,7 +243,7 @@ mod tests {
         };
         let (start, end) = (0.43e-4, 0.53e-4);
         let (force, theta) =
-            PenetrationCubic::new(at(start), at(end), end - start).strongest(&c, &ContactState::at_onset(&c, 0.1));
+            PenetrationCubic::new(at(start), at(end), end - start, 0.0).strongest(&c, &ContactState::at_onset(&c, 0.1));
         let exact = c.normal_force(a, 0.0, 0.1);
         // The Hermite interpolation error of the penetration, (pi h / T)^4 / 384 = 2.5e-5, enters the force to the power
         // 1.5.

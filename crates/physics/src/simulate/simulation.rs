@@ -262,6 +262,8 @@ struct Attempt {
     may_contain_peak: bool,
     /// Largest normal force of each joint in contact, N, and the fraction of the step at which it occurs.
     peak_forces: Vec<(f64, f64)>,
+    /// [`StepStart::rebounds`](crate::mechanism::StepStart::rebounds) of a discrete-gradient step.
+    rebounds: Vec<Option<f64>>,
     /// Step size times the largest eigenvalue seen; 0 if unknown.
     stiffness: f64,
     /// Evaluations spent so far, and factorisations.

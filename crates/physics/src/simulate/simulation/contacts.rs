@@ -5,6 +5,7 @@ use super::{Run, State};
 use crate::contact::{Coefficients, ContactState, Separation};
 use crate::integrate::StepControl;
 use crate::machine::MIN_IMPACT_STEPS;
+use crate::mechanism::Contacts;
 use crate::simulate::peaks::PenetrationCubic;
 
 /// Largest penetration, as a fraction of the clearance, of a ball that is at its wall to within rounding.
@@ -12,6 +13,8 @@ const AT_WALL: f64 = 1e-9;
 
 /// Push on a ball whose motion before the contact is unknown, m/s^2.
 const UNKNOWN_PUSH: f64 = f64::MAX;
+/// Time over which the change of a rate says nothing about the push, s: it is rounding error.
+const TOO_SHORT_FOR_PUSH: f64 = 1e-9;
 
 /// Changes in the contact state at the end of a step.
 #[derive(Clone, Copy)]
@@ -25,17 +28,12 @@ pub(super) struct ContactChanges {
 impl State {
     /// Records that contact `j` begins at `time` with penetration rate `rate` (m/s), which was changing at `push` (m/s^2), and
     /// restitution setting `asked`; returns its contact state.
-    fn begin(
-        &mut self,
-        j: usize,
-        time: f64,
-        rate: f64,
-        push: f64,
-        asked: f64,
-        coefficients: &Coefficients,
-    ) -> ContactState {
-        let among_others = self.now.contact_states.iter().any(|m| m.active);
-        self.record.impacts.begin(j, time, rate, asked, push, coefficients, among_others);
+    fn begin(&mut self, j: usize, time: f64, rate: f64, push: f64, asked: f64, contacts: &Contacts) -> ContactState {
+        let coefficients = contacts.coefficients(j);
+        let interacts = |other: usize| contacts.interact(j, other);
+        let mut active = self.now.contact_states.iter().enumerate().filter(|(_, m)| m.active);
+        let among_others = active.any(|(other, _)| interacts(other));
+        self.record.impacts.begin(j, time, rate, asked, push, coefficients, among_others, interacts);
         let contact_state = ContactState::at_onset(coefficients, rate);
         self.record.statistics.impacts[j] += 1;
         let peak = &mut self.record.peaks[j];
@@ -85,7 +83,7 @@ impl Run<'_> {
             }
             if penetration <= AT_WALL * contact.clearance && rate > 0.0 {
                 state.now.contact_states[j] =
-                    state.begin(j, 0.0, rate, UNKNOWN_PUSH, contact.restitution, coefficients);
+                    state.begin(j, 0.0, rate, UNKNOWN_PUSH, contact.restitution, &mechanism.contacts);
             } else {
                 state.now.contact_states[j] = ContactState::at_onset(coefficients, f64::NEG_INFINITY);
                 state.record.statistics.impacts[j] += 1;
@@ -101,9 +99,9 @@ impl Run<'_> {
         for j in 0..state.conditions.joints.len() {
             let gap = state.now.gaps[j];
             if mechanism.contacts.has_clearance(j) && gap.is_arriving() && !state.now.contact_states[j].active {
-                let (asked, coefficients) =
-                    (state.conditions.joints[j].restitution, mechanism.contacts.coefficients(j));
-                state.now.contact_states[j] = state.begin(j, state.now.t, gap.rate, UNKNOWN_PUSH, asked, coefficients);
+                let asked = state.conditions.joints[j].restitution;
+                state.now.contact_states[j] =
+                    state.begin(j, state.now.t, gap.rate, UNKNOWN_PUSH, asked, &mechanism.contacts);
                 state.record.contact_steps[j] = 0;
                 begins = true;
             }
@@ -116,11 +114,14 @@ impl Run<'_> {
     /// Starts and ends contacts whose penetration changed sign over the step just accepted.
     pub(super) fn switch_contacts(&mut self, h: f64) -> ContactChanges {
         let located = self.attempt.located_joint.take();
-        let fixed = !self.locates();
+        let (fixed, rounding) = (!self.locates(), self.rounding());
         let Self { mechanism, state, before, attempt, .. } = self;
         let peak_forces = &attempt.peak_forces;
         let counts_steps = state.conditions.solver.method.control() == StepControl::Fixed;
         let mut changes = ContactChanges { contacts: false, forces: false };
+        // What is as close to its wall as the located ball, which is there but for the error of the step, switches in the same
+        // instant.
+        let at_wall = located.map_or(0.0, |j| state.now.gaps[j].penetration.abs()) + rounding;
         for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
@@ -128,21 +129,21 @@ impl Run<'_> {
             let (start, end) = (before.gaps[j], state.now.gaps[j]);
             let coefficients = mechanism.contacts.coefficients(j);
             if state.now.contact_states[j].active {
-                let cubic = PenetrationCubic::new(start, end, h);
+                let cubic = PenetrationCubic::new(start, end, h, rounding);
                 let contact_state = state.now.contact_states[j].unfrozen();
                 state.record_contact_step(j, before.t, &cubic, coefficients, peak_forces[j].0, &contact_state, 0.0);
             }
             // A located switch ends within rounding of the wall, on either side. The repeated step may still show that a ball
             // about to separate has turned back.
-            let turned_back = state.now.contact_states[j].active && end.penetration > 0.0 && end.rate > 0.0;
-            let in_contact = match located {
-                Some(located) if located == j => !state.now.contact_states[j].active || turned_back,
-                _ => end.penetration > 0.0 || end.is_arriving(),
-            };
+            let active = state.now.contact_states[j].active;
+            let turned_back = active && end.penetration > 0.0 && end.rate > 0.0;
+            let at_wall = end.penetration.abs() <= at_wall && end.rate != 0.0 && active == (end.rate < 0.0);
+            let switches = located.is_some_and(|located| located == j || at_wall);
+            let in_contact = if switches { !active || turned_back } else { end.penetration > 0.0 || end.is_arriving() };
             state.record.contact_steps[j] += 1;
             if in_contact == state.now.contact_states[j].active {
                 if in_contact {
-                    let fastest = || PenetrationCubic::new(start, end, h).fastest(0.0).0;
+                    let fastest = || PenetrationCubic::new(start, end, h, rounding).fastest(0.0).0;
                     let contact_state = &mut state.now.contact_states[j];
                     changes.forces |= contact_state.update_largest_rate(coefficients, end.rate, fastest);
                 }
@@ -152,15 +153,17 @@ impl Run<'_> {
             changes.forces |= fixed;
             let steps = std::mem::replace(&mut state.record.contact_steps[j], 0);
             if in_contact {
-                let cubic = PenetrationCubic::new(start, end, h);
+                let cubic = PenetrationCubic::new(start, end, h, rounding);
                 let crosses = start.penetration <= 0.0 && end.penetration > 0.0;
                 let theta = if crosses { cubic.crossing() } else { 1.0 };
                 let rate = if crosses { cubic.at(theta).1 } else { end.rate };
                 let time = before.t + theta * h;
                 let asked = state.conditions.joints[j].restitution;
-                let push = (rate - start.rate) / (theta * h);
-                let mut contact_state = state.begin(j, time, rate, push, asked, coefficients);
-                if !fixed && located != Some(j) && end.penetration > AT_WALL * mechanism.contacts.clearance(j) {
+                let approach_time = theta * h;
+                let is_known = approach_time > TOO_SHORT_FOR_PUSH;
+                let push = if is_known { (rate - start.rate) / approach_time } else { UNKNOWN_PUSH };
+                let mut contact_state = state.begin(j, time, rate, push, asked, &mechanism.contacts);
+                if !fixed && !switches && end.penetration > AT_WALL * mechanism.contacts.clearance(j) {
                     let late = &mut state.record.statistics.late[j];
                     *late = late.max(end.penetration);
                 }
@@ -173,8 +176,8 @@ impl Run<'_> {
                 state.now.contact_states[j] = contact_state;
             } else {
                 let crosses = start.penetration > 0.0 && end.penetration < 0.0;
-                let (time, rate) = if crosses && located != Some(j) {
-                    let cubic = PenetrationCubic::new(start, end, h);
+                let (time, rate) = if crosses && !switches {
+                    let cubic = PenetrationCubic::new(start, end, h, rounding);
                     let theta = cubic.crossing();
                     (before.t + theta * h, cubic.at(theta).1)
                 } else {
@@ -199,7 +202,7 @@ impl Run<'_> {
 
     /// Largest contact forces of the step just accepted, in continuous time.
     pub(super) fn track_peaks(&mut self, h: f64) {
-        let immediate = !self.locates();
+        let (immediate, rounding) = (!self.locates(), self.rounding());
         let Self { mechanism, state, before, attempt, .. } = self;
         for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
@@ -211,7 +214,7 @@ impl Run<'_> {
                 continue;
             }
             let coefficients = mechanism.contacts.coefficients(j);
-            let cubic = PenetrationCubic::new(start, end, h);
+            let cubic = PenetrationCubic::new(start, end, h, rounding);
             let (force, theta) = if before.contact_states[j].active {
                 attempt.peak_forces[j]
             } else if state.now.contact_states[j].active {

@@ -1,8 +1,9 @@
 //! Steps of the discrete-gradient method: a number of them while a ball strikes its wall, longer ones otherwise.
 //!
 //! A step is no longer than
-//! - the Hertz time of an impact over `steps_per_impact`, while a ball strikes faster than [`SLOW`];
-//! - the arrival of such a ball at its wall, or that part of its Hertz time if it arrives sooner;
+//! - the Hertz time of an impact over `steps_per_impact`, while a ball strikes; over [`SLOW_STEPS`] if it strikes slower than
+//!   [`SLOW`], and without regard to its duration below the floor of the approach speed;
+//! - the arrival of a ball at its wall, or that part of its Hertz time if it arrives sooner;
 //! - a period of the ringing of a ball on its wall ([`RINGING`]), as longer steps alternate instead of following it;
 //! - the step at which forces other than contact forces move the mechanism by [`SMOOTH`] of its scales more or less than the
 //!   midpoint rule says, from their change since the step before;
@@ -31,8 +32,12 @@ const SHRINKAGE: f64 = 0.3;
 const ATTEMPTS: u32 = 12;
 /// Shortest repeated step, relative to the step repeated.
 const LEAST_PART: f64 = 0.05;
-/// Speed of an impact below which it is stepped like ringing, m/s.
-const SLOW: f64 = 5e-3;
+/// Speed of an impact below which it takes only [`SLOW_STEPS`], m/s: its force is small.
+const SLOW: f64 = 3e-3;
+/// Steps in a slow impact: the fewest for which a rebound by [`crate::contact::Coefficients::rebound`] is at most that of the law.
+const SLOW_STEPS: u32 = 3;
+/// Steps per impact below which the ball rebounds by its energy.
+const FEW_STEPS: f64 = 8.0;
 /// Half periods of ringing in a step.
 const RINGING: f64 = 2.0;
 /// Error of a step due to forces other than contact forces, relative to the scales of the positions.
@@ -91,8 +96,27 @@ fn stiffness(state: &State, j: usize) -> f64 {
 /// Longest step in an impact of ball joint `j` at `speed`, m/s, in s: a part of the Hertz time.
 fn step_in_impact(state: &State, j: usize, speed: f64) -> f64 {
     let mass = 1.0 / state.control.discrete.mobility[j];
-    contact::impact_duration(stiffness(state, j), 0.0, mass, speed)
-        / f64::from(state.conditions.solver.steps_per_impact)
+    let steps = state.conditions.solver.steps_per_impact;
+    let steps = if speed > SLOW { steps } else { steps.min(SLOW_STEPS) };
+    contact::impact_duration(stiffness(state, j), 0.0, mass, speed) / f64::from(steps)
+}
+
+/// Force over elastic force with which each ball rebounds in a step of `h` seconds, for those that need one.
+fn set_rebounds(state: &State, mechanism: &Mechanism, h: f64, rebounds: &mut [Option<f64>]) {
+    let control = &state.control.discrete;
+    for (j, rebound) in rebounds.iter_mut().enumerate() {
+        let gap = state.now.gaps[j];
+        let rises = gap.penetration > 0.0 && control.phases[j] == ContactPhase::Restitution;
+        let law = mechanism.contacts.coefficients(j);
+        let speeds = state.record.impacts.speeds_under_way(j, law.speed_floor);
+        let Some([approach, separation]) = speeds.filter(|_| rises) else {
+            *rebound = None;
+            continue;
+        };
+        let mass = 1.0 / control.mobility[j];
+        let few = h * FEW_STEPS > contact::impact_duration(stiffness(state, j), 0.0, mass, approach);
+        *rebound = few.then(|| law.rebound(mass, gap.penetration, gap.rate, separation));
+    }
 }
 
 /// Half a period of the ringing of ball joint `j` about `penetration`, m, in s.
@@ -110,6 +134,7 @@ pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
     let control = &state.control.discrete;
     let (longest, periods) = (LONGEST / finer(state), RINGING / finer(state));
     let mut h = longest.min(control.smooth);
+    let floor = |j: usize| mechanism.contacts.coefficients(j).speed_floor;
     for (j, (gap, contact_state)) in state.now.gaps.iter().zip(&state.now.contact_states).enumerate() {
         if !mechanism.contacts.has_clearance(j) {
             continue;
@@ -118,11 +143,11 @@ pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
             let lasts = control.phases[j] == ContactPhase::Lasting;
             // A ball at its wall may be struck again.
             let speed = if lasts { gap.rate.abs() } else { contact_state.approach_speed.max(gap.rate.abs()) };
-            if speed > SLOW {
+            if speed > SLOW || (speed > floor(j) && !lasts) {
                 h = h.min(step_in_impact(state, j, speed));
             }
             h = h.min(periods * half_period(state, j, gap.penetration));
-        } else if gap.rate > SLOW {
+        } else if gap.rate > floor(j) {
             let arrival = -gap.penetration / gap.rate;
             if arrival < h {
                 h = h.min(arrival.max(step_in_impact(state, j, gap.rate)));
@@ -142,8 +167,9 @@ impl Run<'_> {
         for attempt in 1.. {
             let t_end = if t + h >= limit - NEARLY * h { limit } else { t + h };
             let size = t_end - t;
-            let now = &self.state.now;
-            let from = StepStart { t, h: size, y: &now.y, k: &now.k, contact_states: &now.contact_states };
+            set_rebounds(self.state, self.mechanism, size, &mut self.attempt.rebounds);
+            let (now, rebounds) = (&self.state.now, &self.attempt.rebounds);
+            let from = StepStart { t, h: size, y: &now.y, k: &now.k, contact_states: &now.contact_states, rebounds };
             let mut evaluator = self.mechanism.evaluator(ActiveSet::by(false, &now.contact_states));
             let converged = evaluator.discrete_step(&from, all, &mut self.attempt.end.y);
             self.attempt.counts += evaluator.counts;
@@ -178,6 +204,7 @@ impl Run<'_> {
     /// The part of the step of size `h` just attempted that must be taken in its place, if any: an impact began in it that it
     /// does not resolve. Sets `all` if the step left out a joint that touches.
     fn part_to_repeat(&mut self, t_end: f64, h: f64, all: &mut bool) -> Option<f64> {
+        let rounding = self.rounding();
         let Self { mechanism, state, attempt, .. } = self;
         let end = &mut attempt.end;
         mechanism.measure_step_end(t_end, &end.y);
@@ -191,10 +218,10 @@ impl Run<'_> {
                 *all = true;
                 return Some(1.0);
             }
-            let cubic = PenetrationCubic::new(*start, *end, h);
+            let cubic = PenetrationCubic::new(*start, *end, h, rounding);
             let theta = cubic.crossing();
             let speed = cubic.at(theta).1;
-            if speed > SLOW {
+            if speed > mechanism.contacts.coefficients(j).speed_floor {
                 let longest = step_in_impact(state, j, speed);
                 if h - theta * h > longest {
                     part = part.min((theta * h).max(longest) / h);

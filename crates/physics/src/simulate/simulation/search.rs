@@ -31,13 +31,13 @@ impl Run<'_> {
     /// penetration cubic; no force where none can come near a peak so far. A peak inside a located step is re-evaluated there: the
     /// cubic's rate, which sets the damping, differs from that of the motion.
     pub(super) fn find_peak_forces(&mut self, h: f64) {
-        let located = self.locates();
+        let (located, rounding) = (self.locates(), self.rounding());
         for j in 0..self.state.now.gaps.len() {
             let contact_state = self.before.contact_states[j].unfrozen();
             if !contact_state.active || !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let cubic = PenetrationCubic::new(self.before.gaps[j], self.state.now.gaps[j], h);
+            let cubic = PenetrationCubic::new(self.before.gaps[j], self.state.now.gaps[j], h, rounding);
             let c = *self.mechanism.contacts.coefficients(j);
             let run_peak = self.state.record.statistics.peak_normal[j];
             let least =

@@ -29,6 +29,7 @@ impl Attempt {
             step_to_reproduce: None,
             may_contain_peak: false,
             peak_forces: vec![(0.0, 0.0); joints],
+            rebounds: vec![None; joints],
             stiffness: 0.0,
             counts: Counts::default(),
             factorisations: 0,
@@ -109,6 +110,11 @@ impl Run<'_> {
     /// Whether the method locates the instants at which contacts begin and end, and the corners of their laws.
     pub(super) fn locates(&self) -> bool {
         self.state.conditions.solver.method.is_adaptive()
+    }
+
+    /// Rounding error of a penetration at the current state, m.
+    pub(super) fn rounding(&self) -> f64 {
+        self.mechanism.rounding(&self.state.now.y)
     }
 
     /// Recomputes derivative and gaps after a change of state other than a step; discards the previous step.
