@@ -226,7 +226,7 @@ impl Machine {
     }
 
     /// Length scale of relative tolerances, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
-    /// most 1 m. A loop-closing joint counts as a ball joint of the scene's radius.
+    /// most 1 m. A loop-closing joint counts as a ball joint of the scene's radius, as does a scene without any of these.
     pub fn length_scale(&self) -> f64 {
         let radii = self.ball_joints.iter().map(|joint| joint.contact.ball_radius);
         let closing = self.closing_joints.iter().map(|_| self.contact.ball_radius);
@@ -240,7 +240,8 @@ impl Machine {
             | ElementKind::Motor(_)
             | ElementKind::Tyre(_) => None,
         });
-        radii.chain(closing).chain(depths).fold(1.0, f64::min)
+        let smallest = radii.chain(closing).chain(depths).reduce(f64::min);
+        smallest.unwrap_or(self.contact.ball_radius).min(1.0)
     }
 
     /// Checks the contact parameters of each joint for consistency.

@@ -686,16 +686,11 @@ fn stabilised(phi: f64, rate: f64, acceleration: f64) -> f64 {
     -(acceleration + 2.0 * alpha * rate + beta * beta * phi)
 }
 
-/// Scales of the body coordinates, as for a free body in the tree, from the model's length scale.
+/// Scales of the body coordinates, as for a free body in the tree.
 fn body_scales(model: &Model) -> Vec<f64> {
-    let n = model.massive;
-    let (length, speed) = (model.length_scale, model.length_scale / 0.1);
-    let mut scale = Vec::with_capacity(13 * n);
-    for _ in 0..n {
-        scale.extend([length, length, length, 0.05, 0.05, 0.05, 0.05]);
-    }
-    for _ in 0..n {
-        scale.extend([speed, speed, speed, 1.0, 1.0, 1.0]);
-    }
-    scale
+    let (length, speed) = (model.length_scale, model.speed_scale());
+    let angles = || model.spin_scales.iter().copied();
+    let positions = angles().flat_map(|angle| [length, length, length].into_iter().chain([0.5 * angle; 4]));
+    let velocities = angles().flat_map(|angle| [speed, speed, speed].into_iter().chain([speed / length * angle; 3]));
+    positions.chain(velocities).collect()
 }

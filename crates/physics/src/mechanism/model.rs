@@ -178,6 +178,8 @@ pub struct Model {
     pub scale: Vec<f64>,
     /// Length from which the position scales are derived, m.
     pub length_scale: f64,
+    /// Scale of the rotation of each body of the scene as a free body, rad.
+    pub spin_scales: Vec<f64>,
     /// Bound on the distance from the origin of every point of the machine with all coordinates at zero, m.
     pub extent: f64,
     pub output_body: BodyIndex,
@@ -330,7 +332,8 @@ impl Model {
             start: machine.start,
             start_state: Vec::new(),
             scale: Vec::new(),
-            length_scale: Scales::of(machine).length,
+            length_scale: machine.length_scale(),
+            spin_scales: Vec::new(),
             extent: 0.0,
             output_body: machine.output.body,
             probe: machine.output.probe.map(|p| p - machine.bodies[machine.output.body].centre),
@@ -355,6 +358,8 @@ impl Model {
             let [parent, child] = joint.points().map(|point| model.anchor(machine, &point));
             model.closures.push(Pair::new(joint, child, parent));
         }
+        let own_reaches = model.own_reaches(machine, |_| Vec3::zeros());
+        model.spin_scales = own_reaches[..massive].iter().map(|reach| model.angle_scale(*reach)).collect();
         model.extent = model.distances().fold(0.0, f64::max);
         model
     }
@@ -404,7 +409,8 @@ impl Model {
 
     /// Numbers the coordinates tree by tree, so that those of a tree are contiguous, and sets start state and scales.
     fn number_coordinates(&mut self, machine: &Machine, root: &[usize]) {
-        let scales = Scales::of(machine);
+        let (length, speed) = (self.length_scale, self.speed_scale());
+        let reaches = self.reaches(machine);
         let mut start_q: Vec<f64> = Vec::new();
         let mut start_v: Vec<f64> = Vec::new();
         let mut scale_q: Vec<f64> = Vec::new();
@@ -431,6 +437,8 @@ impl Model {
                 last[b] = above;
                 let (q, v) = (start_q.len(), start_v.len());
                 let [position, velocity] = self.start_of(machine, b);
+                let angle = self.angle_scale(reaches[b]);
+                let angular_speed = angle / SPEED_TIME;
                 let mut push_coordinate = |length: f64, speed: f64| {
                     start_q.push(position);
                     start_v.push(velocity);
@@ -441,12 +449,12 @@ impl Model {
                 match &mut self.bodies[b].motion {
                     Motion::Prismatic { q: at_q, v: at_v } => {
                         (*at_q, *at_v) = (q, v);
-                        push_coordinate(scales.length, scales.speed);
+                        push_coordinate(length, speed);
                         last[b] = v - first;
                     }
                     Motion::Revolute { q: at_q, v: at_v } => {
                         (*at_q, *at_v) = (q, v);
-                        push_coordinate(scales.angle, scales.angular_speed);
+                        push_coordinate(angle, angular_speed);
                         last[b] = v - first;
                     }
                     Motion::Free { q: at_q, v: at_v } => {
@@ -457,11 +465,11 @@ impl Model {
                         start_q.extend([rotation.w, rotation.i, rotation.j, rotation.k]);
                         start_v.extend((velocity + spin.cross(&centre)).iter());
                         start_v.extend(spin.iter());
-                        scale_q.extend([scales.length; 3]);
+                        scale_q.extend([length; 3]);
                         // A quaternion component changes by half the angle.
-                        scale_q.extend([0.5 * scales.angle; 4]);
-                        scale_v.extend([scales.speed; 3]);
-                        scale_v.extend([scales.angular_speed; 3]);
+                        scale_q.extend([0.5 * angle; 4]);
+                        scale_v.extend([speed; 3]);
+                        scale_v.extend([angular_speed; 3]);
                         for i in 0..6 {
                             parent_coordinate.push(if i == 0 { NONE } else { v - first + i - 1 });
                         }
@@ -485,6 +493,53 @@ impl Model {
         self.start_state = start_q;
         scale_q.extend(scale_v);
         self.scale = scale_q;
+    }
+
+    /// Bound on the distance from each body's joint point, or from the centroid of a free body, of what the joint carries: the
+    /// points at which joints and force elements act, the probe, and centroids, m. Without any off the joint point, the radius of
+    /// gyration.
+    fn reaches(&self, machine: &Machine) -> Vec<f64> {
+        let mut reaches = self.own_reaches(machine, |body| match body.motion {
+            Motion::Free { .. } => Vec3::zeros(),
+            _ => body.to_centroid,
+        });
+        for &b in self.order.iter().rev() {
+            let body = &self.bodies[b];
+            if reaches[b] == 0.0 && body.mass > 0.0 {
+                reaches[b] = (body.inertia.diagonal().max() / body.mass).sqrt();
+            }
+            if body.parent < self.bodies.len() {
+                let parent = &self.bodies[body.parent];
+                let base = if let Motion::Free { .. } = parent.motion { Vec3::zeros() } else { parent.to_centroid };
+                let slides = matches!(body.motion, Motion::Prismatic { .. });
+                let moved = if slides { self.start_of(machine, b)[0].abs() } else { 0.0 };
+                let reach = (base + body.from_parent).norm() + moved + reaches[b];
+                reaches[body.parent] = reaches[body.parent].max(reach);
+            }
+        }
+        reaches
+    }
+
+    /// The same of the points of each body alone, from a point that is `base` before its centroid, m.
+    fn own_reaches(&self, machine: &Machine, base: impl Fn(&Body) -> Vec3) -> Vec<f64> {
+        let mut reaches: Vec<f64> = self.bodies.iter().map(|body| base(body).norm()).collect();
+        let balls = machine.ball_joints.iter().flat_map(|joint| [joint.socket, joint.ball]);
+        let closures = machine.closing_joints.iter().flat_map(Joint::points);
+        let elements = machine.elements.iter().flat_map(|element| element.points(machine));
+        let points = balls.chain(closures).chain(elements).map(|point| self.anchor(machine, &point));
+        let probe = self.probe.map(|offset| Anchor { body: self.output_body, offset });
+        for point in points.chain(probe) {
+            if let Some(body) = self.bodies.get(point.body) {
+                reaches[point.body] = reaches[point.body].max((base(body) + point.offset).norm());
+            }
+        }
+        reaches
+    }
+
+    /// Scale of an angle that moves points at `reach` (m), rad: they move by the length scale, and by a tenth of the reach at
+    /// most.
+    fn angle_scale(&self, reach: f64) -> f64 {
+        MAX_ANGLE.min(self.length_scale / reach)
     }
 
     /// Scale of speeds, m/s.
@@ -570,19 +625,5 @@ fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {
 
 /// Time in which a body moves by the length scale at the speed scale, s.
 const SPEED_TIME: f64 = 0.1;
-
-/// Scales multiplied by the relative tolerance; see `docs/numerics.md`.
-struct Scales {
-    length: f64,
-    speed: f64,
-    angle: f64,
-    angular_speed: f64,
-}
-
-impl Scales {
-    /// Length: [`Machine::length_scale`]. Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
-    fn of(machine: &Machine) -> Self {
-        let length = machine.length_scale();
-        Self { length, speed: length / SPEED_TIME, angle: 0.1, angular_speed: 1.0 }
-    }
-}
+/// Largest scale of an angle, rad.
+const MAX_ANGLE: f64 = 0.1;

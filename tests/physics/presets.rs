@@ -1,0 +1,148 @@
+//! The error that each preset states holds for machines that it was not chosen on: the peak forces of their first impacts, beside
+//! closed forms and independent models (SciPy's DOP853, relative tolerance 1e-11 to 1e-13, located contacts), and for the built-in
+//! scenes, beside a tighter tolerance.
+
+use crate::common::{MACHINES, SCENES, run_until};
+use jointplay::analysis::presets;
+use jointplay::machine::Preset;
+use jointplay::scene::Scene;
+use jointplay::simulate::{Impact, Simulation};
+
+/// A machine, and the peak forces of impacts: (joint, which of its impacts, N).
+struct Trial {
+    scene: &'static str,
+    changes: &'static [(&'static str, &'static str)],
+    end: f64,
+    peaks: &'static [(&'static str, usize, f64)],
+    /// Digits of the right values.
+    digits: f64,
+}
+
+const TRIALS: [Trial; 6] = [
+    Trial {
+        scene: "steer",
+        changes: &[("joint.right.inner.clearance", "0.11 mm")],
+        end: 1.35e-3,
+        peaks: &[
+            ("left.inner", 0, 3450.949874),
+            ("right.inner", 0, 3369.786487),
+            ("left.outer", 0, 7039.359685),
+            ("right.outer", 0, 7367.438547),
+        ],
+        digits: 1e-9,
+    },
+    Trial {
+        scene: "wrist",
+        changes: &[],
+        end: 9e-3,
+        peaks: &[("wrist", 0, 841.460156), ("wrist", 1, 561.569557), ("wrist", 2, 362.230662)],
+        digits: 2e-9,
+    },
+    Trial {
+        scene: "gate",
+        changes: &[],
+        end: 0.9,
+        peaks: &[("latch", 0, 2110.94703), ("latch", 1, 1615.04758), ("latch", 2, 1235.64383), ("latch", 3, 945.36885)],
+        digits: 1e-8,
+    },
+    Trial {
+        scene: "two-balls",
+        changes: &[],
+        end: 13e-3,
+        peaks: &[("A", 0, 463.2202107), ("B", 0, 463.2202107), ("A", 1, 353.0396102), ("B", 1, 353.0396102)],
+        digits: 1e-8,
+    },
+    Trial {
+        scene: "slow-eight",
+        changes: &[("gravity.z", "-0.2 m/s^2")],
+        end: 0.19,
+        peaks: &[("S[1]", 0, 17.977), ("S[1]", 1, 13.748), ("S[8]", 2, 10.513), ("S[8]", 3, 8.038)],
+        digits: 5e-5,
+    },
+    Trial {
+        scene: "peaucellier",
+        changes: &[
+            ("gravity.z", "-9.81 m/s^2"),
+            ("gravity.x", "1 m/s^2"),
+            ("contact.normal_law", "gonthier"),
+            ("contact.restitution", "0.5"),
+            ("contact.approach_speed", "largest"),
+            ("joint.AP0.clearance", "0.200 mm"),
+            ("joint.AP1.clearance", "0.202 mm"),
+            ("joint.BP0.clearance", "0.204 mm"),
+            ("joint.BP1.clearance", "0.03 mm"),
+            ("joint.AQ0.clearance", "0.208 mm"),
+            ("joint.AQ1.clearance", "0.210 mm"),
+            ("joint.BQ0.clearance", "0.212 mm"),
+            ("joint.BQ1.clearance", "0.214 mm"),
+        ],
+        end: 5.3e-3,
+        peaks: &[("BP1", 2, 8.174)],
+        digits: 1e-4,
+    },
+];
+
+fn impacts(scene: &Scene, end: f64) -> Vec<Impact> {
+    let mut simulation = Simulation::new(&scene.machine).unwrap();
+    run_until(&mut simulation, end);
+    simulation.impacts().copied().collect()
+}
+
+fn with(scene: &Scene, key: &str, value: &str) -> Scene {
+    let mut changed = scene.clone();
+    changed.set(key, value).unwrap();
+    changed
+}
+
+/// Peak force of the `n`th impact of the ball joint `name`, N.
+fn peak(scene: &Scene, impacts: &[Impact], name: &str, n: usize) -> Option<f64> {
+    let joint = scene.machine.ball_joints.iter().position(|joint| joint.name == name).expect(name);
+    impacts.iter().filter(|impact| impact.joint == joint).nth(n).map(|impact| impact.peak)
+}
+
+#[test]
+fn peaks_of_unknown_machines_are_within_the_stated_error_of_each_preset() {
+    for trial in &TRIALS {
+        let path = format!("tests/trials/{}.toml", trial.scene);
+        let changes: Vec<_> =
+            trial.changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        let scene = Scene::load(&path, &changes).unwrap();
+        for preset in Preset::ALL {
+            let scene = with(&scene, "solver.preset", preset.word());
+            let impacts = impacts(&scene, trial.end);
+            for (name, n, right) in trial.peaks {
+                let case = format!("{}, {}: impact {n} of {name}", trial.scene, preset.word());
+                let given = peak(&scene, &impacts, name, *n).unwrap_or_else(|| panic!("{case}: none"));
+                let error = (given / right - 1.0).abs();
+                println!("{case}: {error:.1e}");
+                assert!(error < presets::limit(preset) + trial.digits, "{case}: {given} N in place of {right}");
+            }
+        }
+    }
+}
+
+#[test]
+fn peaks_of_the_built_in_scenes_are_within_the_stated_error_of_each_preset() {
+    /// Impacts of a machine that are compared.
+    const COMPARED: usize = 4;
+    for name in SCENES.into_iter().chain(MACHINES) {
+        let scene = Scene::load(name, &[("solver.method".to_owned(), "dopri5".to_owned())]).unwrap();
+        let tight = with(&scene, "solver.tolerance", "1e-12");
+        let mut simulation = Simulation::new(&tight.machine).unwrap();
+        while simulation.impacts().len() < COMPARED {
+            simulation.step().unwrap();
+        }
+        let end = simulation.time();
+        let right: Vec<Impact> = simulation.impacts().take(COMPARED).copied().collect();
+        for preset in Preset::ALL {
+            let given = impacts(&with(&scene, "solver.preset", preset.word()), 1.05 * end);
+            for (k, impact) in right.iter().enumerate() {
+                let n = right[..k].iter().filter(|other| other.joint == impact.joint).count();
+                let own = given.iter().filter(|other| other.joint == impact.joint).nth(n).expect("as many impacts");
+                let error = (own.peak / impact.peak - 1.0).abs();
+                println!("{name}, {}: impact {k}: {error:.1e}", preset.word());
+                assert!(error < presets::limit(preset), "{name}, {}: {own:?} in place of {impact:?}", preset.word());
+            }
+        }
+    }
+}
