@@ -47,6 +47,7 @@ mod settled_start;
 mod simultaneous;
 mod spring_curves;
 mod turned;
+mod turns;
 mod twin;
 mod two_degrees;
 mod tyres;

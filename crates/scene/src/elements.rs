@@ -1,7 +1,6 @@
 //! Force elements of a scene file: a table and a reader per kind. Their physics is in `mechanism/elements`.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
 use super::document::{Node, Section};
@@ -502,10 +501,6 @@ fn read_stop(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError> 
     if lower >= upper {
         let unit = if on_hinge { "deg" } else { "mm" };
         return reader.fault("upper", &format!("must be above lower, {}", format_quantity(lower, unit)));
-    }
-    if on_hinge && upper - lower >= TAU && upper.is_finite() && lower.is_finite() {
-        let why = "must be less than a turn above lower: a hinge is taken within half a turn of their middle";
-        return reader.fault("upper", why);
     }
     if stop.restitution < 1.0 && stop.speed == 0.0 {
         let why = "missing; a restitution below 1 holds at one approach speed, which must be above 0";

@@ -39,6 +39,7 @@ mod stiff;
 mod summary;
 mod systems;
 mod tree;
+mod turns;
 
 pub use crate::jet::Jet;
 use assembly::Settled;
@@ -72,6 +73,7 @@ pub(crate) use model::Model;
 use model::Motion;
 use path::Path;
 use tree::Tree;
+use turns::Turns;
 
 /// Error in setting up the equations of a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -326,6 +328,7 @@ pub struct Mechanism {
     /// Number of the scene's elements.
     scene_elements: usize,
     pull: Option<Pull>,
+    turns: Turns,
     /// World gravity, m/s^2.
     pub gravity: Vec3,
     /// Names of the cut joints: ball joints, then other joints that close loops.
@@ -399,6 +402,7 @@ impl Mechanism {
             elements: elements_of(machine, &model),
             scene_elements: machine.elements.len(),
             pull: None,
+            turns: Turns::new(machine, &model),
             latest: Latest::Unknown,
             model,
             equations,
@@ -498,6 +502,7 @@ impl Mechanism {
     pub fn measure(&mut self, t: f64, y: &[f64]) {
         self.latest = Latest::Measured(t);
         self.equations.update_kinematics(&self.model, t, y);
+        self.turns.follow(&mut self.elements, &*self.equations, &self.model, (t, y));
         self.contacts.measure(t, self.equations.motion());
     }
 
@@ -642,15 +647,6 @@ impl Mechanism {
             let held = !matches!(body.motion, Motion::Free { .. });
             held.then(|| [load.force, load.torque + arm.cross(&load.force)])
         })
-    }
-
-    /// Coordinates and rates of all sliding or turning joints after an evaluation at `y`: tree joints in scene order, then joints
-    /// that close loops.
-    pub fn coordinates(&self, y: &[f64]) -> impl Iterator<Item = [f64; 2]> {
-        let all = self.model.order.iter();
-        let hung = all.filter_map(move |&b| self.equations.coordinate(&self.model, y, b));
-        let closures = self.model.closures.iter();
-        hung.chain(closures.flat_map(|pair| pair.coordinates(self.equations.motion())))
     }
 
     /// Kinetic energy and gravitational potential (zero at the world origin) at the latest evaluation, J.

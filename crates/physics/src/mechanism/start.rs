@@ -130,6 +130,7 @@ impl Mechanism {
         if let Some(rank) = rank {
             self.equations.treat_as_dependent(rank);
         }
+        self.turns.start(&self.model, &mut tree, &y);
         Ok(self.equations.state_of(&self.model, y, &tree.motion))
     }
 

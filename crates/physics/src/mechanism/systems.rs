@@ -47,9 +47,10 @@ impl Evaluator<'_> {
 
     /// Motion and contact forces at (t, y), without accelerations.
     fn load(&mut self, t: f64, y: &[f64]) {
-        let Mechanism { model, equations, contacts, elements, latest, .. } = &mut *self.mechanism;
+        let Mechanism { model, equations, contacts, elements, turns, latest, .. } = &mut *self.mechanism;
         *latest = Latest::Unknown;
         equations.update_active(model, t, y);
+        turns.follow(elements, &**equations, model, (t, y));
         let (motion, wrench) = equations.loads();
         wrench.fill(Wrench::zero());
         let at = At { t, motion, active_set: self.active_set };

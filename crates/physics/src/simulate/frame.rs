@@ -24,7 +24,7 @@ pub struct Frame {
     /// The pulling hand, if any: force from the hand on the grasped point. Only set in the displayed frame.
     pub pull: Option<ElementReport>,
     /// Coordinates of the joints that slide or turn, m or rad, each with its rate: tree joints in scene order, then joints that
-    /// close loops. Angles of the latter, and in the `lagrange` form of all undriven joints, lie between -pi and pi.
+    /// close loops. Angles count turns; those of the latter start between -pi and pi.
     pub coordinates: Vec<[f64; 2]>,
     /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis.
     pub actuators: Vec<f64>,

@@ -43,7 +43,7 @@ pub(super) fn fill(
     out.potential = gravitational + out.elastic;
     out.probe_error = probe_error(mechanism, machine, out);
     out.coordinates.clear();
-    out.coordinates.extend(mechanism.coordinates(y));
+    out.coordinates.extend(mechanism.coordinates(time, y));
     out.actuators.resize(mechanism.drives(), 0.0);
     mechanism.actuator_forces(&mut out.actuators);
     if let Some(reactions) = &mut out.reactions {

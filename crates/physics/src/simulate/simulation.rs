@@ -101,6 +101,9 @@ pub struct Model {
 pub struct State {
     /// The physical state.
     now: StepEnd,
+    /// Nearest number of quarter turns of each angle that force elements act on, where it follows from poses alone and not from a
+    /// coordinate that counts turns.
+    quarter_turns: Vec<i64>,
     /// Gravity, contacts and stepper with the live changes so far.
     conditions: Conditions,
     /// Active clearance ramps, and clearances without them, m.
@@ -192,6 +195,8 @@ struct Record {
     starts_inside: Option<(usize, [f64; 2], f64)>,
     /// Side of singular poses on which a kinematic scene started.
     determinant_positive: bool,
+    /// As [`State::quarter_turns`], of joint angles that no element acts on.
+    quarter_turns: Vec<i64>,
 }
 
 /// A state of another model, or one that no run of the model can have.

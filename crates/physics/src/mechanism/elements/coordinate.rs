@@ -22,12 +22,31 @@ pub(super) struct Coordinate {
     /// coincides with it at coordinate 0.
     across: Vec3,
     child_across: Vec3,
+    /// For an angle: determines its whole turns.
+    reference: AngleReference,
+}
+
+/// Angle of a joint at one instant. Poses determine angles up to whole turns; the turns at instants nearby follow from it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AngleReference {
+    /// s.
+    pub time: f64,
+    /// Within half a right angle, rad.
+    pub angle: f64,
+}
+
+impl AngleReference {
+    /// What to add to `angle`, which is known up to whole turns, rad, at `t`, s, where it changes at `rate`, rad/s. The angle is
+    /// taken as the nearest to that of a constant rate, so that steps may span several turns.
+    pub fn whole_turns(&self, angle: f64, rate: f64, t: f64) -> f64 {
+        TAU * libm::round((self.angle + rate * (t - self.time) - angle) / TAU)
+    }
 }
 
 /// A coordinate at one instant.
 #[derive(Clone, Copy)]
 pub(super) struct CoordinateState {
-    /// Coordinate relative to the given position, m or rad; angles within half a turn.
+    /// Coordinate relative to the given position, m or rad.
     pub deviation: f64,
     /// Rate, m/s or rad/s.
     pub rate: f64,
@@ -69,11 +88,17 @@ impl Coordinate {
             in_child,
             across,
             child_across,
+            reference: AngleReference::default(),
         }
     }
 
-    /// The coordinate relative to `position`, and its rate.
-    pub fn measure(&self, position: f64, motion: &[Kinematics]) -> CoordinateState {
+    /// Sets the reference that determines the turns of an angle from now on.
+    pub fn set_reference(&mut self, reference: AngleReference) {
+        self.reference = reference;
+    }
+
+    /// The coordinate relative to `position`, and its rate, at `t`, s.
+    pub fn measure(&self, position: f64, t: f64, motion: &[Kinematics]) -> CoordinateState {
         let (parent, child) = (&motion[self.parent.body], &motion[self.child.body]);
         let of_axis = if self.in_child { child } else { parent };
         let along = of_axis.rotation * self.axis;
@@ -83,9 +108,8 @@ impl Coordinate {
         let (deviation, rate) = if self.turns {
             let (zero, now) = (parent.rotation * self.across, child.rotation * self.child_across);
             let angle = libm::atan2(zero.cross(&now).dot(&along), zero.dot(&now));
-            let deviation = angle - position;
-            let spin = child.angular_velocity - parent.angular_velocity;
-            (deviation - TAU * libm::round(deviation / TAU), along.dot(&spin))
+            let rate = along.dot(&(child.angular_velocity - parent.angular_velocity));
+            (angle - position + self.reference.whole_turns(angle, rate, t), rate)
         } else {
             let slid = from_parent - parent.rotation * self.parent.offset;
             let velocity = child.point_velocity(&arm) - parent.point_velocity(&from_parent);

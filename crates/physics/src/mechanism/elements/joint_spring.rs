@@ -1,7 +1,7 @@
 //! Spring and damper on a slide or hinge. The force or torque on the child is -(preload + stiffness s + damping ds/dt), where s
 //! is the joint's coordinate measured from `position`; a curve over s may replace the first two terms.
 
-use super::coordinate::{Coordinate, CoordinateState, Slopes};
+use super::coordinate::{AngleReference, Coordinate, CoordinateState, Slopes};
 use super::elastic::Elastic;
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement};
 use crate::machine::{self, SpringSide};
@@ -27,8 +27,8 @@ pub(super) fn make(spring: &machine::JointSpring, on: Coordinate) -> Box<dyn Sce
 
 impl JointSpring {
     /// The coordinate, and the force or torque on the child, N or N m.
-    fn at(&self, motion: &[Kinematics]) -> (CoordinateState, f64) {
-        let state = self.on.measure(self.position, motion);
+    fn at(&self, t: f64, motion: &[Kinematics]) -> (CoordinateState, f64) {
+        let state = self.on.measure(self.position, t, motion);
         let back = self.elastic.tension(state.deviation) + self.damping * state.rate;
         (state, -back)
     }
@@ -36,7 +36,7 @@ impl JointSpring {
 
 impl ForceElement for JointSpring {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        let (state, force) = self.at(at.motion);
+        let (state, force) = self.at(at.t, at.motion);
         self.on.apply_force(&state, force, loads.wrench);
     }
 
@@ -45,24 +45,28 @@ impl ForceElement for JointSpring {
     }
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
-        let (state, _) = self.at(at.motion);
+        let (state, _) = self.at(at.t, at.motion);
         let slopes = Slopes { by_position: -self.elastic.stiffness(state.deviation), by_rate: -self.damping };
         Some(self.on.coupling(&state, &slopes, at.motion))
     }
 
-    fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
-        self.elastic.stored(self.on.measure(self.position, motion).deviation)
+    fn stored(&self, t: f64, motion: &[Kinematics]) -> f64 {
+        self.elastic.stored(self.on.measure(self.position, t, motion).deviation)
     }
 
-    fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
-        let rate = self.on.measure(self.position, motion).rate;
+    fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
+        let rate = self.on.measure(self.position, t, motion).rate;
         powers.damping += self.damping * rate * rate;
     }
 }
 
 impl SceneElement for JointSpring {
-    fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
-        let (state, force) = self.at(motion);
+    fn set_angle_reference(&mut self, reference: AngleReference) {
+        self.on.set_reference(reference);
+    }
+
+    fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
+        let (state, force) = self.at(t, motion);
         self.on.report(&state, force, motion)
     }
 }

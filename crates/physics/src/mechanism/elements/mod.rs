@@ -25,6 +25,7 @@ use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
 use crate::contact::{ContactState, Stiffness};
 use crate::machine::{Attachment, Drive, Element, ElementKind, JointCoordinate, Machine, Mat3, Vec3};
+pub(super) use coordinate::AngleReference;
 use coordinate::Coordinate;
 pub use pull::Pull;
 
@@ -249,6 +250,10 @@ pub(super) trait SceneElement: ForceElement {
     fn has_vertical_onset(&self) -> bool {
         false
     }
+
+    /// Sets the reference that determines the turns of the angle on which it acts, if any. The element reads its joint's
+    /// coordinate, which counts turns, although it measures poses.
+    fn set_angle_reference(&mut self, _reference: AngleReference) {}
 
     /// Freezes the contact state: the element follows its law as if it pressed, or as if it did not, regardless of the motion.
     /// `None` unfreezes it.

@@ -1,7 +1,7 @@
 //! Motor on a slide or hinge. Its force or torque is F + k (target - q) + d (target' - q'), clamped to a limit, where q is the
 //! joint's coordinate. Its work counts as drive work.
 
-use super::coordinate::{Coordinate, CoordinateState, Slopes};
+use super::coordinate::{AngleReference, Coordinate, CoordinateState, Slopes};
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, law_of};
 use crate::jet::Jet;
 use crate::machine;
@@ -41,7 +41,7 @@ impl Motor {
     /// The coordinate relative to the target, and the unclamped force or torque on the child.
     fn at(&self, t: f64, motion: &[Kinematics]) -> (CoordinateState, f64) {
         let target = self.target(t);
-        let state = self.on.measure(target.value, motion);
+        let state = self.on.measure(target.value, t, motion);
         let ahead = self.stiffness * state.deviation + self.damping * (state.rate - target.rate);
         (state, self.force - ahead)
     }
@@ -82,6 +82,10 @@ impl ForceElement for Motor {
 impl SceneElement for Motor {
     fn law(&self) -> Option<&Arc<dyn Law>> {
         self.target.as_ref()
+    }
+
+    fn set_angle_reference(&mut self, reference: AngleReference) {
+        self.on.set_reference(reference);
     }
 
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {

@@ -4,7 +4,7 @@
 //! needs a contact state; here it divides by a given speed, a = chi / speed. An undisturbed impact at that speed rebounds with
 //! the requested restitution, whatever the masses; a slower one rebounds with more.
 
-use super::coordinate::{Coordinate, CoordinateState, Slopes};
+use super::coordinate::{AngleReference, Coordinate, CoordinateState, Slopes};
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement};
 use crate::contact::{NormalLaw, damping_factor};
 use crate::machine;
@@ -14,7 +14,7 @@ use crate::mechanism::model::Anchor;
 
 struct Stop {
     on: Coordinate,
-    /// Midpoint of the limits, or the only limit. The angle of a hinge is taken within half a turn of it.
+    /// Midpoint of the limits, or the only limit.
     middle: f64,
     /// Limits relative to `middle`, m or rad; infinite if absent.
     lower: f64,
@@ -63,8 +63,8 @@ pub(super) fn make(stop: &machine::Stop, on: Coordinate) -> Box<dyn SceneElement
 
 impl Stop {
     /// The coordinate, and the stop in contact, if any.
-    fn at(&self, motion: &[Kinematics]) -> (CoordinateState, Option<StopContact>) {
-        let state = self.on.measure(self.middle, motion);
+    fn at(&self, t: f64, motion: &[Kinematics]) -> (CoordinateState, Option<StopContact>) {
+        let state = self.on.measure(self.middle, t, motion);
         let contact = self.nearest(&state);
         let touches = self.frozen.unwrap_or(contact.depth > 0.0);
         (state, touches.then_some(contact))
@@ -85,7 +85,7 @@ impl Stop {
 
 impl ForceElement for Stop {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        if let (state, Some(contact)) = self.at(at.motion) {
+        if let (state, Some(contact)) = self.at(at.t, at.motion) {
             let force = -contact.side * contact.force;
             self.on.apply_force(&state, force, loads.wrench);
         }
@@ -96,7 +96,7 @@ impl ForceElement for Stop {
     }
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
-        let (state, contact) = self.at(at.motion);
+        let (state, contact) = self.at(at.t, at.motion);
         let contact = contact.filter(|contact| contact.force > 0.0 || self.frozen.is_some())?;
         let slopes = Slopes {
             by_position: -1.5 * self.stiffness * contact.depth.abs().sqrt() * (1.0 + self.damping * contact.rate),
@@ -105,13 +105,13 @@ impl ForceElement for Stop {
         Some(self.on.coupling(&state, &slopes, at.motion))
     }
 
-    fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
-        let contact = self.at(motion).1;
+    fn stored(&self, t: f64, motion: &[Kinematics]) -> f64 {
+        let contact = self.at(t, motion).1;
         contact.map_or(0.0, |contact| 0.4 * contact.elastic * contact.depth)
     }
 
-    fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
-        let (state, contact) = self.at(motion);
+    fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
+        let (state, contact) = self.at(t, motion);
         let nearest = self.nearest(&state);
         // Energy stored when contact is lost is dissipated as the stop recovers.
         let separates = nearest.depth > 0.0 && 1.0 + self.damping * nearest.rate <= 0.0;
@@ -122,8 +122,8 @@ impl ForceElement for Stop {
 
 impl SceneElement for Stop {
     /// Contact is lost where d (1 + a dd/dt) falls to 0.
-    fn contact_indicators(&self, _: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
-        let StopContact { depth, rate, .. } = self.nearest(&self.on.measure(self.middle, motion));
+    fn contact_indicators(&self, t: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
+        let StopContact { depth, rate, .. } = self.nearest(&self.on.measure(self.middle, t, motion));
         Some([depth, depth.min(depth * (1.0 + self.damping * rate))])
     }
 
@@ -131,12 +131,16 @@ impl SceneElement for Stop {
         true
     }
 
+    fn set_angle_reference(&mut self, reference: AngleReference) {
+        self.on.set_reference(reference);
+    }
+
     fn freeze_contact(&mut self, in_contact: Option<bool>) {
         self.frozen = in_contact;
     }
 
-    fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
-        let (state, contact) = self.at(motion);
+    fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
+        let (state, contact) = self.at(t, motion);
         let force = contact.as_ref().map_or(0.0, |contact| -contact.side * contact.force);
         let depth = contact.map(|contact| [contact.depth, self.depth]);
         ElementReport { depth, ..self.on.report(&state, force, motion) }

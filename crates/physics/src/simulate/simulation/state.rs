@@ -49,7 +49,9 @@ impl State {
     pub(super) fn new(conditions: Conditions, mechanism: &Mechanism, y: Vec<f64>) -> Self {
         let joints = mechanism.contacts.len();
         let solver = &conditions.solver;
+        let [quarter_turns, other_turns] = mechanism.quarter_turns();
         Self {
+            quarter_turns,
             ramps: vec![None; joints],
             clearances: (0..joints).map(|j| mechanism.contacts.clearance(j)).collect(),
             pull: None,
@@ -78,6 +80,7 @@ impl State {
                 peaks: vec![Peak::default(); joints],
                 starts_inside: None,
                 determinant_positive: true,
+                quarter_turns: other_turns,
             },
             sampled: vec![(0.0, 0.0); joints],
             loads: None,
@@ -158,8 +161,9 @@ impl State {
     }
 
     /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, then for each ball joint
-    /// whether it is in contact, its approach speed, and its current clearance. The current branch of the friction law is
-    /// excluded: like the step size, it belongs to the stepper.
+    /// whether it is in contact, its approach speed, and its current clearance; then the turns of the angles that elements act on,
+    /// where coordinates do not count them. The current branch of the friction law is excluded: like the step size, it belongs to
+    /// the stepper.
     pub fn hash(&self) -> u64 {
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         let mut add = |bits: u64| {
@@ -176,6 +180,9 @@ impl State {
             add(m.approach_speed.to_bits());
             add(self.clearance(j).to_bits());
         }
+        for quarters in &self.quarter_turns {
+            add(quarters.cast_unsigned());
+        }
         hash
     }
 
@@ -190,7 +197,8 @@ impl State {
         let wear = self.record.wear.as_ref().map_or(0, Wear::bytes);
         let flights = self.flights.len() * size_of::<Option<Flight>>();
         let ideal = self.ideal.as_ref().map_or(0, |ideal| ideal.bytes());
-        FIXED + wear + flights + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts + ideal
+        let turns = (self.quarter_turns.len() + self.record.quarter_turns.len()) * size_of::<i64>();
+        FIXED + turns + wear + flights + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts + ideal
     }
 
     /// Checks a state that was read: it has the dimensions of a state of `model`, which began as `own`, and all its indices are
@@ -203,6 +211,8 @@ impl State {
         let loose =
             |contacts: &Conditions| contacts.joints.iter().map(|contact| contact.clearance > 0.0).collect::<Vec<_>>();
         let fits = self.now.fits(dimension, joints)
+            && self.quarter_turns.len() == own.quarter_turns.len()
+            && record.quarter_turns.len() == own.record.quarter_turns.len()
             && loose(conditions) == loose(&own.conditions)
             && model.machine().with_conditions(conditions).check().is_ok()
             && self.ramps.len() == joints

@@ -129,8 +129,9 @@ impl Run<'_> {
         evaluator.derivative(now.t, &now.y, &mut now.k);
         mechanism.complete_gaps(active_set, &now.y);
         store_gaps(mechanism, &mut now.gaps);
+        self.count_turns();
         // Forces jump here: a parabola across the jump would have a spurious peak.
-        state.record.reactions.fill(Recent::default());
+        self.state.record.reactions.fill(Recent::default());
         self.invalidate();
         self.begin_contacts_at_walls();
         self.discard_previous_step();
@@ -329,7 +330,14 @@ impl Run<'_> {
             }
         }
         self.search_peaks();
+        self.count_turns();
         Ok(())
+    }
+
+    /// Counts the turns of angles that follow from poses at the current state.
+    fn count_turns(&mut self) {
+        let State { now, quarter_turns, record, .. } = &mut *self.state;
+        self.mechanism.count_turns(now.t, &now.y, quarter_turns.iter_mut().chain(&mut record.quarter_turns));
     }
 
     pub(super) fn stopped(&self, fault: StopFault, advice: StopAdvice) -> Stopped {

@@ -91,6 +91,7 @@ impl Workspace {
 pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &State) {
     mechanism.forget_evaluation();
     mechanism.gravity = state.conditions.gravity;
+    mechanism.set_quarter_turns(state.now.t, state.quarter_turns.iter().chain(&state.record.quarter_turns));
     if mechanism.pull() != state.pull {
         mechanism.set_pull(model.machine(), state.pull);
     }
