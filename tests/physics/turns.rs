@@ -220,6 +220,33 @@ fn a_constant_torque_over_many_turns_creates_no_energy() {
 }
 
 #[test]
+fn angles_of_joints_with_two_degrees_of_freedom_count_turns() {
+    for (kind, coordinate, part) in [
+        ("kind = \"cylindrical\"", "angle", 1),
+        ("kind = \"universal\"\nchild_axis = [1, 0, 0]", "angle", 0),
+        ("kind = \"universal\"\nchild_axis = [1, 0, 0]", "child_angle", 1),
+    ] {
+        let spring = format!(
+            "[[joint_spring]]\nname = \"s\"\njoint = \"h\"\ncoordinate = \"{coordinate}\"\nposition = \"400 deg\"\n\
+             stiffness = \"2 N m/rad\"\n"
+        );
+        let position = 400_f64.to_radians();
+        let omega = (2.0 / INERTIA).sqrt();
+        for known in ANGLES {
+            let label = format!("{known:?} {kind} {coordinate}");
+            let text = known.text([0.0, 0.0], &spring).replace("kind = \"revolute\"", kind);
+            let text = text.replace("start = { position = \"0e0 rad\", velocity = \"0e0 rad/s\" }\n", "");
+            let mut simulation = start_simulation(&text, &[("formulation", known.formulation())]);
+            run_until(&mut simulation, 0.3);
+            let angle = frame_now(&mut simulation).coordinates[part][0];
+            let expected = position * (1.0 - (omega * 0.3).cos());
+            assert!((angle - expected).abs() < 1e-4, "{label}: {angle} {expected}");
+            check_energy(&simulation, &label);
+        }
+    }
+}
+
+#[test]
 fn turns_survive_snapshots_saved_states_going_back_and_live_changes() {
     let spring =
         "[[joint_spring]]\nname = \"s\"\njoint = \"h\"\nposition = \"-900 deg\"\nstiffness = \"0.1 N m/rad\"\n";

@@ -161,8 +161,8 @@ impl State {
     }
 
     /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, then for each ball joint
-    /// whether it is in contact, its approach speed, and its current clearance; then the turns of the angles that elements act on,
-    /// where coordinates do not count them. The current branch of the friction law is excluded: like the step size, it belongs to
+    /// whether it is in contact, its approach speed, and its current clearance; then, of the angles that elements act on and
+    /// coordinates do not count, the number and the quarter turns of each that has at least two. The current branch of the friction law is excluded: like the step size, it belongs to
     /// the stepper.
     pub fn hash(&self) -> u64 {
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
@@ -180,7 +180,9 @@ impl State {
             add(m.approach_speed.to_bits());
             add(self.clearance(j).to_bits());
         }
-        for quarters in &self.quarter_turns {
+        // Closer to 0 the poses determine the angle.
+        for (i, quarters) in self.quarter_turns.iter().enumerate().filter(|(_, quarters)| quarters.unsigned_abs() > 1) {
+            add(i as u64);
             add(quarters.cast_unsigned());
         }
         hash
