@@ -31,7 +31,7 @@ pub(super) struct Coordinate {
 pub struct AngleReference {
     /// s.
     pub time: f64,
-    /// Within half a right angle, rad.
+    /// rad; the nearest quarter turn suffices.
     pub angle: f64,
 }
 
