@@ -5,7 +5,7 @@ use serde_json::{Map, Value as Json, json};
 
 use crate::presets::too_slow;
 use jointplay_physics::machine::Machine;
-use jointplay_physics::mechanism::Placement;
+use jointplay_physics::mechanism::{Placement, UnstableRest};
 use jointplay_physics::simulate::{Doubt, Simulation};
 use jointplay_physics::units::format_quantity_digits;
 use jointplay_scene::Scene;
@@ -96,6 +96,18 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
                 .to_owned(),
         );
     }
+    warnings.extend(assembly.unstable_rest.map(|rest| match rest {
+        UnstableRest::Left => {
+            "the search for an equilibrium met an unstable position of rest and left it to one side: the machine may as well rest \
+             on the other side; start values nearer to the intended rest decide."
+                .to_owned()
+        }
+        UnstableRest::Kept => {
+            "the start in equilibrium is an unstable position of rest, which the slightest disturbance leaves: no rest was found \
+             to either side."
+                .to_owned()
+        }
+    }));
     let inside = simulation.doubts().into_iter().filter(|doubt| matches!(doubt, Doubt::StartsInside { .. }));
     warnings.extend(inside.map(|doubt| doubt.to_string()));
     warnings
@@ -172,6 +184,10 @@ fn json(simulation: &Simulation) -> Json {
         "largest_gap_joint": widest.map(|(joint, _)| cut_joint(machine, joint)),
         "largest_gap_m": widest.map(|(_, gap)| gap),
         "other_mode": assembly.other_mode,
+        "unstable_rest": assembly.unstable_rest.map(|rest| match rest {
+            UnstableRest::Left => "left",
+            UnstableRest::Kept => "kept",
+        }),
         "bodies": bodies,
     })
 }

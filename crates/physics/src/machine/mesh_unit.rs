@@ -94,7 +94,7 @@ impl Machine {
     }
 
     /// Attachment points of all joints and force elements.
-    fn points(&self) -> impl Iterator<Item = Attachment> {
+    pub(crate) fn points(&self) -> impl Iterator<Item = Attachment> {
         let joints = self.joints.iter().chain(&self.closing_joints).flat_map(Joint::points);
         let balls = self.ball_joints.iter().flat_map(|joint| [joint.socket, joint.ball]);
         let elements = self.elements.iter().flat_map(|element| element.points(self));

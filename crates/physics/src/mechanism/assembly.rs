@@ -15,6 +15,17 @@ pub struct Assembly {
     pub other_mode: bool,
     /// Whether the guess comes from the closed form.
     pub closed_form: bool,
+    /// The unstable position of rest that the search for a start in equilibrium met, if any.
+    pub unstable_rest: Option<UnstableRest>,
+}
+
+/// What became of a position of rest that the slightest disturbance leaves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnstableRest {
+    /// The search left it to one side, and found a stable rest there.
+    Left,
+    /// It is the start: no rest was found to either side.
+    Kept,
 }
 
 /// What assembly at the start finds about a compiled machine.

@@ -2,7 +2,7 @@
 
 use super::assembly::Settled;
 use super::constraints::Constraints;
-use super::equilibrium::{rest_state, rest_state_near, with_constant_laws};
+use super::equilibrium::{rest_near, rest_state, with_constant_laws};
 use super::model::Model;
 use super::settled::without_play;
 use super::start::{CLOSED, factor_at};
@@ -110,7 +110,7 @@ impl HeldMachine {
             ideal_tip: Vec3::zeros(),
         };
         if own.closed_mobility().trace() > IMMOBILE * own.mobility(|_| {}).trace() {
-            own.ideal = rest_state_near(&stationary, own.ideal.clone())?;
+            own.ideal = rest_near(&stationary, own.ideal.clone())?.state;
         }
         own.ideal_tip = own.tip_at_ideal();
         Ok(own)

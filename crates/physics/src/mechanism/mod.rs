@@ -43,7 +43,7 @@ mod turns;
 
 pub use crate::jet::Jet;
 use assembly::Settled;
-pub use assembly::{Assembly, Placement};
+pub use assembly::{Assembly, Placement, UnstableRest};
 pub use bounds::{Advice, CostlyTask, LimitedQuantity, MAX_DENSE};
 pub use closed_form::{ClosedMotion, Unreachable};
 pub use contacts::{Contacts, Ramp};

@@ -27,8 +27,14 @@ const AT_REST: f64 = 1e-9;
 impl Mechanism {
     /// Changes to the scene's values made by [`Self::start`]; none before.
     pub fn assembly(&self) -> &Assembly {
-        static NONE: Assembly =
-            Assembly { bodies: Vec::new(), widest: None, most_turned: None, other_mode: false, closed_form: false };
+        static NONE: Assembly = Assembly {
+            bodies: Vec::new(),
+            widest: None,
+            most_turned: None,
+            other_mode: false,
+            closed_form: false,
+            unstable_rest: None,
+        };
         self.model.assembled.get().map_or(&NONE, |assembled| &assembled.assembly)
     }
 

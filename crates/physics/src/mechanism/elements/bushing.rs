@@ -54,7 +54,7 @@ pub(super) fn make(bushing: &machine::Bushing, [from, to]: [Anchor; 2]) -> Box<d
 }
 
 /// Rotation vector of a rotation matrix.
-fn rotation_vector(rotation: &Mat3) -> Vec3 {
+pub(super) fn rotation_vector(rotation: &Mat3) -> Vec3 {
     let q = quaternion_of(rotation);
     let (sign, vector) = (q.w.signum(), q.imag());
     let (sin, cos) = (vector.norm(), q.w.abs());

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::bushing::rotation_vector;
 use super::{At, ElementReport, ForceElement, Loads, SceneElement, law_of, point_of, push};
 use crate::machine::{self, LoadAxes, Vec3};
 use crate::mechanism::Powers;
@@ -48,6 +49,13 @@ impl ForceElement for Load {
         let wrench = &mut loads.wrench[self.on.body];
         push(wrench, &arm, &force);
         wrench.torque += torque;
+    }
+
+    fn work(&self, t: f64, [from, to]: [&[Kinematics]; 2]) -> f64 {
+        let [(force, torque), (force_at_end, torque_at_end)] = [from, to].map(|motion| self.at(t, motion));
+        let moved = point_of(&self.on, to).0 - point_of(&self.on, from).0;
+        let turn = rotation_vector(&(to[self.on.body].rotation * from[self.on.body].rotation.transpose()));
+        0.5 * ((force + force_at_end).dot(&moved) + (torque + torque_at_end).dot(&turn))
     }
 
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {

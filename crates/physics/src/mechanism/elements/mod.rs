@@ -24,7 +24,7 @@ use super::drives::{Law, trajectory_of};
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
 use crate::contact::{ContactState, Stiffness};
-use crate::machine::{Attachment, Drive, Element, ElementKind, JointCoordinate, Machine, Mat3, Vec3};
+use crate::machine::{self, Attachment, Drive, Element, ElementKind, JointCoordinate, LoadAxes, Machine, Mat3, Vec3};
 pub(super) use coordinate::AngleReference;
 use coordinate::Coordinate;
 pub use pull::Pull;
@@ -229,6 +229,11 @@ pub(super) trait ForceElement: Send + Sync {
         0.0
     }
 
+    /// Work from one pose to a nearby one at `t`, J, of the part of its force that is not in [`Self::stored`].
+    fn work(&self, _t: f64, _poses: [&[Kinematics]; 2]) -> f64 {
+        0.0
+    }
+
     /// Adds its powers at `t`, after an evaluation.
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers);
 }
@@ -279,6 +284,13 @@ pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn Scene
         }
     };
     machine.elements.iter().map(make).collect()
+}
+
+/// The element for the `force`, N, of gravity on body `body`.
+pub(super) fn weight(body: usize, force: Vec3) -> Box<dyn SceneElement> {
+    let centroid = Attachment { body: Some(body), point: Vec3::zeros() };
+    let load = machine::Load { on: centroid, force, torque: Vec3::zeros(), axes: LoadAxes::World, factor: None };
+    load::make(&load, Anchor { body, offset: Vec3::zeros() })
 }
 
 /// The element for a pulling hand.

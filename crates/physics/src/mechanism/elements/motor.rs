@@ -73,6 +73,11 @@ impl ForceElement for Motor {
         Some(self.on.coupling(&state, &slopes, at.motion))
     }
 
+    fn work(&self, t: f64, poses: [&[Kinematics]; 2]) -> f64 {
+        let [(from, force), (to, force_at_end)] = poses.map(|motion| self.clamped(t, motion));
+        0.5 * (force + force_at_end) * (to.deviation - from.deviation)
+    }
+
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
         let (state, force) = self.clamped(t, motion);
         powers.drive += force * state.rate;
