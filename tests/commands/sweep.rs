@@ -315,6 +315,25 @@ fn each_kind_of_warning_within_the_ranges_is_printed_once() {
 }
 
 #[test]
+fn a_point_without_a_rest_is_a_row_that_says_so() {
+    let folder = folder();
+    let scene = "start = \"equilibrium\"\n[gravity]\nz = \"-9.81 m/s^2\"\n[[parameter]]\nname = \"k\"\nvalue = \"100 N/m\"\n\
+                 [[body]]\nname = \"m\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
+                 [[joint]]\nname = \"g\"\nkind = \"prismatic\"\nchild = \"m\"\naxis = [0, 0, 1]\n\
+                 [[joint_spring]]\nname = \"s\"\njoint = \"g\"\nstiffness = \"k\"\n";
+    fs::write(folder.path().join("m.toml"), scene).unwrap();
+    let line = "sweep ./m.toml --vary parameter.k=0N/m..200N/m:3 --duration 10ms --keep m.pose.z:end --out a.npz";
+    jointplay(folder.path(), line).expect(0);
+    let (arrays, _) = archive(&folder.path().join("a.npz"));
+    assert_eq!(arrays["status"].as_slice().unwrap(), [2.0, 0.0, 0.0]);
+    let depths = arrays["z_end_m"].as_slice().unwrap();
+    assert!(
+        depths[0].is_nan() && (depths[1] + 0.0981).abs() < 1e-9 && (depths[2] + 0.04905).abs() < 1e-9,
+        "{depths:?}"
+    );
+}
+
+#[test]
 fn invalid_input_is_refused_before_anything_runs() {
     let folder = folder();
     let plan = "--periods 3 --discard 1 --out a.npz";

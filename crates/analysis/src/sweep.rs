@@ -8,7 +8,8 @@ use super::design::{Design, Start};
 use super::drive::{NoPeriod, ObservedRun};
 use super::layout::Layout;
 use super::point::{PointResult, PointRun, Protocol};
-use jointplay_physics::simulate::{MAX_RUN_DURATION, Simulation};
+use jointplay_physics::mechanism::MechanismError;
+use jointplay_physics::simulate::{MAX_RUN_DURATION, Simulation, StartError};
 use jointplay_scene::{Scene, SceneError, Value};
 
 /// Largest total number of kept sections; an array of them takes 512 MiB.
@@ -91,7 +92,8 @@ pub struct Sweep {
 
 impl Sweep {
     /// A sweep of `scene`. Before anything runs, it checks that the scene starts for every value of each range with the other
-    /// ranges at their ends, and at up to 4096 points inside a map or of a table.
+    /// ranges at their ends, and at up to 4096 points inside a map or of a table. A point without a position of rest to start in is
+    /// recorded as unable to start.
     ///
     /// # Errors
     /// No kept periods, no drive phase where sections need one, or a value at which the scene cannot start.
@@ -121,12 +123,15 @@ impl Sweep {
         Ok(Self { scene, design, protocol, layout })
     }
 
-    /// Requires that a point can start, and that its run is not longer than allowed.
+    /// Requires that a point can start, or merely lacks a position of rest, and that its run is not longer than allowed.
     fn check(&self, point: usize) -> Result<(), SweepError> {
         let scene = self.design.scene(&self.scene, point);
         let started = scene.and_then(|scene| {
-            Simulation::new(&scene.machine).map_err(|error| scene.locate(&error))?;
-            Ok(scene)
+            match Simulation::new(&scene.machine) {
+                // Whether a search succeeds shows only in the search: such a point is recorded as unable to start.
+                Ok(_) | Err(StartError(MechanismError::NoRest { .. })) => Ok(scene),
+                Err(error) => Err(scene.locate(&error)),
+            }
         });
         let infeasible = |error| SweepError::Infeasible { point: self.describe(point), error: Box::new(error) };
         let interval = self.protocol.interval(&started.map_err(infeasible)?)?;
