@@ -8,7 +8,9 @@
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 pub use jointplay_analysis as analysis;
-pub use jointplay_physics::{contact, expression, integrate, jet, machine, mechanism, simulate, suggest, units, words};
+pub use jointplay_physics::{
+    contact, expression, integrate, interpolate, jet, machine, mechanism, simulate, suggest, units, words,
+};
 pub use jointplay_scene as scene;
 pub use jointplay_scene::mesh;
 

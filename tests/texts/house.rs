@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Floors from the ground up; modules of one floor do not use each other.
 const FLOORS: [&[&str]; 12] = [
     &["words", "jet", "suggest", "units"],
-    &["contact", "expression", "files", "integrate"],
+    &["contact", "expression", "files", "integrate", "interpolate"],
     &["machine"],
     &["mechanism"],
     &["simulate"],
@@ -19,11 +19,32 @@ const FLOORS: [&[&str]; 12] = [
     &["main", "web"],
 ];
 /// Modules whose results must be the same bits everywhere.
-const REPRODUCIBLE: [&str; 9] =
-    ["jet", "contact", "expression", "integrate", "machine", "mechanism", "scene", "simulate", "analysis"];
+const REPRODUCIBLE: [&str; 10] = [
+    "jet",
+    "contact",
+    "expression",
+    "integrate",
+    "interpolate",
+    "machine",
+    "mechanism",
+    "scene",
+    "simulate",
+    "analysis",
+];
 /// Modules of the lowest crate.
-const PHYSICS: [&str; 10] =
-    ["words", "jet", "suggest", "units", "contact", "expression", "integrate", "machine", "mechanism", "simulate"];
+const PHYSICS: [&str; 11] = [
+    "words",
+    "jet",
+    "suggest",
+    "units",
+    "contact",
+    "expression",
+    "integrate",
+    "interpolate",
+    "machine",
+    "mechanism",
+    "simulate",
+];
 /// Crates that are a single module.
 const CRATES: [&str; 2] = ["scene", "analysis"];
 

@@ -15,16 +15,22 @@ const MAX_GROWTH: f64 = 1e5;
 const MIN_SEPARATION: f64 = 1e-9;
 /// Sections that pass before the growth of a new twin is counted, so that its offset aligns with the fastest-growing direction.
 pub const ALIGNMENT: usize = 5;
-/// Number of blocks for the standard error.
-const BLOCKS: usize = 10;
+/// Largest number of blocks for the standard error, and the smallest.
+const MAX_BLOCKS: usize = 512;
+const MIN_BLOCKS: usize = 3;
+/// Largest correlation of neighbouring blocks that count as independent.
+const MAX_CORRELATION: f64 = 0.1;
+/// Multiple of its own standard error beyond which a negative correlation of neighbouring blocks counts.
+const ANTICORRELATED: f64 = 2.0;
 
 /// An exponent and the evidence of its convergence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exponent {
     /// Largest Lyapunov exponent, 1/s, or per iteration for a map.
     pub value: f64,
-    /// Standard error of the mean over blocks of consecutive sections (10 blocks, or one per section if there are fewer),
-    /// 1/s; infinite for fewer than two.
+    /// Standard error, 1/s: of the mean over blocks of consecutive sections that are as long as their growth is correlated, and of
+    /// the twin's change of direction from the first section to the last. Twice this is an interval of 95 %; infinite for fewer
+    /// than three sections.
     pub standard_error: f64,
     /// Estimate after each kept section, 1/s.
     pub running: Vec<f64>,
@@ -54,6 +60,48 @@ pub struct Benettin {
     parts: Vec<(f64, usize)>,
     /// Separation of the twin, and its direction when the two were last comparable.
     difference: Vec<f64>,
+    /// The same at the start of counting.
+    initial_difference: Vec<f64>,
+    /// Distance between the unit vectors of the two directions, or their opposites, at the latest counted section.
+    turned: f64,
+    swing: Swing,
+}
+
+/// Variation of the separation's length between sections: a steadily growing separation that turns in a norm that is not its
+/// own grows unevenly, and the mean growth depends on the directions at its two ends.
+#[derive(Clone, Debug, Default)]
+struct Swing {
+    /// Time of the latest section, s, and the mean growth rate up to it, 1/s, once there was a section before it.
+    begin: f64,
+    rate: Option<f64>,
+    /// Smallest and largest logarithm of the growth since then, less that at the mean rate.
+    extremes: [f64; 2],
+    /// Sum of their differences over counted sections, and the number of these.
+    sum: f64,
+    count: usize,
+}
+
+impl Swing {
+    /// Records the logarithm of the growth since the latest section at `time`, s.
+    fn record(&mut self, time: f64, log_growth: f64) {
+        let excess = log_growth - self.rate.unwrap_or_default() * (time - self.begin);
+        self.extremes = [self.extremes[0].min(excess), self.extremes[1].max(excess)];
+    }
+
+    /// Ends the interval at a section at `time`, s, before which the separation grew by `log_growth`.
+    fn end_interval(&mut self, time: f64, log_growth: f64, counts: bool) {
+        if counts && self.rate.is_some() {
+            self.sum += self.extremes[1] - self.extremes[0];
+            self.count += 1;
+        }
+        let rate = log_growth / (time - self.begin);
+        *self = Self { begin: time, rate: Some(rate).filter(|rate| rate.is_finite()), extremes: [0.0; 2], ..*self };
+    }
+
+    /// Mean logarithm of the ratio of the longest to the shortest separation between two sections.
+    fn mean(&self) -> f64 {
+        self.sum / self.count.max(1) as f64
+    }
 }
 
 impl Benettin {
@@ -69,6 +117,9 @@ impl Benettin {
             counting: false,
             parts: Vec::with_capacity(sections),
             difference: Vec::new(),
+            initial_difference: Vec::new(),
+            turned: 0.0,
+            swing: Swing::default(),
         }
     }
 
@@ -77,12 +128,15 @@ impl Benettin {
         self.difference.clear();
         self.difference.extend(offset(orbit.scales(), self.separation));
         self.place_twin(orbit, twin);
+        self.swing = Swing { begin: orbit.time(), ..Swing::default() };
     }
 
     /// Starts accumulating growth.
     pub fn begin_counting(&mut self) {
         self.counting = true;
         self.parts.clear();
+        self.initial_difference.clone_from(&self.difference);
+        (self.swing.sum, self.swing.count) = (0.0, 0);
     }
 
     /// Advances the twin to the orbit's time, after a step of the orbit, and measures the separation.
@@ -102,24 +156,44 @@ impl Benettin {
             return Ok(());
         }
         twin.adopt_step_control(orbit);
+        self.swing.record(orbit.time(), self.log_growth + self.log_growth_to(ratio));
         if at_section || !(ratio < RENORMALISE_AT && ratio * RENORMALISE_AT > 1.0) {
             self.renormalise(orbit, twin, ratio);
         }
         if at_section {
-            if self.aligning > 0 {
-                self.aligning -= 1;
-            } else if self.counting {
+            let counts = self.counting && self.aligning == 0;
+            self.aligning = self.aligning.saturating_sub(1);
+            if counts {
                 self.parts.push((self.log_growth, self.uncounted));
+                self.turned = self.turn_since_counting(orbit.scales());
             }
+            self.swing.end_interval(orbit.time(), self.log_growth, counts);
             (self.log_growth, self.uncounted) = (0.0, 0);
         }
         Ok(())
     }
 
+    /// A separation of `ratio` times the nominal one; one that is lost in rounding is bounded below.
+    fn bounded_separation(&self, ratio: f64) -> f64 {
+        self.separation * if ratio.is_finite() { ratio.max(MIN_SEPARATION) } else { MIN_SEPARATION }
+    }
+
+    /// Logarithm of the growth since the latest renormalisation to `ratio` times the nominal separation.
+    fn log_growth_to(&self, ratio: f64) -> f64 {
+        libm::log(self.bounded_separation(ratio) / self.from)
+    }
+
+    /// As [`Self::turned`], for a state with these `scales`.
+    fn turn_since_counting(&self, scales: &[f64]) -> f64 {
+        let pairs = self.difference.iter().zip(&self.initial_difference).zip(scales);
+        let product: f64 = pairs.map(|((now, initial), scale)| (now / scale) * (initial / scale)).sum();
+        let cosine = product.abs() / (self.separation * self.separation);
+        (2.0 - 2.0 * cosine).max(0.0).sqrt()
+    }
+
     /// Records growth to `ratio` times the nominal separation, and rescales the twin to the nominal separation.
     fn renormalise<O: Orbit>(&mut self, orbit: &O, twin: &mut O, ratio: f64) {
-        let separation = self.separation * if ratio.is_finite() { ratio.max(MIN_SEPARATION) } else { MIN_SEPARATION };
-        self.log_growth += libm::log(separation / self.from);
+        self.log_growth += self.log_growth_to(ratio);
         if ratio > MIN_SEPARATION && ratio.is_finite() {
             self.difference.clear();
             let pairs = orbit.state().iter().zip(twin.state());
@@ -152,7 +226,11 @@ impl Benettin {
             })
             .collect();
         let value = *running.last()?;
-        Some(Exponent { value, standard_error: standard_error(&self.parts) / self.interval, running })
+        // The two ends of a separation that has turned by a radian may be anywhere between its shortest and its longest.
+        let of_ends = 0.5 * self.swing.mean() * (2.0 * self.turned).min(1.0) / sections as f64;
+        let of_blocks = standard_error(&self.parts);
+        let standard_error = (of_blocks * of_blocks + of_ends * of_ends).sqrt() / self.interval;
+        Some(Exponent { value, standard_error, running })
     }
 }
 
@@ -182,20 +260,87 @@ pub fn scaled_distance(a: &[f64], b: &[f64], scales: &[f64]) -> f64 {
     square.sqrt()
 }
 
-/// Standard error of the mean growth per section, from block means because neighbouring sections are not independent.
+/// Standard error of the mean growth per section, from the sums over blocks of sections. The blocks are doubled until neighbours are
+/// uncorrelated (Fishman, Management Science 24 (1978) 510), and few blocks widen the error as Student's distribution does.
 fn standard_error(parts: &[(f64, usize)]) -> f64 {
-    let blocks = parts.len().min(BLOCKS);
-    if blocks < 2 {
+    if parts.len() < MIN_BLOCKS {
         return f64::INFINITY;
     }
-    let edge = |b: usize| b * parts.len() / blocks;
-    let rate = |b: usize| {
-        let part = &parts[edge(b)..edge(b + 1)];
-        let sections: usize = part.iter().map(|(_, sections)| sections).sum();
-        part.iter().map(|(log_growth, _)| log_growth).sum::<f64>() / sections as f64
+    let sections: usize = parts.iter().map(|(_, sections)| sections).sum();
+    let mean = parts.iter().map(|(log_growth, _)| log_growth).sum::<f64>() / sections as f64;
+    let sum = |parts: &[(f64, usize)]| -> f64 {
+        parts.iter().map(|(log_growth, sections)| log_growth - mean * *sections as f64).sum()
     };
-    let count = blocks as f64;
-    let mean = (0..blocks).map(rate).sum::<f64>() / count;
-    let square = (0..blocks).map(|b| (rate(b) - mean) * (rate(b) - mean));
-    (square.sum::<f64>() / (count * (count - 1.0))).sqrt()
+    let mut blocks = parts.len().min(MAX_BLOCKS);
+    let variance = loop {
+        let edge = |b: usize| b * parts.len() / blocks;
+        let sums: Vec<f64> = (0..blocks).map(|b| sum(&parts[edge(b)..edge(b + 1)])).collect();
+        let variance: f64 = sums.iter().map(|sum| sum * sum).sum();
+        let covariance: f64 = sums.windows(2).map(|pair| pair[0] * pair[1]).sum();
+        let correlation = if variance > 0.0 { covariance / variance } else { 0.0 };
+        let independent = -ANTICORRELATED / (blocks as f64).sqrt()..=MAX_CORRELATION;
+        if blocks / 2 < MIN_BLOCKS || independent.contains(&correlation) {
+            break variance;
+        }
+        blocks /= 2;
+    };
+    let freedoms = (blocks - 1) as f64;
+    student_factor(freedoms) * (variance * (1.0 + 1.0 / freedoms)).sqrt() / sections as f64
+}
+
+/// Quantile of 97.5 % of Student's distribution over that of the normal distribution, within 4 % from two degrees of freedom on
+/// (Abramowitz & Stegun 26.7.5).
+fn student_factor(freedoms: f64) -> f64 {
+    1.0 + (1.210 + (1.440 + 1.304 / freedoms) / freedoms) / freedoms
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Purpose, RandomStream};
+
+    /// Fraction of series of `length` numbers, each `memory` times the one before plus a random number, whose mean is within two
+    /// standard errors of 0, and the mean standard error.
+    fn coverage(length: usize, memory: f64) -> (f64, f64) {
+        const SERIES: u64 = 400;
+        let (mut within, mut errors) = (0.0, 0.0);
+        for seed in 0..SERIES {
+            let random = RandomStream::new(seed, Purpose::Bootstrap, 0);
+            let mut x = 0.0;
+            let numbers = (0..length as u64 + 100).map(|counter| {
+                x = memory * x + random.unit(counter) - 0.5;
+                x
+            });
+            let parts: Vec<(f64, usize)> = numbers.skip(100).map(|number| (number, 1)).collect();
+            let mean = parts.iter().map(|part| part.0).sum::<f64>() / length as f64;
+            let error = standard_error(&parts);
+            within += f64::from(mean.abs() < 2.0 * error);
+            errors += error;
+        }
+        (within / SERIES as f64, errors / SERIES as f64)
+    }
+
+    #[test]
+    fn two_standard_errors_cover_the_mean_of_correlated_series() {
+        for (length, memory) in
+            [(20, 0.0), (200, 0.0), (2000, 0.0), (200, 0.5), (2000, 0.5), (200, 0.9), (2000, 0.9), (200, -0.5)]
+        {
+            let (covered, error) = coverage(length, memory);
+            // A uniform number has the variance 1/12.
+            let exact = 1.0 / ((12.0 * length as f64).sqrt() * (1.0 - memory));
+            println!("{length} {memory}: {covered} {}", error / exact);
+            assert!(covered > 0.9, "{length} {memory}: {covered}");
+            assert!((0.9..1.6).contains(&(error / exact)), "{length} {memory}: {error} {exact}");
+        }
+    }
+
+    #[test]
+    fn few_blocks_widen_the_error_as_students_distribution_does() {
+        for (freedoms, quantile) in [(2.0, 4.303), (3.0, 3.182), (5.0, 2.571), (10.0, 2.228), (30.0, 2.042)] {
+            let ratio = student_factor(freedoms) * 1.95996 / quantile;
+            assert!((0.96..1.001).contains(&ratio), "{freedoms}: {ratio}");
+        }
+        assert!(standard_error(&[(1.0, 1), (2.0, 1)]).is_infinite());
+        assert_eq!(standard_error(&[(1.0, 1), (2.0, 2), (1.0, 1)]), 0.0);
+    }
 }

@@ -1,7 +1,7 @@
 //! The physics of Jointplay: machines, their equations of motion, and running simulations. No screen, clock, thread or file.
 //!
 //! Modules from the bottom up; each uses only those before it (`ARCHITECTURE.md`): [`words`], [`suggest`], [`units`] and [`jet`],
-//! [`expression`], [`contact`] and [`integrate`], [`machine`], [`mechanism`], [`simulate`].
+//! [`expression`], [`contact`], [`integrate`] and [`interpolate`], [`machine`], [`mechanism`], [`simulate`].
 //!
 //! A machine is plain data, read from a scene file (`jointplay-scene`) or built in code. This example drops a ball that hangs in
 //! its socket with 0.2 mm of play:
@@ -33,6 +33,7 @@
 pub mod contact;
 pub mod expression;
 pub mod integrate;
+pub mod interpolate;
 pub mod jet;
 pub mod machine;
 pub mod mechanism;

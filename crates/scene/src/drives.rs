@@ -7,6 +7,8 @@ use super::formula::read_formula;
 use super::key::{FileKey, FileTable, MAX_SI, ValueType, Variants, at_most, key, number, positive};
 use super::points::{Graph, MAX_POINTS, SHORTEST_PART, read_file, read_points};
 use super::*;
+use jointplay_physics::interpolate::Interpolation;
+use jointplay_physics::words::Words;
 use std::sync::LazyLock;
 
 /// Maximum frequency of a harmonic drive, Hz.
@@ -35,6 +37,15 @@ const START: FileKey = key("start", number(Dimension::Time), "\"1 s\"", "when it
 
 const DURATION: FileKey =
     key("duration", ValueType::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)), "\"0.5 s\"", "how long it lasts");
+
+/// A drive needs two derivatives, so that straight lines are left out.
+const INTERPOLATION: FileKey = key(
+    "interpolation",
+    ValueType::Word(&[Interpolation::Spline.word(), Interpolation::Monotone.word()]),
+    "\"monotone\"",
+    "`spline` for samples of a smooth motion; `monotone` turns only where the points do, and its acceleration jumps there",
+)
+.default_text(Interpolation::Spline.word());
 
 /// A drive law of the scene file.
 #[derive(Debug)]
@@ -105,7 +116,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
     },
     DriveLaw {
         word: "table",
-        help: "cubic spline through points",
+        help: "function through points, by default a cubic spline",
         keys: &[
             key(
                 "points",
@@ -122,6 +133,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
                 "the points: two columns under a header with units, `time_s,position_mm`",
             )
             .unless("points"),
+            INTERPOLATION,
             key("repeat", ValueType::Flag, "true", "whether the points are one period of the motion")
                 .default_text("false"),
         ],
@@ -167,12 +179,24 @@ pub(super) static FACTOR: LazyLock<FileTable> = LazyLock::new(|| {
     let words: &[&str] = DRIVE.words().iter().copied().filter(|word| *word != FUNCTION).collect::<Vec<_>>().leak();
     let applies = |key: &&FileKey| key.of != [FUNCTION] && key.name != "unit";
     let row = |key: &FileKey| match key.value_type {
+        ValueType::Word(_) if key.name == INTERPOLATION.name => OF_FACTOR,
         ValueType::Word(_) => FileKey { value_type: ValueType::Word(words), ..*key },
         _ => pure(key),
     };
     let keys: Vec<FileKey> = DRIVE.keys.iter().filter(applies).map(row).collect();
     FileTable::new("factor", "a factor", "a number as a function of time", keys.leak()).by(Variants::Word("law", ""))
 });
+
+/// Interpolation of measured data that may have corners.
+pub(super) const fn interpolation(of: &'static [&'static str]) -> FileKey {
+    let words = ValueType::Word(<Interpolation as Words>::WORDS);
+    let help = "`monotone` turns only where the points do; `linear` has a kink at each point, where steps end; `spline` for samples \
+                of a smooth function";
+    let row = key(INTERPOLATION.name, words, "\"linear\"", help).default_text(Interpolation::Monotone.word());
+    FileKey { of, ..row }
+}
+
+const OF_FACTOR: FileKey = interpolation(&["table"]);
 
 /// A row of a drive for pure numbers in place of lengths, and numbers per second in place of speeds.
 fn pure(key: &FileKey) -> FileKey {
@@ -262,7 +286,18 @@ fn read_table(section: &Section<'_>) -> Result<Drive, SceneError> {
         (None, Some(file)) => read_file(&file, &graph)?,
         _ => read_points(&section.require("points")?, &graph)?,
     };
-    Ok(Drive::Table { points, repeats })
+    let is_factor = coordinate(section) == Dimension::None;
+    let interpolation = match section.get(INTERPOLATION.name) {
+        Some(node) if !is_factor && node.text()? == Interpolation::Linear.word() => {
+            let why =
+                "would make the rate jump at every point, and a drive needs two derivatives; allowed spline, monotone";
+            return Err(node.error(why));
+        }
+        Some(node) => node.word()?,
+        None if is_factor => Interpolation::Monotone,
+        None => Interpolation::Spline,
+    };
+    Ok(Drive::Table { points, interpolation, repeats })
 }
 
 fn read_law_of_formula(section: &Section<'_>) -> Result<Drive, SceneError> {

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use super::document::{Node, Section};
-use super::drives::{DRIVE, FACTOR, MAX_DRIVE_FREQUENCY, read_drive};
+use super::drives::{DRIVE, FACTOR, MAX_DRIVE_FREQUENCY, interpolation, read_drive};
 use super::instance::Instance;
 use super::key::{FileKey, FileTable, MAX_SI, ValueType, at_most, key, number};
 use super::placement::{ATTACHMENT, ROTATION, read_attachment, read_rotation};
 use super::points::{Axis, Graph, MAX_POINTS, read_file, read_points};
 use super::read_joints::read_coordinate;
 use super::*;
+use jointplay_physics::interpolate::Interpolation;
 use jointplay_physics::machine::{
     Bushing, Drive, Elastic, Element, ElementKind, Harmonic, JointCoordinate, JointSpring, Load, LoadAxes, Motor, Quat,
     Spring, SpringSide, Stop, Tyre, Vec3,
@@ -147,6 +148,7 @@ static SPRING: FileTable = FileTable::new(
              `preload`",
         ),
         CURVE_FILE,
+        interpolation(&[]),
         key(
             "side",
             ValueType::Word(SpringSide::WORDS),
@@ -215,6 +217,7 @@ static JOINT_SPRING: FileTable = FileTable::new(
         )
         .on_hinge(D::Torque, "[[\"-10 deg\", \"-5 N m\"], [0, 0], [\"10 deg\", \"8 N m\"]]"),
         CURVE_FILE,
+        interpolation(&[]),
     ],
 );
 
@@ -387,12 +390,16 @@ impl ElementReader<'_, '_> {
             }
             (Some(node), None) => read_points(&node, &graph)?,
             (None, Some(node)) => read_file(&node, &graph)?,
-            (None, None) => return Ok(line),
+            (None, None) => {
+                self.section.refuse("interpolation", "the spring has no `characteristic`")?;
+                return Ok(line);
+            }
         };
         for key in ["stiffness", "preload"] {
             self.section.refuse(key, "`characteristic`, or its `file`, says what the spring exerts")?;
         }
-        Ok(Elastic::Curve(points))
+        let given = self.section.get("interpolation").map(|node| node.word()).transpose()?;
+        Ok(Elastic::Curve { points, interpolation: given.unwrap_or(Interpolation::Monotone) })
     }
 
     /// Rejects an element without effect; `keys` lists the values of which one must not be 0.

@@ -2,11 +2,10 @@
 
 use std::cmp::Ordering;
 
-use super::{
-    BallJoint, Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointKind, JointSpring, Machine, Spring, Warning,
-};
+use super::{BallJoint, Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointKind, Machine, Warning};
 use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::StepControl;
+use crate::interpolate::{Ends, Interpolant, Interpolation, Overshoot};
 use crate::units::{Dimension, format_quantity, unit_names};
 
 /// Minimum number of fixed steps per impact. With fewer, much of the impact is lost; twice as many resolve it.
@@ -81,6 +80,12 @@ pub enum MachineFault {
     /// Points of a curve or of a table of positions that do not rise.
     #[error("{what}: a curve needs at least two finite points with increasing first coordinates")]
     Points {
+        /// Name of the joint or element.
+        what: String,
+    },
+    /// A table of straight lines for a coordinate: its rate would jump.
+    #[error("{what}: a drive needs two derivatives, so that its table cannot be linear; allowed spline, monotone")]
+    Kinks {
         /// Name of the joint or element.
         what: String,
     },
@@ -216,13 +221,74 @@ impl Machine {
         }
         for element in &self.elements {
             element.law().map_or(Ok(()), |law| check(&element.name, law, 0))?;
-            if let ElementKind::Spring(Spring { elastic: Elastic::Curve(points), .. })
-            | ElementKind::JointSpring(JointSpring { elastic: Elastic::Curve(points), .. }) = &element.kind
-            {
+            if let Some(Elastic::Curve { points, .. }) = element.elastic() {
                 rises(&element.name, points)?;
             }
         }
-        Ok(())
+        let coordinates =
+            self.tables().find(|table| !table.may_have_kinks && table.interpolation == Interpolation::Linear);
+        coordinates.map_or(Ok(()), |table| Err(MachineFault::Kinks { what: table.of.to_owned() }))
+    }
+
+    /// Every table of a drive, a time law or a characteristic.
+    fn tables(&self) -> impl Iterator<Item = PointTable<'_>> {
+        let of_drive = |what, of, drive, value: &'static str, may_have_kinks| match drive {
+            &Drive::Table { ref points, interpolation, repeats } => Some(PointTable {
+                what,
+                of,
+                points,
+                interpolation,
+                ends: Ends::of_motion(repeats),
+                units: ["s", value],
+                may_have_kinks,
+            }),
+            _ => None,
+        };
+        let drives = self.joints.iter().flat_map(move |joint| {
+            let drives = joint.drives();
+            drives.filter_map(move |(freedom, drive)| {
+                let unit = if freedom.turns() { "deg" } else { "mm" };
+                of_drive("drive", joint.name.as_str(), drive, unit, false)
+            })
+        });
+        let laws = self.elements.iter().filter_map(move |element| {
+            let (what, unit) = match &element.kind {
+                ElementKind::Load(_) => ("factor", ""),
+                ElementKind::Motor(_) if element.is_on_hinge() => ("target", "deg"),
+                ElementKind::Motor(_) => ("target", "mm"),
+                _ => ("ground", "mm"),
+            };
+            of_drive(what, element.name.as_str(), element.law()?, unit, what == "factor")
+        });
+        let characteristics = self.elements.iter().filter_map(|element| match element.elastic()? {
+            Elastic::Line { .. } => None,
+            &Elastic::Curve { ref points, interpolation } => Some(PointTable {
+                what: "characteristic",
+                of: &element.name,
+                points,
+                interpolation,
+                ends: Ends::Natural,
+                units: if element.is_on_hinge() { ["deg", "N m"] } else { ["mm", "N"] },
+                may_have_kinks: true,
+            }),
+        });
+        drives.chain(laws).chain(characteristics)
+    }
+
+    /// Warns of splines that overshoot.
+    fn overshoot_warning(&self) -> Option<Doubt> {
+        let splines =
+            self.tables().filter(|table| table.interpolation == Interpolation::Spline && table.points.len() >= 2);
+        let excess = |overshoot: &Overshoot| overshoot.excess() / (overshoot.range[1] - overshoot.range[0]);
+        let beyond = splines.filter_map(|table| {
+            let overshoot = Interpolant::new(table.points, table.interpolation, table.ends).overshoot()?;
+            Some((table, overshoot))
+        });
+        let beyond: Vec<_> = beyond.collect();
+        let (table, overshoot) = beyond.iter().max_by(|a, b| excess(&a.1).total_cmp(&excess(&b.1)))?;
+        let PointTable { what, of, units, .. } = table;
+        let others = beyond.len() - 1;
+        Some(Doubt::Overshoot { table: format!("{what} of {of}"), others, overshoot: *overshoot, units: *units })
     }
 
     /// Length scale of relative tolerances, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
@@ -305,6 +371,7 @@ impl Machine {
         }
         doubts.extend(self.step_warning());
         doubts.extend(self.tolerance_warning());
+        doubts.extend(self.overshoot_warning());
         doubts
     }
 
@@ -421,6 +488,21 @@ impl Machine {
     }
 }
 
+/// Points of a drive, a time law or a characteristic.
+struct PointTable<'a> {
+    /// What it is: `drive`.
+    what: &'static str,
+    /// Name of its joint or element.
+    of: &'a str,
+    points: &'a [[f64; 2]],
+    interpolation: Interpolation,
+    ends: Ends,
+    /// Units of abscissas and values; "" for pure numbers.
+    units: [&'static str; 2],
+    /// Whether its slope may jump.
+    may_have_kinks: bool,
+}
+
 /// A contradiction between contact parameters.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ContactFault {
@@ -492,7 +574,7 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::{Attachment, Body, Element, Joint, Mat3, SpringSide, Vec3};
+    use crate::machine::{Attachment, Body, Element, Joint, Mat3, Spring, SpringSide, Vec3};
     use crate::scene::{Scene, built_in_text};
 
     /// Fault of a machine with a bob in a socket after `change`.
@@ -523,7 +605,12 @@ mod tests {
         let drive = |drive: Drive| {
             move |machine: &mut Machine| machine.joints[0] = Joint::revolute(None, 0, Vec3::z()).with_drive(drive)
         };
-        let table = |points: &[[f64; 2]]| drive(Drive::Table { points: points.to_vec(), repeats: false });
+        let table_of = |points: &[[f64; 2]], interpolation| {
+            drive(Drive::Table { points: points.to_vec(), interpolation, repeats: false })
+        };
+        let table = |points: &[[f64; 2]]| table_of(points, Interpolation::Spline);
+        let lines = fault(table_of(&[[0.0, 1.0], [1.0, 2.0]], Interpolation::Linear));
+        assert!(matches!(lines, Some(MachineFault::Kinks { .. })), "{lines:?}");
         assert_eq!(fault(table(&[[0.0, 1.0], [1.0, 2.0]])), None);
         for points in [&[][..], &[[0.0, 1.0]], &[[1.0, 1.0], [1.0, 2.0]], &[[0.0, 1.0], [1.0, f64::NAN]]] {
             assert!(matches!(fault(table(points)), Some(MachineFault::Points { .. })), "{points:?}");
@@ -532,7 +619,8 @@ mod tests {
         assert!(matches!(none, Some(MachineFault::NoFunction { function: 2, .. })), "{none:?}");
         let curve = fault(|machine| {
             let [from, to] = [Attachment::world(Vec3::zeros()), Attachment::on(0, Vec3::zeros())];
-            let (elastic, side) = (Elastic::Curve(Vec::new()), SpringSide::Both);
+            let elastic = Elastic::Curve { points: Vec::new(), interpolation: Interpolation::Monotone };
+            let side = SpringSide::Both;
             let spring = Spring { from, to, length: 0.1, elastic, damping: 0.0, side };
             machine.elements.push(Element { name: "s".to_owned(), kind: ElementKind::Spring(spring) });
         });

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::contact::NormalLaw;
+use crate::interpolate::Overshoot;
 use crate::units::{format_quantity, format_quantity_digits};
 
 /// A reason in the settings to distrust any result of a scene. Its `Display` is a sentence for the user.
@@ -53,6 +54,17 @@ pub enum Doubt {
         /// Names of the joints.
         joints: String,
     },
+    /// A table whose spline leaves the range of the points around it.
+    Overshoot {
+        /// The one that leaves it furthest: `drive of guide`.
+        table: String,
+        /// Number of other tables with the same fault.
+        others: usize,
+        /// Where and how far, SI.
+        overshoot: Overshoot,
+        /// Units of abscissas and values; "" for pure numbers.
+        units: [&'static str; 2],
+    },
     /// The list of ball joints with distinct settings is incomplete.
     MoreJoints,
 }
@@ -96,6 +108,19 @@ impl fmt::Display for Doubt {
                     format_quantity(*step, "us"),
                     format_quantity(libm::round(duration * 1e8) * 1e-8, "us"),
                     format_quantity(*recommended, "us")
+                )
+            }
+            Self::Overshoot { table, others, overshoot, units: [of_x, of_y] } => {
+                let more = if *others > 0 { format!(" (and {others} more)") } else { String::new() };
+                let value = |y: f64| format_quantity_digits(y, of_y, 4);
+                write!(
+                    f,
+                    "{table}{more}: the spline reaches {} at {}, but the points around it lie between {} and {}; interpolation = \
+                     monotone stays between the points.",
+                    value(overshoot.value),
+                    format_quantity_digits(overshoot.at, of_x, 4),
+                    value(overshoot.range[0]),
+                    value(overshoot.range[1])
                 )
             }
             Self::Tolerance { tolerance, loosest } => write!(
@@ -160,7 +185,7 @@ impl Warning {
             Self::Doubt(Doubt::Step { .. }) => Some("solver.step"),
             Self::Doubt(Doubt::Tolerance { .. }) => Some("solver.tolerance"),
             Self::StiffFriction { .. } => Some("slip_speed_high"),
-            Self::Doubt(Doubt::MoreJoints) | Self::MeshUnit { .. } => None,
+            Self::Doubt(Doubt::MoreJoints | Doubt::Overshoot { .. }) | Self::MeshUnit { .. } => None,
         }
     }
 

@@ -1,6 +1,7 @@
 //! Drive laws: prescribed q(t) with exact first and second derivatives. The motions are in `mechanism/drives`.
 
 use crate::expression::Program;
+use crate::interpolate::Interpolation;
 
 /// Prescribed function of time, for a joint coordinate, a motor's target, a tyre's ground or the factor of a load. On a hinge,
 /// lengths are angles (rad) and speeds angular speeds (rad/s); of a factor, they are pure numbers and numbers per second.
@@ -44,10 +45,12 @@ pub enum Drive {
         /// Duration, s.
         duration: f64,
     },
-    /// A cubic spline through points.
+    /// A function through points.
     Table {
         /// Times (s) and positions (m), in ascending time.
         points: Vec<[f64; 2]>,
+        /// How it passes through them; only the factor of a load may be linear.
+        interpolation: Interpolation,
         /// Whether the points span one period of the motion.
         repeats: bool,
     },

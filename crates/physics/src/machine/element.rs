@@ -2,6 +2,7 @@
 //! `mechanism/elements`, one file for each kind.
 
 use super::{Attachment, Drive, Freedom, Machine, Quat, Vec3};
+use crate::interpolate::Interpolation;
 use crate::words::words;
 
 /// A force element.
@@ -51,8 +52,13 @@ pub enum Elastic {
         /// Stiffness, N/m (N m/rad on a hinge).
         stiffness: f64,
     },
-    /// A curve through points of stretch, m (rad), and tension, N (N m), in ascending stretch.
-    Curve(Vec<[f64; 2]>),
+    /// A curve through points.
+    Curve {
+        /// Stretches, m (rad), and tensions, N (N m), in ascending stretch.
+        points: Vec<[f64; 2]>,
+        /// How it passes through them.
+        interpolation: Interpolation,
+    },
 }
 
 /// Tension `elastic` + `damping` dl/dt along the line between two points, restricted to one sign if the spring is one-sided.
@@ -225,7 +231,7 @@ impl Elastic {
     pub fn has_effect(&self) -> bool {
         match self {
             Self::Line { preload, stiffness } => *preload != 0.0 || *stiffness != 0.0,
-            Self::Curve(points) => points.iter().any(|point| point[1] != 0.0),
+            Self::Curve { points, .. } => points.iter().any(|point| point[1] != 0.0),
         }
     }
 
@@ -233,7 +239,7 @@ impl Elastic {
     fn unstretched(&self) -> f64 {
         let points = match self {
             Self::Line { preload, .. } => return *preload,
-            Self::Curve(points) => points,
+            Self::Curve { points, .. } => points,
         };
         let next = points.partition_point(|point| point[0] < 0.0);
         let next = next.clamp(1, points.len() - 1);
@@ -278,6 +284,19 @@ impl Element {
     /// Whether it acts on an angle.
     pub fn is_on_hinge(&self) -> bool {
         self.coordinate().is_some_and(|on| on.freedom.turns())
+    }
+
+    /// The elastic law of a spring.
+    pub fn elastic(&self) -> Option<&Elastic> {
+        match &self.kind {
+            ElementKind::Spring(spring) => Some(&spring.elastic),
+            ElementKind::JointSpring(spring) => Some(&spring.elastic),
+            ElementKind::Load(_)
+            | ElementKind::Stop(_)
+            | ElementKind::Bushing(_)
+            | ElementKind::Motor(_)
+            | ElementKind::Tyre(_) => None,
+        }
     }
 
     /// The time law that it follows, if any.

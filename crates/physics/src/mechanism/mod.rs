@@ -33,7 +33,6 @@ mod power;
 mod reachable;
 mod rows;
 mod settled;
-mod spline;
 mod start;
 mod stiff;
 mod summary;
@@ -49,7 +48,7 @@ pub use closed_form::{ClosedMotion, Unreachable};
 pub use contacts::{Contacts, Ramp};
 pub use discrete_gradient::StepStart;
 pub use drives::periods_of;
-pub use elements::{ActiveSet, Counts, ElementReport, Gap, Powers, Pull, WallContact};
+pub use elements::{ActiveSet, Counts, EdgeIndicator, ElementReport, Gap, Powers, Pull, WallContact};
 use flight::ActiveRanges;
 pub use flight::{Flight, FreeFlightBody};
 pub use held::{HeldError, HeldMachine, drive_positions};
@@ -683,36 +682,40 @@ impl Mechanism {
         scene_elements.map(move |e| e.report(t, motion))
     }
 
-    /// Two numbers per one-sided element, in any unit: depth of contact, and the smaller of that and an indicator that falls to 0
-    /// when contact is lost while compressed. `t`, s, is the time of the motion last measured.
-    pub fn contact_indicators(&self, t: f64) -> impl Iterator<Item = f64> {
+    /// Two indicators per one-sided element: depth of contact, and the smaller of that and an indicator that falls to 0 when
+    /// contact is lost while compressed. Then one per element whose force has kinks. `t`, s, is the time of the motion last
+    /// measured.
+    pub fn edge_indicators(&self, t: f64) -> impl Iterator<Item = EdgeIndicator> {
         let motion = self.equations.motion();
-        self.elements.iter().filter_map(move |e| e.contact_indicators(t, motion)).flatten()
+        let of_contact = self.elements.iter().filter_map(move |e| e.contact_indicators(t, motion)).flatten();
+        let segments = self.elements.iter().filter_map(move |e| e.segment(t, motion));
+        of_contact.map(EdgeIndicator::Contact).chain(segments.map(EdgeIndicator::Segment))
     }
 
-    /// Whether any element is one-sided.
+    /// Whether any element is one-sided or has a force with kinks.
     pub fn has_edges(&self) -> bool {
-        self.contact_indicators(0.0).next().is_some()
+        self.edge_indicators(0.0).next().is_some()
     }
 
-    /// Whether the force of any element in contact, by `contact_indicators` from [`Self::contact_indicators`], has a vertical
-    /// slope at first contact.
-    pub fn has_vertical_onset(&self, contact_indicators: &[f64]) -> bool {
+    /// Whether the force of any element in contact, by `indicators` from [`Self::edge_indicators`], has a vertical slope at first
+    /// contact.
+    pub fn has_vertical_onset(&self, indicators: &[EdgeIndicator]) -> bool {
         let motion = self.equations.motion();
-        let with_edges = self.elements.iter().filter(|e| e.contact_indicators(0.0, motion).is_some());
-        contact_indicators
-            .chunks_exact(2)
-            .zip(with_edges)
-            .any(|(own, element)| own[1] > 0.0 && element.has_vertical_onset())
+        let one_sided = self.elements.iter().filter(|e| e.contact_indicators(0.0, motion).is_some());
+        let in_contact = |own: &[EdgeIndicator]| own[1].side() > 0.0;
+        indicators.chunks_exact(2).zip(one_sided).any(|(own, element)| in_contact(own) && element.has_vertical_onset())
     }
 
-    /// Freezes the contact state of the one-sided elements according to `contact_indicators` from [`Self::contact_indicators`],
-    /// regardless of the motion; unfreezes it if `contact_indicators` is empty.
-    pub fn freeze_elements(&mut self, contact_indicators: &[f64]) {
+    /// Freezes each element on its side of every edge according to `indicators` from [`Self::edge_indicators`], regardless of the
+    /// motion; unfreezes it if `indicators` is empty.
+    pub fn freeze_elements(&mut self, indicators: &[EdgeIndicator]) {
         let motion = self.equations.motion();
-        let with_edges = self.elements.iter_mut().filter(|e| e.contact_indicators(0.0, motion).is_some());
-        for (i, element) in with_edges.enumerate() {
-            element.freeze_contact(contact_indicators.get(2 * i + 1).map(|indicator| *indicator > 0.0));
+        let mut remaining = indicators.iter().map(|indicator| indicator.side());
+        for element in self.elements.iter_mut().filter(|e| e.contact_indicators(0.0, motion).is_some()) {
+            element.freeze_contact(remaining.nth(1).map(|side| side > 0.0));
+        }
+        for element in self.elements.iter_mut().filter(|e| e.segment(0.0, motion).is_some()) {
+            element.freeze_segment(remaining.next().map(|side| side as usize));
         }
     }
 

@@ -36,7 +36,7 @@ use super::{
 use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::{Controller, Polynomial};
 use crate::machine::{Conditions, Machine, Vec3};
-use crate::mechanism::{self, Counts, ElementReport, Flight, Mechanism, Pull, Ramp};
+use crate::mechanism::{self, Counts, EdgeIndicator, ElementReport, Flight, Mechanism, Pull, Ramp};
 use adaptive::FullStep;
 use automatic::SchemeSelector;
 use corners::LawBranch;
@@ -249,13 +249,13 @@ struct Attempt {
     located_joint: Option<usize>,
     /// Joint that switches to another branch of a law there, and that branch.
     corner: Option<(usize, LawBranch)>,
-    /// Contact indicators that fix the side of each element during the step, as from [`Mechanism::contact_indicators`]; empty if
-    /// steps do not end at edges of elements.
-    element_sides: Vec<f64>,
+    /// Indicators that fix the side of each element during the step, as from [`Mechanism::edge_indicators`]; empty if steps do not
+    /// end at edges of elements.
+    element_sides: Vec<EdgeIndicator>,
     /// Whether it ends at an edge.
     edge: bool,
-    /// Contact indicators at both ends of a part of the step.
-    contact_indicators: [Vec<f64>; 2],
+    /// The same indicators at both ends of a part of the step.
+    edge_indicators: [Vec<EdgeIndicator>; 2],
     /// Whether it has been restarted on another branch.
     has_switched_branch: bool,
     /// Joints whose contact left the frozen branches of its laws in an evaluation.

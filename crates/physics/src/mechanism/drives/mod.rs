@@ -16,12 +16,13 @@ use table::Table;
 use std::fmt::Debug;
 use std::sync::Arc;
 
+use crate::interpolate::{Ends, Interpolation};
 use crate::jet::Jet;
 use crate::machine::{Drive, Joint, Machine};
 
 /// A coordinate, m or rad, or a factor as a function of time, s. Allocates nothing.
 pub trait Law: Debug + Send + Sync {
-    /// Coordinate, rate and acceleration at `t`. The rate is continuous.
+    /// Coordinate, rate and acceleration at `t`. The rate of a coordinate is continuous, that of a factor between ends of steps.
     fn at(&self, t: f64) -> Jet;
 
     /// Period of the motion, s; infinite if it does not repeat or nothing moves.
@@ -71,11 +72,24 @@ pub(super) fn trajectory_of(drive: &Drive, turns: bool) -> Trajectory {
         Drive::Pulse { base, height, start, duration } => {
             Arc::new(Pulse { base: *base, height: *height, start: *start, duration: *duration })
         }
-        Drive::Table { points, repeats } => Arc::new(Table::new(points, *repeats)),
+        Drive::Table { points, interpolation, repeats } => {
+            Arc::new(Table::new(points, *interpolation, Ends::of_motion(*repeats)))
+        }
         Drive::Formula { program, scale, resolve } => {
             Arc::new(Formula { program: program.clone(), scale: *scale, max_step: *resolve })
         }
     })
+}
+
+/// Law of the factor of a load, whose rate may jump; `None` for a function of the closed form.
+pub(super) fn law_of_factor(drive: &Drive) -> Option<Arc<dyn Law>> {
+    match drive {
+        // It follows the data up to its ends.
+        Drive::Table { points, interpolation: Interpolation::Monotone, repeats: false } => {
+            Some(Arc::new(Table::new(points, Interpolation::Monotone, Ends::Natural)))
+        }
+        _ => trajectory_of(drive, false).law().cloned(),
+    }
 }
 
 /// Periods of joint drives and of the time laws of force elements, s; infinite if one does not repeat or nothing moves.

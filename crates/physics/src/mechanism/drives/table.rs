@@ -1,9 +1,10 @@
-//! Cubic spline through points. The second derivative is continuous between the first and last point, and everywhere for a
-//! periodic table. Outside a table that does not repeat, the end values hold, and the rate is 0 at both ends.
+//! Function through points. Outside a table that does not repeat, the end values hold, and the rate of a drive is 0 at both
+//! ends. A spline's second derivative is continuous between the first and last point, and everywhere for a periodic table; the
+//! rate of a monotone function is.
 
 use super::{Law, MIN_STEP};
+use crate::interpolate::{Ends, Interpolant, Interpolation};
 use crate::jet::Jet;
-use crate::mechanism::spline::{Ends, Spline};
 
 /// Minimum number of steps per interval, unless they would be shorter than `MIN_PART`, s.
 const PARTS: f64 = 8.0;
@@ -12,24 +13,24 @@ const MIN_PART: f64 = 1e-3;
 #[derive(Debug)]
 pub(super) struct Table {
     /// Value against time, s.
-    spline: Spline,
+    curve: Interpolant,
     end: f64,
     repeats: bool,
 }
 
 impl Table {
-    /// Spline through `points`, which span one period if it `repeats`.
-    pub fn new(points: &[[f64; 2]], repeats: bool) -> Self {
-        let ends = match repeats {
-            true => Ends::Periodic,
-            false => Ends::Clamped,
-        };
-        Self { spline: Spline::new(points, ends), end: points[points.len() - 1][1], repeats }
+    /// Function through `points` with these `ends`.
+    pub fn new(points: &[[f64; 2]], interpolation: Interpolation, ends: Ends) -> Self {
+        Self {
+            curve: Interpolant::new(points, interpolation, ends),
+            end: points[points.len() - 1][1],
+            repeats: ends == Ends::Periodic,
+        }
     }
 
     /// `t` shifted by whole periods into the range of the points if they repeat.
     fn within(&self, t: f64) -> f64 {
-        let [first, last] = self.spline.ends();
+        let [first, last] = self.curve.ends();
         if !self.repeats || (first..last).contains(&t) {
             return t;
         }
@@ -43,9 +44,9 @@ impl Table {
 impl Law for Table {
     fn at(&self, t: f64) -> Jet {
         let t = self.within(t);
-        let [first, last] = self.spline.ends();
+        let [first, last] = self.curve.ends();
         if t < first {
-            return Jet::constant(self.spline.cubics[0][0]);
+            return Jet::constant(self.curve.cubics[0][0]);
         }
         if t >= last {
             return match self.repeats {
@@ -53,20 +54,20 @@ impl Law for Table {
                 false => Jet::constant(self.end),
             };
         }
-        self.spline.at(t)
+        self.curve.at(t)
     }
 
     fn period(&self) -> f64 {
-        let [first, last] = self.spline.ends();
-        let cubics = &self.spline.cubics;
+        let [first, last] = self.curve.ends();
+        let cubics = &self.curve.cubics;
         let moves = cubics.iter().any(|cubic| cubic[1..] != [0.0; 3]);
         if self.repeats && moves { last - first } else { f64::INFINITY }
     }
 
-    /// The next point, where the third derivative jumps, or an intermediate instant before it.
+    /// The next point, where a derivative jumps, or an intermediate instant before it.
     fn step_end(&self, t: f64) -> f64 {
-        let (now, times) = (self.within(t), &self.spline.knots);
-        let next = match self.spline.next(now + MIN_STEP) {
+        let (now, times) = (self.within(t), &self.curve.knots);
+        let next = match self.curve.next(now + MIN_STEP) {
             next if next < times.len() => next,
             _ if self.repeats => return t + part(times[1] - times[0]),
             _ => return f64::INFINITY,

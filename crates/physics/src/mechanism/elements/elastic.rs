@@ -1,9 +1,10 @@
 //! Elastic force of a spring, without its damper: preload + stiffness s, where s is the change of length or of a joint's
-//! coordinate, or a curve through points, straight beyond them. A one-sided spring exerts only the part of one sign.
+//! coordinate, or a curve through points, straight beyond them. On a curve of straight lines, the slope jumps at the inner points,
+//! its kinks. A one-sided spring exerts only the part of one sign.
 
+use crate::interpolate::{Ends, Interpolant, Interpolation};
 use crate::jet::Jet;
 use crate::machine::{self, SpringSide};
-use crate::mechanism::spline::{Ends, Spline};
 
 /// Upper bound on the magnitude of a stretch, m or rad.
 const MAX_STRETCH: f64 = 1e7;
@@ -23,7 +24,7 @@ impl Elastic {
     /// Elastic law of a spring that acts on `side`.
     pub fn new(elastic: &machine::Elastic, side: SpringSide) -> Self {
         match elastic {
-            machine::Elastic::Curve(points) => Self::Curve(Curve::new(points, side)),
+            machine::Elastic::Curve { points, interpolation } => Self::Curve(Curve::new(points, *interpolation, side)),
             machine::Elastic::Line { preload, stiffness } => {
                 Self::Line { preload: *preload, stiffness: *stiffness, side }
             }
@@ -34,7 +35,7 @@ impl Elastic {
     pub fn tension(&self, stretch: f64) -> f64 {
         match self {
             Self::Line { preload, stiffness, .. } => preload + stiffness * stretch,
-            Self::Curve(curve) => curve.at(stretch).value,
+            Self::Curve(curve) => curve.on_segment(stretch).value,
         }
     }
 
@@ -42,7 +43,28 @@ impl Elastic {
     pub fn stiffness(&self, stretch: f64) -> f64 {
         match self {
             Self::Line { stiffness, .. } => *stiffness,
-            Self::Curve(curve) => curve.at(stretch).rate,
+            Self::Curve(curve) => curve.on_segment(stretch).rate,
+        }
+    }
+
+    /// Whether its slope jumps at any stretch.
+    pub fn has_kinks(&self) -> bool {
+        matches!(self, Self::Curve(curve) if !curve.kinks().is_empty())
+    }
+
+    /// Number of kinks below `stretch`, plus a fraction that grows from 0 to 1 up to the next kink.
+    pub fn segment(&self, stretch: f64) -> f64 {
+        match self {
+            Self::Line { .. } => 0.0,
+            Self::Curve(curve) => curve.segment(stretch),
+        }
+    }
+
+    /// Freezes the tension of a curve with kinks on the line that follows this number of them, even beyond its ends; `None`
+    /// unfreezes it. The stored energy does not change.
+    pub fn freeze(&mut self, segment: Option<usize>) {
+        if let Self::Curve(curve) = self {
+            curve.frozen = segment.map(|segment| segment.min(curve.kinks().len()));
         }
     }
 
@@ -65,7 +87,11 @@ impl Elastic {
 
 /// Tension given as a curve over the stretch.
 pub(super) struct Curve {
-    spline: Spline,
+    interpolant: Interpolant,
+    /// Whether the slope jumps at the inner points.
+    has_kinks: bool,
+    /// Interval on whose line the tension is frozen over a step, if any.
+    frozen: Option<usize>,
     /// Stretches at which the cubic changes or a one-sided spring starts or ceases to act, in ascending order, each with the
     /// energy stored there, J.
     breakpoints: Vec<[f64; 2]>,
@@ -74,10 +100,15 @@ pub(super) struct Curve {
 }
 
 impl Curve {
-    fn new(points: &[[f64; 2]], side: SpringSide) -> Self {
-        let mut curve =
-            Self { spline: Spline::new(points, Ends::Natural), breakpoints: Vec::new(), is_active: Vec::new() };
-        let mut breakpoints = curve.spline.knots.clone();
+    fn new(points: &[[f64; 2]], interpolation: Interpolation, side: SpringSide) -> Self {
+        let mut curve = Self {
+            interpolant: Interpolant::new(points, interpolation, Ends::Natural),
+            has_kinks: interpolation == Interpolation::Linear,
+            frozen: None,
+            breakpoints: Vec::new(),
+            is_active: Vec::new(),
+        };
+        let mut breakpoints = curve.interpolant.knots.clone();
         if side != SpringSide::Both {
             breakpoints.extend(curve.roots());
             breakpoints.sort_by(f64::total_cmp);
@@ -105,13 +136,38 @@ impl Curve {
 
     /// Tension and its derivatives with respect to the stretch.
     fn at(&self, stretch: f64) -> Jet {
-        let [first, last] = self.spline.ends();
+        let [first, last] = self.interpolant.ends();
         let within = stretch.clamp(first, last);
-        let at = self.spline.at(within);
+        let at = self.interpolant.at(within);
         if stretch == within {
             return at;
         }
         Jet::new(at.value + at.rate * (stretch - within), at.rate, 0.0)
+    }
+
+    /// The same on the line on which the tension is frozen, if it is.
+    fn on_segment(&self, stretch: f64) -> Jet {
+        self.frozen.map_or_else(|| self.at(stretch), |interval| self.interpolant.on_cubic(interval, stretch))
+    }
+
+    /// Stretches at which the slope jumps. The lines beyond the first and the last point continue those between points.
+    fn kinks(&self) -> &[f64] {
+        let knots = &self.interpolant.knots;
+        if self.has_kinks { &knots[1..knots.len() - 1] } else { &[] }
+    }
+
+    /// As [`Elastic::segment`].
+    fn segment(&self, stretch: f64) -> f64 {
+        let kinks = self.kinks();
+        let below = kinks.partition_point(|kink| *kink <= stretch);
+        let fraction = match (kinks[..below].last(), kinks.get(below)) {
+            (Some(left), Some(right)) => (stretch - left) / (right - left),
+            // Towards 1 at the kink, and towards 1 at infinity.
+            (None, Some(right)) => 1.0 / (1.0 + (right - stretch)),
+            (Some(left), None) => 1.0 - 1.0 / (1.0 + (stretch - left)),
+            (None, None) => 0.0,
+        };
+        below as f64 + fraction
     }
 
     fn stored(&self, stretch: f64) -> f64 {
@@ -131,20 +187,14 @@ impl Curve {
 
     /// Stretches at which the tension changes sign.
     fn roots(&self) -> Vec<f64> {
-        let knots = &self.spline.knots;
         let mut roots = Vec::new();
         // The tension is monotonic between these.
         let mut ends = Vec::new();
-        for (i, [_, b, c, d]) in self.spline.cubics.iter().enumerate() {
-            ends.push(knots[i]);
-            // Roots of b + 2 c s + 3 d s^2, in the form without cancellation.
-            let half = -(c + c.signum() * (c * c - 3.0 * b * d).max(0.0).sqrt());
-            let mut turns = [half / (3.0 * d), b / half].map(|s| knots[i] + s);
-            turns.sort_by(f64::total_cmp);
-            let inside = |turn: &f64| knots[i] < *turn && *turn < knots[i + 1];
-            ends.extend(turns.into_iter().filter(inside));
+        for i in 0..self.interpolant.cubics.len() {
+            ends.push(self.interpolant.knots[i]);
+            ends.extend(self.interpolant.turns(i));
         }
-        let [first, last] = self.spline.ends();
+        let [first, last] = self.interpolant.ends();
         ends.push(last);
         for pair in ends.windows(2) {
             roots.extend(self.root(pair[0], pair[1]));
@@ -185,8 +235,9 @@ mod tests {
 
     #[test]
     fn the_energy_is_the_integral_of_the_acting_tension() {
-        for side in [SpringSide::Both, SpringSide::Push, SpringSide::Pull] {
-            let curve = Curve::new(&POINTS, side);
+        let sides = [SpringSide::Both, SpringSide::Push, SpringSide::Pull];
+        for (interpolation, side) in Interpolation::ALL.into_iter().flat_map(|way| sides.map(|side| (way, side))) {
+            let curve = Curve::new(&POINTS, interpolation, side);
             assert!(curve.stored(0.0).abs() < 1e-15);
             for to in [-0.07, -0.033, -0.0201, -0.015, 0.002, 0.02, 0.05] {
                 let n = 400_000;
@@ -194,34 +245,60 @@ mod tests {
                 let tension = |i: u32| side.of(curve.at((f64::from(i) + 0.5) * h).value);
                 let integral: f64 = (0..n).map(|i| h * tension(i)).sum();
                 let off = curve.stored(to) - integral;
-                assert!(off.abs() < 1e-9, "{side:?} {to}: {off:e}");
+                assert!(off.abs() < 1e-9, "{interpolation} {side:?} {to}: {off:e}");
             }
         }
     }
 
     #[test]
     fn a_curve_continues_straight_beyond_its_points() {
-        let curve = Curve::new(&POINTS, SpringSide::Both);
-        for (end, beyond) in [(-0.04, -0.1), (0.03, 0.2)] {
-            let (at, there) = (curve.at(end), curve.at(beyond));
-            let expected = at.value + at.rate * (beyond - end);
-            assert_eq!((there.value, there.rate), (expected, at.rate));
+        for interpolation in Interpolation::ALL {
+            let curve = Curve::new(&POINTS, interpolation, SpringSide::Both);
+            for (end, beyond) in [(-0.04, -0.1), (0.03, 0.2)] {
+                let (at, there) = (curve.at(end), curve.at(beyond));
+                let expected = at.value + at.rate * (beyond - end);
+                assert_eq!((there.value, there.rate), (expected, at.rate));
+            }
         }
     }
 
     #[test]
     fn all_zeros_of_the_tension_are_found() {
-        let curve = Curve::new(&POINTS, SpringSide::Push);
-        let mut roots = curve.roots();
-        roots.sort_by(f64::total_cmp);
-        // One zero in each of the first three intervals.
-        assert_eq!(roots.len(), 3, "{roots:?}");
-        for root in roots {
-            assert!(curve.at(root).value.abs() < 1e-9, "{root}");
+        for interpolation in Interpolation::ALL {
+            let curve = Curve::new(&POINTS, interpolation, SpringSide::Push);
+            let mut roots = curve.roots();
+            roots.sort_by(f64::total_cmp);
+            // One zero in each of the first three intervals.
+            assert_eq!(roots.len(), 3, "{roots:?}");
+            for root in roots {
+                assert!(curve.at(root).value.abs() < 1e-9, "{root}");
+            }
+            // A zero beyond the points.
+            let line = Curve::new(&[[0.0, 1.0], [1.0, 3.0]], interpolation, SpringSide::Push);
+            assert_eq!(line.roots(), [-0.5]);
+            assert_eq!(line.is_active, [true, false, false, false]);
         }
-        // A zero beyond the points.
-        let line = Curve::new(&[[0.0, 1.0], [1.0, 3.0]], SpringSide::Push);
-        assert_eq!(line.roots(), [-0.5]);
-        assert_eq!(line.is_active, [true, false, false, false]);
+    }
+
+    #[test]
+    fn segments_of_straight_lines_are_numbered_and_frozen_lines_go_on() {
+        let mut elastic = Elastic::Curve(Curve::new(&POINTS, Interpolation::Linear, SpringSide::Both));
+        assert!(elastic.has_kinks());
+        for (stretch, segment) in
+            [(-1e6, 0), (-0.03, 0), (-0.02, 1), (-0.011, 1), (-0.01, 2), (0.0, 2), (0.02, 3), (1e6, 3)]
+        {
+            assert_eq!(elastic.segment(stretch).floor(), f64::from(segment), "{stretch}");
+        }
+        let [energy, tension] = [elastic.stored(0.03), elastic.tension(0.03)];
+        elastic.freeze(Some(2));
+        // The line from (-0.01, -8) to (0.01, 6).
+        assert!((elastic.tension(0.03) - 20.0).abs() < 1e-12 && (elastic.stiffness(0.03) - 700.0).abs() < 1e-9);
+        assert_eq!(elastic.stored(0.03), energy);
+        elastic.freeze(None);
+        assert_eq!(elastic.tension(0.03), tension);
+        for (points, interpolation) in [(&POINTS[..], Interpolation::Monotone), (&POINTS[..2], Interpolation::Linear)] {
+            let smooth = Elastic::Curve(Curve::new(points, interpolation, SpringSide::Both));
+            assert!(!smooth.has_kinks() && smooth.segment(0.0) == 0.0);
+        }
     }
 }

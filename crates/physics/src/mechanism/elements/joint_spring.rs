@@ -65,6 +65,15 @@ impl SceneElement for JointSpring {
         self.on.set_reference(reference);
     }
 
+    fn segment(&self, t: f64, motion: &[Kinematics]) -> Option<f64> {
+        let stretch = || self.on.measure(self.position, t, motion).deviation;
+        self.elastic.has_kinks().then(|| self.elastic.segment(stretch()))
+    }
+
+    fn freeze_segment(&mut self, segment: Option<usize>) {
+        self.elastic.freeze(segment);
+    }
+
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
         let (state, force) = self.at(t, motion);
         self.on.report(&state, force, motion)

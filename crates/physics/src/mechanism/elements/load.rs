@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::bushing::rotation_vector;
-use super::{At, ElementReport, ForceElement, Loads, SceneElement, law_of, point_of, push};
+use super::{At, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
 use crate::machine::{self, LoadAxes, Vec3};
 use crate::mechanism::Powers;
-use crate::mechanism::drives::Law;
+use crate::mechanism::drives::{Law, law_of_factor};
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 
@@ -24,7 +24,7 @@ pub(super) fn make(load: &machine::Load, on: Anchor) -> Box<dyn SceneElement> {
         force: load.force,
         torque: load.torque,
         turns: load.axes == LoadAxes::Body,
-        factor: law_of(load.factor.as_ref(), false),
+        factor: load.factor.as_ref().and_then(law_of_factor),
     })
 }
 

@@ -84,6 +84,43 @@ pub(super) struct At<'a> {
     pub active_set: ActiveSet<'a>,
 }
 
+/// A number that shows on which side of an edge of its force an element is.
+#[derive(Clone, Copy, Debug)]
+pub enum EdgeIndicator {
+    /// In any unit; above 0 where the element presses.
+    Contact(f64),
+    /// Number of kinks passed, plus a fraction.
+    Segment(f64),
+}
+
+impl EdgeIndicator {
+    /// The number, which is continuous.
+    pub fn value(self) -> f64 {
+        match self {
+            Self::Contact(value) | Self::Segment(value) => value,
+        }
+    }
+
+    /// The largest whole number, kinks passed or 1 for an element that presses, not above the indicator.
+    pub fn side(self) -> f64 {
+        match self {
+            Self::Contact(value) => f64::from(value > 0.0),
+            Self::Segment(value) => value.floor(),
+        }
+    }
+
+    /// The value at the first edge on the way to `later`, if there is one.
+    pub fn edge_towards(self, later: Self) -> Option<f64> {
+        let [from, to] = [self.side(), later.side()];
+        match self {
+            _ if from == to => None,
+            Self::Contact(_) => Some(0.0),
+            Self::Segment(_) if from < to => Some(from + 1.0),
+            Self::Segment(_) => Some(from),
+        }
+    }
+}
+
 /// Accumulators of an evaluation.
 pub(super) struct Loads<'a> {
     /// Loads on the bodies about their centroids; the last is the world's.
@@ -259,6 +296,15 @@ pub(super) trait SceneElement: ForceElement {
     /// Sets the reference that determines the turns of the angle on which it acts, if any. The element reads its joint's
     /// coordinate, which counts turns, although it measures poses.
     fn set_angle_reference(&mut self, _reference: AngleReference) {}
+
+    /// Position among the kinks of the force: the number of those passed, plus a fraction that grows from 0 to 1 up to the next.
+    /// `None` if the force has no kinks.
+    fn segment(&self, _t: f64, _motion: &[Kinematics]) -> Option<f64> {
+        None
+    }
+
+    /// Freezes the force on its smooth continuation from this number of kinks; `None` unfreezes it.
+    fn freeze_segment(&mut self, _segment: Option<usize>) {}
 
     /// Freezes the contact state: the element follows its law as if it pressed, or as if it did not, regardless of the motion.
     /// `None` unfreezes it.

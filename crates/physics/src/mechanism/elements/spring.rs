@@ -143,6 +143,14 @@ impl SceneElement for Spring {
         self.frozen = in_contact;
     }
 
+    fn segment(&self, _: f64, motion: &[Kinematics]) -> Option<f64> {
+        self.elastic.has_kinks().then(|| self.elastic.segment(self.state(motion).length - self.length))
+    }
+
+    fn freeze_segment(&mut self, segment: Option<usize>) {
+        self.elastic.freeze(segment);
+    }
+
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
         let s = self.state(motion);
         ElementReport { points: s.points, force: s.along * -s.tension, ..ElementReport::default() }

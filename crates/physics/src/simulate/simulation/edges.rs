@@ -1,9 +1,11 @@
-//! Edges of force elements as events. During a step a stop or a tyre either presses or does not, and the step ends where that
-//! changes. The force has a kink or a jump there, and a step across it has an error that its estimate does not see.
+//! Edges of force elements as events. During a step a stop or a tyre either presses or does not, a spring with a characteristic of
+//! straight lines stays on one of them, and the step ends where that changes. The force has a kink or a jump there, and a step
+//! across it has an error that its estimate does not see.
 
 use super::Run;
 use super::flights::write_flights;
 use crate::integrate::find_root;
+use crate::mechanism::EdgeIndicator;
 
 /// Parts of a step at whose ends elements are checked.
 const PARTS: u32 = 4;
@@ -17,37 +19,38 @@ impl Run<'_> {
         if self.stepper.ends_on_interpolant() && self.mechanism.has_edges() {
             let Self { mechanism, state, attempt, .. } = self;
             mechanism.measure(state.now.t, &state.now.y);
-            attempt.element_sides.extend(mechanism.contact_indicators(state.now.t));
+            attempt.element_sides.extend(mechanism.edge_indicators(state.now.t));
         }
     }
 
-    /// Fraction of the step just attempted at which the first element begins or ceases to press, if any does; 0 if one did so at
-    /// the start and has been switched to the other side.
+    /// Fraction of the step just attempted at which the first element passes an edge, if any does; 0 if one did so at the start
+    /// and has been switched to the other side.
     pub(super) fn first_edge(&mut self, h: f64) -> Option<f64> {
         if self.attempt.element_sides.is_empty() {
             return None;
         }
-        let [mut left, mut right] = std::mem::take(&mut self.attempt.contact_indicators);
+        let [mut left, mut right] = std::mem::take(&mut self.attempt.edge_indicators);
         let mut from = AT_START;
-        self.measure_contact_indicators(from, h, &mut left);
-        let turns = self.attempt.element_sides.iter().zip(&left).any(|(side, now)| (*side > 0.0) != (*now > 0.0));
+        self.measure_edge_indicators(from, h, &mut left);
+        let turns = self.attempt.element_sides.iter().zip(&left).any(|(before, now)| before.side() != now.side());
         // Only once: if that leads back here, either side will do.
         if turns && !self.attempt.has_switched_branch {
             self.attempt.has_switched_branch = true;
             self.attempt.element_sides.copy_from_slice(&left);
-            self.attempt.contact_indicators = [left, right];
+            self.attempt.edge_indicators = [left, right];
             return Some(0.0);
         }
         let mut first: Option<f64> = None;
         for n in 1..=PARTS {
             let to = f64::from(n) / f64::from(PARTS);
-            self.measure_contact_indicators(to, h, &mut right);
+            self.measure_edge_indicators(to, h, &mut right);
             for (number, (&left, &right)) in left.iter().zip(&right).enumerate() {
-                if (left > 0.0) != (right > 0.0) {
+                if let Some(edge) = left.edge_towards(right) {
                     let width = (1e-15 / h).max(1e-12);
                     // The root returned is just past the edge: before it the next step would start with the wrong force.
-                    let at = find_root(from, left, to, right, width, 0.0, |theta| {
-                        self.contact_indicator_at(number, theta, h)
+                    let [before, after] = [left, right].map(|indicator| indicator.value() - edge);
+                    let at = find_root(from, before, to, after, width, 0.0, |theta| {
+                        self.edge_indicator_at(number, theta, h) - edge
                     });
                     first = Some(first.map_or(at, |first| first.min(at)));
                 }
@@ -58,21 +61,21 @@ impl Run<'_> {
             std::mem::swap(&mut left, &mut right);
             from = to;
         }
-        self.attempt.contact_indicators = [left, right];
+        self.attempt.edge_indicators = [left, right];
         first
     }
 
-    /// Writes the contact indicators of every element that has edges, on the interpolant of the attempted step, to `out`.
-    fn measure_contact_indicators(&mut self, theta: f64, h: f64, out: &mut Vec<f64>) {
+    /// Writes the indicators of every element that has edges, on the interpolant of the attempted step, to `out`.
+    fn measure_edge_indicators(&mut self, theta: f64, h: f64, out: &mut Vec<EdgeIndicator>) {
         let time = self.measure_all_at(theta, h);
         out.clear();
-        out.extend(self.mechanism.contact_indicators(time));
+        out.extend(self.mechanism.edge_indicators(time));
     }
 
-    /// One of these indicators.
-    fn contact_indicator_at(&mut self, number: usize, theta: f64, h: f64) -> f64 {
+    /// The value of one of these indicators.
+    fn edge_indicator_at(&mut self, number: usize, theta: f64, h: f64) -> f64 {
         let time = self.measure_all_at(theta, h);
-        self.mechanism.contact_indicators(time).nth(number).unwrap_or_default()
+        self.mechanism.edge_indicators(time).nth(number).map_or(0.0, EdgeIndicator::value)
     }
 
     /// Measures all bodies on the interpolant of the attempted step; returns the time there, s.

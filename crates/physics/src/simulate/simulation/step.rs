@@ -15,14 +15,14 @@ use crate::simulate::{Frame, Indeterminate, StartError, StopAdvice, StopFault, S
 impl Attempt {
     /// For the steps of a state of `dimension` components.
     pub(super) fn new(machine: &Machine, dimension: usize, joints: usize) -> Self {
-        let edges = 2 * machine.elements.len();
+        let edges = 3 * machine.elements.len();
         Self {
             end: StepEnd::new(vec![0.0; dimension], joints),
             located_joint: None,
             corner: None,
             element_sides: Vec::with_capacity(edges),
             edge: false,
-            contact_indicators: std::array::from_fn(|_| Vec::with_capacity(edges)),
+            edge_indicators: std::array::from_fn(|_| Vec::with_capacity(edges)),
             has_switched_branch: false,
             has_left_branch: vec![false; joints],
             full_step: None,
