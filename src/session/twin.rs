@@ -14,7 +14,7 @@ pub const DISPLACEMENT: f64 = 1e-9;
 const MAX_DISTANCES: usize = 4096;
 /// Interval between renormalisations of an undriven machine, s.
 const UNDRIVEN_INTERVAL: f64 = 0.1;
-/// Smallest number of intervals that yield an exponent: two in each block of its error.
+/// Smallest number of intervals that yield an exponent: enough for its standard error.
 const MIN_INTERVALS: usize = 20;
 /// Rounding tolerance of the end of an interval, in intervals.
 const TIME_TOLERANCE: f64 = 1e-9;

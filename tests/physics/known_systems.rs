@@ -353,6 +353,36 @@ fn exponents_of_driven_oscillators_match_published_values() {
     }
 }
 
+/// A damped linear oscillator, x'' = -0.2 x' - w^2 x + cos t, has the exponent -0.1 whatever the drive. The growth of the twin over
+/// a period depends on its phase, which drifts slowly where twice the frequency is near a multiple of the drive's.
+#[test]
+fn two_standard_errors_cover_the_exponent_of_a_damped_oscillator() {
+    let mut errors = Vec::new();
+    for half_waves in [1.0, 2.0, 3.0, 4.0, 6.0] {
+        for detuning in [2e-4, 1e-3, 4e-3, 0.01, 0.03, 0.1, 0.23] {
+            for kept in [20, 60, 200] {
+                let damped: f64 = 0.5 * half_waves + detuning;
+                let square = damped * damped + 0.01;
+                let force = move |t: f64, x: f64, v: f64| -0.2 * v - square * x + t.cos();
+                let orbit = Oscillator::new(force, [1.0, 0.0], false);
+                let (_, evidence) = analyse(orbit, std::f64::consts::TAU, kept + 7, 7, 1e-6, 1e-5);
+                let e = exponent(&evidence);
+                let label = format!("{damped} {kept}: {} +- {}", e.value, e.standard_error);
+                assert!((e.value + 0.1).abs() < 2.0 * e.standard_error + 1e-6, "{label}");
+                // The separation's length varies by a factor of three at most.
+                assert!(e.standard_error < 0.35 / (kept as f64).sqrt(), "{label}");
+                errors.push((kept, e.standard_error));
+            }
+        }
+    }
+    // Ten times the sections: the error falls at least as the square root.
+    let mean = |kept: usize| {
+        let own: Vec<f64> = errors.iter().filter(|error| error.0 == kept).map(|error| error.1).collect();
+        own.iter().sum::<f64>() / own.len() as f64
+    };
+    assert!(mean(200) < mean(20) / 10f64.sqrt(), "{} {}", mean(20), mean(200));
+}
+
 /// An orbit that fails at a known time keeps the sections taken before.
 #[test]
 fn a_motion_that_stops_keeps_its_sections() {

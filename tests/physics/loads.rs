@@ -44,8 +44,8 @@ fn a_law_a_formula_and_a_table_of_a_sine_give_the_same_motion() {
             .to_owned(),
         "{ law = \"formula\", formula = \"sin(2*pi*2*t + pi/6)\" }".to_owned(),
         "{ law = \"formula\", formula = \"sin(2*pi*2 Hz*t + 30 deg)\", resolve = \"5 ms\" }".to_owned(),
-        format!("{{ law = \"table\", points = [{points}], repeat = true }}"),
-        "{ law = \"table\", file = \"pull.csv\", repeat = true }".to_owned(),
+        format!("{{ law = \"table\", interpolation = \"spline\", points = [{points}], repeat = true }}"),
+        "{ law = \"table\", interpolation = \"spline\", file = \"pull.csv\", repeat = true }".to_owned(),
     ];
     for (method, formulation) in THREE_VARIANTS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-11"), ("formulation", formulation)];

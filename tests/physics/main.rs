@@ -46,6 +46,7 @@ mod settled;
 mod settled_start;
 mod simultaneous;
 mod spring_curves;
+mod tables;
 mod turned;
 mod turns;
 mod twin;

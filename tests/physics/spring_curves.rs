@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use crate::common::matrix::for_every;
 use crate::common::{THREE_VARIANTS, parse};
 use crate::elements::frame_at;
+use jointplay::interpolate::Interpolation;
 use jointplay::machine::{Elastic, ElementKind};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
@@ -88,6 +89,7 @@ impl Mounting {
     }
 }
 
+const SPLINE: &str = "interpolation = \"spline\"\n";
 const POINTS: [[f64; 2]; 3] = [[0.0, 0.0], [WIDTH, F1], [2.0 * WIDTH, F2]];
 
 /// Complete elliptic integral of the first kind for k^2 = `m`.
@@ -114,7 +116,7 @@ fn a_hardening_spring_oscillates_as_duffings_in_every_method_and_formulation() {
     let omega = (A / MASS).sqrt();
     for_every([Mounting::Body, Mounting::Slide, Mounting::Hinge], |mounting, variant| {
         let bound = variant.bound();
-        let mut simulation = mounting.start(&POINTS, "", &variant.close());
+        let mut simulation = mounting.start(&POINTS, SPLINE, &variant.close());
         let label = format!("{mounting:?} {variant}");
         // A quarter period along the cubic, half a period along the straight end, and back to the cubic.
         let frame = frame_at(&mut simulation, zero_crossing);
@@ -140,7 +142,7 @@ fn the_error_falls_with_the_order_of_the_method_along_a_curve() {
     let error = |method: &str, steps: f64| {
         let step = format!("{:e} s", zero_crossing / steps);
         let changes = [("solver.method", method), ("solver.step", &*step)];
-        let mut simulation = Mounting::Body.start(&POINTS, "", &changes);
+        let mut simulation = Mounting::Body.start(&POINTS, SPLINE, &changes);
         Mounting::Body.state(&frame_at(&mut simulation, zero_crossing))[0].abs()
     };
     for (method, steps, order) in [("semi-implicit-euler", [1e3, 2e3], 1.0), ("rk4", [20.0, 40.0], 4.0)] {
@@ -148,6 +150,75 @@ fn the_error_falls_with_the_order_of_the_method_along_a_curve() {
         let observed = (coarse / fine).log2();
         println!("{method}: {coarse:e}, {fine:e}, order {observed}");
         assert!((observed - order).abs() < 0.2, "{method}: {observed}");
+    }
+}
+
+/// Two springs that meet at 0, as a characteristic.
+const SOFT: f64 = 80.0;
+const HARD: f64 = 320.0;
+const LINES: [[f64; 2]; 3] = [[-0.2, -0.2 * SOFT], [0.0, 0.0], [0.2, 0.2 * HARD]];
+const LINEAR: &str = "interpolation = \"linear\"\n";
+
+#[test]
+fn straight_lines_oscillate_as_half_periods_of_two_springs() {
+    let [soft, hard] = [SOFT, HARD].map(|stiffness| PI / (stiffness / MASS).sqrt());
+    for_every([Mounting::Body, Mounting::Slide, Mounting::Hinge], |mounting, variant| {
+        // A step that is not cut at a kink has an error of the third order in its size.
+        let bound = if variant.method == "rk4" { 1e-7 } else { variant.bound() };
+        let mut simulation = mounting.start(&LINES, LINEAR, &variant.close());
+        for n in 0..3 {
+            let start = f64::from(n) * (soft + hard);
+            let label = format!("{mounting:?} {variant} {n}");
+            // It begins at 0.1 m, passes 0, turns on the soft side, and returns.
+            let amplitude = 0.1 * (HARD / SOFT).sqrt();
+            for (time, expected) in [
+                (start, 0.1),
+                (start + 0.5 * hard, 0.0),
+                (start + 0.5 * (hard + soft), -amplitude),
+                (start + 0.5 * hard + soft, 0.0),
+            ] {
+                let [x, _] = mounting.state(&frame_at(&mut simulation, time));
+                assert!((x - expected).abs() < 20.0 * bound, "{label}: {:e} at {time}", x - expected);
+            }
+        }
+        let residual = simulation.ledger().unwrap().relative_residual();
+        assert!(residual.abs() < 1e-4, "{label}: {residual:e}", label = variant);
+    });
+}
+
+#[test]
+fn steps_end_at_the_kinks_of_straight_lines() {
+    // A characteristic of 40 lines along a cubic, crossed several lines in a step at this tolerance.
+    let cubic = |s: f64| 400.0 * s + 3e4 * s * s * s;
+    let many: Vec<[f64; 2]> = (-20..=20).map(|n| 7.3e-3 * f64::from(n)).map(|s| [s, cubic(s)]).collect();
+    for (points, mounting) in [(&LINES[..], Mounting::Slide), (&many, Mounting::Body), (&many, Mounting::Hinge)] {
+        for method in ["dopri5", "automatic"] {
+            let changes = [("solver.method", method), ("solver.tolerance", "1e-6")];
+            let mut simulation = mounting.start(points, LINEAR, &changes);
+            let kinks: Vec<f64> = points[1..points.len() - 1].iter().map(|point| point[0]).collect();
+            let line = |s: f64| kinks.partition_point(|kink| *kink <= s);
+            let [mut before, _] = mounting.state(&frame_at(&mut simulation, 0.0));
+            let (mut crossed, mut first) = (0, None);
+            while simulation.time() < 1.0 {
+                simulation.step().unwrap();
+                let frame = crate::common::frame_now(&mut simulation);
+                let [now, _] = mounting.state(&frame);
+                if line(now) != line(before) {
+                    // The step ends just past the one kink that it reached.
+                    assert!(line(now).abs_diff(line(before)) == 1, "{method} {mounting:?}: {before} {now}");
+                    // On the way back, the end may be the kink itself.
+                    let distance = |s: f64| kinks.iter().map(|kink| (kink - s).abs()).fold(f64::INFINITY, f64::min);
+                    let nearest = distance(now).min(distance(before));
+                    assert!(nearest < 1e-9, "{method} {mounting:?}: {nearest:e} from a kink at {}", frame.time);
+                    crossed += 1;
+                }
+                let energy = frame.kinetic + frame.potential;
+                let scale = *first.get_or_insert(energy);
+                assert!((energy / scale - 1.0).abs() < 1e-4, "{method} {mounting:?}: {energy} {scale}");
+                before = now;
+            }
+            assert!(crossed >= 5, "{method} {mounting:?}: {crossed}");
+        }
     }
 }
 
@@ -191,9 +262,11 @@ fn a_one_sided_buffer_returns_its_energy() {
         [[joint]]\nname = \"guide\"\nkind = \"prismatic\"\nchild = \"mass\"\naxis = [0, 0, 1]\nstart = { position = \"60 mm\" }\n\
         [[spring]]\nname = \"pad\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"100 mm\"\nside = \"push\"\n\
         characteristic = [[\"-50 mm\", \"-200 N\"], [\"-30 mm\", \"-40 N\"], [\"-10 mm\", \"-5 N\"], [0, 0], [\"10 mm\", \"4 N\"]]\n";
-    for (method, formulation) in THREE_VARIANTS {
+    let cases = Interpolation::ALL.into_iter().flat_map(|way| THREE_VARIANTS.map(|variant| (way, variant)));
+    for (interpolation, (method, formulation)) in cases {
+        let text = format!("{text}interpolation = \"{interpolation}\"\n");
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
-        let mut simulation = Simulation::new(&parse(text, &changes).machine).unwrap();
+        let mut simulation = Simulation::new(&parse(&text, &changes).machine).unwrap();
         let mut highest = 0.0_f64;
         let energy = frame_at(&mut simulation, 0.0);
         let total_energy = energy.elastic + 0.5 * 9.81 * 0.06;
@@ -203,10 +276,10 @@ fn a_one_sided_buffer_returns_its_energy() {
             highest = highest.max(height);
             let force = frame.elements[0].force.z;
             assert!(force >= 0.0 && (force == 0.0) == (height >= 0.1), "{force} at {height}");
-            assert!((frame.kinetic + frame.potential - total_energy).abs() < 1e-6, "{method}");
+            assert!((frame.kinetic + frame.potential - total_energy).abs() < 1e-6, "{method} {interpolation}");
         }
         let top = total_energy / (0.5 * 9.81);
-        assert!(top > 0.2 && (highest - top).abs() < 1e-4, "{method}: {highest} {top}");
+        assert!(top > 0.2 && (highest - top).abs() < 1e-4, "{method} {interpolation}: {highest} {top}");
         let ledger = simulation.ledger().unwrap();
         assert!(ledger.relative_residual().abs() < 1e-6, "{method} {ledger:?}");
     }
@@ -218,14 +291,14 @@ fn a_characteristic_can_be_read_from_a_file() {
     let scene = folder.path().join("scene.toml");
     let text = Mounting::Body.text(&POINTS, "");
     let from = text.find("characteristic").unwrap();
-    std::fs::write(&scene, format!("{}file = \"coil.csv\"\n", &text[..from])).unwrap();
+    std::fs::write(&scene, format!("{}file = \"coil.csv\"\n{SPLINE}", &text[..from])).unwrap();
     let coil = folder.path().join("coil.csv");
     std::fs::write(&coil, "# measured\nlength_mm, tension [N]\n0, 0\n100, 10\n200, 40\n").unwrap();
     let scene = Scene::load(&scene, &[]).unwrap();
     let ElementKind::Spring(spring) = &scene.machine.elements[0].kind else {
         panic!("a spring");
     };
-    assert_eq!(spring.elastic, Elastic::Curve(POINTS.to_vec()));
+    assert_eq!(spring.elastic, Elastic::Curve { points: POINTS.to_vec(), interpolation: Interpolation::Spline });
     let mut simulation = Simulation::new(&scene.machine).unwrap();
     let (zero_crossing, _) = zero_crossing();
     assert!(Mounting::Body.state(&frame_at(&mut simulation, zero_crossing))[0].abs() < 1e-4);
@@ -254,6 +327,16 @@ fn errors_in_a_characteristic_are_located() {
             ["spring.s.file", "`characteristic` is given as well"],
         ),
         (spring, "file = \"a.csv\"", ["spring.s.file", "has no folder"]),
+        (
+            spring,
+            "stiffness = \"1 N/m\"\ninterpolation = \"linear\"",
+            ["spring.s.interpolation", "the spring has no `characteristic`"],
+        ),
+        (
+            spring,
+            "characteristic = [[0, 0], [\"1 mm\", \"1 N\"]]\ninterpolation = \"cubic\"",
+            ["spring.s.interpolation = \"cubic\"", "allowed spline, monotone, linear"],
+        ),
         (spring, "characteristic = [[0, 0]]", ["spring.s.characteristic", "has 1 points; allowed 2 to 10000"]),
         (
             spring,

@@ -62,7 +62,9 @@ impl Run<'_> {
             from = to;
         }
         self.attempt.edge_indicators = [left, right];
-        first
+        // A step cut so short that time stands still would be repeated for ever.
+        let start = self.state.now.t;
+        first.filter(|theta| start + theta * h > start)
     }
 
     /// Writes the indicators of every element that has edges, on the interpolant of the attempted step, to `out`.
