@@ -207,7 +207,7 @@ fn errors_in_a_drive_law_are_located() {
         ("law = \"table\", repeat = true, points = [[0, 0], [\"1 s\", 0]]", &["has 2 points; allowed 3 to 10000"]),
         (
             "law = \"table\", interpolation = \"linear\", points = [[0, 0], [\"1 s\", 0]]",
-            &["joint.P.drive.interpolation = \"linear\"", "a drive needs two derivatives; allowed spline, monotone"],
+            &["joint.P.drive.interpolation = \"linear\"", "is not one of the choices", "allowed spline, monotone"],
         ),
         (
             "law = \"table\", interpolation = \"cubic\", points = [[0, 0], [\"1 s\", 0]]",

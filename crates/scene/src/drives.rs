@@ -38,12 +38,12 @@ const START: FileKey = key("start", number(Dimension::Time), "\"1 s\"", "when it
 const DURATION: FileKey =
     key("duration", ValueType::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)), "\"0.5 s\"", "how long it lasts");
 
-/// A drive needs two derivatives, so that straight lines are left out.
 const INTERPOLATION: FileKey = key(
     "interpolation",
     ValueType::Word(&[Interpolation::Spline.word(), Interpolation::Monotone.word()]),
     "\"monotone\"",
-    "`spline` for samples of a smooth motion; `monotone` turns only where the points do, and its acceleration jumps there",
+    "`spline` for samples of a smooth motion; `monotone` turns only where the points do, and its acceleration jumps there; \
+     straight lines are refused, because the rate of a drive must not jump",
 )
 .default_text(Interpolation::Spline.word());
 
@@ -288,11 +288,6 @@ fn read_table(section: &Section<'_>) -> Result<Drive, SceneError> {
     };
     let is_factor = coordinate(section) == Dimension::None;
     let interpolation = match section.get(INTERPOLATION.name) {
-        Some(node) if !is_factor && node.text()? == Interpolation::Linear.word() => {
-            let why =
-                "would make the rate jump at every point, and a drive needs two derivatives; allowed spline, monotone";
-            return Err(node.error(why));
-        }
         Some(node) => node.word()?,
         None if is_factor => Interpolation::Monotone,
         None => Interpolation::Spline,
