@@ -193,6 +193,18 @@ pub fn is_link(text: &str) -> bool {
         || (text.contains('=') && !text.ends_with(".toml") && !is_file(text))
 }
 
+/// Whether `text`, the part of a link before its `?` or `#`, consists of pairs: a key has no address in it.
+fn is_pairs(text: &str) -> bool {
+    text.split_once('=').is_some_and(|(key, _)| !key.contains(['/', ':']))
+}
+
+/// Whether `text` is empty or an address, and not the name of a scene or of a file; without its scheme it is recognised only if
+/// pairs follow.
+fn is_address(text: &str, pairs_follow: bool) -> bool {
+    let is_short = || pairs_follow && text.contains(['/', '.', ':']) && !text.ends_with(".toml");
+    text.is_empty() || text.contains("://") || is_short()
+}
+
 /// Whether `text` is the path of a file; a browser has none.
 fn is_file(text: &str) -> bool {
     cfg!(not(target_arch = "wasm32")) && std::path::Path::new(text).is_file()
@@ -229,12 +241,16 @@ impl Link {
     /// As [`Self::parse`], without the length limit.
     fn read(text: &str) -> Result<Self, LinkError> {
         let (before, fragment) = text.split_once('#').unwrap_or((text, ""));
-        let query = match before.split_once('?') {
-            Some((_, query)) => query,
-            // Not a URL: bare pairs, unless a fragment follows a plain address.
-            None if fragment.is_empty() && before.contains('=') => before,
-            None => "",
+        let (address, query) = match before.split_once('?') {
+            Some((address, query)) => (address, query),
+            None if is_pairs(before) => ("", before),
+            None => (before, ""),
         };
+        if !is_address(address, text.contains(['?', '#'])) {
+            let message = "is neither pairs nor the address of a page; a link is for example ?scene=pendulum&c=0.5mm, with or \
+                           without an address before the `?`";
+            return Err(link_error(address, "", message));
+        }
         let pairs = |part: &str| -> Vec<(String, String)> {
             form_urlencoded::parse(part.as_bytes()).map(|(key, value)| (key.into_owned(), value.into_owned())).collect()
         };
@@ -248,7 +264,7 @@ impl Link {
 
     fn from_pairs(pairs: &[(String, String)]) -> Result<Self, LinkError> {
         let mut link = Self::default();
-        let (mut name, mut file, mut log) = (None, None, None);
+        let (mut name, mut file, mut text, mut log) = (None, None, None, None);
         let mut base: Vec<(String, String)> = Vec::new();
         for (key, value) in pairs {
             let value = value.trim();
@@ -258,9 +274,9 @@ impl Link {
                 "file" => {
                     let last = value.rsplit(['/', '\\']).next().unwrap_or(value);
                     let clean: String = last.chars().filter(|c| !c.is_control()).collect();
-                    name = Some(clean);
+                    file = Some(clean);
                 }
-                "text" => file = Some(unpack(key, value)?),
+                "text" => text = Some(unpack(key, value)?),
                 "log" => log = Some(unpack(key, value)?),
                 "t" => {
                     let time = parse_quantity(value, Dimension::Time).map_err(|error| wrong(&error.to_string()))?;
@@ -344,16 +360,26 @@ impl Link {
         if last > 0 && link.steps.is_none_or(|steps| steps < last) {
             return Err(link_error("log", "", "continues past the link's last step"));
         }
-        link.scene = match (file, name) {
-            (Some(text), name) => SceneText::File { name: name.unwrap_or_else(|| "link.toml".to_owned()), text },
-            (None, Some(name)) => {
+        link.scene = match (text, name, file) {
+            (Some(_), Some(name), _) => {
+                return Err(link_error(
+                    "scene",
+                    &name,
+                    "the link also has a scene file, in `text`; allowed is one scene",
+                ));
+            }
+            (Some(text), None, file) => SceneText::File { name: file.unwrap_or_else(|| "link.toml".to_owned()), text },
+            (None, _, Some(file)) => {
+                return Err(link_error("file", &file, "names the scene file in `text`, which is missing"));
+            }
+            (None, Some(name), None) => {
                 if name.contains('/') || name.ends_with(".toml") {
                     let message = "a link names a built-in scene; a file travels in `text`";
                     return Err(link_error("scene", &name, message));
                 }
                 SceneText::BuiltIn(name)
             }
-            (None, None) => link.scene,
+            (None, None, None) => link.scene,
         };
         Ok(link)
     }

@@ -901,6 +901,7 @@ fn a_bad_link_is_refused_before_any_window_opens() {
         ("?scene=pendulum&c=5", "contact.clearance = 5: needs a unit"),
         ("#scene=pendulun", "did you mean `pendulum`?"),
         ("t=5", "link: t = 5: needs a unit"),
+        ("pendulum", "link: pendulum: is neither pairs nor the address of a page"),
     ] {
         let outcome = jointplay(folder.path(), &format!("view --link {link}"));
         assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);

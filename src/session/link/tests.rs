@@ -174,6 +174,11 @@ fn a_handwritten_link_accepts_short_names_and_full_keys() {
     assert_eq!(changes_of("/?c=1mm#scene=pendulum"), Vec::new());
     assert_eq!(changes_of("http://localhost:1/a?c=1mm"), clearance("1mm"));
     assert_eq!(changes_of("http://localhost:1/a"), Vec::new());
+    assert_eq!(changes_of("localhost:1?c=1mm"), clearance("1mm"));
+    assert_eq!(changes_of("https://example.org/a=b/#c=1mm"), clearance("1mm"));
+    // Bare pairs before a fragment are a query.
+    let link = Link::parse("scene=pendulum#c=1mm").expect("a link");
+    assert_eq!((link.scene, link.log.base), (SceneText::BuiltIn("pendulum".to_owned()), clearance("1mm")));
     assert_eq!(changes_of(""), Vec::new());
 }
 
@@ -206,6 +211,16 @@ fn errors_in_a_link_state_key_and_cause() {
         ("log=AAAA", "does not unpack"),
         ("scene=/etc/passwd", "a link names a built-in scene"),
         ("scene=../mine.toml", "a link names a built-in scene"),
+        // Nothing that is given is ignored.
+        ("pendulum", "link: pendulum: is neither pairs nor the address of a page"),
+        ("mine.toml", "is neither pairs nor the address of a page"),
+        ("example.org/lab/", "is neither pairs nor the address of a page"),
+        ("pendulum?c=1mm", "link: pendulum: is neither pairs nor the address of a page"),
+        ("runs/mine.toml#c=1mm", "is neither pairs nor the address of a page"),
+        ("?pendulum", "link: pendulum: unknown word"),
+        ("pendulum&c=1mm", "link: pendulum: unknown word"),
+        ("file=pendulum", "names the scene file in `text`, which is missing"),
+        ("scene=pendulum&text=AwA", "the link also has a scene file, in `text`"),
     ] {
         let error = Link::parse(text).expect_err(text).to_string();
         assert!(error.contains(words), "{text}: {error}");
