@@ -16,7 +16,7 @@ use super::saved::Watcher;
 use super::speaker::Speaker;
 use crate::analysis::task::Job;
 use crate::files::{FileError, OutputFile, publish};
-use crate::scene::{max_file_size, too_large};
+use crate::scene::{ReadError, max_file_size, read_regular, too_large};
 
 /// The desktop host.
 #[derive(Default)]
@@ -44,13 +44,12 @@ impl DesktopHost {
 }
 
 /// Reads a chosen or dropped file, unless it is too large.
-fn read(path: &Path, bytes: impl FnOnce() -> Result<Vec<u8>, String>) -> OpenedFile {
+fn read(path: &Path) -> OpenedFile {
     let name = path.display().to_string();
-    let size = path.metadata().map_or(0, |file| file.len());
-    let content = match max_file_size(&name) {
-        most if size > most => Err(too_large()),
-        _ => bytes(),
-    };
+    let content = read_regular(path, max_file_size(&name)).map_err(|error| match error {
+        ReadError::TooLarge(_) => too_large(),
+        _ => error.to_string(),
+    });
     OpenedFile { name, content }
 }
 
@@ -84,7 +83,7 @@ impl Host for DesktopHost {
     }
 
     fn read_dropped(&mut self, files: Vec<DroppedFile>) {
-        let read = |file: DroppedFile| read(file.path(), || file.bytes());
+        let read = |file: DroppedFile| read(file.path());
         self.opened.push_back(files.into_iter().map(read).collect());
     }
 
@@ -100,8 +99,7 @@ impl Host for DesktopHost {
         match self.chooser.as_mut()?.poll(ctx, frame)? {
             Answer::Cancelled => Some(None),
             Answer::Open(path) => {
-                let bytes = || std::fs::read(&path).map_err(|error| error.to_string());
-                self.opened.push_back(vec![read(&path, bytes)]);
+                self.opened.push_back(vec![read(&path)]);
                 None
             }
             Answer::Save(path) => {

@@ -11,7 +11,7 @@ use super::files::SCENE_TYPE;
 use super::host::SaveFile;
 use super::{App, AppOptions, layout, opening, theme};
 use crate::files::{FileError, OutputFile, create_dir_all};
-use crate::scene::{DEFAULT_SCENE, Scene, built_in_text};
+use crate::scene::{DEFAULT_SCENE, MAX_FILE_SIZE, Scene, built_in_text, read_regular};
 use crate::session::link::ThemeChoice;
 use crate::simulate::Simulation;
 use crate::words::Words as _;
@@ -96,7 +96,8 @@ impl Store {
 
     /// The settings in the file `path`. An unreadable file counts as missing.
     pub fn at(path: PathBuf) -> Self {
-        let read = || -> Option<StoredSettings> { serde_json::from_slice(&std::fs::read(&path).ok()?).ok() };
+        let read =
+            || -> Option<StoredSettings> { serde_json::from_slice(&read_regular(&path, MAX_FILE_SIZE).ok()?).ok() };
         let now = read().unwrap_or_default().plausible();
         Self { path, written: now.clone(), now, due: f64::NEG_INFINITY, scale: 0.0 }
     }

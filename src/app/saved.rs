@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, SystemTime};
 
 use super::host::OpenedFile;
-use crate::scene::{MAX_FILE_SIZE, too_large};
+use crate::scene::{MAX_FILE_SIZE, ReadError, read_regular, too_large};
 
 /// Polling period; short in tests.
 const PERIOD: Duration = Duration::from_millis(if cfg!(test) { 20 } else { 500 });
@@ -81,11 +81,10 @@ fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, String> {
-    let large = path.metadata().is_ok_and(|file| file.len() > MAX_FILE_SIZE);
-    if large {
-        return Err(too_large());
-    }
-    std::fs::read(path).map_err(|cause| format!("cannot read this file: {cause}"))
+    read_regular(path, MAX_FILE_SIZE).map_err(|error| match error {
+        ReadError::TooLarge(_) => too_large(),
+        _ => error.to_string(),
+    })
 }
 
 #[cfg(test)]

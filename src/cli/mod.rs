@@ -50,7 +50,7 @@ use self::args::{Arguments, Command, LessonArguments, SceneArguments, ViewArgume
 pub use self::failure::Failure;
 pub use crate::scene::DEFAULT_SCENE;
 use crate::scene::LiveScene;
-use crate::scene::{BENCHMARKS, BUILT_IN, Scene, reference_page, visible};
+use crate::scene::{BENCHMARKS, BUILT_IN, Scene, read_regular, reference_page, visible};
 
 /// Size limit of a table that is read, in bytes.
 const MAX_TABLE_SIZE: u64 = 64 << 20;
@@ -212,12 +212,9 @@ fn start(scene: &Scene) -> Result<LiveScene, Failure> {
 /// # Errors
 /// Input/output: unreadable, or too large.
 fn read_text(path: &Path) -> Result<String, Failure> {
-    let unreadable = |why: String| Failure::io(format!("cannot read {}: {why}", path.display()));
-    let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
-    if size > MAX_TABLE_SIZE {
-        return Err(unreadable(format!("it has {size} bytes, more than the limit of {MAX_TABLE_SIZE}")));
-    }
-    std::fs::read_to_string(path).map_err(|error| unreadable(error.to_string()))
+    let unreadable = |why: &dyn std::fmt::Display| Failure::io(format!("{}: {why}", path.display()));
+    let bytes = read_regular(path, MAX_TABLE_SIZE).map_err(|error| unreadable(&error))?;
+    String::from_utf8(bytes).map_err(|_| unreadable(&"this is not a text file: it is not valid UTF-8"))
 }
 
 /// Writes results to standard output, with control characters in foreign text made visible; a reader that stops early (`|

@@ -1,8 +1,7 @@
 //! `run --save-state` and `--from-state`: a file with the state at the end of a run, from which a later run resumes with the
 //! same bits.
 
-use std::fs::File;
-use std::io::{Read as _, Write as _};
+use std::io::Write as _;
 use std::path::Path;
 
 use serde_json::{Map, Value as Json};
@@ -10,7 +9,7 @@ use serde_json::{Map, Value as Json};
 use super::Failure;
 use super::provenance::{WRITER, meta};
 use crate::files::{FileError, OutputFile, PendingFile};
-use crate::scene::{LiveScene, SavedState, Scene, visible_line};
+use crate::scene::{LiveScene, ReadError, SavedState, Scene, read_regular, visible_line};
 use crate::simulate::State;
 
 /// Size limit of a state file, bytes.
@@ -68,14 +67,11 @@ impl StateFile {
 /// An unreadable or damaged file; a state of another scene, other parameters or another version of the program.
 pub fn read(path: &Path, scene: &Scene) -> Result<SavedState, Failure> {
     let name = path.display();
-    let mut text = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(MAX_SIZE + 1).read_to_end(&mut text))
-        .map_err(|cause| Failure::io(format!("--from-state: cannot read {name}: {cause}")))?;
     let refuse = |why: String| Failure::usage(format!("--from-state {name}: {why}"));
-    if text.len() as u64 > MAX_SIZE {
-        return Err(refuse(format!("larger than {} GiB: not a state that `run --save-state` wrote", MAX_SIZE >> 30)));
-    }
+    let text = read_regular(path, MAX_SIZE).map_err(|cause| match cause {
+        ReadError::TooLarge(_) => refuse(format!("{cause}: not a state that `run --save-state` wrote")),
+        _ => Failure::io(format!("--from-state {name}: {cause}")),
+    })?;
     let saved = SavedState::read(WRITER, &text).map_err(|why| refuse(why.to_string()))?;
     check_scene(&saved.meta, scene).map_err(&refuse)?;
     Ok(saved)

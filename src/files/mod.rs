@@ -1,5 +1,5 @@
 //! Output files and folders. Each is written under a temporary name beside its final one, then renamed, so that it appears
-//! complete or not at all. Reading does not use this module.
+//! complete or not at all. Reading uses `crate::scene::read_regular`.
 
 mod folder;
 mod names;

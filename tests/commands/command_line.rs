@@ -611,6 +611,43 @@ fn a_file_name_need_not_be_unicode() {
     assert_eq!(missing.status.code(), Some(1), "{missing:?}");
 }
 
+/// Reading them might never end, or wait for ever.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_pipe_or_a_device_is_refused_where_a_file_is_expected() {
+    let folder = folder();
+    for name in ["pipe.toml", "pipe.stl", "pipe.urdf", "pipe"] {
+        assert!(Command::new("mkfifo").arg(folder.path().join(name)).status().unwrap().success());
+    }
+    let pendulum = fs::read_to_string("assets/scenes/pendulum.toml").unwrap();
+    let mesh = "shapes = [{ form = \"mesh\", file = \"pipe.stl\", unit = \"mm\" }, ";
+    let meshed = pendulum.replacen("shapes = [", mesh, 1);
+    fs::write(folder.path().join("mesh.toml"), meshed).unwrap();
+    fs::write(folder.path().join("include.toml"), format!("include = [\"pipe.toml\"]\n{pendulum}")).unwrap();
+    for reader in [
+        "check ./pipe.toml",
+        "check /dev/zero",
+        "check mesh.toml",
+        "check include.toml",
+        "run pendulum --duration 1ms --from-state pipe",
+        "run pendulum --duration 1ms --from-state /dev/zero",
+        "sweep pendulum --points pipe --duration 1ms --out a.npz",
+        "sweep pendulum --points /dev/zero --duration 1ms --out a.npz",
+        "tolerance pendulum --tolerances /dev/zero --limit peak_force<1N --out a",
+        "merge pipe /dev/zero --out a.npz",
+        "import pipe.urdf",
+        "import /dev/zero",
+        #[cfg(feature = "gui")]
+        "lessons ./pipe",
+        #[cfg(feature = "gui")]
+        "lessons /dev/zero",
+    ] {
+        let run = jointplay(folder.path(), reader);
+        assert!(matches!(run.code, Some(1 | 2)), "{reader}: {:?}", run.code);
+        assert!(run.stderr.contains("this is a pipe, a socket or a device, not a file"), "{reader}: {}", run.stderr);
+    }
+}
+
 /// The shell's file size limit makes every write beyond a few kilobytes fail, as on a full disk.
 #[cfg(unix)]
 #[test]

@@ -83,7 +83,8 @@ fn a_mesh_without_a_computable_mass_is_refused_with_its_line() {
     outcome(&with_mesh("", "mass=\"0\"").replace("<joint/>", "<joint/><geom size=\"0.1\"/>"), &open, 0);
     let missing_file = outcome(&with_mesh("", "").replace("m.obj", "gone.obj"), &open, 2).1;
     assert!(
-        missing_file.contains("cannot read gone.obj") && missing_file.contains("give its body an <inertial>"),
+        missing_file.contains("gone.obj: cannot read this file")
+            && missing_file.contains("give its body an <inertial>"),
         "{missing_file}"
     );
     let shell = mujoco("<body><joint/><geom size=\"0.1\" shellinertia=\"true\"/></body>");

@@ -218,7 +218,7 @@ fn a_state_of_another_scene_is_refused_with_the_reason() {
         json = serde_json::from_str(&good).unwrap();
     }
     fs::remove_file(&path).unwrap();
-    check_refused(same, 1, &["cannot read s"]);
+    check_refused(same, 1, &["s: cannot read this file"]);
 }
 
 #[test]

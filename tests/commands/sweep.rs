@@ -379,7 +379,11 @@ fn invalid_input_is_refused_before_anything_runs() {
         (format!("{PENDULUM} --from 60ms --out a.npz"), 2, "must begin before the end"),
         (format!("{PENDULUM} --vary contact.friction=0.1,0.2 --zip --out a.npz"), 2, "contact.friction has 2"),
         (format!("{PENDULUM} --vary contact.normal_law=hertz,flores --start follow-up --out a.npz"), 2, "ascending"),
-        ("sweep pendulum --points none.csv --duration 1ms --out a.npz".to_owned(), 1, "cannot read none.csv"),
+        (
+            "sweep pendulum --points none.csv --duration 1ms --out a.npz".to_owned(),
+            1,
+            "none.csv: cannot read this file",
+        ),
         (format!("{SMALL} --out no/such/folder/a.npz"), 1, "a.npz"),
         (format!("{SMALL} --shard 4/3 --out a.npz"), 2, "--shard 4/3"),
         (format!("{SMALL} --phase 2 --out a.npz"), 2, "--phase 2"),

@@ -245,7 +245,7 @@ fn errors_are_reported_with_their_line() {
     let over = "--over contact.friction=0.1..0.2";
     for (rest, code, fragment) in [
         ("--limit peak-force=140", 2, "--over"),
-        ("--limit peak-force=140 --tolerances none.csv", 1, "cannot read none.csv"),
+        ("--limit peak-force=140 --tolerances none.csv", 1, "none.csv: cannot read this file"),
         (&format!("--limit peak-force {over}"), 2, "--limit peak-force: expected OUTPUT=LIMIT"),
         (&format!("--limit peak-force=1mm {over}"), 2, "expected a number for peak-force in N"),
         (&format!("--limit peak-force=3..2 {over}"), 2, "the lower limit must be below"),

@@ -4,7 +4,6 @@
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::{Component, Path};
 use std::sync::Arc;
 
@@ -12,6 +11,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 
 use super::Texts;
+use super::file::{ReadError, read_regular};
 use super::mesh::{Fault, Format, Mesh};
 
 /// Size limit for scene and text files, bytes: a scene is a few kilobytes.
@@ -65,10 +65,8 @@ pub(super) enum AssetFault {
          from a disk; what the file holds can also be written into the scene itself"
     )]
     NoFolder,
-    #[error("this is a directory, not a file")]
-    Directory,
-    #[error("cannot read this file: {0}")]
-    Unreadable(#[from] std::io::Error),
+    #[error(transparent)]
+    Unreadable(#[from] ReadError),
     #[error("too large; allowed at most {} MiB in all {files} that a scene names", .limit >> 20)]
     TooLarge {
         /// Total limit for files of this kind, bytes.
@@ -194,32 +192,27 @@ impl<'d> AssetResolver<'d> {
         };
         let bytes_read = &self.bytes_read[kind as usize];
         let remaining = limit.saturating_sub(bytes_read.get());
-        // One byte more than allowed: a pipe or a device does not report its size.
-        let bytes = self.bytes(Path::new(name), remaining + 1)?;
-        if bytes.len() as u64 > remaining {
-            return Err(AssetFault::TooLarge { limit, files });
-        }
+        let bytes = self.bytes(Path::new(name), remaining).map_err(|fault| match fault {
+            AssetFault::Unreadable(ReadError::TooLarge(_)) => AssetFault::TooLarge { limit, files },
+            other => other,
+        })?;
         bytes_read.set(bytes_read.get() + bytes.len() as u64);
         Ok(encode(bytes))
     }
 
-    /// The first `limit` bytes of the file `name`.
+    /// Content of the file `name`, of at most `limit` bytes.
     fn bytes(&self, name: &Path, limit: u64) -> Result<Vec<u8>, AssetFault> {
         let path = self.folder.map(|folder| folder.join(name));
         // Files dropped on a web page come without a folder.
         let given = name.file_name().and_then(|own| self.given?.get(own.to_str()?));
         match (given, path) {
             (Some(bytes), path) if !path.as_ref().is_some_and(|path| path.exists()) => {
-                let limit = bytes.len().min(usize::try_from(limit).unwrap_or(usize::MAX));
-                Ok(bytes[..limit].to_vec())
+                if bytes.len() as u64 > limit {
+                    return Err(ReadError::TooLarge(limit).into());
+                }
+                Ok(bytes.clone())
             }
-            (_, Some(path)) if path.is_dir() => Err(AssetFault::Directory),
-            (_, Some(path)) => {
-                let mut bytes = Vec::new();
-                let file = std::fs::File::open(path)?;
-                file.take(limit).read_to_end(&mut bytes)?;
-                Ok(bytes)
-            }
+            (_, Some(path)) => Ok(read_regular(&path, limit)?),
             (_, None) => Err(AssetFault::NoFolder),
         }
     }

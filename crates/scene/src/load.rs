@@ -2,10 +2,10 @@
 
 use super::assets::{AssetResolver, MAX_FILE_SIZE};
 use super::error::line_and_column;
+use super::file::{ReadError, read_regular};
 use super::{Scene, SceneError, visible_line};
 use jointplay_physics::suggest::{brief, nearest};
 use std::ffi::OsStr;
-use std::io::Read;
 use std::path::Path;
 
 /// Embeds scenes from folders of `assets/`: defines the lists of their names and a lookup of their texts.
@@ -96,22 +96,15 @@ fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
         unreadable: true,
         ..SceneError::default()
     };
-    let metadata = std::fs::metadata(path).map_err(|cause| {
-        let stem = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".toml");
-        let (near, known) = known_names(stem);
-        error(format!("cannot read this file: {cause}; built-in scenes, named without `/` and `.toml`: {known}{near}"))
+    let bytes = read_regular(path, MAX_FILE_SIZE).map_err(|cause| match cause {
+        ReadError::TooLarge(_) => SceneError { unreadable: false, ..error(too_large()) },
+        ReadError::Unreadable(_) if !path.exists() => {
+            let stem = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".toml");
+            let (near, known) = known_names(stem);
+            error(format!("{cause}; built-in scenes, named without `/` and `.toml`: {known}{near}"))
+        }
+        _ => error(cause.to_string()),
     })?;
-    if metadata.is_dir() {
-        return Err(error("this is a directory, not a scene file".to_owned()));
-    }
-    let mut bytes = Vec::new();
-    // One byte more than allowed: a pipe or a device does not report its size.
-    std::fs::File::open(path)
-        .and_then(|file| file.take(MAX_FILE_SIZE + 1).read_to_end(&mut bytes))
-        .map_err(|cause| error(format!("cannot read this file: {cause}")))?;
-    if bytes.len() as u64 > MAX_FILE_SIZE {
-        return Err(SceneError { unreadable: false, ..error(too_large()) });
-    }
     String::from_utf8(bytes).map_err(|cause| {
         let valid = &cause.as_bytes()[..cause.utf8_error().valid_up_to()];
         let valid = std::str::from_utf8(valid).unwrap_or("");

@@ -1,15 +1,15 @@
 //! File format of lessons, documented in `docs/lessons.md`.
 
 use std::collections::BTreeMap;
-use std::io::Read as _;
 use std::ops::Range;
+use std::path::Path;
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::names::{Names, comparisons, parameter};
 use super::text;
-use crate::scene::{MAX_FILE_SIZE, Quantity, Scene, SceneError};
+use crate::scene::{MAX_FILE_SIZE, Quantity, Scene, SceneError, read_regular};
 use crate::session::link::{Link, SceneText};
 use crate::suggest::nearest;
 use crate::units::Dimension;
@@ -304,14 +304,8 @@ impl Lesson {
             unreadable: true,
             ..SceneError::default()
         };
-        let mut text = String::new();
-        // One byte above the limit: a pipe does not report its size.
-        std::fs::File::open(path)
-            .and_then(|file| file.take(MAX_FILE_SIZE + 1).read_to_string(&mut text))
-            .map_err(|why| fault(format!("cannot read this lesson: {why}")))?;
-        if text.len() as u64 > MAX_FILE_SIZE {
-            return Err(fault(format!("larger than {} MiB: not a lesson", MAX_FILE_SIZE >> 20)));
-        }
+        let bytes = read_regular(Path::new(path), MAX_FILE_SIZE).map_err(|why| fault(why.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|_| fault("not a text file: it is not valid UTF-8".to_owned()))?;
         Self::parse(path, &text, Some(path))
     }
 

@@ -131,7 +131,7 @@ fn errors_in_a_lesson_name_their_position_and_the_allowed_values() {
     let error = Lesson::load("ratle").expect_err("no such lesson").to_string();
     assert!(error.contains("did you mean `rattle`?"), "{error}");
     let error = Lesson::load("/no/such.toml").expect_err("no such file").to_string();
-    assert!(error.contains("/no/such.toml: cannot read this lesson"), "{error}");
+    assert!(error.contains("/no/such.toml: cannot read this file"), "{error}");
 }
 
 #[test]

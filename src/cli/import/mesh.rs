@@ -1,12 +1,11 @@
 //! Mass of meshes, as MuJoCo computes it: <https://mujoco.readthedocs.io/en/stable/XMLreference.html#asset-mesh-inertia>.
 
 use std::collections::BTreeSet;
-use std::io::Read;
 use std::path::{Component, Path};
 
 use crate::machine::{Mesh, Solid, Vec3};
-use crate::scene::MAX_MESH_SIZE;
 use crate::scene::mesh::Format;
+use crate::scene::{MAX_MESH_SIZE, read_regular};
 use crate::words::words;
 
 /// Limit on the comparisons of a point with a face for a hull.
@@ -44,13 +43,7 @@ pub fn read(folder: &Path, file: &str) -> Result<Mesh, String> {
     let format = format.ok_or_else(|| {
         format!("{file} is not STL, OBJ or glTF, or not in the folder of the description or below it")
     })?;
-    let unreadable = |error: std::io::Error| format!("cannot read {file}: {error}");
-    let mut bytes = Vec::new();
-    let opened = std::fs::File::open(folder.join(file)).map_err(unreadable)?;
-    opened.take(MAX_MESH_SIZE + 1).read_to_end(&mut bytes).map_err(unreadable)?;
-    if bytes.len() as u64 > MAX_MESH_SIZE {
-        return Err(format!("{file} is too large; allowed at most {} MiB", MAX_MESH_SIZE >> 20));
-    }
+    let bytes = read_regular(&folder.join(file), MAX_MESH_SIZE).map_err(|error| format!("{file}: {error}"))?;
     let no_other_file = |other: &str| Err(format!("{other} is another file").into());
     format.read(&bytes, &no_other_file).map_err(|fault| format!("{file}: {}", fault.why))
 }

@@ -14,7 +14,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use super::args::ImportArguments;
 use super::{Failure, print, warn};
-use crate::scene::{Scene, SceneError};
+use crate::scene::{ReadError, Scene, SceneError, read_regular};
 use description::Description;
 use xml::Source;
 
@@ -32,11 +32,12 @@ const MAX_NODES: u32 = 500_000;
 pub fn import(arguments: &ImportArguments) -> Result<(), Failure> {
     let path = &arguments.file;
     let name = path.display().to_string();
-    let failed = |error: std::io::Error| Failure::io(format!("{name}: cannot read this file: {error}"));
-    if path.metadata().map_err(failed)?.len() > MAX_BYTES {
-        return Err(Failure::usage(format!("{name}: too large; allowed at most {} MiB", MAX_BYTES >> 20)));
-    }
-    let text = std::fs::read_to_string(path).map_err(failed)?;
+    let bytes = read_regular(path, MAX_BYTES).map_err(|error| match error {
+        ReadError::TooLarge(_) => Failure::usage(format!("{name}: {error}")),
+        _ => Failure::io(format!("{name}: {error}")),
+    })?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| Failure::io(format!("{name}: cannot read this file: it is not valid UTF-8")))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut description = read(&name, folder, &text)?;
     description.omit_unreadable_meshes(folder);

@@ -17,9 +17,13 @@ use serde_json::{Map, Value as Json};
 
 use super::failure::Failure;
 use crate::files::{OutputFile, PendingFile, same_file};
+use crate::scene::read_regular;
 
 /// Largest number of values in a file of rows: 4 GiB.
 const MAX_VALUES: u64 = 1 << 29;
+
+/// Size limit of metadata, bytes: they have the texts of a scene and of its meshes, 12 MiB together.
+const MAX_METADATA_SIZE: u64 = 64 << 20;
 
 /// File format of a run's rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,7 +136,7 @@ fn metadata_path(path: &Path) -> PathBuf {
 
 /// Whether the file is metadata that this program wrote beside rows or a film.
 fn is_metadata(path: &Path) -> bool {
-    let meta = std::fs::read(path).unwrap_or_default();
+    let meta = read_regular(path, MAX_METADATA_SIZE).unwrap_or_default();
     let meta: Json = serde_json::from_slice(&meta).unwrap_or_default();
     let checked = |key: &str| meta[key].is_string();
     meta["program"] == crate::files::PROGRAM && (checked("rows_crc32") || checked("film_crc32"))

@@ -12,9 +12,10 @@ use super::archive::{Archive, ArchivedAxis, AxisValues, SHARD, Source};
 use super::options;
 use super::target::Target;
 use super::word::Word;
-use crate::cli::Failure;
 use crate::cli::args::MergeArguments;
+use crate::cli::{Failure, interrupt};
 use crate::files::same_file;
+use crate::scene::open_regular;
 
 /// An open shard.
 struct OpenShard {
@@ -110,7 +111,7 @@ fn not_a_shard(path: &Path) -> Failure {
 
 impl OpenShard {
     fn open(path: &Path) -> Result<Self, Failure> {
-        let file = File::open(path).map_err(|error| Failure::io(format!("cannot read {}: {error}", path.display())))?;
+        let file = open_regular(path).map_err(|error| Failure::io(format!("{}: {error}", path.display())))?;
         let mut part = Self {
             path: path.to_owned(),
             reader: NpzReader::new(BufReader::new(file)).map_err(|error| unreadable(path, &error))?,
