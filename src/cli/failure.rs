@@ -1,5 +1,7 @@
 //! Reason why a command ended early: a message, and the exit code for scripts.
 
+use std::path::PathBuf;
+
 use crate::files::FileError;
 use crate::scene::SceneError;
 
@@ -30,6 +32,15 @@ impl Failure {
     /// A failure with the given code.
     pub fn new(code: u8, message: impl Into<String>) -> Self {
         Self { code, message: message.into() }
+    }
+
+    /// The failure of a command whose incomplete result is in the files or folders `beside` instead of replacing an older one.
+    pub fn with_result_in(mut self, beside: &[PathBuf]) -> Self {
+        if !beside.is_empty() {
+            let names: Vec<String> = beside.iter().map(|path| path.display().to_string()).collect();
+            self.message += &format!("; the older result stays, the incomplete one is in {}", names.join(", "));
+        }
+        self
     }
 
     /// Something could not be read or written.

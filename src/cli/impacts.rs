@@ -30,6 +30,11 @@ impl ImpactsFile {
         Ok(Self { file: RowsFile::claim(path, force)?, impacts: Vec::new(), since: 0.0, latest: Vec::new() })
     }
 
+    /// The file.
+    pub fn file(&mut self) -> &mut RowsFile {
+        &mut self.file
+    }
+
     /// Collects only impacts that end at `time`, s, or later.
     pub fn begin_at(&mut self, time: f64) {
         self.since = time;

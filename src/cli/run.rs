@@ -16,7 +16,7 @@ use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
 use crate::analysis::assembly::StartReport;
 use crate::analysis::row_times::RowTimes;
-use crate::files::{FileError, publish};
+use crate::files::{FileError, publish, spare_older};
 use crate::scene::{LiveScene, SavedState, Scene, insert_texts};
 use crate::simulate::Frame;
 
@@ -47,6 +47,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         }
         None => None,
     };
+    let scene = load(&arguments.scene)?;
+    let mut simulation = start(&scene)?;
+    // From here on there may be temporary files, which an interrupted run removes.
+    interrupt::listen();
     let mut names = vec![("the scene".to_owned(), arguments.scene.name())];
     for (option, path) in [("--out", &arguments.out), ("--impacts", &arguments.impacts), ("--wear", &arguments.wear)] {
         names.extend(path.iter().flat_map(|path| RowsFile::names(option, path)));
@@ -55,7 +59,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         names.extend(path.iter().map(|path| (option.to_owned(), path.clone())));
     }
     check_distinct(&names)?;
-    let file = match &arguments.out {
+    let mut file = match &arguments.out {
         Some(path) => Some(RowsFile::claim(path, arguments.force)?),
         None => None,
     };
@@ -63,7 +67,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(path) => Some(ImpactsFile::claim(path, arguments.force)?),
         None => None,
     };
-    let wear = match &arguments.wear {
+    let mut wear = match &arguments.wear {
         Some(path) => Some(RowsFile::claim(path, arguments.force)?),
         None => None,
     };
@@ -71,8 +75,6 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(path) => Some(StateFile::claim(path, arguments.force)?),
         None => None,
     };
-    let scene = load(&arguments.scene)?;
-    let mut simulation = start(&scene)?;
     let start_report = StartReport::of(&mut simulation);
     let mut frame = Frame::default();
     // Columns are determined at t = 0, also for a resumed run.
@@ -116,7 +118,6 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         start_report.warnings_of(&scene).iter().for_each(|warning| warn(warning));
     }
 
-    interrupt::listen();
     let progress = progress::bar(!arguments.quiet, position(duration));
     let mut stopwatch = Duration::ZERO;
     let end = simulate(
@@ -135,19 +136,26 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         &progress,
     );
     progress.finish_and_clear();
-    let end = match (end, &file) {
+    let End { status, failure } = match (end, &file) {
         (Ok(end), _) => end,
         (Err(error), Some(file)) => {
             return Err(FileError::cannot(file.target().path(), error).into());
         }
         (Err(error), None) => return Err(Failure::io(error.to_string())),
     };
+    // A diverged run would diverge again when resumed.
+    let mut state = state.filter(|_| status != Status::Diverged);
+    let failure = failure.map(|failure| {
+        let rows = file.iter_mut().chain(&mut wear).chain(impacts.as_mut().map(ImpactsFile::file));
+        let targets = rows.flat_map(RowsFile::targets).chain(state.as_mut().map(StateFile::file));
+        failure.with_result_in(&spare_older(targets.collect()))
+    });
     let wall = stopwatch.as_secs_f64();
     let stepping = Stepping { from, wall };
 
     let finished_impacts = impacts.as_ref().map(ImpactsFile::impacts);
-    let mut facts = summary::json(&simulation, end.status, stepping, finished_impacts);
-    let mut text = summary::text(&simulation, end.status, stepping, finished_impacts);
+    let mut facts = summary::json(&simulation, status, stepping, finished_impacts);
+    let mut text = summary::text(&simulation, status, stepping, finished_impacts);
     summary::start(&mut facts, &mut text, &start_report);
     let fault = simulation.probe_fault();
     if let Some(fault) = &fault {
@@ -189,32 +197,32 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         facts.insert("out".into(), json!(path.display().to_string()));
         summary::written(&mut text, table.len(), "row", &path);
     }
-    if let (Some(impacts), Some(path)) = (impacts, &arguments.impacts) {
+    if let Some(mut impacts) = impacts {
+        let path = impacts.file().target().path().to_owned();
         let (rows, filled) = impacts.fill(&scene, meta.clone())?;
         files.extend(filled);
         facts.insert("impacts_out".into(), json!(path.display().to_string()));
-        summary::written(&mut text, rows, "impact", path);
+        summary::written(&mut text, rows, "impact", &path);
     }
     simulation.commit_wear();
-    if let (Some(file), Some(map), Some(path)) = (wear, simulation.wear(), &arguments.wear) {
+    if let (Some(file), Some(map)) = (wear, simulation.wear()) {
+        let path = file.target().path().to_owned();
         let (rows, filled) = wear::fill(file, map, &scene, meta)?;
         files.extend(filled);
         facts.insert("wear_out".into(), json!(path.display().to_string()));
-        summary::written(&mut text, rows, "cell", path);
+        summary::written(&mut text, rows, "cell", &path);
     }
-    let mut failure = end.failure.or(verdict);
-    if let (Some(state), Some(path)) = (state, &arguments.save_state) {
-        // A diverged run would diverge again when resumed.
-        if end.status != Status::Diverged {
-            match state.text(&simulation) {
-                Ok(content) => {
-                    files.push(state.fill(&content)?);
-                    facts.insert("state_out".into(), json!(path.display().to_string()));
-                    summary::line(&mut text, "State", &path.display().to_string());
-                }
-                // The rows are still useful without the saved state.
-                Err(error) => failure = failure.or(Some(error)),
+    let mut failure = failure.or(verdict);
+    if let Some(mut state) = state {
+        match state.text(&simulation) {
+            Ok(content) => {
+                let path = state.file().path().display().to_string();
+                files.push(state.fill(&content)?);
+                facts.insert("state_out".into(), json!(path));
+                summary::line(&mut text, "State", &path);
             }
+            // The rows are still useful without the saved state.
+            Err(error) => failure = failure.or(Some(error)),
         }
     }
     publish(files)?;

@@ -31,6 +31,11 @@ impl StateFile {
         Ok(Self { file, saved: None })
     }
 
+    /// The file.
+    pub fn file(&mut self) -> &mut OutputFile {
+        &mut self.file
+    }
+
     /// To be called before every step of a run that ends at `end`, s. Saves the state before the first step that `end`
     /// truncates, because a longer run would not truncate it.
     pub fn watch(&mut self, simulation: &LiveScene, end: f64) {

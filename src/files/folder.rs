@@ -9,13 +9,17 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value as Json, json};
 use tempfile::TempDir;
 
-use super::names::{parent, resolve};
+use super::names::{make_incomplete, parent, resolve};
 use super::output::OutputFile;
 use super::temporary::{self, OLD};
 use super::{FileError, PROGRAM};
+use crate::scene::read_regular;
 
 /// The file that lists the content of a results folder.
 pub const MANIFEST: &str = "manifest.json";
+
+/// Size limit of a manifest, bytes: one with 100 000 frames has a quarter of it.
+const MAX_MANIFEST_SIZE: u64 = 64 << 20;
 
 /// Name of the folder within its temporary folder.
 const NEW: &str = "new";
@@ -65,6 +69,22 @@ impl Folder {
         let (temporary, lock) = temporary::folder(&location).map_err(failed)?;
         fs::create_dir(temporary.path().join(NEW)).map_err(failed)?;
         Ok(Self { path: path.to_owned(), location, replace, temporary, _lock: lock, files: RefCell::default() })
+    }
+
+    /// The requested name, or that chosen by [`Self::spare_older`].
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// For a result that is not complete: if it would replace an older one, gives it another name beside its own, which has not
+    /// been used yet. Returns the new name; none if nothing would be replaced.
+    pub fn spare_older(&mut self) -> Vec<PathBuf> {
+        if !has_content(&self.location) {
+            return Vec::new();
+        }
+        make_incomplete([(&mut self.path, &mut self.location)]);
+        self.replace = false;
+        vec![self.path.clone()]
     }
 
     /// A file to be written in it.
@@ -125,7 +145,7 @@ fn has_content(path: &Path) -> bool {
 
 /// Fails if the folder at `location` contains anything that this program did not write.
 fn check_replaceable(path: &Path, location: &Path) -> Result<(), FileError> {
-    let manifest = fs::read(location.join(MANIFEST)).unwrap_or_default();
+    let manifest = read_regular(&location.join(MANIFEST), MAX_MANIFEST_SIZE).unwrap_or_default();
     let manifest: Json = serde_json::from_slice(&manifest).unwrap_or_default();
     // Other programs also write manifests of that name.
     let own = manifest["program"] == PROGRAM;

@@ -1,13 +1,13 @@
 //! Output files.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
 use super::FileError;
-use super::names::{parent, resolve};
+use super::names::{is_taken, make_incomplete, parent, resolve};
 use super::temporary;
 
 /// Writer for the content of a file.
@@ -89,16 +89,22 @@ impl OutputFile {
     }
 }
 
-/// Whether something has this name; a dangling link counts.
-fn is_taken(path: &Path) -> bool {
-    fs::symlink_metadata(path).is_ok()
-}
-
 /// A complete file that still has its temporary name.
 #[derive(Debug)]
 pub struct PendingFile {
     target: OutputFile,
     file: NamedTempFile,
+}
+
+/// For a result that is not complete: if one of its files would replace an older one, gives all of `targets` other names beside
+/// their own, which have not been used yet. Returns the new names; none if nothing would be replaced.
+pub fn spare_older(mut targets: Vec<&mut OutputFile>) -> Vec<PathBuf> {
+    if !targets.iter().any(|target| is_taken(&target.location)) {
+        return Vec::new();
+    }
+    make_incomplete(targets.iter_mut().map(|target| (&mut target.path, &mut target.location)));
+    targets.iter_mut().for_each(|target| target.replace = false);
+    targets.into_iter().map(|target| target.path.clone()).collect()
 }
 
 /// Gives files their final names, one after the other.

@@ -387,12 +387,15 @@ fn has_signal_in(child: &std::process::Child, disposition: &str, number: u32) ->
     u64::from_str_radix(mask.trim(), 16).unwrap() & (1 << (number - 1)) != 0
 }
 
-/// Starts `command` and waits until it has set its handling of Ctrl-C, SIGTERM and SIGHUP.
+/// Starts `command` and waits until its thread for Ctrl-C, SIGTERM and SIGHUP runs.
 #[cfg(target_os = "linux")]
 pub fn start_and_listen(command: &mut Command) -> std::process::Child {
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let handles_hangup = || has_signal_in(&child, "SigCgt", 1) || has_signal_in(&child, "SigIgn", 1);
-    poll_until(|| has_signal_in(&child, "SigCgt", 2) && has_signal_in(&child, "SigCgt", 15) && handles_hangup());
+    poll_until(|| {
+        let threads = fs::read_dir(format!("/proc/{}/task", child.id())).unwrap();
+        let names = threads.filter_map(|thread| fs::read_to_string(thread.ok()?.path().join("comm")).ok());
+        names.into_iter().any(|name| name.trim() == "signals")
+    });
     child
 }
 
@@ -409,6 +412,86 @@ fn an_interrupted_run_writes_its_complete_rows() {
     for name in ["-INT", "-TERM", "-HUP"] {
         interrupted_run("1000000s --every 1s", &|child, _| signal(child, name));
     }
+}
+
+/// Whatever the program does at that instant: read its arguments, load the scene, step, or write. Only before its first
+/// instruction the system itself ends it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_signal_at_any_instant_ends_a_command_with_the_code_of_an_interruption_and_no_temporary_file() {
+    let folder = folder();
+    for (k, line) in [
+        "run pendulum --duration 1000000s --every 1s --out a.csv --impacts b.csv --save-state c --force --quiet",
+        "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:9 --periods 100000 --discard 1 --out a.npz --quiet",
+        "check hexapod",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        for delay in 0..12 {
+            let mut child = command(folder.path(), line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+            poll_until(|| has_signal_in(&child, "SigCgt", 15) || child_is_over(&child));
+            std::thread::sleep(std::time::Duration::from_micros(300 * delay * delay));
+            signal(&child, "-TERM");
+            let code = child.wait().unwrap().code();
+            assert!(code == Some(130) || k == 2 && code == Some(0), "{line}: {code:?}");
+            let left = names(folder.path());
+            assert!(!left.iter().any(|name| name.starts_with(".jointplay-")), "{line}: {left:?}");
+        }
+    }
+}
+
+/// Whether `child` has ended but was not waited for.
+#[cfg(target_os = "linux")]
+fn child_is_over(child: &std::process::Child) -> bool {
+    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+    status.lines().any(|line| line.starts_with("State:") && line.contains('Z'))
+}
+
+/// A complete result is worth more than the beginning of a new one.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_incomplete_run_leaves_the_older_result_and_writes_its_own_beside_it() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name);
+    let outputs = "--every 1ms --out a.csv --impacts b.csv --wear w.csv --save-state s --force --quiet";
+    jointplay(folder.path(), &format!("run pendulum --duration 20ms {outputs}")).expect(0);
+    let results = || -> Vec<(String, Vec<u8>)> {
+        let all = names(folder.path()).into_iter().filter(|name| !name.starts_with("incomplete-"));
+        all.map(|name| (name.clone(), fs::read(path(&name)).unwrap())).collect()
+    };
+    let old = results();
+    let endless = format!("run pendulum --duration 1000000s {}", outputs.replace("1ms", "1s"));
+    let interrupted = || {
+        let child = start_and_listen(&mut command(folder.path(), &endless));
+        signal(&child, "-INT");
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130));
+        [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap())
+    };
+    let [stdout, stderr] = interrupted();
+    assert!(results() == old, "the older files stay");
+    assert!(stderr.contains("the older result stays, the incomplete one is in incomplete-a.csv, "), "{stderr}");
+    assert!(stdout.contains("to incomplete-a.csv\n") && stdout.contains("incomplete-s\n"), "{stdout}");
+    let meta: Json = serde_json::from_slice(&fs::read(path("incomplete-a.csv.meta.json")).unwrap()).unwrap();
+    let rows = fs::read(path("incomplete-a.csv")).unwrap();
+    assert_eq!(meta["status"], "interrupted");
+    assert_eq!(meta["rows_crc32"], format!("{:08x}", crc32fast::hash(&rows)));
+    for name in ["incomplete-b.csv", "incomplete-w.csv", "incomplete-s"] {
+        assert!(path(name).exists(), "{name}");
+    }
+    // A second one replaces neither.
+    let [_, stderr] = interrupted();
+    assert!(stderr.contains("incomplete-2-a.csv, "), "{stderr}");
+    assert!(results() == old && fs::read(path("incomplete-a.csv")).unwrap() == rows);
+    // Nor does a run that stops; it saves no state.
+    let stopped = "run spcmm --set solver.method=rk4 --set solver.step=2ms --duration 10s";
+    let stopped = jointplay(folder.path(), &format!("{stopped} {outputs}")).expect(4);
+    assert!(stopped.stderr.contains("incomplete-3-a.csv, ") && !stopped.stderr.contains("-s\n"), "{}", stopped.stderr);
+    assert!(results() == old && !path("incomplete-3-s").exists());
+    // A complete run does.
+    jointplay(folder.path(), &format!("run pendulum --duration 30ms {outputs}")).expect(0);
+    assert!(results() != old);
 }
 
 /// `timeout -s INT` sends two.
@@ -852,6 +935,45 @@ mod frames {
             assert!(film(work.path()) == new);
             assert_eq!(names(work.path()), ["film"]);
         });
+    }
+
+    #[test]
+    fn incomplete_frames_leave_the_older_result_and_are_written_beside_it() {
+        let folder = folder();
+        let unstable = "render spcmm --set solver.method=rk4 --set solver.step=2ms --size 64x64 --force --quiet";
+        for (what, out) in [("--at 0s,1ms,2ms", "--out out"), ("--duration 2ms --fps 1000", "--film out.mp4")] {
+            jointplay(folder.path(), &format!("render spcmm {what} --size 64x64 --quiet {out}")).expect(0);
+            let name = out.split(' ').nth(1).unwrap();
+            let files = || crate::reproduce::files(folder.path());
+            let old = files();
+            let what = what.replace("2ms", "10s").replace("1000", "10");
+            let stopped = jointplay(folder.path(), &format!("{unstable} {what} {out}")).expect(4);
+            let beside = format!("the older result stays, the incomplete one is in incomplete-{name}");
+            assert!(stopped.stderr.contains(&beside), "{}", stopped.stderr);
+            assert!(stopped.stdout.ends_with(&format!(" in incomplete-{name}\n")), "{}", stopped.stdout);
+            let now = files();
+            assert!(old.iter().all(|(name, content)| now[name] == *content) && now.len() > old.len());
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn interrupted_frames_leave_the_older_result() {
+        let folder = folder();
+        let render = "render pendulum --size 64x64 --arrows none --force --quiet --out out";
+        jointplay(folder.path(), &format!("{render} --at 0s,1ms,2ms")).expect(0);
+        let old = crate::reproduce::files(folder.path());
+        let child = start_and_listen(&mut command(folder.path(), &format!("{render} --at 0s,1000000s")));
+        // The first frame is in the temporary folder.
+        poll_until(|| crate::reproduce::files(folder.path()).len() > old.len());
+        signal(&child, "-INT");
+        let output = child.wait_with_output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(130), "{stderr}");
+        assert!(stderr.contains("the incomplete one is in incomplete-out"), "{stderr}");
+        let now = crate::reproduce::files(folder.path());
+        assert!(old.iter().all(|(name, content)| now[name] == *content), "the older result stays");
+        assert_eq!(names(&folder.path().join("incomplete-out")), ["frame_00000.png", "manifest.json"]);
     }
 
     #[test]

@@ -88,6 +88,11 @@ impl RowsFile {
         names
     }
 
+    /// All files that it writes.
+    pub fn targets(&mut self) -> impl Iterator<Item = &mut OutputFile> {
+        std::iter::once(&mut self.rows).chain(&mut self.metadata)
+    }
+
     /// The file of the rows.
     pub fn target(&self) -> &OutputFile {
         &self.rows

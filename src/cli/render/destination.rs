@@ -1,7 +1,7 @@
 //! Destination of frames: a folder of pictures, or a film.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value as Json, json};
 
@@ -9,7 +9,7 @@ use super::labels;
 use crate::cli::args::RenderArguments;
 use crate::cli::output::{claim_metadata, write_meta};
 use crate::cli::{Failure, print};
-use crate::files::{Folder, MANIFEST, OutputFile, publish};
+use crate::files::{Folder, MANIFEST, OutputFile, publish, spare_older};
 use crate::film::{Film, FilmError, Format};
 use crate::render::Image;
 
@@ -83,20 +83,23 @@ impl Destination {
         Ok(entry)
     }
 
+    /// For frames that are not complete: names beside the requested ones, if those would replace older results. Returns them.
+    pub fn spare_older(&mut self) -> Vec<PathBuf> {
+        match self {
+            Self::Pictures(folder) => folder.spare_older(),
+            Self::Film { file, metadata, .. } => spare_older(vec![file, metadata]),
+        }
+    }
+
     /// Gives everything its final name.
     ///
     /// # Errors
     /// Input/output.
-    pub fn finish(
-        self,
-        mut manifest: Map<String, Json>,
-        written: &str,
-        arguments: &RenderArguments,
-    ) -> Result<(), Failure> {
+    pub fn finish(self, mut manifest: Map<String, Json>, written: &str) -> Result<(), Failure> {
         match self {
             Self::Pictures(folder) => {
+                let place = folder.path().to_owned();
                 folder.finish(manifest)?;
-                let place = arguments.out.as_deref().unwrap_or(Path::new(""));
                 print(&format!("{written} and {MANIFEST} in {}\n", place.display()))
             }
             Self::Film { film, file, metadata } => {

@@ -122,6 +122,7 @@ fn fill(
     }
 
     frames.retain(|frame| !frame.is_null());
+    let failure = failure.map(|failure| failure.with_result_in(&destination.spare_older()));
     let written = count_of(frames.len() as u64, "frame");
     let mut manifest = meta;
     manifest.insert("parameters".into(), provenance::parameters(scene)?);
@@ -129,7 +130,7 @@ fn fill(
     manifest.insert("size".into(), json!([arguments.size.0, arguments.size.1]));
     manifest.insert("adapter".into(), json!(studio.adapter()));
     manifest.insert("frames".into(), Json::Array(frames));
-    destination.finish(manifest, &written, arguments)?;
+    destination.finish(manifest, &written)?;
     failure.map_or(Ok(()), Err)
 }
 
