@@ -72,13 +72,17 @@ prepare_rust() {
     fi
 }
 
-# Sets XDG_RUNTIME_DIR: without it the software graphics driver prints a warning at every start.
+# Sets XDG_RUNTIME_DIR to a folder of this user: without it the software graphics driver prints a warning at every start. After
+# `sudo` or `su` it may name a folder of another user, and anybody can create a folder in /tmp.
 prepare_environment() {
-    if [[ -z ${XDG_RUNTIME_DIR:-} ]]; then
-        XDG_RUNTIME_DIR=${TMPDIR:-/tmp}/jointplay-runtime-$(id -u)
-        mkdir -p -m 700 "$XDG_RUNTIME_DIR"
-        export XDG_RUNTIME_DIR
-    fi
+    is_own_folder "${XDG_RUNTIME_DIR:-}" && return
+    XDG_RUNTIME_DIR=${TMPDIR:-/tmp}/jointplay-runtime-$(id -u)
+    mkdir -m 700 "$XDG_RUNTIME_DIR" 2> /dev/null || true
+    is_own_folder "$XDG_RUNTIME_DIR" || XDG_RUNTIME_DIR=$(mktemp -d)
+    export XDG_RUNTIME_DIR
+}
+is_own_folder() {
+    [[ -d $1 && -O $1 && ! -L $1 ]]
 }
 
 # Installs what the tests of the page need: Node with the packages of web/package-lock.json, and Chromium; with the argument

@@ -1,4 +1,5 @@
-//! Ctrl-C, SIGTERM and SIGHUP end a run in an orderly way; repeating the signal ends it at once.
+//! Ctrl-C, SIGTERM and SIGHUP end a run in an orderly way; repeating the signal ends it at once. A file that exceeds the limit on
+//! its size is an error like a full disk, not the end of the process.
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,9 +11,30 @@ use super::Failure;
 const ONE_REQUEST: Duration = Duration::from_secs(1);
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
+/// Whether a signal ends the process at once, because nothing needs to be written or removed.
+static AT_ONCE: AtomicBool = AtomicBool::new(true);
 static INSTALL: Once = Once::new();
 
-/// From now on these signals are recorded instead of ending the process.
+/// To be called first of all: from now on these signals end the process at once, with the exit code of an interrupted run.
+#[cfg(unix)]
+pub fn begin() {
+    use signal_hook::consts::SIGXFSZ;
+    use signal_hook::flag;
+    static FILE_TOO_LARGE: AtomicBool = AtomicBool::new(false);
+    let code = i32::from(Failure::INTERRUPTED);
+    let ends = signals().into_iter().map(|signal| flag::register_conditional_shutdown(signal, code, &AT_ONCE));
+    // With a handler, the write fails instead.
+    let too_large = std::iter::once_with(|| flag::register(SIGXFSZ, &FILE_TOO_LARGE));
+    if let Some(Err(error)) = ends.chain(too_large).find(Result::is_err) {
+        log::warn!("a signal will end the program without an exit code: {error}");
+    }
+}
+
+/// Windows ends the process by itself.
+#[cfg(not(unix))]
+pub fn begin() {}
+
+/// From now on these signals are recorded instead of ending the process. To be called before anything is written.
 pub fn listen() {
     // A test that runs a command in its own process must still end on Ctrl-C.
     if cfg!(test) {
@@ -27,6 +49,7 @@ pub fn listen() {
             }
         });
         if let Err(error) = outcome {
+            AT_ONCE.store(true, Ordering::SeqCst);
             log::warn!("Ctrl-C will end the program without writing its rows: {error}");
         }
     });
@@ -55,15 +78,20 @@ impl Signals {
 
 #[cfg(unix)]
 fn catch(mut on_signal: impl FnMut() + Send + 'static) -> std::io::Result<()> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
-    if !outlives_its_terminal() {
-        signals.add_signal(SIGHUP)?;
-    }
+    let mut signals = signal_hook::iterator::Signals::new(signals())?;
+    AT_ONCE.store(false, Ordering::SeqCst);
     std::thread::Builder::new()
         .name("signals".to_owned())
         .spawn(move || signals.forever().for_each(|_| on_signal()))?;
     Ok(())
+}
+
+/// The signals that end a run.
+#[cfg(unix)]
+fn signals() -> Vec<i32> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let hang_up = (!outlives_its_terminal()).then_some(SIGHUP);
+    [SIGINT, SIGTERM].into_iter().chain(hang_up).collect()
 }
 
 /// Whether `nohup` started the program, which then continues when its terminal is closed.

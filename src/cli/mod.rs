@@ -57,6 +57,7 @@ const MAX_TABLE_SIZE: u64 = 64 << 20;
 
 /// Runs the command line; returns the exit code.
 pub fn main() -> u8 {
+    interrupt::begin();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) if error.use_stderr() => {
@@ -65,9 +66,14 @@ pub fn main() -> u8 {
             return Failure::USAGE;
         }
         // Help or version.
-        Err(error) => error.exit(),
+        Err(help) => return exit_code(written(help.print().and_then(|()| io::stdout().flush()))),
     };
-    match dispatch(arguments) {
+    exit_code(dispatch(arguments))
+}
+
+/// The exit code of a command; its failure goes to standard error.
+fn exit_code(outcome: Result<(), Failure>) -> u8 {
+    match outcome {
         Ok(()) => 0,
         Err(failure) => {
             complain(&format!("error: {failure}"));
@@ -233,7 +239,12 @@ fn print(text: &str) -> Result<(), Failure> {
 #[cfg(not(test))]
 fn print_out(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    match out.write_all(visible(text).as_bytes()).and_then(|()| out.flush()) {
+    written(out.write_all(visible(text).as_bytes()).and_then(|()| out.flush()))
+}
+
+/// The failure of an `outcome` of writing to standard output; a reader that stops early is none.
+fn written(outcome: io::Result<()>) -> Result<(), Failure> {
+    match outcome {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Failure::io(format!("cannot write to standard output: {error}")))
         }

@@ -42,7 +42,8 @@ impl OutputFile {
         if path.metadata().is_ok_and(|metadata| !metadata.is_file()) {
             return Err(FileError::cannot(path, "it exists and is not a regular file"));
         }
-        temporary::file(&location).map_err(failed)?;
+        // Without a name, which a signal at this instant would leave behind.
+        tempfile::tempfile_in(parent(&location)).map_err(failed)?;
         Ok(Self { path: path.to_owned(), location, replace })
     }
 

@@ -778,6 +778,14 @@ fn help_version_and_reference_go_to_standard_output() {
     let version = jointplay(folder.path(), "--version").expect(0).stdout;
     assert_eq!(version.trim(), concat!("jointplay ", env!("CARGO_PKG_VERSION")));
     assert!(jointplay(folder.path(), "--help").expect(0).stdout.contains("render"));
+    #[cfg(target_os = "linux")]
+    for line in ["--version", "--help", "run --help", "reference"] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = command(folder.path(), line).stdout(full).output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{line}: {stderr}");
+        assert!(stderr.starts_with("error: cannot write to standard output: "), "{line}: {stderr}");
+    }
     let page = jointplay(folder.path(), "reference").expect(0).stdout;
     assert!(page.contains("### `[[ball_joint]]`"));
     let schema = jointplay(folder.path(), "schema").expect(0).stdout;

@@ -43,6 +43,11 @@ impl Format {
 /// # Errors
 /// Bad input, before anything is computed; later Ctrl-C or the file system.
 pub fn map(arguments: &MapArguments) -> Result<(), Failure> {
+    let scene = load(&arguments.scene)?;
+    let map = WorkspaceMap::new(scene, &arguments.over, arguments.directions);
+    let map = map.map_err(|error| Failure::usage(error.to_string()))?;
+    // From here on there may be temporary files, which an interrupted command removes.
+    interrupt::listen();
     let outputs = arguments.out.iter().map(|path| ("--out".to_owned(), path.clone()));
     let names: Vec<(String, PathBuf)> =
         std::iter::once(("the scene".to_owned(), arguments.scene.name())).chain(outputs).collect();
@@ -52,10 +57,6 @@ pub fn map(arguments: &MapArguments) -> Result<(), Failure> {
         Ok((format, OutputFile::claim(path, arguments.force)?))
     });
     let targets = targets.collect::<Result<Vec<_>, Failure>>()?;
-    let scene = load(&arguments.scene)?;
-    let map = WorkspaceMap::new(scene, &arguments.over, arguments.directions);
-    let map = map.map_err(|error| Failure::usage(error.to_string()))?;
-    interrupt::listen();
     let bar = progress::bar(!arguments.quiet, map.design().points() as u64);
     let points = compute(&map, threads(arguments.threads), || bar.inc(1));
     bar.finish_and_clear();

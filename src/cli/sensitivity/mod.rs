@@ -5,7 +5,7 @@ mod report;
 
 use super::args::{SensitivityArguments, SummaryForm};
 use super::study::{Study, inputs, outputs};
-use super::{Failure, load, print, warn};
+use super::{Failure, interrupt, load, print, warn};
 use crate::analysis::study::{self, SensitivityOptions};
 use crate::files::Folder;
 
@@ -31,6 +31,8 @@ pub fn sensitivity(arguments: &SensitivityArguments) -> Result<(), Failure> {
     if !arguments.study.quiet && options.rows > 0 && !options.rows.is_power_of_two() {
         warn(&format!("--rows {}: a Sobol sequence is evenly distributed only for a power of two", options.rows));
     }
+    // From here on there is a temporary folder, which an interrupted command removes.
+    interrupt::listen();
     let folder = Folder::claim(&arguments.study.out, arguments.study.force)?;
     let mut study = Study::new(scene, inputs, outputs, &arguments.study)?;
     let results = study::sensitivity(&mut study, &options)?;

@@ -8,9 +8,11 @@ pub use rows::{Row, rows};
 
 use std::path::{Path, PathBuf};
 
+use serde_json::{Map, json};
+
 use super::args::StudyArguments;
 use super::sweep::{Partial, Source as _, compute, meta};
-use super::{Failure, interrupt, progress, quantity, start, threads, warn};
+use super::{Failure, progress, quantity, start, threads, warn};
 use crate::analysis::study::{self, Input, Output, RunSpan, StudyError, StudyRunner, StudyRuns, Uncertainty};
 use crate::scene::Scene;
 use crate::units::format_quantity;
@@ -91,7 +93,6 @@ impl Study {
             None => RunSpan::of(&scene),
         };
         start(&scene)?;
-        interrupt::listen();
         Ok(Self {
             scene,
             inputs,

@@ -63,6 +63,8 @@ pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
     check_points(&parts, archive.count())?;
     let mut shards = Shards { names: archive.names(), parts };
     let summary = super::summarise(&archive, &mut shards)?;
+    // An interrupted command must not leave a temporary file.
+    interrupt::listen();
     target.write(&archive, &mut shards)?;
     super::report(&archive, &summary, &arguments.out, arguments.summary)
 }

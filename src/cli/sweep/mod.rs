@@ -48,13 +48,15 @@ const STEPS_BETWEEN_CHECKS: u32 = 4096;
 /// # Errors
 /// Bad input, before the sweep starts; later Ctrl-C or the file system.
 pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
+    let sweep = request::read(arguments)?;
+    // From here on there may be temporary files, which an interrupted sweep removes.
+    interrupt::listen();
     let mut names = vec![("the scene".to_owned(), arguments.scene.name())];
     names.extend(arguments.points.iter().map(|path| ("--points".to_owned(), path.clone())));
     names.extend(RowsFile::names("--out", &arguments.out));
     check_distinct(&names)?;
     let shard = arguments.shard.as_deref().map(options::shard).transpose()?;
     let target = Target::claim(&arguments.out, arguments.force, shard.is_some())?;
-    let sweep = request::read(arguments)?;
     let archive = Archive::of_sweep(meta(&sweep), &sweep, shard.as_ref());
     let blocks: Vec<usize> =
         (0..sweep.design().blocks()).filter(|&b| shard.as_ref().is_none_or(|shard| shard.has(b))).collect();
@@ -71,7 +73,6 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     if left < all && !arguments.quiet {
         warn(&format!("resuming where {} stopped: {} of {all} points are done", partial.path().display(), all - left));
     }
-    interrupt::listen();
     let bar = progress::bar(!arguments.quiet, all);
     bar.set_position(all - left);
     bar.reset_eta();

@@ -7,7 +7,7 @@ mod report;
 
 use super::args::{SummaryForm, ToleranceArguments};
 use super::study::{Row, Study, inputs, rows};
-use super::{Failure, load, print};
+use super::{Failure, interrupt, load, print};
 use crate::analysis::study::{self, CandidateRequest, FitOptions, Input, ToleranceOptions};
 use crate::files::Folder;
 use crate::scene::Scene;
@@ -26,6 +26,8 @@ pub fn tolerance(arguments: &ToleranceArguments) -> Result<(), Failure> {
         seed: arguments.study.seed,
         fits: fits(&scene, &inputs, arguments)?,
     };
+    // From here on there is a temporary folder, which an interrupted command removes.
+    interrupt::listen();
     let folder = Folder::claim(&arguments.study.out, arguments.study.force)?;
     let mut study = Study::new(scene, inputs, outputs, &arguments.study)?;
     let outcome = study::tolerance(&mut study, &limits, options)?;

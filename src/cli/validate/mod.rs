@@ -5,7 +5,7 @@ use std::io::Write as _;
 use super::args::ValidateArguments;
 use super::output::significant;
 use super::tables::{Table, fill};
-use super::{Failure, print};
+use super::{Failure, interrupt, print};
 use crate::analysis::validation::{CASES, Case, Check, Comparison, ReferenceValue};
 use crate::files::OutputFile;
 
@@ -16,6 +16,8 @@ use crate::files::OutputFile;
 pub fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
     let target = arguments.out.as_ref().map(|path| OutputFile::claim(path, arguments.force)).transpose()?;
     let (page, missed) = page()?;
+    // An interrupted command must not leave a temporary file.
+    interrupt::listen();
     match target {
         Some(target) => target.write(|file| file.write_all(page.as_bytes()))?,
         None => print(&page)?,
