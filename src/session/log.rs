@@ -6,10 +6,14 @@
 use crate::analysis::section::Schedule;
 use crate::machine::Vec3;
 use crate::scene::{LiveScene, SOLVER_KEYS, Scene, SetError, Value};
-use crate::simulate::{Effect, Pull};
+use crate::simulate::{Effect, MAX_RUN_DURATION, Pull};
 
 /// Largest stiffness, N/m, and damping, N s/m, of a logged pull.
 const MAX_STIFFNESS: f64 = 1e9;
+/// Largest number of sections of a sweep, each of which ends a step.
+const MAX_SECTIONS: u64 = 20_000;
+/// Least time between two sections, s: times closer together are the same number late in a long run.
+const MIN_INTERVAL: f64 = 1e-9;
 
 /// An event between two steps.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -218,7 +222,7 @@ impl Log {
                 return Err(error());
             }
             if let Some(text) = body.strip_prefix('|') {
-                log.push(before, read_sections(text).ok_or_else(error)?);
+                log.push(before, read_sections(text).ok_or_else(error)??);
                 continue;
             }
             if let Some(text) = body.strip_prefix('@') {
@@ -322,16 +326,28 @@ impl Script {
     }
 }
 
-/// Reads `FIRST INTERVAL SECTIONS`.
-fn read_sections(text: &str) -> Option<Event> {
+/// Reads `FIRST INTERVAL SECTIONS`; the inner error states the limits that they exceed.
+fn read_sections(text: &str) -> Option<Result<Event, String>> {
     let mut parts = text.split(' ');
     let mut number = || {
         let value = parts.next()?.parse::<f64>().ok()?;
         (value.is_finite() && value > 0.0).then_some(Number(value))
     };
     let (first, interval) = (number()?, number()?);
-    let sections = parts.next()?.parse().ok()?;
-    parts.next().is_none().then_some(Event::Sections { first, interval, sections })
+    let sections: u64 = parts.next()?.parse().ok()?;
+    if parts.next().is_some() {
+        return None;
+    }
+    let is_allowed = first.0 <= MAX_RUN_DURATION && interval.0 >= MIN_INTERVAL && sections <= MAX_SECTIONS;
+    Some(if is_allowed {
+        Ok(Event::Sections { first, interval, sections })
+    } else {
+        Err(format!(
+            "{sections} sections from {} s on, {} s apart; allowed at most {MAX_SECTIONS}, from at most {MAX_RUN_DURATION} s on, \
+             at least {MIN_INTERVAL} s apart",
+            first.0, interval.0
+        ))
+    })
 }
 
 /// Reads `BODY` and eight numbers, or nothing.
@@ -395,6 +411,17 @@ mod tests {
             assert!(Log::read(Vec::new(), bad).is_err(), "{bad}");
         }
     }
+
+    #[test]
+    fn a_log_with_more_or_closer_sections_than_a_run_can_end_steps_at_is_refused() {
+        assert!(Log::read(Vec::new(), "0 |1000000 1e-9 20000\n").is_ok());
+        for beyond in ["0 |1 1 1000000000000", "0 |1 1e-9 20001", "0 |1 1e-10 2", "0 |1e300 1 2"] {
+            let error = Log::read(Vec::new(), beyond).expect_err(beyond);
+            let allowed = "allowed at most 20000, from at most 1000000 s on, at least 0.000000001 s apart";
+            assert!(error.contains(allowed), "{error}");
+        }
+    }
+
     #[test]
     fn a_new_event_drops_the_entries_ahead_and_passed_entries_stay() {
         let mut script = Script::new(Log::default());
