@@ -166,6 +166,19 @@ fn shards_whose_included_files_differ_are_not_merged() {
     merge().expect(0);
 }
 
+/// The partial file holds the texts of the scene and of the files that it names.
+#[test]
+fn a_scene_of_megabytes_can_be_swept() {
+    let folder = folder();
+    let pendulum = fs::read_to_string("assets/scenes/pendulum.toml").unwrap();
+    let large = format!("{pendulum}\n{}", "# A comment as long as a table of measured values.\n".repeat(40_000));
+    assert!(large.len() > 2_000_000);
+    fs::write(folder.path().join("large.toml"), large).unwrap();
+    let sweep = "sweep large.toml --vary contact.clearance=0.2mm..0.3mm:2 --duration 1ms --quiet --out a.npz";
+    jointplay(folder.path(), sweep).expect(0);
+    assert_eq!(names(folder.path()), ["a.npz", "large.toml"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_sweep_resumes_and_a_damaged_partial_file_is_refused() {

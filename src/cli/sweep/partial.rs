@@ -21,7 +21,7 @@ use crate::files::{open_or_create, remove_file};
 /// Magic number; its last character is the format version.
 const MAGIC: &[u8; 8] = b"JPSWEEP1";
 /// Size limit of the settings, bytes; longer ones are rejected as damaged.
-const MAX_SETTINGS_SIZE: u64 = 1 << 20;
+const MAX_SETTINGS_SIZE: u64 = 64 << 20;
 
 /// The finished blocks of a sweep.
 pub struct Partial {
