@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use jointplay_analysis::assembly::StartReport;
 use jointplay_analysis::ideal_fault::ideal_fault;
@@ -15,6 +16,9 @@ use crate::errors::scene_error;
 use crate::interpreter::detached;
 use crate::machine::text_of;
 use crate::quantity::{to_python, to_text};
+
+/// Time for the examination of the motion without play.
+const MAX_EXAMINATION_TIME: Duration = Duration::from_secs(2);
 
 /// Names of the built-in scenes, then of the benchmarks.
 #[pyfunction]
@@ -187,7 +191,9 @@ impl PyScene {
         all.set_item("contacts", contents.contacts)?;
         all.set_item("ideal_joints", contents.ideal_joints)?;
         let warnings = detached(py, || {
-            let singular = ideal_fault(scene).map(|near| near.to_string());
+            let started = Instant::now();
+            let may_continue = || started.elapsed() < MAX_EXAMINATION_TIME;
+            let singular = ideal_fault(scene, may_continue).map(|near| near.to_string());
             let start = StartReport::of(&mut live);
             (start.warnings_of(scene).into_iter().chain(singular).collect::<Vec<_>>(), start.indeterminate_forces())
         })?;

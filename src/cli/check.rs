@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::args::CheckArguments;
+use super::measuring::within;
 use super::output::significant;
 use super::summary::count;
 use super::{Failure, load, print, start};
@@ -32,7 +33,7 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
         return print(&channels(&channels_of(&scene.machine, &frame)));
     }
     let contents = simulation.mechanism().summary();
-    let beginning = (contents.contacts > 0).then(|| InitialPeaks::of(&mut simulation));
+    let beginning = (contents.contacts > 0).then(|| InitialPeaks::of(&mut simulation, within(MAX_COST)));
     print(&report(&scene, &contents, &start_report, &frame, beginning.as_ref())?)
 }
 
@@ -114,7 +115,12 @@ fn report(
     start_report.lines.iter().for_each(|(label, value)| line(label, value));
     if let Some(beginning) = beginning {
         let until = format_quantity_digits(beginning.until, "ms", 4);
-        line("Beginning", &format!("largest contact forces of the first {until}"));
+        let cut = if beginning.is_cut {
+            format!(", which took {MAX_COST} s of processor time: looked no further")
+        } else {
+            String::new()
+        };
+        line("Beginning", &format!("largest contact forces of the first {until}{cut}"));
         let loose = scene.machine.ball_joints.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
         for (joint, peak) in loose.take(MAX_LISTED) {
             line(&format!("  {}", joint.name), &first_contact(peak));
@@ -137,7 +143,7 @@ fn report(
     let (computed, skipped) = computed_and_skipped(scene, contents);
     computed.iter().for_each(|item| line("Computed", item));
     skipped.iter().for_each(|item| line("Not computed", item));
-    let near_singularity = ideal_fault(scene).map(|near| near.to_string());
+    let near_singularity = ideal_fault(scene, within(MAX_COST)).map(|near| near.to_string());
     start_report.warnings_of(scene).iter().chain(&near_singularity).for_each(|warning| line("Warning", warning));
     Ok(out)
 }
@@ -218,6 +224,9 @@ fn force_element(element: &Element, report: &ElementReport) -> String {
     let exerts: Vec<String> = force.into_iter().chain(torque).collect();
     format!("{}: {}", element.kind.word(), exerts.join(" and "))
 }
+
+/// Processor time for each part of the check that steps, s.
+const MAX_COST: f64 = 2.0;
 
 /// Largest number of ball joints listed with their first contact forces.
 const MAX_LISTED: usize = 12;

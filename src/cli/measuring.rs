@@ -38,6 +38,13 @@ pub fn measure<T>(
     })
 }
 
+/// Whether less than `most` s of processor time have passed on this thread since this call.
+pub fn within(most: f64) -> impl FnMut() -> bool {
+    let mut clock = clock();
+    let end = clock() + most;
+    move || clock() < end
+}
+
 /// Processor time of this thread, which does the stepping, s; it excludes other load on the machine.
 #[cfg(unix)]
 fn clock() -> impl FnMut() -> f64 {

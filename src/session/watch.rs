@@ -137,6 +137,11 @@ impl RunWatch {
 
     /// Adds the sections of the latest step up to `until`, s, by interpolation. Sampling never changes a run.
     pub fn step(&mut self, simulation: &mut Simulation, until: f64) {
+        if let Ok(period) = self.period {
+            // Earlier ones would be dropped again: a step may be much longer than the period.
+            let kept = (until / period - self.phase).floor() - MAX_SECTIONS as f64;
+            self.next = self.next.max(kept.max(0.0) as u64);
+        }
         while let Some(time) = self.next_time().filter(|time| *time <= until) {
             self.next += 1;
             if self.sections.back().is_some_and(|(last, _)| time <= *last) {

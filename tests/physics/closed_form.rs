@@ -81,13 +81,21 @@ fn a_closed_form_that_contradicts_the_machine_is_reported() {
         if with_play {
             scene.set("contact.clearance", "0.1 mm").expect("a clearance in range");
         }
-        let Some(IdealFault::OffPath(time, distance)) = ideal_fault(&scene) else {
+        let Some(IdealFault::OffPath(time, distance)) = ideal_fault(&scene, || true) else {
             panic!("the path is wrong");
         };
         let expected = 2e-3 * (2.0 * std::f64::consts::TAU * time).sin();
         assert!(time < 0.05 && (distance - expected).abs() < 1e-9, "{distance} at {time}");
     }
-    assert!(ideal_fault(&slider_crank("100 mm")).is_none());
+    let scene = slider_crank("100 mm");
+    assert!(ideal_fault(&scene, || true).is_none());
+    // An examination that is cut short says so.
+    let mut left = 3;
+    let may_continue = || {
+        left -= 1;
+        left >= 0
+    };
+    assert!(matches!(ideal_fault(&scene, may_continue), Some(IdealFault::NotExamined(time)) if time > 0.0));
 }
 
 #[test]

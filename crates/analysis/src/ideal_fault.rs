@@ -31,6 +31,8 @@ pub enum IdealFault {
     HighReaction(f64, f64),
     /// A time, s, and the distance from the path in closed form at that time, m.
     OffPath(f64, f64),
+    /// No fault up to this time, s, at which the examination was cut short.
+    NotExamined(f64),
 }
 
 impl std::fmt::Display for IdealFault {
@@ -49,13 +51,18 @@ impl std::fmt::Display for IdealFault {
                  which tip errors are measured",
                 format_quantity_digits(*distance, "mm", 4)
             ),
+            Self::NotExamined(time) => write!(
+                f,
+                "the motion without play was examined for singular poses and for its path only up to t = {time:.3e} s, because \
+                 that took too long"
+            ),
         }
     }
 }
 
 /// Checks the motion without play of a scene whose drives prescribe it: whether it follows its path in closed form, and whether
-/// it comes near a singular pose.
-pub fn ideal_fault(scene: &Scene) -> Option<IdealFault> {
+/// it comes near a singular pose. `may_continue` is asked between steps: small fixed steps, for example, can take for ever.
+pub fn ideal_fault(scene: &Scene, mut may_continue: impl FnMut() -> bool) -> Option<IdealFault> {
     let mut rigid = scene.clone();
     rigid.machine.formulation = Formulation::Tree;
     rigid.machine.elements.clear();
@@ -72,12 +79,15 @@ pub fn ideal_fault(scene: &Scene) -> Option<IdealFault> {
     let mut simulation = Simulation::new(&rigid.machine).ok()?;
     // Reactions in any other motion would need a simulation of arbitrary length.
     if !simulation.mechanism().is_kinematic() {
-        return off_path(&scene.machine);
+        return off_path(&scene.machine, may_continue);
     }
     let mut frame = Frame::default();
     let (mut largest, mut when) = (0.0, 0.0);
     for k in 0..=instants {
         let time = period * f64::from(k) / f64::from(INSTANTS);
+        if !may_continue() {
+            return Some(IdealFault::NotExamined(pace * simulation.time()));
+        }
         if let Err(stopped) = simulation.advance_to(time) {
             return Some(match stopped.fault {
                 StopFault::OffPath { distance } => IdealFault::OffPath(pace * stopped.time, distance),
@@ -96,7 +106,7 @@ pub fn ideal_fault(scene: &Scene) -> Option<IdealFault> {
 
 /// Simulates the motion without play and compares the probe's tip with its path for one period, or for [`MAX_DURATION`] if that
 /// is shorter.
-fn off_path(machine: &Machine) -> Option<IdealFault> {
+fn off_path(machine: &Machine, mut may_continue: impl FnMut() -> bool) -> Option<IdealFault> {
     let form = machine.closed_form.as_ref().filter(|form| form.path.is_some() && form.frequency > 0.0)?;
     let end = f64::min(1.0 / (form.frequency * form.pace), MAX_DURATION);
     let ideal = closed(machine);
@@ -105,7 +115,12 @@ fn off_path(machine: &Machine) -> Option<IdealFault> {
     let mut frame = Frame::default();
     (1..=COMPARED).find_map(|k| {
         let time = end * f64::from(k) / f64::from(COMPARED);
-        simulation.advance_to(time).ok()?;
+        while simulation.time() < time {
+            if !may_continue() {
+                return Some(IdealFault::NotExamined(simulation.time()));
+            }
+            simulation.step().ok()?;
+        }
         simulation.sample(time, &mut frame);
         let distance = frame.probe_error?.norm();
         (distance > OFF_PATH).then_some(IdealFault::OffPath(time, distance))

@@ -25,6 +25,7 @@ use self::archive::{ZIPPED, unit_suffix};
 use self::options::Shard;
 use self::target::Target;
 use super::args::{SummaryForm, SweepArguments};
+use super::measuring::within;
 use super::output::{RowsFile, check_distinct};
 use super::summary::count;
 use super::workers::run_jobs;
@@ -184,6 +185,9 @@ fn axis_meta(scene: &Scene, axis: &Axis) -> Json {
 /// Largest number of points examined for warnings, spread over the ranges, so that the check stays fast.
 const MAX_EXAMINED: usize = 64;
 
+/// Processor time for the motions without play at these points, s.
+const MAX_EXAMINATION_COST: f64 = 2.0;
+
 /// Kind of a warning; each kind is reported once.
 #[derive(PartialEq, Eq, Hash)]
 enum Kind {
@@ -195,6 +199,7 @@ enum Kind {
 fn warnings(sweep: &Sweep) -> Vec<String> {
     let mut all = Vec::new();
     let mut kinds = HashSet::new();
+    let mut may_continue = within(MAX_EXAMINATION_COST);
     let last = sweep.design().points() - 1;
     let step = sweep.design().points().div_ceil(MAX_EXAMINED);
     for point in (0..last).step_by(step).chain([last]) {
@@ -203,7 +208,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
         };
         let of_scene = scene.machine.warnings().into_iter();
         let of_scene = of_scene.map(|warning| (Kind::Scene(warning.kind()), warning.to_string()));
-        let singular = ideal_fault(&scene).map(|near| {
+        let singular = ideal_fault(&scene, &mut may_continue).map(|near| {
             let kind = Kind::Singular(std::mem::discriminant(&near));
             (kind, near.to_string())
         });
