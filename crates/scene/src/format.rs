@@ -610,7 +610,12 @@ static PARAMETER: FileTable = FileTable::new(
     "[[parameter]]",
     "a parameter of the scene's own, for expressions, sliders and `--set`",
     &[
-        key("name", ValueType::Name, "\"stroke\"", "its name in expressions: letters, digits and `_`"),
+        key(
+            "name",
+            ValueType::Name,
+            "\"stroke\"",
+            "its name in expressions: letters, digits and `_`, a letter first; not `i`, `pi`, `e`, `t` or a unit",
+        ),
         key("value", ValueType::Quantity, "\"20 mm\"", "its value"),
         key("label", ValueType::Text, "\"Stroke\"", "its name in the window").default_text("`name`"),
         key("unit", ValueType::Text, "\"mm\"", "unit in which it is shown")
