@@ -258,6 +258,18 @@ fn invalid_includes_are_refused_with_their_position() {
             LEG.replace("{ body = \"toe1\" }", "{ body = \"toe3\" }"),
             ["leg.toml:56:17: spring.left.tendon.from.body", "no body `left.toe3`"],
         ),
+        // The other copy of the file has a parameter of the same name, defined later.
+        (
+            one("name = \"left\"") + &one("name = \"right\""),
+            LEG.replace("unit = \"mm\"", "unit = \"mm\"\nrange = [\"150 mm\", \"200 mm\"]"),
+            ["leg.toml:9:9: parameter.left.half = \"length / 2\"", "out of range; allowed 150 mm to 200 mm"],
+        ),
+        // And where the parameter itself comes later:
+        (
+            one("name = \"left\"") + &one("name = \"right\""),
+            LEG.replace("\"length / 2\"", "\"late / 2\"") + "\n[[parameter]]\nname = \"late\"\nvalue = \"1 m\"\n",
+            ["leg.toml:9:9: parameter.half.value = \"late / 2\"", "uses the parameter late, which is defined after it"],
+        ),
         (
             one("name = \"left\"") + &one("name = \"left\""),
             LEG.to_owned(),

@@ -17,8 +17,7 @@ pub(super) fn read_user_parameters(files: &[Section<'_>]) -> Result<Vec<&'static
     files.iter().try_for_each(check_values)?;
     let nodes = lists(files, "parameter", Vec::new())?;
     for (i, node) in nodes.iter().enumerate() {
-        let own = read_parameter(node, files[0].rows)
-            .map_err(|error| defined_later(node, &nodes[i + 1..]).unwrap_or(error))?;
+        let own = read_parameter(node, files[0].rows, &nodes[i + 1..])?;
         if let Some(first) = all.iter().position(|(other, _)| other.key == own.0.key) {
             let [name, first] =
                 [node, &nodes[first]].map(|node| node.section_as(node.title("parameter"))?.require("name"));
@@ -30,18 +29,28 @@ pub(super) fn read_user_parameters(files: &[Section<'_>]) -> Result<Vec<&'static
     Ok(all.into_iter().filter_map(|(row, adjustable)| adjustable.then_some(row)).collect())
 }
 
-/// The error for a value that uses a parameter defined later; `None` if it uses none.
-fn defined_later(node: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
-    let named = |node: &Node<'_>| Some(node.section().ok()?.require("name").ok()?.text().ok()?.to_owned());
-    let value = node.section_as(node.title("parameter")).ok()?.require("value").ok()?;
+/// The error for an invalid `value` that uses one of the parameters `later`; `None` if it uses none. A file that is included twice
+/// has two parameters of a name, of which the value sees only the one with its own prefix.
+fn defined_later(value: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
+    let prefix = |node: &Node<'_>| node.document.instance.map_or("", Instance::prefix).to_owned();
+    let own = prefix(value);
+    let named = |node: &Node<'_>| {
+        let name = node.section().ok()?.require("name").ok()?.text().ok()?.to_owned();
+        let local = prefix(node) == own || prefix(node).is_empty();
+        local.then_some(name)
+    };
     let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let words: Vec<&str> = value.scalar().ok()?.split(|c| !letters(c)).collect();
     let name = later.iter().filter_map(named).find(|name| words.contains(&&**name))?;
     Some(value.error(format!("uses the parameter {name}, which is defined after it: define that one first")))
 }
 
-/// Reads a `[[parameter]]` of a file with the keys `file`: its row, and whether it is adjustable.
-fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Parameter, bool), SceneError> {
+/// Reads a `[[parameter]]` of a file with the keys `file`, before the parameters `later`: its row, and whether it is adjustable.
+fn read_parameter(
+    node: &Node<'_>,
+    file: &FileTable,
+    later: &[Node<'_>],
+) -> Result<(&'static Parameter, bool), SceneError> {
     let title = node.title("parameter");
     let document = node.document;
     let section = node.section_as(title.clone())?;
@@ -79,7 +88,7 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
         return Err(node.error("a whole number has no unit"));
     }
     let value_node = value_node.with_key(key.clone());
-    let value = value_node.quantity(dimension)?;
+    let value = value_node.quantity(dimension).map_err(|error| defined_later(&value_node, later).unwrap_or(error))?;
     let pair = |key: &str| section.get(key).map(|node| read_range(&node, dimension)).transpose();
     let words = |key: &str| section.get(key).map(|node| node.text()).transpose();
     let label = words("label")?.unwrap_or(&full);
