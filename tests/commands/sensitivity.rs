@@ -81,6 +81,22 @@ fn joints_in_a_straight_chain_share_the_variance_equally() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "no partial file is left");
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_study_is_not_resumed_with_another_seed() {
+    use crate::command_line::{signal, start_and_listen};
+    use crate::program::{command, names, poll_until};
+    let folder = folder();
+    write_hung_chain(folder.path());
+    let line = format!("{HUNG_CHAIN} --output link3.pose.z:end --rows 65536 --threads 1 --out out");
+    let child = start_and_listen(&mut command(folder.path(), &line));
+    poll_until(|| names(folder.path()).iter().any(|name| name.ends_with(".partial")));
+    signal(&child, "-INT");
+    assert_eq!(child.wait_with_output().unwrap().status.code(), Some(130));
+    let other = jointplay(folder.path(), &format!("{line} --seed 7")).expect(2);
+    assert!(other.stderr.contains("started with other settings (seed: 1 there, 7 now)"), "{}", other.stderr);
+}
+
 #[test]
 fn suggested_changes_for_a_target_reach_it() {
     let folder = folder();

@@ -153,7 +153,10 @@ impl StudyRunner for Study {
         let sweep = study.sweep();
         let blocks: Vec<usize> = (0..sweep.design().blocks()).collect();
         let beside = self.out.with_added_extension(stage);
-        let mut partial = Partial::open(&beside, &meta(sweep), sweep, &blocks)?;
+        // First, because another seed also changes the values.
+        let mut settings = Map::from_iter([("seed".to_owned(), json!(self.seed))]);
+        settings.extend(meta(sweep));
+        let mut partial = Partial::open(&beside, &settings, sweep, &blocks)?;
         let todo: Vec<usize> = blocks.iter().copied().filter(|b| !partial.has(*b)).collect();
         let done = blocks.len() - todo.len();
         if done > 0 && !self.quiet {
