@@ -90,12 +90,11 @@ fn report(
         line("Close loops", &joints(&scene.machine.closing_joints));
     }
     for (joint, [force, torque]) in scene.machine.closing_joints.iter().zip(&start.closing) {
-        let is_unique = !start_report.reactions.contains(&joint.name);
         let reaction = format!(
             "reaction at the start {} N and {} N m{}",
             significant(force.norm(), 6),
             significant(torque.norm(), 6),
-            if is_unique { "" } else { " (not unique)" }
+            not_unique(start_report.indeterminate_parts(&joint.name))
         );
         line(&format!("  {}", joint.name), &reaction);
     }
@@ -103,7 +102,7 @@ fn report(
     for (joint, report) in scene.machine.ball_joints.iter().zip(&start.joints) {
         line(
             &format!("  {}", joint.name),
-            &ball_joint(joint, report.normal_force.norm(), !start_report.reactions.contains(&joint.name)),
+            &ball_joint(joint, report.normal_force.norm(), start_report.indeterminate_parts(&joint.name)),
         );
     }
     if !scene.machine.elements.is_empty() {
@@ -195,14 +194,15 @@ fn joints(all: &[Joint]) -> String {
     parts.join(", ")
 }
 
-fn ball_joint(joint: &BallJoint, force: f64, is_unique: bool) -> String {
+/// A note about the indeterminate `parts` of a reaction, if there are any.
+fn not_unique(parts: Option<&str>) -> String {
+    parts.map_or_else(String::new, |parts| format!(" (not unique: {parts})"))
+}
+
+fn ball_joint(joint: &BallJoint, force: f64, indeterminate_parts: Option<&str>) -> String {
     let contact = &joint.contact;
     if is_ideal(joint) {
-        return format!(
-            "ideal; reaction at the start {} N{}",
-            significant(force, 6),
-            if is_unique { "" } else { " (not unique)" }
-        );
+        return format!("ideal; reaction at the start {} N{}", significant(force, 6), not_unique(indeterminate_parts));
     }
     let friction = match contact.friction_law {
         FrictionLaw::None => "no friction".to_owned(),

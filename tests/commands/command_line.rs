@@ -648,6 +648,20 @@ fn scenes_are_listed_and_checked_with_their_contents() {
     assert!(line_of(&tight, "Warning").contains("Hertz"), "{tight}");
 }
 
+/// A planar loop of hinges constrains only the directions across its plane more than once.
+#[test]
+fn check_names_the_parts_of_a_reaction_that_are_not_unique() {
+    let folder = folder();
+    let press = jointplay(folder.path(), "check press").expect(0).stdout;
+    let parts = "(not unique: the force along y, the torque across y)\n";
+    assert!(press.contains(parts), "{press}");
+    let listed = "forces at connecting-pin (the force along y, the torque across y): joints constrain";
+    assert!(press.contains(listed), "{press}");
+    // In both formulations.
+    let lagrange = jointplay(folder.path(), "check press --set formulation=lagrange").expect(0).stdout;
+    assert!(lagrange.contains(parts), "{lagrange}");
+}
+
 #[test]
 fn a_scene_with_resting_sliders_can_be_checked() {
     // A drive at rest has no period to scan; this check once never returned.
@@ -1031,6 +1045,27 @@ mod frames {
             assert_eq!(output.status.code(), Some(0), "{line}");
         }
         assert_eq!(names(folder.path()), ["plain", "window"]);
+    }
+
+    /// After `sudo` the variable may name a folder of another user, who may also have made links in /tmp.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_scripts_use_no_runtime_folder_of_another_user() {
+        let folder = folder();
+        let foreign = folder.path().join("foreign");
+        fs::create_dir(&foreign).unwrap();
+        // Only root can give it away; for anybody else the root folder is foreign.
+        let chown = Command::new("chown").arg("1:1").arg(&foreign).stderr(Stdio::null()).status().unwrap();
+        let foreign = if chown.success() { foreign.as_path() } else { Path::new("/") };
+        let script = "source tools/prepare.sh; ln -s / \"$TMPDIR/jointplay-runtime-$(id -u)\"; prepare_environment; \
+                      echo \"$XDG_RUNTIME_DIR\"; stat -c '%u %a' \"$XDG_RUNTIME_DIR\"; id -u";
+        let mut bash = Command::new("bash");
+        bash.args(["-c", script]).env("XDG_RUNTIME_DIR", foreign).env("TMPDIR", folder.path());
+        let text = String::from_utf8(bash.output().unwrap().stdout).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        let [chosen, owner, user] = lines[..] else { panic!("{text}") };
+        assert!(Path::new(chosen) != foreign && !fs::symlink_metadata(chosen).unwrap().is_symlink(), "{text}");
+        assert_eq!(owner, format!("{user} 700"));
     }
 
     #[cfg(target_os = "linux")]

@@ -4,7 +4,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use crate::presets::too_slow;
-use jointplay_physics::machine::Machine;
+use jointplay_physics::machine::{Machine, Vec3};
 use jointplay_physics::mechanism::{Placement, UnstableRest};
 use jointplay_physics::simulate::{Doubt, Simulation};
 use jointplay_physics::units::format_quantity_digits;
@@ -113,6 +113,29 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
     warnings
 }
 
+/// Words for the indeterminate parts of a reaction: `the force along y, the torque across y`. The parts across those are unique.
+fn parts([force, torque]: &[Vec<Vec3>; 2]) -> String {
+    let part = |what: &str, along: &str, directions: &[Vec3]| match directions {
+        [] => None,
+        [one] => Some(format!("the {what} {along} {}", axis(one))),
+        [one, other] => Some(format!("the {what} across {}", axis(&one.cross(other)))),
+        _ => Some(format!("the {what}")),
+    };
+    let parts = [part("force", "along", force), part("torque", "about", torque)];
+    parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+/// The axis of the world that `direction` is parallel to, otherwise its components.
+fn axis(direction: &Vec3) -> String {
+    let largest = direction.iamax();
+    if direction[largest].abs() > 1.0 - 1e-9 {
+        return ["x", "y", "z"][largest].to_owned();
+    }
+    let components = direction * direction[largest].signum();
+    let components = components.map(|component| format_quantity_digits(component, "", 3));
+    format!("({})", components.as_slice().join(" "))
+}
+
 /// Report on a scene at the start of its run.
 pub struct StartReport {
     /// Label and text of each line about the assembly.
@@ -121,6 +144,8 @@ pub struct StartReport {
     warnings: Vec<String>,
     /// Ideal ball joints, and joints that close loops, whose reactions are indeterminate.
     pub reactions: Vec<String>,
+    /// Which parts of each of these are indeterminate, in words.
+    parts: Vec<String>,
     /// Driven joints whose actuator forces are indeterminate.
     pub actuators: Vec<String>,
     /// The assembly as JSON, in m and rad.
@@ -138,9 +163,16 @@ impl StartReport {
             lines: lines(simulation),
             warnings: warnings(simulation),
             reactions: reactions.map(|&j| cut_joint(machine, j).to_owned()).collect(),
+            parts: indeterminate.directions.iter().map(parts).collect(),
             actuators: indeterminate.actuators.iter().map(|&i| driven[i].clone()).collect(),
             assembly: json(simulation),
         }
+    }
+
+    /// The indeterminate parts of the reaction at joint `name`, in words; `None` if it is unique.
+    pub fn indeterminate_parts(&self, name: &str) -> Option<&str> {
+        let mut all = self.reactions.iter().zip(&self.parts);
+        all.find(|(joint, _)| *joint == name).map(|(_, parts)| parts.as_str())
     }
 
     /// Message about indeterminate forces, if there are any.
@@ -153,10 +185,12 @@ impl StartReport {
         } else {
             format!(", and of the actuators at {}", self.actuators.join(", "))
         };
+        let joints = self.reactions.iter().zip(&self.parts);
+        let joints: Vec<String> = joints.map(|(joint, parts)| format!("{joint} ({parts})")).collect();
         Some(format!(
             "forces at {}{actuators}: joints constrain the same direction more than once; the reactions given are \
              those of least squares",
-            self.reactions.join(", ")
+            joints.join(", ")
         ))
     }
 

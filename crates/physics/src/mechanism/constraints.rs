@@ -260,6 +260,15 @@ impl Constraints {
         self.matrix.is_unique(rows.start, rows.len())
     }
 
+    /// Changes of the load of joint `k`, counted as in [`Self::is_unique`], that the motion does not determine: force and torque,
+    /// each up to a common factor.
+    pub fn null_loads(&self, k: usize) -> Vec<[Vec3; 2]> {
+        self.matrix.null_loads(|null| match k.checked_sub(self.joints.len()) {
+            None => [Vec3::from_column_slice(part::<3>(null, 3 * k)), Vec3::zeros()],
+            Some(closure) => self.closure_load_of(closure, null),
+        })
+    }
+
     /// Row ranges: each ball joint, then the translational and rotational part of each other loop-closing joint.
     fn units_of_rows(&self) -> impl Iterator<Item = Range<usize>> {
         let balls = (0..self.joints.len()).map(|k| 3 * k..3 * k + 3);
@@ -327,7 +336,11 @@ impl Constraints {
 
     /// Force, N, and torque, N m, exerted on its child by the `c`-th loop-closing joint.
     pub fn closure_load(&self, c: usize) -> [Vec3; 2] {
-        [2 * c, 2 * c + 1].map(|unit| self.units[unit].load(&self.multipliers))
+        self.closure_load_of(c, &self.multipliers)
+    }
+
+    fn closure_load_of(&self, c: usize, multipliers: &[f64]) -> [Vec3; 2] {
+        [2 * c, 2 * c + 1].map(|unit| self.units[unit].load(multipliers))
     }
 
     /// Computes the Jacobians and factors J M^-1 J^T, unless the latest call was for the same (t, q). Kinematics and mass

@@ -132,12 +132,18 @@ pub(super) trait Equations: Send + Sync {
     /// Whether that reaction is unique.
     fn is_reaction_unique(&self, k: usize) -> bool;
 
+    /// Changes of that reaction that the motion does not determine: a force, and no torque, each up to a factor.
+    fn null_reactions(&self, k: usize) -> Vec<[Vec3; 2]>;
+
     /// Force, N, at the child's point and torque, N m, exerted on its child by the `c`-th loop-closing joint at the latest
     /// evaluation.
     fn closure_load(&self, c: usize) -> [Vec3; 2];
 
     /// Whether that load is unique.
     fn is_closure_unique(&self, c: usize) -> bool;
+
+    /// Changes of that load that the motion does not determine, each up to a factor.
+    fn null_closure_loads(&self, c: usize) -> Vec<[Vec3; 2]>;
 
     /// Force (N) or torque (N m) of every actuator, given the true accelerations in [`Self::motion`].
     fn actuator_forces(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]);

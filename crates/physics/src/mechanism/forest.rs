@@ -232,6 +232,10 @@ impl Equations for Forest {
         self.constraints.as_ref().is_none_or(|c| c.is_unique(k))
     }
 
+    fn null_reactions(&self, k: usize) -> Vec<[Vec3; 2]> {
+        self.constraints.as_ref().map_or_else(Vec::new, |own| own.null_loads(k))
+    }
+
     fn closure_load(&self, c: usize) -> [Vec3; 2] {
         let constraints = self.constraints.as_ref();
         constraints.map_or([Vec3::zeros(); 2], |constraints| constraints.closure_load(c))
@@ -240,6 +244,10 @@ impl Equations for Forest {
     fn is_closure_unique(&self, c: usize) -> bool {
         let constraints = self.constraints.as_ref();
         constraints.is_none_or(|own| own.is_unique(own.joints().len() + c))
+    }
+
+    fn null_closure_loads(&self, c: usize) -> Vec<[Vec3; 2]> {
+        self.constraints.as_ref().map_or_else(Vec::new, |own| own.null_loads(own.joints().len() + c))
     }
 
     fn actuator_forces(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {

@@ -563,18 +563,22 @@ impl Equations for Lagrange {
         self.matrix.is_unique(self.ideal_row[k], 3)
     }
 
+    fn null_reactions(&self, k: usize) -> Vec<[Vec3; 2]> {
+        let first = self.ideal_row[k];
+        self.matrix.null_loads(|null| [Vec3::from_column_slice(&null[first..][..3]), Vec3::zeros()])
+    }
+
     fn closure_load(&self, c: usize) -> [Vec3; 2] {
-        let mut load = [Vec3::zeros(); 2];
-        for i in self.closure_rows[c].clone() {
-            let part = usize::from(self.groups[self.group_of[i]].rows.turns());
-            load[part] += self.rows[i].j.child[part] * self.multipliers[i];
-        }
-        load
+        self.closure_load_of(c, &self.multipliers)
     }
 
     fn is_closure_unique(&self, c: usize) -> bool {
         let rows = &self.closure_rows[c];
         self.matrix.is_unique(rows.start, rows.len())
+    }
+
+    fn null_closure_loads(&self, c: usize) -> Vec<[Vec3; 2]> {
+        self.matrix.null_loads(|null| self.closure_load_of(c, null))
     }
 
     fn actuator_forces(&mut self, _: &Model, _: &Vec3, out: &mut [f64]) {
@@ -616,6 +620,18 @@ impl Equations for Lagrange {
             None => rate_of(model, &self.motion, b),
         };
         each.map(|(drive, &row)| self.multipliers[row] * rate(drive.body)).sum()
+    }
+}
+
+impl Lagrange {
+    /// Force and torque on the child of the `c`-th loop-closing joint from the `multipliers` of all rows.
+    fn closure_load_of(&self, c: usize, multipliers: &[f64]) -> [Vec3; 2] {
+        let mut load = [Vec3::zeros(); 2];
+        for i in self.closure_rows[c].clone() {
+            let part = usize::from(self.groups[self.group_of[i]].rows.turns());
+            load[part] += self.rows[i].j.child[part] * multipliers[i];
+        }
+        load
     }
 }
 

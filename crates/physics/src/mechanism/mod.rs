@@ -62,7 +62,7 @@ pub use systems::Evaluator;
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::machine::{Formulation, Machine, MachineFault, StartRule, Vec3};
+use crate::machine::{Formulation, Machine, MachineFault, Mat3, StartRule, Vec3};
 use crate::units::format_quantity_digits;
 use elements::{ForceElement, SceneElement, elements_of};
 use equations::{Equations, LEAST_PIVOT, NEARLY_DEPENDENT};
@@ -71,6 +71,7 @@ use lagrange::Lagrange;
 pub(crate) use model::Model;
 use model::Motion;
 use path::Path;
+use rows::NEGLIGIBLE;
 use tree::Tree;
 use turns::Turns;
 
@@ -304,6 +305,15 @@ fn axes(vector: &Vec3) -> String {
     let named = ["x", "y", "z"].into_iter().zip(vector.iter());
     let named = named.filter(|(_, part)| part.abs() > 0.05 * largest);
     named.map(|(axis, _)| axis).collect::<Vec<_>>().join(" and ")
+}
+
+/// Orthogonal unit vectors that span `vectors`, the longest of which has a length of about 1. Components at the level of rounding do
+/// not count.
+fn span(vectors: impl Iterator<Item = Vec3>) -> Vec<Vec3> {
+    let squares = vectors.fold(Mat3::zeros(), |sum, vector| sum + vector * vector.transpose()).symmetric_eigen();
+    let directions = squares.eigenvectors.column_iter().zip(&squares.eigenvalues);
+    let counted = directions.filter(|(_, square)| **square > NEGLIGIBLE * NEGLIGIBLE);
+    counted.map(|(direction, _)| direction.into_owned()).collect()
 }
 
 fn unclosed(remaining: &[OpenJoint]) -> String {
@@ -586,6 +596,16 @@ impl Mechanism {
                 self.equations.is_closure_unique(c)
             }
         }
+    }
+
+    /// Directions in which the force, and about which the torque, of cut joint `j` is not unique at the latest evaluation, counted
+    /// as in [`Self::is_reaction_unique`]: orthogonal unit vectors, world axes.
+    pub fn undetermined_directions(&self, j: usize) -> [Vec<Vec3>; 2] {
+        let loads = match self.model.joints.get(j) {
+            Some(joint) => joint.ideal.map_or_else(Vec::new, |k| self.equations.null_reactions(k)),
+            None => self.equations.null_closure_loads(j - self.model.joints.len()),
+        };
+        [0, 1].map(|part| span(loads.iter().map(|load| load[part])))
     }
 
     /// Force, N, at the child's point and torque, N m, exerted on its child by each loop-closing joint at the latest evaluation.

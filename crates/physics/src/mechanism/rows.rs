@@ -2,6 +2,7 @@
 //! closed by a ball joint, two ball joints that make a hinge) Cholesky with pivoting up to the rank.
 
 use super::factor::Skyline;
+use crate::machine::Vec3;
 use std::ops::Range;
 
 /// Scaled pivots at or below this are rounding.
@@ -10,7 +11,7 @@ const ROUNDING: f64 = 1e-12;
 /// instead of growing, so that finite steps pass through such a pose with an error of the order of its square.
 const REGULARISATION: f64 = 1e-10;
 /// Components of a null vector below this fraction of its largest count as zero.
-const NEGLIGIBLE: f64 = 1e-7;
+pub const NEGLIGIBLE: f64 = 1e-7;
 
 /// The coupled constraint rows.
 pub struct RowSystem {
@@ -66,6 +67,15 @@ impl RowSystem {
     pub fn null_multipliers(&self) -> impl Iterator<Item = &[f64]> {
         let rows = self.dependent.iter();
         rows.flat_map(|rows| rows.null.chunks_exact(rows.n).take(rows.n - rows.rank))
+    }
+
+    /// The loads that `load_of` derives from each null vector, whose largest component is scaled to 1.
+    pub fn null_loads(&self, load_of: impl Fn(&[f64]) -> [Vec3; 2]) -> Vec<[Vec3; 2]> {
+        let loads = self.null_multipliers().map(|null| {
+            let largest = null.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
+            load_of(null).map(|part| part / largest)
+        });
+        loads.collect()
     }
 
     /// Whether the multipliers of rows `first..first + count` are unique.

@@ -34,6 +34,7 @@ pub use wear::{Cell, Edges, Grid, Wear};
 
 use serde::{Deserialize, Serialize};
 
+use crate::machine::Vec3;
 pub use crate::mechanism::Pull;
 use crate::mechanism::{Counts, MechanismError};
 
@@ -56,10 +57,13 @@ pub enum Effect {
 
 /// Forces that the motion does not determine, because ideal joints constrain a direction redundantly. The values reported are the
 /// least-squares reactions and the forces that follow from them.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Indeterminate {
     /// Ball joints, by index; joints that close loops count after them.
     pub reactions: Vec<usize>,
+    /// For each of these, the directions in which its force, and about which its torque, is indeterminate: orthogonal unit vectors,
+    /// world axes. Across them the load is unique.
+    pub directions: Vec<[Vec<Vec3>; 2]>,
     /// Actuators, by index among the driven joints.
     pub actuators: Vec<usize>,
 }

@@ -349,8 +349,10 @@ impl Run<'_> {
     pub(super) fn indeterminate_forces(&mut self) -> Indeterminate {
         self.sample(self.state.now.t, &mut Frame::default());
         let mechanism = &mut self.mechanism;
+        let reactions: Vec<usize> = (0..mechanism.cut_joints()).filter(|&j| !mechanism.is_reaction_unique(j)).collect();
         Indeterminate {
-            reactions: (0..mechanism.cut_joints()).filter(|&j| !mechanism.is_reaction_unique(j)).collect(),
+            directions: reactions.iter().map(|&j| mechanism.undetermined_directions(j)).collect(),
+            reactions,
             actuators: (0..mechanism.drives()).filter(|&i| !mechanism.is_actuator_unique(i)).collect(),
         }
     }
