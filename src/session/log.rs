@@ -343,8 +343,8 @@ fn read_sections(text: &str) -> Option<Result<Event, String>> {
         Ok(Event::Sections { first, interval, sections })
     } else {
         Err(format!(
-            "{sections} sections from {} s on, {} s apart; allowed at most {MAX_SECTIONS}, from at most {MAX_RUN_DURATION} s on, \
-             at least {MIN_INTERVAL} s apart",
+            "{sections} sections from {:e} s on, {:e} s apart; allowed at most {MAX_SECTIONS}, from at most {MAX_RUN_DURATION:e} s on, \
+             at least {MIN_INTERVAL:e} s apart",
             first.0, interval.0
         ))
     })
@@ -417,7 +417,7 @@ mod tests {
         assert!(Log::read(Vec::new(), "0 |1000000 1e-9 20000\n").is_ok());
         for beyond in ["0 |1 1 1000000000000", "0 |1 1e-9 20001", "0 |1 1e-10 2", "0 |1e300 1 2"] {
             let error = Log::read(Vec::new(), beyond).expect_err(beyond);
-            let allowed = "allowed at most 20000, from at most 1000000 s on, at least 0.000000001 s apart";
+            let allowed = "allowed at most 20000, from at most 1e6 s on, at least 1e-9 s apart";
             assert!(error.contains(allowed), "{error}");
         }
     }
