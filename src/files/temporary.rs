@@ -54,6 +54,10 @@ pub(super) fn remove_leftovers(target: &Path) {
         if !entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes()) {
             continue;
         }
+        // Opening a pipe would wait for its writer.
+        if !entry.file_type().is_ok_and(|kind| kind.is_file() || kind.is_dir()) {
+            continue;
+        }
         let Some(_lock) = File::open(&path).ok().filter(|file| file.try_lock().is_ok()) else {
             continue;
         };
