@@ -268,7 +268,7 @@ fn invalid_includes_are_refused_with_their_position() {
         (
             one("name = \"left\"") + &one("name = \"right\""),
             LEG.replace("\"length / 2\"", "\"late / 2\"") + "\n[[parameter]]\nname = \"late\"\nvalue = \"1 m\"\n",
-            ["leg.toml:9:9: parameter.half.value = \"late / 2\"", "uses the parameter late, which is defined after it"],
+            ["leg.toml:9:9: parameter.left.half = \"late / 2\"", "uses the parameter late, which is defined after it"],
         ),
         (
             one("name = \"left\"") + &one("name = \"left\""),

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 /// Floors from the ground up; modules of one floor do not use each other.
 const FLOORS: [&[&str]; 12] = [
     &["words", "jet", "suggest", "units"],
-    &["contact", "expression", "files", "integrate", "interpolate"],
+    &["contact", "expression", "integrate", "interpolate"],
     &["machine"],
     &["mechanism"],
     &["simulate"],
     &["scene", "mesh"],
-    &["analysis"],
+    &["analysis", "files"],
     &["chart", "film", "view"],
     &["render", "session"],
     &["app"],
