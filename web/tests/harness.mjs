@@ -67,9 +67,18 @@ let opener;
 /** Open pages: one that a failed test left open would slow down the next test. */
 const opened = new Set();
 
-/** Serves `folder`; `rest`: port, host. Returns its first output, its address, and a function that ends it. */
-export async function serveFolder(folder, ...rest) {
-    const child = spawn(TOOL, ['serve', folder, ...rest.map(String)], { stdio: ['ignore', 'pipe', 'inherit'] });
+/** Serves `folder`; `rest`: port, host. Returns its first output, its address, its process, and a function that ends it. */
+export function serveFolder(folder, ...rest) {
+    return serveBy(TOOL, ['serve', folder, ...rest.map(String)]);
+}
+
+/** As `serveFolder`, where the system lets the server open only `count` files. */
+export function serveWithFiles(count, folder) {
+    return serveBy('sh', ['-c', `ulimit -n ${count} && exec "$0" serve "$1"`, TOOL, folder]);
+}
+
+async function serveBy(program, given) {
+    const child = spawn(program, given, { stdio: ['ignore', 'pipe', 'inherit'] });
     const output = await new Promise((found, failed) => {
         child.once('error', failed);
         child.once('exit', (code) => failed(new Error(`${TOOL} ended with ${code}`)));
@@ -81,7 +90,7 @@ export async function serveFolder(folder, ...rest) {
         child.kill();
         return ended;
     };
-    return { output, address: output.split('\n')[0], end };
+    return { output, address: output.split('\n')[0], pid: child.pid, end };
 }
 
 /** Serves the page below a sub-path; returns the address of its folder. */

@@ -6,12 +6,13 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import http from 'node:http';
+import net from 'node:net';
 import { after, test } from 'node:test';
 import { brotliCompressSync, gzipSync } from 'node:zlib';
 
 import jsQR from 'jsqr';
 
-import { ELSEWHERE, open, PAGE, quit, serveFolder } from './harness.mjs';
+import { ELSEWHERE, open, PAGE, quit, serveFolder, serveWithFiles } from './harness.mjs';
 import { drawNothing } from './inside.mjs';
 
 after(quit);
@@ -115,6 +116,65 @@ test('every connection is answered and kept alive', async () => {
             agent.destroy();
             await server.end();
         }
+    }
+});
+
+/** Opens `count` connections that send `text` and read nothing; returns a function that ends them. */
+async function connect(address, count, text) {
+    const { hostname: host, port } = new URL(address);
+    const sockets = await Promise.all(Array.from({ length: count }, () => new Promise((done, failed) => {
+        const socket = net.connect({ host, port }, () => socket.write(text, () => done(socket)));
+        // Reading starts with a listener for data.
+        socket.once('error', failed);
+    })));
+    return () => sockets.forEach((socket) => socket.on('error', () => {}).destroy());
+}
+
+/** A folder with a file of `size` bytes, which takes no room on the disk. */
+function sparseFolder(size) {
+    const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'jointplay-page-'));
+    fs.writeFileSync(path.join(folder, 'large.wasm'), '');
+    fs.truncateSync(path.join(folder, 'large.wasm'), size);
+    return folder;
+}
+
+test('a class of 183 browsers is answered, and 300 readers that stall cost the server less than 50 MB', async () => {
+    const folder = sparseFolder(32e6);
+    const server = await serveFolder(folder);
+    try {
+        const endIdle = await connect(server.address, 1100, '');
+        assert.equal((await get(`${server.address}none`)).status, 404);
+        endIdle();
+        const endStalled = await connect(server.address, 300, 'GET /large.wasm HTTP/1.1\r\nHost: here\r\n\r\n');
+        const whole = await get(`${server.address}large.wasm`);
+        assert.deepEqual([whole.status, whole.bytes.length], [200, 32e6]);
+        if (process.platform === 'linux') {
+            const [, peak] = /VmHWM:\s*(\d+) kB/.exec(fs.readFileSync(`/proc/${server.pid}/status`, 'utf8'));
+            assert.ok(peak < 50e3, `${peak} kB`);
+        }
+        endStalled();
+    } finally {
+        await server.end();
+        fs.rmSync(folder, { recursive: true });
+    }
+});
+
+test('where the system allows few open files, connections beyond them are told so and the server survives', async () => {
+    const folder = sparseFolder(1);
+    const server = await serveWithFiles(64, folder);
+    try {
+        const end = await connect(server.address, 100, '');
+        const refused = await get(`${server.address}large.wasm`);
+        assert.equal(refused.status, 503);
+        assert.match(String(refused.bytes), /^\d+ connections are open, the most that this server answers/);
+        assert.ok(refused.headers['retry-after']);
+        end();
+        let { status } = refused;
+        while (status === 503) ({ status } = await get(`${server.address}large.wasm`));
+        assert.equal(status, 200);
+    } finally {
+        await server.end();
+        fs.rmSync(folder, { recursive: true });
     }
 });
 

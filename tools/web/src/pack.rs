@@ -35,7 +35,7 @@ const PARTS: [&str; 11] = [
 const PREVIEW: &str = "web/preview.png";
 
 /// Content codings of the precompressed copies beside a file, best first, each with its file extension.
-pub const CODINGS: [(&str, &str); 2] = [("br", "br"), ("gzip", "gz")];
+const CODINGS: [(&str, &str); 2] = [("br", "br"), ("gzip", "gz")];
 
 /// Writes the page into `folder`, which is built from scratch and replaced only as a whole: each file, and beside it
 /// `<file>.gz`. `compress`: also `<file>.br`, and a table of sizes is printed.
@@ -198,7 +198,7 @@ fn brotli(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
 }
 
 /// FNV-1a, 64 bit.
-pub fn hash(bytes: &[u8]) -> u64 {
+fn hash(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 

@@ -1,25 +1,85 @@
 //! A static file server for this machine or for a classroom.
 
+use std::convert::Infallible;
 use std::fs;
+use std::future::Future;
 use std::io::{self, Write as _};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
+use std::pin::{Pin, pin};
+use std::sync::Arc;
+use std::time::Duration;
 
-use axum::Router;
-use axum::extract::Request;
-use axum::http::{HeaderName, Method, StatusCode, header};
-use axum::response::{IntoResponse as _, Response};
+use http_body_util::{Either, Full};
+use hyper::body::{Bytes, Incoming};
+use hyper::header::{self, HeaderName, HeaderValue};
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper::{Request, Response, StatusCode};
+use hyper_util::rt::{TokioIo, TokioTimer};
 use qrcodegen::{QrCode, QrCodeEcc};
-use tokio::net::TcpListener;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio_io_timeout::TimeoutStream;
+use tower_http::services::ServeDir;
+use tower_http::services::fs::{
+    Backend, DefaultServeDirFallback, ServeFileSystemResponseBody, TokioBackend, TokioFile,
+};
+use tower_service::Service as _;
 
-use crate::pack::{CODINGS, hash};
+/// A file, or a sentence that says why there is none.
+type Answer = Response<Either<ServeFileSystemResponseBody, Full<Bytes>>>;
+
+/// What the server grants its readers.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// Connections answered at the same time. Further ones are told so.
+    connections: usize,
+    /// Time for a complete request, and for the next one on the same connection.
+    request: Duration,
+    /// Time without progress after which a reader that takes nothing of its answer is disconnected.
+    stall: Duration,
+    /// Time for everything: a reader that takes a little now and then holds its place no longer.
+    total: Duration,
+}
+
+/// Browsers keep up to six open each: enough for six hundred of them.
+const MAX_CONNECTIONS: usize = 4096;
+/// Connections that are told at the same time that there are too many; later ones wait in the system's queue.
+const REFUSALS: usize = 32;
+/// Time for the request of a refused connection.
+const REFUSAL_TIME: Duration = Duration::from_secs(1);
+/// Open files beside those of the connections: terminal, listener, timers.
+const OTHER_FILES: usize = 16;
+/// Bytes read from a file at a time.
+const CHUNK: usize = 16 << 10;
+/// Bytes of an answer that wait for its reader, and the longest request: a link of 32 000 characters may be in an address.
+const BUFFER: usize = 64 << 10;
+/// The system's disk cache answers most reads; further threads would only use memory.
+const READING_THREADS: usize = 4;
+/// Pause after the system has refused a connection, as for a lack of memory.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Fields of every answer.
+const FIELDS: [(HeaderName, &str); 6] = [
+    (header::CACHE_CONTROL, "no-cache"),
+    (header::VARY, "Accept-Encoding"),
+    // A frame that is sandboxed without `allow-same-origin` is a page of another origin.
+    (header::ACCESS_CONTROL_ALLOW_ORIGIN, "*"),
+    (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (header::REFERRER_POLICY, "no-referrer"),
+    (HeaderName::from_static("permissions-policy"), "camera=(), microphone=(), geolocation=()"),
+];
 
 /// Serves `folder` on an address of this machine and prints the link; port 0 takes any free entry. An address that
 /// other machines can reach is also printed as a QR code.
 pub fn serve(folder: &Path, host: IpAddr, port: u16) -> Result<(), String> {
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_io().build();
-    let runtime = runtime.map_err(|e| format!("cannot serve: {e}"))?;
+    let runtime = runtime().map_err(|e| format!("cannot serve: {e}"))?;
     runtime.block_on(serve_files(folder, host, port))
+}
+
+fn runtime() -> io::Result<tokio::runtime::Runtime> {
+    tokio::runtime::Builder::new_multi_thread().max_blocking_threads(READING_THREADS).enable_all().build()
 }
 
 async fn serve_files(folder: &Path, host: IpAddr, port: u16) -> Result<(), String> {
@@ -34,8 +94,162 @@ async fn serve_files(folder: &Path, host: IpAddr, port: u16) -> Result<(), Strin
     // In one write, so that a program reading the output gets it whole.
     let printed = io::stdout().write_all(format!("{link}\n{code}").as_bytes());
     printed.map_err(|e| format!("standard output: {e}"))?;
-    let files = Router::new().fallback(async move |request: Request| answer(&folder, &request));
-    axum::serve(listener, files).await.map_err(|e| format!("the server stopped: {e}"))
+    let limits = Limits {
+        connections: possible_connections(),
+        request: Duration::from_secs(30),
+        stall: Duration::from_secs(60),
+        total: Duration::from_secs(3600),
+    };
+    match accept(&listener, folder, limits).await {}
+}
+
+/// As many connections as the system's limit of open files allows: each needs one for itself and one for the file that it reads.
+fn possible_connections() -> usize {
+    let wanted = 2 * MAX_CONNECTIONS + REFUSALS + OTHER_FILES;
+    // A system that does not tell its limit grants at least 256.
+    let files = rlimit::increase_nofile_limit(wanted as u64).unwrap_or(256);
+    let free = (files as usize).min(wanted).saturating_sub(REFUSALS + OTHER_FILES);
+    (free / 2).max(1)
+}
+
+/// Answers connections until the process ends.
+async fn accept(listener: &TcpListener, folder: PathBuf, limits: Limits) -> Infallible {
+    let files = ServeDir::with_backend(folder.clone(), Inside { folder })
+        .precompressed_br()
+        .precompressed_gzip()
+        .ignore_multi_range_requests(true)
+        .with_buf_chunk_size(CHUNK);
+    let free = Arc::new(Semaphore::new(limits.connections));
+    let refusals = Arc::new(Semaphore::new(REFUSALS));
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            tokio::time::sleep(ACCEPT_PAUSE).await;
+            continue;
+        };
+        if let Ok(permit) = free.clone().try_acquire_owned() {
+            let (files, free) = (files.clone(), free.clone());
+            let answer = move |request| {
+                // Connections that only wait for their next request leave room for those that have one.
+                let is_crowded = free.available_permits() < limits.connections / 4;
+                let files = files.clone();
+                async move {
+                    let mut response = answer(files, request).await;
+                    if is_crowded {
+                        response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
+                    }
+                    response
+                }
+            };
+            tokio::spawn(converse(stream, limits, answer, permit));
+        } else if let Ok(permit) = refusals.clone().acquire_owned().await {
+            let answer = move |_| async move { too_many(limits.connections) };
+            let limits = Limits { request: REFUSAL_TIME, stall: REFUSAL_TIME, ..limits };
+            tokio::spawn(converse(stream, limits, answer, permit));
+        }
+    }
+}
+
+/// Answers the requests of a connection until one of the two ends it, and returns its `permit`.
+async fn converse<F: Future<Output = Answer> + Send>(
+    stream: TcpStream,
+    limits: Limits,
+    answer: impl Fn(Request<Incoming>) -> F + Send,
+    permit: OwnedSemaphorePermit,
+) {
+    let mut stream = pin!(TimeoutStream::new(stream));
+    stream.as_mut().set_write_timeout_pinned(Some(limits.stall));
+    let service = service_fn(|request| {
+        let answer = answer(request);
+        async {
+            let mut response = answer.await;
+            for (name, value) in FIELDS {
+                response.headers_mut().insert(name, HeaderValue::from_static(value));
+            }
+            Ok::<_, Infallible>(response)
+        }
+    });
+    let conversation = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(limits.request)
+        .max_buf_size(BUFFER)
+        .serve_connection(TokioIo::new(stream), service);
+    // An error concerns only this connection: its reader has left, stalls, or speaks no HTTP.
+    let _ = tokio::time::timeout(limits.total, conversation).await;
+    drop(permit);
+}
+
+/// The requested file, or why there is none.
+async fn answer(mut files: ServeDir<DefaultServeDirFallback, Inside>, mut request: Request<Incoming>) -> Answer {
+    // The file service does not compare the condition, and without a range every answer is right.
+    if request.headers().contains_key(header::IF_RANGE) {
+        request.headers_mut().remove(header::RANGE);
+    }
+    let Ok(response) = files.call(request).await;
+    let mut response = match response.status() {
+        status @ StatusCode::NOT_FOUND => sentence(status, "no such file"),
+        status @ StatusCode::METHOD_NOT_ALLOWED => sentence(status, "this server only serves files"),
+        status @ StatusCode::INTERNAL_SERVER_ERROR => sentence(status, "the file cannot be read"),
+        _ => response.map(Either::Left),
+    };
+    // All texts of the page are UTF-8.
+    if let Some(kind) = response.headers_mut().get_mut(header::CONTENT_TYPE)
+        && let Ok(text) = kind.to_str()
+        && text.starts_with("text/")
+        && !text.contains("charset")
+        && let Ok(complete) = HeaderValue::try_from(format!("{text}; charset=utf-8"))
+    {
+        *kind = complete;
+    }
+    response
+}
+
+fn too_many(connections: usize) -> Answer {
+    let text = format!("{connections} connections are open, the most that this server answers: reload in a minute\n");
+    let mut response = sentence(StatusCode::SERVICE_UNAVAILABLE, text);
+    let fields = response.headers_mut();
+    fields.insert(header::CONNECTION, HeaderValue::from_static("close"));
+    fields.insert(header::RETRY_AFTER, HeaderValue::from_static("60"));
+    response
+}
+
+fn sentence(status: StatusCode, text: impl Into<Bytes>) -> Answer {
+    let mut response = Response::new(Either::Right(Full::new(text.into())));
+    *response.status_mut() = status;
+    response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static("text/plain; charset=utf-8"));
+    response
+}
+
+/// The regular files inside a folder: a symbolic link out of it leads to nothing, and neither does a pipe, which would block.
+#[derive(Clone)]
+struct Inside {
+    /// Without symbolic links.
+    folder: PathBuf,
+}
+
+impl Inside {
+    async fn resolve(self, path: PathBuf) -> io::Result<PathBuf> {
+        let path = tokio::fs::canonicalize(path).await.map_err(|_| io::ErrorKind::NotFound)?;
+        let kind = tokio::fs::metadata(&path).await?;
+        let is_served = path.starts_with(&self.folder) && (kind.is_file() || kind.is_dir());
+        if is_served { Ok(path) } else { Err(io::ErrorKind::NotFound.into()) }
+    }
+}
+
+impl Backend for Inside {
+    type File = TokioFile;
+    type Metadata = fs::Metadata;
+    type OpenFuture = Pin<Box<dyn Future<Output = io::Result<TokioFile>> + Send>>;
+    type MetadataFuture = Pin<Box<dyn Future<Output = io::Result<fs::Metadata>> + Send>>;
+
+    fn open(&self, path: PathBuf) -> Self::OpenFuture {
+        let path = self.clone().resolve(path);
+        Box::pin(async { TokioBackend.open(path.await?).await })
+    }
+
+    fn metadata(&self, path: PathBuf) -> Self::MetadataFuture {
+        let path = self.clone().resolve(path);
+        Box::pin(async { TokioBackend.metadata(path.await?).await })
+    }
 }
 
 /// The address at which other machines reach a server on `host`. If that stands for every address of this machine, it is the
@@ -80,89 +294,5 @@ fn qr(text: &str) -> Result<String, String> {
     Ok(lines)
 }
 
-fn answer(folder: &Path, request: &Request) -> Response {
-    const MISSING: (StatusCode, &str) = (StatusCode::NOT_FOUND, "no such file");
-    if !matches!(*request.method(), Method::GET | Method::HEAD) {
-        let refused = "this server only serves files";
-        return (StatusCode::METHOD_NOT_ALLOWED, refused).into_response();
-    }
-    file_response(folder, request).unwrap_or_else(|| MISSING.into_response())
-}
-
-/// The requested file; `None` if there is none.
-fn file_response(folder: &Path, request: &Request) -> Option<Response> {
-    let file = locate(folder, request.uri().path())?;
-    let mut packed = CODINGS.iter().filter_map(|(coding, ending)| {
-        let packed = file.with_added_extension(ending);
-        (accepts(request, coding) && packed.is_file()).then_some((*coding, packed))
-    });
-    let (coding, source) = match packed.next() {
-        Some((coding, packed)) => (Some(coding), packed),
-        None => (None, file.clone()),
-    };
-    let bytes = fs::read(source).ok()?;
-    let tag = format!("\"{:016x}\"", hash(&bytes));
-    let known =
-        field(request, header::IF_NONE_MATCH).is_some_and(|known| known.split(',').any(|known| known.trim() == tag));
-    let fields = [
-        (header::CONTENT_TYPE, media_type(&file)),
-        (header::CACHE_CONTROL, "no-cache"),
-        (header::ETAG, &tag),
-        (header::VARY, "Accept-Encoding"),
-        // A frame that is sandboxed without `allow-same-origin` is a page of another origin.
-        (header::ACCESS_CONTROL_ALLOW_ORIGIN, "*"),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::REFERRER_POLICY, "no-referrer"),
-    ];
-    Some(if known {
-        (StatusCode::NOT_MODIFIED, fields).into_response()
-    } else {
-        let coding = coding.map(|coding| [(header::CONTENT_ENCODING, coding)]);
-        (fields, coding, bytes).into_response()
-    })
-}
-
-/// The file that `path` names inside `folder`; for a folder, its `index.html`.
-fn locate(folder: &Path, path: &str) -> Option<PathBuf> {
-    let relative = Path::new(path.trim_start_matches('/'));
-    let is_plain = relative.components().all(|part| matches!(part, Component::Normal(_)));
-    if !is_plain {
-        return None;
-    }
-    let mut file = folder.join(relative);
-    if file.is_dir() {
-        // Without the slash, relative addresses in the page would not resolve.
-        if !path.ends_with('/') {
-            return None;
-        }
-        file.push("index.html");
-    }
-    file.is_file().then_some(file)
-}
-
-/// Value of the header field `name`.
-fn field(request: &Request, name: HeaderName) -> Option<&str> {
-    request.headers().get(name)?.to_str().ok()
-}
-
-fn accepts(request: &Request, coding: &str) -> bool {
-    field(request, header::ACCEPT_ENCODING).is_some_and(|accepted| {
-        accepted.split(',').any(|entry| {
-            let (name, weight) = entry.split_once(';').unwrap_or((entry, ""));
-            name.trim() == coding && !matches!(weight.trim(), "q=0" | "q=0.0")
-        })
-    })
-}
-
-fn media_type(file: &Path) -> &'static str {
-    match file.extension().and_then(|e| e.to_str()) {
-        Some("html") => "text/html; charset=utf-8",
-        Some("js") => "text/javascript; charset=utf-8",
-        Some("css") => "text/css; charset=utf-8",
-        Some("svg") => "image/svg+xml",
-        Some("png") => "image/png",
-        Some("wasm") => "application/wasm",
-        Some("webmanifest") => "application/manifest+json",
-        _ => "application/octet-stream",
-    }
-}
+#[cfg(test)]
+mod tests;
