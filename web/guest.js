@@ -9,6 +9,9 @@ const VERSION = 1;
 /** Interval between reports to the embedding page, ms. */
 const REPORT_INTERVAL = 100;
 
+/** Most characters of a text in a message: more than any link has. */
+const MAX_TEXT = 100_000;
+
 const canvas = () => document.getElementById('laboratory');
 
 /** Resolves when the page becomes visible for the first time; later changes call `changed(visible)`. */
@@ -55,6 +58,18 @@ function isLast(page, backwards) {
     return backwards ? at <= 0 : at === controls.length - 1;
 }
 
+/** Why a message cannot be processed. */
+class Refusal extends Error {}
+
+/** The field `name` of a message as a text. Any page may send any object, also one that JavaScript cannot turn into a text. */
+function textOf(message, name) {
+    const value = message[name];
+    if (!['string', 'number', 'boolean'].includes(typeof value)) throw new Refusal(`\`${name}\` must be a text`);
+    const text = String(value);
+    if (text.length > MAX_TEXT) throw new Refusal(`\`${name}\` has ${text.length} characters; allowed at most ${MAX_TEXT}`);
+    return text;
+}
+
 /** Answers the embedding page; `laboratory` is that of web/main.js. */
 export class Messages {
     /** Messages that arrived before the first picture. */
@@ -78,35 +93,56 @@ export class Messages {
     start() {
         const { scene, version } = JSON.parse(this.laboratory.page.state());
         this.#post('ready', { scene, version });
-        this.#isStarted = true;
-        for (const message of this.#queue) this.#handle(message);
         // A key without a function here may be one of the embedding page, such as the next slide.
         addEventListener('keydown', (event) => {
             const { key, code, shiftKey: shift, ctrlKey: control, altKey: alt, metaKey: meta } = event;
             if (!this.laboratory.page.uses(key, control || meta, alt)) this.#post('key', { key, code, shift, control, alt, meta });
         }, { capture: true });
         setInterval(() => this.#report(), REPORT_INTERVAL);
+        this.#isStarted = true;
+        for (const message of this.#queue) this.#handle(message);
     }
 
     #post(event, values) {
+        const report = { jointplay: VERSION, event, ...values };
         // Any page may embed this one and receives this; nothing in it is secret.
-        window.parent.postMessage({ jointplay: VERSION, event, ...values }, '*');
+        const send = () => window.parent.postMessage(report, '*');
+        try {
+            send();
+        } catch {
+            // The message in it holds something that cannot be copied back, such as a port.
+            delete report.message;
+            send();
+        }
     }
 
+    /** Performs the request of a message, or answers why not. */
     #handle(message) {
+        try {
+            const problem = this.#perform(message);
+            if (problem) this.#post('problem', { text: problem, message });
+        } catch (error) {
+            const text = this.laboratory.trouble?.title ?? error?.message ?? String(error);
+            this.#post('problem', { text, message });
+            // An error of the program is reported as any other; later messages are answered nevertheless.
+            if (!(error instanceof Refusal)) setTimeout(() => { throw error; });
+        }
+    }
+
+    /** Returns the reason if the request cannot be performed. */
+    #perform(message) {
         const { page, trouble } = this.laboratory;
-        if (trouble) return this.#post('problem', { text: trouble.title, message });
+        if (trouble) return trouble.title;
         const actions = {
-            open: ({ link }) => page.openLink(`#${String(link).replace(/^[?#]/, '')}`),
-            set: ({ key, value }) => page.set(String(key), String(value)),
+            open: () => page.openLink(`#${textOf(message, 'link').replace(/^[?#]/, '')}`),
+            set: () => page.set(textOf(message, 'key'), textOf(message, 'value')),
             play: () => page.play(true),
             pause: () => page.play(false),
             reset: () => page.reset(),
             state: () => this.#post('state', { state: JSON.parse(page.state()), link: page.link() }),
         };
-        const known = Object.hasOwn(actions, message.do);
-        const problem = known ? actions[message.do](message) : `allowed: ${Object.keys(actions).join(', ')}`;
-        return problem ? this.#post('problem', { text: problem, message }) : undefined;
+        const isKnown = typeof message.do === 'string' && Object.hasOwn(actions, message.do);
+        return isKnown ? actions[message.do]() : `allowed: ${Object.keys(actions).join(', ')}`;
     }
 
     /** Reports what has changed since the last call. */

@@ -157,7 +157,8 @@ $('copy').addEventListener('click', async () => {
 for (const kind of ['dragover', 'drop']) addEventListener(kind, (event) => event.preventDefault());
 // Errors that the panic hook does not see: traps in the compiled code, and failures before the laboratory has started.
 function uncaught(error) {
-    const fatal = !laboratory.ready || error instanceof WebAssembly.RuntimeError;
+    // After a trap, or an overflow of the stack, the laboratory has no state.
+    const fatal = !laboratory.ready || error instanceof WebAssembly.RuntimeError || !laboratory.page.state();
     if (fatal && error) crashed(error.stack ?? String(error), null);
 }
 addEventListener('error', (event) => uncaught(event.error));
@@ -174,6 +175,7 @@ async function download(address, bytes) {
     const response = await fetch(address);
     if (!response.ok) {
         const reason = `${address}: ${response.status} ${response.statusText}`;
+        if (response.status === 503) throw new Error(`${reason}. The server of this page is busy: reload in a minute`);
         throw new Error(`${reason}. Files of this page are missing on its server: please report this line to its operator`);
     }
     const megabytes = (n) => (n / 1e6).toFixed(1);

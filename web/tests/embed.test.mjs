@@ -176,6 +176,59 @@ test('the embedding page opens, sets, plays and pauses by messages, and receives
     await lab.close();
 });
 
+test('any message whatever leaves the frame answering, before its first picture, later, and out of sight', async () => {
+    const lab = await blank({ size: { width: 340, height: 240 }, ownTime: true });
+    await embed(lab, `<iframe src="{page}?embed&scene=pendulum&play=0&renderer=webgl" width="320" height="200"></iframe>
+        <p style="height: 3000px"></p>`);
+    await lab.page.evaluate(() => {
+        globalThis.received = [];
+        addEventListener('message', ({ data }) => data.jointplay === 1 && received.push(data));
+        const send = (message, transfer) => frames[0].postMessage(message, '*', transfer);
+        const circle = { jointplay: 1, do: 'circle' };
+        circle.circle = circle;
+        const refused = () => [
+            { do: 'open', link: { toString: 1, valueOf: 1 } },
+            { do: 'open', link: [{ toString: 1, valueOf: 1 }] },
+            { do: 'open', link: 'x'.repeat(1e6) },
+            { do: 'open' },
+            { do: 'open', link: 10n },
+            { do: 'set', key: { toString: 1, valueOf: 1 }, value: '1' },
+            { do: 'set', key: 'contact.clearance', value: { toString: 1, valueOf: 1 } },
+            { do: 'set', key: '__proto__', value: null },
+            { do: { toString: 1, valueOf: 1 } },
+            { do: 'constructor' },
+            { do: null },
+            {},
+        ];
+        globalThis.disturb = () => {
+            // Ignored.
+            for (const message of [null, 'text', [], new Map(), { jointplay: { valueOf: 1 } }]) send(message);
+            for (const message of refused()) send({ jointplay: 1, ...message });
+            const { port1: port } = new MessageChannel();
+            send({ jointplay: 1, do: 'port', port }, [port]);
+            send(circle);
+            send(Object.assign([], { jointplay: 1, do: 'list' }));
+            send({ jointplay: 1, do: 'state' });
+            return refused().length + 3;
+        };
+    });
+    const received = (event) => lab.page.evaluate((event) => globalThis.received.filter((message) => message.event === event).length, event);
+    let [problems, states] = [0, 0];
+    const survives = async () => {
+        problems += await lab.page.evaluate(() => globalThis.disturb());
+        states += 1;
+        await lab.until(async () => (await received('state')) === states, 'the frame is silent');
+        assert.equal(await received('problem'), problems);
+    };
+    await survives();
+    await runningFrames(lab);
+    await survives();
+    await lab.page.evaluate(() => scrollTo(0, document.body.scrollHeight));
+    await lab.until(() => lab.page.frames()[1].evaluate(() => !globalThis.jointplay.ready), 'it keeps its graphics out of sight');
+    await survives();
+    await lab.close();
+});
+
 test('frames out of sight hold no graphics, and continue from the same state when they are visible again', async () => {
     const frame = '<iframe src="{page}?embed&scene=pendulum&t=10ms&renderer=webgl" width="300" height="200"></iframe>';
     const lab = await blank({ size: { width: 320, height: 300 }, ownTime: true });
