@@ -238,6 +238,11 @@ fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
         ui.label(format!("Drawn with {renderer}")).on_hover_text("Graphics interface and adapter");
     }
     ui.label("A 3D laboratory that shows what play in a ball joint does to a machine.");
+    #[cfg(target_arch = "wasm32")]
+    ui.add(
+        egui::Hyperlink::from_label_and_url("Licences of the fonts and libraries", "licences.txt")
+            .open_in_new_tab(true),
+    );
     ui.add_space(6.0);
     let scene = player.running();
     ui.label(RichText::new(&scene.title).strong());

@@ -3,6 +3,7 @@
 //! `jointplay-web pack LIBRARY.wasm FOLDER [--compress]` writes the page; `jointplay-web serve FOLDER [PORT [HOST]]` serves a folder
 //! until it is stopped: to this machine only, or on its address HOST (0.0.0.0: all its addresses).
 
+mod licences;
 mod pack;
 mod serve;
 

@@ -10,6 +10,8 @@ use flate2::{Compression, write::GzEncoder};
 use sha2::{Digest as _, Sha256};
 use wasm_bindgen_cli_support::Bindgen;
 
+use crate::licences::licences;
+
 /// Base name of the files that wasm-bindgen generates.
 const NAME: &str = "jointplay";
 /// The page's own files, from the root of the project.
@@ -31,6 +33,8 @@ const PARTS: [&str; 11] = [
     "web/page.webmanifest",
 ];
 
+/// Licences of the fonts and libraries in the page.
+const LICENCES: &str = "licences.txt";
 /// Preview picture that other sites show; opening the page does not load it.
 const PREVIEW: &str = "web/preview.png";
 
@@ -65,6 +69,9 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
         let name = from.file_name().expect("a file");
         fs::copy(&from, scratch.join(name)).map_err(|e| failed(&from, &e))?;
     }
+    let licences = licences(&root)?;
+    let to = scratch.join(LICENCES);
+    fs::write(&to, &licences).map_err(|e| failed(&to, &e))?;
     let mut all = code.clone();
     for part in PARTS.map(|part| root.join(part)) {
         all.extend(fs::read(&part).map_err(|e| failed(&part, &e))?);
@@ -73,7 +80,7 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
     let page = fs::read_to_string(&from).map_err(|e| failed(&from, &e))?;
     let from = root.join(SERVICE_WORKER);
     let worker = fs::read_to_string(&from).map_err(|e| failed(&from, &e))?;
-    all.extend(page.bytes().chain(worker.bytes()));
+    all.extend(page.bytes().chain(worker.bytes()).chain(licences.bytes()));
     // Every address contains the build, so that a browser never combines new scripts with old code from its cache.
     let build = format!("{:016x}", hash(&all));
     let page = page.replace("{{build}}", &build).replace("{{wasm_bytes}}", &code.len().to_string());
@@ -133,7 +140,7 @@ fn check_replaceable(folder: &Path) -> Result<(), String> {
 }
 
 /// The files of `folder`, in order.
-fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
+pub fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let entries = fs::read_dir(folder).map_err(|e| failed(folder, &e))?;
     let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
     files.sort();
@@ -209,6 +216,6 @@ fn remove(folder: &Path) -> Result<(), String> {
     }
 }
 
-fn failed(path: &Path, error: &std::io::Error) -> String {
+pub fn failed(path: &Path, error: &std::io::Error) -> String {
     format!("{}: {error}", path.display())
 }

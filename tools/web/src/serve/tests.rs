@@ -233,7 +233,7 @@ fn readers_that_take_nothing_or_too_long_are_disconnected() {
 #[test]
 fn a_slow_reader_gets_everything() {
     // Long enough for a busy machine, and shorter than the whole takes.
-    let stall = Duration::from_secs(2);
+    let stall = Duration::from_secs(1);
     let server = serve_with(Limits { stall, ..PATIENT }, &[("large", &vec![7; LARGE])]);
     let mut reader = server.connect(LARGE_REQUEST);
     let (mut received, mut part) = (0, vec![0; LARGE / 8]);
