@@ -38,9 +38,13 @@ async function deleteOlder() {
     await clients.claim();
 }
 
-/** A page starts with the newest build available, and continues with the files of that build. */
-async function answer(request) {
-    if (request.mode !== 'navigate') return (await caches.match(request)) ?? fetch(request);
+/**
+ * The answer to a request for the file `name` of this page. A page starts with the newest build available, and continues with the
+ * files of that build. Other pages of this origin have caches, too; they are not searched.
+ */
+async function answer(request, name) {
+    const cacheName = CACHE_PREFIX + new URL(request.url).search.slice(1);
+    if (request.mode !== 'navigate') return (await caches.match(request, { cacheName })) ?? fetch(request);
     const timeout = new AbortController();
     const timer = setTimeout(() => timeout.abort(), NETWORK_TIMEOUT);
     try {
@@ -52,13 +56,15 @@ async function answer(request) {
         // A response that has begun may take longer.
         clearTimeout(timer);
     }
-    const cache = await caches.open(CACHE);
-    return (await cache.match('./')) ?? Response.error();
+    return (await caches.match(address(name), { cacheName: CACHE })) ?? Response.error();
 }
 
 addEventListener('install', (event) => event.waitUntil(store()));
 addEventListener('activate', (event) => event.waitUntil(deleteOlder()));
 addEventListener('fetch', (event) => {
     const { method, url } = event.request;
-    if (method === 'GET' && url.startsWith(registration.scope)) event.respondWith(answer(event.request));
+    if (method !== 'GET' || !url.startsWith(registration.scope)) return;
+    const name = new URL(url).pathname.slice(new URL(registration.scope).pathname.length) || 'index.html';
+    // Other pages may be below this one.
+    if (Object.hasOwn(FILES, name)) event.respondWith(answer(event.request, name));
 });

@@ -247,10 +247,20 @@ test('the page works without a network, and a newer build replaces it completely
     let server = await serveFolder(folder);
     const { address } = server;
     const { port } = new URL(address);
-    const storedBuilds = (lab) => lab.page.evaluate(() => caches.keys());
+    const ofThisPage = (names) => names.filter((name) => name.startsWith('jointplay '));
+    const storedBuilds = async (lab) => ofThisPage(await lab.page.evaluate(() => caches.keys()));
     const isSecond = (lab) => lab.page.evaluate(() => Boolean(globalThis.secondBuild));
-    const first = await open('scene=pendulum&c=0.2mm&play=0', { at: address, backend: 'webgl', context: { serviceWorkers: 'allow' } });
+    // Another page of the same origin has stored something at the addresses of this one.
+    const plant = async () => {
+        const cache = await caches.open('another page');
+        const [build] = /\?[0-9a-f]{16}/.exec(await (await fetch('./')).text());
+        for (const name of ['./', `main.js${build}`]) await cache.put(name, new Response('globalThis.planted = true'));
+    };
+    const before = `if (location.search) globalThis.planting = (${plant})().catch(() => {})`;
+    const context = { serviceWorkers: 'allow' };
+    const first = await open('scene=pendulum&c=0.2mm&play=0', { at: address, backend: 'webgl', context, before: [{ content: before }] });
     try {
+        await first.page.evaluate(() => globalThis.planting);
         await first.until(() => first.page.evaluate(() => Boolean(navigator.serviceWorker.controller)), 'nothing is stored');
         assert.equal((await storedBuilds(first)).length, 1);
 
@@ -260,6 +270,11 @@ test('the page works without a network, and a newer build replaces it completely
         assert.equal(await first.page.evaluate(() => globalThis.jointplay.trouble), null);
         await first.runTo(0.01);
         assert.ok((await first.state()).steps > 0);
+        const licences = await first.context.newPage();
+        await licences.goto(`${address}licences.txt`);
+        assert.match(await licences.textContent('body'), /UBUNTU FONT LICENCE/);
+        await assert.rejects(licences.goto(`${address}another/page`), /ERR_/);
+        await licences.close();
 
         makeSecondBuild(folder);
         server = await serveFolder(folder, port);
@@ -287,7 +302,7 @@ test('the page works without a network, and a newer build replaces it completely
             await second.goto('about:blank');
             await new Promise((done) => setTimeout(done, 10));
             await second.goto(`${address}icon.svg`);
-            remaining = (await second.evaluate(() => caches.keys())).length;
+            remaining = ofThisPage(await second.evaluate(() => caches.keys())).length;
         }
         assert.equal(remaining, 1, 'the older build stays');
         await server.end();
