@@ -219,6 +219,20 @@ test('on a page that other devices can reach, the menu shows the link as a QR co
     }
 });
 
+test('the licences open from the page before it has started, and from About', async () => {
+    const lab = await open('scene=pendulum&play=0', { backend: 'webgl', size: { width: 1000, height: 480 } });
+    const licences = async (click) => {
+        const [opened] = await Promise.all([lab.context.waitForEvent('page'), click()]);
+        await opened.waitForLoadState();
+        assert.match(await opened.textContent('body'), /epaint_default_fonts[^]*SIL Open Font License/);
+        await opened.close();
+    };
+    await licences(() => lab.page.locator('[rel=license]').evaluate((link) => link.click()));
+    await lab.click('Button', 'About');
+    await licences(() => lab.click('Link', 'Licences of the fonts and libraries'));
+    await lab.close();
+});
+
 /** Turns `folder` into another build: with a mark, and a worker that throws in a page of the first build. */
 function makeSecondBuild(folder) {
     const write = (name, change) => {
