@@ -320,8 +320,8 @@ pub struct App {
     /// Settings of the last film.
     film_settings: Option<film::FilmSettings>,
     presentation: Option<present::Presentation>,
-    /// The zoom before it was reduced for a tiny window.
-    squeezed: Option<f32>,
+    /// The user's zoom while another is shown: in a presentation and in a tiny window, until it is in effect again.
+    set_aside_zoom: Option<f32>,
     /// Index of the single plot shown in a presentation and in the audience window.
     single_plot: Option<usize>,
     /// The audience window.
@@ -413,7 +413,7 @@ impl App {
             film: None,
             film_settings: None,
             presentation: None,
-            squeezed: None,
+            set_aside_zoom: None,
             single_plot: None,
             #[cfg(not(target_arch = "wasm32"))]
             audience: None,

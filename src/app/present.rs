@@ -32,12 +32,10 @@ const MIN_HEIGHT_CHANGE: f32 = 0.02;
 
 /// Settings to restore, and the screen height.
 pub struct Presentation {
-    /// Previous zoom of the interface.
-    zoom: f32,
     /// Previous thickness of arrows.
     thickness: f32,
     /// Screen height for which the type was sized, points at zoom 1.
-    height: f32,
+    height: Option<f32>,
 }
 
 /// Height of the plots below the picture in the rest of `ui`, points.
@@ -60,25 +58,18 @@ pub(super) fn legible_zoom(height: f32) -> f32 {
 }
 
 impl App {
-    /// Begins or ends the presentation.
+    /// Begins or ends the presentation. [`Self::follow_screen`] sizes the type once a frame: a zoom takes effect a pass later, so two
+    /// changes within a frame would not see each other.
     pub fn present(&mut self, ctx: &egui::Context, on: bool) {
         if on == self.presentation.is_some() {
             return;
         }
         match self.presentation.take() {
-            Some(before) => {
-                ctx.set_zoom_factor(before.zoom);
-                self.viewport.options.arrows.thickness = before.thickness;
-            }
+            Some(before) => self.viewport.options.arrows.thickness = before.thickness,
             None => {
                 self.bench.set_aside();
-                let height = screen_height(ctx);
-                self.presentation = Some(Presentation {
-                    zoom: ctx.zoom_factor(),
-                    thickness: self.viewport.options.arrows.thickness,
-                    height,
-                });
-                ctx.set_zoom_factor(legible_zoom(height));
+                let thickness = self.viewport.options.arrows.thickness;
+                self.presentation = Some(Presentation { thickness, height: None });
                 self.viewport.options.arrows.thickness = ARROW_THICKNESS;
             }
         }
@@ -90,11 +81,9 @@ impl App {
         self.presentation.is_some()
     }
 
-    /// Zoom of the interface without that of a presentation.
-    #[cfg(not(target_arch = "wasm32"))]
+    /// The user's zoom of the interface.
     pub(super) fn own_zoom(&self, ctx: &egui::Context) -> f32 {
-        let shown = || self.squeezed.unwrap_or_else(|| ctx.zoom_factor());
-        self.presentation.as_ref().map_or_else(shown, |presentation| presentation.zoom)
+        self.set_aside_zoom.unwrap_or_else(|| ctx.zoom_factor())
     }
 
     /// The plot shown in a presentation and in the audience window, if any.
@@ -113,28 +102,31 @@ impl App {
         self.single_plot = self.single_plot();
     }
 
-    /// Sizes the type for the screen after a size change, e.g. when entering or leaving full screen.
+    /// Sizes the type: in a presentation for the screen, also after a size change such as entering or leaving full screen;
+    /// otherwise as the user chose, but smaller in a window that is too small for its controls, e.g. on a page zoomed to four
+    /// times the size.
     pub(super) fn follow_screen(&mut self, ctx: &egui::Context) {
-        let Some(presentation) = &mut self.presentation else {
-            return self.reduce_zoom(ctx);
+        let (now, own) = (ctx.zoom_factor(), self.own_zoom(ctx));
+        let zoom = if let Some(presentation) = &mut self.presentation {
+            let height = screen_height(ctx);
+            let is_sized = presentation.height.is_some_and(|sized| {
+                // The new zoom takes effect a pass later; only then the height is that of the screen.
+                let settled = (now - legible_zoom(sized)).abs() < 1e-3;
+                !settled || (height - sized).abs() <= MIN_HEIGHT_CHANGE * sized
+            });
+            self.set_aside_zoom = Some(own);
+            if is_sized {
+                return;
+            }
+            presentation.height = Some(height);
+            legible_zoom(height)
+        } else {
+            let room = ctx.content_rect().size() * now / MIN_WINDOW_SIZE;
+            let zoom = own.min(room.min_elem().max(MIN_ZOOM));
+            let is_shown = zoom == own && (zoom - now).abs() <= 1e-3;
+            self.set_aside_zoom = (!is_shown).then_some(own);
+            zoom
         };
-        let height = screen_height(ctx);
-        let change = (height - presentation.height).abs();
-        // The new zoom takes effect a pass later; only then the height is that of the screen.
-        let settled = (ctx.zoom_factor() - legible_zoom(presentation.height)).abs() < 1e-3;
-        if settled && change > MIN_HEIGHT_CHANGE * presentation.height {
-            presentation.height = height;
-            ctx.set_zoom_factor(legible_zoom(height));
-        }
-    }
-
-    /// Reduces the zoom in a window that is too small for its controls, e.g. on a page zoomed to four times the size.
-    fn reduce_zoom(&mut self, ctx: &egui::Context) {
-        let now = ctx.zoom_factor();
-        let own = self.squeezed.unwrap_or(now);
-        let room = ctx.content_rect().size() * now / MIN_WINDOW_SIZE;
-        let zoom = own.min(room.min_elem().max(MIN_ZOOM));
-        self.squeezed = (zoom < own).then_some(own);
         if (zoom - now).abs() > 1e-3 {
             ctx.set_zoom_factor(zoom);
         }

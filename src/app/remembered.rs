@@ -269,12 +269,12 @@ impl App {
         };
         new.host = std::mem::replace(&mut self.host, Box::new(super::NoHost));
         new.store = self.store.take();
+        new.set_aside_zoom = Some(1.0);
         new.follow_frame_rate();
         *self = new;
         if let Some(store) = &mut self.store {
             store.forget();
         }
-        ctx.set_zoom_factor(1.0);
         ctx.send_viewport_cmd(egui::ViewportCommand::Maximized(false));
         // In points at the zoom still in effect when the command arrives.
         let size = egui::Vec2::from(INITIAL_SIZE) / ctx.zoom_factor();

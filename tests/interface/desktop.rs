@@ -159,6 +159,36 @@ fn stored(path: &std::path::Path) -> StoredSettings {
 }
 
 #[test]
+fn a_presentation_of_an_instant_leaves_the_type_as_it_was() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("window.json");
+    let mut harness = with_store(&path);
+    harness.ctx.set_zoom_factor(1.25);
+    harness.run();
+    let key = |key: Key, pressed: bool| {
+        let (physical_key, modifiers) = (None, egui::Modifiers::NONE);
+        egui::Event::Key { key, physical_key, pressed, repeat: false, modifiers }
+    };
+    // Both keys within a frame, then with some frames between.
+    for frames in [0, 1, 2, 5] {
+        for (index, pressed) in [Key::F5, Key::Escape].into_iter().enumerate() {
+            harness.input_mut().events.extend([key(pressed, true), key(pressed, false)]);
+            if index == 0 {
+                harness.run_steps(frames);
+                assert_eq!(harness.state().is_presenting(), frames > 0);
+            }
+        }
+        harness.step();
+        assert!(!harness.state().is_presenting());
+        // Closed in the very next moment.
+        eframe::App::on_exit(harness.state_mut());
+        assert_eq!(stored(&path).zoom, Some(1.25), "{frames}");
+        harness.run();
+        assert_eq!(harness.ctx.zoom_factor(), 1.25, "{frames}");
+    }
+}
+
+#[test]
 fn theme_zoom_and_scenes_are_remembered_until_a_fresh_start() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("window.json");
