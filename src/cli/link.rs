@@ -3,7 +3,6 @@
 use super::Failure;
 use crate::app::{Event, Link};
 use crate::scene::LiveScene;
-use crate::scene::Scene;
 use crate::session::goal::Obstacle;
 use crate::session::log::Script;
 use crate::session::replay::Verdict;
@@ -12,8 +11,6 @@ use crate::session::replay::Verdict;
 pub struct LinkReplay {
     link: Link,
     script: Script,
-    /// The scene as parsed from its file.
-    original: Scene,
 }
 
 /// Reads a link.
@@ -26,13 +23,8 @@ pub fn parse(text: &str) -> Result<Link, Failure> {
 
 impl LinkReplay {
     /// The replay up to the instant of `link`.
-    ///
-    /// # Errors
-    /// The link's scene without its changes cannot be read.
-    pub fn new(mut link: Link) -> Result<Self, Failure> {
-        link.log.base.clear();
-        let original = link.load()?;
-        Ok(Self { script: Script::new(std::mem::take(&mut link.log)), link, original })
+    pub fn new(mut link: Link) -> Self {
+        Self { script: Script::new(std::mem::take(&mut link.log)), link }
     }
 
     /// The link's instant, s; `None` if it names none.
@@ -76,7 +68,7 @@ impl LinkReplay {
     fn apply_due(&mut self, simulation: &mut LiveScene) -> Result<(), String> {
         let steps = simulation.statistics().steps;
         while let Some(event) = self.script.due(steps).filter(|event| **event != Event::Stop) {
-            let applied = event.apply(simulation, &self.original);
+            let applied = event.apply(simulation);
             applied.map_err(|error| format!("the change that the link made after {steps} steps: {error}"))?;
             self.script.pass(simulation.time());
         }
@@ -100,7 +92,7 @@ mod tests {
         let mut link = Link::parse("?scene=pendulum&steps=9").expect("a link");
         link.log.push(3, Event::Stop);
         let mut simulation = crate::cli::start(&link.load().expect("built in")).expect("starts");
-        let mut replay = LinkReplay::new(link).expect("its scene");
+        let mut replay = LinkReplay::new(link);
         let outcomes: Vec<_> = (0..9).map(|_| replay.step(&mut simulation, None)).collect();
         assert_eq!(outcomes.iter().position(Result::is_err), Some(3), "{outcomes:?}");
     }

@@ -237,7 +237,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
 #[cfg(feature = "gui")]
 fn link_replay(arguments: &RunArguments) -> Result<Option<LinkReplay>, Failure> {
     let text = arguments.scene.link.as_deref();
-    text.map(|text| LinkReplay::new(super::link::parse(text)?)).transpose()
+    text.map(|text| super::link::parse(text).map(LinkReplay::new)).transpose()
 }
 
 #[cfg(not(feature = "gui"))]

@@ -55,12 +55,11 @@ impl Event {
         }
     }
 
-    /// Applies the event to `run`; `original` is the scene as loaded from its file. Sections and a refused step change nothing
-    /// here: the caller that steps the run handles them.
+    /// Applies the event to `run`. Sections and a refused step change nothing here: the caller that steps the run handles them.
     ///
     /// # Errors
     /// As [`LiveScene::set`]; the run is left unchanged.
-    pub fn apply(&self, run: &mut LiveScene, original: &Scene) -> Result<Effect, SetError> {
+    pub fn apply(&self, run: &mut LiveScene) -> Result<Effect, SetError> {
         match self {
             Self::Set { key, value } => {
                 let effect = run.set(key, value)?;
@@ -72,7 +71,8 @@ impl Event {
                 }
                 Ok(effect)
             }
-            Self::Original { key } => run.set_value(key, &original.get(key)?),
+            // A ball joint without a value of its own in the file follows the common one again, whatever that is now.
+            Self::Original { key } => run.set_value(key, &Value::Unset),
             Self::Pull(pulled) => Ok(run.pull(pulled.map(Pull::from)).map(|()| Effect::Now)?),
             Self::Sections { .. } | Self::Stop => Ok(Effect::Now),
         }

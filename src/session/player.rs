@@ -522,12 +522,12 @@ impl Player {
 
     /// Applies a change at the latest state. The rest of the latest step is still displayed as computed.
     fn apply(&mut self, event: &Event) -> Result<Effect, SetError> {
-        let Self { simulation: run, unchanged, original, pacer, .. } = self;
+        let Self { simulation: run, unchanged, pacer, .. } = self;
         let effect = if pacer.shown() >= run.time() || run.step_start() >= run.time() {
-            event.apply(run, original)?
+            event.apply(run)?
         } else {
             let mut copy = run.clone();
-            let effect = event.apply(&mut copy, original)?;
+            let effect = event.apply(&mut copy)?;
             *unchanged = Some(Box::new(std::mem::replace(run, copy)));
             effect
         };
@@ -542,12 +542,12 @@ impl Player {
         SOLVER_KEYS.into_iter().filter(is_in_file).collect()
     }
 
-    /// Resets a parameter to its value in the scene file.
+    /// Reverts the change of a parameter: it has its value in the scene file again, or follows what it follows there.
     ///
     /// # Errors
     /// As [`LiveScene::set_value`]; the run is left unchanged.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SetError> {
-        self.original.get(key)?;
+        self.pending().parameter(key)?;
         self.change(key, Event::Original { key: key.to_owned() })
     }
 
@@ -607,7 +607,7 @@ impl Player {
 
     /// Value of `key` in the scene file.
     pub fn original(&self, key: &str) -> Option<Value> {
-        self.original.get(key).ok()
+        self.pending().value_without_change(&self.original, key)
     }
 
     /// Records the rest of the previous step and takes one step; false if the divergence guard stopped it.

@@ -3,6 +3,7 @@
 use eframe::egui::{self, Key, Modifiers, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::App;
+use jointplay::scene::Value;
 use jointplay::simulate::Quantity;
 
 use crate::window::{click, sized};
@@ -132,4 +133,41 @@ fn another_scene_has_nothing_to_undo() {
     harness.state_mut().open("pendulum").expect("opens");
     harness.run_steps(3);
     assert_eq!(harness.state().undo_words(false), None);
+}
+
+#[test]
+fn undo_returns_a_value_to_what_it_followed() {
+    let mut harness = window();
+    let set = |harness: &mut Harness<'_, App>, key: &str, value: &str| {
+        harness.state_mut().player_mut().set(key, value).expect("allowed");
+        harness.run_steps(45);
+    };
+    let clearances = |harness: &Harness<'_, App>| -> Vec<f64> {
+        let joints = &harness.state().player().pending().machine.ball_joints;
+        joints.iter().map(|joint| joint.contact.clearance).collect()
+    };
+    // The file has 0.3 mm for all joints.
+    set(&mut harness, "contact.clearance", "0.5 mm");
+    for own in ["0.3 mm", "0.7 mm"] {
+        set(&mut harness, "joint.S1.clearance", own);
+        assert!(clearances(&harness)[0] != 5e-4 && clearances(&harness)[1..].iter().all(|other| *other == 5e-4));
+        let words = harness.state().undo_words(false).expect("a change");
+        assert!(words.ends_with("to 0.5 mm"), "{words}");
+        assert_eq!(harness.state().player().original("joint.S1.clearance"), Some(Value::Number(5e-4)));
+        press(&mut harness, UNDO);
+        assert!(clearances(&harness).iter().all(|all| *all == 5e-4), "{:?}", clearances(&harness));
+    }
+    // It follows the common value again.
+    set(&mut harness, "contact.clearance", "0.6 mm");
+    assert!(clearances(&harness).iter().all(|all| *all == 6e-4), "{:?}", clearances(&harness));
+
+    // The solver follows its preset.
+    let tolerance = |harness: &Harness<'_, App>| harness.state().player().pending().machine.solver.tolerance;
+    set(&mut harness, "solver.preset", "reference");
+    let preset = tolerance(&harness);
+    set(&mut harness, "solver.tolerance", "1e-4");
+    assert_ne!(tolerance(&harness), preset);
+    assert_eq!(harness.state().player().original("solver.tolerance"), Some(Value::Number(preset)));
+    press(&mut harness, UNDO);
+    assert_eq!(tolerance(&harness), preset);
 }

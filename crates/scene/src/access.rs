@@ -173,6 +173,29 @@ impl Scene {
         Ok(parameter)
     }
 
+    /// The value that `key` has once its change is reverted; `text` is the scene as read from the same text without changes. A ball
+    /// joint without a value of its own in the text then follows the common value, and the solver its preset, as changed since.
+    pub fn value_without_change(&self, text: &Self, key: &str) -> Option<Value> {
+        if !self.changes.iter().any(|(changed, _)| changed == key) {
+            return self.get(key).ok();
+        }
+        let Resolved { parameter, joint } = self.lookup(key)?;
+        let is_own = |part: &str| {
+            let joint = text.lookup(key).and_then(|resolved| resolved.joint);
+            joint.is_some_and(|joint| text.overrides[joint].contains(&part))
+        };
+        if joint.is_some() && !contact_part(parameter).is_some_and(is_own) {
+            return self.get(parameter.key).ok();
+        }
+        if SOLVER_KEYS.contains(&key) && !self.source.places.contains_key(key) && self.machine.solver.preset.is_some() {
+            let mut next = self.clone();
+            next.changes.retain(|(changed, _)| changed != key);
+            next.apply_preset();
+            return next.get(key).ok();
+        }
+        text.get(key).ok()
+    }
+
     /// The scene read again from its text with its changes, except those of keys that it no longer has, such as those of a
     /// joint beyond the end of a shortened chain.
     fn rebuilt(&self) -> Result<Self, SceneError> {
