@@ -97,12 +97,20 @@ fn settled_hint(ui: &mut Ui, player: &Player) {
         return;
     }
     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-        ui.label(RichText::new("At rest. Press R to restart").weak())
-            .on_hover_text(
-                "The motion relative to the drives has ended: for an eighth of their period no ball with play has left \
-                 its socket's wall or moved along it by more than 15 % of the clearance, and no load has changed by more \
-                 than 25 %. Without drives: no body has moved for 0.5 s.",
-            );
+        let (words, help) = if player.is_driven() {
+            (
+                "No rattling. Press R to restart",
+                "The drives move the machine, but the motion relative to them has ended: for an eighth of their period no \
+                 ball with play has left its socket's wall or moved along it by more than 15 % of the clearance, and no \
+                 load has changed by more than 25 %",
+            )
+        } else {
+            (
+                "At rest. Press R to restart",
+                "No drive moves, and for 0.5 s no point of a body has moved by more than 15 % of the smallest clearance",
+            )
+        };
+        ui.label(RichText::new(words).weak()).on_hover_text(help);
     });
 }
 

@@ -361,6 +361,11 @@ impl Player {
         self.record.settling.has_settled()
     }
 
+    /// Whether periodic drives move the machine.
+    pub fn is_driven(&self) -> bool {
+        self.record.settling.is_driven()
+    }
+
     /// Advances by one frame, `dt` seconds after the last, and updates the display.
     pub fn advance(&mut self, dt: f64) {
         if let Some(impact_search) = self.impact_search {

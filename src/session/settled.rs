@@ -4,14 +4,18 @@
 //!   in contact, moved in its socket by no more than [`MAX_DISPLACEMENT`] of the clearance (at that rate, it hardly crosses its
 //!   play once per period), and carried the same load within [`MAX_LOAD_CHANGE`]. If motion resumes after such an interval, the
 //!   next one must last a whole period: a ball that crosses its play once per turn is quiet in between.
-//! - A scene without a moving drive is at rest when no point of a body has moved by more than [`MAX_DISPLACEMENT`] of the
-//!   smallest clearance for [`REST_TIME`]. A pendulum also stops at the end of each swing, but only briefly.
+//! - A scene without a periodic drive is at rest when no drive moves and no point of a body has moved by more than
+//!   [`MAX_DISPLACEMENT`] of the smallest clearance for [`REST_TIME`]. A pendulum also stops at the end of each swing, but only
+//!   briefly.
 //! - A scene without play never settles: nothing in it rattles.
 //!
-//! The criteria use only the frames of the run.
+//! The criteria use only the frames of the run and the laws of its drives.
+
+use std::sync::Arc;
 
 use crate::analysis::drive::{NoPeriod, drive_period};
 use crate::machine::Vec3;
+use crate::mechanism::{Law, laws_of};
 use crate::scene::Scene;
 use crate::simulate::{ContactMode, Frame, JointReport};
 
@@ -38,8 +42,12 @@ struct Instant {
 /// Detects from the frames of a run whether it has settled.
 #[derive(Clone, Debug)]
 pub struct Settling {
-    /// Longest period of the drives, s.
+    /// Longest period of the drives, s; `None` if none is periodic.
     period: Option<f64>,
+    /// Laws of the drives of a scene without a periodic one.
+    laws: Vec<Arc<dyn Law>>,
+    /// Size of the machine at the start, m.
+    size: f64,
     /// Body of each socket, and clearance of each joint with play, m.
     joints: Vec<Option<(Option<usize>, f64)>>,
     /// Earlier instants that equal the latest within the tolerances, oldest first.
@@ -66,12 +74,19 @@ impl Settling {
         };
         Self {
             period,
+            laws: if period.is_none() { laws_of(&scene.machine).collect() } else { Vec::new() },
+            size: 0.0,
             joints: scene.machine.ball_joints.iter().map(play).collect(),
             past: Vec::new(),
             latest: Instant::default(),
             quiet_since: None,
             has_resumed: false,
         }
+    }
+
+    /// Whether periodic drives move the machine: once settled, it moves without rattling; otherwise it is at rest.
+    pub fn is_driven(&self) -> bool {
+        self.period.is_some()
     }
 
     /// Whether the motion has settled.
@@ -91,8 +106,9 @@ impl Settling {
             return;
         }
         let is_free = |(play, now): (&Option<_>, &JointReport)| play.is_some() && now.state == ContactMode::Free;
-        let is_driven = self.period.is_some();
-        if is_driven && self.joints.iter().zip(&frame.joints).any(is_free) {
+        let is_driven = self.is_driven();
+        let moves = |law: &Arc<dyn Law>| law.at(frame.time).rate != 0.0;
+        if self.laws.iter().any(moves) || (is_driven && self.joints.iter().zip(&frame.joints).any(is_free)) {
             self.past.clear();
         }
         self.sample(frame);
@@ -124,12 +140,21 @@ impl Settling {
 
     /// Samples positions: in a driven scene the balls in the axes of their sockets, otherwise points of the bodies.
     fn sample(&mut self, frame: &Frame) {
+        if let Some(body) = frame.bodies.first().filter(|_| self.size == 0.0) {
+            let distances = frame.joints.iter().map(|joint| (joint.ball_centre - body.position).norm());
+            self.size = distances.fold(0.0, f64::max);
+        }
+        let size = self.size;
         let Instant { time, points, loads } = &mut self.latest;
         *time = frame.time;
         points.clear();
         loads.clear();
         if self.period.is_none() {
-            points.extend(frame.bodies.iter().map(|body| body.position));
+            // Beside a body's origin, two points at the size of the machine show its rotation.
+            points.extend(frame.bodies.iter().flat_map(|body| {
+                let far = |axis: usize| body.position + size * body.rotation.column(axis);
+                [body.position, far(0), far(1)]
+            }));
             points.extend(frame.joints.iter().map(|joint| joint.ball_centre));
             return;
         }
@@ -191,6 +216,37 @@ mod tests {
             let switch_times = changes_of_state(&scene(name, changes), to);
             assert!(switch_times.is_empty(), "{name} {changes:?}: {switch_times:?}");
         }
+    }
+
+    #[test]
+    fn a_machine_is_at_rest_only_while_no_drive_moves_and_no_body_turns() {
+        let text = scene("pendulum", &[]).source.text.replace("-30 deg", "0 deg");
+        let at_rest = |text: &str, to: f64| {
+            let scene = Scene::parse(text, None, &[]).expect("a scene");
+            let switch_times = changes_of_state(&scene, to);
+            (Settling::new(&scene).is_driven(), switch_times.len() % 2 == 1)
+        };
+        // The socket moves by less than the tolerance in half a second.
+        let carriage = r#"
+            [[body]]
+            name = "carriage"
+            mass = "1 kg"
+            inertia = "1 1 1 kg m^2"
+            [[joint]]
+            name = "slide"
+            kind = "prismatic"
+            child = "carriage"
+            axis = [1, 0, 0]
+            drive = { law = "ramp", to = "0.1 mm", start = "1.5 s", duration = "3 s" }
+        "#;
+        let carried = text.replace(r#"socket = { body = "world","#, r#"socket = { body = "carriage","#) + carriage;
+        assert_ne!(carried, text.clone() + carriage);
+        assert_eq!([1.4, 3.0, 6.0].map(|to| at_rest(&carried, to)), [(false, true), (false, false), (false, true)]);
+        // A rod that turns about its own axis, without friction.
+        let turning = text.replace("friction = 0.15", "friction = 0");
+        assert!(at_rest(&turning, 3.0).1);
+        let turning = turning.replace("[joint.start]", "[joint.start]\nangular_velocity = \"0 0 1 rad/s\"");
+        assert!(!at_rest(&turning, 3.0).1);
     }
 
     #[test]

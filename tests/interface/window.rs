@@ -552,7 +552,7 @@ fn a_settled_run_is_reported_beside_the_picture_and_a_swinging_one_never() {
     player.run_to(9e-3);
     player.set_playing(true);
     harness.step();
-    assert!(harness.query_by_label("At rest. Press R to restart").is_none());
+    assert!(harness.query_by_label("No rattling. Press R to restart").is_none());
 
     // Stepping must not depend on the speed of this computer.
     harness.state_mut().player_mut().run_to(0.5);
@@ -560,11 +560,11 @@ fn a_settled_run_is_reported_beside_the_picture_and_a_swinging_one_never() {
         ["Step", "3D view", "Time scale preset"].map(|label| harness.get_by_label(label).rect())
     };
     harness.step();
-    assert!(harness.query_by_label("At rest. Press R to restart").is_none());
+    assert!(harness.query_by_label("No rattling. Press R to restart").is_none());
     let paused = control_rects(&harness);
     harness.state_mut().player_mut().set_playing(true);
     harness.step();
-    let words = harness.get_by_label("At rest. Press R to restart").rect();
+    let words = harness.get_by_label("No rattling. Press R to restart").rect();
     assert!(!words.intersects(harness.get_by_label("3D view").rect()));
     assert_eq!(control_rects(&harness), paused, "the layout does not shift for it");
 

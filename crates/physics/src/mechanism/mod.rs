@@ -47,7 +47,7 @@ pub use bounds::{Advice, CostlyTask, LimitedQuantity, MAX_DENSE};
 pub use closed_form::{ClosedMotion, Unreachable};
 pub use contacts::{Contacts, Ramp};
 pub use discrete_gradient::StepStart;
-pub use drives::periods_of;
+pub use drives::{Law, laws_of, periods_of};
 pub use elements::{ActiveSet, Counts, EdgeIndicator, ElementReport, Gap, Powers, Pull, WallContact};
 use flight::ActiveRanges;
 pub use flight::{Flight, FreeFlightBody};

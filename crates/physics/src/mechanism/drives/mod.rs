@@ -92,6 +92,13 @@ pub(super) fn law_of_factor(drive: &Drive) -> Option<Arc<dyn Law>> {
     }
 }
 
+/// Laws of joint drives and of the time laws of force elements, without the functions of the closed form.
+pub fn laws_of(machine: &Machine) -> impl Iterator<Item = Arc<dyn Law>> {
+    let drives = machine.joints.iter().flat_map(Joint::drives).map(|(freedom, drive)| (drive, freedom.turns()));
+    let elements = machine.elements.iter().filter_map(|element| Some((element.law()?, element.is_on_hinge())));
+    drives.chain(elements).filter_map(|(drive, turns)| trajectory_of(drive, turns).law().cloned())
+}
+
 /// Periods of joint drives and of the time laws of force elements, s; infinite if one does not repeat or nothing moves.
 pub fn periods_of(machine: &Machine) -> impl Iterator<Item = f64> {
     let drives = machine.joints.iter().flat_map(Joint::drives);
