@@ -183,14 +183,19 @@ impl Comparison {
         let mut lags = false;
         for earlier in &mut self.runs {
             let run = &mut earlier.run;
+            run.plotted = player.plotted;
             run.pick(player.picks());
             run.pacer.set_scale(player.pacer.scale());
             if run.ideal().is_some() != player.ideal().is_some() {
                 run.set_ideal(player.ideal().is_some());
             }
             let shown = player.pacer.shown();
-            if self.beside == Some(earlier.place) || shown > run.reached() {
+            let is_beside = self.beside == Some(earlier.place);
+            if is_beside || shown > run.reached() || (earlier.shown && may_step()) {
+                // To a known instant, too: its record is fine only around the instant it displays.
                 lags |= !run.follow(shown, may_step);
+            } else {
+                lags |= earlier.shown && run.pacer.shown() != shown;
             }
         }
         lags

@@ -1,18 +1,25 @@
 //! Curves of recorded quantities, drawn so that no coloured pixel represents a value that was not recorded: each pixel column is
-//! filled from the least to the greatest value in it. Lines with mitred joins would overshoot at every peak.
+//! filled from the least to the greatest value in it. Lines with mitred joins would overshoot at every peak. Where only the range of
+//! a long stretch is known, that range is a pale block, not a curve.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use eframe::egui::{Color32, Mesh, Pos2, Shape, Stroke, Ui, pos2};
+use eframe::egui::{Color32, Mesh, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
 use egui_plot::{PlotBounds, PlotGeometry, PlotItem, PlotItemBase, PlotPoint, PlotTransform};
 
+use super::player::FINEST_BIN;
 use crate::simulate::Bin;
 
 /// Width of a curve, points.
 pub const WIDTH: f32 = 1.4;
 /// Length of the dashes where curves coincide and alternate, points.
 pub const DASH: f32 = 6.0;
+
+/// Widest bin that is part of a curve, points.
+pub const MAX_BIN_WIDTH: f32 = 5.0;
+/// Opacity of a wider one.
+const PALE: f32 = 0.25;
 
 /// Most pixels over which a steep curve fades into the next column.
 const MAX_FADE: f32 = 6.0;
@@ -33,6 +40,12 @@ impl Trace {
         let bin = self.bins[..after].last()?;
         (time <= bin.to).then_some((bin.least, bin.greatest))
     }
+}
+
+/// Whether `bin` shows where in it the curve is: it has a single value or is not wider than `widest`, s, or nothing finer is ever
+/// recorded.
+pub fn is_narrow(bin: &Bin, widest: f64) -> bool {
+    bin.least == bin.greatest || bin.to - bin.from <= widest.max(1.5 * FINEST_BIN)
 }
 
 /// Curves over a common time axis. None hides another: in a pixel column, taller curves are drawn behind shorter ones, and
@@ -79,10 +92,21 @@ impl<'a> Curves<'a> {
             [origin[0] + time * across, y]
         };
         let width = self.width * scale;
+        let widest = f64::from(MAX_BIN_WIDTH * scale) / across;
         let all: Vec<Vec<Bar>> =
-            self.traces.iter().map(|trace| bars(&spans(&trace.bins, place, first, count), width)).collect();
+            self.traces.iter().map(|trace| bars(&spans(&trace.bins, widest, place, first, count), width)).collect();
         let dash = (DASH * scale).round().max(1.0);
         let mut mesh = Mesh::default();
+        for trace in self.traces {
+            for bin in trace.bins.iter().filter(|bin| !is_narrow(bin, widest)) {
+                let corners = [(bin.from, bin.greatest), (bin.to, bin.least)].map(|(time, value)| {
+                    let [x, y] = place(time, value);
+                    pos2(x as f32 / scale, y as f32 / scale)
+                });
+                let block = Rect::from_points(&corners).expand2(vec2(0.0, 0.5 * self.width));
+                mesh.add_colored_rect(block.intersect(*frame), trace.colour.gamma_multiply(PALE));
+            }
+        }
         let mut column_bars: Vec<(usize, Bar)> = Vec::new();
         let mut groups: Vec<Vec<(usize, Bar)>> = Vec::new();
         for column in 0..count {
@@ -157,8 +181,9 @@ impl Span {
     }
 }
 
-/// Spans of the `count` pixel columns from `first` for a curve through `bins`; `place` maps time and value to pixels.
-fn spans(bins: &[Bin], place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: usize) -> Vec<Span> {
+/// Spans of the `count` pixel columns from `first` for a curve through those `bins` that are not wider than `widest`, s; `place` maps
+/// time and value to pixels.
+fn spans(bins: &[Bin], widest: f64, place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: usize) -> Vec<Span> {
     let mut spans = vec![Span::EMPTY; count];
     let column = |x: f64| {
         let at = x.floor() as i64 - first;
@@ -178,11 +203,11 @@ fn spans(bins: &[Bin], place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: 
     let mut pen: Option<(f64, f64)> = None;
     let mut extremes: Vec<(f64, f64)> = Vec::new();
     for (index, bin) in bins.iter().enumerate() {
-        if bin.least.is_nan() || bin.greatest.is_nan() {
+        if bin.least.is_nan() || bin.greatest.is_nan() || !is_narrow(bin, widest) {
             pen = None;
             continue;
         }
-        let next = bins.get(index + 1).filter(|next| next.from == bin.to);
+        let next = bins.get(index + 1).filter(|next| next.from == bin.to && is_narrow(next, widest));
         let exit = next.map(|next| {
             // Middle of their overlap, or of the gap between them.
             0.5 * (bin.least.max(next.least) + bin.greatest.min(next.greatest))

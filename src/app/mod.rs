@@ -805,6 +805,7 @@ impl App {
         if self.film.is_some() {
             return true;
         }
+        self.player.plotted = self.plots.length(&self.player);
         let was_seeking = self.player.is_seeking();
         // Two machines side by side show the same instant: the current one waits for the other.
         let waits = self.plots.comparison.is_behind(&self.player);

@@ -386,6 +386,11 @@ impl Plots {
         }
     }
 
+    /// Length of the time range of the plots, s.
+    pub fn length(&self, player: &Player) -> f64 {
+        self.zoomed.map_or_else(|| self.window_length(player), |(from, to)| to - from)
+    }
+
     /// Time range of the plots, s. It ends at the displayed instant, or up to a quarter of its length later if recorded.
     fn range(&self, player: &Player) -> (f64, f64) {
         if let Some(range) = self.zoomed {
@@ -482,6 +487,11 @@ impl Plots {
             }
         }
         let kind = panel.kind;
+        if kind == PlotKind::Bands {
+            // A stack of ranges would mean nothing.
+            let widest = f64::from(curve::MAX_BIN_WIDTH / space.x) * length;
+            self.traces.iter_mut().for_each(|trace| trace.bins.retain(|bin| curve::is_narrow(bin, widest)));
+        }
         self.earlier.clear();
         if kind != PlotKind::Bands {
             let shown = self.comparison.shown();

@@ -26,6 +26,7 @@ use crate::simulate::{
 };
 use before_change::BeforeChange;
 use keyframes::Keyframes;
+pub use record::FINEST_BIN;
 use record::Record;
 use travel::ImpactSearch;
 pub use travel::{AbandonedFuture, Flag};
@@ -39,6 +40,8 @@ pub use travel::{AbandonedFuture, Flag};
 pub struct Player {
     /// How fast simulated time passes.
     pub pacer: Pacer,
+    /// Length of the plots' time axis, s.
+    pub(crate) plotted: f64,
     /// Clock that measures stepping time.
     pub clock: Clock,
     simulation: LiveScene,
@@ -127,6 +130,7 @@ impl Player {
         let scene = simulation.running();
         Self {
             pacer: Pacer::default(),
+            plotted: f64::INFINITY,
             clock: wall,
             original,
             warnings: warnings_of(scene),
@@ -461,6 +465,7 @@ impl Player {
         // A new run with the same settings.
         let mut run = Self {
             pacer: self.pacer.clone(),
+            plotted: self.plotted,
             clock: self.clock,
             playing: self.playing,
             backwards: self.backwards,
@@ -610,7 +615,8 @@ impl Player {
         warnings.find(|(own, _)| own.is_some_and(|own| own == last.unwrap_or(key))).map(|(_, text)| &**text)
     }
 
-    /// Value of `key` in the scene file.
+    /// Value of `key` after [`Self::set_original`]: that of the scene file, or what it follows there, such as the common value of the
+    /// ball joints.
     pub fn original(&self, key: &str) -> Option<Value> {
         self.pending().value_without_change(&self.original, key)
     }

@@ -3,7 +3,7 @@
 use eframe::egui::{self, Rect, Theme, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, Player};
-use jointplay::simulate::Bin;
+use jointplay::simulate::{Bin, Frame, Quantity, Simulation};
 
 use crate::hands::plain;
 use crate::window::click;
@@ -215,4 +215,112 @@ fn the_current_machine_waits_for_the_one_before_the_change() {
     assert!(now > 0.3 && (now - before).abs() < 0.05, "{before} {now}");
     click(&mut harness, "Close");
     assert!(harness.query_by_label("3D view before the change").is_none());
+}
+
+/// Checks the last `window` seconds before `time`, s, in the record of `run`, which had no change up to `time`, against the values of
+/// the same steps: the curves reach the instant, have no wide bins, and hold no value that did not occur there.
+fn assert_true_curves(run: &Player, time: f64, window: f64) {
+    let from = time - window;
+    let mut simulation = Simulation::new(&run.running().machine).expect("starts");
+    let (mut frame, mut samples) = (Frame::default(), Vec::new());
+    while simulation.time() < time {
+        simulation.step().expect("runs");
+        let (start, end) = (simulation.step_start(), simulation.time());
+        if end < from - 1e-4 {
+            continue;
+        }
+        let parts = ((end - start) / 2e-7).ceil();
+        for part in 0..=parts as u32 {
+            let at = start + (end - start) * f64::from(part) / parts;
+            simulation.sample(at, &mut frame);
+            let joint = &frame.joints[0];
+            samples.push((at, [joint.normal_force.norm(), joint.eccentricity.norm()]));
+        }
+    }
+    let list = run.channels().list();
+    let of = |quantity| list.iter().position(|channel| channel.quantity == quantity).expect("recorded");
+    for (index, quantity) in [Quantity::NormalForce, Quantity::Eccentricity].into_iter().enumerate() {
+        let mut bins = Vec::new();
+        run.bins(of(quantity), from, time, 600, &mut bins);
+        let name = format!("{quantity:?} to {time} s");
+        let most = samples.iter().map(|(_, values)| values[index]).fold(0.0, f64::max);
+        let ends = (bins.first().expect("recorded").from, bins.last().expect("recorded").to);
+        assert!(ends.0 <= from + 0.01 * window && (ends.1 - time).abs() < 1e-9, "{name}: only {ends:?}");
+        for bin in &bins {
+            let width = bin.to - bin.from;
+            assert!(width <= (window / 200.0).max(3e-6), "{name}: {bin:?}");
+            let inside = samples.iter().filter(|(at, _)| (bin.from - 1e-6..=bin.to + 1e-6).contains(at));
+            let (least, greatest) = inside.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (_, values)| {
+                (a.min(values[index]), b.max(values[index]))
+            });
+            let margin = 0.005 * most + 1e-9;
+            assert!(
+                bin.least >= least - margin && bin.greatest <= greatest + margin,
+                "{name}: {bin:?} {least} {greatest}"
+            );
+        }
+    }
+}
+
+/// Times, s, shortly after the beginning of some impacts of the first joint of `run`.
+fn touches(run: &Player, from: f64, to: f64) -> Vec<f64> {
+    let all: Vec<f64> = run.contact_history().touches(0, from, to).collect();
+    assert!(all.len() > 3, "{all:?}");
+    [0, all.len() / 2, all.len() - 1].map(|index| all[index] + 1e-4).into()
+}
+
+#[test]
+fn a_slow_replay_shows_the_true_values_of_both_runs() {
+    // A time scale at which the plots show half a millisecond.
+    const SCALE: f64 = 1e-4;
+    let mut harness = window();
+    harness.state_mut().run_to(0.3);
+    set(&mut harness, "Clearance", 0.9);
+    harness.state_mut().reset();
+    harness.run_steps(3);
+    harness.state_mut().player_mut().pacer.set_scale(SCALE);
+    let window = harness.state().player().automatic_window();
+    let wanted = touches(harness.state().comparison().kept()[0].run(), 0.02, 0.3);
+    for start in wanted {
+        for time in [start, start + 2e-5, start + 0.3 * window] {
+            harness.state_mut().player_mut().run_to(time);
+            harness.run_steps(5);
+            let app = harness.state();
+            let kept = app.comparison().kept()[0].run();
+            assert_eq!((kept.reached(), kept.pacer.shown()), (0.3, time));
+            assert_true_curves(kept, time, window);
+            assert_true_curves(app.player(), time, window);
+        }
+    }
+    // Backwards, out of a long replay.
+    let back = touches(harness.state().player(), 0.02, 0.2);
+    for time in back.into_iter().rev() {
+        harness.state_mut().player_mut().go_to(time);
+        harness.run_steps(5);
+        let app = harness.state();
+        assert_true_curves(app.comparison().kept()[0].run(), time, window);
+        assert_true_curves(app.player(), time, window);
+    }
+}
+
+#[test]
+fn a_change_in_the_past_leaves_a_fine_record_of_what_led_to_it() {
+    let mut harness = window();
+    harness.state_mut().run_to(0.3);
+    harness.state_mut().player_mut().pacer.set_scale(1e-4);
+    let window = harness.state().player().automatic_window();
+    let time = touches(harness.state().player(), 0.02, 0.2)[1];
+    harness.state_mut().player_mut().go_to(time);
+    harness.run_steps(3);
+    set(&mut harness, "Friction coefficient", 0.4);
+    assert_eq!(harness.state().player().reached(), time);
+    let ends = |run: &Player| {
+        let bins = force(run, time - window, time);
+        assert!(bins.iter().all(|bin| bin.to - bin.from < 3e-6), "{bins:?}");
+        (bins[0].from, bins[bins.len() - 1].to)
+    };
+    for run in [harness.state().player(), harness.state().comparison().kept()[0].run()] {
+        let (from, to) = ends(run);
+        assert!(from <= time - 0.99 * window && (to - time).abs() < 1e-9, "{from} {to}");
+    }
 }

@@ -156,6 +156,29 @@ fn a_curve_is_whole_and_stays_in_the_range_of_its_values() {
 }
 
 #[test]
+fn a_range_over_a_long_stretch_is_a_pale_block_and_no_curve() {
+    // One touch of a millisecond. Once half a minute has been recorded, only the range of bins of 16 ms is known.
+    let mut history = record(|n, channel| match channel {
+        0 if (480..490).contains(&n) => 390.0,
+        0 => 0.0,
+        _ => f64::NAN,
+    });
+    history.push(30.0, &[0.0, f64::NAN, f64::NAN]);
+    for (size, scale) in SIZES {
+        let (picture, place) = drawn(&history, 0.1, size, scale);
+        let corners = (place(0.0, 390.0), place(0.1, 10.0));
+        let above_zero = [corners.0[0], corners.0[1], corners.1[0], corners.1[1]].map(|at| at as usize);
+        assert!(picture.coloured(above_zero, COLOURS[0], MOSTLY).is_empty(), "{size:?}: a curve");
+        let at = |time: f64| {
+            let [x, y] = place(time, 200.0);
+            picture.at(x as usize, y as usize)
+        };
+        assert_ne!(at(0.048), at(0.02), "{size:?}: the range of the touch");
+        assert_eq!(at(0.09), at(0.02), "{size:?}: no touch");
+    }
+}
+
+#[test]
 fn lines_are_split_at_sharp_corners() {
     let points = [(0.0, 0.0), (1.0, 0.1), (1.0, 0.1), (2.0, 0.0), (2.5, 50.0), (3.0, 0.0), (4.0, 0.0)];
     let parts = parts(points.into_iter().map(|(x, y)| pos2(x, y)));

@@ -3,6 +3,7 @@
 use eframe::egui::Ui;
 
 use super::{Panel, Plots, earlier_traces, time_axis};
+use crate::app::curve;
 use crate::app::host::SaveFile;
 use crate::app::player::Player;
 use crate::app::{App, layout};
@@ -99,13 +100,16 @@ impl Plots {
         let (from, to) = self.range(player);
         let (time_unit, time_size) = time_axis(to - from);
         let (unit, size) = panel.unit;
+        let widest = (to - from) * f64::from(curve::MAX_BIN_WIDTH) / f64::from(CHART_SIZE.0);
         let ends = |bins: &[Bin]| -> Vec<(f64, f64)> {
             let ends = |bin: &Bin| {
                 let time = 0.5 * (bin.from + bin.to) / time_size;
                 [bin.least, bin.greatest].map(|value| (time, value / size))
             };
-            let ends =
-                bins.iter().flat_map(|bin| ends(bin).into_iter().take(1 + usize::from(bin.least != bin.greatest)));
+            let ends = bins
+                .iter()
+                .filter(|bin| curve::is_narrow(bin, widest))
+                .flat_map(|bin| ends(bin).into_iter().take(1 + usize::from(bin.least != bin.greatest)));
             ends.collect()
         };
         let mut bins: Vec<Bin> = Vec::new();

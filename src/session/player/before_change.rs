@@ -57,6 +57,9 @@ impl Player {
     /// Displays `time`, s, stepping while `may_step`. Returns true once it is reached or the run cannot continue.
     pub(crate) fn follow(&mut self, time: f64, may_step: impl FnMut() -> bool) -> bool {
         if time > self.reached {
+            if self.has_future() {
+                self.go_to(self.reached);
+            }
             return self.run_towards(time, may_step);
         }
         if time != self.pacer.shown() {

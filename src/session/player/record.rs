@@ -9,7 +9,7 @@ use crate::session::watch::RunWatch;
 use crate::simulate::{Bin, Channels, Frame, History, Mark, Peak, RECORDED_JOINTS};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
-pub(super) const FINEST_BIN: f64 = 2e-6;
+pub const FINEST_BIN: f64 = 2e-6;
 
 /// The record of a run, as far as it was ever displayed, and the peaks that are still to be added.
 #[derive(Clone)]
@@ -82,6 +82,18 @@ impl Record {
             self.history.bins(channel, end, to, most_bins, out);
             drop_before(out, first, end);
         }
+    }
+
+    /// Width of the narrowest bins from `time`, s, on, s.
+    pub fn resolution(&self, time: f64) -> f64 {
+        let detailed = self.detailed_at(time).map_or(f64::INFINITY, |detailed| detailed.resolution(time));
+        self.history.resolution(time).min(detailed)
+    }
+
+    /// The full-resolution record, if it contains `time`, s.
+    pub fn detailed_at(&self, time: f64) -> Option<&History> {
+        let contains = |history: &&History| history.span().is_some_and(|(from, to)| from <= time && time <= to);
+        self.detailed.as_deref().filter(contains)
     }
 
     /// Begins another full-resolution record.

@@ -4,7 +4,7 @@
 use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
 use super::keyframes::Keyframe;
-use super::record::drop_before;
+use super::record::{FINEST_BIN, drop_before};
 use super::{Player, warnings_of};
 use crate::session::goal::{Goal, Obstacle};
 use crate::session::log::Event;
@@ -12,6 +12,9 @@ use crate::simulate::{Bin, History};
 
 /// Most steps retraced before a past instant, so that the plots show its history in detail.
 const MAX_RETRACED_STEPS: u64 = 512;
+
+/// Widest bins of a past window, as a fraction of its length: less than a pixel in most plots.
+const MAX_BIN: f64 = 1.0 / 400.0;
 
 /// Search horizon for the next impact, s.
 const SEARCH_HORIZON: f64 = 5.0;
@@ -183,7 +186,9 @@ impl Player {
             let is_before = |k: &Keyframe| goal.is_ahead_of(k.state.steps(), k.state.time());
             let best = self.keyframes.latest(is_before);
             let (start, steps) = best.map_or((0.0, 0), |k| (k.state.time(), k.state.steps()));
-            if now < start || !goal.is_ahead_of(here, now) {
+            // Repeated steps are recorded only at the end of a record.
+            let is_coarse = self.record.resolution(now) > self.widest_bin();
+            if now < start || !goal.is_ahead_of(here, now) || is_coarse {
                 let seen = if goal.time.is_finite() { goal.time } else { start };
                 self.restore_before(start, steps, seen);
             }
@@ -239,11 +244,17 @@ impl Player {
         applied
     }
 
+    /// Widest bins that show the plots' window as curves, s.
+    fn widest_bin(&self) -> f64 {
+        (MAX_BIN * self.automatic_window().min(self.plotted)).max(FINEST_BIN)
+    }
+
     /// Restores the keyframe at `start`, s, after `steps` steps, or an earlier one if the history up to the instant `seen`, s,
     /// must be recorded in detail.
     fn restore_before(&mut self, start: f64, steps: u64, seen: f64) {
-        let span = self.record.detailed.as_ref().and_then(|detailed| detailed.span());
-        if span.is_some_and(|(from, to)| from <= start && start <= to) {
+        // A long record has lost the details of its older part.
+        let is_fine = |detailed: &History| detailed.resolution(start) <= self.widest_bin();
+        if self.record.detailed_at(start).is_some_and(is_fine) {
             return self.restore(start, false);
         }
         let lead = seen - self.automatic_window();
@@ -330,7 +341,8 @@ impl Player {
             twin.truncate(start);
         }
         (self.reached, self.most_steps) = (start, start_steps);
-        self.restore(start, false);
+        // What led to the branch is recorded in detail again.
+        self.restore_before(start, start_steps, shown);
         let _ = self.step_towards(shown, |player| player.steps() >= steps, |_| true);
         let now = self.simulation.time();
         self.restart_twin(|start| start > now);

@@ -18,8 +18,8 @@ pub struct History {
     indices: Vec<i64>,
     /// Newest index per level.
     newest: [i64; LEVELS],
-    /// Greatest index ever reached per level: anything more than `BINS` older has been overwritten.
-    reached: [i64; LEVELS],
+    /// Greatest index per level whose bin has been overwritten, and with it all earlier ones.
+    lost: [i64; LEVELS],
     /// First value per channel; NaN until a channel added later has one. Values are stored as differences from it, so that a
     /// small motion far from zero keeps its digits.
     base: Vec<f64>,
@@ -78,7 +78,7 @@ impl History {
             finest: if finest > 0.0 && finest.is_finite() { finest } else { 1e-6 },
             indices: vec![EMPTY; LEVELS * BINS],
             newest: [EMPTY; LEVELS],
-            reached: [EMPTY; LEVELS],
+            lost: [EMPTY; LEVELS],
             base: vec![0.0; channels],
             ranges: vec![(0.0, 0.0); LEVELS * BINS * channels],
             start: None,
@@ -112,7 +112,7 @@ impl History {
     pub fn clear(&mut self) {
         self.indices.fill(EMPTY);
         self.newest = [EMPTY; LEVELS];
-        self.reached = [EMPTY; LEVELS];
+        self.lost = [EMPTY; LEVELS];
         self.start = None;
         self.end = 0.0;
     }
@@ -142,6 +142,8 @@ impl History {
                     *index = EMPTY;
                 }
             }
+            // The mark restores its newest bin; of later ones none is lost any more.
+            self.lost[level] = self.lost[level].min(newest.saturating_sub(1));
             if newest != EMPTY
                 && let Some(ranges) = stored.next()
             {
@@ -212,8 +214,9 @@ impl History {
         let (width, complete) = (self.width(level), self.complete(level));
         // If the first bin is empty, start from the last non-empty one before it.
         let (mut first, oldest) = (self.index(level, from), self.index(level, start));
-        let overwritten = self.reached[level].saturating_sub(BINS as i64);
-        while first > oldest.max(overwritten + 1) && self.range(level, first, complete, channel).is_none() {
+        while first > oldest.max(self.lost[level].saturating_add(1))
+            && self.range(level, first, complete, channel).is_none()
+        {
             first -= 1;
         }
         for index in first..=self.index(level, to) {
@@ -253,11 +256,14 @@ impl History {
         // Two spare bins: the window seldom starts and ends on a bin's edge.
         let most_bins = most_bins.clamp(2, BINS - 2) as f64;
         (0..LEVELS)
-            .find(|&level| {
-                let oldest = self.reached[level].saturating_sub(BINS as i64);
-                (to - from) / self.width(level) <= most_bins && self.index(level, from) > oldest
-            })
+            .find(|&level| (to - from) / self.width(level) <= most_bins && self.index(level, from) > self.lost[level])
             .unwrap_or(LEVELS - 1)
+    }
+
+    /// Width of the narrowest bins that still exist from `time` on, s.
+    pub fn resolution(&self, time: f64) -> f64 {
+        let exists = |level: &usize| self.index(*level, time) > self.lost[*level];
+        self.width((0..LEVELS).find(exists).unwrap_or(LEVELS - 1))
     }
 
     fn width(&self, level: usize) -> f64 {
@@ -334,7 +340,7 @@ impl History {
 
     fn open(&mut self, level: usize, index: i64) {
         self.newest[level] = index;
-        self.reached[level] = self.reached[level].max(index);
+        self.lost[level] = self.lost[level].max(index - BINS as i64);
         self.indices[level * BINS + slot_of(index)] = index;
     }
 }
@@ -477,6 +483,25 @@ mod tests {
         assert!(straight.rows(70) == anew.rows(70));
         history.rewind(&nothing);
         assert_eq!((history.span(), history.rows(9).len()), (None, 0));
+    }
+
+    #[test]
+    fn what_follows_a_rewound_record_is_as_fine_as_ever() {
+        let mut history = History::new(1, 1e-6);
+        let push = |history: &mut History, from: u64, to: u64| {
+            (from..to).for_each(|n| history.push(n as f64 * 1e-6, &[wave(n)]));
+        };
+        push(&mut history, 0, 10_000);
+        let mark = history.mark();
+        push(&mut history, 10_000, 900_000);
+        assert!(history.resolution(0.01) > 1e-4);
+        history.rewind(&mark);
+        push(&mut history, 10_000, 11_000);
+        assert_eq!([0.01, 0.011].map(|time| history.resolution(time)), [1e-6; 2]);
+        let fine = bins(&history, 0, 0.01, 0.011, 2000);
+        assert!(fine.len() > 990, "{}", fine.len());
+        // What was overwritten is not available again.
+        assert!(history.resolution(0.005) > 1e-6);
     }
 
     #[test]
