@@ -97,8 +97,8 @@ async fn serve_files(folder: &Path, host: IpAddr, port: u16) -> Result<(), Strin
     let limits = Limits {
         connections: possible_connections(),
         request: Duration::from_secs(30),
-        stall: Duration::from_secs(60),
-        total: Duration::from_secs(3600),
+        stall: Duration::from_mins(1),
+        total: Duration::from_hours(1),
     };
     match accept(&listener, folder, limits).await {}
 }
@@ -108,7 +108,7 @@ fn possible_connections() -> usize {
     let wanted = 2 * MAX_CONNECTIONS + REFUSALS + OTHER_FILES;
     // A system that does not tell its limit grants at least 256.
     let files = rlimit::increase_nofile_limit(wanted as u64).unwrap_or(256);
-    let free = (files as usize).min(wanted).saturating_sub(REFUSALS + OTHER_FILES);
+    let free = usize::try_from(files).unwrap_or(wanted).min(wanted).saturating_sub(REFUSALS + OTHER_FILES);
     (free / 2).max(1)
 }
 

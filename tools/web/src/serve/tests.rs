@@ -8,7 +8,7 @@ use super::*;
 
 /// Longer than any test waits for an answer.
 const PATIENT: Limits = {
-    let long = Duration::from_secs(600);
+    let long = Duration::from_mins(10);
     Limits { connections: 64, request: long, stall: long, total: long }
 };
 /// Short enough to wait for.
@@ -51,7 +51,7 @@ impl Server {
     /// A connection that has sent `text`.
     fn connect(&self, text: &str) -> TcpStream {
         let mut stream = TcpStream::connect(self.address).expect("a connection");
-        stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a limit");
+        stream.set_read_timeout(Some(Duration::from_mins(1))).expect("a limit");
         stream.write_all(text.as_bytes()).expect("a request");
         stream
     }
