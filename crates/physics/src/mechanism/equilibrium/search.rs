@@ -29,7 +29,7 @@ use crate::mechanism::{ActiveSet, Mechanism};
 const MAX_STEPS: usize = 4000;
 const MAX_EVALUATIONS: usize = 50_000;
 const MAX_WORK: usize = 3_000_000;
-/// Number of successive steps without much progress after which a search looks whether it has any way to go.
+/// Number of successive steps without much progress after which a search ends if it is close to a rest.
 const PATIENCE: usize = 10;
 /// Maximum number of corrections of a step: bodies that move along a wall leave it by the curvature of their path, and each
 /// correction takes two thirds of a penetration back.
@@ -56,6 +56,7 @@ const ROUNDING: f64 = 64.0;
 /// A search that cannot go on has found a rest if the unbalanced forces are this fraction of those that act, or if Newton's method
 /// would move by this fraction of the largest step: where balls barely touch, all forces vanish.
 const BALANCED: f64 = 1e-6;
+const CLOSELY_BALANCED: f64 = 1e-9;
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// The machine at a position.
@@ -186,7 +187,7 @@ impl<'a> Search<'a> {
                 return Ok(pose.state);
             }
             slow = if stagnates { slow + 1 } else { 0 };
-            if slow >= PATIENCE && self.hardly_moves(&pose, &linear) {
+            if slow >= PATIENCE && (over_acting <= CLOSELY_BALANCED || self.hardly_moves(&pose, &linear)) {
                 return Ok(pose.state);
             }
             last = over_noise;
