@@ -212,7 +212,7 @@ fn steps_end_at_the_kinks_of_straight_lines() {
                 crossed += u32::from(kinks.iter().any(|kink| (kink - now).abs() < 1e-9));
                 let energy = frame.kinetic + frame.potential;
                 let scale = *first.get_or_insert(energy);
-                assert!((energy / scale - 1.0).abs() < 1e-4, "{method} {mounting:?}: {energy} {scale}");
+                assert!((energy / scale - 1.0).abs() < 1e-3, "{method} {mounting:?}: {energy} {scale}");
                 before = now;
             }
             assert!(crossed >= 5, "{method} {mounting:?}: {crossed}");
