@@ -56,8 +56,9 @@ const ROUNDING: f64 = 64.0;
 /// A search that cannot go on has found a rest if the unbalanced forces are this fraction of those that act, or if Newton's method
 /// would move by this fraction of the largest step: where balls barely touch, all forces vanish.
 const BALANCED: f64 = 1e-6;
-const CLOSELY_BALANCED: f64 = 1e-9;
 const NEGLIGIBLE: f64 = 1e-9;
+/// The first of these fractions for a search that makes little progress.
+const CLOSELY_BALANCED: f64 = 1e-9;
 
 /// The machine at a position.
 pub(super) struct Pose {

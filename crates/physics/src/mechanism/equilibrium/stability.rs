@@ -9,6 +9,8 @@ const ROUNDING: f64 = 32.0;
 /// Displacement for the second derivatives along soft directions, over that for the whole matrix: their rounding errors are smaller
 /// by this factor. Bodies on a wall then leave it by less than their penetration.
 const WIDER: f64 = 100.0;
+/// Squared length of the part of a unit direction that the joints allow below which it is rounding.
+const IMMOBILE: f64 = 1e-6;
 /// Least negative stiffness that counts, over the largest stiffness.
 const LEAST: f64 = 1e-13;
 /// Ratio of successive displacements that are tried along a direction, and the longest, over the limit of a step.
@@ -42,6 +44,10 @@ impl Search<'_> {
                 direction.axpy(*part, of, 1.0);
             }
             self.project(&rest, direction.as_mut_slice());
+            // A direction in which the joints allow no motion.
+            if !(linear.metric.tr_mul(&direction).dot(&direction) > IMMOBILE) {
+                continue;
+            }
             let ways = self.ways_along(&rest, &linear, &direction);
             if !ways.is_empty() {
                 return ways;
