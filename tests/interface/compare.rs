@@ -245,7 +245,7 @@ fn assert_true_curves(run: &Player, time: f64, window: f64) {
         let name = format!("{quantity:?} to {time} s");
         let most = samples.iter().map(|(_, values)| values[index]).fold(0.0, f64::max);
         let ends = (bins.first().expect("recorded").from, bins.last().expect("recorded").to);
-        assert!(ends.0 <= from + 0.01 * window && (ends.1 - time).abs() < 1e-9, "{name}: only {ends:?}");
+        assert!(ends.0 <= from + 0.01 * window && (-1e-9..3e-6).contains(&(ends.1 - time)), "{name}: only {ends:?}");
         for bin in &bins {
             let width = bin.to - bin.from;
             assert!(width <= (window / 200.0).max(3e-6), "{name}: {bin:?}");
@@ -269,31 +269,38 @@ fn touches(run: &Player, from: f64, to: f64) -> Vec<f64> {
     [0, all.len() / 2, all.len() - 1].map(|index| all[index] + 1e-4).into()
 }
 
+/// A window on a machine that has rattled for 0.15 s.
+fn rattling() -> Harness<'static, App> {
+    let mut harness = plain("spcmm", &[], [1280.0, 800.0], Theme::Dark);
+    harness.state_mut().run_to(0.15);
+    harness.run_steps(2);
+    harness
+}
+
 #[test]
 fn a_slow_replay_shows_the_true_values_of_both_runs() {
     // A time scale at which the plots show half a millisecond.
     const SCALE: f64 = 1e-4;
-    let mut harness = window();
-    harness.state_mut().run_to(0.3);
+    let mut harness = rattling();
     set(&mut harness, "Clearance", 0.9);
     harness.state_mut().reset();
     harness.run_steps(3);
     harness.state_mut().player_mut().pacer.set_scale(SCALE);
     let window = harness.state().player().automatic_window();
-    let wanted = touches(harness.state().comparison().kept()[0].run(), 0.02, 0.3);
+    let wanted = touches(harness.state().comparison().kept()[0].run(), 0.02, 0.12);
     for start in wanted {
         for time in [start, start + 2e-5, start + 0.3 * window] {
             harness.state_mut().player_mut().run_to(time);
             harness.run_steps(5);
             let app = harness.state();
             let kept = app.comparison().kept()[0].run();
-            assert_eq!((kept.reached(), kept.pacer.shown()), (0.3, time));
+            assert_eq!((kept.reached(), kept.pacer.shown()), (0.15, time));
             assert_true_curves(kept, time, window);
             assert_true_curves(app.player(), time, window);
         }
     }
     // Backwards, out of a long replay.
-    let back = touches(harness.state().player(), 0.02, 0.2);
+    let back = touches(harness.state().player(), 0.02, 0.1);
     for time in back.into_iter().rev() {
         harness.state_mut().player_mut().go_to(time);
         harness.run_steps(5);
@@ -305,11 +312,10 @@ fn a_slow_replay_shows_the_true_values_of_both_runs() {
 
 #[test]
 fn a_change_in_the_past_leaves_a_fine_record_of_what_led_to_it() {
-    let mut harness = window();
-    harness.state_mut().run_to(0.3);
+    let mut harness = rattling();
     harness.state_mut().player_mut().pacer.set_scale(1e-4);
     let window = harness.state().player().automatic_window();
-    let time = touches(harness.state().player(), 0.02, 0.2)[1];
+    let time = touches(harness.state().player(), 0.02, 0.12)[1];
     harness.state_mut().player_mut().go_to(time);
     harness.run_steps(3);
     set(&mut harness, "Friction coefficient", 0.4);
