@@ -5,7 +5,7 @@
 
 use crate::analysis::section::Schedule;
 use crate::machine::Vec3;
-use crate::scene::{LiveScene, SOLVER_KEYS, Scene, SetError, Value};
+use crate::scene::{LiveScene, SOLVER_KEYS, SetError, Value};
 use crate::simulate::{Effect, MAX_RUN_DURATION, Pull};
 
 /// Largest stiffness, N/m, and damping, N s/m, of a logged pull.

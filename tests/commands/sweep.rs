@@ -333,7 +333,7 @@ fn a_point_without_a_rest_is_a_row_that_says_so() {
     let scene = "start = \"equilibrium\"\n[gravity]\nz = \"-9.81 m/s^2\"\n[[parameter]]\nname = \"k\"\nvalue = \"100 N/m\"\n\
                  [[body]]\nname = \"m\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
                  [[joint]]\nname = \"g\"\nkind = \"prismatic\"\nchild = \"m\"\naxis = [0, 0, 1]\n\
-                 [[joint_spring]]\nname = \"s\"\njoint = \"g\"\nstiffness = \"k\"\n";
+                 [[joint_spring]]\nname = \"s\"\njoint = \"g\"\nstiffness = \"k\"\ndamping = \"1 N s/m\"\n";
     fs::write(folder.path().join("m.toml"), scene).unwrap();
     let line = "sweep ./m.toml --vary parameter.k=0N/m..200N/m:3 --duration 10ms --keep m.pose.z:end --out a.npz";
     jointplay(folder.path(), line).expect(0);

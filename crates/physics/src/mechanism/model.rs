@@ -536,10 +536,10 @@ impl Model {
         reaches
     }
 
-    /// Scale of an angle that moves points at `reach` (m), rad: they move by the length scale, and by a tenth of the reach at
-    /// most.
+    /// Scale of an angle that moves points at `reach` (m), rad: they move by twice the length scale, and by a tenth of the reach
+    /// at most.
     fn angle_scale(&self, reach: f64) -> f64 {
-        MAX_ANGLE.min(self.length_scale / reach)
+        MAX_ANGLE.min(2.0 * self.length_scale / reach)
     }
 
     /// Scale of speeds, m/s.

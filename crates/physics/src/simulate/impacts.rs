@@ -9,6 +9,8 @@ use crate::contact::{Coefficients, undisturbed_restitution};
 const STORED_IMPACTS: usize = 64;
 /// Work of other forces during an impact, relative to its energy, beyond which its law alone does not determine its restitution.
 const MAX_EXTERNAL_WORK: f64 = 0.01;
+/// The same beyond which its law does not determine its rebound.
+const MAX_WORK_IN_REBOUND: f64 = 0.5;
 
 /// A finished impact of one ball joint, from the start of an approaching contact to its end. A contact that existed at the
 /// start, or that a live change ended, does not count.
@@ -60,8 +62,12 @@ impl Impact {
 
     /// Whether other forces, such as weight and drives, do enough work during it to change its restitution.
     pub fn is_soft(&self) -> bool {
-        let kinetic = self.approach_speed * self.approach_speed;
-        !(2.0 * self.push.abs() * self.deepest <= MAX_EXTERNAL_WORK * kinetic)
+        !(self.external_work() <= MAX_EXTERNAL_WORK)
+    }
+
+    /// Work of other forces while it is compressed, relative to its energy.
+    fn external_work(&self) -> f64 {
+        2.0 * self.push.abs() * self.deepest / (self.approach_speed * self.approach_speed)
     }
 
     /// Whether its restitution can be compared with its law's prediction: it was neither disturbed nor slow nor soft.
@@ -157,10 +163,12 @@ impl Impacts {
         }
     }
 
-    /// Approach speed of the undisturbed impact of `joint` under way, and the speed with which its law lets it separate, m/s. Below
-    /// `floor` (m/s) the damping is less by the ratio of the speeds, and so is the loss, to first order.
+    /// Approach speed of the impact of `joint` under way, and the speed with which its law lets it separate, m/s, if neither other
+    /// contacts nor other forces determine its course. Below `floor` (m/s) the damping is less by the ratio of the speeds, and so
+    /// is the loss, to first order.
     pub(super) fn speeds_under_way(&self, joint: usize, floor: f64) -> Option<[f64; 2]> {
-        let impact = self.under_way[joint].as_ref().filter(|impact| !impact.disturbed)?;
+        let is_own = |impact: &&Impact| !impact.disturbed && impact.external_work() < MAX_WORK_IN_REBOUND;
+        let impact = self.under_way[joint].as_ref().filter(is_own)?;
         let (speed, law) = (impact.approach_speed, impact.law);
         Some([speed, speed * (1.0 - (1.0 - law) * (speed / floor).min(1.0))])
     }
