@@ -86,7 +86,8 @@ fn slopes_of_the_error_equal_the_orders() {
     };
     // At these steps the next term of the error changes the slope by a few hundredths.
     order("semi-implicit-euler", [160, 320, 640, 1280], 1.0, 0.05);
-    order("discrete-gradient", [160, 320, 640, 1280], 2.0, 0.1);
+    // At 160 steps the ends are so far from the guesses that the steps are repeated, which makes them more accurate.
+    order("discrete-gradient", [320, 640, 1280, 2560], 2.0, 0.1);
     order("rk4", [40, 80, 160, 320], 4.0, 0.2);
     order("dopri5", [40, 80, 160, 320], 5.0, 0.3);
 }
