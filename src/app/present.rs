@@ -58,7 +58,7 @@ pub(super) fn legible_zoom(height: f32) -> f32 {
 }
 
 impl App {
-    /// Begins or ends the presentation. [`Self::follow_screen`] sizes the type once a frame: a zoom takes effect a pass later, so two
+    /// Begins or ends the presentation. `follow_screen` sizes the type once a frame: a zoom takes effect a pass later, so two
     /// changes within a frame would not see each other.
     pub fn present(&mut self, ctx: &egui::Context, on: bool) {
         if on == self.presentation.is_some() {
