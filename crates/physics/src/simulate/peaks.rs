@@ -20,6 +20,10 @@ impl Approach {
     }
 }
 
+/// Shortest interval between two instants over the next or the one before, for a parabola through the three: rounding errors of the
+/// values decide the slope over a shorter one, such as a step between two events.
+const MIN_PART: f64 = 1e-4;
+
 /// A quantity at the latest two instants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Recent {
@@ -42,6 +46,9 @@ impl Recent {
             return value;
         }
         let (a, b) = (t1 - t0, time - t1);
+        if a.min(b) < MIN_PART * a.max(b) {
+            return f1;
+        }
         let (left, right) = ((f1 - f0) / a, (value - f1) / b);
         let curvature = (right - left) / (a + b);
         if curvature >= 0.0 {
@@ -209,6 +216,14 @@ mod tests {
         let mut recent = Recent::default();
         let peak = [0.1, 0.35, 0.7].map(|t| recent.push_and_find_peak(t, f(t)))[2];
         assert!((peak - 7.0).abs() < 1e-14, "{peak}");
+    }
+
+    #[test]
+    fn instants_in_quick_succession_make_no_peak_of_rounding_errors() {
+        let mut recent = Recent::default();
+        let values = [(1.0, 7.0 - 1e-14), (1.0 + 1e-15, 7.0), (1.0 + 1e-3, 6.9)];
+        let peak = values.map(|(t, value)| recent.push_and_find_peak(t, value))[2];
+        assert_eq!(peak, 7.0);
     }
 
     #[test]
