@@ -43,7 +43,7 @@ fn impact_errors(scene: &str, impacts: &[ImpactRow], reference: &[ImpactRow]) ->
 #[test]
 fn impacts_are_resolved_at_a_loose_tolerance() {
     let cases =
-        [("chain", 25e-3, 2e-6), ("four-bar", 20e-3, 2e-6), ("pendulum", 60e-3, 1.2e-5), ("slider-crank", 60e-3, 4e-5)];
+        [("chain", 25e-3, 2e-6), ("four-bar", 20e-3, 2e-6), ("pendulum", 60e-3, 1.2e-5), ("slider-crank", 60e-3, 3e-5)];
     for (scene, end, limit) in cases {
         let (reference, _) = run(scene, &[], "dopri5", ("solver.tolerance", "1e-9"), end);
         let (impacts, _) = run(scene, &[], "automatic", ("solver.tolerance", "1e-3"), end);
@@ -87,7 +87,7 @@ fn a_long_chain_at_rest_in_its_sockets_is_stepped_implicitly() {
     };
     let (reference, explicit) = run("dopri5", "1e-7");
     // The instant at which the implicit scheme is first tried varies irregularly with the tolerance.
-    for (tolerance, limit) in [("2e-5", 1500), ("1e-5", 4500), ("5e-6", 1500)] {
+    for (tolerance, limit) in [("2e-5", 1000), ("1e-5", 4500), ("5e-6", 1500)] {
         let (forces, evaluations) = run("automatic", tolerance);
         for (j, (force, peak)) in forces.iter().zip(&reference).enumerate() {
             let error = (force / peak - 1.0).abs();

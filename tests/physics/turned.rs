@@ -50,7 +50,7 @@ fn assert_same_motion(name: &str, [plain, transformed]: [Scene; 2], time: f64) {
     }
     for j in 0..a.joints.len() {
         let [a, b] = both.each_ref().map(|simulation| simulation.peak(j).0);
-        assert!((a / b - 1.0).abs() < 1e-8 || a == b, "{name}, joint {j}: {a} {b}");
+        assert!((a / b - 1.0).abs() < 3e-9 || a == b, "{name}, joint {j}: {a} {b}");
     }
 }
 

@@ -104,7 +104,7 @@ fn settled_creep_has_the_exponent_of_an_overdamped_pendulum() {
 /// Without friction nothing damps the swinging of the balls in their sockets.
 #[test]
 fn a_frictionless_mechanism_is_chaotic() {
-    let result = point("spcmm", &[("contact.friction", "0"), ("spcmm.frequency", "2 Hz")], 24, 4);
+    let result = point("spcmm", &[("contact.friction", "0"), ("spcmm.frequency", "2 Hz")], 12, 2);
     let exponent = result.evidence.exponent.as_ref().unwrap();
     assert_eq!(result.regime, Regime::Chaotic);
     assert!(exponent.value > 1.0, "{}", exponent.value);

@@ -155,7 +155,7 @@ fn a_cell_lies_where_the_ball_touches() {
             let difference: f64 = (0..expected.len()).map(|i| (impulse(i) - expected[i]).abs()).sum();
             println!("{name}, joint {j}: {difference:e} of {total:e}");
             // The reference assigns a whole step at the edge of two cells to one of them.
-            assert!(total > 0.0 && difference < 0.1 * total, "{name}, joint {j}: {difference} of {total}");
+            assert!(total > 0.0 && difference < 0.05 * total, "{name}, joint {j}: {difference} of {total}");
         }
     }
 }
