@@ -6,6 +6,7 @@ mod check;
 #[cfg(feature = "gui")]
 mod drivers;
 mod failure;
+mod gone;
 mod impacts;
 mod import;
 mod interrupt;
@@ -58,7 +59,12 @@ const MAX_TABLE_SIZE: u64 = 64 << 20;
 /// Runs the command line; returns the exit code.
 pub fn main() -> u8 {
     interrupt::begin();
-    let arguments = match Arguments::try_parse() {
+    let given: Vec<_> = std::env::args_os().collect();
+    if let Some(answer) = gone::answer(given.get(1..).unwrap_or_default()) {
+        complain(&format!("error: {answer}"));
+        return Failure::USAGE;
+    }
+    let arguments = match Arguments::try_parse_from(given) {
         Ok(arguments) => arguments,
         Err(error) if error.use_stderr() => {
             // The message quotes user input, so it is printed with control characters visible.
