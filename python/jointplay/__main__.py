@@ -21,7 +21,9 @@ class CommandModule(Protocol):
         """Runs the command."""
 
 
-COMMANDS: dict[str, tuple[str, str]] = {}
+COMMANDS: dict[str, tuple[str, str]] = {
+    "paper": ("_paper", "Section 4 of the paper: every figure, number and statement beside what is computed here, on one page."),
+}
 """Module within the package, and one line of help, of each command."""
 
 OF_PROGRAM = ("view", "scenes", "lessons", "check", "run", "render", "tradeoff", "sweep", "map", "parameters", "reference", "schema")
