@@ -6,8 +6,7 @@ use plotters::style::text_anchor::{HPos, VPos};
 use super::ink::{Canvas, FAINT, FINE, INK, Plot, SheetError, TEXT, failed, fine, rgb, style, write};
 use super::labels::{Area, place_labels};
 use super::ticks::Ruler;
-use super::{Chart, Colour, LINE, Marker, Series};
-use super::{heat, thin};
+use super::{Chart, Colour, LINE, Marker, Series, thin};
 use crate::scene::visible;
 
 /// Several charts on one page with a common legend.
@@ -166,26 +165,16 @@ fn stroke(colour: Colour, width: f64) -> ShapeStyle {
 }
 
 fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetError> {
-    let ends = chart.map.as_ref().map(heat::ends).unwrap_or_default();
-    let points = || {
-        let series = chart.series.iter();
-        series.flat_map(|series| series.points.iter()).chain(&ends)
-    };
-    let mut x = Ruler::new(&chart.x, points().map(|p| p.0));
+    let points = || chart.series.iter().flat_map(|series| series.points.iter());
+    let x = Ruler::new(&chart.x, points().map(|p| p.0));
     let levels = chart.levels.iter().map(|level| level.y);
-    let mut y = Ruler::new(&chart.y, points().map(|p| p.1).chain(levels));
-    if let (Some(_), [low, high]) = (&chart.map, &ends[..]) {
-        // Cells fill the chart.
-        x.narrow(low.0, high.0);
-        y.narrow(low.1, high.1);
-    }
-    let beside = if chart.map.is_some() { heat::SCALE_WIDTH } else { 0.0 };
+    let y = Ruler::new(&chart.y, points().map(|p| p.1).chain(levels));
     // Room for the longest tick label on the left.
     let longest = y.ticks.iter().map(|&tick| text_width(&y.label(tick), TEXT)).fold(0.0, f64::max);
     let heading = style(HEADING, INK, HPos::Left, VPos::Top);
     let mut plot: Plot = ChartBuilder::on(area)
         .margin_top(fine(6.0))
-        .margin_right(fine(18.0 + beside))
+        .margin_right(fine(18.0))
         .margin_left(fine(8.0))
         .margin_bottom(fine(6.0))
         .set_label_area_size(LabelAreaPosition::Left, fine(longest + 34.0))
@@ -212,12 +201,6 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
         is_inside.then_some(position)
     };
     let mut occupied: Vec<Area> = Vec::new();
-    if let Some(map) = &chart.map {
-        heat::cells(root, &plot, map, &x, &y)?;
-        let (xs, ys) = plot.plotting_area().get_pixel_range();
-        let pixels = |at: i32| f64::from(at) / f64::from(FINE);
-        heat::scale(root, map, pixels(xs.end) + 14.0, pixels(ys.start) + 16.0, pixels(ys.end))?;
-    }
     draw_levels(root, &plot, chart, &x, &y, &mut occupied)?;
     for series in &chart.series {
         if let Some(width) = series.line {
@@ -236,12 +219,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
         }
     }
     for series in &chart.series {
-        let all = series.points.iter().filter_map(inside);
-        let mut all: Vec<_> = all.map(|position| plot.backend_coord(&position)).collect();
-        if series.line.is_none() {
-            all = thin::cloud(all.into_iter(), fine(1.0));
-        }
-        for at in all {
+        for at in series.points.iter().filter_map(inside).map(|position| plot.backend_coord(&position)) {
             if let Some(marker) = series.marker {
                 draw_marker(root, at, marker, series.colour)?;
             }
@@ -380,8 +358,6 @@ fn draw_marker(root: &Canvas, (x, y): (i32, i32), marker: Marker, colour: Colour
     };
     match marker {
         Marker::Disc => root.draw(&Circle::new((x, y), r, filled)),
-        Marker::Dot => root.draw(&Circle::new((x, y), fine(1.25), filled)),
-        Marker::Point => root.draw(&Circle::new((x, y), fine(2.5), filled)),
         Marker::Ring => root.draw(&Circle::new((x, y), fine(MARKER + 3.0), stroke(colour, LINE))),
         Marker::Square => {
             let s = fine(0.88 * MARKER);

@@ -3,7 +3,6 @@
 //! This module knows nothing of mechanisms and needs no display.
 
 mod draw;
-mod heat;
 mod ink;
 mod labels;
 mod pdf;
@@ -86,10 +85,6 @@ pub enum Marker {
     Plus,
     /// Ring around other markers, to single them out.
     Ring,
-    /// Small disc.
-    Point,
-    /// Smallest dot, for clouds of many points.
-    Dot,
 }
 
 /// Width of a line, pixels.
@@ -150,21 +145,6 @@ pub struct Level {
     pub text: String,
 }
 
-/// A field of cells coloured by value.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Map {
-    /// Centres of the cells along the horizontal axis, ascending.
-    pub xs: Vec<f64>,
-    /// Centres of the cells along the vertical axis, ascending.
-    pub ys: Vec<f64>,
-    /// Values row by row, from the lowest row; those not finite are grey.
-    pub values: Vec<f64>,
-    /// Scale and unit of the values.
-    pub scale: Axis,
-    /// For categories: the value and name of each. Empty for quantities.
-    pub names: Vec<(f64, String)>,
-}
-
 /// One pair of axes with its contents.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
@@ -180,8 +160,6 @@ pub struct Chart {
     pub labels: Vec<Label>,
     /// Horizontal lines.
     pub levels: Vec<Level>,
-    /// Cells below everything else.
-    pub map: Option<Map>,
 }
 
 impl Chart {

@@ -1,6 +1,4 @@
-//! Drops invisible points of lines and clouds, so that pictures stay small for any number of points.
-
-use std::collections::HashSet;
+//! Drops invisible points of lines, so that pictures stay small for any number of points.
 
 type Point = (i32, i32);
 
@@ -38,12 +36,6 @@ fn distance(p: Point, a: Point, b: Point) -> f64 {
     (px - theta * bx).hypot(py - theta * by)
 }
 
-/// One point per cell of `cell` units: the first in it.
-pub(super) fn cloud(points: impl Iterator<Item = Point>, cell: i32) -> Vec<Point> {
-    let mut seen = HashSet::new();
-    points.filter(|p| seen.insert((p.0.div_euclid(cell), p.1.div_euclid(cell)))).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -68,11 +60,5 @@ mod tests {
         }
         // A closed curve begins where it ends.
         assert_eq!(line(&[(0, 0), (9, 0), (9, 9), (0, 0)], 0.5).len(), 4);
-    }
-
-    #[test]
-    fn a_cloud_has_one_point_in_each_cell() {
-        let points = (0..1000).map(|k| (k % 7, -(k % 3)));
-        assert_eq!(cloud(points, 4).len(), 4);
     }
 }

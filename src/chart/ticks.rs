@@ -85,14 +85,6 @@ impl Ruler {
         ruler
     }
 
-    /// Sets the ends to these values.
-    pub(super) fn narrow(&mut self, from: f64, to: f64) {
-        (self.from, self.to) = (self.position(from), self.position(to));
-        let inside = |tick: &f64| (self.from..=self.to).contains(tick);
-        self.ticks.retain(inside);
-        self.minor.retain(inside);
-    }
-
     /// Position of `value`; not finite where the axis has none.
     pub(super) fn position(&self, value: f64) -> f64 {
         position(self.scale, value)

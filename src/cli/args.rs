@@ -60,8 +60,6 @@ pub enum Command {
     /// Print a robot description, URDF or MJCF, as a scene file: bodies, inertias, hinges, slides, ball joints, shapes and meshes. Omitted
     /// parts are listed on standard error and at the head of the scene.
     Import(ImportArguments),
-    /// Compute everything in the paper's section 4 and compare it with the paper: data, plots and one page.
-    Reproduce(ReproduceArguments),
     /// Compute the validation cases and print the results beside the known values: `docs/validation.md` (Markdown).
     Validate(ValidateArguments),
     /// Print the reference page of all parameters (Markdown).
@@ -452,26 +450,6 @@ pub struct TradeoffArguments {
     #[arg(long)]
     pub force: bool,
     /// No progress and no warnings.
-    #[arg(long)]
-    pub quiet: bool,
-}
-
-/// `reproduce`.
-#[derive(Debug, Args)]
-pub struct ReproduceArguments {
-    /// Folder to write: `index.html`, `data/` and `plots/`; finished blocks are stored in `FOLDER.partial` until then.
-    #[arg(long, value_name = "FOLDER")]
-    pub out: PathBuf,
-    /// Few points and few periods: about a minute instead of half an hour on two cores.
-    #[arg(long)]
-    pub quick: bool,
-    /// Threads to use [default: one for each core]; the files do not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
-    /// Replace a folder of earlier results.
-    #[arg(long)]
-    pub force: bool,
-    /// No progress.
     #[arg(long)]
     pub quiet: bool,
 }

@@ -3,7 +3,7 @@
 use std::ffi::{OsStr, OsString};
 
 /// A command that the Python package took over, as the package names it.
-const IN_PACKAGE: [(&str, &str); 0] = [];
+const IN_PACKAGE: [(&str, &str); 1] = [("reproduce", "paper")];
 
 /// Other commands and options, each with the command that has it, and what to do in place of it.
 const GONE: [(&str, &str, &str); 0] = [];

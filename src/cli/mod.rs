@@ -25,7 +25,6 @@ mod quantity;
 pub mod reference;
 #[cfg(feature = "gui")]
 mod render;
-pub mod reproduce;
 mod run;
 pub mod schema;
 mod sensitivity;
@@ -117,7 +116,6 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Sensitivity(arguments)) => sensitivity::sensitivity(&arguments),
         Some(Command::Tolerance(arguments)) => tolerance::tolerance(&arguments),
         Some(Command::Import(arguments)) => import::import(&arguments),
-        Some(Command::Reproduce(arguments)) => reproduce::reproduce(&arguments),
         Some(Command::Validate(arguments)) => validate::validate(&arguments),
         Some(Command::Parameters) => print(&reference_page()),
         Some(Command::Reference) => print(&reference::page()),

@@ -1,4 +1,4 @@
-//! Independent jobs on several threads, for sweeps and for the paper's runs.
+//! Independent jobs on several threads, for sweeps.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::{sync::mpsc, thread};

@@ -13,7 +13,7 @@ pub use folder::{Folder, MANIFEST};
 pub use output::{Content, OutputFile, PendingFile, open_or_create, publish, spare_older};
 pub use same::same_file;
 // The rest of the program changes nothing on the disk except through this module.
-pub use std::fs::{create_dir_all, remove_dir, remove_file};
+pub use std::fs::{create_dir_all, remove_file};
 
 use std::io;
 use std::path::{Path, PathBuf};

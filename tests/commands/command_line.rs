@@ -966,7 +966,7 @@ mod frames {
         for (what, out) in [("--at 0s,1ms,2ms", "--out out"), ("--duration 2ms --fps 1000", "--film out.mp4")] {
             jointplay(folder.path(), &format!("render spcmm {what} --size 64x64 --quiet {out}")).expect(0);
             let name = out.split(' ').nth(1).unwrap();
-            let files = || crate::reproduce::files(folder.path());
+            let files = || crate::program::files(folder.path());
             let old = files();
             let what = what.replace("2ms", "10s").replace("1000", "10");
             let stopped = jointplay(folder.path(), &format!("{unstable} {what} {out}")).expect(4);
@@ -984,16 +984,16 @@ mod frames {
         let folder = folder();
         let render = "render pendulum --size 64x64 --arrows none --force --quiet --out out";
         jointplay(folder.path(), &format!("{render} --at 0s,1ms,2ms")).expect(0);
-        let old = crate::reproduce::files(folder.path());
+        let old = crate::program::files(folder.path());
         let child = start_and_listen(&mut command(folder.path(), &format!("{render} --at 0s,1000000s")));
         // The first frame is in the temporary folder.
-        poll_until(|| crate::reproduce::files(folder.path()).len() > old.len());
+        poll_until(|| crate::program::files(folder.path()).len() > old.len());
         signal(&child, "-INT");
         let output = child.wait_with_output().unwrap();
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(130), "{stderr}");
         assert!(stderr.contains("the incomplete one is in incomplete-out"), "{stderr}");
-        let now = crate::reproduce::files(folder.path());
+        let now = crate::program::files(folder.path());
         assert!(old.iter().all(|(name, content)| now[name] == *content), "the older result stays");
         assert_eq!(names(&folder.path().join("incomplete-out")), ["frame_00000.png", "manifest.json"]);
     }

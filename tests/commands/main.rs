@@ -15,7 +15,6 @@ mod links;
 mod map;
 mod peaks;
 mod program;
-mod reproduce;
 mod sensitivity;
 mod states;
 mod survival;

@@ -9,8 +9,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value as Json;
 
-use crate::program::{command, folder, jointplay, names};
-use crate::reproduce::files as tree;
+use crate::program::{command, files as tree, folder, jointplay, names};
 
 /// Contents of files by name.
 type Tree = BTreeMap<String, Vec<u8>>;

@@ -32,6 +32,7 @@ mod machines;
 mod many_joints;
 mod massless;
 mod order;
+mod paper;
 mod pays_only;
 mod planar_loops;
 mod presets;

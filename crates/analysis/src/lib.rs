@@ -7,8 +7,7 @@
 //!   [`regime`].
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`],
 //!   [`model_costs`].
-//! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and
-//!   validation cases with known answers ([`validation`]).
+//! - Validation cases with known answers ([`validation`]).
 //! - The tip's error over the workspace, with the drives held ([`map`]).
 //! - Uncertain parameters of a scene ([`study`]). Independent of any scene: [`sampling`], [`distribution`] and ISO fits
 //!   ([`iso286`]); ranking of inputs ([`morris`], [`indices`]); percentiles, yield and rejects ([`yields`]); the cheapest fits
@@ -66,7 +65,6 @@ pub mod morris;
 mod normal;
 pub mod one_at_a_time_task;
 pub mod orbit;
-pub mod paper;
 mod pareto_front;
 pub mod point;
 mod points;
@@ -75,8 +73,6 @@ mod random;
 pub mod ready_sweeps;
 mod reference_solution;
 pub mod regime;
-pub mod reproduction;
-pub mod response;
 pub mod row_times;
 mod run_context;
 pub mod sampling;

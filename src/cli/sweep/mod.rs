@@ -10,7 +10,7 @@ mod request;
 mod target;
 mod word;
 
-pub(super) use archive::{Archive, Source};
+pub(super) use archive::Source;
 pub use merge::merge;
 pub(super) use partial::Partial;
 pub(super) use word::Word;
@@ -21,7 +21,7 @@ use std::time::Instant;
 use indicatif::ProgressBar;
 use serde_json::{Map, Value as Json, json};
 
-use self::archive::{ZIPPED, unit_suffix};
+use self::archive::{Archive, ZIPPED, unit_suffix};
 use self::options::Shard;
 use self::target::Target;
 use super::args::{SummaryForm, SweepArguments};

@@ -6,7 +6,6 @@
 //! A block is appended by one write; if that is cut short, only this block is lost. Any other inconsistency rejects the whole
 //! file, because a partly read result would look complete.
 
-use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -91,26 +90,6 @@ impl Partial {
     /// Whether block `b` is done.
     pub fn has(&self, b: usize) -> bool {
         self.done[b]
-    }
-
-    /// Whether any block is done.
-    pub fn has_finished_blocks(&self) -> bool {
-        self.done.contains(&true)
-    }
-
-    /// Records of every finished block, by block number.
-    ///
-    /// # Errors
-    /// Input/output.
-    pub fn blocks(&self) -> Result<BTreeMap<usize, Vec<f64>>, Failure> {
-        let mut reader = self.reader()?;
-        let mut all = BTreeMap::new();
-        for _ in 0..self.done.iter().filter(|done| **done).count() {
-            let mut records = Vec::new();
-            let b = self.read_block(&mut reader, &mut records)?;
-            all.insert(b, records);
-        }
-        Ok(all)
     }
 
     /// Reader positioned at the first block.
