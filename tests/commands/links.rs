@@ -52,6 +52,7 @@ fn run_replays_a_link_to_the_same_bits_and_reports_differences() {
     for (line, words) in [
         ("run --link ?scene=pendulum", "no instant"),
         ("run --link ?scene=pendulun --duration 1ms", "did you mean `pendulum`"),
+        ("run --link ?scene=spcmm&contact.friction_velocity=printed --duration 1ms", "is gone: use centres"),
         ("run pendulum --link ?c=1mm --duration 1ms", "cannot be used with"),
     ] {
         let outcome = run(line).expect(2);

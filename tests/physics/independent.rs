@@ -106,29 +106,22 @@ fn the_pendulum_agrees_with_other_equations_and_another_solver() {
 }
 
 #[test]
-fn the_measuring_mechanism_agrees_with_other_equations_for_either_friction_velocity() {
+fn the_measuring_mechanism_agrees_with_other_equations() {
     let end = 0.025;
-    let mut ends = Vec::new();
-    for word in ["centres", "printed"] {
-        let changes =
-            [("contact.clearance", "0.5 mm"), ("contact.friction", "0.2"), ("contact.friction_velocity", word)];
-        let stored_run = stored_run("spcmm", &changes, "again", "Tsitouras", end);
-        let method = [("solver.method", "dopri5"), TIGHT];
-        let (mut simulation, contacts) = own_run("spcmm", &[&changes[..], &method].concat(), end);
-        assert_same_contacts(word, &contacts, &stored_run.contacts);
-        assert!(contacts.len() >= 6, "only {} contacts", contacts.len());
-        // The quantities of a Poincaré section.
-        let pose = frame_now(&mut simulation).pose;
-        let [x, _, _, w, i, j, k] = stored_run.state[..7] else { panic!() };
-        let axes = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k)).to_rotation_matrix();
-        let beta = -axes[(0, 1)].asin();
-        let errors = [pose.position.x - x, pose.angles.y - beta];
-        println!("{word}: x {x} m, beta {beta} rad, off by {errors:?}");
-        assert!(errors.iter().all(|error| error.abs() < 1e-9), "{word}: {errors:?}");
-        ends.push(x);
-    }
-    // Otherwise the comparison would not distinguish the two.
-    assert!((ends[0] - ends[1]).abs() > 1e-7, "{ends:?}");
+    let changes = [("contact.clearance", "0.5 mm"), ("contact.friction", "0.2")];
+    let stored_run = stored_run("spcmm", &changes, "again", "Tsitouras", end);
+    let method = [("solver.method", "dopri5"), TIGHT];
+    let (mut simulation, contacts) = own_run("spcmm", &[&changes[..], &method].concat(), end);
+    assert_same_contacts("spcmm", &contacts, &stored_run.contacts);
+    assert!(contacts.len() >= 6, "only {} contacts", contacts.len());
+    // The quantities of a Poincaré section.
+    let pose = frame_now(&mut simulation).pose;
+    let [x, _, _, w, i, j, k] = stored_run.state[..7] else { panic!() };
+    let axes = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k)).to_rotation_matrix();
+    let beta = -axes[(0, 1)].asin();
+    let errors = [pose.position.x - x, pose.angles.y - beta];
+    println!("x {x} m, beta {beta} rad, off by {errors:?}");
+    assert!(errors.iter().all(|error| error.abs() < 1e-9), "{errors:?}");
 }
 
 #[test]

@@ -127,13 +127,20 @@ pub enum ValueFault {
         /// The nearest choice, if one is near.
         nearest: Option<&'static str>,
     },
+    /// A choice of earlier versions; the text says what took its place.
+    #[error("{0}")]
+    Gone(&'static str),
     /// A value of the wrong type, such as a number for a choice.
     #[error("is of the wrong kind")]
     WrongKind,
 }
 
-/// Words of older files, and those to use in their place.
-const REPLACED: [(&str, &str); 2] = [("imex-euler", "discrete-gradient"), ("rosenbrock", "radau5")];
+/// Values that files and links of earlier versions may have: key, value, and what took its place.
+const GONE: [(&str, &str, &str); 1] = [(
+    "contact.friction_velocity",
+    "printed",
+    "is gone: use centres, the velocity of the paper's friction law (15), (16); what printed gave is in docs/tried.md",
+)];
 
 impl Parameter {
     /// Unit in which values are shown; "" for pure numbers, counts and choices.
@@ -219,10 +226,12 @@ impl Parameter {
                 let found =
                     words.iter().find(|choice| **choice == word || choice.strip_prefix('+') == Some(word.as_str()));
                 let Some(choice) = found else {
-                    let replaced = REPLACED.iter().find(|(old, new)| *old == word && words.contains(new));
-                    let near = || nearest_name(text, words.iter().copied());
-                    let nearest = replaced.map(|(_, new)| *new).or_else(near);
-                    return Err(self.refuse(ValueFault::NoChoice { nearest }));
+                    let gone = GONE.iter().find(|(key, value, _)| (*key, *value) == (self.key, &*word));
+                    let nearest = || nearest_name(text, words.iter().copied());
+                    return Err(self.refuse(match gone {
+                        Some((_, _, now)) => ValueFault::Gone(now),
+                        None => ValueFault::NoChoice { nearest: nearest() },
+                    }));
                 };
                 Value::Choice(choice)
             }

@@ -146,10 +146,8 @@ static TABLE: [Parameter; 25] = [
         Value::Choice(DEFAULT.friction_velocity.word()),
         "Sliding velocity of the friction law. centres, the paper's choice, is the relative velocity of the two \
          centres, which neglects the rotation of the ball. surface is the relative velocity of the two material \
-         points in contact. printed uses the points of (13) as printed, which do not rotate with their bodies: (1 - \
-         c/e) times centres, almost 0 when the clearance is large compared with the penetration. It is meant for \
-         comparison with the paper.",
-        "Paper eqs. (15), (16) for centres; (13), (14) with the bodies' rotation for surface; (13) alone for printed",
+         points in contact.",
+        "Paper eqs. (15), (16) for centres; (13), (14) with the bodies' rotation for surface",
     ),
     contact(
         "contact.slip_speed_low",

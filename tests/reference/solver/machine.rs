@@ -13,8 +13,6 @@ use crate::integrate::Equations;
 pub struct Machine {
     clearance: f64,
     friction: f64,
-    /// Whether friction uses the velocities of (13) as printed, not (15)-(16).
-    printed: bool,
     start: Vec<f64>,
     approach: RefCell<Vec<Option<f64>>>,
 }
@@ -50,7 +48,7 @@ impl Machine {
     const RADIUS: f64 = 0.010;
 
     /// Starts in the program's initial state of `scene`.
-    pub fn new(clearance: f64, friction: f64, printed: bool, scene: &Scene) -> Self {
+    pub fn new(clearance: f64, friction: f64, scene: &Scene) -> Self {
         let mut frame = Frame::default();
         Simulation::new(&scene.machine).unwrap().sample(0.0, &mut frame);
         let mut start = Vec::new();
@@ -63,7 +61,7 @@ impl Machine {
             start.extend(body.velocity.iter());
             start.extend(body.angular_velocity.iter());
         }
-        Self { clearance, friction, printed, start, approach: RefCell::new(vec![None; 3]) }
+        Self { clearance, friction, start, approach: RefCell::new(vec![None; 3]) }
     }
 
     fn bodies(y: &[f64]) -> Vec<BodyState> {
@@ -137,12 +135,7 @@ impl Machine {
             };
             let damping = 1.0 + 0.75 * (1.0 - restitution * restitution) * rate / approach_speed;
             contact.normal = (k * depth.powf(1.5) * damping).max(0.0);
-            let mut slip = relative_velocity - n * rate;
-            if self.printed {
-                // Z_j + r n against Z_i + R n, with dn/dt.
-                let normal_rate = (relative_velocity - n * rate) / size;
-                slip += normal_rate * Self::RADIUS - normal_rate * socket;
-            }
+            let slip = relative_velocity - n * rate;
             let speed = slip.norm();
             let (low, high) = (1e-6, 1e-4);
             let correction = ((speed - low) / (high - low)).clamp(0.0, 1.0);

@@ -5,7 +5,7 @@
 //! whatever the step, and a contact that begins or ends within the step is in U (Gonzalez 1996; McLachlan, Quispel & Robidoux
 //! 1999).
 
-use super::{Coefficients, FrictionBranch, FrictionVelocity, Mat3, Vec3};
+use super::{Coefficients, FrictionBranch, Mat3, Vec3};
 
 /// Change of penetration, relative to the larger one, below which Simpson's rule replaces the quotient.
 const NEARLY_EQUAL: f64 = 1e-3;
@@ -98,12 +98,8 @@ impl Coefficients {
         let mut direction = -normal;
         let mut by_slip = Mat3::zeros();
         if self.friction > 0.0 {
-            let slip_ratio = match self.friction_velocity {
-                FrictionVelocity::Centres | FrictionVelocity::Surface => 1.0,
-                FrictionVelocity::Printed => (d0 + d1) / sum,
-            };
             // The sliding velocity at the end: twice the mean less that at the start, as on a parabola.
-            let sliding = tangent * (slip * 2.0 - step.slip) * slip_ratio;
+            let sliding = tangent * (slip * 2.0 - step.slip);
             let speed = sliding.norm();
             let per_speed = self.friction_per_speed(FrictionBranch::Unfrozen, speed);
             direction -= sliding * per_speed;
@@ -111,7 +107,7 @@ impl Coefficients {
             // slowly where friction nearly stops the sliding. The tangent converges quadratically once the direction is known.
             // Within the dead band, the slope of the ramp.
             let full = per_speed.max(0.0);
-            let direction_is_known = speed > 2.0 * slip_ratio * slip_change && speed > FAR_FROM_RAMP * self.slip_high;
+            let direction_is_known = speed > 2.0 * slip_change && speed > FAR_FROM_RAMP * self.slip_high;
             let mut resistance = tangent * full;
             if speed < self.slip_low {
                 resistance = tangent * (self.friction / (self.slip_high - self.slip_low));
@@ -119,7 +115,7 @@ impl Coefficients {
                 let along = sliding / speed;
                 resistance += along * along.transpose() * (self.friction_slope(speed) - full);
             }
-            by_slip = resistance * (-2.0 * slip_ratio * force);
+            by_slip = resistance * (-2.0 * force);
         }
         let by_velocity = direction * (end / after).transpose() * by_rate - tangent * (force * h / sum);
         StepForce { force: direction * force, normal, by_velocity, by_slip }
@@ -144,7 +140,7 @@ impl Coefficients {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{ApproachSpeed, Parameters};
+    use crate::contact::{ApproachSpeed, FrictionVelocity, Parameters};
 
     fn law(parameters: Parameters) -> Coefficients {
         Coefficients::new(&parameters, 3e-4)

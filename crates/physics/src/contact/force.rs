@@ -16,6 +16,14 @@ pub struct Separation {
     pub rate: f64,
 }
 
+impl Separation {
+    /// Sliding velocity v_t, m/s, from the velocity used by friction.
+    #[inline]
+    pub fn sliding_velocity(&self, slip_velocity: &Vec3) -> Vec3 {
+        slip_velocity - self.normal * self.normal.dot(slip_velocity)
+    }
+}
+
 /// Force on a ball, with its sliding speed.
 #[derive(Clone, Copy, Debug)]
 pub struct Force {
@@ -78,7 +86,7 @@ impl Coefficients {
     /// ball turns its normal a lot, which changes the sliding velocity of spinning bodies.
     pub fn slip_velocity_by_normal(&self, ball: &Vec3, socket: &Vec3) -> Mat3 {
         match self.friction_velocity {
-            FrictionVelocity::Centres | FrictionVelocity::Printed => Mat3::zeros(),
+            FrictionVelocity::Centres => Mat3::zeros(),
             FrictionVelocity::Surface => {
                 let radius = self.ball_radius;
                 ball.cross_matrix() * radius - socket.cross_matrix() * (radius + self.clearance)
@@ -91,7 +99,7 @@ impl Coefficients {
     #[inline]
     pub fn slip_velocity(&self, normal: &Vec3, velocity: &Vec3, ball: &Vec3, socket: &Vec3) -> Vec3 {
         match self.friction_velocity {
-            FrictionVelocity::Centres | FrictionVelocity::Printed => *velocity,
+            FrictionVelocity::Centres => *velocity,
             FrictionVelocity::Surface => self.surface_velocity(normal, velocity, ball, socket),
         }
     }
@@ -99,25 +107,6 @@ impl Coefficients {
     /// Whether friction uses the velocity of the surfaces rather than that of the centres.
     pub fn uses_surface_velocity(&self) -> bool {
         self.friction_velocity == FrictionVelocity::Surface
-    }
-
-    /// Ratio of v_t to the projected friction velocity: 1, or (1 - c/|e|) with (13) as printed.
-    #[inline]
-    fn slip_ratio(&self, gap: &Separation) -> f64 {
-        match self.friction_velocity {
-            FrictionVelocity::Centres | FrictionVelocity::Surface => 1.0,
-            FrictionVelocity::Printed => gap.penetration / gap.distance,
-        }
-    }
-
-    /// Sliding velocity v_t, m/s, from the velocity used by friction.
-    #[inline]
-    pub fn sliding_velocity(&self, gap: &Separation, slip_velocity: &Vec3) -> Vec3 {
-        let tangential = slip_velocity - gap.normal * gap.normal.dot(slip_velocity);
-        match self.friction_velocity {
-            FrictionVelocity::Centres | FrictionVelocity::Surface => tangential,
-            FrictionVelocity::Printed => tangential * self.slip_ratio(gap),
-        }
     }
 
     /// Force on a ball in contact; `slip_velocity` returns the velocity used by friction and is called only if there is friction.
@@ -130,7 +119,7 @@ impl Coefficients {
             slip_speed: 0.0,
         };
         if force.normal > 0.0 && self.friction > 0.0 {
-            let sliding_velocity = self.sliding_velocity(gap, &slip_velocity());
+            let sliding_velocity = gap.sliding_velocity(&slip_velocity());
             force.slip_speed = sliding_velocity.norm();
             let per_speed = self.friction_per_speed(contact_state.friction_branch, force.slip_speed);
             if per_speed != 0.0 {
@@ -167,7 +156,7 @@ impl Coefficients {
         if self.friction > 0.0 {
             let speed = force.slip_speed;
             let per_speed = self.friction_per_speed(contact_state.friction_branch, speed);
-            let sliding_velocity = self.sliding_velocity(gap, slip_velocity);
+            let sliding_velocity = gap.sliding_velocity(slip_velocity);
             along -= sliding_velocity * per_speed;
             // dF/dv_t
             let mut resistance = Mat3::identity() * (-per_speed * force.normal);
@@ -175,17 +164,11 @@ impl Coefficients {
                 let slope = self.friction_per_speed_slope(contact_state.friction_branch, speed) / speed;
                 resistance -= sliding_velocity * sliding_velocity.transpose() * (slope * force.normal);
             }
-            // v_t = s (1 - n n') w, and the tangent plane turns with n: dv_t = -s ((n . w) dn + n (w . dn)).
-            let slip_ratio = self.slip_ratio(gap);
+            // v_t = (1 - n n') w, and the tangent plane turns with n: dv_t = -((n . w) dn + n (w . dn)).
             let turned = normal_by_displacement * n.dot(slip_velocity)
                 + n * (normal_by_displacement * slip_velocity).transpose();
-            by_displacement -= resistance * turned * slip_ratio;
-            by_slip = resistance * tangent * slip_ratio;
-            if self.friction_velocity == FrictionVelocity::Printed {
-                // s = 1 - c/|e|.
-                let swept = resistance * (tangent * slip_velocity) / distance;
-                by_displacement += swept * n.transpose() * (self.clearance / distance);
-            }
+            by_displacement -= resistance * turned;
+            by_slip = resistance * tangent;
         }
         // d(delta_dot)/de = (1 - n n') e_dot / |e|.
         by_displacement += along * (n * by_penetration + normal_by_displacement * velocity * by_rate).transpose();
@@ -241,9 +224,6 @@ mod tests {
     use super::*;
     use crate::contact::{ApproachBranch, Parameters};
 
-    const VELOCITIES: [FrictionVelocity; 3] =
-        [FrictionVelocity::Centres, FrictionVelocity::Surface, FrictionVelocity::Printed];
-
     /// A ball pressed 2 µm into its wall that slides at `speed` m/s and sinks further at 5 mm/s while its clearance ramps.
     fn penetrating_ball(friction_velocity: FrictionVelocity, speed: f64) -> (Coefficients, Vec3, Vec3) {
         let parameters = Parameters { friction_velocity, ..Parameters::default() };
@@ -271,16 +251,11 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_central_differences() {
-        for friction_velocity in VELOCITIES {
+        for friction_velocity in FrictionVelocity::ALL {
             for (friction_branch, speed) in
                 [(FrictionBranch::Ramp, 3e-5), (FrictionBranch::Full, 0.04), (FrictionBranch::Unfrozen, 0.04)]
             {
                 for approach_branch in [ApproachBranch::Held, ApproachBranch::Rising] {
-                    // The printed velocity is so much smaller that this branch takes a higher speed.
-                    let speed = match friction_velocity {
-                        FrictionVelocity::Printed => speed * 150.0,
-                        _ => speed,
-                    };
                     let (c, e, v) = penetrating_ball(friction_velocity, speed);
                     let contact_state = contact_state(friction_branch, approach_branch);
                     let at = c.separation(&e, &v);
@@ -315,26 +290,6 @@ mod tests {
                     }
                 }
             }
-        }
-    }
-
-    #[test]
-    fn the_printed_velocity_is_that_of_the_geometric_points_of_contact() {
-        let (c, e, v) = penetrating_ball(FrictionVelocity::Printed, 0.2);
-        let at = c.separation(&e, &v);
-        // (13): V_j + r dn/dt against V_i + R dn/dt.
-        let normal_rate = (v - at.normal * at.normal.dot(&v)) / at.distance;
-        let (r, socket) = (c.ball_radius, c.ball_radius + c.clearance);
-        let printed = v + normal_rate * r - normal_rate * socket;
-        let tangential = printed - at.normal * at.normal.dot(&printed);
-        let got = c.sliding_velocity(&at, &c.slip_velocity(&at.normal, &v, &BALL, &SOCKET));
-        assert!((got - tangential).norm() < 1e-12 * 0.2);
-        // The dead band ends where the centres move at v_a |e| / delta.
-        let ends = c.slip_low * at.distance / at.penetration;
-        for (part, vanishes) in [(0.999, true), (1.001, false)] {
-            let slow = tangential.normalize() * (part * ends);
-            let force = c.force(&contact_state(FrictionBranch::Unfrozen, ApproachBranch::Unfrozen), &at, || slow);
-            assert_eq!(force.friction == Vec3::zeros(), vanishes, "{part}");
         }
     }
 }

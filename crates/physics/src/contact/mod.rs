@@ -68,15 +68,11 @@ pub enum FrictionVelocity {
     Centres,
     /// Relative velocity of the two material points in contact.
     Surface,
-    /// Relative velocity of the two geometric points of contact, paper eq. (13) as printed: (1 - c/|e|) times that of the
-    /// centres. Not objective; for comparison with the paper.
-    Printed,
 }
 
 words!(FrictionVelocity {
     Centres => "centres",
     Surface => "surface",
-    Printed => "printed",
 });
 
 /// Approach speed by which the damping term of the normal force divides.

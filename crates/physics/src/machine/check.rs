@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 use super::{BallJoint, Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointKind, Machine, Warning};
-use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
+use crate::contact::{self, FrictionLaw, NormalLaw};
 use crate::integrate::StepControl;
 use crate::interpolate::{Ends, Interpolant, Interpolation, Overshoot};
 use crate::units::{Dimension, format_quantity, unit_names};
@@ -354,13 +354,6 @@ impl Machine {
             if contact.clearance > 0.0 && (achieved - requested).abs() > RESTITUTION_ERROR {
                 doubts.push(Doubt::Restitution { joints: joints.clone(), law, requested, achieved });
             }
-            if contact.clearance > 0.0
-                && contact.friction_velocity == FrictionVelocity::Printed
-                && contact.friction_law != FrictionLaw::None
-                && contact.friction > 0.0
-            {
-                doubts.push(Doubt::PrintedFriction { joints: joints.clone() });
-            }
             if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
                 doubts.push(Doubt::Clearance {
                     joints,
@@ -456,7 +449,7 @@ impl Machine {
             normal += at_centre;
             let turning = match c.friction_velocity {
                 contact::FrictionVelocity::Surface => c.ball_radius * c.ball_radius / moments.min(),
-                contact::FrictionVelocity::Centres | contact::FrictionVelocity::Printed => 0.0,
+                contact::FrictionVelocity::Centres => 0.0,
             };
             sliding += at_centre + turning;
             forces.push((element_forces[b], body.mass));

@@ -49,11 +49,6 @@ pub enum Doubt {
         /// Loosest adequate tolerance.
         loosest: f64,
     },
-    /// Friction uses the velocities of (13) as printed.
-    PrintedFriction {
-        /// Names of the joints.
-        joints: String,
-    },
     /// A table whose spline leaves the range of the points around it.
     Overshoot {
         /// The one that leaves it furthest: `drive of guide`.
@@ -88,12 +83,6 @@ impl fmt::Display for Doubt {
                  (radius {}), which Hertz's theory assumes.",
                 format_quantity(*clearance, "mm"),
                 format_quantity(*ball_radius, "mm")
-            ),
-            Self::PrintedFriction { joints } => write!(
-                f,
-                "{joints}: friction_velocity = printed is meant for comparison with the paper. It uses (1 - c/e) \
-                 times the velocity of the centres, so friction vanishes at low sliding speeds; surface uses the \
-                 sliding velocity of the contact."
             ),
             Self::Step { joint, step, duration, sliding, recommended } => {
                 let why = if *sliding {
@@ -181,7 +170,6 @@ impl Warning {
         match self {
             Self::Doubt(Doubt::Restitution { .. }) => Some("restitution"),
             Self::Doubt(Doubt::Clearance { .. }) => Some("clearance"),
-            Self::Doubt(Doubt::PrintedFriction { .. }) => Some("friction_velocity"),
             Self::Doubt(Doubt::Step { .. }) => Some("solver.step"),
             Self::Doubt(Doubt::Tolerance { .. }) => Some("solver.tolerance"),
             Self::StiffFriction { .. } => Some("slip_speed_high"),

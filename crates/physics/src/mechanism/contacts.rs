@@ -237,6 +237,6 @@ impl Contacts {
         let contact = &self.joints[i];
         let at = &contact.gap.separation;
         let slip_velocity = contact.slip_velocity(&at.normal, motion);
-        contact.law.sliding_velocity(at, &slip_velocity).norm()
+        at.sliding_velocity(&slip_velocity).norm()
     }
 }

@@ -399,7 +399,6 @@ mod tests {
         // In the last case the rate is the largest so far, so that the damping term does not depend on it.
         for (surface, approach, approach_speed) in [
             ("centres", "start", 1e-3),
-            ("printed", "start", 1e-3),
             ("surface", "start", 1e-3),
             ("surface", "largest", 1e-3),
             ("surface", "largest", 1e-9),
