@@ -98,8 +98,8 @@ fn a_pdf_has_every_line_marker_and_letter_of_the_svg() {
     let lines = elements.iter().filter(|element| element.contains("stroke=\"#") && points(element) > 1).count();
     assert_eq!(operations(&drawing, "S"), lines);
     let filled = elements.iter().filter(|element| element.contains("fill=\"#")).count();
-    // A text in two fonts has several outlines.
-    assert!(operations(&drawing, "f") >= filled && filled > 400, "{} {filled}", operations(&drawing, "f"));
+    // A text in two fonts has several outlines. Five of the markers are filled, at 60 points each.
+    assert!(operations(&drawing, "f") >= filled && filled > 300, "{} {filled}", operations(&drawing, "f"));
     // Nothing is outside the page, and every colour is used.
     let (mut words, mut colours) = (Vec::new(), Vec::new());
     for word in drawing.split_whitespace() {
