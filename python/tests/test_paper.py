@@ -375,6 +375,9 @@ def test_sections_crowd_around_a_centre_only_if_they_can_be_told_apart():
     assert share(near * 1e-5) == pytest.approx(7.0 / 9.0)
     assert np.isnan(share(near * 1e-9))
     assert share(np.array([1e-4, -1e-4, 1e-4, -1e-4])) == 0.0
+    crowded = points([1, 2, 3], ["chaotic"] * 3, [0.2] * 3, [0.0] * 3)
+    crowded.sections["beta_rad"] = np.tile(near[:8] * 1e-5, (3, 1))
+    assert verdict(made_up(runs_by_friction=crowded), "Figure 22", "denser")
 
 
 def test_portraits_are_compared_at_equal_phases():
