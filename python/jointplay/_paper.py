@@ -1,4 +1,4 @@
-"""`python -m jointplay paper`: section 4 of the paper as data, figures and one page that compares it with what the paper prints."""
+"""`python -m jointplay paper`: section 4 of the paper as data, figures and one page that compares it with the paper."""
 
 from __future__ import annotations
 
@@ -18,9 +18,13 @@ PARTS = {"index.html", "data", "plots"}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the arguments."""
     parser.add_argument("--out", required=True, type=Path, metavar="FOLDER", help="folder to write: index.html, data/ and plots/")
-    parser.add_argument("--quick", action="store_true", help="few points and few periods: half a minute instead of a quarter of an hour")
+    parser.add_argument(
+        "--quick", action="store_true", help="few points and few periods: half a minute instead of a quarter of an hour"
+    )
     parser.add_argument("--force", action="store_true", help="replace a folder of an earlier report")
-    parser.add_argument("--threads", type=int, metavar="N", help="threads to use (default: one per core); the files do not depend on it")
+    parser.add_argument(
+        "--threads", type=int, metavar="N", help="threads to use (default: one per core); the files do not depend on it"
+    )
 
 
 def main(arguments: argparse.Namespace) -> None:
@@ -46,7 +50,9 @@ def main(arguments: argparse.Namespace) -> None:
             out.rename(Path(beside) / "old")
         folder.rename(out)
     counts = [sum(c.agreement == word for c in compared) for word in page.AGREEMENTS]
-    print(f"Numbers     {counts[0]} of {len(compared)} agree within 10 %, {counts[1]} more within a factor of 2, {counts[2]} differ")
+    print(
+        f"Numbers     {counts[0]} of {len(compared)} agree within 10 %, {counts[1]} more within a factor of 2, {counts[2]} differ"
+    )
     print(f"Statements  {sum(s.verdict.confirmed for s in stated)} of {len(stated)} confirmed")
     print(f"Wall time   {time.monotonic() - started:.1f} s")
     print(f"Written     {out / 'index.html'}")

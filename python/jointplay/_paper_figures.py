@@ -62,7 +62,7 @@ def label_of(column: str) -> str:
 
 
 def curve(axes: Axes, record: Record, column: str, end: float, colour: str, label: str, **style: Any) -> None:
-    """A column over the first `end` seconds: in each of 1500 intervals the smallest and the largest value, so that no peak is lost."""
+    """A column over the first `end` seconds; of each of 1500 intervals the smallest and the largest value, to lose no peak."""
     rows = int(np.searchsorted(record.time, end * (1.0 + 1e-9), side="right"))
     values = record.columns[column][:rows] / COLUMNS[column].size
     length = max(rows // 1500, 1)
@@ -73,7 +73,9 @@ def curve(axes: Axes, record: Record, column: str, end: float, colour: str, labe
     axes.set(xlim=(0.0, end), xlabel="Time (s)", ylabel=label_of(column))
 
 
-def peaks(axes: Axes, places: Sequence[float], here: Sequence[float], at_step: Sequence[float], paper: Sequence[list[float]]) -> None:
+def peaks(
+    axes: Axes, places: Sequence[float], here: Sequence[float], at_step: Sequence[float], paper: Sequence[list[float]]
+) -> None:
     """Peaks of three runs or joints: here, at the paper's output step, and as the paper prints them."""
     printed = [(place, value) for place, values in zip(places, paper, strict=True) for value in values]
     if printed:
@@ -216,8 +218,12 @@ def bifurcation(findings: Findings, over: str) -> Figure:
         differences.axhline(resolution, color=PAPERS, ls="--", label="resolution: less counts as equal")
         for (text, sizes), colour, marker in zip(lines.items(), (INK, *COLOURS), "o^v", strict=False):
             # A logarithmic axis cannot show the frequent 0.
-            differences.plot(cold.values, np.maximum(sizes * 1e6, 1e-6 * resolution), marker + "-", color=colour, ms=3, label=text)
-        differences.set(title=f"Spread and hysteresis in {label_of(column).split()[0]}", xlabel=parameter(over), ylabel=f"Distance ({unit})")
+            differences.plot(
+                cold.values, np.maximum(sizes * 1e6, 1e-6 * resolution), marker + "-", color=colour, ms=3, label=text
+            )
+        differences.set(
+            title=f"Spread and hysteresis in {label_of(column).split()[0]}", xlabel=parameter(over), ylabel=f"Distance ({unit})"
+        )
         differences.legend()
     return figure
 
@@ -240,7 +246,10 @@ def exponents(findings: Findings, over: str) -> Figure:
     for place in axes:
         place.axhline(0.0, color=PAPERS, ls="--", lw=0.8)
         place.text(0.01, 0.0, "chaos lies above", color=PAPERS, va="bottom", transform=place.get_yaxis_transform(), fontsize=8)
-        place.set(ylim=(MIN_EXPONENT, 1.1 * max(0.0, float(np.nanmax(points.exponents))) + 1.0), ylabel="Largest Lyapunov exponent (1/s)")
+        place.set(
+            ylim=(MIN_EXPONENT, 1.1 * max(0.0, float(np.nanmax(points.exponents))) + 1.0),
+            ylabel="Largest Lyapunov exponent (1/s)",
+        )
     return figure
 
 

@@ -89,21 +89,31 @@ def write_table(path: Path, heads: Iterable[str], rows: Iterable[Iterable[Any]])
 def write_data(folder: Path, findings: Findings, compared: list[Comparison], stated: list[Statement]) -> None:
     """Writes the comparison, the statements, the runs every 1 ms, the settled curves and the sweeps."""
     heads = ["figure", "clearance_mm", "friction", "quantity", "unit", "paper", "full", "sampled", "agreement"]
-    rows = [[p.figure, *p.run, p.quantity, QUANTITIES[p.quantity][0], p.value, full, s, c.agreement] for c in compared for p, full, s in [c]]
+    rows = [
+        [p.figure, *p.run, p.quantity, QUANTITIES[p.quantity][0], p.value, full, s, c.agreement]
+        for c in compared
+        for p, full, s in [c]
+    ]
     write_table(folder / "numbers.csv", heads, rows)
     heads = ["place", "statement", "criterion", "verdict", "evidence"]
-    write_table(folder / "statements.csv", heads, ([s.place, s.says, s.verdict.criterion, verdict(s), evidence(s)] for s in stated))
+    write_table(
+        folder / "statements.csv", heads, ([s.place, s.says, s.verdict.criterion, verdict(s), evidence(s)] for s in stated)
+    )
     named = {f"response_c{run[0]:g}mm_cf{run[1]:g}": record for run, record in findings.runs.items()}
     for name, record in {**named, "lagrange": findings.lagrange, "ideal": findings.ideal}.items():
         columns = [record.time[:: record.stride], *(record.samples(column) for column in COLUMNS)]
         write_table(folder / f"{name}.csv", ["t_s", *COLUMNS], np.column_stack(columns).tolist())
     curves = [(run, record.settled) for run, record in findings.runs.items()]
     heads = ["clearance_mm", "friction", "phase", *next(settled.columns for _, settled in curves if settled)]
-    write_table(folder / "settled_curves.csv", heads, (row for run, settled in curves if settled for row in curve_rows(run, settled)))
+    write_table(
+        folder / "settled_curves.csv", heads, (row for run, settled in curves if settled for row in curve_rows(run, settled))
+    )
     for name, result in findings.results.items():
         [(key, values)] = result.axes.items()
         single, sections = ([column for column in result if result[column].ndim == n and column != key] for n in (1, 2))
-        write_table(folder / f"{name}.csv", [key, *single], zip(values.tolist(), *(result[c].tolist() for c in single), strict=True))
+        write_table(
+            folder / f"{name}.csv", [key, *single], zip(values.tolist(), *(result[c].tolist() for c in single), strict=True)
+        )
         places = [(k, n) for k in range(len(values)) for n in range(result[sections[0]].shape[1])]
         rows_of = ([float(values[k]), n, *(float(result[column][k, n]) for column in sections)] for k, n in places)
         write_table(folder / f"{name}_sections.csv", [key, "section", *sections], rows_of)
@@ -187,7 +197,9 @@ def strongest(figures: list[str], compared: list[Comparison]) -> str:
         own = [c for c in compared if c.published.figure == figure and "contact force" in c.published.quantity]
         paper, here = max(c.published.value for c in own), max(c.full for c in own)
         run = own[0].published.run
-        rows.append([figure, f"{run[0]:g} mm, {run[1]:g}", number(paper), number(here), f"{here / paper:.2f}", agreement(here / paper)])
+        rows.append(
+            [figure, f"{run[0]:g} mm, {run[1]:g}", number(paper), number(here), f"{here / paper:.2f}", agreement(here / paper)]
+        )
     heads = "Figure | Clearance, friction | Paper (N) # | Here (N) # | Ratio # | Verdict"
     return table(heads, rows, "The largest contact force of any joint, whichever it is:")
 
@@ -201,7 +213,9 @@ def verification(findings: Findings) -> str:
         ours = [value for record in records for value in (record.value(quantity), record.sampled(quantity))]
         rows.append([figure, f"{quantity} ({QUANTITIES[quantity][0]})", *map(number, [own, commercial, *ours])])
     heads = "Figure | Quantity | Paper, own # | Paper, commercial # | Tree # | Tree at 1 ms # | Lagrange # | Lagrange at 1 ms #"
-    title = "The paper does not name the run of this figure. Its peaks, beside those of both formulations at 0.3 mm and friction 0.2:"
+    title = (
+        "The paper does not name the run of this figure. Its peaks, beside those of both formulations at 0.3 mm and friction 0.2:"
+    )
     return table(heads, rows, title)
 
 
@@ -268,7 +282,9 @@ def page(findings: Findings, compared: list[Comparison], stated: list[Statement]
         for row in section["figure"]:
             name, heading = row["name"], escape(row["heading"])
             picture = f'<a href="plots/{name}.png"><img src="plots/{name}.png" alt="{heading}" loading="lazy"></a>'
-            body.append(f'<h3 id="{name}">{heading}</h3>\n<figure>{picture}<figcaption>{escape(row["caption"])}</figcaption></figure>')
+            body.append(
+                f'<h3 id="{name}">{heading}</h3>\n<figure>{picture}<figcaption>{escape(row["caption"])}</figcaption></figure>'
+            )
             body.extend(tables_of(row, findings, compared))
     rows = [[s.place, s.says, s.verdict.criterion, verdict(s), evidence(s)] for s in stated]
     gaps = {
@@ -293,7 +309,7 @@ def page(findings: Findings, compared: list[Comparison], stated: list[Statement]
     return text
 
 
-SHORTENED = """<p class="notice">This is a quick report: few values and few periods, which shows that everything works. Transients have not
-ended everywhere, so regimes, sections and diagrams may differ from those of the whole report, which
+SHORTENED = """<p class="notice">This is a quick report: few values and few periods, which shows that everything works.
+Transients have not ended everywhere, so regimes, sections and diagrams may differ from those of the whole report, which
 <code>python -m jointplay paper --out paper</code> computes.</p>
 """

@@ -148,8 +148,8 @@ class Extent(NamedTuple):
     """Periods and discarded periods per value."""
 
 
-# An impact lasts about 0.1 ms, and accelerations have kinks in it: rows 20 µs apart miss up to 4 % of a peak, rows 5 µs apart up to
-# 0.5 %.
+# An impact lasts about 0.1 ms, and accelerations have kinks in it: rows 20 µs apart miss up to 4 % of a peak, rows 5 µs apart
+# up to 0.5 %.
 FULL = Extent(200, 30, (200, 50), (100, 40), (100, 40))
 QUICK = Extent(200, 4, (24, 8), (9, 7), (16, 6))
 
@@ -334,7 +334,9 @@ def compute(extent: Extent, threads: int, progress: Callable[[str, float], None]
         runs={run: future.result() for run, future in runs.items()},
         lagrange=lagrange.result(),
         ideal=ideal,
-        points={name: Points.of(result, SERIES[series]) for name, result in results.items() for series in SERIES if series in name},
+        points={
+            name: Points.of(result, SERIES[series]) for name, result in results.items() for series in SERIES if series in name
+        },
         results=results,
         resolution={coordinate: tolerance * float(length or 0.0) for coordinate, length in lengths.items()},
     )

@@ -139,7 +139,9 @@ def formulations_agree(findings: Findings, of: list[str]) -> Verdict:
 
 def formulations_apart(findings: Findings, coordinate: str) -> float:
     """Largest difference between the two formulations at the paper's output step, m or rad."""
-    tree, lagrange = (record.samples(DERIVATIVES[coordinate][0]) for record in (next(iter(findings.runs.values())), findings.lagrange))
+    tree, lagrange = (
+        record.samples(DERIVATIVES[coordinate][0]) for record in (next(iter(findings.runs.values())), findings.lagrange)
+    )
     return float(np.abs(tree - lagrange).max())
 
 

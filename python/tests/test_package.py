@@ -61,11 +61,13 @@ def test_everything_public_is_documented():
 def test_documents_use_commands_and_options_of_the_package_that_exist():
     used = 0
     for document in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
-        for command, rest in re.findall(r"^(?:\./run lab|python -m jointplay) ([a-z]+)([^#\n]*)", document.read_text(), re.MULTILINE):
-            help_text = subprocess.run([sys.executable, "-P", "-m", "jointplay", command, "--help"], capture_output=True, text=True, check=False)
-            assert help_text.returncode == 0, f"{document.name}: {command}"
+        lines = re.findall(r"^(?:\./run lab|python -m jointplay) ([a-z]+)([^#\n]*)", document.read_text(), re.MULTILINE)
+        for command, rest in lines:
+            words = [sys.executable, "-P", "-m", "jointplay", command, "--help"]
+            shown = subprocess.run(words, capture_output=True, text=True, check=False)
+            assert shown.returncode == 0, f"{document.name}: {command}"
             for option in re.findall(r"--[a-z-]+", rest):
-                assert re.search(rf"{option}\b", help_text.stdout), f"{document.name}: {command} {option}"
+                assert re.search(rf"{option}\b", shown.stdout), f"{document.name}: {command} {option}"
             used += 1
     assert used > 0
 

@@ -97,7 +97,9 @@ def test_data_files_have_the_results(report, found):
     assert len(samples) == 2001 and float(samples[1000]["t_s"]) == pytest.approx(1.0)
     assert float(samples[10]["x_m"]) == pytest.approx(found.runs[(0.3, 0.2)].columns["x_m"][2000], rel=1e-11)
     sections = rows_of(report / "data" / "runs_by_clearance_sections.csv")
-    assert len(sections) == 3 * 3 and [float(row["contact.clearance"]) for row in sections[::3]] == pytest.approx([3e-4, 5e-4, 7e-4])
+    assert len(sections) == 3 * 3 and [float(row["contact.clearance"]) for row in sections[::3]] == pytest.approx(
+        [3e-4, 5e-4, 7e-4]
+    )
     assert len(rows_of(report / "data" / "settled_curves.csv")) == 5 * 801
 
 
@@ -112,7 +114,9 @@ def shortened(monkeypatch, found):
 
 
 def call(*words):
-    return subprocess.run([sys.executable, "-P", "-m", "jointplay", "paper", *map(str, words)], capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "jointplay", "paper", *map(str, words)], capture_output=True, text=True, check=False
+    )
 
 
 def run_here(out, *, force=False):
@@ -179,7 +183,13 @@ def still(peaks=(1.0, 1.0, 1.0), last=0.01, settled=True, **largest):
     for name, value in largest.items():
         columns[name][1000] = value
     curve = {name: np.zeros(4) for columns_ in DERIVATIVES.values() for name in columns_[:2]}
-    return Record(columns, 1, dict(zip(results.JOINTS, peaks, strict=True)), last, Settled(curve, {"x": 0.0, "beta": 0.0}) if settled else None)
+    return Record(
+        columns,
+        1,
+        dict(zip(results.JOINTS, peaks, strict=True)),
+        last,
+        Settled(curve, {"x": 0.0, "beta": 0.0}) if settled else None,
+    )
 
 
 def points(values, regimes, x, beta):
@@ -222,7 +232,8 @@ def test_verdicts_on_numbers_follow_them():
     def runs(ax, beta, deviation, peaks, last):
         rows = zip(peaks, last, ax, beta, deviation, strict=True)
         return [
-            still(peak, time, ax_m_s2=a, beta_accel_rad_s2=b, x_deviation_m=d, beta_deviation_rad=d) for peak, time, a, b, d in rows
+            still(peak, time, ax_m_s2=a, beta_accel_rad_s2=b, x_deviation_m=d, beta_deviation_rad=d)
+            for peak, time, a, b, d in rows
         ]
 
     # Runs at 0.3, 0.5 and 0.7 mm, then at friction 0.15 and 0.25; over friction, x is constant and beta grows from 1 to 3.
