@@ -13,24 +13,10 @@ from ._render import render
 from ._run import Run
 from ._scene import Check, Parameter, Scene
 from ._simulation import Frame, Simulation
-from ._study import (
-    Changes,
-    Effects,
-    Ends,
-    Estimate,
-    FitChoice,
-    Fits,
-    Indices,
-    Quality,
-    RejectDriver,
-    Sensitivity,
-    Study,
-    Target,
-    Tolerance,
-    sensitivity,
-    tolerance,
-)
+from ._sensitivity import Changes, Effects, Ends, Indices, Sensitivity, Target, sensitivity
+from ._study import Estimate, Runs, Study
 from ._sweep import Sweep, SweepResult, sweep
+from ._tolerance import FitChoice, Fits, Quality, RejectDriver, Tolerance, tolerance
 from ._tradeoff import Tradeoff, tradeoff
 from .errors import ChannelError, DoubtWarning, InternalError, JointplayError, OptionError, SceneError, Stopped
 
@@ -53,6 +39,7 @@ __all__ = [
     "Quality",
     "RejectDriver",
     "Run",
+    "Runs",
     "Scene",
     "SceneError",
     "Sensitivity",

@@ -23,6 +23,11 @@ class CommandModule(Protocol):
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "paper": ("_paper", "Section 4 of the paper: every figure, number and statement beside what is computed here, on one page."),
+    "sensitivity": ("_sensitivity_command", "Find which parameters influence an output most: each alone, and all together."),
+    "tolerance": (
+        "_tolerance_command",
+        "Find what part of a manufactured lot meets its limits, what drives the rejects, and the cheapest fits that reach a yield.",
+    ),
 }
 """Module within the package, and one line of help, of each command."""
 

@@ -97,45 +97,23 @@ class Simulation:
     def statistics(self) -> dict[str, Any]:
         """Counters so far, as `Run.statistics`."""
 
+def matching_keys(scene: Scene, pattern: str) -> list[str]: ...
+def provenance_of(scene: Scene) -> str: ...
+def read_number(scene: Scene, key: str, text: str) -> float: ...
+
 class Study:
     def __new__(
-        cls,
-        scene: Scene,
-        over: list[tuple[str, str | None]],
-        output: str,
-        length: float | str | None,
-        start_after: float | str | None,
+        cls, scene: Scene, keys: list[str], entries: list[str], length: float | str | None, from_: float | str | None
     ) -> Study: ...
     @property
-    def inputs(self) -> list[tuple[str, float, str]]: ...
+    def inputs(self) -> list[tuple[float, str]]: ...
     @property
-    def assumed_ranges(self) -> list[tuple[str, tuple[float, float]]]: ...
-    @property
-    def outputs(self) -> list[tuple[str, str]]: ...
+    def outputs(self) -> list[tuple[str, str, int]]: ...
     @property
     def span(self) -> tuple[float, float]: ...
+    def read_output(self, o: int, text: str) -> float: ...
+    def alone(self, ends: list[tuple[float, float]]) -> list[list[float]]: ...
     def run(self, rows: list[list[float]], threads: int, progress: Callable[[float], object] | None = None) -> _Array: ...
-    def sensitivity(
-        self,
-        rows: int,
-        screen: int | None,
-        target: float | str | None,
-        seed: int,
-        threads: int,
-        progress: Callable[[float], object] | None = None,
-    ) -> dict[str, Any]: ...
-    def tolerance(
-        self,
-        limits: list[tuple[float | str | None, float | str | None]],
-        units: int,
-        sampling: str,
-        seed: int,
-        cost: list[tuple[str, str, float]] | None,
-        required_yield: float,
-        evaluations: int,
-        threads: int,
-        progress: Callable[[float], object] | None = None,
-    ) -> dict[str, Any]: ...
 
 class Sweep:
     def __new__(cls, scene: Scene, vary: list[tuple[str, Any]], options: dict[str, Any], tried: bool) -> Sweep: ...

@@ -1,25 +1,36 @@
-"""Studies of uncertain parameters: which of them matter, and what fraction of a lot meets its limits."""
+"""Studies: runs of a scene at values of its uncertain parameters, reduced to a few numbers."""
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from ._distribution import Distribution, Request, library, resolve
+from .errors import OptionError
 
 if TYPE_CHECKING:
-    import pandas
-
     from ._scene import Quantity, Scene
 
-Over = Mapping[str, str | None] | Sequence[str]
+Over = Mapping[str, str | None] | Sequence[str | Request]
 """Parameters by key or pattern, each with a distribution as text, or None for 0.5 to 1.5 times its value."""
 Progress = Callable[[float], object]
+
+DIVERGED = 1
+"""Status of a run that the divergence guard stopped."""
+NOT_STARTED = 2
+"""Status of a run that did not start."""
+CHUNK_TIME = 1.0
+"""Least wall-clock time between two entries into a record, s."""
 
 
 class Estimate(NamedTuple):
@@ -28,9 +39,20 @@ class Estimate(NamedTuple):
     value: float
     """Best value."""
     low: float
-    """Lower end of the interval."""
+    """Lower end of the interval; -inf if unknown."""
     high: float
-    """Upper end of the interval."""
+    """Upper end of the interval; inf if unknown."""
+
+
+class Runs(NamedTuple):
+    """Runs of one stage of a study."""
+
+    values: NDArray[np.float64]
+    """Values of the parameters, SI: one row per run, one column per parameter."""
+    results: NDArray[np.float64]
+    """Outputs, SI: one row per run, one column per output; NaN for a run that fails."""
+    status: NDArray[np.int64]
+    """How each run ended: 0 at its end, 1 stopped by the divergence guard, 2 not started."""
 
 
 class Study:
@@ -43,364 +65,230 @@ class Study:
         output: str | Sequence[str] = "tip-error",
         *,
         duration: Quantity | None = None,
-        start_after: Quantity | None = None,
+        from_: Quantity | None = None,
     ) -> None:
         """A study of `scene` over parameters with distributions.
 
-        `over` has a distribution for each key or pattern, as in `jointplay sensitivity --over`: `"0.05mm..0.2mm"`,
-        `"normal(0.15, 0.02)"`, `"H7/g6"`, or None for 0.5 to 1.5 times the value. `output` names the numbers recorded of each
-        run: `tip-error`, `tip-error-rms`, `peak-force`, `impacts`, `energy-lost`, or CHANNEL:STATISTIC. A run takes
-        `duration`, s, and is observed from `start_after`, s, on; by default three periods of the drives, the first of them a
-        transient.
+        `over` has a distribution for each key or pattern: `"0.05mm..0.2mm"`, `"normal(0.15, 0.02)"`, `"H7/g6"` …
+        (`docs/uncertainty.md`), or None for 0.5 to 1.5 times the value. `output` names the numbers recorded of each run:
+        `tip-error`, `tip-error-rms`, `peak-force`, `impacts`, `energy-lost`, or CHANNEL:STATISTIC. A run takes `duration`, s, and
+        is observed from `from_`, s, on; by default three periods of the drives, the first of them a transient.
         """
-        requested: list[tuple[str, str | None]] = []
-        requested += over.items() if isinstance(over, Mapping) else [(key, None) for key in over]
-        names = output if isinstance(output, str) else ",".join(output)
-        self._native = _native.Study(scene._native, requested, names, duration, start_after)
+        self.scene = scene
+        """The scene."""
+        self._over = requests(over)
+        self._entries = [entry.strip() for entry in (output.split(",") if isinstance(output, str) else output)]
+        self._span = duration, from_
+        # Raises errors here, not at the first use. The ends of all distributions are checked.
+        self._native.alone([one.ends for one in self._distributions.values()])
+
+    @cached_property
+    def _distributions(self) -> dict[str, Distribution]:
+        found: dict[str, Distribution] = {}
+        for request in self._over:
+            found |= resolve(self.scene, request)
+        if not found:
+            raise OptionError("over: give at least one parameter")
+        return found
+
+    @cached_property
+    def _native(self) -> _native.Study:
+        return _native.Study(self.scene._native, list(self._distributions), self._entries, *self._span)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name not in ("_native", "_distributions")}
 
     @property
     def inputs(self) -> dict[str, float]:
         """Value in the scene, SI, of each parameter."""
-        return {key: value for key, value, _ in self._native.inputs}
+        return {key: value for key, (value, _) in zip(self._distributions, self._native.inputs, strict=True)}
 
     @property
     def units(self) -> dict[str, str]:
         """SI unit of each parameter; empty for one without."""
-        return {key: unit for key, _, unit in self._native.inputs}
+        return {key: unit for key, (_, unit) in zip(self._distributions, self._native.inputs, strict=True)}
 
     @property
     def assumed_ranges(self) -> dict[str, tuple[float, float]]:
         """Ends, SI, of each range that was not given: 0.5 to 1.5 times the value, within the allowed range."""
-        return dict(self._native.assumed_ranges)
+        return {key: one.ends for key, one in self._distributions.items() if one.is_assumed}
 
     @property
     def outputs(self) -> dict[str, str]:
         """Unit of each output."""
-        return dict(self._native.outputs)
+        return {name: unit for name, unit, _ in self._native.outputs}
 
-    def run(self, values: Any, *, threads: int | None = None, progress: Progress | None = None) -> NDArray[np.float64]:
-        """Outputs, SI, at `values`, one row per run and one column per parameter, SI; NaN for a run that fails."""
-        return self._native.run(np.asarray(values, dtype=float).tolist(), threads or os.cpu_count() or 1, progress)
+    @property
+    def span(self) -> tuple[float, float]:
+        """Length of each run and end of its transient, s."""
+        return self._native.span
 
+    def run(
+        self,
+        values: Any,
+        *,
+        threads: int | None = None,
+        progress: Progress | None = None,
+        record: str | os.PathLike[str] | None = None,
+    ) -> NDArray[np.float64]:
+        """Outputs, SI, at `values`, one row per run and one column per parameter, SI; NaN for a run that fails.
 
-@dataclass(frozen=True)
-class Indices:
-    """Sensitivity of one output to each parameter."""
+        With `record`, finished runs are kept in this file, and an interrupted call resumes when it is repeated. The file stays.
+        """
+        return self._run(values, threads, progress, None if record is None else Path(record)).results
 
-    mean: float
-    """Mean of the output, SI."""
-    variance: float
-    """Variance of the output, SI squared."""
-    first: dict[str, Estimate]
-    """First-order index: the share of the variance that vanishes on average when the parameter is fixed."""
-    total: dict[str, Estimate]
-    """Total index: the share that remains on average when all other parameters are fixed."""
+    def _run(self, values: Any, threads: int | None, progress: Progress | None, record: Path | None) -> Runs:
+        table = np.atleast_2d(np.asarray(values, dtype=float))
+        workers = (os.cpu_count() or 1) if threads is None else threads
+        if workers < 1:
+            raise OptionError(f"threads = {threads}: allowed at least 1")
+        if len(table) and table.shape[1] == len(self._distributions):
+            # All values are allowed if the extremes are.
+            self._native.alone(list(zip(table.min(0).tolist(), table.max(0).tolist(), strict=True)))
+        if record is None:
+            finished = self._native.run(table.tolist(), workers, progress)
+        else:
+            finished = self._run_recorded(table, workers, progress, record)
+        status = finished[:, -1].astype(np.int64)
+        results = np.where(status[:, None] == 0, finished[:, :-1], np.nan)
+        return Runs(table, results, status)
 
+    def _run_recorded(
+        self, values: NDArray[np.float64], threads: int, progress: Progress | None, record: Path
+    ) -> NDArray[np.float64]:
+        """Runs in parts, each of which is added to the file `record`."""
+        width = len(self._native.outputs) + 1
+        finished = read_record(record, self._settings(values), width)
+        size = threads
+        while len(finished) < len(values):
+            begun, first = monotonic(), len(finished)
+            part = values[first : first + size]
 
-class Ends(NamedTuple):
-    """One parameter at the ends of its distribution, the others at their values in the scene."""
+            def report(fraction: float, first: int = first, count: int = len(part)) -> None:
+                if progress:
+                    progress((first + fraction * count) / len(values))
 
-    low: float
-    """Lower end of the parameter, SI."""
-    at_low: float
-    """Output there, SI; NaN for a run that fails."""
-    high: float
-    """Upper end of the parameter, SI."""
-    at_high: float
-    """Output there, SI; NaN for a run that fails."""
+            new = self._native.run(part.tolist(), threads, report)
+            with record.open("a", encoding="utf-8") as file:
+                file.writelines(" ".join(map(repr, row)) + "\n" for row in new.tolist())
+            finished = np.concatenate([finished, new])
+            if monotonic() - begun < CHUNK_TIME:
+                size *= 2
+        return finished
 
+    def _settings(self, values: NDArray[np.float64]) -> dict[str, str]:
+        """What determines the results of `values`."""
+        scene = json.dumps(self.scene._native.origin())
+        return {
+            "provenance": _native.provenance_of(self.scene._native),
+            "scene": sha256(scene.encode()).hexdigest(),
+            "parameters": " ".join(self._distributions),
+            "outputs": " ".join(self.outputs),
+            "span": repr(self.span),
+            "values": sha256(values.tobytes()).hexdigest(),
+        }
 
-class Effects(NamedTuple):
-    """Elementary effects of one parameter on the first output, from end to end of its distribution, SI."""
-
-    mean: float
-    """Mean effect."""
-    mean_magnitude: float
-    """Mean magnitude of the effect: the influence of the parameter."""
-    deviation: float
-    """Standard deviation: interactions and curvature."""
-
-
-class Changes(NamedTuple):
-    """Changed parameters that were run together."""
-
-    values: dict[str, float]
-    """Value of each changed parameter, SI."""
-    output: float
-    """First output there, SI."""
-
-
-@dataclass(frozen=True)
-class Target:
-    """Changes of parameters with which the first output does not exceed a target."""
-
-    target: float
-    """Largest allowed value of the first output, SI."""
-    single: list[Changes]
-    """For each parameter that suffices alone, the smallest sufficient change that was run."""
-    together: Changes | None
-    """Changes of several parameters if none suffices alone. Empty if the scene meets the target; None if nothing reaches it."""
-
-
-@dataclass(frozen=True)
-class Sensitivity:
-    """Result of `sensitivity`."""
-
-    inputs: dict[str, float]
-    """Value in the scene, SI, of each parameter."""
-    units: dict[str, str]
-    """SI unit of each parameter and output."""
-    assumed_ranges: dict[str, tuple[float, float]]
-    """Ends, SI, of each range that was not given: 0.5 to 1.5 times the value, within the allowed range."""
-    nominal: dict[str, float]
-    """Each output with the values of the scene, SI."""
-    alone: dict[str, dict[str, Ends]]
-    """For each output, the effect of every parameter alone."""
-    together: dict[str, tuple[float, float]]
-    """Each output with all parameters at their lower ends, and at their upper ends, SI."""
-    screening: dict[str, Effects | None] | None
-    """Effects of each parameter on the first output (None if the runs failed); None without a screening."""
-    kept: list[str]
-    """Parameters with indices; a screening omits the others."""
-    indices: dict[str, Indices | str]
-    """Indices of each output, or the reason why there are none; empty with rows=0."""
-    target: Target | None
-    """Changes that reach the target; None if none was given."""
-    values: NDArray[np.float64] = field(repr=False)
-    """Values of the parameters in each run of the indices, SI."""
-    results: NDArray[np.float64] = field(repr=False)
-    """Outputs of each run of the indices, SI."""
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """One row per output and parameter, SI: the columns of `sensitivity.csv`."""
-        import pandas
-
-        rows = []
-        for output, alone in self.alone.items():
-            indices = self.indices.get(output)
-            for key, (low, at_low, high, at_high) in alone.items():
-                row: dict[str, Any] = {"output": output, "unit": self.units[output]}
-                row |= {"parameter": key, "parameter_unit": self.units[key]}
-                row |= {"low": low, "high": high, "alone_low": at_low, "alone_high": at_high}
-                for name, of_key in (("first_order", "first"), ("total", "total")):
-                    estimate = getattr(indices, of_key).get(key) if isinstance(indices, Indices) else None
-                    row |= dict(zip((name, f"{name}_low", f"{name}_high"), estimate or UNKNOWN, strict=True))
-                rows.append(row)
-        return pandas.DataFrame(rows)
+    def __repr__(self) -> str:
+        return f"<jointplay.Study of {self.scene.name}: {', '.join(self.outputs)} over {len(self._distributions)} parameters>"
 
 
-UNKNOWN = Estimate(np.nan, np.nan, np.nan)
+def requests(over: Over) -> list[Request]:
+    """`over` in its general form."""
+    if isinstance(over, Mapping):
+        return [Request("over", key, text) for key, text in over.items()]
+    return [one if isinstance(one, Request) else Request("over", one, None) for one in ([over] if isinstance(over, str) else over)]
 
 
-def sensitivity(
-    scene: Scene,
-    over: Over,
-    output: str | Sequence[str] = "tip-error",
-    *,
-    rows: int = 64,
-    screen: int | None = None,
-    target: Quantity | None = None,
-    seed: int = 1,
-    duration: Quantity | None = None,
-    start_after: Quantity | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> Sensitivity:
-    """Which uncertain parameters move an output most, as `jointplay sensitivity` computes it.
-
-    The stages are: every parameter alone; a screening with `screen` trajectories (by default 10 if more than 8 parameters vary,
-    otherwise none), after which unimportant parameters are omitted; first-order and total indices from `rows` rows of a Sobol
-    sequence (rows (k + 2) runs for k parameters; a power of two is best, 0 for none); changes with which the first output is at
-    most `target`. `progress` is called with the fraction of the present stage. The other arguments are those of `Study`.
-    """
-    study = Study(scene, over, output, duration=duration, start_after=start_after)
-    results = study._native.sensitivity(rows, screen, target, seed, threads or os.cpu_count() or 1, progress)
-    keys, outputs = list(study.inputs), list(study.outputs)
-    kept = [keys[i] for i in results["kept"]]
-    effects = results["screening"]
-    return Sensitivity(
-        inputs=study.inputs,
-        units=study.units | study.outputs,
-        assumed_ranges=study.assumed_ranges,
-        nominal=dict(zip(outputs, results["nominal"], strict=True)),
-        alone={
-            name: {
-                key: Ends(low, at_low[o], high, at_high[o])
-                for key, ((low, at_low), (high, at_high)) in zip(keys, results["alone"], strict=True)
-            }
-            for o, name in enumerate(outputs)
-        },
-        together=dict(zip(outputs, zip(*results["together"], strict=True), strict=True)),
-        screening=effects and {key: one and Effects(*one) for key, one in zip(keys, effects, strict=True)},
-        kept=kept,
-        indices={name: _indices(kept, data) for name, data in zip(outputs, results["indices"])},
-        target=results["target"] and _target(results["target"]),
-        values=results["values"],
-        results=results["results"],
-    )
+def read_record(path: Path, settings: dict[str, str], width: int) -> NDArray[np.float64]:
+    """Rows of `width` numbers that a record has; begins it if there is none. A last line without its end is removed."""
+    heading = json.dumps(settings) + "\n"
+    if not path.exists():
+        path.write_text(heading, encoding="utf-8")
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    try:
+        other = json.loads(lines[0])
+        differing = [key for key in settings if other[key] != settings[key]]
+        whole = [line for line in lines[1:] if line.endswith("\n")]
+        rows = [[float(number) for number in line.split()] for line in whole]
+    except (ValueError, KeyError, TypeError, IndexError):
+        raise OptionError(f"{path}: this is no record of runs; remove it, or choose another name") from None
+    if differing or any(len(row) != width for row in rows):
+        why = f"other settings ({', '.join(differing)})" if differing else "other outputs"
+        raise OptionError(f"{path}: these runs were started with {why}; repeat that command, or remove the file")
+    if len(whole) < len(lines) - 1:
+        path.write_text("".join([heading, *whole]), encoding="utf-8")
+    return np.array(rows).reshape(len(rows), width)
 
 
-def _indices(kept: list[str], data: dict[str, Any]) -> Indices | str:
-    if "fault" in data:
-        return str(data["fault"])
-    by_key = {name: {key: Estimate(*one) for key, one in zip(kept, data[name], strict=True)} for name in ("first", "total")}
-    return Indices(data["mean"], data["variance"], **by_key)
+def record_of(path: str | os.PathLike[str], stage: str) -> Path:
+    """Record of one stage of a study whose records begin with `path`."""
+    return Path(f"{os.fspath(path)}.{stage}.partial")
 
 
-def _target(data: dict[str, Any]) -> Target:
-    def changes(pair: tuple[list[tuple[str, float]], float]) -> Changes:
-        return Changes(dict(pair[0]), pair[1])
+class Stages:
+    """Runs of a study, stage by stage."""
 
-    together = data["together"]
-    return Target(data["target"], [changes(one) for one in data["single"]], None if together is None else changes(together))
+    def __init__(
+        self,
+        study: Study,
+        threads: int | None,
+        progress: Progress | None,
+        record: str | os.PathLike[str] | None,
+    ) -> None:
+        self.study = study
+        self.threads = threads
+        self.progress = progress
+        self.record = record
+        self.runs: dict[str, Runs] = {}
 
+    def run(self, stage: str, values: Any) -> NDArray[np.float64]:
+        """Outputs at `values`, SI."""
+        record = None if self.record is None else record_of(self.record, stage)
+        self.runs[stage] = self.study._run(values, self.threads, self.progress, record)
+        return self.runs[stage].results
 
-@dataclass(frozen=True)
-class Quality:
-    """Statistics of one limited output over a lot."""
+    def count(self, status: int) -> int:
+        """Number of runs that ended with a status."""
+        return sum(int((runs.status == status).sum()) for runs in self.runs.values())
 
-    yield_: Estimate
-    """Fraction of the lot that meets this limit."""
-    mean: float
-    """Mean of the units with a result, SI."""
-    deviation: float
-    """Standard deviation of the units with a result, SI."""
-    percentiles: dict[int, Estimate | None]
-    """50th, 95th and 99th percentile, SI; None without results."""
-    cp: float | None
-    """Process capability Cp; None with one limit, or without spread."""
-    cpk: Estimate | None
-    """Process capability Cpk; None without spread."""
-
-
-class RejectDriver(NamedTuple):
-    """How one parameter differs between rejected and accepted units."""
-
-    mean_shift: float
-    """Mean of the rejected minus mean of the accepted units, in standard deviations."""
-    distance: float
-    """Kolmogorov-Smirnov distance of the two distributions."""
-    p_value: float
-    """Probability of such a distance if the parameter has no influence."""
-
-
-class FitChoice(NamedTuple):
-    """One of the candidates of each parameter that has candidates."""
-
-    fits: dict[str, str]
-    """Fit of each parameter, as it was given."""
-    cost: float
-    """Sum of the costs."""
-    yield_: Estimate
-    """Fraction of the lot that meets all limits with these fits."""
+    def at(self, u: NDArray[np.float64], kept: Sequence[int] | None = None) -> NDArray[np.float64]:
+        """Values of all parameters where those that are `kept`, by default all, have the quantiles `u`."""
+        study = self.study
+        values = np.tile(list(study.inputs.values()), (len(u), 1))
+        distributions = list(study._distributions.values())
+        for column, i in enumerate(range(len(distributions)) if kept is None else kept):
+            values[:, i] = distributions[i].quantile(u[:, column])
+        return values
 
 
-@dataclass(frozen=True)
-class Fits:
-    """The cheapest fits that reach a required yield."""
-
-    best: FitChoice | None
-    """The cheapest choice found; None if even the tightest fits miss the yield."""
-    is_proven: bool
-    """Whether every cheaper choice is known to fail, provided that a tighter fit never lowers the yield."""
-    evaluations: int
-    """Number of choices that were evaluated."""
-    check: Estimate | None
-    """Yield of the best choice in another lot."""
-    verdict: str | None
-    """Whether the check confirms the required yield: `held` with 95 % confidence, `missed`, or `open` with too few units."""
-    order_not_checked: list[str]
-    """Parameters with a candidate without limits, which may not be tighter than the one before it."""
+SAMPLINGS = ("sobol", "latin-hypercube", "random")
 
 
-@dataclass(frozen=True)
-class Tolerance:
-    """Result of `tolerance`."""
-
-    yield_: Estimate
-    """Fraction of the lot that meets all limits."""
-    qualities: dict[str, Quality]
-    """Statistics of each limited output."""
-    drivers: dict[str, RejectDriver] | None
-    """How rejects differ from accepted units, by parameter; None if all units or none are accepted."""
-    fits: Fits | None
-    """The cheapest fits; None without `cost`."""
-    assumed_ranges: dict[str, tuple[float, float]]
-    """Ends, SI, of each range that was not given: 0.5 to 1.5 times the value, within the allowed range."""
-    accepted: NDArray[np.bool_] = field(repr=False)
-    """Whether each unit meets all limits."""
-    values: NDArray[np.float64] = field(repr=False)
-    """Values of the parameters of each unit, SI."""
-    results: NDArray[np.float64] = field(repr=False)
-    """Limited outputs of each unit, SI."""
+def sample(sampling: str, dimensions: int, points: int, seed: int) -> NDArray[np.float64]:
+    """Points in the unit cube, away from its faces, where the quantiles of distributions without limits are infinite."""
+    if sampling not in SAMPLINGS:
+        raise OptionError(f"sampling = {sampling!r}: there are: {', '.join(SAMPLINGS)}")
+    if sampling == "random":
+        unit = np.random.default_rng(seed).random((points, dimensions))
+    elif sampling == "sobol":
+        # The whole sequence up to a power of two: SciPy warns about a part of it.
+        unit = library("scipy.stats.qmc").Sobol(dimensions, rng=seed).random_base2(max(points - 1, 1).bit_length())[:points]
+    else:
+        unit = library("scipy.stats.qmc").LatinHypercube(dimensions, rng=seed).random(points)
+    return np.clip(unit, 2.0**-31, 1.0 - 2.0**-31)
 
 
-def tolerance(
-    scene: Scene,
-    over: Over,
-    limits: Mapping[str, Quantity | tuple[Quantity | None, Quantity | None]],
-    *,
-    units: int = 200,
-    sampling: str = "latin-hypercube",
-    seed: int = 1,
-    cost: Mapping[str, Mapping[str, float]] | None = None,
-    required_yield: float = 0.99,
-    evaluations: int = 64,
-    duration: Quantity | None = None,
-    start_after: Quantity | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> Tolerance:
-    """Which fraction of a lot meets its limits, and what drives the rejects, as `jointplay tolerance` computes it.
-
-    The lot has `units` units. `limits` has an upper limit for each output, or a lower and an upper one, of which one may be None.
-    `sampling` is `sobol`, `latin-hypercube` or `random`.
-
-    `cost` has the cost of each candidate of a parameter or pattern, from the loosest to the tightest:
-    `{"joint.S1.clearance": {"H8/f7": 1.0, "H7/g6": 2.5}}`. With it, the result also has the cheapest fits with a yield of at
-    least `required_yield`, found with at most `evaluations` evaluated choices. `progress` is called with the fraction of each
-    lot. The other arguments are those of `Study`.
-    """
-    study = Study(scene, over, list(limits), duration=duration, start_after=start_after)
-    ends = [end if isinstance(end, tuple) else (None, end) for end in limits.values()]
-    priced = None if cost is None else [(key, fit, price) for key, of_key in cost.items() for fit, price in of_key.items()]
-    results = study._native.tolerance(
-        ends, units, sampling, seed, priced, required_yield, evaluations, threads or os.cpu_count() or 1, progress
-    )
-    drivers = results["drivers"]
-    return Tolerance(
-        yield_=Estimate(*results["yield"]),
-        qualities={name: _quality(data) for name, data in zip(study.outputs, results["qualities"], strict=True)},
-        drivers=None if drivers is None else {key: RejectDriver(*one) for key, one in zip(study.inputs, drivers, strict=True)},
-        fits=results["fits"] and _fits(results["fits"]),
-        assumed_ranges=study.assumed_ranges,
-        accepted=np.array(results["accepted"]),
-        values=results["values"],
-        results=results["results"],
-    )
+def whole(name: str, value: int, least: int, most: int, more: str = "") -> int:
+    """A whole number within its range."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= most:
+        raise OptionError(f"{name} = {value!r}: allowed whole numbers from {least} to {most}{more}")
+    return int(value)
 
 
-def _quality(data: dict[str, Any]) -> Quality:
-    def estimate(name: str) -> Estimate | None:
-        return None if data[name] is None else Estimate(*data[name])
-
-    return Quality(
-        yield_=Estimate(*data["yield"]),
-        mean=data["mean"],
-        deviation=data["deviation"],
-        percentiles={p: estimate(f"percentile_{p}") for p in (50, 95, 99)},
-        cp=data["cp"],
-        cpk=estimate("cpk"),
-    )
-
-
-def _fits(data: dict[str, Any]) -> Fits:
-    best, check = data["best"], data["check"]
-    return Fits(
-        best=best and FitChoice(dict(best[1]), best[0], Estimate(*best[2])),
-        is_proven=data["is_proven"],
-        evaluations=data["evaluations"],
-        check=check and Estimate(*check[0]),
-        verdict=check and check[1],
-        order_not_checked=data["order_not_checked"],
-    )
+def read_quantity(study: Study, o: int, value: Quantity) -> float:
+    """A value of output `o`: a number in SI units, or text with a unit."""
+    if isinstance(value, str):
+        return study._native.read_output(o, value)
+    if isinstance(value, bool) or not np.isfinite(value):
+        raise OptionError(f"{value!r}: expected a finite number in SI units, or text with a unit")
+    return float(value)

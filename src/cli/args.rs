@@ -1,7 +1,6 @@
 //! Command-line arguments.
 
 mod map;
-mod tolerance;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -12,7 +11,6 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::analysis::design::Start;
 
 pub use self::map::MapArguments;
-pub use self::tolerance::ToleranceArguments;
 
 /// A 3D laboratory that shows what play in a ball joint does to a machine.
 ///
@@ -51,12 +49,6 @@ pub enum Command {
     Merge(MergeArguments),
     /// Map the error of the tip over drive positions and parameters: at rest, and with every ball anywhere in its play.
     Map(MapArguments),
-    /// Find which parameters influence an output most, such as the clearance with the largest effect on the tip error: each alone,
-    /// and all together.
-    Sensitivity(SensitivityArguments),
-    /// Find what part of a manufactured lot meets its limits, such as a tip error of at most 50 um: percentiles, yield, capability, what
-    /// drives the rejects, and the cheapest fits that hold a yield.
-    Tolerance(ToleranceArguments),
     /// Print a robot description, URDF or MJCF, as a scene file: bodies, inertias, hinges, slides, ball joints, shapes and meshes. Omitted
     /// parts are listed on standard error and at the head of the scene.
     Import(ImportArguments),
@@ -257,65 +249,6 @@ pub struct SweepArguments {
     /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
-}
-
-/// The runs of `sensitivity` and `tolerance`.
-#[derive(Debug, Args)]
-pub struct StudyArguments {
-    /// Length of each run, e.g. `2s` [default: three periods of the drives, or 1 s without a drive].
-    #[arg(long, value_name = "TIME")]
-    pub duration: Option<String>,
-    /// End of the transient: outputs count from there [default: one period of the drives, or 0].
-    #[arg(long, value_name = "TIME", requires = "duration")]
-    pub from: Option<String>,
-    /// Seed of the samples: the same seed gives the same results.
-    #[arg(long, value_name = "N", default_value = "1")]
-    pub seed: u64,
-    /// Threads to use [default: one for each core]; the result does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
-    /// Folder for the table (CSV), the results (JSON), all runs (CSV), and the charts (SVG, PNG).
-    #[arg(long, value_name = "FOLDER")]
-    pub out: PathBuf,
-    /// Format of the result on standard output.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value = "text")]
-    pub summary: SummaryForm,
-    /// Replace existing results.
-    #[arg(long)]
-    pub force: bool,
-    /// No progress and no warnings.
-    #[arg(long)]
-    pub quiet: bool,
-}
-
-/// `sensitivity`.
-#[derive(Debug, Args)]
-pub struct SensitivityArguments {
-    /// Scene.
-    #[command(flatten)]
-    pub scene: SceneArguments,
-    /// What to explain: `tip-error` (largest), `tip-error-rms`, `peak-force`, `impacts`, `energy-lost` (since the start), or
-    /// CHANNEL:STATISTIC as in `sweep --keep`; several, separated by commas.
-    #[arg(long, value_name = "LIST", default_value = "tip-error")]
-    pub output: String,
-    /// Parameters that vary: a key, in which `*` stands for any characters, and a range or distribution, e.g.
-    /// `joint.*.clearance=0.05mm..0.2mm`, `contact.friction=normal(0.15, 0.02)`, `joint.S1.clearance=H7/g6`; may be repeated
-    /// [default range: half to one and a half of the value, within what is allowed].
-    #[arg(long, value_name = "PATTERN[=RANGE]", required = true)]
-    pub over: Vec<String>,
-    /// Rows N of the design for the indices, N (k + 2) runs for k parameters; a power of two is best; 0 leaves them out.
-    #[arg(long, value_name = "N", default_value = "64", value_parser = clap::value_parser!(u32).range(0..=65536))]
-    pub rows: u32,
-    /// Trajectories of the screening by elementary effects, which selects the parameters that matter most for the first output for the
-    /// indices [default: 10 if more than 8 parameters vary, else 0].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=10000))]
-    pub screen: Option<u32>,
-    /// Largest allowed value of the first output, e.g. `100um`: finds which parameters must be lowered or raised, and how far.
-    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
-    pub target: Option<String>,
-    /// Runs.
-    #[command(flatten)]
-    pub study: StudyArguments,
 }
 
 /// `merge`.

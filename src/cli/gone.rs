@@ -3,10 +3,10 @@
 use std::ffi::{OsStr, OsString};
 
 /// A command that the Python package took over, as the package names it.
-const IN_PACKAGE: [(&str, &str); 1] = [("reproduce", "paper")];
+const IN_PACKAGE: &[(&str, &str)] = &[("reproduce", "paper"), ("sensitivity", "sensitivity"), ("tolerance", "tolerance")];
 
 /// Other commands and options, each with the command that has it, and what to do in place of it.
-const GONE: [(&str, &str, &str); 0] = [];
+const GONE: &[(&str, &str, &str)] = &[];
 
 /// What to answer to `arguments`, without the name of the program, if they begin with a former command or use a former option.
 pub fn answer(arguments: &[OsString]) -> Option<String> {

@@ -27,13 +27,10 @@ pub mod reference;
 mod render;
 mod run;
 pub mod schema;
-mod sensitivity;
 mod state;
-mod study;
 mod summary;
 mod sweep;
 mod tables;
-mod tolerance;
 pub mod tradeoff;
 pub mod validate;
 mod wear;
@@ -113,8 +110,6 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Merge(arguments)) => sweep::merge(&arguments),
         Some(Command::Map(arguments)) => map::map(&arguments),
-        Some(Command::Sensitivity(arguments)) => sensitivity::sensitivity(&arguments),
-        Some(Command::Tolerance(arguments)) => tolerance::tolerance(&arguments),
         Some(Command::Import(arguments)) => import::import(&arguments),
         Some(Command::Validate(arguments)) => validate::validate(&arguments),
         Some(Command::Parameters) => print(&reference_page()),

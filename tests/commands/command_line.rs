@@ -730,7 +730,6 @@ fn a_pipe_or_a_device_is_refused_where_a_file_is_expected() {
         "run pendulum --duration 1ms --from-state /dev/zero",
         "sweep pendulum --points pipe --duration 1ms --out a.npz",
         "sweep pendulum --points /dev/zero --duration 1ms --out a.npz",
-        "tolerance pendulum --tolerances /dev/zero --limit peak_force<1N --out a",
         "merge pipe /dev/zero --out a.npz",
         "import pipe.urdf",
         "import /dev/zero",

@@ -7,7 +7,7 @@ use egui_kittest::{
     Harness,
     kittest::{NodeT as _, Queryable as _},
 };
-use jointplay::analysis::study::{NAMED, OneAtATimePlan, RunSpan, StudyRuns, Uncertainty, inputs, outputs};
+use jointplay::analysis::study::{NAMED, OneAtATimePlan, RunSpan, StudyRuns, outputs};
 use jointplay::app::{App, Event};
 use jointplay::scene::Value;
 
@@ -109,13 +109,14 @@ fn the_tornado_shows_the_results_of_the_study() {
     harness.hover_at(egui::pos2(700.0, 300.0));
     harness.run();
 
-    // The results have the bits of the command line's study.
+    // The results have the bits of the same runs outside the window.
     let scene = harness.state().player().pending();
-    let varied = inputs(scene, &[Uncertainty::parse("--over", "joint.*.clearance")]).expect("joints");
+    let nominal = scene.machine.contact.clearance;
+    let over = ["S1", "S2", "S3"].map(|joint| (format!("joint.{joint}.clearance"), [0.5 * nominal, 1.5 * nominal]));
     let names: Vec<&str> = NAMED.iter().map(|named| named.name).collect();
     let study_outputs = outputs(scene, &names.join(",")).expect("outputs");
-    let one_at_a_time = OneAtATimePlan::new(&varied);
-    let keys: Vec<String> = varied.iter().map(|input| input.key.clone()).collect();
+    let one_at_a_time = OneAtATimePlan::new(scene, &over).expect("a plan");
+    let keys: Vec<String> = over.iter().map(|(key, _)| key.clone()).collect();
     let study = StudyRuns::new(scene, &keys, &study_outputs, SPAN, &one_at_a_time.rows()).expect("runs");
     let run = |index| {
         let mut block = study.sweep().begin(index);

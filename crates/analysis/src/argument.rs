@@ -20,14 +20,6 @@ pub enum Argument {
     Crossings,
     /// Transient periods or crossings to discard.
     Discard,
-    /// Rows of the design for sensitivity indices.
-    Rows,
-    /// Trajectories of a screening.
-    Screen,
-    /// Number of units of a lot.
-    Units,
-    /// Candidate fits and their costs.
-    Cost,
 }
 
 impl Argument {
@@ -41,10 +33,6 @@ impl Argument {
             Self::Periods => ["--periods", "periods"],
             Self::Crossings => ["--crossings", "crossings"],
             Self::Discard => ["--discard", "discard"],
-            Self::Rows => ["--rows", "rows"],
-            Self::Screen => ["--screen", "screen"],
-            Self::Units => ["--runs", "units"],
-            Self::Cost => ["--cost", "cost"],
         }
     }
 

@@ -297,7 +297,6 @@ fn student_factor(freedoms: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::{Purpose, RandomStream};
 
     /// Fraction of series of `length` numbers, each `memory` times the one before plus a random number, whose mean is within two
     /// standard errors of 0, and the mean standard error.
@@ -305,10 +304,12 @@ mod tests {
         const SERIES: u64 = 400;
         let (mut within, mut errors) = (0.0, 0.0);
         for seed in 0..SERIES {
-            let random = RandomStream::new(seed, Purpose::Bootstrap, 0);
+            // Knuth's linear congruential generator, of which the upper bits are random enough.
+            let mut state = seed;
             let mut x = 0.0;
-            let numbers = (0..length as u64 + 100).map(|counter| {
-                x = memory * x + random.unit(counter) - 0.5;
+            let numbers = (0..length + 100).map(|_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                x = memory * x + (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
                 x
             });
             let parts: Vec<(f64, usize)> = numbers.skip(100).map(|number| (number, 1)).collect();

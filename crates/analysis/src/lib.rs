@@ -9,9 +9,7 @@
 //!   [`model_costs`].
 //! - Validation cases with known answers ([`validation`]).
 //! - The tip's error over the workspace, with the drives held ([`map`]).
-//! - Uncertain parameters of a scene ([`study`]). Independent of any scene: [`sampling`], [`distribution`] and ISO fits
-//!   ([`iso286`]); ranking of inputs ([`morris`], [`indices`]); percentiles, yield and rejects ([`yields`]); the cheapest fits
-//!   that hold a yield ([`fits`]).
+//! - Runs of a scene at given values of its parameters, reduced to a few numbers, and each parameter alone ([`study`]).
 //!
 //! A sweep over two clearances that prints the kind of motion and the largest force in the second ball joint:
 //!
@@ -47,35 +45,26 @@ pub mod axis;
 mod cost;
 pub mod crossing;
 pub mod design;
-pub mod distribution;
 pub mod drive;
 pub mod exponent;
-pub mod fits;
 pub mod ideal_fault;
 pub mod impact_row;
-pub mod indices;
 pub mod initial_peaks;
-pub mod iso286;
 pub mod layout;
-pub mod lot;
 mod many_joints;
 pub mod map;
 pub mod map_task;
-pub mod morris;
-mod normal;
 pub mod one_at_a_time_task;
 pub mod orbit;
 mod pareto_front;
 pub mod point;
 mod points;
 pub mod presets;
-mod random;
 pub mod ready_sweeps;
 mod reference_solution;
 pub mod regime;
 pub mod row_times;
 mod run_context;
-pub mod sampling;
 pub mod section;
 mod setting;
 pub mod source;
@@ -88,7 +77,6 @@ pub mod task;
 mod timing;
 pub mod validation;
 mod work_precision;
-pub mod yields;
 
 pub use cost::{CaseCost, CostCase, model_costs};
 pub use many_joints::{GROWTH, LIMITS, LOOSE_MACHINES, LooseMachine, LooseSpeed, Timed, growth, loose_speed};

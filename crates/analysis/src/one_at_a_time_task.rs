@@ -68,7 +68,7 @@ pub(super) async fn run(
     }
     let scene = task.scene.scene()?;
     Simulation::new(&scene.machine).map_err(|error| scene.locate(&error))?;
-    let alone = OneAtATimePlan::between(&scene, &task.over)?;
+    let alone = OneAtATimePlan::new(&scene, &task.over)?;
     let keys: Vec<String> = task.over.iter().map(|(key, _)| key.clone()).collect();
     // An output can be unknown in this scene: not every scene has a probe or an energy ledger.
     let known = task.outputs.iter().map(|name| outputs(&scene, name).ok().and_then(|mut outputs| outputs.pop()));
@@ -100,7 +100,7 @@ pub(super) async fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::{Uncertainty, inputs};
+    use crate::study::{matching, real_parameter};
     use crate::task::{Job, Message, perform};
     use jointplay_scene::Scene;
 
@@ -110,14 +110,13 @@ mod tests {
     fn task(scene: &str, pattern: &str) -> OneAtATimeTask {
         let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
         let scene = Scene::load(scene, if scene == "spcmm" { &changes } else { &[] }).expect("built in");
-        let varied = inputs(&scene, &[Uncertainty::parse("--over", pattern)]).expect("parameters");
+        let range = |key: String| {
+            let (_, nominal) = real_parameter(&scene, &key).expect("a number");
+            (key, [0.5 * nominal, 1.5 * nominal])
+        };
         OneAtATimeTask {
             scene: SceneSource::of(&scene),
-            over: varied
-                .iter()
-                .map(|input| input.key.clone())
-                .zip(OneAtATimePlan::new(&varied).ends().to_vec())
-                .collect(),
+            over: matching(&scene, pattern).expect("parameters").into_iter().map(range).collect(),
             outputs: OUTPUTS.map(str::to_owned).to_vec(),
             span: RunSpan { duration: 0.06, from: 0.02 },
         }
@@ -158,7 +157,7 @@ mod tests {
         let scene = task.scene.scene().expect("built in");
         let available: Vec<Output> =
             OUTPUTS.iter().flat_map(|name| outputs(&scene, name).expect("an output")).collect();
-        let alone = OneAtATimePlan::between(&scene, &task.over).expect("ends");
+        let alone = OneAtATimePlan::new(&scene, &task.over).expect("ends");
         let keys: Vec<String> = task.over.iter().map(|(key, _)| key.clone()).collect();
         let study = StudyRuns::new(&scene, &keys, &available, task.span, &alone.rows()).expect("runs");
         let expected: Vec<OneAtATimeRun> = (0..study.sweep().design().blocks())

@@ -1,42 +1,25 @@
-//! Studies of uncertain parameters: the varied parameters ([`Input`]), the scalar results of a run ([`Output`]), the runs at
-//! given values ([`StudyRuns`]), and their evaluation ([`sensitivity()`], [`tolerance()`]). The caller schedules the runs, as
-//! in any [`Sweep`].
+//! Studies of uncertain parameters: the varied parameters, the scalar results of a run ([`Output`]), the runs at given values
+//! ([`StudyRuns`]), and the rows in which each parameter varies alone ([`OneAtATimePlan`]). The caller schedules the runs, as in
+//! any [`Sweep`]. Distributions, sensitivity indices and yields are the Python package's.
 
-mod candidates;
 mod inputs;
 mod one_at_a_time;
 mod outputs;
-mod runner;
-mod sensitivity;
-mod target;
-mod tolerance;
 
-pub use candidates::{Candidate, CandidateRequest, Candidates, candidates};
-pub use inputs::{Input, Uncertainty, inputs, matching};
-pub use one_at_a_time::{ENDS, OneAtATimeOutputs, OneAtATimePlan};
+pub use inputs::{matching, read_unchecked, real_parameter};
+pub use one_at_a_time::OneAtATimePlan;
 pub use outputs::{NAMED, NamedOutput, Output, outputs};
-pub use runner::StudyRunner;
-pub use sensitivity::{Screening, Sensitivity, SensitivityOptions, sensitivity};
-pub use target::{Change, TargetAnswer};
-pub use tolerance::{CheapestFits, FitOptions, FitVerdict, Tolerance, ToleranceOptions, tolerance};
 
-use std::fmt::{Display, Formatter};
+use std::fmt::Formatter;
 
 use serde::{Deserialize, Serialize};
 
-use crate::argument::Argument;
 use crate::axis::RangeError;
 use crate::design::{Design, Start};
-use crate::distribution::DistributionError;
 use crate::drive::common_period;
-use crate::fits::FitSearchError;
-use crate::indices::{IndicesError, MIN_ROWS};
-use crate::morris::MorrisError;
 use crate::point::{Protocol, Span};
-use crate::sampling::SamplingError;
 use crate::statistic::StatisticError;
 use crate::sweep::{Sweep, SweepError};
-use crate::yields::YieldsError;
 use jointplay_scene::{Scene, SceneError, Value, ValueError};
 
 /// Default number of observed periods of a driven scene.
@@ -48,9 +31,9 @@ const UNDRIVEN_DURATION: f64 = 1.0;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StudyError {
     /// An error with its place in the request.
-    #[error(fmt = write_at_place)]
+    #[error("{place}: {error}")]
     At {
-        /// Option, or file with line.
+        /// Key of the parameter.
         place: String,
         /// The error at that place.
         error: Box<Self>,
@@ -69,21 +52,10 @@ pub enum StudyError {
     /// A parameter whose values are words or whole numbers.
     #[error("its values are not real numbers")]
     NotReal,
-    /// A parameter without a given distribution whose value yields no default range.
-    #[error(
-        "is {value} in the scene, so the default range, 0.5 to 1.5 times this value, is empty: give a range, KEY=A..B"
-    )]
-    NoRange {
-        /// Value in the scene, with unit.
-        value: String,
-    },
     /// A text that is not a value of the parameter.
     #[error(transparent)]
     Read(#[from] ValueError),
-    /// An invalid distribution.
-    #[error(transparent)]
-    Distribution(#[from] DistributionError),
-    /// An end of a distribution that the parameter does not accept.
+    /// An end of a range that the parameter does not accept.
     #[error("{value}: {error}")]
     End {
         /// The end, with unit.
@@ -91,14 +63,9 @@ pub enum StudyError {
         /// What is allowed.
         error: ValueError,
     },
-    /// An end of a distribution that the scene does not accept.
-    #[error("{value}: {why}")]
-    RejectedEnd {
-        /// The end, with unit.
-        value: String,
-        /// The reason, and the allowed values.
-        why: String,
-    },
+    /// A range that runs downwards.
+    #[error("the lower limit must not be above the upper one")]
+    Order,
     /// More parameters than a study varies.
     #[error("{found} uncertain parameters; expected at most {most}")]
     TooMany {
@@ -123,11 +90,9 @@ pub enum StudyError {
         /// Position of the repetition, from 1.
         position: usize,
     },
-    /// A drawn value that the parameter does not accept; only a distribution without limits can draw one.
-    #[error(
-        "{key}: {value}: {error}; a distribution with limits, such as normal(MEAN, SD, LOW..HIGH), draws no such value"
-    )]
-    DrawnValue {
+    /// A value of a run that the parameter does not accept.
+    #[error("{key}: {value}: {error}")]
+    RunValue {
         /// Key of the parameter.
         key: String,
         /// The value, with unit.
@@ -141,53 +106,6 @@ pub enum StudyError {
     /// Runs that do not define a sweep.
     #[error(transparent)]
     Sweep(#[from] SweepError),
-    /// A number that an argument does not accept.
-    #[error(fmt = write_argument_error)]
-    Argument {
-        /// The argument.
-        argument: Argument,
-        /// The number.
-        value: usize,
-        /// The error.
-        error: Box<Self>,
-    },
-    /// Fewer rows than the indices need.
-    #[error("allowed at least {MIN_ROWS}, or 0 for no indices")]
-    TooFewRows,
-    /// An error of the design for indices.
-    #[error(transparent)]
-    Indices(#[from] IndicesError),
-    /// An error of the screening.
-    #[error(transparent)]
-    Screening(#[from] MorrisError),
-    /// An error of the sampling.
-    #[error(transparent)]
-    Sampling(#[from] SamplingError),
-    /// An error of the statistics of a lot.
-    #[error(transparent)]
-    Yields(#[from] YieldsError),
-    /// A candidate without a cost.
-    #[error("expected a cost, a finite number of at least 0")]
-    NoCost,
-    /// A candidate for a parameter that does not vary.
-    #[error("give the parameter a distribution of its own, too")]
-    NoDistribution,
-    /// Candidates in the wrong order.
-    #[error(
-        "{text} is wider than the candidate before it; list the candidates of a parameter from the loosest to the tightest"
-    )]
-    Wider {
-        /// The wider candidate, as given.
-        text: String,
-    },
-    /// An error of the search for the cheapest fits.
-    #[error(fmt = write_fit_search_error)]
-    Fits(FitSearchError),
-}
-
-fn write_at_place(place: &str, error: &StudyError, f: &mut Formatter<'_>) -> std::fmt::Result {
-    write!(f, "{place}: ")?;
-    error.fmt(f)
 }
 
 fn write_output_error(entry: &str, error: &StatisticError, f: &mut Formatter<'_>) -> std::fmt::Result {
@@ -198,31 +116,10 @@ fn write_output_error(entry: &str, error: &StatisticError, f: &mut Formatter<'_>
     write!(f, "{error}; outputs by name: {}", NAMED.map(|named| named.name).join(", "))
 }
 
-fn write_argument_error(
-    argument: &Argument,
-    value: &usize,
-    error: &StudyError,
-    f: &mut Formatter<'_>,
-) -> std::fmt::Result {
-    argument.write(value, f)?;
-    f.write_str(": ")?;
-    error.fmt(f)
-}
-
-fn write_fit_search_error(error: &FitSearchError, f: &mut Formatter<'_>) -> std::fmt::Result {
-    Argument::Cost.fmt(f)?;
-    write!(f, ": {error}")
-}
-
 impl StudyError {
     /// Adds the place of the error.
     pub(crate) fn at(self, place: &str) -> Self {
         Self::At { place: place.to_owned(), error: Box::new(self) }
-    }
-
-    /// An error about the number `value` given for `argument`.
-    fn argument(argument: Argument, value: usize, error: impl Into<Self>) -> Self {
-        Self::Argument { argument, value, error: Box::new(error.into()) }
     }
 }
 
@@ -278,7 +175,7 @@ impl StudyRuns {
             let parameter = scene.parameter(key)?;
             for row in rows {
                 let value = Value::Number(row[i]);
-                parameter.check(&value).map_err(|error| StudyError::DrawnValue {
+                parameter.check(&value).map_err(|error| StudyError::RunValue {
                     key: key.clone(),
                     value: parameter.show(&value),
                     error,
@@ -303,6 +200,11 @@ impl StudyRuns {
     pub fn outputs_of(&self, record: &[f64]) -> Vec<f64> {
         let outputs = self.outputs.iter().zip(&self.columns);
         outputs.map(|(output, columns)| output.value(columns.iter().map(|&column| record[column]))).collect()
+    }
+
+    /// How a run ended, from its record: the code of its [`Status`](crate::layout::Status), with which every record begins.
+    pub fn status_of(&self, record: &[f64]) -> f64 {
+        record[0]
     }
 }
 

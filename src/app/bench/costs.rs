@@ -252,7 +252,7 @@ impl Costs {
             (
                 "Start runs",
                 "Runs the scene with its current settings, then with each value alone at its lower and at its upper end, in the \
-                 background; the numbers are those of `jointplay sensitivity`",
+                 background; the numbers are those of `./run lab sensitivity`",
             )
         };
         let clicked = ui.horizontal(|ui| {
