@@ -50,9 +50,9 @@ def main(given: Sequence[str] | None = None) -> int:
         if words and words[0] == name:
             cast(CommandModule, import_module(f".{module}", __package__)).add_arguments(own)
     arguments = parser.parse_args(words)
-    module = cast(CommandModule, import_module(f".{COMMANDS[arguments.command][0]}", __package__))
+    command = cast(CommandModule, import_module(f".{COMMANDS[arguments.command][0]}", __package__))
     try:
-        module.main(arguments)
+        command.main(arguments)
     except JointplayError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -96,8 +96,8 @@ def radial_clearance(fit: str, diameter: float) -> Distribution:
     standard deviations (Cp = 1); the sum is cut off at the limits of the fit.
     """
     low, high = (0.5 * end for end in _iso286.clearance(fit, diameter))
-    widths = [_iso286.tolerance(name, diameter) for name in _iso286.classes(fit)]
-    return _normal(0.5 * (low + high), 0.5 * float(np.hypot(*widths)) / 6.0, low, high)
+    hole, shaft = (_iso286.tolerance(name, diameter) for name in _iso286.classes(fit))
+    return _normal(0.5 * (low + high), 0.5 * float(np.hypot(hole, shaft)) / 6.0, low, high)
 
 
 def _normal(mean: float, deviation: float, low: float = -np.inf, high: float = np.inf) -> Distribution:
@@ -105,7 +105,9 @@ def _normal(mean: float, deviation: float, low: float = -np.inf, high: float = n
     _check(low < high, "the lower limit of a truncated normal distribution must be below the upper one")
     a, b = (low - mean) / deviation, (high - mean) / deviation
     law = library("scipy.stats").truncnorm(a, b, mean, deviation)
-    _check(np.isfinite(law.median()), "the limits of a truncated normal distribution are too many standard deviations from its mean")
+    _check(
+        np.isfinite(law.median()), "the limits of a truncated normal distribution are too many standard deviations from its mean"
+    )
     return Distribution(low, high, law.ppf)
 
 

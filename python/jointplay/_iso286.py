@@ -16,9 +16,7 @@ def _row(text: str) -> tuple[float, ...]:
 RANGES = _row("3 6 10 18 30 50 80 120 180 250 315 400 500")
 """Upper ends of the main ranges of nominal sizes, mm; each range excludes its lower end."""
 
-INTERMEDIATE = _row(
-    "3 6 10 14 18 24 30 40 50 65 80 100 120 140 160 180 200 225 250 280 315 355 400 450 500"
-)
+INTERMEDIATE = _row("3 6 10 14 18 24 30 40 50 65 80 100 120 140 160 180 200 225 250 280 315 355 400 450 500")
 """Upper ends of the intermediate ranges, mm."""
 
 TOLERANCES = {

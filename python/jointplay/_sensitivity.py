@@ -248,8 +248,10 @@ def _screen(stages: Stages, trajectories: int, seed: int) -> tuple[dict[str, Eff
         own = slopes[moved == i]
         # An effect is missing on either side of a run that failed.
         own = own[np.isfinite(own)]
-        numbers = [float(number) for number in (own.mean(), np.abs(own).mean(), own.std(ddof=1))] if len(own) > 1 else None
-        effects[key] = numbers and Effects(*numbers, *one.ends, "limits" if one.is_limited else "quantiles")
+        effects[key] = None
+        if len(own) > 1:
+            mean, magnitude, deviation = (float(number) for number in (own.mean(), np.abs(own).mean(), own.std(ddof=1)))
+            effects[key] = Effects(mean, magnitude, deviation, *one.ends, "limits" if one.is_limited else "quantiles")
     influence = np.array([one.mean_magnitude if one else 0.0 for one in effects.values()])
     largest = np.argsort(-influence, kind="stable")[:UNSCREENED]
     return effects, sorted(int(i) for i in largest if influence[i] >= NEGLIGIBLE * influence.max())

@@ -30,8 +30,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what to explain: tip-error (largest, the default), tip-error-rms, peak-force, impacts, energy-lost, or "
         "CHANNEL:STATISTIC as in sweep --keep; several, separated by commas",
     )
-    add("--rows", type=int, default=64, metavar="N", help="rows of the design for the indices (default: 64), N (k + 2) runs; 0: none")
-    add("--screen", type=int, metavar="N", help="trajectories of the screening (default: 10 if more than 8 parameters vary, else 0)")
+    add(
+        "--rows",
+        type=int,
+        default=64,
+        metavar="N",
+        help="rows of the design for the indices (default: 64), N (k + 2) runs; 0: none",
+    )
+    add(
+        "--screen",
+        type=int,
+        metavar="N",
+        help="trajectories of the screening (default: 10 if more than 8 parameters vary, else 0)",
+    )
     add("--target", metavar="VALUE", help="largest allowed value of the first output, e.g. 100um: which changes reach it")
 
 
@@ -84,9 +95,9 @@ def summary(found: Sensitivity) -> dict[str, Any]:
         and {"changes": changes(found.target.together.values), "output": found.target.together.output},
     }
     names = ("mean", "mean_magnitude", "deviation", "low", "high", "ends")
-    screening = None if found.screening is None else [
+    screening = found.screening and [
         {"key": key} | {name: effects and getattr(effects, name) for name in names} for key, effects in found.screening.items()
-    ]  # fmt: skip
+    ]
     return {
         "outputs": [of_output(name) for name in found.alone],
         "screening": screening,
@@ -106,21 +117,33 @@ def describe(scene: Scene, found: Sensitivity) -> str:
         for key, effects in found.screening.items():
             numbers = effects and [show(n, found.units[first]) for n in (effects.mean_magnitude, effects.mean, effects.deviation)]
             ends = effects and [show(effects.low, found.units[key]), show(effects.high, found.units[key]), effects.ends]
-            rows.append([key, *(numbers or "---"), *(ends or "---"), "kept" if key in found.kept else "left out"])
+            rows.append([key, *(numbers or ["-"] * 3), *(ends or ["-"] * 3), "kept" if key in found.kept else "left out"])
         heads = "parameter", "mean size of effect", "mean effect", "deviation", "from", "to", "ends", "for the indices"
-        text += f"\nScreening of {first}: from the one end of each parameter to the other, limits or quantiles of 2.5 % and 97.5 %\n"
+        text += (
+            f"\nScreening of {first}: from the one end of each parameter to the other, limits or quantiles of 2.5 % and 97.5 %\n"
+        )
         text += common.table(heads, rows)
     for name, alone in found.alone.items():
         unit, nominal, indices = found.units[name], found.nominal[name], found.indices.get(name)
         known = indices if isinstance(indices, Indices) else None
         all_low, all_high = found.together[name]
-        digits = common.distinguishing_digits(nominal, [*(at for e in alone.values() for at in (e.at_low, e.at_high)), all_low, all_high])
+        digits = common.distinguishing_digits(
+            nominal, [*(at for e in alone.values() for at in (e.at_low, e.at_high)), all_low, all_high]
+        )
         text += f"\n{name}: {show(nominal, unit, digits)} with the values of the scene\n"
         rows = []
         for key, (low, at_low, high, at_high) in alone.items():
-            ends = show(low, found.units[key]), show(at_low, unit, digits), show(high, found.units[key]), show(at_high, unit, digits)
-            rows.append([key, *ends, *(interval(known and of.get(key)) for of in ((known.first, known.total) if known else ({}, {})))])
-        rows.append(["all together", "lower ends", show(all_low, unit, digits), "upper ends", show(all_high, unit, digits), "-", "-"])
+            at_ends = (
+                show(low, found.units[key]),
+                show(at_low, unit, digits),
+                show(high, found.units[key]),
+                show(at_high, unit, digits),
+            )
+            shares = (known.first.get(key), known.total.get(key)) if known else (None, None)
+            rows.append([key, *at_ends, *map(interval, shares)])
+        rows.append(
+            ["all together", "lower ends", show(all_low, unit, digits), "upper ends", show(all_high, unit, digits), "-", "-"]
+        )
         text += common.table(("parameter", "from", "output alone", "to", "output alone", "first-order", "total"), rows)
         if known:
             left_out = f", {known.incomplete_rows} left out" if known.incomplete_rows else ""
@@ -164,7 +187,9 @@ def draw(scene: Scene, found: Sensitivity) -> Any:
     has_indices = any(isinstance(indices, Indices) for indices in found.indices.values())
     count, bars = len(found.alone), min(len(found.inputs), MAX_BARS)
     height = 1.6 + 0.42 * bars
-    figure = library("matplotlib.figure").Figure(figsize=(11.0 if has_indices else 7.0, height * count + 0.5), layout="constrained")
+    figure = library("matplotlib.figure").Figure(
+        figsize=(11.0 if has_indices else 7.0, height * count + 0.5), layout="constrained"
+    )
     axes = figure.subplots(count, 2 if has_indices else 1, squeeze=False)
     figure.suptitle(f"{scene.name}: influences on the output")
     for (name, alone), row in zip(found.alone.items(), axes, strict=True):
@@ -185,12 +210,17 @@ def draw(scene: Scene, found: Sensitivity) -> Any:
         row[0].legend(handles, ["lower end", "upper end"], loc="best", frameon=False, fontsize="small")
         indices = found.indices.get(name)
         if has_indices and isinstance(indices, Indices):
-            for side, colour, of, words in ((-1.0, common.BLUE, indices.first, "first-order"), (1.0, common.ORANGE, indices.total, "total")):
+            for side, colour, of, words in (
+                (-1.0, common.BLUE, indices.first, "first-order"),
+                (1.0, common.ORANGE, indices.total, "total"),
+            ):
                 known = [(i, of[key]) for i, key in enumerate(keys) if key in of]
                 where = [i + 0.175 * side for i, _ in known]
                 values = np.array([one for _, one in known]).reshape(-1, 3).T
                 row[1].barh(where, values[0], 0.35, color=colour, label=words)
-                row[1].errorbar(values[0], where, xerr=[values[0] - values[1], values[2] - values[0]], fmt="none", ecolor=common.GREY)
+                row[1].errorbar(
+                    values[0], where, xerr=[values[0] - values[1], values[2] - values[0]], fmt="none", ecolor=common.GREY
+                )
             row[1].legend(loc="best", frameon=False, fontsize="small")
             row[1].axvline(0.0, color=common.GREY, linewidth=1.0)
             row[1].set_xlim(-0.1, 1.1)

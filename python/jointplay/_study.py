@@ -196,7 +196,9 @@ def requests(over: Over) -> list[Request]:
     """`over` in its general form."""
     if isinstance(over, Mapping):
         return [Request("over", key, text) for key, text in over.items()]
-    return [one if isinstance(one, Request) else Request("over", one, None) for one in ([over] if isinstance(over, str) else over)]
+    return [
+        one if isinstance(one, Request) else Request("over", one, None) for one in ([over] if isinstance(over, str) else over)
+    ]
 
 
 def read_record(path: Path, settings: dict[str, str], width: int) -> NDArray[np.float64]:

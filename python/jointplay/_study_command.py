@@ -74,7 +74,9 @@ def requests(arguments: argparse.Namespace) -> list[Request]:
         pattern, sign, text = option.partition("=")
         found.append(Request(f"--over {option}", pattern.strip(), text.strip() if sign else None))
     if not found:
-        raise OptionError("--over: give at least one parameter" + (", or --tolerances" if hasattr(arguments, "tolerances") else ""))
+        raise OptionError(
+            "--over: give at least one parameter" + (", or --tolerances" if hasattr(arguments, "tolerances") else "")
+        )
     return found
 
 
@@ -132,10 +134,7 @@ def check_replaceable(out: Path, force: bool) -> None:
         raise OptionError(f"--out {out}: other files than results of jointplay are not replaced: {', '.join(foreign[:4])}")
 
 
-Compute = Callable[..., Any]
-
-
-def perform(arguments: argparse.Namespace, compute: Compute) -> Any:
+def perform(arguments: argparse.Namespace, compute: Callable[..., Any]) -> Any:
     """The result of `compute`, which takes `threads`, `progress` and `record`. Its records are beside the folder."""
     check_replaceable(arguments.out, arguments.force)
     out = os.fspath(arguments.out)
@@ -157,9 +156,14 @@ def perform(arguments: argparse.Namespace, compute: Compute) -> Any:
 
 
 def write(
-    arguments: argparse.Namespace, scene: Scene, found: Sensitivity | Tolerance, name: str, settings: Mapping[str, Any],
-    results: dict[str, Any], figure: Any,
-) -> None:  # fmt: skip
+    arguments: argparse.Namespace,
+    scene: Scene,
+    found: Sensitivity | Tolerance,
+    name: str,
+    settings: Mapping[str, Any],
+    results: dict[str, Any],
+    figure: Any,
+) -> None:
     """Writes the folder, which appears whole, and removes the records of the runs."""
     out: Path = arguments.out
     duration, start = found.span
@@ -251,7 +255,11 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def describe(scene: Scene, found: Sensitivity | Tolerance) -> str:
     """Lines about the scene, its runs and the ranges that were not given, for people."""
     duration, start = found.span
-    text = f"Scene             {scene.name}: runs of {duration:.6g} s" + (f", observed from {start:.6g} s on" if start else "") + "\n"
+    text = (
+        f"Scene             {scene.name}: runs of {duration:.6g} s"
+        + (f", observed from {start:.6g} s on" if start else "")
+        + "\n"
+    )
     for key, (low, high) in found.assumed_ranges.items():
         ends = f"{show(low, found.units[key])} to {show(high, found.units[key])}"
         text += f"Range not given   {key}: {ends}, half to one and a half of its value, within what is allowed\n"

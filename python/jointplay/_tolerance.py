@@ -226,7 +226,7 @@ def tolerance(
     def run_lot(stage: str, unit: NDArray[np.float64], laws: Sequence[Distribution]) -> NDArray[np.bool_]:
         """Whether each unit meets all limits."""
         values = np.column_stack([law.quantile(unit[:, i]) for i, law in enumerate(laws)])
-        return _meets(stages.run(stage, values), lower, upper).all(1)
+        return np.asarray(_meets(stages.run(stage, values), lower, upper).all(axis=1))
 
     accepted = run_lot("lot", unit, distributions)
     lot = stages.runs["lot"]

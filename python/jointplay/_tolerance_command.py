@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="limit of an output: an upper one (tip-error=50um), both (S1.normal:max=20N..500N) or a lower one "
         "(tip-error-rms=1um..); outputs as in sensitivity --output; may be repeated for other outputs",
     )
-    add("--tolerances", type=Path, metavar="FILE", help="uncertain parameters: a CSV file with the heading parameter,distribution")
+    add(
+        "--tolerances", type=Path, metavar="FILE", help="uncertain parameters: a CSV file with the heading parameter,distribution"
+    )
     add("--runs", type=int, default=1000, metavar="N", help="units of the lot, one run each (default: 1000)")
     add("--sampling", choices=SAMPLINGS, default="sobol", help="how the values of the lot are drawn (default: sobol)")
     add(
@@ -42,7 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="find the cheapest fits that reach --yield: a CSV file with the heading parameter,fit,cost; candidates of a parameter "
         "from the loosest to the tightest",
     )
-    add("--yield", dest="yield_", default="99%", metavar="FRACTION", help="yield that the fits must reach, e.g. 99%% or 0.99 (default)")
+    add(
+        "--yield",
+        dest="yield_",
+        default="99%",
+        metavar="FRACTION",
+        help="yield that the fits must reach, e.g. 99%% or 0.99 (default)",
+    )
     add("--evaluations", type=int, default=64, metavar="N", help="largest number of choices of fits to try (default: 64)")
 
 
@@ -203,7 +211,13 @@ def draw(scene: Scene, found: Tolerance) -> Any:
         # Units without a result count, so that the function stays below 100 % with them.
         share = 100.0 * np.arange(len(finite) + 1) / len(found.accepted)
         if len(finite):
-            axes.step(factor * np.concatenate([finite[:1], finite]), share, where="post", color=common.BLUE, label="part of the lot below")
+            axes.step(
+                factor * np.concatenate([finite[:1], finite]),
+                share,
+                where="post",
+                color=common.BLUE,
+                label="part of the lot below",
+            )
         for end, words in zip(found.limits[name], ("lower limit", "upper limit"), strict=True):
             if end is not None:
                 axes.axvline(factor * end, color=common.ORANGE, linestyle="--", label=words)

@@ -30,10 +30,9 @@ pub struct Sheet {
 const TITLE: f64 = 16.0;
 const HEADING: f64 = 14.0;
 
-/// Height of a row of the legend, length of its sample and its largest width, gap between entries, pixels.
+/// Height of a row of the legend, length of its sample, gap between entries, pixels.
 const ROW: f64 = 20.0;
 const SAMPLE: f64 = 26.0;
-const MAX_SAMPLE_WIDTH: f64 = 10.0;
 const GAP: f64 = 18.0;
 /// Half the size of a marker, pixels.
 const MARKER: f64 = 4.0;
@@ -149,7 +148,7 @@ fn draw_legend(root: &Canvas, row: &[&Series], left: f64, width: f64, y: f64) ->
     for series in row {
         if let Some(width) = series.line {
             let ends = vec![(fine(x), fine(y)), (fine(x + SAMPLE), fine(y))];
-            root.draw(&PathElement::new(ends, stroke(series.colour, width.min(MAX_SAMPLE_WIDTH)))).map_err(failed)?;
+            root.draw(&PathElement::new(ends, stroke(series.colour, width))).map_err(failed)?;
         }
         if let Some(marker) = series.marker {
             draw_marker(root, (fine(x + 0.5 * SAMPLE), fine(y)), marker, series.colour)?;

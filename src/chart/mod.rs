@@ -50,8 +50,6 @@ pub struct Axis {
     pub scale: Scale,
     /// Range; `None` follows the data.
     pub range: Option<(f64, f64)>,
-    /// For categories: the value and name of each, in place of numbers. Empty for quantities.
-    pub names: Vec<(f64, String)>,
 }
 
 impl Axis {
@@ -109,11 +107,6 @@ impl Series {
     /// A line without markers.
     pub fn line(label: &str, points: Vec<(f64, f64)>, colour: Colour) -> Self {
         Self { label: label.to_owned(), points, colour, line: Some(LINE), marker: None }
-    }
-
-    /// A horizontal bar at height `y`, `width` pixels wide, from `ends.0` to `ends.1` on the x axis.
-    pub fn bar(label: &str, ends: (f64, f64), y: f64, width: f64, colour: Colour) -> Self {
-        Self { line: Some(width), ..Self::line(label, vec![(ends.0, y), (ends.1, y)], colour) }
     }
 
     /// Markers without a line.

@@ -15,8 +15,6 @@ pub(super) struct Ruler {
     step: f64,
     /// Whether the labels are powers of ten.
     powers: bool,
-    /// Names in place of numbers, at their positions.
-    names: Vec<(f64, String)>,
 }
 
 /// Largest number of ticks on an axis.
@@ -58,12 +56,7 @@ impl Ruler {
             minor: Vec::new(),
             step,
             powers: scale == Scale::Logarithmic && (from < -3.5 || to > 4.5),
-            names: axis.names.iter().map(|(value, name)| (position_of(*value), name.clone())).collect(),
         };
-        if !ruler.names.is_empty() {
-            ruler.ticks = ruler.names.iter().map(|name| name.0).filter(|p| (from..=to).contains(p)).collect();
-            return ruler;
-        }
         ruler.ticks = multiples(step, from, to);
         ruler.minor = match scale {
             Scale::Logarithmic if step == 1.0 => {
@@ -92,9 +85,6 @@ impl Ruler {
 
     /// Label of a tick.
     pub(super) fn label(&self, tick: f64) -> String {
-        if let Some((_, name)) = self.names.iter().find(|name| name.0 == tick) {
-            return name.clone();
-        }
         match self.scale {
             Scale::Logarithmic => {
                 let whole = (tick + 1e-9).floor();
@@ -188,13 +178,6 @@ mod tests {
         assert_eq!(words(&log, &[1e-12, 1e-2]), ["10⁻¹²", "10⁻¹⁰", "10⁻⁸", "10⁻⁶", "10⁻⁴", "10⁻²"]);
         assert_eq!(words(&log, &[3.0, 6.0]), ["5"]);
         assert_eq!(words(&log, &[3e5, 6e5]), ["5·10⁵"]);
-    }
-
-    #[test]
-    fn categories_have_names_in_place_of_numbers() {
-        let names = [(1.0, "one".to_owned()), (2.0, "two".to_owned()), (9.0, "outside".to_owned())];
-        let axis = Axis { names: names.into(), range: Some((0.5, 2.5)), ..Axis::default() };
-        assert_eq!(words(&axis, &[]), ["one", "two"]);
     }
 
     #[test]

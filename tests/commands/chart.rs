@@ -187,24 +187,6 @@ fn blue_pixels(series: Series) -> Vec<(u32, u32)> {
 }
 
 #[test]
-fn a_bar_has_the_length_of_its_values_and_the_given_thickness() {
-    let extent = |from: f64, to: f64, width: f64| {
-        let pixels = blue_pixels(Series::bar("", (from, to), 5.0, width, PALETTE[1]));
-        let span = |component: fn(&(u32, u32)) -> u32| {
-            let (low, high) =
-                (pixels.iter().map(component).min().unwrap(), pixels.iter().map(component).max().unwrap());
-            assert!(low < high);
-            high + 1 - low
-        };
-        (span(|at| at.0), span(|at| at.1))
-    };
-    let (long, thick) = extent(2.0, 8.0, 20.0);
-    let (short, thin) = extent(6.0, 4.0, 10.0);
-    assert!(long.abs_diff(3 * short) <= 3, "{long} {short}");
-    assert!(thick.abs_diff(40) <= 1 && thin.abs_diff(20) <= 1, "{thick} {thin}");
-}
-
-#[test]
 fn a_line_does_not_overshoot_its_peak() {
     // The highest coloured row of a line through `points`.
     let top = |points: &[(f64, f64)]| blue_pixels(Series::line("", points.to_vec(), PALETTE[1]))[0].1;

@@ -81,7 +81,7 @@ mod work_precision;
 pub use cost::{CaseCost, CostCase, model_costs};
 pub use many_joints::{GROWTH, LIMITS, LOOSE_MACHINES, LooseMachine, LooseSpeed, Timed, growth, loose_speed};
 pub use pareto_front::front;
-pub use points::{PointsError, cells, read_points};
+pub use points::{PointsError, read_points};
 pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};
 pub use run_context::{AnalysisError, RunContext};
 pub use setting::Setting;

@@ -100,7 +100,7 @@ pub fn read_points(scene: &Scene, file: &str, text: &str, starts: &[Start]) -> R
 }
 
 /// The cells of a line of CSV, without quotes and surrounding white space.
-pub fn cells(line: &str) -> Vec<String> {
+fn cells(line: &str) -> Vec<String> {
     let (mut all, mut cell, mut quoted) = (Vec::new(), String::new(), false);
     let mut characters = line.chars().peekable();
     while let Some(character) = characters.next() {
