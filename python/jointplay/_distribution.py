@@ -182,7 +182,11 @@ def resolve(scene: Scene, request: Request) -> dict[str, Distribution]:
         found = {}
         for key in keys:
             with At(key):
-                found[key] = _of_parameter(scene, key, request.text, diameters.get(key))
+                one = found[key] = _of_parameter(scene, key, request.text, diameters.get(key))
+            # One without limits is checked at its median.
+            for value in (one.low, one.high, float(one.quantile(np.array(0.5)))):
+                if np.isfinite(value):
+                    scene.set({key: value})
         return found
 
 
@@ -227,9 +231,4 @@ def _of_parameter(scene: Scene, key: str, text: str | None, diameter: float | No
             raise OptionError(f"a fit gives a clearance, and {key} is none")
         return radial_clearance(name, diameter)
 
-    found = parse(text, lambda part: _native.read_number(scene._native, key, part), fit)
-    # One without limits is checked at its median.
-    for value in {found.low, found.high, float(found.quantile(np.array(0.5)))}:
-        if np.isfinite(value):
-            scene.set({key: value})
-    return found
+    return parse(text, lambda part: _native.read_number(scene._native, key, part), fit)

@@ -62,3 +62,36 @@ name = "S1"
 socket = { body = "world", at = "0 0 0 mm" }
 ball = { body = "bob", at = "0 0 0 mm" }
 """
+
+
+@pytest.fixture
+def hung():
+    """Three links of 100 mm that reversed gravity pulls straight up from a fixed socket, as a scene file: the height of the last
+    one is the sum of link lengths and clearances."""
+    text = """
+start = "equilibrium"
+[gravity]
+z = "9.81 m/s^2"
+[contact]
+clearance = "0.1 mm"
+[output]
+body = "link3"
+"""
+    for n in (1, 2, 3):
+        text += f"""
+[[body]]
+name = "link{n}"
+mass = "0.2 kg"
+inertia = "2e-4 2e-4 1e-5 kg m^2"
+[[joint]]
+name = "free{n}"
+kind = "free"
+child = "link{n}"
+start = {{ position = "0 0 {100 * n - 50} mm" }}
+[[ball_joint]]
+name = "J{n}"
+socket = {{ body = "{f"link{n - 1}" if n > 1 else "world"}", at = "0 0 {50 if n > 1 else 0} mm" }}
+ball = {{ body = "link{n}", at = "0 0 -50 mm" }}
+opening = [0, 1, 0]
+"""
+    return text
