@@ -32,7 +32,8 @@ def library(name: str) -> ModuleType:
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
-        raise OptionError(f"needs {error.name}: pip install 'jointplay[studies]'") from error
+        missing = str(error.name).partition(".")[0]
+        raise OptionError(f"needs {missing}: pip install 'jointplay[studies]'") from error
 
 
 class At:

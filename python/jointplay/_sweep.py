@@ -37,7 +37,7 @@ class Sweep:
         period: Quantity | None = None,
         exponent: bool = True,
         duration: Quantity | None = None,
-        start_after: Quantity | None = None,
+        from_: Quantity | None = None,
         section: str | None = None,
         crossings: int | None = None,
         keep: str | Sequence[str] | None = None,
@@ -55,7 +55,7 @@ class Sweep:
         - `periods` drive periods, the first `discard` of them a transient, with a Poincaré section at the `phase` of each (a
           fraction of the period, 0 to below 1), a regime, and unless `exponent` is False the largest Lyapunov exponent; `period`,
           s, replaces the common period of the drives;
-        - a `duration`, s, observed from `start_after`, s, on;
+        - a `duration`, s, observed from `from_`, s, on;
         - `crossings` of `section` (`"crank.angle=90deg:up"`), the first `discard` of them a transient, within `duration`.
 
         `keep` names statistics of channels (`"A.normal:max"`) to record in place of the forces and impacts of the ball joints.
@@ -70,7 +70,7 @@ class Sweep:
             "period": period,
             "exponent": exponent,
             "duration": duration,
-            "start_after": start_after,
+            "from_": from_,
             "section": section,
             "crossings": crossings,
             "keep": keep if keep is None or isinstance(keep, str) else ",".join(keep),

@@ -86,17 +86,17 @@ impl PyStudy {
             })
         };
         let inputs = keys.iter().map(input).collect::<PyResult<_>>()?;
-        let from = from.map(|value| duration("from", &value)).transpose()?;
+        let from = from.map(|value| duration("from_", &value)).transpose()?;
         let span = match (length.map(|value| duration("duration", &value)).transpose()?, from) {
             (None, None) => RunSpan::of(&scene),
-            (None, Some(_)) => return Err(invalid(py, &"from: give the duration, too")),
+            (None, Some(_)) => return Err(invalid(py, &"from_: give the duration, too")),
             (Some(duration), from) => RunSpan { duration, from: from.unwrap_or_default() },
         };
         if span.from >= span.duration {
             let (end, from) = (span.duration, span.from);
             return Err(invalid(
                 py,
-                &format!("duration = {end}, from = {from}: the outputs must begin before the end"),
+                &format!("duration = {end}, from_ = {from}: the outputs must begin before the end"),
             ));
         }
         Ok(Self { scene, keys, inputs, outputs, entries: sources, span })

@@ -76,7 +76,7 @@ fn start(py: Python<'_>, word: &str) -> PyResult<Start> {
 fn span(py: Python<'_>, scene: &Scene, options: &Bound<'_, PyDict>) -> PyResult<Span> {
     let invalid = |message: &str| Err(option_error(py, message));
     let (periods, discard) = (count(options, "periods")?, count(options, "discard")?);
-    let (length, from) = (time(options, "duration")?, time(options, "start_after")?);
+    let (length, from) = (time(options, "duration")?, time(options, "from_")?);
     if let Some(section) = option(options, "section")? {
         let text: String = section.extract()?;
         let crossing = Crossing::parse(scene, &text);
@@ -110,13 +110,11 @@ fn span(py: Python<'_>, scene: &Scene, options: &Bound<'_, PyDict>) -> PyResult<
         (None, Some(duration)) => {
             let from = from.unwrap_or_default();
             if discard.is_some() {
-                return invalid(
-                    "discard counts periods or crossings; with duration alone, start_after ends the transient",
-                );
+                return invalid("discard counts periods or crossings; with duration alone, from_ ends the transient");
             }
             if from >= duration {
                 return invalid(&format!(
-                    "duration = {duration}, start_after = {from}: the statistics must begin before the end"
+                    "duration = {duration}, from_ = {from}: the statistics must begin before the end"
                 ));
             }
             Ok(Span::Duration { duration, from })

@@ -290,7 +290,7 @@ CLEARANCE = ["contact.clearance"]
         (lambda scene: jp.sensitivity(scene, CLEARANCE, target="5 kg"), "^target of tip-error: "),
         (lambda scene: jp.sensitivity(scene, CLEARANCE, target=float("inf")), "^target of tip-error: inf: expected a finite"),
         (lambda scene: jp.sensitivity(scene, {}), "at least one"),
-        (lambda scene: jp.sensitivity(scene, CLEARANCE, from_="1 ms"), "^from: give the duration, too"),
+        (lambda scene: jp.sensitivity(scene, CLEARANCE, from_="1 ms"), "^from_: give the duration, too"),
         (lambda scene: jp.sensitivity(scene, CLEARANCE, duration="1 ms", from_="2 ms"), "before the end"),
         (lambda scene: jp.tolerance(scene, CLEARANCE, {}), "^limits: "),
         (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": "5 kg"}), "^limit of tip-error: "),

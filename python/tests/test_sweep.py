@@ -24,7 +24,7 @@ CASES = [
     (
         "pendulum",
         {"contact.clearance": "0.05mm..0.2mm:3:log", "contact.normal_law": "hertz,flores"},
-        {"duration": "20 ms", "start_after": "5 ms", "keep": ["S1.normal:max", "energy.kinetic:mean"]},
+        {"duration": "20 ms", "from_": "5 ms", "keep": ["S1.normal:max", "energy.kinetic:mean"]},
         ["--duration", "20ms", "--from", "5ms", "--keep", "S1.normal:max,energy.kinetic:mean"],
     ),
     (
@@ -80,7 +80,7 @@ def test_listed_values_are_numbers_or_texts():
         ({"contact.clearence": [1e-4]}, {"duration": 0.01}, "did you mean"),
         ({"contact.clearance": [-1.0]}, {"duration": 0.01}, "allowed"),
         ({"contact.clearance": [1e-4]}, {"duration": "1 mm"}, "duration"),
-        ({"contact.clearance": [1e-4]}, {"duration": 0.01, "start_after": 0.02}, "before the end"),
+        ({"contact.clearance": [1e-4]}, {"duration": 0.01, "from_": 0.02}, "before the end"),
         ({"contact.clearance": [1e-4]}, {"duration": 0.01, "keep": "S1.nromal:max"}, "did you mean"),
         ({"contact.clearance": [1e-4]}, {"duration": 0.01, "start": "warm"}, "no such start"),
         ({"contact.clearance": [1e-4]}, {"periods": 3, "discard": 1}, "driven"),

@@ -1184,3 +1184,14 @@ fn control_characters_of_foreign_text_do_not_reach_the_terminal() {
     let summary = jointplay(folder.path(), &format!("run {title} --duration 1ms --summary json"));
     summary.expect(0).json();
 }
+
+#[test]
+fn a_command_of_the_package_is_answered_with_the_way_there() {
+    for word in ["sensitivity", "tolerance"] {
+        let run = jointplay(folder().path(), &format!("{word} four-bar --out out")).expect(2);
+        let expected = format!(
+            "error: `jointplay {word}` is now `./run lab {word} …`, or `python -m jointplay {word} …` after `pip install jointplay`\n"
+        );
+        assert_eq!((run.stdout.as_str(), run.stderr), ("", expected));
+    }
+}

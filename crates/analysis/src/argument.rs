@@ -1,14 +1,14 @@
-//! Names of the arguments of sweeps and studies in error messages.
+//! Names of the arguments of sweeps in error messages.
 
 use std::fmt::{Display, Formatter, Result};
 
-/// An argument of a sweep or study. `{}` writes the command-line option, `--discard`; `{:#}` writes the function argument,
+/// An argument of a sweep. `{}` writes the command-line option, `--discard`; `{:#}` writes the function argument,
 /// `discard`. Errors that contain an argument forward this choice, so that users of the library print `{error:#}`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Argument {
     /// A parameter and its values.
     Vary,
-    /// A parameter with a range or distribution.
+    /// A parameter with a range.
     Over,
     /// Whether values vary in parallel.
     Zip,

@@ -1,4 +1,4 @@
-//! The licences of what the page contains: fonts, libraries and data of others.
+//! The licences of what the page contains: fonts and libraries of others.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -12,9 +12,6 @@ use crate::pack::{failed, files};
 /// The target of the page's library, and its package.
 const TARGET: &str = "wasm32-unknown-unknown";
 const PACKAGE: &str = "jointplay";
-/// Data with a licence in their source.
-const DATA: [(&str, &str); 1] =
-    [("Direction numbers of Sobol sequences", "crates/analysis/src/sampling/direction_numbers.rs")];
 /// Texts for packages that come without one, the first choice first.
 const STANDARD: [(&str, &str); 3] =
     [("Apache-2.0", APACHE), ("MIT", MIT), ("BSD-2-Clause", "tools/web/licences/BSD-2-Clause.txt")];
@@ -28,12 +25,6 @@ pub fn licences(root: &Path) -> Result<String, String> {
     let mut document = Document::default();
     document.add("Jointplay", "MIT OR Apache-2.0", &[standard(MIT)?, apache.clone()]);
     document.add("Standard library of Rust", "MIT OR Apache-2.0", &[apache]);
-    for (name, source) in DATA {
-        let source = standard(source)?;
-        let comment = source.lines().skip_while(|line| !line.starts_with("// Copyright"));
-        let text: Vec<_> = comment.map_while(|line| line.strip_prefix("//")).map(str::trim_end).collect();
-        document.add(name, "BSD-3-Clause", &[text.join("\n")]);
-    }
     let contained = contained(root)?;
     let metadata = cargo(root, &["metadata", "--format-version", "1", "--filter-platform", TARGET])?;
     let metadata: Value = serde_json::from_str(&metadata).map_err(|e| format!("cargo metadata: {e}"))?;
