@@ -139,9 +139,7 @@ class Study:
 
     def _run(self, values: Any, threads: int | None, progress: Progress | None, record: Path | None) -> Runs:
         table = np.atleast_2d(np.asarray(values, dtype=float))
-        workers = (os.cpu_count() or 1) if threads is None else threads
-        if workers < 1:
-            raise OptionError(f"threads = {threads}: allowed at least 1")
+        workers = (os.cpu_count() or 1) if threads is None else whole("threads", threads, 1, 1024)
         if len(table) and table.shape[1] == len(self._distributions):
             # All values are allowed if the extremes are.
             self._native.alone(list(zip(table.min(0).tolist(), table.max(0).tolist(), strict=True)))

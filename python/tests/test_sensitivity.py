@@ -189,7 +189,7 @@ def test_effects_beside_a_run_that_failed_are_left_out():
 
     effects, _ = _sensitivity._screen(Machine(function, LAWS), 3, 5)
     assert all(one.mean == pytest.approx(c, abs=1e-13) for one, c in zip(effects.values(), COEFFICIENTS))
-    effects, kept = _sensitivity._screen(Machine(lambda u: np.full(len(u), np.nan), LAWS), 3, 5)
+    effects, _ = _sensitivity._screen(Machine(lambda u: np.full(len(u), np.nan), LAWS), 3, 5)
     assert list(effects.values()) == [None] * 4
 
 

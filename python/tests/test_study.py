@@ -102,9 +102,7 @@ def test_a_fit_is_that_of_every_ball(scene, key, expected):
 def test_a_shared_clearance_takes_the_fit_of_the_only_ball():
     text = sizes(30).toml
     text = text[: text.index('[[body]]\nname = "b2"')].replace('name = "S1"', 'name = "S1"\nball_radius = "30 mm"')
-    lot = jp.tolerance(
-        jp.Scene.from_toml(text), {"contact.clearance": "H7/g6"}, {"peak-force": 1.0}, runs=4096, duration="1 us"
-    )
+    lot = jp.tolerance(jp.Scene.from_toml(text), {"contact.clearance": "H7/g6"}, {"peak-force": 1.0}, runs=4096, duration="1 us")
     assert lot.values.min() >= 5e-6 and lot.values.max() <= 29.5e-6 and lot.values.mean() == pytest.approx(17.25e-6, rel=1e-3)
 
 
@@ -233,7 +231,9 @@ def test_a_panic_within_a_study_is_an_internal_error(work, calls):
     assert seen[0] == 0.0 and len(seen) == calls + 1
 
 
-@pytest.mark.parametrize("limit", ["", "uniform", "uniform(1um, 2um", "uniform(10um)", "gauss(1um)", "measured()", "(1um)", "1um.."])
+@pytest.mark.parametrize(
+    "limit", ["", "uniform", "uniform(1um, 2um", "uniform(10um)", "gauss(1um)", "measured()", "(1um)", "1um.."]
+)
 def test_what_is_no_distribution_is_refused(limit):
     with pytest.raises(jp.OptionError, match="^over: contact.clearance: "):
         jp.Study(jp.Scene.load("four-bar"), {"contact.clearance": limit})
@@ -252,7 +252,10 @@ CLEARANCE = ["contact.clearance"]
     "work, message",
     [
         (lambda scene: jp.sensitivity(scene, {"contact.clearence": None}), "did you mean `contact.clearance`"),
-        (lambda scene: jp.Study(scene, ["joint.*.clearence"]), "^over: no number of the scene matches joint.*.clearence .did you"),
+        (
+            lambda scene: jp.Study(scene, ["joint.*.clearence"]),
+            "^over: no number of the scene matches joint.*.clearence .did you",
+        ),
         (lambda scene: jp.Study(scene, ["contact.friction_law"]), "its values are not real numbers|no number"),
         (lambda scene: jp.Study(scene, {"contact.clearance": "normal(1mm)"}), "contact.clearance: `normal(1mm)` is not a dist"),
         (lambda scene: jp.Study(scene, {"contact.clearance": "uniform(1mm, 5 s)"}), "`uniform(1mm, 5 s)`: 5 s: wrong unit"),
@@ -297,7 +300,10 @@ CLEARANCE = ["contact.clearance"]
         (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": (2.0, 1.0)}), "must be below the upper one"),
         (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": ".."}), "expected a value, or LOW..HIGH"),
         (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": (None, None)}), "expected a value, or LOW..HIGH"),
-        (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, sampling="sobl"), "^sampling = 'sobl': there are: sobol"),
+        (
+            lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, sampling="sobl"),
+            "^sampling = 'sobl': there are: sobol",
+        ),
         (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, runs=0), "^runs = 0: allowed .* 2 to 1000000"),
         (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, yield_=99), "^yield = 99: allowed above 0 up to 1"),
         (lambda scene: jp.tolerance(scene, CLEARANCE, {"tip-error": 1.0}, cost={}), "^cost: "),

@@ -15,7 +15,9 @@ import jointplay as jp
 from jointplay import __main__ as command
 from jointplay import _study_command
 
-SENSITIVITY = "sensitivity hung.toml --duration 1ms --over joint.*.clearance=0.05mm..0.15mm --output link3.pose.z:end --out out --quiet"
+SENSITIVITY = (
+    "sensitivity hung.toml --duration 1ms --over joint.*.clearance=0.05mm..0.15mm --output link3.pose.z:end --out out --quiet"
+)
 FOUR_BAR = "tolerance four-bar --set solver.preset=real-time --duration 20ms --quiet --out t"
 TOLERANCES = """# Both joints
 parameter,distribution
@@ -116,7 +118,7 @@ def test_an_interrupted_command_resumes(hung, tmp_path):
     start = [sys.executable, "-P", "-m", "jointplay", *line, "--threads=1"]
 
     def runs(*more):
-        return subprocess.run([*start, *more], cwd=tmp_path, capture_output=True, text=True)
+        return subprocess.run([*start, *more], cwd=tmp_path, capture_output=True, text=True, check=False)
 
     assert runs("--rows=128", "--out=whole").returncode == 0
     child = subprocess.Popen([*start, "--rows=128"], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
@@ -139,7 +141,9 @@ def test_an_interrupted_command_resumes(hung, tmp_path):
 
 def test_a_tolerance_folder_has_what_the_package_computes(call, tmp_path):
     (tmp_path / "tolerances.csv").write_text(TOLERANCES)
-    (tmp_path / "costs.csv").write_text("parameter,fit,cost\njoint.A.clearance,0.05mm..0.2mm,1\njoint.A.clearance,0.05mm..0.1mm,2\n")
+    (tmp_path / "costs.csv").write_text(
+        "parameter,fit,cost\njoint.A.clearance,0.05mm..0.2mm,1\njoint.A.clearance,0.05mm..0.1mm,2\n"
+    )
     line = f"{FOUR_BAR} --limit peak-force=140N --limit impacts=7..12 --tolerances tolerances.csv --runs 32 --seed 2"
     code, printed, _ = call(line, "--cost=costs.csv", "--yield=30%", "--summary=json")
     assert code == 0
@@ -149,7 +153,14 @@ def test_a_tolerance_folder_has_what_the_package_computes(call, tmp_path):
     limits = {"peak-force": 140.0, "impacts": (7, 12)}
     expected = jp.tolerance(scene, over, limits, runs=32, seed=2, cost=cost, yield_=0.3, duration="20 ms")
     results = json.loads(printed)
-    assert names(tmp_path / "t") == ["manifest.json", "runs.csv", "tolerance.csv", "tolerance.json", "tolerance.png", "tolerance.svg"]
+    assert names(tmp_path / "t") == [
+        "manifest.json",
+        "runs.csv",
+        "tolerance.csv",
+        "tolerance.json",
+        "tolerance.png",
+        "tolerance.svg",
+    ]
     assert names(tmp_path) == ["costs.csv", "t", "tolerances.csv"]
     assert results["yield"] == expected.yield_._asdict() and results["accepted"] == expected.accepted.sum()
     assert (results["units"], results["missed"], results["not_started"], results["diverged"]) == (32, expected.missed, 0, 0)
@@ -159,7 +170,10 @@ def test_a_tolerance_folder_has_what_the_package_computes(call, tmp_path):
     assert (force["mean"], force["upper"], force["lower"]) == (expected.qualities["peak-force"].mean, 140.0, None)
     distances = [driver["distance"] for driver in results["reject_drivers"]]
     assert distances == sorted(distances, reverse=True) and len(distances) == 3
-    assert results["fits"]["best"]["cost"] == expected.fits.best.cost and results["fits"]["check"]["verdict"] == expected.fits.verdict
+    assert (
+        results["fits"]["best"]["cost"] == expected.fits.best.cost
+        and results["fits"]["check"]["verdict"] == expected.fits.verdict
+    )
     table = pandas.read_csv(tmp_path / "t" / "tolerance.csv", keep_default_na=False, na_values="NaN")
     pandas.testing.assert_frame_equal(expected.to_pandas(), table, rtol=1e-11, check_dtype=False)
     code, text, _ = call(line, "--force", "--over=joint.A.clearance=0.1mm..0.11mm")
@@ -226,16 +240,28 @@ def test_errors_of_tables_name_the_line(call, tmp_path, option, text, message):
     [
         (f"{FOUR_BAR} --limit peak-force=140", 2, "--over: give at least one parameter, or --tolerances"),
         (f"{FOUR_BAR} --limit peak-force=140 --tolerances none.csv", 1, "none.csv"),
-        (f"{FOUR_BAR} --limit peak-force=140 --tolerances /dev/zero", 2, "/dev/zero: this is a folder, a pipe, a socket or a device"),
+        (
+            f"{FOUR_BAR} --limit peak-force=140 --tolerances /dev/zero",
+            2,
+            "/dev/zero: this is a folder, a pipe, a socket or a device",
+        ),
         (f"{FOUR_BAR} --limit peak-force --over contact.friction", 2, "--limit peak-force: expected OUTPUT=LIMIT"),
-        (f"{FOUR_BAR} --limit peak-force=1mm --over contact.friction", 2, "limit of peak-force: expected a number for peak-force in N"),
+        (
+            f"{FOUR_BAR} --limit peak-force=1mm --over contact.friction",
+            2,
+            "limit of peak-force: expected a number for peak-force in N",
+        ),
         (f"{FOUR_BAR} --limit peak-force=3..2 --over contact.friction", 2, "the lower limit must be below"),
         (f"{FOUR_BAR} --limit impacts=1 --limit impacts=2 --over contact.friction", 2, "impacts has a limit already"),
         (f"{FOUR_BAR} --limit peak-forc=1 --over contact.friction", 2, "output: peak-forc: "),
         (f"{FOUR_BAR} --limit peak-force=1 --yield 99 --over contact.friction", 2, "--yield 99: expected a part of the lot"),
         (f"{FOUR_BAR} --limit peak-force=1 --runs 1 --over contact.friction", 2, "runs = 1: allowed whole numbers from 2"),
         (f"{FOUR_BAR} --limit peak-force=1 --over contact.friction --set contact.clearance", 2, "expected KEY=VALUE"),
-        ("sensitivity four-bar --out out --over contact.friction=-1..2", 2, "--over contact.friction=-1..2: contact.friction = -1: out of"),
+        (
+            "sensitivity four-bar --out out --over contact.friction=-1..2",
+            2,
+            "--over contact.friction=-1..2: contact.friction = -1: out of",
+        ),
         ("sensitivity four-bar --out out --over joint.A.clearance --rows 4", 2, "rows = 4: allowed"),
         ("sensitivity four-bar --out out --over joint.A.clearance --target 1kg", 2, "target of tip-error: "),
         ("sensitivity four-bar --out out --over joint.A.clearance --from 1ms", 2, "from_: give the duration, too"),
@@ -250,7 +276,9 @@ def test_wrong_input_is_answered_in_a_sentence(call, tmp_path, line, code, messa
 
 def test_a_library_that_is_missing_is_named(call, monkeypatch):
     monkeypatch.setitem(sys.modules, "SALib.sample.morris", None)
-    code, _, error = call("sensitivity pendulum --over contact.friction --output peak-force --screen 2 --duration 1ms --quiet --out out")
+    code, _, error = call(
+        "sensitivity pendulum --over contact.friction --output peak-force --screen 2 --duration 1ms --quiet --out out"
+    )
     assert code == 2 and error.endswith("needs SALib: pip install 'jointplay[studies]'\n")
 
 

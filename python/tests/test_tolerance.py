@@ -20,7 +20,12 @@ def machine():
 
 def test_yields_have_wilsons_interval():
     # Newcombe 1998, Statistics in Medicine 17, 857-872, table I, method 3.
-    for accepted, units, low, high in [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0, 0.1611), (1, 29, 0.0061, 0.1718)]:
+    for accepted, units, low, high in [
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (0, 20, 0, 0.1611),
+        (1, 29, 0.0061, 0.1718),
+    ]:
         found = _tolerance.wilson(np.arange(units) < accepted)
         assert found == pytest.approx((accepted / units, low, high), abs=5e-5)
 
@@ -104,7 +109,9 @@ def test_a_yield_counts_the_runs_that_hold_all_limits():
     assert list(found.drivers) == ["joint.A.clearance", "joint.B.clearance", "contact.friction"]
     for values, driver in zip(found.values.T, found.drivers.values(), strict=True):
         good, bad = np.sort(values[accepted]), np.sort(values[~accepted])
-        distance = max(abs(np.searchsorted(good, v, "right") / len(good) - np.searchsorted(bad, v, "right") / len(bad)) for v in values)
+        distance = max(
+            abs(np.searchsorted(good, v, "right") / len(good) - np.searchsorted(bad, v, "right") / len(bad)) for v in values
+        )
         assert driver.distance == pytest.approx(distance, abs=1e-12)
     assert (found.values[:, :2] >= 0.05e-3).all() and (found.values[:, :2] <= 0.2e-3).all()
     again = pickle.loads(pickle.dumps(found))
