@@ -1,11 +1,16 @@
 """`python -m jointplay sensitivity` and `tolerance`: folders, tables, resuming, and answers to wrong input."""
 
+import argparse
 import json
 import os
+import re
+import shlex
 import signal
 import subprocess
 import sys
 import time
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pandas
@@ -14,6 +19,8 @@ import pytest
 import jointplay as jp
 from jointplay import __main__ as command
 from jointplay import _study_command
+
+ROOT = Path(__file__).resolve().parents[2]
 
 SENSITIVITY = (
     "sensitivity hung.toml --duration 1ms --over joint.*.clearance=0.05mm..0.15mm --output link3.pose.z:end --out out --quiet"
@@ -39,6 +46,19 @@ def call(tmp_path, monkeypatch, capsys):
         return code, *capsys.readouterr()
 
     return run
+
+
+def test_the_documents_give_arguments_that_exist():
+    lines = []
+    for document in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        text = document.read_text().replace("\\\n", " ")
+        lines += re.findall(r"^\./run lab ((?:sensitivity|tolerance) .*)", text, re.MULTILINE)
+    assert len(lines) >= 6
+    for line in lines:
+        name, *words = shlex.split(line)
+        parser = argparse.ArgumentParser(exit_on_error=False)
+        import_module(f"jointplay.{command.COMMANDS[name][0]}").add_arguments(parser)
+        assert parser.parse_args(words).over or "--tolerances" in line
 
 
 def names(folder):
