@@ -64,6 +64,8 @@ class FitChoice(NamedTuple):
 
     fits: dict[str, str]
     """Fit of each parameter, as it was given."""
+    costs: dict[str, float]
+    """Cost of each of them."""
     cost: float
     """Sum of the costs."""
     yield_: Estimate
@@ -378,8 +380,8 @@ def _cheapest(
     best, check, verdict = None, None, None
     if search.best is not None:
         chosen = {key: own[i] for (key, own), i in zip(candidates.items(), search.best, strict=True)}
-        total = sum(one.cost for one in chosen.values())
-        best = FitChoice({key: one.text for key, one in chosen.items()}, total, yields[search.best])
+        fits, costs = ({key: getattr(one, name) for key, one in chosen.items()} for name in ("text", "cost"))
+        best = FitChoice(fits, costs, sum(costs.values()), yields[search.best])
         check = yield_of("fits-check", search.best, independent)
         verdict = "held" if check.low >= required else "missed" if check.high < required else "open"
     unchecked = [key for key, own in candidates.items() if len(own) > 1 and not all(one.distribution.is_limited for one in own)]

@@ -102,7 +102,7 @@ def summary(found: Tolerance) -> dict[str, Any]:
         "best": found.fits.best
         and {
             "cost": found.fits.best.cost,
-            "fits": [{"key": key, "fit": fit} for key, fit in found.fits.best.fits.items()],
+            "fits": [{"key": key, "fit": fit, "cost": found.fits.best.costs[key]} for key, fit in found.fits.best.fits.items()],
             "yield": found.fits.best.yield_,
         },
         "is_proven": found.fits.is_proven,
@@ -189,7 +189,8 @@ def fits_in_words(fits: Fits, evaluations: int) -> str:
         if not fits.is_proven:
             proof = f"not proven the cheapest: --evaluations {evaluations} ended the search"
         text = f"\nFits for a yield of {required}: cost {fits.best.cost:g}, {proof}; {effort} tried\n"
-        text += common.table(("parameter", "fit"), fits.best.fits.items())
+        rows = [[key, fit, f"{fits.best.costs[key]:g}"] for key, fit in fits.best.fits.items()]
+        text += common.table(("parameter", "fit", "cost"), rows)
         text += f"Yield {percent(fits.best.yield_)} in the lot of the search\n"
     if fits.check and fits.verdict:
         text += f"Yield {percent(fits.check)} in another lot: {VERDICTS[fits.verdict]}\n"
