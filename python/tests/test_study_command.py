@@ -188,6 +188,9 @@ def test_a_tolerance_folder_has_what_the_package_computes(call, tmp_path):
     # The largest of 32 is above the 99 % percentile with a probability of 1 - 0.99^32 = 28 %: its upper end is unknown.
     assert force["percentile_99"]["high"] is None and expected.qualities["peak-force"].percentiles[99].high == np.inf
     assert (force["mean"], force["upper"], force["lower"]) == (expected.qualities["peak-force"].mean, 140.0, None)
+    best = expected.fits.best
+    rows = [{"key": key, "fit": fit, "cost": cost["joint.A.clearance"][fit]} for key, fit in best.fits.items()]
+    assert results["fits"]["best"]["fits"] == rows and sum(row["cost"] for row in rows) == best.cost
     distances = [driver["distance"] for driver in results["reject_drivers"]]
     assert distances == sorted(distances, reverse=True) and len(distances) == 3
     assert (
