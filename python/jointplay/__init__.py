@@ -18,7 +18,7 @@ from ._study import Estimate, Runs, Study
 from ._sweep import Sweep, SweepResult, sweep
 from ._tolerance import FitChoice, Fits, Quality, RejectDriver, Tolerance, tolerance
 from ._tradeoff import Tradeoff, tradeoff
-from .errors import ChannelError, DoubtWarning, InternalError, JointplayError, OptionError, SceneError, Stopped
+from .errors import ChannelError, DoubtWarning, InternalError, JointplayError, OmissionWarning, OptionError, SceneError, Stopped
 
 __all__ = [
     "Changes",
@@ -34,6 +34,7 @@ __all__ = [
     "Indices",
     "InternalError",
     "JointplayError",
+    "OmissionWarning",
     "OptionError",
     "Parameter",
     "Quality",

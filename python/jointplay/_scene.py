@@ -6,6 +6,7 @@ import html
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,29 @@ class Scene:
         Numbers in place of quantities are SI. `toml` of the scene is the file that describes the same machine.
         """
         return cls.from_toml(_native.Scene.text_of(dict(machine)), folder=folder)
+
+    @classmethod
+    def from_mjcf(cls, source: str | os.PathLike[str]) -> Scene:
+        """The machine of an MJCF file, or of its text, compiled by MuJoCo (extra `robots`), with its meshes.
+
+        `notes` says what the scene does not have of it; a `jp.OmissionWarning` repeats that.
+        """
+        from . import _robots
+
+        return _robots.warned(_robots.scene_of(source, "mujoco")[0])
+
+    @classmethod
+    def from_urdf(cls, source: str | os.PathLike[str]) -> Scene:
+        """The machine of a URDF file, or of its text, as `from_mjcf`. Meshes of packages are sought in the folders above the file."""
+        from . import _robots
+
+        return _robots.warned(_robots.scene_of(source, "robot")[0])
+
+    @property
+    def notes(self) -> list[str]:
+        """Comments at the head of its text: of an imported robot, what the scene does not have."""
+        head = takewhile(lambda line: line.startswith("#"), self.toml.splitlines())
+        return [line.lstrip("# ") for line in head]
 
     @property
     def name(self) -> str:

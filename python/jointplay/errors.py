@@ -68,3 +68,7 @@ class InternalError(JointplayError, RuntimeError):
 
 class DoubtWarning(UserWarning):
     """A reason to doubt the results of a run."""
+
+
+class OmissionWarning(UserWarning):
+    """Parts of a robot description that the scene made of it does not have."""
