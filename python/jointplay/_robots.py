@@ -39,6 +39,8 @@ PLACEHOLDER = 2e-14
 """Mass, kg, and moments, kg m^2, that MuJoCo just accepts: for moving links without mass, which have 0 in the scene."""
 ALL_MESHES = 8 << 20
 """Bytes that the mesh files of a scene may have together."""
+MAX_BYTES = 64 << 20
+"""Largest description, bytes."""
 FORMATS = {"mujoco": "<mujoco> (MJCF)", "robot": "<robot> (URDF)"}
 """Formats by their first element."""
 
@@ -79,6 +81,8 @@ def scene_of(source: str | os.PathLike[str], kind: str | None, folder: str | Non
         raise OptionError("a robot description needs mujoco: pip install 'jointplay[robots]'")
     path = None if isinstance(source, str) and "<" in source else Path(source)
     description = Description(path.name if path else "description")
+    if path and path.exists() and not (path.is_file() and path.stat().st_size <= MAX_BYTES):
+        raise description.refused(f"is not a file of at most {MAX_BYTES >> 20} MiB")
     text = str(source) if path is None else path.read_bytes().decode("utf-8-sig", "replace")
     root = re.search(r"<([A-Za-z_][^\s/>]*)", re.sub(r"<!--.*?-->|<[?!].*?>", "", text, flags=re.DOTALL))
     if root is None:
@@ -96,7 +100,9 @@ def scene_of(source: str | os.PathLike[str], kind: str | None, folder: str | Non
         try:
             return Scene.from_toml(scene_text, folder=scratch), writer.meshes
         except SceneError as error:
-            raise description.refused(f"a scene cannot hold this machine: {error}") from error
+            # The lines of the scene mean nothing to who has none.
+            message = re.sub(r"^line \d+, column \d+: ", "", str(error).splitlines()[0])
+            raise description.refused(f"a scene cannot hold this machine: {message}") from error
 
 
 def warned(scene: Scene) -> Scene:
@@ -310,11 +316,14 @@ class Writer:
         carried = self.mass.copy()
         for b in range(model.nbody - 1, 0, -1):
             carried[model.body_parentid[b]] += carried[b]
+        # Bodies without joints are parts of those that carry them.
         self.owner, self.place = [0], [np.eye(4)]
+        self.parts: dict[int, list[int]] = {0: [0]}
         for b in range(1, model.nbody):
             parent, name = model.body_parentid[b], self.raw_bodies[b]
             is_own = model.body_jntnum[b] > 0
             self.owner.append(b if is_own else self.owner[parent])
+            self.parts.setdefault(self.owner[b], []).append(b)
             self.place.append(np.eye(4) if is_own else self.place[parent] @ _frame(model.body_pos[b], model.body_quat[b]))
             if not is_own and self.owner[b]:
                 self.note("part of another body, without a joint", f"{name} of {self.raw_bodies[self.owner[b]]}")
@@ -380,7 +389,7 @@ class Writer:
     def body(self, b: int) -> None:
         """A body with the mass of its parts."""
         model = self.model
-        parts = [part for part in range(b, model.nbody) if self.owner[part] == b and self.mass[part] > 0.0]
+        parts = [part for part in self.parts[b] if self.mass[part] > 0.0]
         frames = [self.place[part] @ _frame(model.body_ipos[part], model.body_iquat[part]) for part in parts]
         masses, centres = self.mass[parts], np.array([frame[:3, 3] for frame in frames]).reshape(-1, 3)
         centre = masses @ centres / (masses.sum() or 1.0)
@@ -403,11 +412,12 @@ class Writer:
     def shapes(self, owner: int) -> list[_Keys]:
         """Shapes of a body and its parts, or of the world: those that MuJoCo's viewer shows at first; of a URDF, its visuals."""
         model, kinds, found = self.model, mujoco.mjtGeom, []
-        for g in range(model.ngeom):
-            b, group, material = model.geom_bodyid[g], model.geom_group[g], model.geom_matid[g]
+        geoms = ((b, model.body_geomadr[b] + n) for b in self.parts[owner] for n in range(model.body_geomnum[b]))
+        for b, g in geoms:
+            group, material = model.geom_group[g], model.geom_matid[g]
             has_colour = material < 0 or not np.allclose(model.geom_rgba[g], (0.5, 0.5, 0.5, 1.0))
             rgba = model.geom_rgba[g] if has_colour else model.mat_rgba[material]
-            if self.owner[b] != owner or rgba[3] == 0.0 or not (group == 1 if self.description.is_urdf else group < 3):
+            if rgba[3] == 0.0 or not (group == 1 if self.description.is_urdf else group < 3):
                 continue
             frame, size = self.place[b] @ _frame(model.geom_pos[g], model.geom_quat[g]), model.geom_size[g]
             kind = model.geom_type[g]

@@ -62,13 +62,6 @@ pub enum Command {
     Schema,
 }
 
-/// `import`.
-#[derive(Debug, Args)]
-pub struct ImportArguments {
-    /// The description: a file whose root is <robot> (URDF) or <mujoco> (MJCF). Its meshes are read beside it or in folders below it.
-    pub file: PathBuf,
-}
-
 /// A scene and what to change in it.
 #[derive(Debug, Args)]
 pub struct SceneArguments {

@@ -3,7 +3,7 @@
 use std::ffi::{OsStr, OsString};
 
 /// A command that the Python package took over, as the package names it.
-const IN_PACKAGE: &[(&str, &str)] = &[("reproduce", "paper"), ("sensitivity", "sensitivity"), ("tolerance", "tolerance")];
+const IN_PACKAGE: &[(&str, &str)] = &[("import", "import"), ("reproduce", "paper"), ("sensitivity", "sensitivity"), ("tolerance", "tolerance")];
 
 /// Other commands and options, each with the command that has it, and what to do in place of it.
 const GONE: &[(&str, &str, &str)] = &[];

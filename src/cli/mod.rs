@@ -8,7 +8,6 @@ mod drivers;
 mod failure;
 mod gone;
 mod impacts;
-mod import;
 mod interrupt;
 #[cfg_attr(not(feature = "gui"), path = "no_link.rs")]
 mod link;
