@@ -13,6 +13,15 @@ prepare_python() {
     cp python/requirements.txt "$python_env/.from"
 }
 
+# Public robot descriptions: files of packages, for the long tests.
+prepare_robots() {
+    local packages=(gymnasium==1.4.0 dm_control==1.0.50 example-robot-data==6.0.0)
+    [[ $(cat target/robots/.from 2> /dev/null) != "${packages[*]}" ]] || return 0
+    rm -rf target/robots
+    "$python_env/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --no-compile --target target/robots "${packages[@]}"
+    echo "${packages[*]}" > target/robots/.from
+}
+
 # Builds the wheel, installs it as a user would, and tests it.
 python_test() {
     local wheels=$python_env/wheels

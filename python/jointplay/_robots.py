@@ -118,7 +118,11 @@ def _warnings_into(description: Description) -> Iterator[None]:
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: description.note("MuJoCo", " ".join(str(text).split())))
     try:
-        yield
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            yield
+        for one in found:
+            description.note("MuJoCo", " ".join(str(one.message).split()))
     finally:
         mujoco.set_mju_user_warning(before)
 
@@ -178,7 +182,7 @@ def _urdf(description: Description, text: str, path: Path | None) -> mujoco.MjMo
     assets: dict[str, bytes] = {}
     for link in root.findall("link"):
         _mass_of_link(description, link)
-        for shape in link.findall("visual") + link.findall("collision"):
+        for shape in link.findall("visual"):
             # Names of shapes serve nothing here, and MuJoCo complains about equal ones.
             shape.attrib.pop("name", None)
             mesh = shape.find("geometry/mesh")
@@ -220,15 +224,15 @@ def _mass_of_link(description: Description, link: ElementTree.Element) -> None:
 
     if collisions:
         description.note("omitted: contact of body", name)
-    if inertial is None and collisions:
-        description.note("mass from collision shapes of 1000 kg/m^3: link without <inertial>", name)
-        return
     for collision in collisions:
+        # MuJoCo would compute the mass of a link without <inertial> from them; the format says that it has none.
         link.remove(collision)
     moments = _moments(numbers("inertia", "ixx iyy izz ixy ixz iyz"))
     is_massless = numbers("mass", "value")[0] <= 0.0
     if is_massless:
         description.massless.add(name)
+        if moments[2] > PLACEHOLDER:
+            description.note("altered to 0: inertia of link without mass", name)
         for old in link.findall("inertial"):
             link.remove(old)
         inertial = ElementTree.SubElement(link, "inertial")
