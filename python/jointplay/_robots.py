@@ -445,7 +445,7 @@ class Writer:
                 colour = "#" + "".join(f"{round(255 * min(max(float(part), 0.0), 1.0)):02x}" for part in rgba[:3])
                 found.append(keys | {"colour": colour})
             elif kind == kinds.mjGEOM_MESH.value:
-                self.note("not drawn without a folder for it: mesh", self.raw("MESH", model.geom_dataid[g]))
+                self.note("not drawn, because no folder is given: mesh", self.raw("MESH", model.geom_dataid[g]))
             else:
                 self.note(f"not drawn: {kinds(int(kind)).name[7:].lower()}", f"{self.raw('GEOM', g)} of {self.raw_bodies[b]}")
         return found

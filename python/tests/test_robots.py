@@ -138,8 +138,10 @@ ARM = """<body name="upper" pos="0 0.1 1" euler="10 20 30"><joint name="hip_x" a
             "",
         ),
         (
-            f'<body name="a" euler="0 30 0"><joint axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/><body name="b" pos="0.5 0 0" '
-            f'euler="5 6 7"><joint type="ball" pos="0 0.1 0"/>{BALL}<geom size="0.05" pos="0.2 0 0.1"/></body></body>',
+            (
+                f'<body name="a" euler="0 30 0"><joint axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/><body name="b" pos="0.5 0 0" '
+                f'euler="5 6 7"><joint type="ball" pos="0 0.1 0"/>{BALL}<geom size="0.05" pos="0.2 0 0.1"/></body></body>'
+            ),
             "",
         ),
         (
@@ -147,15 +149,21 @@ ARM = """<body name="upper" pos="0 0.1 1" euler="10 20 30"><joint name="hip_x" a
             "",
         ),
         (
-            '<replicate count="3" offset="1 0 0" euler="0 0 20"><body name="b"><joint axis="0 1 0"/>'
-            '<geom size="0.1" pos="0.3 0 0"/></body></replicate>',
+            (
+                '<replicate count="3" offset="1 0 0" euler="0 0 20"><body name="b"><joint axis="0 1 0"/>'
+                '<geom size="0.1" pos="0.3 0 0"/></body></replicate>'
+            ),
             "",
         ),
         (
-            '<body name="a" childclass="stiff"><joint name="one"/><geom size="0.1" pos="0.1 0.2 0"/><body name="b" pos="1 0 0">'
-            '<joint class="main" axis="0 0 1"/><geom size="0.1" pos="0.3 0.1 0"/></body></body>',
-            '<default><geom density="2000"/><default class="stiff"><joint stiffness="20" springref="33" axis="0 1 0"/></default>'
-            "</default>",
+            (
+                '<body name="a" childclass="stiff"><joint name="one"/><geom size="0.1" pos="0.1 0.2 0"/><body name="b" pos="1 0 0">'
+                '<joint class="main" axis="0 0 1"/><geom size="0.1" pos="0.3 0.1 0"/></body></body>'
+            ),
+            (
+                '<default><geom density="2000"/><default class="stiff"><joint stiffness="20" springref="33" axis="0 1 0"/></default>'
+                "</default>"
+            ),
         ),
         ('<body name="b" gravcomp="0.7" euler="0 9 0"><joint axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/></body>', ""),
     ],
@@ -261,8 +269,8 @@ def test_a_weld_holds_two_bodies_together(weld):
     x, z = 0.5 + 0.1 * math.cos(math.pi / 6), -0.1 * math.sin(math.pi / 6)
     text = mjcf(
         '<body name="rod"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0.5 0 0" size="0.02"/>'
-        f'<site name="tip" pos="0.5 0 0" euler="0 30 0"/></body><body name="weight" pos="{x!r} 0 {z!r}" euler="0 30 0"><freejoint/>'
-        '<geom type="box" size="0.1 0.05 0.02"/><site name="eye" pos="-0.1 0 0"/></body>'
+        f'<site name="tip" pos="0.5 0 0" euler="0 45 0"/></body><body name="weight" pos="{x!r} 0 {z!r}" euler="0 30 0"><freejoint/>'
+        '<geom type="box" size="0.1 0.05 0.02"/><site name="eye" pos="-0.1 0 0" euler="0 15 0"/></body>'
     )
     text = text.replace("</mujoco>", f'<equality><weld name="w" {weld}/></equality></mujoco>')
     scene = imported(text)
@@ -432,7 +440,7 @@ def test_inertias_that_no_body_has_are_balanced_and_named():
     assert inertia == pytest.approx(model.body("flat").inertia[0], rel=1e-12)
 
 
-def test_meshes_of_packages_are_found_and_equal_names_are_told_apart(tmp_path):
+def test_meshes_of_packages_are_found_and_equal_names_are_told_apart(tmp_path, capsys):
     for folder, scale in (("visual", 1.0), ("other", 2.0)):
         (tmp_path / "pkg" / folder).mkdir(parents=True)
         (tmp_path / "pkg" / folder / "part.stl").write_bytes(stl(scale * TETRAHEDRON))
@@ -441,11 +449,16 @@ def test_meshes_of_packages_are_found_and_equal_names_are_told_apart(tmp_path):
     def shape(name):
         return f'<visual name="same"><geometry><mesh filename="{name}"/></geometry></visual>'
 
-    shapes = [shape(f"package://pkg/{name}") for name in ("visual/part.stl", "other/part.stl", "visual/part.dae", "none.stl")]
+    (tmp_path / "pkg" / "broken.stl").write_bytes(b"nothing")
+    names = ("visual/part.stl", "other/part.stl", "visual/part.dae", "none.stl", "broken.stl")
+    shapes = [shape(f"package://pkg/{name}") for name in names]
     file = tmp_path / "pkg" / "urdf" / "r.urdf"
     file.write_text(robot(link("arm", more="".join(shapes)), joint("a", "continuous", "base", "arm")))
     scene = imported(file, "urdf")
     assert note(scene, "not drawn: mesh that is missing") == ["package://pkg/visual/part.dae", "package://pkg/none.stl"]
+    assert note(scene, "not drawn: mesh that MuJoCo refuses") == ["broken-2.stl"]
+    main(["import", str(file)])
+    assert len(note(jp.Scene.from_toml(capsys.readouterr().out), "not drawn, because no folder is given")) == 2
     main(["import", str(file), "--out", str(tmp_path / "r.toml")])
     spans = sorted(float(np.ptp(corners_of(path.read_bytes()), 0).max()) for path in (tmp_path / "r-meshes").iterdir())
     # Turned to principal axes, an edge of a tetrahedron spans between 1 and sqrt(2) times its length.
@@ -539,7 +552,7 @@ def body(inside):
         (
             "mjcf",
             mjcf(
-                f'<replicate count="10001" offset="1 0 0"><body><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></replicate>'
+                '<replicate count="10001" offset="1 0 0"><body><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></replicate>'
             ),
             "10000",
         ),
