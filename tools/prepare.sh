@@ -1,12 +1,11 @@
 # Installs what ./run and ./test need. Sourced by both, never run by itself.
 
 # System packages (Debian, Ubuntu): a linker; a software graphics driver for machines without a GPU; libraries that a window loads at
-# run time; GNU parallel for the example that distributes a sweep.
+# run time.
 packages=(
     gcc libc6-dev
     libvulkan1 mesa-vulkan-drivers libegl1
     libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2 libwayland-client0
-    parallel
 )
 
 # Further packages for sound, which is optional.

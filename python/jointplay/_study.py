@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from hashlib import sha256
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -29,8 +26,6 @@ DIVERGED = 1
 """Status of a run that the divergence guard stopped."""
 NOT_STARTED = 2
 """Status of a run that did not start."""
-CHUNK_TIME = 1.0
-"""Least wall-clock time between two entries into a record, s."""
 
 
 class Estimate(NamedTuple):
@@ -143,48 +138,10 @@ class Study:
         if len(table) and table.shape[1] == len(self._distributions):
             # All values are allowed if the extremes are.
             self._native.alone(list(zip(table.min(0).tolist(), table.max(0).tolist(), strict=True)))
-        if record is None:
-            finished = self._native.run(table.tolist(), workers, progress)
-        else:
-            finished = self._run_recorded(table, workers, progress, record)
+        finished = self._native.run(table.tolist(), workers, progress, record)
         status = finished[:, -1].astype(np.int64)
         results = np.where(status[:, None] == 0, finished[:, :-1], np.nan)
         return Runs(table, results, status)
-
-    def _run_recorded(
-        self, values: NDArray[np.float64], threads: int, progress: Progress | None, record: Path
-    ) -> NDArray[np.float64]:
-        """Runs in parts, each of which is added to the file `record`."""
-        width = len(self._native.outputs) + 1
-        finished = read_record(record, self._settings(values), width)
-        size = threads
-        while len(finished) < len(values):
-            begun, first = monotonic(), len(finished)
-            part = values[first : first + size]
-
-            def report(fraction: float, first: int = first, count: int = len(part)) -> None:
-                if progress:
-                    progress((first + fraction * count) / len(values))
-
-            new = self._native.run(part.tolist(), threads, report)
-            with record.open("a", encoding="utf-8") as file:
-                file.writelines(" ".join(map(repr, row)) + "\n" for row in new.tolist())
-            finished = np.concatenate([finished, new])
-            if monotonic() - begun < CHUNK_TIME:
-                size *= 2
-        return finished
-
-    def _settings(self, values: NDArray[np.float64]) -> dict[str, str]:
-        """What determines the results of `values`."""
-        scene = json.dumps(self.scene._native.origin())
-        return {
-            "provenance": _native.provenance_of(self.scene._native),
-            "scene": sha256(scene.encode()).hexdigest(),
-            "parameters": " ".join(self._distributions),
-            "outputs": " ".join(self.outputs),
-            "span": repr(self.span),
-            "values": sha256(values.tobytes()).hexdigest(),
-        }
 
     def __repr__(self) -> str:
         return f"<jointplay.Study of {self.scene.name}: {', '.join(self.outputs)} over {len(self._distributions)} parameters>"
@@ -197,27 +154,6 @@ def requests(over: Over) -> list[Request]:
     return [
         one if isinstance(one, Request) else Request("over", one, None) for one in ([over] if isinstance(over, str) else over)
     ]
-
-
-def read_record(path: Path, settings: dict[str, str], width: int) -> NDArray[np.float64]:
-    """Rows of `width` numbers that a record has; begins it if there is none. A last line without its end is removed."""
-    heading = json.dumps(settings) + "\n"
-    if not path.exists():
-        path.write_text(heading, encoding="utf-8")
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-    try:
-        other = json.loads(lines[0])
-        differing = [key for key in settings if other[key] != settings[key]]
-        whole = [line for line in lines[1:] if line.endswith("\n")]
-        rows = [[float(number) for number in line.split()] for line in whole]
-    except (ValueError, KeyError, TypeError, IndexError):
-        raise OptionError(f"{path}: this is no record of runs; remove it, or choose another name") from None
-    if differing or any(len(row) != width for row in rows):
-        why = f"other settings ({', '.join(differing)})" if differing else "other outputs"
-        raise OptionError(f"{path}: these runs were started with {why}; repeat that command, or remove the file")
-    if len(whole) < len(lines) - 1:
-        path.write_text("".join([heading, *whole]), encoding="utf-8")
-    return np.array(rows).reshape(len(rows), width)
 
 
 def record_of(path: str | os.PathLike[str], stage: str) -> Path:

@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 
     from ._scene import Quantity, Scene
 
+Vary = Mapping[str, "str | Sequence[Quantity] | NDArray[Any]"]
+"""Values of parameters by key: text as in `jointplay sweep --vary`, or a list of numbers (SI) or texts."""
+Points = Mapping[str, "Sequence[Quantity] | NDArray[Any]"]
+"""A table of points: columns of equal length by key."""
+
 
 class Sweep:
     """A sweep whose points can be computed in this or other processes.
@@ -29,8 +34,9 @@ class Sweep:
     def __init__(
         self,
         scene: Scene,
-        vary: Mapping[str, str | Sequence[Quantity] | NDArray[Any]],
+        vary: Vary | None = None,
         *,
+        points: Points | None = None,
         periods: int | None = None,
         discard: int | None = None,
         phase: float | None = None,
@@ -42,13 +48,12 @@ class Sweep:
         crossings: int | None = None,
         keep: str | Sequence[str] | None = None,
         start: str | Sequence[str] = "cold",
-        zip: bool = False,
     ) -> None:
         """A sweep of `scene`.
 
         `vary` has the values of each parameter: text as in `jointplay sweep --vary` (`"0.1mm..1mm:10"`, `"0.1mm..1mm:10:log"`),
-        or a list of numbers (SI) or texts. All combinations are run, the last parameter varying fastest; with `zip`, the lists
-        are run in parallel.
+        or a list of numbers (SI) or texts. All combinations are run, the last parameter varying fastest. In place of it, `points`
+        is a table with one row per point: a mapping or data frame of columns, each a list of numbers (SI) or texts.
 
         The run of a point is one of
 
@@ -62,7 +67,12 @@ class Sweep:
         `start` is `cold`, `follow-up` or `follow-down`, or several of them.
         """
         self.scene = scene
-        self._vary = [(key, values) for key, values in vary.items()]
+        if (vary is None) == (points is None):
+            raise OptionError("give the values of parameters either as vary or as points")
+        # A column of a data frame has the index of its rows.
+        table = {} if points is None else {key: np.asarray(points[key]).tolist() for key in points}
+        self._vary: list[tuple[str, Any]] = list((vary or table).items())
+        self._is_table = points is not None
         self._options: dict[str, Any] = {
             "periods": periods,
             "discard": discard,
@@ -75,7 +85,6 @@ class Sweep:
             "crossings": crossings,
             "keep": keep if keep is None or isinstance(keep, str) else ",".join(keep),
             "start": [start] if isinstance(start, str) else list(start),
-            "zip": zip,
         }
         self._is_checked = False
         # Raises errors here, not at the first use.
@@ -83,7 +92,7 @@ class Sweep:
 
     @cached_property
     def _native(self) -> _native.Sweep:
-        return _native.Sweep(self.scene._native, self._vary, self._options, self._is_checked)
+        return _native.Sweep(self.scene._native, self._vary, self._is_table, self._options, self._is_checked)
 
     def __getstate__(self) -> dict[str, Any]:
         state = {name: value for name, value in self.__dict__.items() if name != "_native"}
@@ -118,12 +127,20 @@ class Sweep:
                 raise OptionError(f"blocks: block {block} has {len(rows)} points, but should have {end - first}")
         return SweepResult(self, np.concatenate(given))
 
-    def run(self, threads: int | None = None, progress: Callable[[float], object] | None = None) -> SweepResult:
+    def run(
+        self,
+        threads: int | None = None,
+        progress: Callable[[float], object] | None = None,
+        *,
+        record: str | os.PathLike[str] | None = None,
+    ) -> SweepResult:
         """Computes all blocks on `threads` threads (by default one per core), which do not affect the result.
 
-        `progress` is called with the fraction done, from 0 to 1.
+        `progress` is called with the fraction done, from 0 to 1. The file `record` has the finished blocks; a sweep that was
+        interrupted resumes from it, with the same bits.
         """
-        return SweepResult(self, self._native.run(threads or os.cpu_count() or 1, progress))
+        path = None if record is None else os.fspath(record)
+        return SweepResult(self, self._native.run(threads or os.cpu_count() or 1, progress, path))
 
     def __repr__(self) -> str:
         return f"<jointplay.Sweep of {self.scene.name}: {self.points} points in {self.blocks} blocks>"
@@ -175,11 +192,39 @@ class SweepResult(Mapping[str, NDArray[Any]]):
 
 def sweep(
     scene: Scene,
-    vary: Mapping[str, str | Sequence[Quantity] | NDArray[Any]],
+    vary: Vary | None = None,
     *,
+    points: Points | None = None,
+    periods: int | None = None,
+    discard: int | None = None,
+    phase: float | None = None,
+    period: Quantity | None = None,
+    exponent: bool = True,
+    duration: Quantity | None = None,
+    from_: Quantity | None = None,
+    section: str | None = None,
+    crossings: int | None = None,
+    keep: str | Sequence[str] | None = None,
+    start: str | Sequence[str] = "cold",
     threads: int | None = None,
     progress: Callable[[float], object] | None = None,
-    **options: Any,
+    record: str | os.PathLike[str] | None = None,
 ) -> SweepResult:
-    """Runs a sweep: `Sweep(scene, vary, **options).run(threads, progress)`."""
-    return Sweep(scene, vary, **options).run(threads, progress)
+    """Runs a sweep: the arguments of `Sweep`, then those of `Sweep.run`."""
+    given = Sweep(
+        scene,
+        vary,
+        points=points,
+        periods=periods,
+        discard=discard,
+        phase=phase,
+        period=period,
+        exponent=exponent,
+        duration=duration,
+        from_=from_,
+        section=section,
+        crossings=crossings,
+        keep=keep,
+        start=start,
+    )
+    return given.run(threads, progress, record=record)

@@ -20,6 +20,9 @@ mod tradeoff;
 
 use pyo3::prelude::*;
 
+/// Name and version of the program, as it writes them into its files.
+const WRITER: [&str; 2] = ["jointplay", env!("CARGO_PKG_VERSION")];
+
 /// The parts of `jointplay` that are written in Rust.
 #[pymodule]
 mod _native {

@@ -11,14 +11,12 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
+use crate::WRITER;
 use crate::errors::{exception, option_error, scene_error, set_error, stopped};
 use crate::interpreter::{STEPS_BETWEEN_CHECKS, detached, guarded};
 use crate::quantity::{duration, to_text};
 use crate::report;
 use crate::scene::{PyScene, channels_at_start};
-
-/// Name and version of the program, as it writes them into its state files.
-const PROGRAM: [&str; 2] = ["jointplay", env!("CARGO_PKG_VERSION")];
 
 /// Changed parameters of a scene, in order: key and value.
 type Changes = Vec<(String, String)>;
@@ -63,7 +61,7 @@ impl PyState {
     #[new]
     fn new(py: Python<'_>, text: &str, changes: [Changes; 3]) -> PyResult<Self> {
         let refused = |why: String| option_error(py, &format!("state: {why}"));
-        let saved = detached(py, || SavedState::read(PROGRAM, text.as_bytes()))?;
+        let saved = detached(py, || SavedState::read(WRITER, text.as_bytes()))?;
         let saved = saved.map_err(|why| refused(why.to_string()))?;
         let read = || {
             let pending = saved.scene()?;
@@ -87,7 +85,7 @@ impl PyState {
     #[pyo3(name = "__reduce__")]
     fn reduce<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Pickled<'_>)> {
         let snapshot = &self.snapshot;
-        let text = detached(py, || SavedState::write(PROGRAM, snapshot.pending(), snapshot, snapshot.time()))?;
+        let text = detached(py, || SavedState::write(WRITER, snapshot.pending(), snapshot, snapshot.time()))?;
         let text = text.map_err(|why| option_error(py, &format!("state: {why}")))?;
         let changes = [&self.scene.changes, &self.layout.changes, &snapshot.running().changes];
         Ok((py.get_type::<Self>(), (text, changes)))

@@ -2,6 +2,7 @@
 //! alone: those of the window's panel "What play costs".
 
 use std::fmt::Display;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use jointplay_analysis::study::{
@@ -14,6 +15,7 @@ use numpy::ndarray::Array2;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
+use crate::WRITER;
 use crate::errors::option_error;
 use crate::interpreter::{guarded, report_progress};
 use crate::quantity::duration;
@@ -53,7 +55,7 @@ pub fn read_number(py: Python<'_>, scene: &PyScene, key: &str, text: &str) -> Py
 /// Provenance of results about `scene`, as every output of the program carries it, in JSON.
 #[pyfunction]
 pub fn provenance_of(scene: &PyScene) -> String {
-    serde_json::Value::Object(provenance(["jointplay", env!("CARGO_PKG_VERSION")], &scene.scene)).to_string()
+    serde_json::Value::Object(provenance(WRITER, &scene.scene)).to_string()
 }
 
 #[pymethods]
@@ -135,14 +137,15 @@ impl PyStudy {
     }
 
     /// Runs at `rows`, values of the parameters, SI: one row of outputs per run, SI, and after them how it ended: 0 at its end,
-    /// 1 stopped by the divergence guard, 2 not started.
-    #[pyo3(signature = (rows, threads, progress=None))]
+    /// 1 stopped by the divergence guard, 2 not started. Finished runs are in the file `record`, from which the same call resumes.
+    #[pyo3(signature = (rows, threads, progress=None, record=None))]
     fn run<'py>(
         &self,
         py: Python<'py>,
         rows: Vec<Vec<f64>>,
         threads: usize,
         progress: Option<Bound<'py, PyAny>>,
+        record: Option<PathBuf>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         if let Some((i, row)) = rows.iter().enumerate().find(|(_, row)| row.len() != self.keys.len()) {
             let (given, parameters) = (row.len(), self.keys.len());
@@ -151,7 +154,7 @@ impl PyStudy {
         guarded(py, || report_progress(py, progress.as_ref(), 0.0))??;
         let runs = guarded(py, || StudyRuns::new(&self.scene, &self.keys, &self.outputs, self.span, &rows))?;
         let runs = runs.map_err(|error| invalid(py, &error))?;
-        let records = records(py, runs.sweep(), threads, progress)?;
+        let records = records(py, runs.sweep(), threads, progress, record.as_deref())?;
         let of_run = |record: &[f64]| {
             let mut all = runs.outputs_of(record);
             all.push(runs.status_of(record));

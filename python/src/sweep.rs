@@ -1,33 +1,31 @@
 //! Sweeps: the points that `jointplay sweep` computes, block by block or all at once.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::thread;
-use std::time::Duration;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 
 use jointplay_analysis::axis::Axis;
-use jointplay_analysis::crossing::Crossing;
 use jointplay_analysis::design::{Design, Start};
-use jointplay_analysis::point::{Plan, Protocol, Span};
+use jointplay_analysis::point::{Protocol, Span};
+use jointplay_analysis::span_request::SpanRequest;
 use jointplay_analysis::statistic::ChannelStatistic;
 use jointplay_analysis::sweep::Sweep;
+use jointplay_analysis::sweep_run::{RunFault, SweepRun};
+use jointplay_analysis::sweep_settings::settings;
 use jointplay_physics::suggest::nearest;
 use jointplay_scene::Scene;
 use numpy::ndarray::Array2;
 use numpy::{PyArray1, PyArray2};
-use pyo3::exceptions::PyMemoryError;
+use pyo3::exceptions::{PyMemoryError, PyOSError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
+use serde_json::Value as Json;
 
-use crate::errors::{exception, option_error, scene_error};
+use crate::WRITER;
+use crate::errors::{option_error, scene_error};
 use crate::interpreter::{STEPS_BETWEEN_CHECKS, detached, report_progress};
 use crate::quantity::{duration, to_python, to_text};
 use crate::report::constant;
 use crate::scene::PyScene;
-
-/// Time between two checks for Ctrl-C while threads compute.
-const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// A sweep of which any block can be computed.
 #[pyclass(frozen, name = "Sweep", module = "jointplay._native")]
@@ -74,64 +72,31 @@ fn start(py: Python<'_>, word: &str) -> PyResult<Start> {
 }
 
 fn span(py: Python<'_>, scene: &Scene, options: &Bound<'_, PyDict>) -> PyResult<Span> {
-    let invalid = |message: &str| Err(option_error(py, message));
-    let (periods, discard) = (count(options, "periods")?, count(options, "discard")?);
-    let (length, from) = (time(options, "duration")?, time(options, "from_")?);
-    if let Some(section) = option(options, "section")? {
-        let text: String = section.extract()?;
-        let crossing = Crossing::parse(scene, &text);
-        let crossing = crossing.map_err(|error| option_error(py, &format!("section = {text:?}: {error}")))?;
-        let (Some(count), Some(discard), Some(duration), None) = (count(options, "crossings")?, discard, length, from)
-        else {
-            return invalid(
-                "section: give the number of crossings with crossings and discard, and duration to end the search",
-            );
-        };
-        return Ok(Span::Crossings { crossing, count, discard, duration });
-    }
-    match (periods, length) {
-        (Some(periods), None) => {
-            let Some(discard) = discard else {
-                return invalid("periods: give the number of initial periods to discard, with discard");
-            };
-            let phase: f64 = option(options, "phase")?.map_or(Ok(0.0), |phase| phase.extract())?;
-            if !(0.0..1.0).contains(&phase) {
-                return invalid(&format!(
-                    "phase = {phase}: a drive phase is a fraction of the period, from 0 to below 1"
-                ));
-            }
-            let exponent = option(options, "exponent")?.map_or(Ok(true), |exponent| exponent.extract())?;
-            let interval = time(options, "period")?;
-            if interval == Some(0.0) {
-                return invalid("period = 0: the time must be above 0");
-            }
-            Ok(Span::Sections { plan: Plan { periods, discard, phase, exponent }, interval })
-        }
-        (None, Some(duration)) => {
-            let from = from.unwrap_or_default();
-            if discard.is_some() {
-                return invalid("discard counts periods or crossings; with duration alone, from_ ends the transient");
-            }
-            if from >= duration {
-                return invalid(&format!(
-                    "duration = {duration}, from_ = {from}: the statistics must begin before the end"
-                ));
-            }
-            Ok(Span::Duration { duration, from })
-        }
-        _ => invalid("a sweep needs either periods and discard, or duration"),
-    }
+    let request = SpanRequest {
+        periods: count(options, "periods")?,
+        discard: count(options, "discard")?,
+        phase: option(options, "phase")?.map(|phase| phase.extract()).transpose()?,
+        period: time(options, "period")?,
+        no_exponent: option(options, "exponent")?.map_or(Ok(false), |exponent| exponent.extract().map(|e: bool| !e))?,
+        duration: time(options, "duration")?,
+        from: time(options, "from_")?,
+        section: option(options, "section")?.map(|section| section.extract()).transpose()?,
+        crossings: count(options, "crossings")?,
+    };
+    request.span(scene).map_err(|error| option_error(py, &format!("{error:#}")))
 }
 
 #[pymethods]
 impl PySweep {
-    /// A sweep of `scene`. `vary` has a key and its values for each varied parameter; `options` are those of `jointplay.Sweep`.
-    /// All points are checked first, unless `tried`: they were checked elsewhere.
+    /// A sweep of `scene`. `vary` has a key and its values for each varied parameter: of all combinations, or with `is_table` one
+    /// for each point. `options` are those of `jointplay.Sweep`. All points are checked first, unless `tried`: they were checked
+    /// elsewhere.
     #[new]
     fn new(
         py: Python<'_>,
         scene: &PyScene,
         vary: Vec<(String, Bound<'_, PyAny>)>,
+        is_table: bool,
         options: &Bound<'_, PyDict>,
         tried: bool,
     ) -> PyResult<Self> {
@@ -140,8 +105,7 @@ impl PySweep {
         let axes = vary.iter().map(|(key, values)| axis(scene, key, values)).collect::<PyResult<Vec<_>>>()?;
         let starts: Vec<String> = option(options, "start")?.map_or(Ok(Vec::new()), |starts| starts.extract())?;
         let starts = starts.iter().map(|word| start(py, word)).collect::<PyResult<Vec<_>>>()?;
-        let zip = option(options, "zip")?.map_or(Ok(false), |zip| zip.extract())?;
-        let combine = if zip { Design::zipped } else { Design::crossed };
+        let combine = if is_table { Design::of_columns } else { Design::crossed };
         let design = combine(scene, axes, &starts).map_err(|error| invalid(format!("{error:#}")))?;
         let keep = match option(options, "keep")? {
             None => Vec::new(),
@@ -229,15 +193,18 @@ impl PySweep {
         rows(py, run.records(), self.sweep.layout().record_length())
     }
 
-    /// Computes all blocks on `threads` threads: one row per point. `progress` is called with the completed fraction.
-    #[pyo3(signature = (threads, progress=None))]
+    /// Computes all blocks on `threads` threads: one row per point. `progress` is called with the completed fraction. Finished
+    /// blocks are in the file `record`, from which the same sweep resumes.
+    #[pyo3(signature = (threads, progress=None, record=None))]
     fn run<'py>(
         &self,
         py: Python<'py>,
         threads: usize,
         progress: Option<Bound<'py, PyAny>>,
+        record: Option<PathBuf>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        rows(py, records(py, &self.sweep, threads, progress)?, self.sweep.layout().record_length())
+        let records = records(py, &self.sweep, threads, progress, record.as_deref())?;
+        rows(py, records, self.sweep.layout().record_length())
     }
 }
 
@@ -257,111 +224,45 @@ impl PySweep {
     }
 }
 
-/// The records of all points of `sweep`, computed on `threads` threads. `progress` is called with the completed fraction.
+/// The records of all points of `sweep`, computed on `threads` threads. `progress` is called with the completed fraction. Finished
+/// blocks are in the file `record`, which holds those of an interrupted run.
 ///
 /// # Errors
-/// `KeyboardInterrupt`, what `progress` raises, `MemoryError`, and `InternalError` for a panic.
+/// `KeyboardInterrupt`, what `progress` raises, `MemoryError`, `OSError` and `OptionError` about the file, and `InternalError` for a
+/// panic.
 pub fn records(
     py: Python<'_>,
     sweep: &Sweep,
     threads: usize,
     progress: Option<Bound<'_, PyAny>>,
+    record: Option<&Path>,
 ) -> PyResult<Vec<f64>> {
-    let (points, length) = (sweep.design().points(), sweep.layout().record_length());
-    let mut records = Vec::new();
-    if points.checked_mul(length).is_none_or(|count| records.try_reserve_exact(count).is_err()) {
-        return Err(PyMemoryError::new_err(format!("{points} points of {length} values do not fit into memory")));
-    }
-    records.resize(points * length, f64::NAN);
     let progress: Option<Py<PyAny>> = progress.map(Bound::unbind);
     let report = |fraction: f64| {
         Python::attach(|py| report_progress(py, progress.as_ref().map(|progress| progress.bind(py)), fraction))
     };
     let outcome = detached(py, || {
-        compute(sweep, threads, report, |block, own| {
-            let points = sweep.design().block(block);
-            records[points.start * length..points.end * length].copy_from_slice(own);
-        })
+        let mut run = match record {
+            None => SweepRun::new(sweep)?,
+            Some(path) => SweepRun::resumed(sweep, path, &Json::Object(settings(WRITER, sweep)))?,
+        };
+        let mut raised = None;
+        run.compute(threads, |points| match report(points as f64 / sweep.design().points() as f64) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                raised = Some(error);
+                ControlFlow::Break(())
+            }
+        })?;
+        Ok((raised, run.into_records()))
     })?;
     match outcome {
-        Ok(()) => Ok(records),
-        Err(EarlyEnd::Raised(error)) => Err(error),
-        Err(EarlyEnd::Panicked) => {
-            let message =
-                "internal error: a thread of the sweep panicked. This is a bug in the program; please report it.";
-            Err(exception(py, "InternalError", message, None))
-        }
+        Ok((None, records)) => Ok(records),
+        Ok((Some(error), _)) => Err(error),
+        Err(fault @ RunFault::NoMemory { .. }) => Err(PyMemoryError::new_err(fault.to_string())),
+        Err(fault @ RunFault::OtherSettings { .. }) => Err(option_error(py, &fault.to_string())),
+        Err(fault) => Err(PyOSError::new_err(fault.to_string())),
     }
-}
-
-/// Reason why a sweep ended early.
-enum EarlyEnd {
-    /// Ctrl-C, or an error of the progress function.
-    Raised(PyErr),
-    Panicked,
-}
-
-/// Computes every block of `sweep` and passes its records to `receive`. `report` is called regularly with the completed
-/// fraction; an error that it returns ends the sweep.
-fn compute(
-    sweep: &Sweep,
-    threads: usize,
-    report: impl Fn(f64) -> PyResult<()>,
-    mut receive: impl FnMut(usize, &[f64]),
-) -> Result<(), EarlyEnd> {
-    let blocks = sweep.design().blocks();
-    let next = AtomicUsize::new(0);
-    let stop = AtomicBool::new(false);
-    let work = |block: usize| {
-        let mut run = sweep.begin(block);
-        while !run.is_done() {
-            if stop.load(Ordering::Relaxed) {
-                return None;
-            }
-            run.advance(STEPS_BETWEEN_CHECKS);
-        }
-        Some(run.records())
-    };
-    let worker = |send: mpsc::Sender<Option<(usize, Vec<f64>)>>| {
-        while !stop.load(Ordering::Relaxed) {
-            let block = next.fetch_add(1, Ordering::Relaxed);
-            if block >= blocks {
-                return;
-            }
-            let result = match catch_unwind(AssertUnwindSafe(|| work(block))) {
-                Ok(None) => return,
-                Ok(Some(records)) => Some((block, records)),
-                Err(_) => None,
-            };
-            // The receiver outlives the threads.
-            let _ = send.send(result);
-        }
-    };
-    thread::scope(|scope| {
-        let (send, results) = mpsc::channel();
-        for _ in 0..threads.clamp(1, blocks) {
-            let send = send.clone();
-            scope.spawn(|| worker(send));
-        }
-        drop(send);
-        let mut done = 0;
-        let outcome = loop {
-            match results.recv_timeout(CHECK_INTERVAL) {
-                Ok(Some((block, records))) => {
-                    receive(block, &records);
-                    done += 1;
-                }
-                Ok(None) => break Err(EarlyEnd::Panicked),
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break Ok(()),
-            }
-            if let Err(error) = report(done as f64 / blocks as f64) {
-                break Err(EarlyEnd::Raised(error));
-            }
-        };
-        stop.store(true, Ordering::Relaxed);
-        outcome
-    })
 }
 
 /// An array with one row per point.

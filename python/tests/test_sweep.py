@@ -10,6 +10,7 @@ import time
 import distributed
 import joblib
 import numpy as np
+import pandas
 import pytest
 
 import jointplay as jp
@@ -72,11 +73,44 @@ def test_listed_values_are_numbers_or_texts():
     assert len(table) == 3
 
 
+def test_a_table_has_one_point_per_row():
+    scene = jp.Scene.load("pendulum")
+    table = pandas.DataFrame({"contact.clearance": [1e-4, 2e-4], "contact.normal_law": ["hertz", "flores"]}, index=[7, 9])
+    options = {"duration": "2 ms", "keep": "S1.normal:max"}
+    result = jp.sweep(scene, points=table, **options)
+    crossed = jp.sweep(scene, {key: table[key].tolist() for key in table}, **options)
+    assert result["S1_normal_max_N"].tolist() == np.diag(crossed["S1_normal_max_N"]).tolist()
+    assert jp.sweep(scene, points=dict(table), **options)["S1_normal_max_N"].tolist() == result["S1_normal_max_N"].tolist()
+
+
+def test_an_interrupted_sweep_resumes_from_its_record(tmp_path):
+    sweep = jp.Sweep(jp.Scene.load("four-bar"), {"contact.friction": [0.1, 0.2, 0.3, 0.4]}, duration="20 ms")
+    record = tmp_path / "sweep.record"
+
+    def stop(part):
+        if part > 0.3:
+            raise RuntimeError("stopped")
+
+    with pytest.raises(RuntimeError, match="stopped"):
+        sweep.run(1, stop, record=record)
+    assert 1 < len(record.read_text().splitlines()) < 5
+    parts = []
+    result = sweep.run(1, parts.append, record=record)
+    assert parts[0] > 0.2 and result["A_peak_N"].tobytes() == sweep.run()["A_peak_N"].tobytes()
+    other = jp.Sweep(jp.Scene.load("four-bar"), {"contact.friction": [0.1, 0.2, 0.3, 0.4]}, duration="10 ms")
+    with pytest.raises(jp.OptionError, match=r"other settings \(duration_s: 0.02 there, 0.01 now\)"):
+        other.run(record=record)
+    with pytest.raises(OSError, match="not a regular file"):
+        sweep.run(record=tmp_path)
+
+
 @pytest.mark.parametrize(
     "vary, options, message",
     [
-        ({"contact.clearance": "0.1mm..0.2mm:3"}, {}, "either periods and discard, or duration"),
-        ({"contact.clearance": "0.1mm"}, {"duration": 0.01}, "expected"),
+        ({"contact.clearance": "0.1mm..0.2mm:3"}, {}, "give periods and discard, or a duration"),
+        ({"contact.clearance": "0.1mm..0.2mm"}, {"duration": 0.01}, "expected"),
+        (None, {"duration": 0.01}, "either as vary or as points"),
+        (None, {"duration": 0.01, "points": {"contact.clearance": [1e-4], "contact.friction": []}}, "empty"),
         ({"contact.clearence": [1e-4]}, {"duration": 0.01}, "did you mean"),
         ({"contact.clearance": [-1.0]}, {"duration": 0.01}, "allowed"),
         ({"contact.clearance": [1e-4]}, {"duration": "1 mm"}, "duration"),

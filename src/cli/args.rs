@@ -45,13 +45,8 @@ pub enum Command {
     Bench(BenchArguments),
     /// Run a scene at many parameter values: statistics of any channel, sections, regimes, exponents.
     Sweep(SweepArguments),
-    /// Merge the shards of a sweep.
-    Merge(MergeArguments),
     /// Map the error of the tip over drive positions and parameters: at rest, and with every ball anywhere in its play.
     Map(MapArguments),
-    /// Print a robot description, URDF or MJCF, as a scene file: bodies, inertias, hinges, slides, ball joints, shapes and meshes. Omitted
-    /// parts are listed on standard error and at the head of the scene.
-    Import(ImportArguments),
     /// Compute the validation cases and print the results beside the known values: `docs/validation.md` (Markdown).
     Validate(ValidateArguments),
     /// Print the reference page of all parameters (Markdown).
@@ -179,13 +174,10 @@ pub struct SweepArguments {
     #[command(flatten)]
     pub scene: SceneArguments,
     /// Parameter to vary; may be repeated. `contact.clearance=0.01mm..1mm:200`: equally spaced values, both ends included;
-    /// `0.01mm..1mm:20:log`: with equal ratios; `contact.normal_law=hertz,flores`: listed numbers or words. All combinations are
-    /// run, the last parameter varying fastest.
+    /// `0.01mm..1mm:20:log`: with equal ratios; `contact.normal_law=hertz,flores`: listed numbers or words, also a single one. All
+    /// combinations are run, the last parameter varying fastest.
     #[arg(long, value_name = "KEY=VALUES", required_unless_present = "points", conflicts_with = "points")]
     pub vary: Vec<String>,
-    /// Take the values of all `--vary` in parallel instead of crossing them: point i has value i of each.
-    #[arg(long, requires = "vary")]
-    pub zip: bool,
     /// Take the points from a CSV file: a header of parameter keys, then one row per point, with units.
     #[arg(long, value_name = "FILE")]
     pub points: Option<PathBuf>,
@@ -224,13 +216,10 @@ pub struct SweepArguments {
     /// Leave out the twin runs that measure the largest Lyapunov exponent.
     #[arg(long)]
     pub no_exponent: bool,
-    /// Compute one part of the sweep, e.g. `3/16`; `jointplay merge` combines the parts.
-    #[arg(long, value_name = "K/M", allow_hyphen_values = true)]
-    pub shard: Option<String>,
     /// Threads to use [default: one for each core]; the result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// File to write: a NumPy archive (.npz), or a table with one row per point (.csv, .parquet).
+    /// File to write: a NumPy archive (.npz), or a table with one row per point (.csv).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Format of the summary on standard output.
@@ -242,23 +231,6 @@ pub struct SweepArguments {
     /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
-}
-
-/// `merge`.
-#[derive(Debug, Args)]
-pub struct MergeArguments {
-    /// Files that `sweep --shard` wrote, all from one sweep.
-    #[arg(value_name = "SHARD", required = true)]
-    pub shards: Vec<PathBuf>,
-    /// File to write: a NumPy archive (.npz), or a table with one row per point (.csv, .parquet).
-    #[arg(long, value_name = "FILE")]
-    pub out: PathBuf,
-    /// Format of the summary on standard output.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value = "text")]
-    pub summary: SummaryForm,
-    /// Replace an existing file.
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// Form of the summary.

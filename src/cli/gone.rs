@@ -3,10 +3,23 @@
 use std::ffi::{OsStr, OsString};
 
 /// A command that the Python package took over, as the package names it.
-const IN_PACKAGE: &[(&str, &str)] = &[("import", "import"), ("reproduce", "paper"), ("sensitivity", "sensitivity"), ("tolerance", "tolerance")];
+const IN_PACKAGE: &[(&str, &str)] =
+    &[("import", "import"), ("reproduce", "paper"), ("sensitivity", "sensitivity"), ("tolerance", "tolerance")];
 
 /// Other commands and options, each with the command that has it, and what to do in place of it.
-const GONE: &[(&str, &str, &str)] = &[];
+const GONE: &[(&str, &str, &str)] = &[
+    (
+        "merge",
+        "",
+        "split the rows of `sweep --points` over the computers, and concatenate the tables (docs/cluster.md)",
+    ),
+    (
+        "sweep",
+        "--shard",
+        "split the rows of `--points` over the computers, and concatenate the tables (docs/cluster.md)",
+    ),
+    ("sweep", "--zip", "write one row per point to a file for `--points`"),
+];
 
 /// What to answer to `arguments`, without the name of the program, if they begin with a former command or use a former option.
 pub fn answer(arguments: &[OsString]) -> Option<String> {

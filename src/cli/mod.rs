@@ -33,7 +33,6 @@ mod tables;
 pub mod tradeoff;
 pub mod validate;
 mod wear;
-mod workers;
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -107,9 +106,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Tradeoff(arguments)) => tradeoff::tradeoff(&arguments),
         Some(Command::Bench(arguments)) => bench::bench(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
-        Some(Command::Merge(arguments)) => sweep::merge(&arguments),
         Some(Command::Map(arguments)) => map::map(&arguments),
-        Some(Command::Import(arguments)) => import::import(&arguments),
         Some(Command::Validate(arguments)) => validate::validate(&arguments),
         Some(Command::Parameters) => print(&reference_page()),
         Some(Command::Reference) => print(&reference::page()),

@@ -20,22 +20,6 @@ pub fn duration(option: &str, text: &str) -> Result<f64, Failure> {
     Ok(seconds)
 }
 
-/// The options `--duration` and `--from` of statistics, s.
-///
-/// # Errors
-/// Usage: as [`duration`]; a start that is not before the end.
-pub fn span(text: &str, from: Option<&str>) -> Result<(f64, f64), Failure> {
-    let end = duration("--duration", text)?;
-    let begin = from.map_or(Ok(0.0), |from| duration("--from", from))?;
-    if end <= begin {
-        return Err(Failure::usage(match from {
-            Some(from) => format!("--duration {text} --from {from}: the statistics must begin before the end"),
-            None => format!("--duration {text}: the time must be above 0"),
-        }));
-    }
-    Ok((end, begin))
-}
-
 /// An angle, rad.
 ///
 /// # Errors

@@ -730,7 +730,6 @@ fn a_pipe_or_a_device_is_refused_where_a_file_is_expected() {
         "run pendulum --duration 1ms --from-state /dev/zero",
         "sweep pendulum --points pipe --duration 1ms --out a.npz",
         "sweep pendulum --points /dev/zero --duration 1ms --out a.npz",
-        "merge pipe /dev/zero --out a.npz",
         #[cfg(feature = "gui")]
         "lessons ./pipe",
         #[cfg(feature = "gui")]

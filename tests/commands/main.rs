@@ -5,7 +5,6 @@ mod common;
 
 mod channels;
 mod chart;
-mod cluster;
 mod command_line;
 mod ledger_files;
 mod links;

@@ -1,4 +1,4 @@
-//! `sweep` and `merge` as scripts use them: the same bytes for any number of threads, interruptions and shards.
+//! `sweep` as scripts use it: the same bytes for any number of threads and interruptions.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -88,82 +88,13 @@ fn a_map_has_the_shape_of_its_ranges_and_the_values_of_single_runs() {
 }
 
 #[test]
-fn neither_threads_nor_shards_change_a_bit() {
+fn threads_change_no_bit() {
     let folder = folder();
     let run = |rest: &str| jointplay(folder.path(), &format!("{SMALL} {rest}")).expect(0);
-    let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
     run("--threads 1 --out one.npz");
     run("--threads 3 --out three.npz");
+    let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
     assert!(read("one.npz") == read("three.npz"));
-    run("--shard 1/3 --out s1.npz");
-    run("--shard 2/3 --out s2.npz");
-    run("--shard 3/3 --out s3.npz");
-    let merge = |line: &str| jointplay(folder.path(), &format!("merge {line}"));
-    merge("s3.npz s1.npz s2.npz --out merged.npz").expect(0);
-    assert!(read("one.npz") == read("merged.npz"));
-
-    // Anything but all shards of one sweep is refused, and nothing is written.
-    let before = names(folder.path());
-    let missing = merge("s1.npz s3.npz --out bad.npz").expect(2);
-    assert!(missing.stderr.contains("shards not given: 2/3"), "{}", missing.stderr);
-    let duplicate = merge("s1.npz s2.npz s1.npz s3.npz --out bad.npz").expect(2);
-    assert!(duplicate.stderr.contains("hold the same points"), "{}", duplicate.stderr);
-    let not_a_shard = merge("one.npz --out bad.npz").expect(2);
-    assert!(not_a_shard.stderr.contains("one.npz is not a shard"), "{}", not_a_shard.stderr);
-    fs::write(folder.path().join("text.npz"), "no archive").unwrap();
-    let not_an_archive = merge("s1.npz text.npz --out bad.npz").expect(1);
-    assert!(not_an_archive.stderr.contains("text.npz"), "{}", not_an_archive.stderr);
-    merge("nowhere.npz --out bad.npz").expect(1);
-    merge("s1.npz s2.npz s3.npz --out merged.npz").expect(1);
-    merge("s1.npz s2.npz s3.npz --out merged.txt").expect(2);
-    let overwriting = merge("s1.npz s2.npz s3.npz --out ./s2.npz --force").expect(2);
-    assert!(overwriting.stderr.contains("one of the shards"), "{}", overwriting.stderr);
-    fs::remove_file(folder.path().join("text.npz")).unwrap();
-    assert_eq!(names(folder.path()), before);
-
-    // With more shards than points, an empty shard is valid.
-    let empty = run("--shard 5/5 --out e5.npz").stdout;
-    assert!(empty.contains("Points            0") && empty.contains("Regimes           none"), "{empty}");
-    for k in 1..5 {
-        run(&format!("--shard {k}/5 --out e{k}.npz"));
-    }
-    merge("e1.npz e2.npz e3.npz e4.npz e5.npz --out five.npz").expect(0);
-    assert!(read("one.npz") == read("five.npz"));
-
-    jointplay(
-        folder.path(),
-        "sweep spcmm --vary contact.clearance=0.2mm..0.5mm:4 --periods 3 --discard 2 --shard 2/3 --out other.npz",
-    )
-    .expect(0);
-    let mixed = merge("s1.npz other.npz s3.npz --out bad.npz").expect(2);
-    assert!(mixed.stderr.contains("different sweeps: discard: 1 there, 2 now"), "{}", mixed.stderr);
-}
-
-#[test]
-fn shards_whose_included_files_differ_are_not_merged() {
-    let folder = folder();
-    let write_include = |value: &str| {
-        let text = format!("[[parameter]]\nname = \"own\"\nvalue = \"{value}\"\n");
-        fs::write(folder.path().join("own.toml"), text).unwrap();
-    };
-    let text = jointplay::scene::built_in_text("spcmm").unwrap();
-    let text = format!("include = [\"own.toml\"]\n{text}");
-    fs::write(folder.path().join("mine.toml"), text).unwrap();
-    let shard = |shard: &str, out: &str| {
-        let line = SMALL.replace("spcmm", "./mine.toml");
-        let line = format!("{line} --shard {shard} --out {out} --force");
-        jointplay(folder.path(), &line).expect(0);
-    };
-    let merge = || jointplay(folder.path(), "merge s1.npz s2.npz --out merged.npz");
-    write_include("1 mm");
-    shard("1/2", "s1.npz");
-    write_include("2 mm");
-    shard("2/2", "s2.npz");
-    let mixed = merge().expect(2).stderr;
-    assert!(mixed.contains("different sweeps: scene_files_crc32: ") && mixed.contains("own.toml"), "{mixed}");
-    write_include("1 mm");
-    shard("2/2", "s2.npz");
-    merge().expect(0);
 }
 
 /// The partial file holds the texts of the scene and of the files that it names.
@@ -181,7 +112,7 @@ fn a_scene_of_megabytes_can_be_swept() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupted_sweep_resumes_and_a_damaged_partial_file_is_refused() {
+fn an_interrupted_sweep_resumes_and_a_partial_file_of_another_is_refused() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     let sweep = |points: usize, out: &str| {
@@ -227,7 +158,7 @@ fn an_interrupted_sweep_resumes_and_a_damaged_partial_file_is_refused() {
     let line = |out: &str| sweep(points, out);
     let partial = fs::read(at("a.npz.partial")).unwrap();
 
-    // Every kind of damage, and settings of another sweep, are refused.
+    // Settings of another sweep, damaged settings and a foreign file are refused.
     let check_refused = |bytes: &[u8], line: &str, code: i32, fragment: &str| {
         fs::write(at("a.npz.partial"), bytes).unwrap();
         let outcome = jointplay(folder.path(), line).expect(code);
@@ -241,19 +172,14 @@ fn an_interrupted_sweep_resumes_and_a_damaged_partial_file_is_refused() {
         bytes[offset] ^= 0x10;
         bytes
     };
-    let n = partial.len();
-    check_refused(&partial[..5], &line("a.npz"), 1, "cut short");
-    check_refused(&flipped(n - 100), &line("a.npz"), 1, "checksum");
-    check_refused(&flipped(n - 2), &line("a.npz"), 1, "checksum");
-    check_refused(&flipped(100), &line("a.npz"), 1, "checksum");
-    check_refused(&flipped(0), &line("a.npz"), 1, "not a partial sweep");
-    check_refused(&flipped(7), &line("a.npz"), 1, "another version");
-    check_refused(&[&partial[..], &partial[n - 8..]].concat(), &line("a.npz"), 1, "damaged");
+    check_refused(&flipped(100), &line("a.npz"), 1, "no finished blocks");
+    check_refused(b"mine", &line("a.npz"), 1, "no finished blocks");
     let other = line("a.npz").replace("--periods 4", "--periods 5");
     check_refused(&partial, &other, 2, "periods: 4 there, 5 now");
 
-    // A block truncated by a crash is lost, but no other.
-    fs::write(at("a.npz.partial"), &partial[..n - 1]).unwrap();
+    // A damaged block, and one truncated by a crash, are computed again.
+    let damaged = flipped(partial.len() - 100);
+    fs::write(at("a.npz.partial"), &damaged[..partial.len() - 1]).unwrap();
     let resumed = jointplay(folder.path(), &line("a.npz")).expect(0);
     assert!(resumed.stderr.contains("resuming where"), "{}", resumed.stderr);
     jointplay(folder.path(), &line("b.npz")).expect(0);
@@ -315,7 +241,7 @@ fn each_kind_of_warning_within_the_ranges_is_printed_once() {
     let folder = folder();
     // Singular poses are in the middle of this range, not at its ends.
     let line = "sweep spcmm --vary contact.clearance=0.01mm..0.2mm:2 --vary spcmm.slider_plane=20mm..300mm:15 --periods 1 \
-                --discard 0 --shard 30/30 --no-exponent --out a.npz";
+                --discard 0 --period 1ms --no-exponent --out a.npz";
     let outcome = jointplay(folder.path(), line).expect(0);
     let warnings: Vec<&str> = outcome.stderr.lines().filter(|l| l.contains("warning:")).collect();
     assert_eq!(warnings.len(), 4, "{}", outcome.stderr);
@@ -381,8 +307,10 @@ fn invalid_input_is_refused_before_anything_runs() {
             2,
             "more than a result holds",
         ),
-        (format!("{SMALL} --out a.txt"), 2, ".npz, .csv or .parquet"),
-        (format!("{SMALL} --shard 1/2 --out a.csv"), 2, "a shard is a NumPy archive"),
+        (format!("{SMALL} --out a.txt"), 2, ".npz or .csv"),
+        (format!("{SMALL} --shard 1/2 --out a.csv"), 2, "`--shard` of `jointplay sweep` is gone: split the rows"),
+        (format!("{SMALL} --zip --out a.csv"), 2, "`--zip` of `jointplay sweep` is gone: write one row per point"),
+        ("merge a.npz --out b.npz".to_owned(), 2, "`jointplay merge` is gone: split the rows"),
         (format!("{SMALL} --period 0 --out a.npz"), 2, "--period 0: the time must be above 0"),
         (format!("{SMALL} --keep S1.nromal:max --out a.npz"), 2, "did you mean `S1.normal`?"),
         (format!("{SMALL} --keep S1.normal:top --out a.npz"), 2, "`top` is not a statistic"),
@@ -390,7 +318,6 @@ fn invalid_input_is_refused_before_anything_runs() {
         (format!("{SMALL} --duration 1s --out a.npz"), 2, "cannot be used with"),
         (format!("{SMALL} --points points.csv --out a.npz"), 2, "cannot be used with"),
         (format!("{PENDULUM} --from 60ms --out a.npz"), 2, "must begin before the end"),
-        (format!("{PENDULUM} --vary contact.friction=0.1,0.2 --zip --out a.npz"), 2, "contact.friction has 2"),
         (format!("{PENDULUM} --vary contact.normal_law=hertz,flores --start follow-up --out a.npz"), 2, "ascending"),
         (
             "sweep pendulum --points none.csv --duration 1ms --out a.npz".to_owned(),
@@ -398,19 +325,18 @@ fn invalid_input_is_refused_before_anything_runs() {
             "none.csv: cannot read this file",
         ),
         (format!("{SMALL} --out no/such/folder/a.npz"), 1, "a.npz"),
-        (format!("{SMALL} --shard 4/3 --out a.npz"), 2, "--shard 4/3"),
         (format!("{SMALL} --phase 2 --out a.npz"), 2, "--phase 2"),
         (format!("{SMALL} --threads 0 --out a.npz"), 2, "--threads"),
         (format!("{SMALL} --section zero --out a.npz"), 2, "phase"),
-        (format!("{SMALL} --section S1.normal=1N --out a.npz"), 2, "--crossings N"),
-        (format!("{PENDULUM} --section S1.normal=1N --out a.npz"), 2, "--crossings N"),
+        (format!("{SMALL} --section S1.normal=1N --out a.npz"), 2, "--crossings and --discard"),
+        (format!("{PENDULUM} --section S1.normal=1N --out a.npz"), 2, "--crossings and --discard"),
         (format!("{PENDULUM} --section S1.normal=1 --crossings 2 --discard 1 --out a.npz"), 2, "needs a unit"),
         (
             format!("{PENDULUM} --section S1.normal=1N --crossings 2 --discard 2 --out a.npz"),
             2,
             "less than --crossings",
         ),
-        (format!("{PENDULUM} --discard 2 --out a.npz"), 2, "--from ends the transient"),
+        (format!("{PENDULUM} --discard 2 --out a.npz"), 2, "--discard 2: it counts periods"),
     ] {
         let outcome = jointplay(folder.path(), &line).expect(code);
         assert!(outcome.stderr.contains(fragment), "{line}: {}", outcome.stderr);

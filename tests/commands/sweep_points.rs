@@ -3,15 +3,13 @@
 use std::fs;
 
 use jointplay::scene::Scene;
-use parquet::file::reader::{FileReader, SerializedFileReader};
-use parquet::record::Field;
 use serde_json::Value as Json;
 
 use crate::program::{folder, jointplay};
 use crate::sweep::{PENDULUM, archive};
 
 #[test]
-fn a_sweep_over_a_duration_needs_no_drive_and_threads_and_shards_change_no_bit() {
+fn a_sweep_over_a_duration_needs_no_drive_and_threads_change_no_bit() {
     let folder = folder();
     let line = format!("{PENDULUM} --from 10ms --vary contact.normal_law=hertz,flores");
     let run = |rest: &str| jointplay(folder.path(), &format!("{line} {rest}")).expect(0);
@@ -20,15 +18,7 @@ fn a_sweep_over_a_duration_needs_no_drive_and_threads_and_shards_change_no_bit()
     assert!(text.contains("Points            6") && !text.contains("Regimes"), "{text}");
     run("--threads 2 --out two.npz");
     run("--threads 2 --out two.csv");
-    run("--threads 2 --out two.parquet");
-    run("--shard 1/2 --out s1.npz");
-    run("--shard 2/2 --out s2.npz");
-    jointplay(folder.path(), "merge s2.npz s1.npz --out merged.npz").expect(0);
-    jointplay(folder.path(), "merge s1.npz s2.npz --out merged.csv").expect(0);
-    jointplay(folder.path(), "merge s2.npz s1.npz --out merged.parquet").expect(0);
-    assert!(read("one.npz") == read("two.npz") && read("one.npz") == read("merged.npz"));
-    assert!(read("two.parquet") == read("merged.parquet"));
-    assert!(read("two.csv") == read("merged.csv") && read("two.csv.meta.json") == read("merged.csv.meta.json"));
+    assert!(read("one.npz") == read("two.npz"));
 
     let (arrays, meta) = archive(&folder.path().join("one.npz"));
     assert_eq!((&meta["duration_s"], &meta["from_s"]), (&Json::from(0.05), &Json::from(0.01)));
@@ -42,32 +32,7 @@ fn a_sweep_over_a_duration_needs_no_drive_and_threads_and_shards_change_no_bit()
     let holds = |bytes: &[u8]| read("one.npz").windows(bytes.len()).any(|window| window == bytes);
     assert!(holds(b"<U32") && holds(&utf32("hertz")) && holds(&utf32("flores")) && !holds(&utf32("gonthier")));
 
-    // The tables have the same numbers at every point.
-    let table = SerializedFileReader::new(fs::File::open(folder.path().join("two.parquet")).unwrap()).unwrap();
-    let file_metadata = table.metadata().file_metadata();
-    let entry = file_metadata.key_value_metadata().unwrap().iter().find(|entry| entry.key == "meta").unwrap();
-    let stored: Json = serde_json::from_str(entry.value.as_ref().unwrap()).unwrap();
-    assert_eq!(stored, meta);
-    let mut points = 0;
-    for (i, row) in table.get_row_iter(None).unwrap().map(Result::unwrap).enumerate() {
-        let columns: Vec<(&String, &Field)> = row.get_column_iter().collect();
-        assert_eq!(
-            columns[0],
-            (&"contact.clearance_m".to_owned(), &Field::Double(arrays["contact.clearance"][[i / 2]]))
-        );
-        assert_eq!(columns[1].1, &Field::Str(["hertz", "flores"][i % 2].to_owned()));
-        for (name, field) in &columns[2..] {
-            let value = arrays[*name][[i / 2, i % 2]];
-            let same = match field {
-                Field::Double(own) => own.to_bits() == value.to_bits(),
-                Field::Long(own) => *own as f64 == value,
-                _ => false,
-            };
-            assert!(same, "{name}: {field} for {value}");
-        }
-        points += 1;
-    }
-    assert_eq!(points, 6);
+    // The table has the same numbers at every point.
     let text = String::from_utf8(read("two.csv")).unwrap();
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let heads = lines.next().unwrap();
@@ -133,28 +98,28 @@ fn statistics_equal_those_of_the_rows_of_a_run() {
 }
 
 #[test]
-fn points_from_a_file_zipped_and_crossed_agree() {
+fn points_from_a_file_are_those_of_a_crossed_sweep() {
     let folder = folder();
     let points = "contact.clearance,contact.friction,contact.normal_law\n0.2mm,0.1,hertz\n\"0.8 mm\",0.3,flores\n";
     fs::write(folder.path().join("points.csv"), points).unwrap();
     let rest = "--duration 30ms --keep S1.normal:max,S1.normal:mean";
     let run = |line: &str| jointplay(folder.path(), &format!("sweep pendulum {line} {rest}")).expect(0);
     run("--points points.csv --out file.csv");
-    let zipped = "--vary contact.clearance=0.2mm..0.8mm:2:log --vary contact.friction=0.1,0.3 \
-                  --vary contact.normal_law=hertz,flores";
-    run(&format!("{zipped} --zip --out zip.csv"));
-    run(&format!("{zipped} --out cross.csv"));
+    let crossed = "--vary contact.clearance=0.2mm..0.8mm:2:log --vary contact.friction=0.1,0.3 \
+                   --vary contact.normal_law=hertz,flores";
+    run(&format!("{crossed} --out cross.csv"));
+    // One value of each is a list.
+    run("--vary contact.clearance=0.8mm --vary contact.friction=0.3 --vary contact.normal_law=flores --out one.csv");
     run("--points points.csv --out file.npz");
     let rows = |name: &str| -> Vec<String> {
         fs::read_to_string(folder.path().join(name)).unwrap().lines().map(str::to_owned).collect()
     };
-    let (zip, cross) = (rows("zip.csv"), rows("cross.csv"));
-    assert_eq!(rows("file.csv"), zip);
-    assert_eq!((zip.len(), cross.len()), (3, 9));
-    assert_eq!((&cross[1], &cross[8]), (&zip[1], &zip[2]));
-    assert!(zip[2].starts_with("0.0008,0.3,flores,0,NaN,"), "{}", zip[2]);
+    let (file, cross, one) = (rows("file.csv"), rows("cross.csv"), rows("one.csv"));
+    assert_eq!((file.len(), cross.len(), one.len()), (3, 9, 2));
+    assert_eq!((&cross[1], &cross[8], &one[1]), (&file[1], &file[2], &file[2]));
+    assert!(file[2].starts_with("0.0008,0.3,flores,0,NaN,"), "{}", file[2]);
     let (arrays, meta) = archive(&folder.path().join("file.npz"));
-    assert_eq!(meta["arrangement"], "zipped");
+    assert_eq!(meta["arrangement"], "table");
     assert_eq!((arrays["contact.friction"].shape(), arrays["S1_normal_max_N"].shape()), (&[2][..], &[2][..]));
 
     let outcome =
@@ -204,11 +169,6 @@ fn each_start_has_its_own_slice_of_the_result() {
     let run = |rest: &str| jointplay(folder.path(), &format!("{line} {rest}")).expect(0);
     run("--start cold,follow-up,follow-down --threads 2 --out all.npz");
     run("--start cold,follow-up,follow-down --out all.csv");
-    for k in 1..=2 {
-        run(&format!("--start cold,follow-up,follow-down --shard {k}/2 --out s{k}.npz"));
-    }
-    jointplay(folder.path(), "merge s1.npz s2.npz --out merged.npz").expect(0);
-    assert!(fs::read(folder.path().join("all.npz")).unwrap() == fs::read(folder.path().join("merged.npz")).unwrap());
     let (all, meta) = archive(&folder.path().join("all.npz"));
     assert_eq!(meta["start"], serde_json::json!(["cold", "follow-up", "follow-down"]));
     assert_eq!(all["section_beta_rad"].shape(), [3, 3, 1]);
@@ -223,4 +183,35 @@ fn each_start_has_its_own_slice_of_the_result() {
             assert!(part == own[name], "{start}: {name}");
         }
     }
+}
+
+/// The lines of `docs/cluster.md` for an array of jobs give the table of one sweep.
+#[cfg(unix)]
+#[test]
+fn jobs_over_ranges_of_rows_give_the_table_of_one_sweep() {
+    let folder = folder();
+    let clearances = (0..5).map(|k| format!("0.{}mm\n", k + 2));
+    let points = format!("contact.clearance\n{}", clearances.collect::<String>());
+    fs::write(folder.path().join("points.csv"), points).unwrap();
+    let page = fs::read_to_string("docs/cluster.md").unwrap();
+    let blocks: Vec<String> = page
+        .split("```sh\n")
+        .skip(1)
+        .map(|rest| rest.split("```").next().unwrap().replace("--periods 100 --discard 40", "--periods 2 --discard 1"))
+        .collect();
+    assert_eq!(blocks.len(), 2);
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_jointplay")).parent().unwrap();
+    let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
+    let run = |script: &str, job: usize| {
+        let mut shell = std::process::Command::new("bash");
+        shell.args(["-ec", &script.replace("seq 16", "seq 3")]).current_dir(folder.path());
+        shell.env("PATH", &path).env("SLURM_ARRAY_TASK_ID", job.to_string()).env("ROWS", "2");
+        assert!(shell.status().unwrap().success());
+    };
+    (1..=3).for_each(|job| run(&blocks[0], job));
+    run(&blocks[1], 0);
+    jointplay(folder.path(), "sweep spcmm --points points.csv --periods 2 --discard 1 --out whole.csv").expect(0);
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    assert_eq!(read("all.csv"), read("whole.csv"));
+    assert_eq!(read("all.csv").lines().count(), 6);
 }

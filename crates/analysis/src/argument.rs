@@ -10,12 +10,22 @@ pub enum Argument {
     Vary,
     /// A parameter with a range.
     Over,
-    /// Whether values vary in parallel.
-    Zip,
+    /// A table of points.
+    Points,
     /// States from which points start.
     Start,
     /// Drive periods of a run.
     Periods,
+    /// Phase of the sections.
+    Phase,
+    /// Time between two sections.
+    Period,
+    /// Length of a run.
+    Duration,
+    /// End of the transient of a run.
+    From,
+    /// Condition of the sections.
+    Section,
     /// Section crossings of a run.
     Crossings,
     /// Transient periods or crossings to discard.
@@ -28,9 +38,15 @@ impl Argument {
         match self {
             Self::Vary => ["--vary", "vary"],
             Self::Over => ["--over", "over"],
-            Self::Zip => ["--zip", "zip"],
+            Self::Points => ["--points", "points"],
             Self::Start => ["--start", "start"],
             Self::Periods => ["--periods", "periods"],
+            Self::Phase => ["--phase", "phase"],
+            Self::Period => ["--period", "period"],
+            Self::Duration => ["--duration", "duration"],
+            // `from` is a word of Python.
+            Self::From => ["--from", "from_"],
+            Self::Section => ["--section", "section"],
             Self::Crossings => ["--crossings", "crossings"],
             Self::Discard => ["--discard", "discard"],
         }

@@ -293,9 +293,6 @@ impl Axis {
                 (subject, values)
             } else {
                 let subject = Subject::find(scene, argument, key)?;
-                if !values.contains(',') {
-                    return Err(RangeFault::Form);
-                }
                 let listed =
                     values.split(',').map(|value| subject.read(value).map_err(|error| value_fault(value, error)));
                 let listed = Values::Listed(listed.collect::<Result<_, _>>()?);
@@ -539,6 +536,8 @@ mod tests {
         let clearance = axis("contact.clearance=0.5mm, 20um,1mm").expect("a list");
         assert_eq!(clearance.numbers().collect::<Vec<_>>(), [5e-4, 20e-6, 1e-3]);
         assert_eq!((clearance.words(), clearance.is_ascending()), (None, false));
+        let one = axis("contact.clearance=0.5mm").expect("one value");
+        assert_eq!(one.numbers().collect::<Vec<_>>(), [5e-4]);
         let law = axis("contact.normal_law=hertz,flores").expect("two laws");
         assert_eq!(law.words(), Some(vec!["hertz", "flores"]));
         assert_eq!(law.value(1), Value::Choice("flores"));
@@ -552,7 +551,7 @@ mod tests {
             ("contact.clearance=0.1mm..1mm", "expected KEY=A..B:N"),
             ("contact.clearance=0.1mm..1mm:x", "expected KEY=A..B:N"),
             ("contact.clearance=0.1mm..1mm:5:cubic", "expected KEY=A..B:N"),
-            ("contact.clearance=0.1mm", "expected KEY=A..B:N"),
+            ("contact.clearance=", "is not a number"),
             ("contact.clearance=0.1mm..1mm:0", "empty: 0 values"),
             ("contact.clearance=1mm..0.1mm:5", "reversed"),
             ("contact.clearance=1mm..1mm:5", "empty: both ends"),

@@ -9,8 +9,8 @@ use super::argument::Argument;
 use super::axis::{Axis, Coordinate, RangeError};
 use jointplay_scene::{Scene, SceneError, Value};
 
-/// Points per block in a `follow` sweep. Each block starts cold at its first point, so that the predecessor of a point depends
-/// neither on threads nor on shards.
+/// Points per block in a `follow` sweep. Each block starts cold at its first point, so that the predecessor of a point does not
+/// depend on threads.
 pub const FOLLOW_BLOCK: usize = 25;
 /// Largest number of points in a sweep.
 const MAX_POINTS: usize = 1 << 24;
@@ -57,7 +57,7 @@ pub enum Arrangement {
     /// All combinations of the values; the last parameter varies fastest.
     Crossed,
     /// Value i of each parameter with value i of the others.
-    Zipped,
+    Table,
 }
 
 /// All points of a sweep: every parameter set, once for each start.
@@ -79,28 +79,28 @@ impl Design {
         Self::new(scene, axes, Arrangement::Crossed, starts)
     }
 
-    /// The values of `axes` in parallel, value i of each with value i of the others.
+    /// One point per row of a table, whose columns are `axes`.
     ///
     /// # Errors
     /// As [`Self::crossed`]; axes of different lengths.
-    pub fn zipped(scene: &Scene, axes: Vec<Axis>, starts: &[Start]) -> Result<Self, RangeError> {
+    pub fn of_columns(scene: &Scene, axes: Vec<Axis>, starts: &[Start]) -> Result<Self, RangeError> {
         if let Some(other) = axes.iter().find(|axis| axis.count() != axes[0].count()) {
             let what = format!(
-                "{} has {} values and {} has {}; values in parallel need the same number",
+                "{} has {} values and {} has {}; a table of points needs the same number of each",
                 axes[0].key(),
                 axes[0].count(),
                 other.key(),
                 other.count(),
             );
-            return Err(RangeError::Together(Some(Argument::Zip), what));
+            return Err(RangeError::Together(Some(Argument::Points), what));
         }
-        Self::new(scene, axes, Arrangement::Zipped, starts)
+        Self::new(scene, axes, Arrangement::Table, starts)
     }
 
     /// One point per row of `rows`, which has a value for each of `keys`.
     ///
     /// # Errors
-    /// As [`Self::zipped`]; a row of another length.
+    /// As [`Self::of_columns`]; a row of another length.
     pub fn table(scene: &Scene, keys: &[String], rows: &[Vec<Value>], starts: &[Start]) -> Result<Self, RangeError> {
         if let Some(i) = rows.iter().position(|row| row.len() != keys.len()) {
             let (values, keys) = (rows[i].len(), keys.len());
@@ -110,7 +110,7 @@ impl Design {
         let column =
             |(j, key): (usize, &String)| Axis::listed(scene, key, rows.iter().map(|row| row[j].clone()).collect());
         let axes = keys.iter().enumerate().map(column).collect::<Result<Vec<_>, _>>()?;
-        Self::zipped(scene, axes, starts)
+        Self::of_columns(scene, axes, starts)
     }
 
     fn new(scene: &Scene, axes: Vec<Axis>, arrangement: Arrangement, starts: &[Start]) -> Result<Self, RangeError> {
@@ -155,14 +155,14 @@ impl Design {
         }
         let along = match self.arrangement {
             Arrangement::Crossed => std::slice::from_ref(last),
-            Arrangement::Zipped => &self.axes[..],
+            Arrangement::Table => &self.axes[..],
         };
         if let Some(deferred) = along.iter().find(|axis| axis.waits_for_restart(scene)) {
             let why = format!(
                 "{} takes effect at the next reset only, so no state can be followed through its values",
                 deferred.key()
             );
-            let has_no_alternative = others.is_empty() || self.arrangement == Arrangement::Zipped;
+            let has_no_alternative = others.is_empty() || self.arrangement == Arrangement::Table;
             return invalid(why, if has_no_alternative { "" } else { ", or name another range last" });
         }
         Ok(())
@@ -184,7 +184,7 @@ impl Design {
     }
 
     /// Shape of an array with one value per point: the number of starts, if there are several, then the number of values of
-    /// each crossed axis, or the common number of zipped axes.
+    /// each crossed axis, or the number of rows of a table.
     pub fn shape(&self) -> Vec<usize> {
         let starts = (self.starts.len() > 1).then_some(self.starts.len());
         starts.into_iter().chain(self.counts()).collect()
@@ -195,7 +195,7 @@ impl Design {
         let counts = self.axes.iter().map(Axis::count);
         match self.arrangement {
             Arrangement::Crossed => counts.collect(),
-            Arrangement::Zipped => counts.take(1).collect(),
+            Arrangement::Table => counts.take(1).collect(),
         }
     }
 
@@ -217,7 +217,7 @@ impl Design {
     /// Index of a point along each axis.
     pub fn indices(&self, point: usize) -> Vec<usize> {
         let mut rest = point % self.sets();
-        if self.arrangement == Arrangement::Zipped {
+        if self.arrangement == Arrangement::Table {
             return vec![rest; self.axes.len()];
         }
         let index = |axis: &Axis| {
@@ -270,10 +270,10 @@ impl Design {
 
     /// Points whose scenes are checked before anything runs. With crossed axes, these are every value of each axis with the
     /// others at their ends, and a lattice inside, which covers every point of a small map; with more than two axes, at most
-    /// [`MAX_CHECKED`] of these. With zipped axes, these are all points, or [`MAX_CHECKED`] spread over the rows.
+    /// [`MAX_CHECKED`] of these. In a table, these are all points, or [`MAX_CHECKED`] spread over the rows.
     pub(super) fn checked_points(&self) -> Vec<usize> {
         let sets = self.sets();
-        if self.arrangement == Arrangement::Zipped {
+        if self.arrangement == Arrangement::Table {
             return (0..sets - 1).step_by(sets.div_ceil(MAX_CHECKED)).chain([sets - 1]).collect();
         }
         let fits = |per_axis: usize| {
@@ -293,7 +293,7 @@ impl Design {
         all.into_iter().step_by(stride).collect()
     }
 
-    /// Number of blocks. A block is computed as a whole, independently of threads and shards.
+    /// Number of blocks. A block is computed as a whole, independently of threads.
     pub fn blocks(&self) -> usize {
         self.starts.iter().map(|start| self.blocks_of(*start)).sum()
     }
@@ -380,10 +380,10 @@ mod tests {
     }
 
     #[test]
-    fn zipped_values_vary_in_parallel_and_tables_are_zipped() {
+    fn a_row_of_a_table_is_a_point() {
         let scene = spcmm();
         let axes = vec![axis("contact.friction=0.1..0.3:3"), axis("contact.normal_law=hertz,flores,hertz")];
-        let design = Design::zipped(&scene, axes, &[Start::Cold]).expect("three points");
+        let design = Design::of_columns(&scene, axes, &[Start::Cold]).expect("three points");
         assert_eq!((design.points(), design.blocks(), design.shape()), (3, 3, vec![3]));
         let settings = design.settings(1);
         assert_eq!(settings[0], ("contact.friction", Value::Number(0.2)));
@@ -424,9 +424,9 @@ mod tests {
             assert!(error.contains(fragment), "{error}");
         }
         assert!(Design::crossed(&scene, vec![frequency(), friction()], &follow).is_ok());
-        let zipped = |axes, starts| Design::zipped(&scene, axes, starts).map_err(|error| error.to_string());
-        assert!(zipped(vec![frequency(), friction()], &follow).is_err_and(|why| why.contains("next reset")));
-        let uneven = zipped(vec![axis("contact.clearance=0.1mm..1mm:4"), friction()], &[Start::Cold]);
+        let table = |axes, starts| Design::of_columns(&scene, axes, starts).map_err(|error| error.to_string());
+        assert!(table(vec![frequency(), friction()], &follow).is_err_and(|why| why.contains("next reset")));
+        let uneven = table(vec![axis("contact.clearance=0.1mm..1mm:4"), friction()], &[Start::Cold]);
         assert!(uneven.is_err_and(|why| why.contains("contact.clearance has 4 values and contact.friction has 3")));
     }
 

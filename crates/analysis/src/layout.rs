@@ -4,6 +4,7 @@ use super::drive::OBSERVABLES;
 use super::exponent::Exponent;
 use super::point::{JointResult, PointResult, Protocol};
 use jointplay_scene::Scene;
+use serde::Serialize;
 
 /// How a point ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +29,7 @@ impl Status {
 }
 
 /// One array of the result.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Column {
     /// Name, with the unit.
     pub name: String,

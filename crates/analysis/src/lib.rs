@@ -1,8 +1,8 @@
-//! Results computed from whole runs. The crate starts no threads; the caller supplies the clock ([`RunContext`]).
+//! Results computed from whole runs. The caller supplies the clock ([`RunContext`]); only [`parallel`] starts threads.
 //!
 //! - Sweeps: [`axis`] and [`design`] define the points, [`sweep`] runs them, [`point`], [`crossing`] and [`statistic`] record
-//!   the results; [`sweep_task`] and [`task`] describe the same work as plain data for a thread or a worker, as
-//!   [`one_at_a_time_task`] does for a study.
+//!   the results; `sweep_run` computes them on all cores, and resumes; [`sweep_task`] and [`task`] describe the same work as plain
+//!   data for a thread or a worker, as [`one_at_a_time_task`] does for a study.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the resulting
 //!   [`regime`].
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`],
@@ -56,6 +56,8 @@ pub mod map;
 pub mod map_task;
 pub mod one_at_a_time_task;
 pub mod orbit;
+#[cfg(feature = "native")]
+pub mod parallel;
 mod pareto_front;
 pub mod point;
 mod points;
@@ -68,10 +70,14 @@ mod run_context;
 pub mod section;
 mod setting;
 pub mod source;
+pub mod span_request;
 mod speed_goals;
 pub mod statistic;
 pub mod study;
 pub mod sweep;
+#[cfg(feature = "native")]
+pub mod sweep_run;
+pub mod sweep_settings;
 pub mod sweep_task;
 pub mod task;
 mod timing;

@@ -95,7 +95,7 @@ pub fn read_points(scene: &Scene, file: &str, text: &str, starts: &[Start]) -> R
     }
     let axes = keys.iter().zip(columns).map(|(key, values)| Axis::listed(scene, key, values));
     let axes: Result<Vec<_>, _> = axes.collect();
-    let design = axes.and_then(|axes| Design::zipped(scene, axes, starts));
+    let design = axes.and_then(|axes| Design::of_columns(scene, axes, starts));
     design.map_err(|error| PointsError::Together { file: file_name(), error: Box::new(error) })
 }
 

@@ -437,7 +437,7 @@ mod tests {
         assert_eq!(messages_of(good, 3).len(), 3);
         for (vary, words) in [
             ("contact.friction=0.3..0.1:3", "reversed"),
-            ("contact.friction=0.3", "expected KEY=A..B:N"),
+            ("contact.friction=0.1..0.3", "expected KEY=A..B:N"),
             ("contact.friction=0.1..0.3:900000", "more than the window draws"),
             ("contact.clearance=0.1mm..20mm:3", "below the ball radius"),
         ] {

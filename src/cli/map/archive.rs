@@ -6,8 +6,7 @@ use ndarray::Array1;
 
 use super::results::Results;
 use super::vtk::Points;
-use crate::cli::output::{add_array, as_io, write_archive};
-use crate::cli::sweep::Word;
+use crate::cli::output::{add_array, add_axis, as_io, write_archive};
 use crate::files::{FileError, OutputFile, PendingFile};
 use crate::machine::Vec3;
 
@@ -47,14 +46,7 @@ pub fn npz(results: &Results, target: OutputFile) -> Result<PendingFile, FileErr
     target.fill(|file| {
         write_archive(*file.get_ref(), |archive| {
             for axis in results.map.design().axes() {
-                let written = match axis.words() {
-                    Some(words) => {
-                        let words: Array1<Word> = words.into_iter().map(|word| Word(word.to_owned())).collect();
-                        archive.add_array(axis.key(), &words)
-                    }
-                    None => archive.add_array(axis.key(), &Array1::from_iter(axis.numbers())),
-                };
-                written.map_err(as_io)?;
+                add_axis(archive, axis)?;
             }
             add_array(archive, "status", shape.clone(), points().map(status).collect())?;
             let unbounded = points().map(|point| results.unbounded(point).len() as i64);

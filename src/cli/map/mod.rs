@@ -5,6 +5,7 @@ mod report;
 mod results;
 mod vtk;
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value as Json;
@@ -12,9 +13,10 @@ use serde_json::Value as Json;
 use self::results::Results;
 use super::args::{MapArguments, SummaryForm};
 use super::output::check_distinct;
-use super::workers::run_jobs;
 use super::{Failure, interrupt, load, print, progress, threads};
 use crate::analysis::map::{MapPoint, MapPointError, WorkspaceMap};
+use crate::analysis::parallel::run_parallel;
+use crate::analysis::sweep_run::RunFault;
 use crate::files::{OutputFile, PendingFile, publish};
 
 /// Format of an output, by its extension.
@@ -83,16 +85,15 @@ fn compute(
 ) -> Result<Vec<Result<MapPoint, MapPointError>>, Failure> {
     let todo: Vec<usize> = (0..map.design().points()).collect();
     let mut points: Vec<Option<Result<MapPoint, MapPointError>>> = todo.iter().map(|_| None).collect();
-    run_jobs(
-        &todo,
-        threads,
-        |point, _| Some(Ok(map.point(point))),
-        |point, result| {
+    let work = |point, _: &dyn Fn() -> bool| Some(map.point(point));
+    run_parallel(&todo, threads, work, |result| {
+        if let Some((point, result)) = result {
             points[point] = Some(result);
             done();
-            Ok(())
-        },
-    )?;
+        }
+        if interrupt::is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })
+    .map_err(RunFault::from)?;
     let computed = points.iter().flatten().count();
     let points: Option<Vec<_>> = points.into_iter().collect();
     points.ok_or_else(|| {

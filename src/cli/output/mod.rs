@@ -5,11 +5,13 @@ mod json;
 mod npz;
 mod rows;
 mod table;
+mod word;
 
 pub use csv::{ChecksumWriter, significant};
 pub use json::write_meta;
 pub use npz::{add_array, as_io, write_archive};
 pub use table::{RowError, Table};
+pub use word::{add_axis, add_words};
 
 use std::path::{Path, PathBuf};
 
