@@ -28,7 +28,7 @@ pub struct Arguments {
 pub enum Command {
     /// Open the window on a scene.
     View(ViewArguments),
-    /// List the built-in scenes, and the benchmarks with which `validate` compares the program.
+    /// List the built-in scenes, and the benchmarks of docs/validation.md.
     Scenes,
     /// List the built-in lessons, or check a lesson: compute its measures, print its texts with values and answers, and report
     /// errors and claims that fail.
@@ -47,8 +47,6 @@ pub enum Command {
     Sweep(SweepArguments),
     /// Map the error of the tip over drive positions and parameters: at rest, and with every ball anywhere in its play.
     Map(MapArguments),
-    /// Compute the validation cases and print the results beside the known values: `docs/validation.md` (Markdown).
-    Validate(ValidateArguments),
     /// Print the reference page of all parameters (Markdown).
     Parameters,
     /// Print the page about scene files, a guide and a reference of every key (Markdown).
@@ -350,17 +348,6 @@ pub struct TradeoffArguments {
     /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
-}
-
-/// `validate`.
-#[derive(Debug, Args)]
-pub struct ValidateArguments {
-    /// File to write in place of standard output.
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-    /// Replace an existing file.
-    #[arg(long, requires = "out")]
-    pub force: bool,
 }
 
 /// `bench`.

@@ -24,7 +24,7 @@ impl Failure {
     pub const NO_ADAPTER: u8 = 3;
     /// The divergence guard stopped the run.
     pub const DIVERGED: u8 = 4;
-    /// A case of `validate` missed its bound.
+    /// A link does not lead to the state that it names.
     pub const MISSED: u8 = 5;
     /// Ctrl-C.
     pub const INTERRUPTED: u8 = 130;

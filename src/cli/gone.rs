@@ -8,6 +8,7 @@ const IN_PACKAGE: &[(&str, &str)] =
 
 /// Other commands and options, each with the command that has it, and what to do in place of it.
 const GONE: &[(&str, &str, &str)] = &[
+    ("validate", "", "`cargo test --test physics validation` compares with the known answers of docs/validation.md"),
     (
         "merge",
         "",

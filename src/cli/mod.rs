@@ -31,7 +31,6 @@ mod summary;
 mod sweep;
 mod tables;
 pub mod tradeoff;
-pub mod validate;
 mod wear;
 
 use std::fmt::Write as _;
@@ -107,7 +106,6 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Bench(arguments)) => bench::bench(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Map(arguments)) => map::map(&arguments),
-        Some(Command::Validate(arguments)) => validate::validate(&arguments),
         Some(Command::Parameters) => print(&reference_page()),
         Some(Command::Reference) => print(&reference::page()),
         Some(Command::Schema) => print(&schema::page()),

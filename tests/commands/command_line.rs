@@ -571,18 +571,6 @@ fn lessons_are_listed_and_a_file_is_checked() {
 }
 
 #[test]
-fn validation_cases_reproduce_their_page() {
-    let folder = folder();
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation.md");
-    let stored = fs::read_to_string(path).unwrap();
-    assert!(jointplay(folder.path(), "validate").expect(0).stdout == stored);
-    let out = jointplay(folder.path(), "validate --out page.md").expect(0).stdout;
-    assert_eq!(out, "");
-    assert!(fs::read_to_string(folder.path().join("page.md")).unwrap() == stored);
-    jointplay(folder.path(), "validate --out page.md").expect(1);
-}
-
-#[test]
 fn scenes_are_listed_and_checked_with_their_contents() {
     let folder = folder();
     let list = jointplay(folder.path(), "scenes").expect(0).stdout;

@@ -81,7 +81,6 @@ pub mod sweep_settings;
 pub mod sweep_task;
 pub mod task;
 mod timing;
-pub mod validation;
 mod work_precision;
 
 pub use cost::{CaseCost, CostCase, model_costs};

@@ -1,7 +1,7 @@
 """Independent models of the cases of docs/validation.md, written down again without the program, in coordinates of their own.
 
     pip install numpy==2.* scipy==1.17.1
-    python tests/reference/validation/models.py > assets/validation/models.toml
+    python tests/reference/validation/models.py > tests/physics/validation/models.toml
 
 Integrations have a relative tolerance of 1e-13, that with contacts of 1e-12. Every number is SI. Takes half a minute.
 """
