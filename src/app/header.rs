@@ -206,7 +206,7 @@ impl App {
         self.plots_menu(ui);
         #[cfg(target_arch = "wasm32")]
         ui.add_enabled(false, egui::Button::new("Plots…")).on_disabled_hover_text(
-            "Plots as PDF, SVG and PNG are saved by the desktop program: the page leaves out the libraries that draw them, so \
+            "Plots as SVG and PNG are saved by the desktop program: the page leaves out the libraries that draw them, so \
              that it loads fast. Picture… can show them with the view, as PNG, and Data (CSV) has their values",
         );
         let help = "Everything that the plots have recorded since the reset";

@@ -1,11 +1,10 @@
-//! Charts as data. One description gives an SVG, from which PNG and PDF files are made.
+//! Charts as data. One description gives an SVG, from which PNG files are made.
 //!
 //! This module knows nothing of mechanisms and needs no display.
 
 mod draw;
 mod ink;
 mod labels;
-mod pdf;
 mod png;
 mod thin;
 mod ticks;

@@ -30,7 +30,6 @@ impl Variant {
     /// Changes for a comparison of smooth motion with a closed form: step sizes suit the method's order.
     pub fn close(self) -> [(&'static str, &'static str); 5] {
         let step = match self.method {
-            "semi-implicit-euler" => "1 us",
             "rk4" => "100 us",
             _ => "10 us",
         };
@@ -41,15 +40,10 @@ impl Variant {
     /// Error bound of such a comparison, m.
     pub fn bound(self) -> f64 {
         match self.method {
-            "semi-implicit-euler" | "discrete-gradient" => 2e-6,
+            "discrete-gradient" => 2e-6,
             "rk4" => 1e-9,
             _ => 1e-8,
         }
-    }
-
-    /// First-order methods need a hundred times the steps for this accuracy.
-    fn is_expensive(self) -> bool {
-        self.method.ends_with("euler")
     }
 }
 
@@ -59,14 +53,12 @@ pub fn every_variant() -> impl Iterator<Item = Variant> {
 }
 
 /// Calls `check` with every case and every method, alternating the formulation. Every case meets both formulations, and so does
-/// every method except those of first order, which meet only the first case.
+/// every method.
 pub fn for_every<C: Copy>(cases: impl IntoIterator<Item = C>, mut check: impl FnMut(C, Variant)) {
     for (turn, case) in cases.into_iter().enumerate() {
         for (place, method) in METHODS.into_iter().enumerate() {
             let variant = Variant { method, formulation: FORMULATIONS[(turn + place) % 2] };
-            if turn == 0 || !variant.is_expensive() {
-                check(case, variant);
-            }
+            check(case, variant);
         }
     }
 }

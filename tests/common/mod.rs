@@ -29,7 +29,7 @@ pub const SCENES: [&str; 5] = ["spcmm", "pendulum", "slider-crank", "slider-cran
 /// The other built-in scenes, whose long runs are slow; `tests/physics/machines.rs` checks each of them.
 pub const MACHINES: [&str; 5] = ["hexapod", "delta", "four-bar", "suspension", "press"];
 /// Words of `solver.method`.
-pub const METHODS: [&str; 6] = ["semi-implicit-euler", "discrete-gradient", "rk4", "dopri5", "radau5", "automatic"];
+pub const METHODS: [&str; 5] = ["discrete-gradient", "rk4", "dopri5", "radau5", "automatic"];
 
 /// Changed parameters: keys and values as in `--set`.
 pub type Changes<'a> = [(&'a str, &'a str)];

@@ -43,7 +43,7 @@ type Case<'a> = (&'a str, &'a Changes<'a>, f64, fn(&Doubt) -> bool);
 
 #[test]
 fn a_wrong_energy_raises_a_doubt() {
-    let coarse = [("solver.method", "semi-implicit-euler"), ("solver.step", "40 us")];
+    let coarse = [("solver.method", "rk4"), ("solver.step", "50 us")];
     let loose = [("solver.method", "dopri5"), ("solver.tolerance", "1e-3")];
     let heavy = [("solver.method", "rk4"), ("gravity.x", "981 m/s^2")];
     let energy = |doubt: &Doubt| matches!(doubt, Doubt::Energy { share, .. } if *share > 5e-3);

@@ -65,9 +65,6 @@ impl<F: Fn(f64, f64, f64) -> f64> System for Force<F> {
         dy[0] = y[1];
         dy[1] = (self.0)(t, y[0], y[1]);
     }
-    fn position_rate(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
-        dy[0] = y[1];
-    }
     fn scale(&self) -> &[f64] {
         &[1.0, 1.0]
     }

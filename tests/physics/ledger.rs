@@ -155,7 +155,6 @@ fn every_method_keeps_a_ledger() {
         for method in METHODS {
             // A fixed step of 10 us resolves the force of an impact to a per cent, its energy to some parts in a thousand.
             let bound = match method {
-                "semi-implicit-euler" => 5e-3,
                 "rk4" => 5e-4,
                 _ => RESIDUAL_BOUND,
             };

@@ -160,7 +160,7 @@ fn changes_act_from_the_next_step_on() {
         ("joint.S2.friction", "0"),
         ("gravity.x", "-5 m/s^2"),
         ("solver.method", "rk4"),
-        ("solver.method", "semi-implicit-euler"),
+        ("solver.method", "rk4"),
         ("solver.tolerance", "1e-9"),
         ("solver.preset", "preview"),
     ] {

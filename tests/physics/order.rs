@@ -2,7 +2,7 @@
 
 use crate::common::{run_until, scene, simulation, slope};
 use jointplay::contact::ContactState;
-use jointplay::integrate::{DormandPrince, RungeKutta4, SemiImplicitEuler, Stepper, System};
+use jointplay::integrate::{DormandPrince, RungeKutta4, Stepper, System};
 use jointplay::mechanism::{ActiveSet, Mechanism, StepStart};
 
 /// Largest difference of two states relative to the scales of their components.
@@ -72,7 +72,6 @@ fn slopes_of_the_error_equal_the_orders() {
             .map(|&steps| {
                 let m = &mut mechanism;
                 let y = match name {
-                    "semi-implicit-euler" => equal_steps(m, SemiImplicitEuler::new(n), &start, DURATION, steps),
                     "discrete-gradient" => equal_discrete_steps(m, &start, DURATION, steps),
                     "rk4" => equal_steps(m, RungeKutta4::new(n), &start, DURATION, steps),
                     _ => equal_steps(m, DormandPrince::new(n), &start, DURATION, steps),
@@ -85,7 +84,6 @@ fn slopes_of_the_error_equal_the_orders() {
         assert!((observed - expected).abs() < tolerance, "{name}: {observed}");
     };
     // At these steps the next term of the error changes the slope by a few hundredths.
-    order("semi-implicit-euler", [160, 320, 640, 1280], 1.0, 0.05);
     // At 160 steps the ends are so far from the guesses that the steps are repeated, which makes them more accurate.
     order("discrete-gradient", [320, 640, 1280, 2560], 2.0, 0.1);
     order("rk4", [40, 80, 160, 320], 4.0, 0.2);
@@ -107,18 +105,13 @@ fn projected(changes: &[(&str, &str)], exact: Option<&[f64]>) -> (f64, Vec<f64>,
 #[test]
 fn projection_keeps_the_order_of_fixed_steps() {
     let (_, exact, _) = projected(&[("solver.tolerance", "1e-13")], None);
-    for (method, steps, expected, tolerance) in [
-        ("semi-implicit-euler", [2000.0, 1000.0, 500.0, 250.0], 1.0, 0.1),
-        ("rk4", [8000.0, 4000.0, 2000.0, 1000.0], 4.0, 0.3),
-    ] {
-        let points = steps.map(|step| {
-            let changes = [("solver.method", method), ("solver.step", &format!("{step} us"))];
-            (step, projected(&changes, Some(&exact)).0)
-        });
-        let observed = slope(&points);
-        println!("{method}, projected: order {observed:.3}, {points:?}");
-        assert!((observed - expected).abs() < tolerance, "{method}: {observed}");
-    }
+    let points = [8000.0, 4000.0, 2000.0, 1000.0].map(|step| {
+        let changes = [("solver.method", "rk4"), ("solver.step", &format!("{step} us"))];
+        (step, projected(&changes, Some(&exact)).0)
+    });
+    let observed = slope(&points);
+    println!("rk4, projected: order {observed:.3}, {points:?}");
+    assert!((observed - 4.0).abs() < 0.3, "{observed}");
 }
 
 #[test]

@@ -46,7 +46,7 @@ fn fully_driven_ideal_scenes_solve_no_differential_equation() {
     assert_eq!(statistics.evaluations, statistics.steps);
     assert_eq!(statistics.rejected, 0);
     // The result does not depend on the stepper: any method and step reach the same state.
-    let mut other = simulation("spcmm", &[IDEAL, ("solver.method", "semi-implicit-euler"), ("solver.step", "10 ms")]);
+    let mut other = simulation("spcmm", &[IDEAL, ("solver.method", "rk4"), ("solver.step", "10 ms")]);
     other.advance_to(0.5).unwrap();
     assert_eq!(driven.state_hash(), other.state_hash());
     for (name, changes) in [

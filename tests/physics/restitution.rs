@@ -53,7 +53,6 @@ fn an_undisturbed_impact_has_the_restitution_of_its_law() {
             ];
             // First order: errors of some parts in a thousand at 2 us.
             let bound = match method {
-                "semi-implicit-euler" => 2e-2,
                 _ => 1e-3,
             };
             let impacts = impacts(&mut axial_impact(&changes), 0.02);
@@ -264,7 +263,6 @@ fn damping_of_a_joint_hit_again_is_bounded_by_chi_with_the_largest_speed() {
             let case = format!("{word}, {method}: {peak} against {force}, {damping} against {ratio}");
             println!("{case}; residual {:.1e}", ledger.relative_residual());
             let bound = match method {
-                "semi-implicit-euler" => 5e-3,
                 // Its step is an eighth of the duration of such a slow impact.
                 "discrete-gradient" => 2e-2,
                 _ => 1e-5,

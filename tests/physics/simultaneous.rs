@@ -77,7 +77,6 @@ fn two_four_and_eight_balls_strike_alike_with_every_method() {
         ("method = \"dopri5\"\ntolerance = 1e-11", 1e-6),
         ("method = \"radau5\"\ntolerance = 1e-8", 1e-5),
         ("method = \"rk4\"\nstep = \"1 us\"", 1e-4),
-        ("method = \"semi-implicit-euler\"\nstep = \"0.5 us\"", 2e-2),
         ("method = \"discrete-gradient\"\nsteps_per_impact = 16", 2e-2),
     ];
     for balls in [2, 4, 8] {

@@ -145,7 +145,7 @@ fn the_error_falls_with_the_order_of_the_method_along_a_curve() {
         let mut simulation = Mounting::Body.start(&POINTS, SPLINE, &changes);
         Mounting::Body.state(&frame_at(&mut simulation, zero_crossing))[0].abs()
     };
-    for (method, steps, order) in [("semi-implicit-euler", [1e3, 2e3], 1.0), ("rk4", [20.0, 40.0], 4.0)] {
+    for (method, steps, order) in [("rk4", [20.0, 40.0], 4.0)] {
         let [coarse, fine] = steps.map(|steps| error(method, steps));
         let observed = (coarse / fine).log2();
         println!("{method}: {coarse:e}, {fine:e}, order {observed}");

@@ -7,7 +7,6 @@
 //!   [`regime`].
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`],
 //!   [`model_costs`].
-//! - Validation cases with known answers ([`validation`]).
 //! - The tip's error over the workspace, with the drives held ([`map`]).
 //! - Runs of a scene at given values of its parameters, reduced to a few numbers, and each parameter alone ([`study`]).
 //!

@@ -18,11 +18,6 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Error for a `[chain]`, a section of earlier versions.
-const NO_CHAIN: &str = "a row of links is a pattern: write a [[pattern]] with `count` and `along`, with the link as [[pattern.body]], \
-     a free [[pattern.joint]], and a [[pattern.ball_joint]] with `socket = { body = \"previous.link\" }`; a [[ball_joint]] holds \
-     `link1`; the built-in scene `chain` is written so";
-
 /// The text being read, its name in errors, and the context of its values.
 #[derive(Clone, Copy)]
 pub(super) struct Document<'d> {
@@ -163,10 +158,7 @@ impl<'d> Section<'d> {
             return node.error(format!("not allowed here: a {one} has {}; a {its} has `{name}`", own.join(", ")));
         }
         let near = nearest(name, known.iter().copied());
-        let message = match (&*self.path, &**name) {
-            ("", "chain") => NO_CHAIN.to_owned(),
-            _ => format!("unknown key{near}; allowed here: {}", known.join(", ")),
-        };
+        let message = format!("unknown key{near}; allowed here: {}", known.join(", "));
         let document = self.document;
         document.error(key.span(), &self.key(name), None, message)
     }

@@ -136,11 +136,18 @@ pub enum ValueFault {
 }
 
 /// Values that files and links of earlier versions may have: key, value, and what took its place.
-const GONE: [(&str, &str, &str); 1] = [(
-    "contact.friction_velocity",
-    "printed",
-    "is gone: use centres, the velocity of the paper's friction law (15), (16); what printed gave is in docs/tried.md",
-)];
+const GONE: &[(&str, &str, &str)] = &[
+    (
+        "contact.friction_velocity",
+        "printed",
+        "is gone: use centres, the velocity of the paper's friction law (15), (16); what printed gave is in docs/tried.md",
+    ),
+    (
+        "solver.method",
+        "semi-implicit-euler",
+        "is gone: use rk4, which has a fixed step, too, or discrete-gradient, which is fast at low accuracy",
+    ),
+];
 
 impl Parameter {
     /// Unit in which values are shown; "" for pure numbers, counts and choices.

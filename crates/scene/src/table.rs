@@ -270,7 +270,7 @@ static TABLE: [Parameter; 25] = [
         Kind::Choice(Method::WORDS),
         Value::Choice("automatic"),
         Scope::Every,
-        "Time stepper. semi-implicit-euler (order 1) and rk4 (order 4) keep a fixed step; discrete-gradient takes a number of steps \
+        "Time stepper. rk4 (order 4) keeps a fixed step; discrete-gradient takes a number of steps \
          per impact, solves each for the contact forces, and stays stable whatever its step: the fastest where many balls are \
          loose, to a few per cent; dopri5 (Dormand-Prince, order 5) chooses its steps by the tolerance and finds the instants at \
          which contacts begin and end; radau5 (Radau IIA, implicit, order 5) does so too and takes longer steps where contacts have \

@@ -25,8 +25,6 @@ const PNG_SCALE: f32 = 2.0;
 /// File format of saved plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlotFormat {
-    /// PDF, for print.
-    Pdf,
     /// SVG, for editing.
     Svg,
     /// PNG.
@@ -34,11 +32,8 @@ pub enum PlotFormat {
 }
 
 impl PlotFormat {
-    const ALL: [(Self, &'static str, &'static str, &'static str); 3] = [
-        (Self::Pdf, "PDF", "pdf", "application/pdf"),
-        (Self::Svg, "SVG", "svg", "image/svg+xml"),
-        (Self::Png, "PNG", "png", "image/png"),
-    ];
+    const ALL: [(Self, &'static str, &'static str, &'static str); 2] =
+        [(Self::Svg, "SVG", "svg", "image/svg+xml"), (Self::Png, "PNG", "png", "image/png")];
 }
 
 impl App {
@@ -63,7 +58,6 @@ impl App {
             return;
         };
         let bytes = match format {
-            PlotFormat::Pdf => sheet.pdf(),
             PlotFormat::Svg => sheet.svg().map(String::into_bytes),
             PlotFormat::Png => sheet.png(PNG_SCALE),
         };

@@ -16,8 +16,8 @@ const EVALUATIONS_PER_SECOND: f64 = 50_000.0;
 const FRAME_LIMIT: f64 = 1.5;
 /// Limit of evaluations in a single step.
 const MAX_STEP_EVALUATIONS: u64 = 2000;
-/// Allowed gain of energy of a passive scene, relative to that exchanged: for a first-order method with ten steps per impact, and for the others.
-const ALLOWED_GAIN: [f64; 2] = [0.06, 0.02];
+/// Allowed gain of energy of a passive scene, relative to that exchanged.
+const ALLOWED_GAIN: f64 = 0.02;
 
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -145,8 +145,7 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
     }
     let doubts = simulation.doubts();
     let mut doubts: Vec<String> = doubts.iter().map(ToString::to_string).collect();
-    let euler = scene.machine.solver.method == jointplay::integrate::Method::SemiImplicitEuler;
-    if row.passive && balance.gain() > ALLOWED_GAIN[usize::from(!euler)] {
+    if row.passive && balance.gain() > ALLOWED_GAIN {
         let message = format!("{:.3} of the energy created", balance.gain());
         if doubts.is_empty() {
             return Outcome::Wrong(message);

@@ -1,42 +1,6 @@
-//! Fixed-step methods.
+//! A fixed-step method.
 
 use super::{Stepper, System, combine};
-
-/// Semi-implicit Euler, v1 = v + h a(t, q, v), q1 = q + h q_dot(q, v1): order 1; the energy of oscillations stays bounded.
-pub struct SemiImplicitEuler {
-    rate: Vec<f64>,
-}
-
-impl SemiImplicitEuler {
-    /// Stepper for `dimension` components.
-    pub fn new(dimension: usize) -> Self {
-        Self { rate: vec![0.0; dimension] }
-    }
-}
-
-impl Stepper for SemiImplicitEuler {
-    fn attempt<S: System>(
-        &mut self,
-        system: &mut S,
-        t: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        y_end: &mut [f64],
-        _k_end: &mut [f64],
-    ) -> f64 {
-        let positions = system.positions();
-        y_end[..positions].copy_from_slice(&y[..positions]);
-        for i in positions..y.len() {
-            y_end[i] = y[i] + h * k[i];
-        }
-        system.position_rate(t, y_end, &mut self.rate);
-        for i in 0..positions {
-            y_end[i] += h * self.rate[i];
-        }
-        0.0
-    }
-}
 
 /// Kutta's classical method of order 4 (1901).
 pub struct RungeKutta4 {

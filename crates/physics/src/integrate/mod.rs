@@ -13,7 +13,7 @@ mod root;
 
 pub use controller::Controller;
 pub use dormand_prince::DormandPrince;
-pub use fixed::{RungeKutta4, SemiImplicitEuler};
+pub use fixed::RungeKutta4;
 pub use radau::{Polynomial, Radau};
 pub use root::find_root;
 
@@ -23,8 +23,6 @@ use std::ops::Range;
 /// Time-stepping method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Semi-implicit Euler, order 1, fixed step.
-    SemiImplicitEuler,
     /// Discrete gradient of the contacts' elastic energy, friction at the end of the step; a number of steps per impact.
     DiscreteGradient,
     /// Classical Runge-Kutta, order 4, fixed step.
@@ -38,7 +36,6 @@ pub enum Method {
 }
 
 words!(Method {
-    SemiImplicitEuler => "semi-implicit-euler",
     DiscreteGradient => "discrete-gradient",
     RungeKutta4 => "rk4",
     DormandPrince5 => "dopri5",
@@ -66,7 +63,7 @@ impl Method {
     /// Rule for the size of its steps.
     pub fn control(self) -> StepControl {
         match self {
-            Self::SemiImplicitEuler | Self::RungeKutta4 => StepControl::Fixed,
+            Self::RungeKutta4 => StepControl::Fixed,
             Self::DiscreteGradient => StepControl::PerImpact,
             Self::DormandPrince5 | Self::Radau5 | Self::Automatic => StepControl::Error,
         }
@@ -92,8 +89,6 @@ pub trait System {
     fn prepare_times(&mut self, _times: &[f64]) {}
     /// Writes f(t, y) to `dy`.
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
-    /// Writes the position part of f alone to the first [`System::positions`] components of `dy`; evaluates no force.
-    fn position_rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
     /// Absolute scale of each component: an error of `tolerance * scale` is acceptable.
     fn scale(&self) -> &[f64];
 }
@@ -217,9 +212,6 @@ mod tests {
             dy[0] = y[1];
             dy[1] = -y[0];
         }
-        fn position_rate(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
-            dy[0] = y[1];
-        }
         fn scale(&self) -> &[f64] {
             &[1.0, 1.0]
         }
@@ -243,10 +235,8 @@ mod tests {
 
     #[test]
     fn each_stepper_has_its_order() {
-        let euler = observed_order(&mut SemiImplicitEuler::new(2), 400);
         let rk4 = observed_order(&mut RungeKutta4::new(2), 40);
         let dopri = observed_order(&mut DormandPrince::new(2), 20);
-        assert!((euler - 1.0).abs() < 0.1, "semi-implicit Euler: {euler}");
         assert!((rk4 - 4.0).abs() < 0.1, "Runge-Kutta 4: {rk4}");
         assert!((dopri - 5.0).abs() < 0.2, "Dormand-Prince: {dopri}");
     }

@@ -154,7 +154,6 @@ impl System for Probe {
         dy.copy_from_slice(&self.slopes[self.calls]);
         self.calls += 1;
     }
-    fn position_rate(&mut self, _t: f64, _y: &[f64], _dy: &mut [f64]) {}
     fn scale(&self) -> &[f64] {
         &self.scale
     }
@@ -246,41 +245,4 @@ fn radau_has_order_five_and_its_interpolant_and_embedded_method_three() {
     let mut rows = vec![vec![0.0; 4]];
     rows.extend(a.iter().map(|row| [&[0.0], &row[..]].concat()));
     Tableau(rows).assert_order("embedded", &embedded, 1.0, 3);
-}
-
-/// q' = v, v' = a.
-struct Falling(f64);
-
-impl System for Falling {
-    fn dimension(&self) -> usize {
-        2
-    }
-    fn positions(&self) -> usize {
-        1
-    }
-    fn active_ranges(&self) -> &[Range<usize>] {
-        std::slice::from_ref(&(0..2))
-    }
-    fn derivative(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
-        dy.copy_from_slice(&[y[1], self.0]);
-    }
-    fn position_rate(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
-        dy[0] = y[1];
-    }
-    fn scale(&self) -> &[f64] {
-        &[1.0, 1.0]
-    }
-}
-
-#[test]
-fn semi_implicit_euler_has_order_one_exactly() {
-    let h = 0.25;
-    for (v, a) in [(1.0, 0.0), (0.0, 1.0)] {
-        let (y, k) = ([0.0, v], [v, a]);
-        let mut end = [0.0; 2];
-        let mut system = Falling(a);
-        SemiImplicitEuler::new(2).attempt(&mut system, 0.0, h, &y, &k, &mut end, &mut [0.0; 2]);
-        // The position uses the velocity at the end: h^2 a, twice the exact contribution.
-        assert_eq!(end, [h * v + h * h * a, v + h * a]);
-    }
 }

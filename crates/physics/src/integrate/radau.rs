@@ -490,7 +490,6 @@ mod tests {
             dy[0] = y[1];
             dy[1] = ((1.0 - y[0] * y[0]) * y[1] - y[0] + libm::sin(t)) / self.epsilon;
         }
-        fn position_rate(&mut self, _t: f64, _y: &[f64], _dy: &mut [f64]) {}
         fn scale(&self) -> &[f64] {
             &[1.0, 1.0]
         }

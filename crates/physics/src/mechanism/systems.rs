@@ -107,10 +107,6 @@ impl System for Evaluator<'_> {
         self.mechanism.active_ranges()
     }
 
-    fn position_rate(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
-        self.mechanism.position_rate(y, dy);
-    }
-
     fn scale(&self) -> &[f64] {
         self.mechanism.scale()
     }

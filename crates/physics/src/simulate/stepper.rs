@@ -2,13 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::integrate::{
-    DormandPrince, Method, Polynomial, Radau, RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem, System, hermite,
-};
+use crate::integrate::{DormandPrince, Method, Polynomial, Radau, RungeKutta4, Stepper, StiffSystem, System, hermite};
 use std::ops::Range;
 
 pub(super) enum AnyStepper {
-    SemiImplicitEuler(SemiImplicitEuler),
     /// The equations take the whole step.
     DiscreteGradient,
     RungeKutta4(RungeKutta4),
@@ -35,7 +32,6 @@ pub(super) enum ActiveScheme {
 impl AnyStepper {
     pub(super) fn new(method: Method, dimension: usize) -> Self {
         match method {
-            Method::SemiImplicitEuler => Self::SemiImplicitEuler(SemiImplicitEuler::new(dimension)),
             Method::DiscreteGradient => Self::DiscreteGradient,
             Method::RungeKutta4 => Self::RungeKutta4(RungeKutta4::new(dimension)),
             Method::DormandPrince5 => Self::DormandPrince(DormandPrince::new(dimension)),
@@ -51,7 +47,6 @@ impl AnyStepper {
     /// The method that it steps by.
     pub(super) fn method(&self) -> Method {
         match self {
-            Self::SemiImplicitEuler(_) => Method::SemiImplicitEuler,
             Self::DiscreteGradient => Method::DiscreteGradient,
             Self::RungeKutta4(_) => Method::RungeKutta4,
             Self::DormandPrince(_) => Method::DormandPrince5,
@@ -119,7 +114,6 @@ impl AnyStepper {
         polynomial: &mut Polynomial,
     ) -> f64 {
         match self {
-            Self::SemiImplicitEuler(s) => s.attempt(system, t, h, y, k, y_end, k_end),
             Self::DiscreteGradient => unreachable!("the equations take this step"),
             Self::RungeKutta4(s) => s.attempt(system, t, h, y, k, y_end, k_end),
             Self::DormandPrince(s) | Self::Automatic { explicit: s, scheme: ActiveScheme::Explicit, .. } => {
@@ -167,7 +161,7 @@ impl AnyStepper {
 
     /// Whether `attempt` provides the derivative at the end.
     pub(super) fn ends_with_derivative(&self) -> bool {
-        !matches!(self, Self::SemiImplicitEuler(_) | Self::DiscreteGradient | Self::RungeKutta4(_))
+        !matches!(self, Self::DiscreteGradient | Self::RungeKutta4(_))
     }
 
     /// Whether rates are difference quotients over the step: no step needs a derivative at its end.
@@ -189,7 +183,7 @@ impl AnyStepper {
         out: &mut [f64],
     ) {
         match self {
-            Self::SemiImplicitEuler(_) | Self::DiscreteGradient | Self::RungeKutta4(_) => {
+            Self::DiscreteGradient | Self::RungeKutta4(_) => {
                 let [y, k, y_end, k_end] = [y, k, y_end, k_end].map(|x| &x[part.clone()]);
                 hermite(theta, h, y, k, y_end, k_end, &mut out[part]);
             }
