@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import tempfile
 import time
+from importlib.metadata import version
 from pathlib import Path
 
+from ._folder import check_replaceable, result_folder
 from .errors import OptionError
-
-PARTS = {"index.html", "data", "plots"}
-"""What a report consists of."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,15 +38,13 @@ def main(arguments: argparse.Namespace) -> None:
     except ModuleNotFoundError as error:
         raise OptionError(f"paper needs {error.name}: pip install 'jointplay[paper]'") from error
     started = time.monotonic()
-    findings = results.compute(results.QUICK if arguments.quick else results.FULL, threads, report_progress)
-    with tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.resolve().parent) as beside:
-        folder = Path(beside) / "new"
-        folder.mkdir()
+    extent = results.QUICK if arguments.quick else results.FULL
+    findings = results.compute(extent, threads, report_progress, out)
+    meta = {"program": "jointplay", "version": version("jointplay")}
+    with result_folder(out, arguments.force, meta) as folder:
         compared, stated = page.write_report(folder, findings)
-        check_replaceable(out, arguments.force)
-        if out.is_dir():
-            out.rename(Path(beside) / "old")
-        folder.rename(out)
+    for path in results.records(out, extent):
+        path.unlink(missing_ok=True)
     counts = [sum(c.agreement == word for c in compared) for word in page.AGREEMENTS]
     print(
         f"Numbers     {counts[0]} of {len(compared)} agree within 10 %, {counts[1]} more within a factor of 2, {counts[2]} differ"
@@ -56,19 +52,6 @@ def main(arguments: argparse.Namespace) -> None:
     print(f"Statements  {sum(s.verdict.confirmed for s in stated)} of {len(stated)} confirmed")
     print(f"Wall time   {time.monotonic() - started:.1f} s")
     print(f"Written     {out / 'index.html'}")
-
-
-def check_replaceable(out: Path, force: bool) -> None:
-    """Refuses a place that cannot be written, or whose content may not be replaced: other files never are."""
-    if not out.resolve().parent.is_dir():
-        raise OptionError(f"--out {out}: there is no folder {out.resolve().parent}")
-    if out.exists() and not out.is_dir():
-        raise OptionError(f"--out {out}: it is a file, not a folder")
-    content = {entry.name for entry in out.iterdir()} if out.is_dir() else set()
-    if content and not content <= PARTS:
-        raise OptionError(f"--out {out}: it has other files than those of a report: {', '.join(sorted(content - PARTS))}")
-    if content and not force:
-        raise OptionError(f"--out {out}: it has a report; --force replaces it")
 
 
 def report_progress(stage: str, part: float) -> None:

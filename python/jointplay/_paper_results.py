@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from itertools import count
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._scene import Scene
+from ._study import record_of
 from ._sweep import Sweep, SweepResult
 
 if sys.version_info >= (3, 11):
@@ -311,10 +313,15 @@ def settled_motion(scene: Scene, settle: int, points: int = 800) -> Settled:
     return Settled({name: values[points:].copy() for name, values in last_two.items()}, width)
 
 
-def compute(extent: Extent, threads: int, progress: Callable[[str, float], None]) -> Findings:
+def compute(extent: Extent, threads: int, progress: Callable[[str, float], None], out: Path | None = None) -> Findings:
     """Computes everything on `threads` threads, which do not affect the results; `progress` gets the name of the present
-    stage and its fraction done."""
-    results = {name: computed(sweep, name, threads, progress) for name, sweep in sweeps(extent)}
+    stage and its fraction done. Finished points are in files beside the folder `out`, from which the next call resumes."""
+
+    def computed(name: str, sweep: Sweep) -> SweepResult:
+        record = None if out is None else record_of(out, name)
+        return sweep.run(threads, lambda part: progress(f"sweep {name}", part), record=record)
+
+    results = {name: computed(name, sweep) for name, sweep in sweeps(extent)}
     nominal, done = scene_of(RUNS[0]), count(1)
     ideal = record(nominal.set(clearance=0), extent)
     with ThreadPoolExecutor(threads) as pool:
@@ -342,6 +349,6 @@ def compute(extent: Extent, threads: int, progress: Callable[[str, float], None]
     )
 
 
-def computed(sweep: Sweep, name: str, threads: int, progress: Callable[[str, float], None]) -> SweepResult:
-    """The result of a sweep: the one long part of a report, and the place to give it a record from which it resumes."""
-    return sweep.run(threads, lambda part: progress(f"sweep {name}", part))
+def records(out: Path, extent: Extent) -> list[Path]:
+    """Files with the finished points of the sweeps, beside the folder `out`."""
+    return [record_of(out, name) for name, _ in sweeps(extent)]

@@ -8,7 +8,6 @@ import json
 import math
 import os
 import sys
-import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _native
 from ._distribution import Request, library
+from ._folder import check_replaceable, result_folder
 from ._scene import Quantity, Scene
 from ._study import Estimate, Runs, record_of
 from .errors import OptionError
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from ._sensitivity import Sensitivity
     from ._tolerance import Tolerance
 
-MANIFEST = "manifest.json"
 BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#404040"
 MAX_TABLE_SIZE = 64 << 20
 """Size limit of a table that is read, bytes."""
@@ -114,26 +113,6 @@ def read_rows(option: str, path: Path, heads: tuple[str, ...]) -> list[tuple[str
     return rows
 
 
-def check_replaceable(out: Path, force: bool) -> None:
-    """Refuses a folder that cannot be written, or whose content may not be replaced: files of others never are."""
-    if not out.resolve().parent.is_dir():
-        raise OptionError(f"--out {out}: there is no folder {out.resolve().parent}")
-    if out.exists() and not out.is_dir():
-        raise OptionError(f"--out {out}: it is a file, not a folder")
-    content = {path.relative_to(out).as_posix() for path in out.rglob("*") if not path.is_dir()} if out.is_dir() else set()
-    if not content:
-        return
-    if not force:
-        raise OptionError(f"--out {out}: the folder is not empty; --force replaces earlier results")
-    try:
-        manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
-        listed = {MANIFEST, *manifest["files"]} if manifest["program"] == "jointplay" else set()
-    except (OSError, ValueError, KeyError, TypeError):
-        listed = set()
-    if foreign := sorted(content - listed):
-        raise OptionError(f"--out {out}: other files than results of jointplay are not replaced: {', '.join(foreign[:4])}")
-
-
 def perform(arguments: argparse.Namespace, compute: Callable[..., Any]) -> Any:
     """The result of `compute`, which takes `threads`, `progress` and `record`. Its records are beside the folder."""
     check_replaceable(arguments.out, arguments.force)
@@ -169,22 +148,14 @@ def write(
     duration, start = found.span
     meta = json.loads(_native.provenance_of(scene._native))
     meta |= {"duration_s": duration, "from_s": start, "seed": arguments.seed, "assumed_ranges": found.assumed_ranges, **settings}
-    files = [f"{name}.csv", f"{name}.json", f"{name}.png", f"{name}.svg", "runs.csv"]
-    with tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.resolve().parent) as beside:
-        folder = Path(beside) / "new"
-        folder.mkdir()
-        write_table(found.to_pandas(), folder / files[0])
-        (folder / files[1]).write_text(to_json({**results, "meta": meta}), encoding="utf-8")
+    with result_folder(out, arguments.force, json.loads(to_json(meta))) as folder:
+        write_table(found.to_pandas(), folder / f"{name}.csv")
+        (folder / f"{name}.json").write_text(to_json({**results, "meta": meta}), encoding="utf-8")
         # The same bytes whenever it is drawn.
         with library("matplotlib").rc_context({"svg.hashsalt": "jointplay"}):
-            figure.savefig(folder / files[2], dpi=160)
-            figure.savefig(folder / files[3], metadata={"Date": None})
-        write_table(table_of(found), folder / files[4])
-        (folder / MANIFEST).write_text(to_json({**meta, "files": files}), encoding="utf-8")
-        check_replaceable(out, arguments.force)
-        if out.is_dir():
-            out.rename(Path(beside) / "old")
-        folder.rename(out)
+            figure.savefig(folder / f"{name}.png", dpi=160)
+            figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
+        write_table(table_of(found), folder / "runs.csv")
     for stage in found.runs:
         record_of(out, stage).unlink(missing_ok=True)
 

@@ -110,7 +110,7 @@ def test_data_files_have_the_results(report, found):
 def shortened(monkeypatch, found):
     """The command with results at hand and without pictures."""
     monkeypatch.setattr(page, "drawn", lambda findings: iter(()))
-    monkeypatch.setattr(results, "compute", lambda extent, threads, progress: found)
+    monkeypatch.setattr(results, "compute", lambda extent, threads, progress, out: found)
 
 
 def call(*words):
@@ -127,12 +127,12 @@ def test_a_report_is_replaced_only_with_force_and_other_files_never(shortened, t
     out = tmp_path / "paper"
     run_here(out)
     assert "of 52 confirmed" in capsys.readouterr().out
-    (out / "data" / "old.csv").write_text("old")
+    (out / "index.html").write_text("old")
     with pytest.raises(_paper.OptionError, match="--force"):
         run_here(out)
-    assert (out / "data" / "old.csv").exists()
+    assert (out / "index.html").read_text() == "old"
     run_here(out, force=True)
-    assert not (out / "data" / "old.csv").exists() and (out / "index.html").exists()
+    assert (out / "index.html").read_text() != "old"
     (out / "mine.txt").write_text("mine")
     with pytest.raises(_paper.OptionError, match=r"mine\.txt"):
         run_here(out, force=True)

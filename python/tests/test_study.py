@@ -172,8 +172,7 @@ damping = "1000 N s/m"
         assert (found[key].at_low, found[key].at_high) == pytest.approx((low, high), rel=1e-6)
 
 
-def test_an_interrupted_study_resumes(tmp_path, monkeypatch):
-    monkeypatch.setattr(_study, "CHUNK_TIME", 0.0)
+def test_an_interrupted_study_resumes(tmp_path):
     study = jp.Study(jp.Scene.load("four-bar"), ["contact.clearance"], "A.normal:max", duration="5 ms")
     values, record = np.linspace(1e-4, 2e-4, 7)[:, None], tmp_path / "record"
     expected = study.run(values)
@@ -192,12 +191,12 @@ def test_an_interrupted_study_resumes(tmp_path, monkeypatch):
     record.write_text("\n".join(kept) + "\n123.4 ")
     seen.clear()
     assert study.run(values, threads=1, progress=seen.append, record=record).tobytes() == expected.tobytes()
-    assert seen[0] == (len(kept) - 1) / 7 and seen[-1] == 1.0
+    assert seen[0] == 0.0 and seen[1] >= (len(kept) - 1) / 7 and seen[-1] == 1.0
     assert study.run(values, record=record).tobytes() == expected.tobytes()
-    with pytest.raises(jp.OptionError, match=r"record: these runs were started with other settings \(values\)"):
+    with pytest.raises(jp.OptionError, match=r"record was started with other settings \(vary\)"):
         study.run(values + 1e-5, record=record)
     record.write_text("x")
-    with pytest.raises(jp.OptionError, match="no record of runs"):
+    with pytest.raises(OSError, match="no finished blocks"):
         study.run(values, record=record)
 
 

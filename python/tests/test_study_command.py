@@ -151,7 +151,7 @@ def test_an_interrupted_command_resumes(hung, tmp_path):
     assert child.returncode == 130 and "the same command resumes from out.*.partial" in error
     assert names(tmp_path) == ["hung.toml", "out.alone.partial", "out.indices.partial", "whole"]
     other = runs("--rows=128", "--seed=7")
-    assert other.returncode == 2 and "out.indices.partial: these runs were started with other settings (values)" in other.stderr
+    assert other.returncode == 2 and "out.indices.partial was started with other settings (vary)" in other.stderr
     kept = os.stat(record).st_size
     assert runs("--rows=128").returncode == 0 and kept > 0
     assert names(tmp_path) == ["hung.toml", "out", "whole"]

@@ -1,6 +1,5 @@
 //! `run`: simulate without a window and write rows at equal intervals.
 
-use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -10,13 +9,13 @@ use serde_json::{Value as Json, json};
 use super::args::{RunArguments, SummaryForm};
 use super::impacts::ImpactsFile;
 use super::link::LinkReplay;
-use super::output::{RowError, RowsFile, Table, check_distinct, check_size, significant};
+use super::output::{RowsFile, Table, check_distinct, check_size, significant};
 use super::state::{self, StateFile};
 use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
 use crate::analysis::assembly::StartReport;
 use crate::analysis::row_times::RowTimes;
-use crate::files::{FileError, publish, spare_older};
+use crate::files::{publish, spare_older};
 use crate::scene::{LiveScene, SavedState, Scene, insert_texts};
 use crate::simulate::Frame;
 
@@ -96,7 +95,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let mut table = if arguments.channels.is_empty() {
         Table::new(&scene, &frame)
     } else {
-        Table::of_channels(&scene, &frame, &arguments.channels).map_err(|error| {
+        Table::of_patterns(&scene, &frame, &arguments.channels).map_err(|error| {
             Failure::usage(format!(
                 "--channels: {error}; `jointplay check {} --channels` lists them",
                 arguments.scene.name().display()
@@ -104,9 +103,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         })?
     };
     table.request(&mut frame);
-    if let (Some(times), Some(file)) = (&times, &file) {
-        check_size(times.last().saturating_add(1), table.names().len())?;
-        table.spool_beside(file.target())?;
+    if let (Some(times), Some(_)) = (&times, &file) {
+        check_size(times.last().saturating_add(1), table.columns().len())?;
     }
     if !arguments.quiet {
         if times.is_some_and(|times| !times.include_the_end()) {
@@ -136,13 +134,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         &progress,
     );
     progress.finish_and_clear();
-    let End { status, failure } = match (end, &file) {
-        (Ok(end), _) => end,
-        (Err(error), Some(file)) => {
-            return Err(FileError::cannot(file.target().path(), error).into());
-        }
-        (Err(error), None) => return Err(Failure::io(error.to_string())),
-    };
+    let End { status, failure } = end;
     // A diverged run would diverge again when resumed.
     let mut state = state.filter(|_| status != Status::Diverged);
     let failure = failure.map(|failure| {
@@ -162,7 +154,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         summary::line(&mut text, "No tip error", &format!("the ideal mechanism {fault}"));
     }
     facts.insert("probe_fault".into(), json!(fault.map(|fault| fault.to_string())));
-    facts.insert("rows".into(), json!(table.len()));
+    facts.insert("rows".into(), json!(table.rows()));
     if let Some(path) = &arguments.from_state {
         let message = format!("{} s, from {}", significant(from, 9), path.display());
         summary::line(&mut text, "Resumed at", &message);
@@ -186,7 +178,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     insert_texts(&mut meta, &scene);
     let mut files = Vec::new();
     if let (Some(file), Some(times)) = (file, times) {
-        let path = file.target().path().to_owned();
+        let path = file.path().to_owned();
         let mut meta = meta.clone();
         meta.insert("every_s".into(), json!(times.every()));
         if !arguments.channels.is_empty() {
@@ -195,10 +187,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         meta.insert("contact_states".into(), json!({"0": "free", "1": "creep", "2": "slip", "3": "ideal"}));
         files.extend(file.fill(&table, meta)?);
         facts.insert("out".into(), json!(path.display().to_string()));
-        summary::written(&mut text, table.len(), "row", &path);
+        summary::written(&mut text, table.rows(), "row", &path);
     }
     if let Some(mut impacts) = impacts {
-        let path = impacts.file().target().path().to_owned();
+        let path = impacts.file().path().to_owned();
         let (rows, filled) = impacts.fill(&scene, meta.clone())?;
         files.extend(filled);
         facts.insert("impacts_out".into(), json!(path.display().to_string()));
@@ -206,7 +198,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     }
     simulation.commit_wear();
     if let (Some(file), Some(map)) = (wear, simulation.wear()) {
-        let path = file.target().path().to_owned();
+        let path = file.path().to_owned();
         let (rows, filled) = wear::fill(file, map, &scene, meta)?;
         files.extend(filled);
         facts.insert("wear_out".into(), json!(path.display().to_string()));
@@ -281,9 +273,6 @@ impl StepObservers<'_> {
 }
 
 /// Steps to `duration` and fills `table` with the rows at `from` and later; `stopwatch` runs only while the simulation steps.
-///
-/// # Errors
-/// A disk error while rows are written.
 fn simulate(
     simulation: &mut LiveScene,
     (from, duration): (f64, f64),
@@ -293,41 +282,33 @@ fn simulate(
     frame: &mut Frame,
     stopwatch: &mut Duration,
     progress: &ProgressBar,
-) -> io::Result<End> {
+) -> End {
     let mut next = times.map_or(0, |times| times.first(from, simulation.time()));
     loop {
         // Rows that lie in the latest step (initially: the row at 0).
         if let Some(times) = times {
             while next <= times.last() && times.at(next) <= simulation.time() {
                 simulation.sample(times.at(next), frame);
-                match table.push(frame) {
-                    Ok(()) => {}
-                    Err(RowError::Disk(error)) => return Err(error),
-                    Err(error @ RowError::NotFinite { .. }) => {
-                        return Ok(End {
-                            status: Status::Diverged,
-                            failure: Some(Failure::new(
-                                Failure::DIVERGED,
-                                format!("stopped: {error}; try a smaller solver.step or solver.tolerance"),
-                            )),
-                        });
-                    }
+                if let Err(error) = table.push(frame) {
+                    let message = format!("stopped: {error}; try a smaller solver.step or solver.tolerance");
+                    let failure = Some(Failure::new(Failure::DIVERGED, message));
+                    return End { status: Status::Diverged, failure };
                 }
                 next += 1;
             }
         }
         if observers.is_over(simulation, duration) {
-            return Ok(End { status: Status::Done, failure: None });
+            return End { status: Status::Done, failure: None };
         }
         progress.set_position(position(simulation.time()));
         if interrupt::is_requested() {
-            return Ok(End {
+            return End {
                 status: Status::Interrupted,
                 failure: Some(Failure::new(
                     Failure::INTERRUPTED,
                     format!("interrupted at t = {:.6e} s of {duration:.6e} s", simulation.time()),
                 )),
-            });
+            };
         }
         let last = if observers.replay.is_some() { f64::INFINITY } else { duration };
         let row = times.filter(|times| next <= times.last()).map_or(last, |times| times.at(next));
@@ -335,7 +316,7 @@ fn simulate(
         let outcome = step_until_check(simulation, row, duration, observers);
         *stopwatch += started.elapsed();
         if let Err(message) = outcome {
-            return Ok(End { status: Status::Diverged, failure: Some(Failure::new(Failure::DIVERGED, message)) });
+            return End { status: Status::Diverged, failure: Some(Failure::new(Failure::DIVERGED, message)) };
         }
     }
 }

@@ -10,7 +10,7 @@ mod temporary;
 mod tests;
 
 pub use folder::{Folder, MANIFEST};
-pub use output::{Content, OutputFile, PendingFile, open_or_create, publish, spare_older};
+pub use output::{Content, OutputFile, PendingFile, publish, spare_older};
 pub use same::same_file;
 // The rest of the program changes nothing on the disk except through this module.
 pub use std::fs::{create_dir_all, remove_file};

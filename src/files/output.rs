@@ -1,6 +1,6 @@
 //! Output files.
 
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -80,14 +80,6 @@ impl OutputFile {
     pub fn write(self, fill: impl FnOnce(&mut Content) -> io::Result<()>) -> Result<(), FileError> {
         publish(vec![self.fill(fill)?])
     }
-
-    /// An unnamed file in the same folder, for data that does not fit in memory.
-    ///
-    /// # Errors
-    /// Input/output.
-    pub fn spool(&self) -> Result<File, FileError> {
-        tempfile::tempfile_in(parent(&self.location)).map_err(|error| FileError::of(&self.path, &error))
-    }
 }
 
 /// A complete file that still has its temporary name.
@@ -122,21 +114,4 @@ pub fn publish(files: Vec<PendingFile>) -> Result<(), FileError> {
         named.map_err(|failed| FileError::of(&path, &failed.error))?;
     }
     Ok(())
-}
-
-/// Opens a file that is visible while it grows; if it is missing or empty, creates it with `header` in it.
-///
-/// # Errors
-/// Input/output.
-pub fn open_or_create(path: &Path, header: &[u8]) -> Result<File, FileError> {
-    let length = path.metadata().map(|metadata| metadata.len()).ok();
-    if matches!(length, None | Some(0)) {
-        let target = OutputFile::claim(path, length.is_some());
-        match target.and_then(|target| target.write(|file| file.write_all(header))) {
-            // Another run created it first.
-            Ok(()) | Err(FileError::Exists(_)) => {}
-            Err(error) => return Err(error),
-        }
-    }
-    OpenOptions::new().read(true).write(true).open(path).map_err(|error| FileError::of(path, &error))
 }

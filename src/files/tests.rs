@@ -6,7 +6,7 @@ use serde_json::{Map, json};
 use tempfile::tempdir;
 
 use super::temporary::{self, OLD};
-use super::{FileError, Folder, MANIFEST, OutputFile, PROGRAM, open_or_create, publish, same_file};
+use super::{FileError, Folder, MANIFEST, OutputFile, PROGRAM, publish, same_file};
 
 fn write(path: &Path, content: &str, replace: bool) -> Result<(), FileError> {
     OutputFile::claim(path, replace)?.write(|file| file.write_all(content.as_bytes()))
@@ -81,18 +81,6 @@ fn an_unwritable_place_is_refused_at_once() {
         let text = Folder::claim(Path::new(bad), true).unwrap_err().to_string();
         assert!(text.contains(why), "{text}");
     }
-}
-
-#[test]
-fn a_growing_file_is_created_once_with_its_beginning() {
-    let folder = tempdir().unwrap();
-    let path = folder.path().join("a.partial");
-    open_or_create(&path, b"one").unwrap();
-    open_or_create(&path, b"two").unwrap();
-    assert_eq!(fs::read(&path).unwrap(), b"one");
-    fs::write(&path, "").unwrap();
-    open_or_create(&path, b"two").unwrap();
-    assert_eq!(fs::read(&path).unwrap(), b"two");
 }
 
 #[test]

@@ -931,7 +931,7 @@ fn recorded_channels_have_the_columns_of_a_run() {
             let window_only = matches!(channel.quantity, Quantity::FrictionForce | Quantity::TipError)
                 || replaced.contains(&channel.column())
                 || (channel.column() == "external_work_J" && scene.machine.elements.is_empty());
-            let in_run = table.names().iter().any(|name| name == channel.column());
+            let in_run = table.columns().iter().any(|column| column.name == channel.column());
             assert_eq!(in_run, !window_only, "{name}: {}", channel.column());
         }
     }

@@ -134,11 +134,12 @@ impl<'a> SweepRun<'a> {
         loop {
             line.clear();
             let read = io::Read::take(&mut reader, longest as u64).read_until(b'\n', &mut line).map_err(failed)?;
-            if line.pop() != Some(b'\n') {
+            if line.last() != Some(&b'\n') {
                 // Before the settings are whole, the file has nothing to lose, unless it is somebody else's.
                 let is_torn_start = end == 0 && (read == 0 || settings_line(settings).as_bytes().starts_with(&line));
                 return if end > 0 || is_torn_start { Ok(end) } else { Err(RunFault::Foreign(path.to_owned())) };
             }
+            line.pop();
             let content = checked(&line);
             if end == 0 {
                 let stored = content.and_then(|text| serde_json::from_str(text).ok());
@@ -276,9 +277,11 @@ fn difference(stored: &Json, requested: &Json) -> String {
     };
     let mut keys = requested.keys().chain(stored.keys());
     let differing = keys.find(|key| stored.get(*key) != requested.get(*key));
+    let is_short = |value: Option<&Json>| value.is_none_or(|value| !value.is_array() && !value.is_object());
     let show = |value: Option<&Json>| value.map_or("none".to_owned(), Json::to_string);
-    differing.map_or("in their order".to_owned(), |key| {
-        format!("{key}: {} there, {} now", show(stored.get(key)), show(requested.get(key)))
+    differing.map_or("in their order".to_owned(), |key| match (stored.get(key), requested.get(key)) {
+        (there, now) if is_short(there) && is_short(now) => format!("{key}: {} there, {} now", show(there), show(now)),
+        _ => key.clone(),
     })
 }
 
@@ -349,7 +352,7 @@ mod tests {
             }
         }
         // Settings that are damaged, or somebody else's file, are not touched.
-        for content in [&b"hello"[..], b"hello\nworld\n", &[&b"x"[..], &bytes].concat()] {
+        for content in [&b"hello"[..], b"x", b"hello\nworld\n", &[&b"x"[..], &bytes].concat()] {
             std::fs::write(&path, content).expect("written");
             let refused = SweepRun::resumed(&sweep, &path, &settings);
             assert!(matches!(refused, Err(RunFault::Foreign(_))));

@@ -1,12 +1,8 @@
 //! A map as a NumPy archive, and as points for ParaView.
 
-use std::io;
-
-use ndarray::Array1;
-
 use super::results::Results;
 use super::vtk::Points;
-use crate::cli::output::{add_array, add_axis, as_io, write_archive};
+use crate::cli::output::{Column, axis_column, fill_archive};
 use crate::files::{FileError, OutputFile, PendingFile};
 use crate::machine::Vec3;
 
@@ -43,36 +39,31 @@ pub fn npz(results: &Results, target: OutputFile) -> Result<PendingFile, FileErr
         Ok(at_point) if at_point.settled.is_err() => NO_REST,
         Ok(_) => 0,
     };
-    target.fill(|file| {
-        write_archive(*file.get_ref(), |archive| {
-            for axis in results.map.design().axes() {
-                add_axis(archive, axis)?;
-            }
-            add_array(archive, "status", shape.clone(), points().map(status).collect())?;
-            let unbounded = points().map(|point| results.unbounded(point).len() as i64);
-            add_array(archive, "unbounded", shape.clone(), unbounded.collect())?;
-            for (name, of) in [
-                ("ideal_tip_m", &(|p| results.ideal_tip(p)) as &dyn Fn(usize) -> Vec3),
-                ("settled_error_m", &|p| results.settled(p)),
-                ("largest_error_m", &|p| results.largest(p)),
-                ("largest_direction", &|p| results.largest_direction(p)),
-            ] {
-                add_array(archive, name, shape_with(&[3]), vectors(of))?;
-            }
-            let joint = points().map(|point| results.largest_joint(point).map_or(-1, |joint| joint as i64));
-            add_array(archive, "largest_joint", shape.clone(), joint.collect())?;
-            let joints = results.map.scene().machine.ball_joints.len();
-            add_array(archive, "share_m", shape_with(&[joints]), points().flat_map(|p| results.shares(p)).collect())?;
-            let direction = of_directions(3, &|farthest| parts(&farthest.direction));
-            add_array(archive, "direction", shape_with(&[directions, 3]), direction)?;
-            let support = of_directions(1, &|farthest| vec![farthest.support]);
-            add_array(archive, "support_m", shape_with(&[directions]), support)?;
-            let error = of_directions(3, &|farthest| farthest.error.as_ref().map_or_else(unknown, parts));
-            add_array(archive, "error_m", shape_with(&[directions, 3]), error)?;
-            let meta = serde_json::to_vec(&results.meta()).map_err(io::Error::from)?;
-            archive.add_array("meta", &Array1::from(meta)).map_err(as_io)
-        })
-    })
+    let unbounded = points().map(|point| results.unbounded(point).len() as i64);
+    let joint = points().map(|point| results.largest_joint(point).map_or(-1, |joint| joint as i64));
+    let joints = results.map.scene().machine.ball_joints.len();
+    let axes = results.map.design().axes().iter().map(|axis| axis_column(axis, axis.key(), 0..axis.count()));
+    let mut columns: Vec<Column> = axes.collect();
+    columns.push(Column::whole("status", points().map(status).collect()).shaped(shape.clone()));
+    columns.push(Column::whole("unbounded", unbounded.collect()).shaped(shape.clone()));
+    for (name, of) in [
+        ("ideal_tip_m", &(|p| results.ideal_tip(p)) as &dyn Fn(usize) -> Vec3),
+        ("settled_error_m", &|p| results.settled(p)),
+        ("largest_error_m", &|p| results.largest(p)),
+        ("largest_direction", &|p| results.largest_direction(p)),
+    ] {
+        columns.push(Column::numbers(name, vectors(of)).shaped(shape_with(&[3])));
+    }
+    columns.push(Column::whole("largest_joint", joint.collect()).shaped(shape.clone()));
+    let shares = points().flat_map(|point| results.shares(point)).collect();
+    columns.push(Column::numbers("share_m", shares).shaped(shape_with(&[joints])));
+    let direction = of_directions(3, &|farthest| parts(&farthest.direction));
+    columns.push(Column::numbers("direction", direction).shaped(shape_with(&[directions, 3])));
+    let support = of_directions(1, &|farthest| vec![farthest.support]);
+    columns.push(Column::numbers("support_m", support).shaped(shape_with(&[directions])));
+    let error = of_directions(3, &|farthest| farthest.error.as_ref().map_or_else(unknown, parts));
+    columns.push(Column::numbers("error_m", error).shaped(shape_with(&[directions, 3])));
+    fill_archive(target, columns.into_iter(), &results.meta())
 }
 
 /// Writes the points that have a pose, with their errors.

@@ -2,23 +2,30 @@
 
 use std::io::{self, Write};
 
-use super::Table;
+use super::{Table, Values};
 
 /// Writes header and rows.
 pub(super) fn write(out: &mut impl Write, table: &Table) -> io::Result<()> {
-    writeln!(out, "{}", table.names().join(","))?;
-    let mut line = String::new();
-    table.rows(|row| {
-        line.clear();
-        for (i, value) in row.iter().enumerate() {
-            if i > 0 {
-                line.push(',');
+    let heads: Vec<String> = table.columns().iter().map(|column| quoted(&column.name)).collect();
+    writeln!(out, "{}", heads.join(","))?;
+    for row in 0..table.rows() {
+        for (i, column) in table.columns().iter().enumerate() {
+            let separator = if i > 0 { "," } else { "" };
+            match &column.values {
+                Values::Numbers(values) => write!(out, "{separator}{}", significant(values[row], 12))?,
+                Values::Whole(values) => write!(out, "{separator}{}", values[row])?,
+                Values::Words(words) => write!(out, "{separator}{}", quoted(&words[row]))?,
             }
-            line.push_str(&significant(*value, 12));
         }
-        line.push('\n');
-        out.write_all(line.as_bytes())
-    })
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+/// A cell.
+fn quoted(text: &str) -> String {
+    let plain = !text.contains([',', '"', '\n']);
+    if plain { text.to_owned() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
 /// Forwards bytes and computes their CRC-32, which tells a reader whether rows and metadata belong together.

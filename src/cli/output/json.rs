@@ -4,23 +4,20 @@ use std::io::{self, Write};
 
 use serde_json::{Map, Value as Json};
 
-use super::Table;
+use super::{Table, Values};
 
 /// Writes `meta` and the columns.
 pub(super) fn write(out: &mut impl Write, table: &Table, meta: &Map<String, Json>) -> io::Result<()> {
-    // Written by hand around serde's numbers: a tree of all values would take several times the memory of the table.
-    let meta = serde_json::to_string(meta)?;
-    write!(out, "{{\"meta\": {meta},\n\"columns\": {{")?;
-    for (column, name) in table.names().iter().enumerate() {
-        let separator = if column == 0 { "\n" } else { ",\n" };
-        write!(out, "{separator}{}: [", Json::from(name.as_str()))?;
-        let mut separator: &[u8] = b"";
-        table.column(column, |value| {
-            out.write_all(separator)?;
-            separator = b",";
-            serde_json::to_writer(&mut *out, &value).map_err(io::Error::from)
-        })?;
-        out.write_all(b"]")?;
+    // Column by column: a tree of all values would take several times the memory of the table.
+    write!(out, "{{\"meta\": {},\n\"columns\": {{", serde_json::to_string(meta)?)?;
+    for (i, column) in table.columns().iter().enumerate() {
+        let separator = if i == 0 { "\n" } else { ",\n" };
+        write!(out, "{separator}{}: ", Json::from(column.name.as_str()))?;
+        match &column.values {
+            Values::Numbers(values) => serde_json::to_writer(&mut *out, values)?,
+            Values::Whole(values) => serde_json::to_writer(&mut *out, values)?,
+            Values::Words(words) => serde_json::to_writer(&mut *out, words)?,
+        }
     }
     out.write_all(b"\n}}\n")
 }

@@ -3,31 +3,28 @@
 mod csv;
 mod json;
 mod npz;
-mod rows;
 mod table;
-mod word;
 
 pub use csv::{ChecksumWriter, significant};
 pub use json::write_meta;
-pub use npz::{add_array, as_io, write_archive};
-pub use table::{RowError, Table};
-pub use word::{add_axis, add_words};
+pub use table::{Column, NotFinite, Table, Values};
 
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value as Json};
 
 use super::failure::Failure;
-use crate::files::{OutputFile, PendingFile, same_file};
+use crate::analysis::axis::Axis;
+use crate::files::{FileError, OutputFile, PendingFile, same_file};
 use crate::scene::read_regular;
 
-/// Largest number of values in a file of rows: 4 GiB.
-const MAX_VALUES: u64 = 1 << 29;
+/// Largest number of values in the rows of a run, which are in memory: 2 GiB.
+const MAX_VALUES: u64 = 1 << 28;
 
 /// Size limit of metadata, bytes: they have the texts of a scene and of its meshes, 12 MiB together.
 const MAX_METADATA_SIZE: u64 = 64 << 20;
 
-/// File format of a run's rows.
+/// File format of results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Text, one row per line; a second file beside it holds the metadata.
@@ -90,14 +87,14 @@ impl RowsFile {
         names
     }
 
+    /// The file of the rows, as it was named.
+    pub fn path(&self) -> &Path {
+        self.rows.path()
+    }
+
     /// All files that it writes.
     pub fn targets(&mut self) -> impl Iterator<Item = &mut OutputFile> {
         std::iter::once(&mut self.rows).chain(&mut self.metadata)
-    }
-
-    /// The file of the rows.
-    pub fn target(&self) -> &OutputFile {
-        &self.rows
     }
 
     /// Writes rows and metadata under temporary names.
@@ -114,7 +111,7 @@ impl RowsFile {
                 Ok(())
             }
             Format::Json => json::write(file, table, &meta),
-            Format::Npz => npz::write(file, table, &meta),
+            Format::Npz => npz::write(file, table.columns().iter().cloned(), &meta),
         })?;
         let Some(metadata) = self.metadata else {
             return Ok(vec![rows]);
@@ -123,6 +120,26 @@ impl RowsFile {
         let metadata_file = metadata.fill(|file| json::write_meta(file, &meta))?;
         // In this order, a kill between the two renames never leaves rows without metadata.
         Ok(vec![metadata_file, rows])
+    }
+}
+
+/// Writes `columns`, arrays of any shape, and `meta` as a NumPy archive under a temporary name. One column is in memory at a time.
+///
+/// # Errors
+/// A file system error.
+pub fn fill_archive(
+    file: OutputFile,
+    columns: impl Iterator<Item = Column>,
+    meta: &Map<String, Json>,
+) -> Result<PendingFile, FileError> {
+    file.fill(|content| npz::write(content, columns, meta))
+}
+
+/// The values of a varied parameter at `indices`: numbers, SI, or words.
+pub fn axis_column(axis: &Axis, name: &str, indices: impl Iterator<Item = usize>) -> Column {
+    match axis.words() {
+        Some(words) => Column::words(name, indices.map(|i| words[i])),
+        None => Column::numbers(name, indices.map(|i| axis.number(i)).collect()),
     }
 }
 

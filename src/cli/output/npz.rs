@@ -1,33 +1,48 @@
-//! NumPy archives. The rows of a run: one float64 array per column, and `meta` as the bytes of a JSON text.
+//! NumPy archives: one array per column, and `meta` as the bytes of a JSON text.
 
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 
-use ndarray::{Array1, ArrayD, IxDyn};
-use ndarray_npy::{NpzWriter, WritableElement, WriteNpzError};
+use ndarray::{ArrayD, IxDyn};
+use ndarray_npy::{NpzWriter, WritableElement, WriteDataError, WriteNpzError};
+use py_literal::Value;
 use serde_json::{Map, Value as Json};
 
-use super::Table;
+use super::{Column, Values};
 use crate::files::Content;
 
-/// Writes the columns and `meta` (in Python: `json.loads(bytes(archive["meta"]))`).
-pub(super) fn write(out: &mut Content, table: &Table, meta: &Map<String, Json>) -> io::Result<()> {
+/// Writes `columns`, one in memory at a time, and `meta` (in Python: `json.loads(bytes(archive["meta"]))`).
+pub(super) fn write(
+    out: &mut Content,
+    columns: impl Iterator<Item = Column>,
+    meta: &Map<String, Json>,
+) -> io::Result<()> {
     write_archive(*out.get_ref(), |archive| {
-        for (column, name) in table.names().iter().enumerate() {
-            let mut values = Vec::with_capacity(table.len());
-            table.column(column, |value| {
-                values.push(value);
-                Ok(())
-            })?;
-            let values = Array1::from(values);
-            archive.add_array(name.as_str(), &values).map_err(as_io)?;
+        for Column { name, shape, values } in columns {
+            let shape = shape.unwrap_or_else(|| vec![values.len()]);
+            match values {
+                Values::Numbers(values) => add(archive, &name, &shape, values)?,
+                Values::Whole(values) => add(archive, &name, &shape, values)?,
+                Values::Words(words) => add(archive, &name, &shape, words.into_iter().map(Word).collect())?,
+            }
         }
-        let meta = Array1::from(serde_json::to_vec(meta)?);
-        archive.add_array("meta", &meta).map_err(as_io)
+        let meta = serde_json::to_vec(meta)?;
+        add(archive, "meta", &[meta.len()], meta)
     })
 }
 
+/// Adds an array of `shape` with these values.
+fn add<W: Write + Seek, T: WritableElement>(
+    archive: &mut NpzWriter<W>,
+    name: &str,
+    shape: &[usize],
+    values: Vec<T>,
+) -> io::Result<()> {
+    let array = ArrayD::from_shape_vec(IxDyn(shape), values).map_err(io::Error::other)?;
+    archive.add_array(name, &array).map_err(as_io)
+}
+
 /// Converts an archive error to an I/O error.
-pub fn as_io(error: WriteNpzError) -> io::Error {
+fn as_io(error: WriteNpzError) -> io::Error {
     match error {
         WriteNpzError::Zip(zip) => zip.into(),
         WriteNpzError::Npy(ndarray_npy::WriteNpyError::Io(io)) => io,
@@ -39,7 +54,7 @@ pub fn as_io(error: WriteNpzError) -> io::Error {
 ///
 /// # Errors
 /// The first error of the file, otherwise the error of `fill`.
-pub fn write_archive<W: Write + Seek>(
+fn write_archive<W: Write + Seek>(
     file: W,
     fill: impl FnOnce(&mut NpzWriter<&mut BufWriter<Sink<W>>>) -> io::Result<()>,
 ) -> io::Result<()> {
@@ -49,20 +64,6 @@ pub fn write_archive<W: Write + Seek>(
     let finished = archive.finish().map_err(as_io).map(|_| ());
     let outcome = filled.and(finished).and_then(|()| out.flush());
     out.get_mut().failure.take().map_or(outcome, Err)
-}
-
-/// Adds an array with these values, in row-major order.
-///
-/// # Errors
-/// Input/output, or a number of values other than that of the shape.
-pub fn add_array<W: Write + Seek, T: WritableElement>(
-    archive: &mut NpzWriter<W>,
-    name: &str,
-    shape: Vec<usize>,
-    values: Vec<T>,
-) -> io::Result<()> {
-    let array = ArrayD::from_shape_vec(IxDyn(&shape), values).map_err(io::Error::other)?;
-    archive.add_array(name, &array).map_err(as_io)
 }
 
 /// Sink for the bytes of an archive. After its first failure it accepts everything and writes nothing: the archive writer
@@ -97,11 +98,39 @@ impl<W: Seek> Seek for Sink<W> {
     }
 }
 
+/// Width of every array of words, characters.
+const WIDTH: usize = 32;
+/// NumPy's name of the type: little-endian UTF-32, padded with zeros.
+const TYPE: &str = "<U32";
+
+/// A word of at most [`WIDTH`] characters.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Word(String);
+
+impl WritableElement for Word {
+    fn type_descriptor() -> Value {
+        Value::String(TYPE.to_owned())
+    }
+
+    fn write<W: Write>(&self, mut writer: W) -> Result<(), WriteDataError> {
+        let letters = self.0.chars().map(u32::from).chain(std::iter::repeat(0));
+        let bytes: Vec<u8> = letters.take(WIDTH).flat_map(u32::to_le_bytes).collect();
+        Ok(writer.write_all(&bytes)?)
+    }
+
+    fn write_slice<W: Write>(slice: &[Self], mut writer: W) -> Result<(), WriteDataError> {
+        slice.iter().try_for_each(|word| word.write(&mut writer))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::io::Cursor;
 
+    use ndarray::Array1;
+
     use super::*;
+    use crate::scene::{Kind, table};
 
     /// A disk that is full after some writes.
     struct Disk {
@@ -147,6 +176,24 @@ mod tests {
                 break;
             }
             assert_eq!(kind, io::ErrorKind::StorageFull, "{writes}");
+        }
+    }
+
+    #[test]
+    fn words_of_every_parameter_fit() {
+        let choices = table().iter().filter_map(|parameter| match parameter.kind {
+            Kind::Choice(words) => Some(words),
+            _ => None,
+        });
+        let words: Vec<Word> = choices.flatten().map(|word| Word((*word).to_owned())).collect();
+        assert!(words.len() > 10 && words.iter().all(|word| word.0.chars().count() <= WIDTH));
+        let mut bytes = Vec::new();
+        Word::write_slice(&words[..2], &mut bytes).unwrap();
+        let codes: Vec<u32> = bytes.as_chunks().0.iter().map(|code| u32::from_le_bytes(*code)).collect();
+        for (word, codes) in words.iter().zip(codes.chunks(WIDTH)) {
+            let letters: String =
+                codes.iter().take_while(|code| **code != 0).filter_map(|c| char::from_u32(*c)).collect();
+            assert_eq!(letters, word.0);
         }
     }
 }
