@@ -17,7 +17,7 @@ from ._simulation import Frame, Simulation
 from ._study import Estimate, Runs, Study
 from ._sweep import Sweep, SweepResult, sweep
 from ._tolerance import FitChoice, Fits, Quality, RejectDriver, Tolerance, tolerance
-from ._tradeoff import Tradeoff, tradeoff
+from ._tradeoff import Tradeoff, TradeoffRow, tradeoff
 from .errors import ChannelError, DoubtWarning, InternalError, JointplayError, OmissionWarning, OptionError, SceneError, Stopped
 
 __all__ = [
@@ -52,6 +52,7 @@ __all__ = [
     "Target",
     "Tolerance",
     "Tradeoff",
+    "TradeoffRow",
     "render",
     "sensitivity",
     "sweep",

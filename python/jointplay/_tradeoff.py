@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
 
 from . import _native
 
@@ -15,27 +16,68 @@ if TYPE_CHECKING:
     from ._scene import Scene
 
 
+@dataclass(frozen=True)
+class TradeoffRow:
+    """One method at one step or tolerance; a row of `tradeoff.csv` (`docs/tradeoff.md`). `None`: no value."""
+
+    method: str
+    """Word of `solver.method`."""
+    step_s: float | None
+    """Step of a method with fixed steps, s."""
+    tolerance: float | None
+    """Tolerance of a method that controls its error."""
+    steps_per_impact: int | None
+    """Steps per impact of `discrete-gradient`."""
+    preset: str | None
+    """The preset with this setting on this scene."""
+    end: str
+    """How the run ended: "reached", "capped" (too costly) or "stopped". Only a run that reached its end has time and cost."""
+    span_s: float
+    """Simulated time from the start, s."""
+    time_s: float | None
+    """Processor time to step over it, s."""
+    ratio: float | None
+    """Speed over that of `rk4` at 10 microseconds."""
+    cost: float | None
+    """Counted cost of the span, in evaluations of the equations: the same on every computer."""
+    steps: int
+    """Accepted steps over the span."""
+    evaluations: int
+    """Evaluations of the equations of motion over the span."""
+    rejected: int
+    """Rejected steps over the span."""
+    peak_error: float | None
+    """Largest relative error of the peak forces of the first impacts."""
+    position_error_m: float | None
+    """Error of the output body's position at the third impact, m."""
+    energy_error: float | None
+    """Residual of the energy balance over the first impacts, relative to the energy exchanged."""
+    force_error: float | None
+    """Largest relative error of the mean contact forces in settled motion, if the scene settles."""
+
+
+@dataclass(frozen=True)
 class Tradeoff:
     """Result of `tradeoff`."""
 
-    def __init__(self, points: list[dict[str, Any]]) -> None:
-        self.points = points
-        """One per method and step or tolerance, as in `tradeoff.json` (`docs/tradeoff.md`)."""
+    rows: list[TradeoffRow]
+    """In the order of the methods, each from coarse to fine."""
 
     def to_pandas(self) -> pandas.DataFrame:
-        """One row per point; nested names are joined by dots: `impacts.ratio`, `errors.peak`."""
+        """One line per row."""
         import pandas
 
-        return pandas.json_normalize(self.points)
+        return pandas.DataFrame([asdict(row) for row in self.rows])
 
     def __repr__(self) -> str:
-        return f"<jointplay.Tradeoff: {len(self.points)} points>"
+        return f"<jointplay.Tradeoff: {len(self.rows)} rows>"
 
 
 def tradeoff(scene: Scene, *, quick: bool = True, progress: Callable[[float], object] | None = None) -> Tradeoff:
     """Runs every method on `scene` over its steps or tolerances, and measures cost and error, as `jointplay tradeoff` does.
 
-    A `quick` measurement uses a coarse grid and takes seconds; a full one takes minutes. Times are processor times of the calling
-    thread. `progress` is called with the fraction done, from 0 to 1.
+    A `quick` measurement uses a coarse grid over a tenth of a second and takes seconds; a full one takes a minute. Times are
+    processor times of the calling thread. `progress` is called with the fraction done, from 0 to 1.
     """
-    return Tradeoff(json.loads(_native.tradeoff(scene._native, quick, time.thread_time, progress)))
+    rows = json.loads(_native.tradeoff(scene._native, quick, time.thread_time, progress))
+    return Tradeoff([TradeoffRow(**row) for row in rows])

@@ -2,15 +2,16 @@
 
 use std::ops::ControlFlow;
 
-use jointplay_analysis::{AnalysisError, RunContext, WorkBudget, work_precision};
+use jointplay_analysis::{AnalysisError, Grid, RunContext, Tradeoff};
 use pyo3::prelude::*;
+use serde_json::{Map, Value as Json};
 
 use crate::errors::{option_error, scene_error, stopped};
 use crate::interpreter::{detached, report_progress};
 use crate::scene::PyScene;
 
 /// Runs every method on `scene` over its steps or tolerances; `clock` returns the processor time of this thread, s. Returns the
-/// points as JSON, as in `tradeoff.json`.
+/// rows of `tradeoff.csv` as JSON.
 #[pyfunction]
 #[pyo3(signature = (scene, quick, clock, progress=None))]
 pub fn tradeoff(
@@ -21,7 +22,7 @@ pub fn tradeoff(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
     let scene = &*scene.scene;
-    let budget = if quick { WorkBudget::QUICK } else { WorkBudget::FULL };
+    let grid = if quick { Grid::QUICK } else { Grid::FULL };
     let mut raised = None;
     let measured = detached(py, || {
         let mut now = || Python::attach(|py| clock.call0(py)?.extract::<f64>(py)).unwrap_or(f64::NAN);
@@ -36,7 +37,7 @@ pub fn tradeoff(
                 }
             }
         };
-        work_precision(scene, &budget, &mut RunContext::new(&mut now, &mut report))
+        Tradeoff::measure(scene, &grid, &mut RunContext::new(&mut now, &mut report))
     })?;
     if let Some(error) = raised {
         return Err(error);
@@ -47,5 +48,7 @@ pub fn tradeoff(
         AnalysisError::Stopped(error) => stopped(py, &error),
         other => option_error(py, &other.to_string()),
     })?;
-    serde_json::to_string(&measured.points).map_err(|error| option_error(py, &error.to_string()))
+    let named = |(name, value): (&str, Json)| (name.to_owned(), value);
+    let rows = measured.rows.iter().map(|row| row.values().into_iter().map(named).collect::<Map<_, _>>());
+    serde_json::to_string(&rows.collect::<Vec<_>>()).map_err(|error| option_error(py, &error.to_string()))
 }

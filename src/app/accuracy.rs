@@ -1,14 +1,11 @@
-//! Reliability of the displayed numbers: measured accuracy of the preset, and indicators of the running scene.
+//! Reliability of the displayed numbers: accuracy of the preset as measured, and indicators of the running scene.
 
-use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
+use eframe::egui::{Label, RichText, Ui, vec2};
 
-use super::host::{BackgroundTask, Host};
 use super::layout::reserve_lines;
 use super::player::Player;
 use super::{theme, value};
-use crate::analysis::presets::{self, Measured};
-use crate::analysis::source::SceneSource;
-use crate::analysis::task::{Job, Message};
+use crate::analysis::presets;
 use crate::integrate::StepControl;
 use crate::machine::Preset;
 use crate::simulate::Impact;
@@ -18,8 +15,6 @@ const LABEL_WIDTH: f32 = 138.0;
 /// Height of a row, points, and lines reserved for doubts.
 const ROW_HEIGHT: f32 = 20.0;
 const DOUBT_LINES: usize = 3;
-/// Width of the measure button, points; fixed, so that it does not move.
-const BUTTON_WIDTH: f32 = 130.0;
 /// Placeholder before the first impact.
 const PLACEHOLDER: &str = "—";
 /// Minimum number of steps to resolve an impact.
@@ -56,175 +51,76 @@ impl AccuracyLine {
     }
 }
 
-/// Measured accuracy of a preset on a scene.
-struct MeasuredAccuracy {
-    scene: SceneSource,
-    preset: Preset,
-    measured: Measured,
+/// The panel below the selection of the preset.
+pub fn ui(ui: &mut Ui, player: &Player) {
+    let preset = preset_of(player);
+    let mut list = vec![solver(player, preset)];
+    list.extend(measured(player, preset));
+    list.push(capacity(player));
+    list.extend(latest_impact(player));
+    list.push(residual(player));
+    ui.scope(|ui| list.iter().for_each(|row| row.ui(ui)));
+    doubts_ui(ui, player);
 }
 
-/// The panel: a measurement in progress, and the latest one.
-#[derive(Default)]
-pub struct Accuracy {
-    requested: Option<(Job, SceneSource, Preset)>,
-    running: Option<(Box<dyn BackgroundTask>, SceneSource, Preset)>,
-    progress: f64,
-    latest: Option<MeasuredAccuracy>,
-    problem: Option<String>,
+/// Reasons to doubt the result, in a space of fixed height.
+fn doubts_ui(ui: &mut Ui, player: &Player) {
+    // A doubt already shown beside a control is not repeated.
+    let already_shown: Vec<&str> = player.warnings().collect();
+    let doubts = player.simulation().doubts().into_iter();
+    let mut doubts: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
+    let none =
+        if doubts.is_empty() { "No warnings so far" } else { "No warnings other than those beside the controls" };
+    doubts.retain(|doubt| !already_shown.contains(&&**doubt));
+    reserve_lines(ui, "doubts", DOUBT_LINES, |ui| {
+        for doubt in &doubts {
+            theme::warning(ui, value::typeset(doubt));
+        }
+        if doubts.is_empty() {
+            ui.label(RichText::new(none).small().weak())
+                .on_hover_text("Reasons to doubt the numbers, if there are any");
+        }
+    });
 }
 
-impl Accuracy {
-    /// Starts a requested measurement and takes messages from a running one; returns whether one is running.
-    pub fn update(&mut self, host: &mut dyn Host) -> bool {
-        if let Some((job, scene, preset)) = self.requested.take() {
-            self.progress = 0.0;
-            self.problem = None;
-            match host.start(job) {
-                Some(running) => self.running = Some((running, scene, preset)),
-                None => self.problem = Some("Presets cannot be measured here".to_owned()),
+/// Measured accuracy of `preset` on the present scene: on a built-in one with its default values.
+fn measured(player: &Player, preset: Option<Preset>) -> [AccuracyLine; 2] {
+    let scene = player.pending();
+    let affects_model = |key: &str| !key.starts_with("solver.") && !key.starts_with("view.");
+    let is_built_in = scene.source.file.is_none() && !scene.changes.iter().any(|(key, _)| affects_model(key));
+    let measured = preset.filter(|_| is_built_in).and_then(|preset| presets::measured(&scene.name, preset));
+    let row = |label, error: Option<f64>, what: &str| AccuracyLine {
+        label,
+        value: match (&measured, error) {
+            (None, _) if preset.is_none() => "no preset".to_owned(),
+            (None, _) => "not measured".to_owned(),
+            (Some(_), None) => "does not apply".to_owned(),
+            (Some(_), Some(error)) => value::percent(error),
+        },
+        doubtful: error.is_some_and(|error| error > DOUBTFUL_ERROR),
+        help: match measured {
+            None if preset.is_none() => what.to_owned(),
+            None => {
+                format!("{what} It was not measured for these values: `jointplay tradeoff` does it for any scene file.")
             }
-        }
-        while let Some((running, scene, preset)) = &mut self.running {
-            match running.poll() {
-                None => return true,
-                Some(Message::Progress(done)) => self.progress = done,
-                Some(Message::Presets(list)) => {
-                    self.latest = list.first().map(|(_, measured)| MeasuredAccuracy {
-                        scene: scene.clone(),
-                        preset: *preset,
-                        measured: *measured,
-                    });
-                }
-                Some(Message::Done) => self.running = None,
-                Some(Message::Ranges(_) | Message::Point(_) | Message::Plan(_) | Message::Run(_) | Message::Map(_)) => {
-                }
-                Some(Message::Failed(why)) => {
-                    self.problem = Some(why);
-                    self.running = None;
-                }
+            Some(_) => {
+                format!("{what} Measured on this built-in scene with its default values, against a converged run.")
             }
-        }
-        false
-    }
-
-    /// The panel below the selection of the preset.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
-        let preset = preset_of(player);
-        let mut list = vec![solver(player, preset)];
-        list.extend(self.measured(player, preset));
-        list.push(capacity(player));
-        list.extend(latest_impact(player));
-        list.push(residual(player));
-        ui.scope(|ui| list.iter().for_each(|row| row.ui(ui)));
-        self.measure_ui(ui, player, preset);
-        self.doubts_ui(ui, player);
-    }
-
-    /// Reasons to doubt the result, in a space of fixed height.
-    fn doubts_ui(&self, ui: &mut Ui, player: &Player) {
-        // A doubt already shown beside a control is not repeated.
-        let already_shown: Vec<&str> = player.warnings().collect();
-        let doubts = player.simulation().doubts().into_iter();
-        let mut doubts: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
-        let none = if doubts.is_empty() {
-            "No warnings so far"
-        } else {
-            "No warnings other than those beside the \
-                                                                         controls"
-        };
-        doubts.retain(|doubt| !already_shown.contains(&&**doubt));
-        reserve_lines(ui, "doubts", DOUBT_LINES, |ui| {
-            if let Some(problem) = &self.problem {
-                theme::error(ui, problem);
-            }
-            for doubt in &doubts {
-                theme::warning(ui, value::typeset(doubt));
-            }
-            if doubts.is_empty() && self.problem.is_none() {
-                ui.label(RichText::new(none).small().weak())
-                    .on_hover_text("Reasons to doubt the numbers, if there are any");
-            }
-        });
-    }
-
-    fn measure_ui(&mut self, ui: &mut Ui, player: &Player, preset: Option<Preset>) {
-        let running = self.running.is_some() || self.requested.is_some();
-        let (name, help) = if running {
-            ("Cancel", "End the measurement")
-        } else {
-            (
-                "Measure preset",
-                "Runs this scene in the background with its current values, once with the preset and once as a \
-                 converged reference, and compares forces and speed. Takes a few seconds.",
-            )
-        };
-        ui.horizontal(|ui| {
-            let button = Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0));
-            let clicked = ui
-                .add_enabled(running || preset.is_some(), button)
-                .on_hover_text(help)
-                .on_disabled_hover_text("Only presets are measured; the current method and tolerance are not a preset")
-                .clicked();
-            if running {
-                let bar = ProgressBar::new(self.progress as f32).show_percentage();
-                ui.add(bar.desired_width(ui.available_width())).accessible_name("Measured so far");
-            }
-            match preset {
-                _ if !clicked => {}
-                _ if running => (self.running, self.requested) = (None, None),
-                None => {}
-                Some(preset) => {
-                    let scene = model_of(player);
-                    let job = Job::Presets { scene: scene.clone(), presets: vec![preset.word().to_owned()] };
-                    self.requested = Some((job, scene, preset));
-                }
-            }
-        });
-    }
-
-    /// Measured accuracy of `preset` on the present scene.
-    fn measured(&self, player: &Player, preset: Option<Preset>) -> [AccuracyLine; 2] {
-        let scene = model_of(player);
-        let latest_measurement = self.latest.as_ref();
-        let applicable = latest_measurement.filter(|latest| Some(latest.preset) == preset && latest.scene == scene);
-        let (measured, place) = match (applicable, preset) {
-            (Some(latest), _) => (Some(latest.measured), "on this scene with its current values"),
-            (None, Some(preset)) if scene.changes.is_empty() && player.pending().source.file.is_none() => {
-                (presets::measured(&player.pending().name, preset), "on this built-in scene with its default values")
-            }
-            _ => (None, ""),
-        };
-        let row = |label, error: Option<f64>, what: &str| AccuracyLine {
-            label,
-            value: match (&measured, error) {
-                (None, _) if preset.is_none() => "no preset".to_owned(),
-                (None, _) => "not measured".to_owned(),
-                (Some(_), None) => "does not apply".to_owned(),
-                (Some(_), Some(error)) => value::percent(error),
-            },
-            doubtful: error.is_some_and(|error| error > DOUBTFUL_ERROR),
-            help: match measured {
-                None if preset.is_none() => what.to_owned(),
-                None => {
-                    format!("{what} It was not measured for these values: press Measure preset.")
-                }
-                Some(_) => format!("{what} Measured {place}, against a converged run."),
-            },
-        };
-        [
-            row(
-                "Peak force error",
-                measured.and_then(|m| m.peak_error),
-                "Largest relative error of the peak forces of the first six impacts under this preset.",
-            ),
-            row(
-                "Settled force error",
-                measured.and_then(|m| m.settled_error),
-                "Largest relative error of the mean contact forces in settled motion under this preset; does not apply where \
-                 the motion does not settle soon.",
-            ),
-        ]
-    }
+        },
+    };
+    [
+        row(
+            "Peak force error",
+            measured.and_then(|m| m.peak_error),
+            "Largest relative error of the peak forces of the first six impacts under this preset.",
+        ),
+        row(
+            "Settled force error",
+            measured.and_then(|m| m.settled_error),
+            "Largest relative error of the mean contact forces in settled motion under this preset; does not apply where \
+             the motion does not settle soon.",
+        ),
+    ]
 }
 
 /// The preset that matches the present method and its accuracy, whether or not it was chosen by name.
@@ -232,7 +128,7 @@ pub fn preset_of(player: &Player) -> Option<Preset> {
     let machine = &player.pending().machine;
     let solver = &machine.solver;
     let matches_solver = |preset: &Preset| {
-        let own = preset.solver(machine.joints_with_clearance());
+        let own = preset.solver(machine);
         own.method == solver.method
             && match own.method.control() {
                 StepControl::Fixed => own.step == solver.step,
@@ -242,14 +138,6 @@ pub fn preset_of(player: &Player) -> Option<Preset> {
     };
     let chosen = solver.preset.filter(|preset| matches_solver(preset));
     chosen.or_else(|| Preset::ALL.into_iter().find(matches_solver))
-}
-
-/// The scene without solver and view settings, i.e. the model whose motion is computed.
-fn model_of(player: &Player) -> SceneSource {
-    let mut scene = SceneSource::of(player.pending());
-    let affects_model = |key: &str| !key.starts_with("solver.") && !key.starts_with("view.");
-    scene.changes.retain(|(key, _)| affects_model(key));
-    scene
 }
 
 /// Name of a ball joint.

@@ -31,10 +31,8 @@ impl Thread {
         let rest = Arc::new(AtomicU64::new(0.0_f64.to_bits()));
         let resting = Arc::clone(&rest);
         let work = move || {
-            let start = Instant::now();
-            let mut clock = move || start.elapsed().as_secs_f64();
-            let mut spell = start;
-            perform(&job, &mut clock, &mut |message| {
+            let mut spell = Instant::now();
+            perform(&job, &mut |message| {
                 // A closed receiver counts as cancellation.
                 if is_cancelled.load(Ordering::Relaxed) || sender.send(message).is_err() {
                     return ControlFlow::Break(());

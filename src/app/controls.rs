@@ -8,7 +8,7 @@ use eframe::egui::{
     Tooltip, Ui,
 };
 
-use super::accuracy::{self, Accuracy};
+use super::accuracy;
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::{equations, keys, spoken, theme, value};
@@ -88,11 +88,11 @@ impl Controls {
     }
 
     /// All controls.
-    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy) {
+    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) {
         self.main_controls(ui, player);
         let table = player.pending().parameters();
         ui.separator();
-        self.accuracy_ui(ui, player, accuracy, &table);
+        self.accuracy_ui(ui, player, &table);
         self.one_joint(ui, player, &table);
         let mut groups: Vec<&'static str> = Vec::new();
         // The groups of the scene's author come first.
@@ -137,12 +137,12 @@ impl Controls {
     }
 
     /// The preset, and the accuracy of the running scene.
-    fn accuracy_ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy, table: &[&'static Parameter]) {
+    fn accuracy_ui(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
         let header = egui::CollapsingHeader::new(RichText::new("Accuracy").strong()).show(ui, |ui| {
             if let Some(parameter) = table.iter().find(|p| p.key == PRESET) {
                 self.control(ui, player, parameter, PRESET);
             }
-            accuracy.ui(ui, player);
+            accuracy::ui(ui, player);
         });
         header
             .header_response

@@ -229,7 +229,6 @@ impl App {
         let Self {
             player,
             controls,
-            accuracy,
             plots,
             bench,
             timeline,
@@ -253,7 +252,7 @@ impl App {
                     ui.set_max_width(ui.available_width() - 10.0);
                     ui.spacing_mut().item_spacing.y = 5.0;
                     controls.title(ui, player);
-                    ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
+                    ui.add_enabled_ui(free, |ui| controls.ui(ui, player));
                 });
             },
         );
@@ -442,14 +441,14 @@ impl App {
             return self.lesson_ui(ui);
         }
         let free = !self.is_under_way();
-        let Self { player, controls, accuracy, plots, bench, sheet, viewport, .. } = self;
+        let Self { player, controls, plots, bench, sheet, viewport, .. } = self;
         let mut bench_request = None;
         ScrollArea::vertical().id_salt("sheet").auto_shrink(false).show(ui, |ui| {
             // Space for the scroll bar.
             ui.set_max_width(ui.available_width() - 14.0);
             match sheet {
                 Some(Sheet::Controls) => {
-                    ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
+                    ui.add_enabled_ui(free, |ui| controls.ui(ui, player));
                 }
                 Some(Sheet::Plots) => {
                     spoken::landmark(ui, "Plots");

@@ -83,7 +83,6 @@ pub use crate::session::link::{
     CameraPose, Link, LinkError, MAX_LINK_LENGTH, NOT_A_PAGE_ADDRESS, SceneText, is_page_address,
 };
 pub use crate::session::replay::{Replay, Verdict};
-use accuracy::Accuracy;
 use announce::Announcer;
 use bench::Bench;
 pub use click::{Click, MAX_CLICKS, PITCHES, TimeWindow, Voice, clicks};
@@ -273,7 +272,6 @@ impl Notice {
 pub struct App {
     player: Player,
     controls: Controls,
-    accuracy: Accuracy,
     viewport: Viewport,
     /// Picture of a run from before a change, and that run's number.
     beside: Option<(u64, Box<Viewport>)>,
@@ -380,7 +378,6 @@ impl App {
         let mut app = Self {
             viewport: Viewport::new(&player, options.view),
             controls: Controls::default(),
-            accuracy: Accuracy::default(),
             beside: None,
             plots: Plots::of(&options.scene),
             timeline: Timeline::default(),
@@ -1073,8 +1070,7 @@ impl eframe::App for App {
         self.advance_film(ctx);
         self.follow_screen(ctx);
         self.check_sound();
-        let measuring = self.accuracy.update(self.host.as_mut());
-        if self.bench.update(self.host.as_mut()) || measuring {
+        if self.bench.update(self.host.as_mut()) {
             ctx.request_repaint_after(POLL_PERIOD);
         }
         self.viewport.cloud = self.bench.take_cloud(&self.player);

@@ -39,10 +39,8 @@ pub enum Command {
     Run(RunArguments),
     /// Draw frames without a window.
     Render(RenderArguments),
-    /// Measure the cost and error of every method on a scene.
+    /// Measure the cost and error of every method on scenes.
     Tradeoff(TradeoffArguments),
-    /// Measure how fast the default scene and machines with many loose joints run, against their speed goals.
-    Bench(BenchArguments),
     /// Run a scene at many parameter values: statistics of any channel, sections, regimes, exponents.
     Sweep(SweepArguments),
     /// Map the error of the tip over drive positions and parameters: at rest, and with every ball anywhere in its play.
@@ -323,40 +321,27 @@ pub struct RenderArguments {
 
 /// `tradeoff`.
 #[derive(Debug, Args)]
-#[command(group = clap::ArgGroup::new("what").required(true).args(["scene", "all"]))]
 pub struct TradeoffArguments {
-    /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`).
-    pub scene: Option<OsString>,
-    /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_change, conflicts_with = "all")]
+    /// Names of built-in scenes or benchmarks, or files (contain `/` or end in `.toml`).
+    #[arg(required = true, value_name = "SCENE")]
+    pub scenes: Vec<OsString>,
+    /// Change a parameter of every scene, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_change)]
     pub changes: Vec<(String, String)>,
-    /// Use a coarse grid of steps and tolerances, which takes seconds.
+    /// Use a coarse grid of steps and tolerances over a tenth of a second, which takes seconds.
     #[arg(long)]
     pub quick: bool,
-    /// Folder to write: points as CSV and JSON, diagrams as SVG and PNG.
-    #[arg(long, value_name = "FOLDER", conflicts_with = "all")]
+    /// Folder to write: `tradeoff.csv`, a row per scene, method, and step or tolerance.
+    #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
-    /// All built-in scenes.
-    #[arg(long, requires = "write")]
-    pub all: bool,
-    /// Source folder of the program: rewrite `docs/tradeoff.md` with its diagrams, and `assets/presets.json`.
-    #[arg(long, value_name = "FOLDER", requires = "all")]
-    pub write: Option<PathBuf>,
-    /// Replace a folder of earlier results.
+    /// File to write: what the program states about its presets, of the built-in scenes among these; in the source,
+    /// `assets/presets.json`.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["changes", "quick"])]
+    pub presets: Option<PathBuf>,
+    /// Replace earlier results.
     #[arg(long)]
     pub force: bool,
     /// No progress and no warnings.
-    #[arg(long)]
-    pub quiet: bool,
-}
-
-/// `bench`.
-#[derive(Debug, Args)]
-pub struct BenchArguments {
-    /// Change a parameter of the default scene, e.g. `contact.friction=0.2`; may be repeated, the last wins.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_change)]
-    pub changes: Vec<(String, String)>,
-    /// No progress.
     #[arg(long)]
     pub quiet: bool,
 }

@@ -8,6 +8,8 @@ const IN_PACKAGE: &[(&str, &str)] =
 
 /// Other commands and options, each with the command that has it, and what to do in place of it.
 const GONE: &[(&str, &str, &str)] = &[
+    ("bench", "", "`jointplay tradeoff SCENE…` measures the cost and error of every method on scenes"),
+    ("tradeoff", "--all", "name the scenes: `jointplay tradeoff SCENE… --out FOLDER`"),
     ("validate", "", "`cargo test --test physics validation` compares with the known answers of docs/validation.md"),
     (
         "merge",

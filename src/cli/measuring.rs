@@ -72,7 +72,7 @@ mod tests {
         let code = |error| measure::<()>(true, None, |_| Err(error)).map_err(|f| f.code);
         let stopped = Stopped { time: 0.1, fault: StopFault::SingularLoops, advice: StopAdvice::Dependent };
         assert_eq!(code(stopped.into()), Err(Failure::DIVERGED));
-        let too_long = AnalysisError::TooLong { evaluations: 1 };
+        let too_long = AnalysisError::TooLong { cost: 1.0 };
         assert_eq!(code(too_long), Err(Failure::USAGE));
     }
 }

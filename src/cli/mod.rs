@@ -1,7 +1,6 @@
 //! The command line: its arguments, its output and its exit codes.
 
 mod args;
-mod bench;
 mod check;
 #[cfg(feature = "gui")]
 mod drivers;
@@ -30,7 +29,7 @@ mod state;
 mod summary;
 mod sweep;
 mod tables;
-pub mod tradeoff;
+mod tradeoff;
 mod wear;
 
 use std::fmt::Write as _;
@@ -103,7 +102,6 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         #[cfg(not(feature = "gui"))]
         Some(Command::Render(_)) => Err(no_graphics()),
         Some(Command::Tradeoff(arguments)) => tradeoff::tradeoff(&arguments),
-        Some(Command::Bench(arguments)) => bench::bench(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Map(arguments)) => map::map(&arguments),
         Some(Command::Parameters) => print(&reference_page()),

@@ -108,7 +108,7 @@ mod tests {
             exponent: false,
         };
         let mut points = vec![None; 3];
-        perform(&Job::Sweep(task.clone(), Share::WHOLE), &mut || 0.0, &mut |message| {
+        perform(&Job::Sweep(task.clone(), Share::WHOLE), &mut |message| {
             if let Message::Point(point) = message {
                 let index = point.index;
                 points[index] = Some(*point);

@@ -5,7 +5,6 @@ use std::ops::ControlFlow;
 use wasm_bindgen::prelude::*;
 use wasm_bindgen_futures::JsFuture;
 use wasm_bindgen_futures::js_sys::Promise;
-use web_time::Instant;
 
 use crate::analysis::task::{self, Job, Message};
 use crate::app::BackgroundTask;
@@ -43,12 +42,10 @@ pub async fn perform(job: String) {
     std::panic::set_hook(Box::new(|info| {
         post_message(&Message::Failed(format!("internal error in the computation: {info}")));
     }));
-    let start = Instant::now();
     let job = match serde_json::from_str::<Job>(&job) {
         Ok(job) => job,
         Err(error) => return post_message(&Message::Failed(format!("not a computation: {error}"))),
     };
-    let mut clock = || start.elapsed().as_secs_f64();
     let mut send = |message| {
         post_message(&message);
         // The page terminates the worker to cancel the job.
@@ -60,7 +57,7 @@ pub async fn perform(job: String) {
             let _ = JsFuture::from(promise).await;
         }
     };
-    task::perform_with_rests(&job, &mut clock, &mut send, &mut wait).await;
+    task::perform_with_rests(&job, &mut send, &mut wait).await;
 }
 
 /// On the page: a running worker, terminated on drop.

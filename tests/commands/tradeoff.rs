@@ -1,16 +1,13 @@
 //! The trade-off of speed and accuracy on the command line and in the library.
 
-use std::cell::Cell;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use jointplay::analysis::{
-    AnalysisError, End, RunContext, Setting, WorkBudget, WorkPrecision, presets, work_precision,
-};
+use jointplay::analysis::{AnalysisError, Grid, Row, RunContext, Setting, Tradeoff, presets};
 use jointplay::integrate::{Method, StepControl};
 use jointplay::machine::Preset;
-use jointplay::scene::Scene;
+use jointplay::scene::BUILT_IN;
 use serde_json::Value as Json;
 
 use crate::program::{jointplay, names};
@@ -21,78 +18,85 @@ fn run(folder: &Path, line: &str, code: i32) -> String {
     outcome.stdout + &outcome.stderr
 }
 
-const FILES: [&str; 5] = ["manifest.json", "tradeoff.csv", "tradeoff.json", "tradeoff.png", "tradeoff.svg"];
-
 /// A cheap scene: a rod on an ideal joint.
 const SMALL: &str = "pendulum --set contact.clearance=0 --quick --quiet";
 
 #[test]
 fn the_command_writes_all_files_or_none() {
     let folder = tempfile::tempdir().unwrap();
-    let output = run(folder.path(), &format!("tradeoff {SMALL} --out out"), 0);
-    assert!(output.contains("rk4") && output.contains("Settled motion"), "{output}");
+    let output = run(folder.path(), &format!("tradeoff trammel {SMALL} --out out"), 0);
+    assert!(output.contains("rk4") && output.contains("trammel") && output.contains("no impact"), "{output}");
     let out = folder.path().join("out");
     assert_eq!(names(folder.path()), ["out"], "no other file is left");
-    assert_eq!(names(&out), FILES);
+    assert_eq!(names(&out), ["manifest.json", "tradeoff.csv"]);
 
     let csv = fs::read_to_string(out.join("tradeoff.csv")).unwrap();
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{csv}");
     let column = |name: &str| rows[0].iter().position(|head| *head == name).unwrap();
-    for method in Method::ALL {
-        assert!(rows.iter().any(|row| row[0] == method.word()), "{method}");
-    }
-    for preset in Preset::ALL {
-        let has_preset = |row: &&Vec<&str>| row[column("preset")] == preset.word();
-        assert_eq!(rows.iter().filter(has_preset).count(), 1, "{preset:?}");
-    }
-    let error: f64 = rows[1][column("peak_error")].parse().unwrap();
-    assert!(error >= 0.0);
-    for row in rows.iter().skip(1) {
-        let count = |name: &str| row[column(name)].parse::<f64>().unwrap_or(0.0);
-        for phase in ["impacts", "settled"] {
-            let phase_count = |name: &str| count(&format!("{phase}_{name}"));
-            assert!(phase_count("steps") > 0.0 && phase_count("simulated_s") > 0.0, "{row:?}");
-            assert!(phase_count("evaluations") >= phase_count("steps"), "{row:?}");
+    for scene in ["trammel", "pendulum"] {
+        let of_scene = || rows.iter().filter(|row| row[column("scene")] == scene);
+        for method in Method::ALL {
+            assert!(of_scene().any(|row| row[column("method")] == method.word()), "{scene}, {method}");
+        }
+        for preset in Preset::ALL {
+            let count = of_scene().filter(|row| row[column("preset")] == preset.word()).count();
+            assert_eq!(count, 1, "{scene}, {preset:?}");
         }
     }
+    for row in rows.iter().skip(1) {
+        let value = |name: &str| row[column(name)].parse::<f64>().unwrap_or(0.0);
+        assert!(value("span_s") == 0.1 && value("steps") > 0.0, "{row:?}");
+        assert!(row[column("end")] != "reached" || value("cost") >= value("evaluations"), "{row:?}");
+    }
+    let baseline = rows.iter().find(|row| row[column("method")] == "rk4" && row[column("step_s")] == "1e-5");
+    assert_eq!(baseline.unwrap()[column("ratio")], "1");
 
-    let text = fs::read_to_string(out.join("tradeoff.json")).unwrap();
-    let json: Json = serde_json::from_str(&text).unwrap();
-    assert_eq!(json["points"].as_array().unwrap().len(), rows.len() - 1);
-    assert_eq!(json["meta"]["changed_parameters"]["contact.clearance"], "0");
-    assert!(json["meta"]["machine"].is_string());
-    let png = fs::read(out.join("tradeoff.png")).unwrap();
-    assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
-    let svg = fs::read_to_string(out.join("tradeoff.svg")).unwrap();
-    assert!(svg.contains("radau5") && svg.contains("Time for a simulated second"));
+    let manifest: Json = serde_json::from_str(&fs::read_to_string(out.join("manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["scenes"], serde_json::json!(["trammel", "pendulum"]));
+    assert!(manifest["machine"].is_string(), "{manifest}");
 
-    // Existing folders are refused before any measurement and stay unchanged.
-    let message = run(folder.path(), &format!("tradeoff {SMALL} --out out"), 1);
-    assert!(message.contains("--force"), "{message}");
-    fs::create_dir(folder.path().join("photos")).unwrap();
-    fs::write(folder.path().join("photos/holiday"), "mine").unwrap();
-    let line = format!("tradeoff {SMALL} --out photos --force");
-    run(folder.path(), &line, 1);
-    assert_eq!(names(&folder.path().join("photos")), ["holiday"]);
+    // Existing results are refused before any measurement and stay unchanged.
+    fs::write(folder.path().join("presets.json"), "mine").unwrap();
+    for option in ["--quick --out out", "--presets presets.json"] {
+        let message = run(folder.path(), &format!("tradeoff pendulum --quiet {option}"), 1);
+        assert!(message.contains("--force"), "{message}");
+    }
+    assert_eq!(fs::read_to_string(folder.path().join("presets.json")).unwrap(), "mine");
+}
+
+#[test]
+fn the_record_has_the_presets_of_the_scenes_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    // A file of the user's has no place in it.
+    fs::copy("assets/benchmarks/ball.toml", folder.path().join("mine.toml")).unwrap();
+    run(folder.path(), "tradeoff ball mine.toml --quiet --presets record.json", 0);
+    assert_eq!(names(folder.path()), ["mine.toml", "record.json"]);
+    let text = fs::read_to_string(folder.path().join("record.json")).unwrap();
+    let record: presets::Record = serde_json::from_str(&text).unwrap();
+    assert_eq!(record.scenes.keys().collect::<Vec<_>>(), ["ball"]);
+    let measured = &record.scenes["ball"];
+    assert_eq!(measured.len(), Preset::ALL.len());
+    assert_eq!(measured["accurate"].setting, ("automatic".to_owned(), 1e-7));
+    let errors = Preset::ALL.map(|preset| measured[preset.word()].peak_error.unwrap());
+    assert!(errors.windows(2).all(|pair| pair[1] <= pair[0]), "from fast to accurate: {errors:?}");
+    assert!(record.pace["ball"] > 0.0);
 }
 
 #[test]
 fn errors_about_invalid_input_state_what_is_allowed() {
     let folder = tempfile::tempdir().unwrap();
     for (line, fragment) in [
-        ("tradeoff", "--all"),
-        ("tradeoff pendulm --quick", "pendulum"),
-        ("tradeoff --all", "--write"),
-        ("tradeoff pendulum --all --write .", "cannot be used with"),
+        ("tradeoff", "SCENE"),
+        ("tradeoff pendulum pendulm --quick", "pendulm"),
+        ("tradeoff pendulum --quick --presets p.json", "cannot be used with"),
         ("tradeoff pendulum --set contact.clearence=1mm", "contact.clearance"),
-        ("bench --set contact.friction=-1", "contact.friction"),
+        ("tradeoff --all --write .", "tradeoff SCENE"),
+        ("bench --quiet", "tradeoff SCENE"),
     ] {
         let message = run(folder.path(), line, 2);
         assert!(message.contains(fragment), "{line}: {message}");
     }
-    let message = run(folder.path(), "tradeoff --all --write .", 1);
-    assert!(message.contains("tradeoff"), "{message}");
     assert!(names(folder.path()).is_empty());
 }
 
@@ -101,7 +105,8 @@ fn errors_about_invalid_input_state_what_is_allowed() {
 fn an_interrupted_measurement_writes_nothing() {
     use crate::command_line::{signal, start_and_listen};
     let folder = tempfile::tempdir().unwrap();
-    let child = start_and_listen(&mut crate::program::command(folder.path(), "tradeoff chain --quiet --out out"));
+    let line = "tradeoff chain --quiet --out out --presets record.json";
+    let child = start_and_listen(&mut crate::program::command(folder.path(), line));
     signal(&child, "-INT");
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
@@ -109,117 +114,84 @@ fn an_interrupted_measurement_writes_nothing() {
     assert!(names(folder.path()).is_empty(), "{:?}", names(folder.path()));
 }
 
-/// Runs an analysis with a clock that advances at every reading, so that the result is the same on every computer.
+/// Runs an analysis without a clock.
 fn measure<T>(
     analysis: impl FnOnce(&mut RunContext) -> Result<T, AnalysisError>,
     max_reports: u64,
 ) -> Result<T, AnalysisError> {
-    let (readings, reports) = (Cell::new(0), Cell::new(0));
-    let mut clock = || {
-        readings.set(readings.get() + 1);
-        readings.get() as f64 * 1e-4
-    };
+    let mut reports = 0;
     let mut progress = |done: f64| {
         assert!((0.0..=1.0).contains(&done), "{done}");
-        reports.set(reports.get() + 1);
-        if reports.get() > max_reports { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        reports += 1;
+        if reports > max_reports { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    analysis(&mut RunContext::new(&mut clock, &mut progress))
-}
-
-fn error_at(diagram: &WorkPrecision, method: Method, value: f64) -> f64 {
-    let matches = |p: &&jointplay::analysis::Point| p.setting.method == method && p.setting.value() == value;
-    let point = diagram.points.iter().find(matches).unwrap();
-    assert_eq!(point.impacts.end, End::Reached);
-    point.errors.peak.unwrap()
+    analysis(&mut RunContext::new(&mut || 0.0, &mut progress))
 }
 
 #[test]
 fn finer_steps_and_tolerances_reduce_the_error_and_raise_the_cost() {
     let scene = crate::common::scene("spcmm", &[]);
-    let budget = WorkBudget {
-        evaluations: 40_000,
-        measured: 0.0,
+    let grid = Grid {
+        span_s: 0.013,
+        max_cost: 1e6,
         steps: &[10e-6, 3e-6],
         tolerances: &[1e-4, 1e-8],
         steps_per_impact: &[4.0, 64.0],
-        seconds: f64::INFINITY,
     };
-    let diagram = measure(|context| work_precision(&scene, &budget, context), u64::MAX).unwrap();
+    let found = measure(|context| Tradeoff::measure(&scene, &grid, context), u64::MAX).unwrap();
+    let row = |method: Method, value: f64| -> &Row {
+        let matches = |row: &&Row| row.setting.method == method && row.setting.value() == value;
+        found.rows.iter().find(matches).unwrap()
+    };
     for method in Method::ALL {
-        let points: Vec<_> = diagram.points.iter().filter(|p| p.setting.method == method).collect();
-        assert!(points.len() >= 2, "{method}");
         let [coarse, fine] = match method.control() {
             StepControl::Fixed => [10e-6, 3e-6],
             StepControl::Error => [1e-4, 1e-8],
             StepControl::PerImpact => [4.0, 64.0],
         };
-        let (coarse_error, fine_error) = (error_at(&diagram, method, coarse), error_at(&diagram, method, fine));
+        let (coarse, fine) = (row(method, coarse), row(method, fine));
+        let (coarse_error, fine_error) = (coarse.errors.peak.unwrap(), fine.errors.peak.unwrap());
         println!("{method}: {coarse_error:e} {fine_error:e}");
         assert!(fine_error < 0.6 * coarse_error, "{method}");
-        let evaluations = |value: f64| {
-            let point = points.iter().find(|p| p.setting.value() == value).unwrap();
-            point.impacts.evaluations
-        };
-        assert!(evaluations(fine) > 2 * evaluations(coarse), "{method}");
+        assert!(fine.cost.unwrap() > 2.0 * coarse.cost.unwrap(), "{method}");
     }
-    // The reference is accurate enough to distinguish all settings, and the best settings approach it.
-    let floor = diagram.reference.floor.peak.unwrap();
-    assert!(floor < 1e-6, "{floor}");
-    assert!(error_at(&diagram, Method::Radau5, 1e-8) < 1e-5);
-    // The Pareto front is not empty, and no point on it is dominated.
-    let front: Vec<_> = diagram.points.iter().filter(|p| p.impacts.front).collect();
-    assert!(!front.is_empty());
-    for point in &front {
-        for other in &diagram.points {
-            let (Some(a), Some(b)) = (point.errors.peak, other.errors.peak) else {
-                continue;
-            };
-            let slower = other.impacts.wall_s >= point.impacts.wall_s;
-            assert!(slower || b.max(floor) > a.max(floor), "{point:?} {other:?}");
-        }
+    // Two methods of high order that agree with the reference also confirm it.
+    assert!(row(Method::Radau5, 1e-8).errors.peak.unwrap() < 1e-5);
+    assert!(row(Method::DormandPrince5, 1e-8).errors.peak.unwrap() < 1e-5);
+    // Cost is counted, and the same in every run.
+    let again = measure(|context| Tradeoff::measure(&scene, &grid, context), u64::MAX).unwrap();
+    for (row, again) in found.rows.iter().zip(&again.rows) {
+        assert_eq!((row.cost, row.errors), (again.cost, again.errors), "{}", row.setting.method);
     }
+    assert_eq!(measure(|context| Tradeoff::measure(&scene, &grid, context), 20).unwrap_err(), AnalysisError::Cancelled);
 }
 
 #[test]
-fn presets_can_be_measured_on_any_scene_and_cancelled() {
-    let scene = crate::common::scene("pendulum", &[("contact.clearance", "0.5 mm")]);
-    let measure_presets = |scene: &Scene, max_reports: u64| {
-        measure(|context| presets::measure(scene, &Preset::ALL, context), max_reports)
-    };
-    let points = measure_presets(&scene, u64::MAX).unwrap();
-    assert_eq!(points.len(), Preset::ALL.len());
-    let errors: Vec<f64> = points.iter().map(|p| p.errors.peak.unwrap()).collect();
-    assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "from fast to accurate: {errors:?}");
-    for (point, preset) in points.iter().zip(Preset::ALL) {
-        assert_eq!(point.preset, Some(preset));
-        assert!(presets::Measured::of(point).impacts_ratio.is_some());
-    }
-    assert_eq!(measure_presets(&scene, 20).unwrap_err(), AnalysisError::Cancelled);
-    // The reference run fails because balls leave their sockets.
+fn a_scene_whose_reference_fails_has_no_result() {
+    // Balls leave their sockets.
     let soft = crate::common::scene("pendulum", &[("contact.youngs_modulus", "1 MPa"), ("gravity.z", "-1000 m/s^2")]);
-    let error = measure_presets(&soft, u64::MAX).unwrap_err();
+    let error = measure(|context| Tradeoff::measure(&soft, &Grid::QUICK, context), u64::MAX).unwrap_err();
     assert!(matches!(error, AnalysisError::Stopped(_)), "{error}");
 }
 
 #[test]
 fn the_built_in_presets_equal_the_measured_ones() {
     let record = presets::record();
-    for preset in Preset::ALL {
-        // `tests/texts/documents.rs` checks that the record has all built-in scenes.
-        for name in presets::record().scenes.keys() {
-            let (method, value) = &record.points[name][preset.word()];
-            let setting = Setting::of_preset(preset, &crate::common::scene(name, &[]).machine);
+    for name in BUILT_IN {
+        let machine = crate::common::scene(name, &[]).machine;
+        for preset in Preset::ALL {
+            let stale = format!("{name}, {preset:?}: measure the presets again, see docs/checks.md");
+            let measured = presets::measured(name, preset).unwrap_or_else(|| panic!("{stale}"));
+            let setting = Setting::of_preset(preset, &machine);
             assert_eq!(
-                (method.as_str(), *value),
+                (measured.setting.0.as_str(), measured.setting.1),
                 (setting.method.word(), setting.value()),
-                "{name}, {preset:?} has changed: jointplay tradeoff --all --write ."
+                "{stale}"
             );
-            let measured = presets::measured(name, preset).unwrap();
-            let error = measured.peak_error.unwrap();
-            let limit = presets::limit(preset);
+            let (error, limit) = (measured.peak_error.unwrap(), presets::limit(preset));
             assert!(error <= limit, "{name}, {preset:?}: {error:e} against {limit:e}");
         }
     }
+    assert_eq!(record.scenes.len(), BUILT_IN.len());
     assert_eq!(presets::measured("mine", Preset::Accurate), None);
 }

@@ -1,9 +1,12 @@
 //! The error that each preset states holds for machines that it was not chosen on: the peak forces of their first impacts, beside
 //! closed forms and independent models (SciPy's DOP853, relative tolerance 1e-11 to 1e-13, located contacts), and for the built-in
-//! scenes, beside a tighter tolerance.
+//! scenes, beside a tighter tolerance. And the method that a fast preset chooses is the cheaper one.
+
+use std::ops::ControlFlow;
 
 use crate::common::{MACHINES, SCENES, run_until, scene};
-use jointplay::analysis::presets;
+use jointplay::analysis::{Grid, Row, RunContext, Tradeoff, presets};
+use jointplay::integrate::Method;
 use jointplay::machine::Preset;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Impact, Simulation};
@@ -144,5 +147,63 @@ fn peaks_of_the_built_in_scenes_are_within_the_stated_error_of_each_preset() {
                 assert!(error < presets::limit(preset), "{name}, {}: {own:?} in place of {impact:?}", preset.word());
             }
         }
+    }
+}
+
+/// Allowed cost of the setting of a fast preset, over that of the other method where it keeps the limit, too.
+const DEARER: f64 = 1.3;
+
+/// Settings of the fast presets with either method.
+const OF_FAST_PRESETS: [(Preset, f64, u32); 2] = [(Preset::Preview, 1e-2, 12), (Preset::RealTime, 1e-3, 24)];
+
+/// Asserts that the presets keep their limits on a machine, and that the fast ones chose the cheaper method.
+fn assert_chosen_well(name: &str, changes: &[(&str, &str)]) {
+    const GRID: Grid =
+        Grid { span_s: 0.2, max_cost: 6e5, steps: &[], tolerances: &[1e-2, 1e-3], steps_per_impact: &[12.0, 24.0] };
+    let owned: Vec<_> = changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    let scene = Scene::load(name, &owned).unwrap();
+    let (mut clock, mut progress) = (|| 0.0, |_| ControlFlow::Continue(()));
+    let measured = Tradeoff::measure(&scene, &GRID, &mut RunContext::new(&mut clock, &mut progress)).unwrap();
+    for preset in Preset::ALL {
+        let row = measured.preset(preset).unwrap();
+        let case = format!("{name} {changes:?}, {}", preset.word());
+        println!("{case}: {:?}, {:.1e}", row.setting.method, row.errors.peak.unwrap());
+        assert_eq!(row.keeps(presets::limit(preset)), Some(true), "{case}: {:?}", row.errors);
+    }
+    for (preset, tolerance, steps) in OF_FAST_PRESETS {
+        let chosen = measured.preset(preset).unwrap();
+        let is_other = |row: &&Row| match row.setting.method {
+            Method::Automatic => row.setting.tolerance == tolerance,
+            Method::DiscreteGradient => row.setting.steps_per_impact == steps,
+            _ => false,
+        };
+        let other = measured.rows.iter().filter(is_other).find(|row| row.setting.method != chosen.setting.method).unwrap();
+        let (cost, other_cost) = (chosen.cost.unwrap(), other.cost.unwrap_or(f64::INFINITY));
+        let case = format!("{name} {changes:?}, {}: {:?}", preset.word(), chosen.setting.method);
+        println!("{case} {cost:.2e}, the other {other_cost:.2e}, peaks {:.1e}", other.errors.peak.unwrap_or(f64::NAN));
+        let keeps = other.keeps(presets::limit(preset)) == Some(true);
+        assert!(!keeps || cost <= DEARER * other_cost, "{case} costs {cost:e}, the other method {other_cost:e}");
+    }
+}
+
+const IDEAL: (&str, &str) = ("contact.clearance", "0");
+
+#[test]
+fn fast_presets_choose_the_cheaper_method_on_variants_of_built_in_machines() {
+    assert_chosen_well("chain", &[("chain.links", "4")]);
+    assert_chosen_well("chain", &[("chain.links", "32")]);
+    assert_chosen_well("hexapod", &[IDEAL, ("joint.A6.clearance", "0.1 mm")]);
+    let four = ["joint.A6.clearance", "joint.A1.clearance", "joint.B1.clearance", "joint.B4.clearance"];
+    assert_chosen_well("hexapod", &[&[IDEAL], &four.map(|joint| (joint, "0.1 mm"))[..]].concat());
+    // Only their balls hold the rods.
+    assert_chosen_well("delta", &[("parameter.grip", "0.001 N")]);
+    assert_chosen_well("four-bar", &[("contact.clearance", "0.1 mm"), ("contact.restitution", "0.7")]);
+    assert_chosen_well("suspension", &[("contact.clearance", "0.15 mm"), ("contact.friction", "0")]);
+}
+
+#[test]
+fn fast_presets_choose_the_cheaper_method_on_machines_that_came_later() {
+    for name in ["door", "swing", "five-rods", "tied-arm"] {
+        assert_chosen_well(&format!("tests/trials/{name}.toml"), &[]);
     }
 }

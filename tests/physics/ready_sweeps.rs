@@ -16,7 +16,7 @@ fn points(ready: &ReadySweep, vary: Option<&str>, exponent: bool) -> Vec<SweptPo
         task.vary = vec![format!("{}={range}", ready.key)];
     }
     let mut points = Vec::new();
-    perform(&Job::Sweep(task, Share::WHOLE), &mut || 0.0, &mut |message| {
+    perform(&Job::Sweep(task, Share::WHOLE), &mut |message| {
         match message {
             Message::Point(point) => points.push(*point),
             Message::Failed(why) => panic!("{}: {why}", ready.name),

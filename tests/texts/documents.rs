@@ -3,8 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use jointplay::analysis::Setting;
+use jointplay::analysis::presets::limit;
 use jointplay::cli::{reference, schema};
-use jointplay::machine::{Role, Vec3};
+use jointplay::machine::{Preset, Role, Vec3};
 use jointplay::scene::{Scene, file_tables, reference_page};
 use jointplay::simulate::{Frame, Simulation};
 
@@ -124,39 +126,53 @@ fn the_example_of_the_scene_format_runs() {
     assert!(simulation.statistics().impacts[0] > 0, "a released rod falls onto its socket");
 }
 
-/// The scenes of `assets/presets.json`: all built-in ones, in order.
-fn measured_scenes() -> Vec<&'static str> {
-    let record = &jointplay::analysis::presets::record().scenes;
-    let all = jointplay::scene::BUILT_IN;
-    for name in all {
-        assert!(record.contains_key(name), "{name}: run `jointplay tradeoff --all --write .`");
-    }
-    all.to_vec()
-}
-
+/// The page of the trade-off was drawn from its table, which has the presets of the program, within their limits.
 #[test]
-fn the_tradeoff_page_has_the_headings_and_diagrams_of_the_command() {
-    /// Headings and table heads.
-    fn structure(page: &str) -> Vec<&str> {
-        let lines: Vec<&str> = page.lines().collect();
-        let is_rule = |line: &&str| line.starts_with("|---");
-        let head = |n: &usize| lines[*n].starts_with('#') || lines.get(n + 1).is_some_and(is_rule);
-        (0..lines.len()).filter(head).map(|n| lines[n]).collect()
+fn the_tradeoff_page_and_its_table_are_those_of_the_presets() {
+    let again = "measure the presets again, see docs/checks.md";
+    let (page, table) = (read("docs/tradeoff.md"), read("docs/tradeoff.csv"));
+    assert!(page.lines().count() <= 150, "{}", page.lines().count());
+    let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let heads = lines.next().expect("heads");
+    let rows: Vec<Vec<&str>> = lines.collect();
+    let cell = |row: &[&str], name: &str| row[heads.iter().position(|head| *head == name).expect(name)].to_owned();
+    let number = |row: &[&str], name: &str| cell(row, name).parse::<f64>().ok();
+    let trials = ["steer", "wrist", "peaucellier", "gate", "two-balls", "slow-eight"];
+    let files = trials.map(|name| root().join(format!("tests/trials/{name}.toml")));
+    let scenes = jointplay::scene::BUILT_IN.map(std::path::PathBuf::from).into_iter().chain(files);
+    let mut largest = [0.0_f64; Preset::ALL.len()];
+    for scene in scenes {
+        let scene = Scene::load(&scene, &[]).expect("loads");
+        let own: Vec<_> = rows.iter().filter(|row| cell(row, "scene") == scene.name).collect();
+        assert!(page.contains(&format!("| `{}` |", scene.name)), "{}: {again}", scene.name);
+        for (preset, largest) in Preset::ALL.into_iter().zip(&mut largest) {
+            let case = format!("{}, {}: {again}", scene.name, preset.word());
+            let row = own.iter().find(|row| cell(row, "preset") == preset.word()).unwrap_or_else(|| panic!("{case}"));
+            let setting = Setting::of_preset(preset, &scene.machine);
+            let value = ["tolerance", "steps_per_impact"].into_iter().find_map(|name| number(row, name));
+            assert_eq!((cell(row, "method"), value), (setting.method.to_string(), Some(setting.value())), "{case}");
+            let error = number(row, "peak_error").unwrap_or_else(|| panic!("{case}"));
+            assert!(error <= limit(preset), "{case}: {error}");
+            *largest = largest.max(error);
+            let Some((tolerance, steps)) = [(1e-2, 12.0), (1e-3, 24.0)].get(preset as usize).copied() else {
+                continue;
+            };
+            // The method not chosen costs at least as much, within a factor, where it keeps the limit.
+            let other = own.iter().filter(|other| match &*cell(other, "method") {
+                "automatic" => number(other, "tolerance") == Some(tolerance),
+                "discrete-gradient" => number(other, "steps_per_impact") == Some(steps),
+                _ => false,
+            });
+            let keeps = |row: &[&str]| number(row, "peak_error").is_some_and(|error| error <= limit(preset));
+            let cheapest = other.filter(|row| keeps(row)).filter_map(|row| number(row, "cost")).fold(f64::INFINITY, f64::min);
+            assert!(number(row, "cost").is_some_and(|cost| cost <= 1.3 * cheapest), "{case}: {cheapest}");
+        }
     }
-    let page = read("docs/tradeoff.md");
-    let measured = measured_scenes();
-    assert_eq!(
-        structure(&page),
-        structure(&jointplay::cli::tradeoff::skeleton(&measured)),
-        "jointplay tradeoff --all --write ."
-    );
-    let skeleton = jointplay::cli::tradeoff::skeleton(&measured);
-    let pictures =
-        |page: &str| -> Vec<String> { page.lines().filter(|line| line.starts_with("![")).map(str::to_owned).collect() };
-    assert_eq!(pictures(&page), pictures(&skeleton));
-    for picture in pictures(&page) {
-        let (_, file) = picture.trim_end_matches(')').split_once("](").expect("a link");
-        assert!(read(format!("docs/{file}")).starts_with("<svg"), "{file}");
+    for (preset, error) in Preset::ALL.into_iter().zip(largest) {
+        let stated = format!("{error:.1e}");
+        let row = page.lines().find(|line| line.starts_with(&format!("| {} | {:e} |", preset.word(), limit(preset))));
+        let is_stated = |row: &str| row.replace("e-0", "e-").contains(&format!("| {stated} |"));
+        assert!(row.is_some_and(is_stated), "{}: {stated}: {again}", preset.word());
     }
 }
 

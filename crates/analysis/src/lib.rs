@@ -5,8 +5,7 @@
 //!   data for a thread or a worker, as [`one_at_a_time_task`] does for a study.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the resulting
 //!   [`regime`].
-//! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`],
-//!   [`model_costs`].
+//! - Cost and error of the methods: [`Tradeoff`], and of the presets on the built-in scenes, as stored: [`presets`].
 //! - The tip's error over the workspace, with the drives held ([`map`]).
 //! - Runs of a scene at given values of its parameters, reduced to a few numbers, and each parameter alone ([`study`]).
 //!
@@ -41,7 +40,6 @@
 pub mod argument;
 pub mod assembly;
 pub mod axis;
-mod cost;
 pub mod crossing;
 pub mod design;
 pub mod drive;
@@ -50,14 +48,12 @@ pub mod ideal_fault;
 pub mod impact_row;
 pub mod initial_peaks;
 pub mod layout;
-mod many_joints;
 pub mod map;
 pub mod map_task;
 pub mod one_at_a_time_task;
 pub mod orbit;
 #[cfg(feature = "native")]
 pub mod parallel;
-mod pareto_front;
 pub mod point;
 mod points;
 pub mod presets;
@@ -70,7 +66,6 @@ pub mod section;
 mod setting;
 pub mod source;
 pub mod span_request;
-mod speed_goals;
 pub mod statistic;
 pub mod study;
 pub mod sweep;
@@ -80,15 +75,11 @@ pub mod sweep_settings;
 pub mod sweep_task;
 pub mod task;
 mod timing;
-mod work_precision;
+mod tradeoff;
 
-pub use cost::{CaseCost, CostCase, model_costs};
-pub use many_joints::{GROWTH, LIMITS, LOOSE_MACHINES, LooseMachine, LooseSpeed, Timed, growth, loose_speed};
-pub use pareto_front::front;
 pub use points::{PointsError, read_points};
-pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};
+pub use reference_solution::{Errors, ReferenceSolution};
 pub use run_context::{AnalysisError, RunContext};
 pub use setting::Setting;
-pub use speed_goals::{Goal, GoalResult, measure_speed_goals};
-pub use timing::{End, WorkBudget};
-pub use work_precision::{Phase, Point, View, WorkPrecision, work_precision};
+pub use timing::End;
+pub use tradeoff::{Grid, Row, Tradeoff};

@@ -93,7 +93,7 @@ mod tests {
         // A job must survive its serialisation as text.
         let job: Job = serde_json::from_str(&serde_json::to_string(&job).expect("plain data")).expect("its own text");
         let mut messages = Vec::new();
-        perform(&job, &mut || 0.0, &mut |message| {
+        perform(&job, &mut |message| {
             messages.push(message);
             if messages.len() < limit { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });

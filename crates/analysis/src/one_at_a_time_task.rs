@@ -126,7 +126,7 @@ mod tests {
     fn messages_of(task: &OneAtATimeTask, index: usize, of: usize) -> Vec<Message> {
         let text = serde_json::to_string(&Job::OneAtATime(task.clone(), Share { index, of })).expect("plain data");
         let mut messages = Vec::new();
-        perform(&serde_json::from_str(&text).expect("its own text"), &mut || 0.0, &mut |message| {
+        perform(&serde_json::from_str(&text).expect("its own text"), &mut |message| {
             let text = serde_json::to_string(&message).expect("plain data");
             assert_eq!(serde_json::from_str::<Message>(&text).expect("its own text"), message);
             messages.push(message);
@@ -232,7 +232,7 @@ mod tests {
     /// As [`messages_of`], for a task with numbers that text cannot represent.
     fn messages_without_text(task: &OneAtATimeTask) -> Vec<Message> {
         let mut messages = Vec::new();
-        perform(&Job::OneAtATime(task.clone(), Share::WHOLE), &mut || 0.0, &mut |message| {
+        perform(&Job::OneAtATime(task.clone(), Share::WHOLE), &mut |message| {
             messages.push(message);
             ControlFlow::Continue(())
         });
@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn a_cancelled_task_sends_no_further_messages() {
         let mut messages = 0;
-        perform(&Job::OneAtATime(task("spcmm", "joint.*.clearance"), Share::WHOLE), &mut || 0.0, &mut |_| {
+        perform(&Job::OneAtATime(task("spcmm", "joint.*.clearance"), Share::WHOLE), &mut |_| {
             messages += 1;
             if messages < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });

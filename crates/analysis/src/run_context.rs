@@ -67,10 +67,10 @@ pub enum AnalysisError {
     Stopped(#[from] Stopped),
     /// The reference run reached the work limit.
     #[error(
-        "the reference run takes more than {evaluations} evaluations of the equations: the scene is too large to be measured"
+        "the reference run costs more than {cost:e} evaluations of the equations: the scene is too large to be measured"
     )]
     TooLong {
         /// The limit.
-        evaluations: u64,
+        cost: f64,
     },
 }

@@ -1,7 +1,5 @@
 //! An integration method with the setting that controls its steps.
 
-use serde::Serialize;
-
 use super::AnalysisError;
 use jointplay_physics::integrate::{Method, StepControl};
 use jointplay_physics::machine::{Machine, Preset, Solver};
@@ -9,7 +7,7 @@ use jointplay_physics::simulate::Simulation;
 use jointplay_scene::Scene;
 
 /// A method with its step size, tolerance or steps per impact.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
     /// Integration method.
     pub method: Method,
@@ -42,7 +40,12 @@ impl Setting {
 
     /// The setting of a preset on `machine`.
     pub fn of_preset(preset: Preset, machine: &Machine) -> Self {
-        Self::of(&preset.solver(machine.joints_with_clearance()))
+        Self::of(&preset.solver(machine))
+    }
+
+    /// Whether `machine` runs with all settings of `preset`.
+    pub(super) fn has_preset(machine: &Machine, preset: Preset) -> bool {
+        Self::of(&machine.solver) == Self::of_preset(preset, machine)
     }
 
     /// Runge-Kutta 4 at 10 microseconds, the baseline of speed ratios.

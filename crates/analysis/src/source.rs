@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::AnalysisError;
 use super::axis::RangeError;
 use super::study::StudyError;
 use super::sweep::SweepError;
@@ -53,8 +52,6 @@ pub(super) enum TaskFault {
     #[error("cancelled")]
     Cancelled,
     #[error(transparent)]
-    Analysis(Box<AnalysisError>),
-    #[error(transparent)]
     Scene(#[from] SceneError),
     #[error(transparent)]
     Range(#[from] RangeError),
@@ -76,15 +73,4 @@ pub(super) enum TaskFault {
     TooManySections { points: usize, kept: usize, most: usize },
     #[error("{points} points are more than the window shows ({most}): take fewer values, or run `jointplay map`")]
     TooManyPoints { points: usize, most: usize },
-    #[error("no preset is called {0}")]
-    NoPreset(String),
-}
-
-impl From<AnalysisError> for TaskFault {
-    fn from(error: AnalysisError) -> Self {
-        match error {
-            AnalysisError::Cancelled => Self::Cancelled,
-            other => Self::Analysis(Box::new(other)),
-        }
-    }
 }

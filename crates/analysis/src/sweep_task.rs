@@ -300,7 +300,7 @@ mod tests {
         // Jobs and messages must survive their serialisation as text.
         let text = serde_json::to_string(&Job::Sweep(task, share)).expect("plain data");
         let job = serde_json::from_str(&text).expect("its own text");
-        perform(&job, &mut || 0.0, &mut |message| {
+        perform(&job, &mut |message| {
             let text = serde_json::to_string(&message).expect("plain data");
             messages.push(serde_json::from_str(&text).expect("its own text"));
             if messages.len() < limit { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }

@@ -239,7 +239,7 @@ impl Scene {
         let Some(preset) = self.machine.solver.preset else {
             return;
         };
-        let preset = preset.solver(self.machine.joints_with_clearance());
+        let preset = preset.solver(&self.machine);
         let given = |key: &str| self.source.places.contains_key(key) || self.changes.iter().any(|(own, _)| own == key);
         let [method, step, tolerance, steps_per_impact] = SOLVER_KEYS.map(given);
         let solver = &mut self.machine.solver;

@@ -327,9 +327,9 @@ static TABLE: [Parameter; 25] = [
         Kind::Choice(Preset::WORDS),
         Value::Unset,
         Scope::Every,
-        "Method and accuracy by name: preview (automatic, 1e-4; discrete-gradient, 4, where 8 or more balls are loose), real-time \
-         (automatic, 1e-6; discrete-gradient, 16), accurate (automatic, 1e-7), reference (dopri5, 1e-11). A method, step, tolerance or \
-         number of steps per impact that is set as well overrides the preset.",
+        "Method and accuracy by name: preview (automatic, 1e-2; discrete-gradient, 12, where 4 or more loose balls act on one another), \
+         real-time (automatic, 1e-3; discrete-gradient, 24), accurate (automatic, 1e-7), reference (dopri5, 1e-11). \
+         A method, step, tolerance or number of steps per impact that is set as well overrides the preset.",
         "Solves paper eqs. (55), (58) in time",
     ),
     at_reset(row(

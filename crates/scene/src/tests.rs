@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::*;
-use jointplay_physics::integrate::StepControl;
+use jointplay_physics::integrate::{Method, StepControl};
 use jointplay_physics::machine::ElementKind;
 
 /// World poses of all bodies at the file's start, without drives.
@@ -179,8 +179,8 @@ fn a_missing_drive_value_is_requested_in_the_unit_of_its_joint() {
 fn the_help_of_the_presets_states_their_settings() {
     let help = table().iter().find(|p| p.key == "solver.preset").unwrap().help;
     for preset in Preset::ALL {
-        for loose in [1, Preset::MANY_JOINTS] {
-            let solver = preset.solver(loose);
+        for scene in ["pendulum", "suspension"] {
+            let solver = preset.solver(&changed(scene, &[]).machine);
             let value = match solver.method.control() {
                 StepControl::PerImpact => format!("{}, {}", solver.method, solver.steps_per_impact),
                 _ => format!("{}, {:e}", solver.method, solver.tolerance),
@@ -841,16 +841,16 @@ stiffness = \"1 N m/rad\"
 }
 
 #[test]
-fn a_fast_preset_follows_the_number_of_loose_balls_in_whatever_order_it_is_set() {
+fn a_fast_preset_follows_the_number_of_coupled_balls_in_whatever_order_it_is_set() {
     let preset = ("solver.preset", "real-time");
     let ideal = ("contact.clearance", "0");
     let one = ("joint.A6.clearance", "0.1 mm");
     let solver = |changes: &[(&str, &str)]| changed("hexapod", changes).machine.solver;
-    let many = Preset::RealTime.solver(12);
+    let many = Preset::RealTime.solver(&changed("hexapod", &[]).machine);
     assert_eq!(many.method.control(), StepControl::PerImpact);
     assert_eq!(solver(&[preset]), many);
     for changes in [[preset, ideal, one], [ideal, one, preset], [ideal, preset, one]] {
-        assert_eq!(solver(&changes), Preset::RealTime.solver(1), "{changes:?}");
+        assert_eq!(solver(&changes), Preset::RealTime.solver(&changed("pendulum", &[]).machine), "{changes:?}");
     }
     // Explicit settings are unaffected.
     let explicit = [preset, ("solver.steps_per_impact", "8"), ("solver.tolerance", "1e-5")];
@@ -860,5 +860,5 @@ fn a_fast_preset_follows_the_number_of_loose_balls_in_whatever_order_it_is_set()
     scene.undo_change("solver.steps_per_impact").unwrap();
     assert_eq!(scene.machine.solver.steps_per_impact, many.steps_per_impact);
     scene.set("contact.clearance", "0").unwrap();
-    assert_eq!(scene.machine.solver.method, Preset::RealTime.solver(0).method);
+    assert_eq!(scene.machine.solver.method, Method::Automatic);
 }

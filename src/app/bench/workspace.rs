@@ -340,7 +340,7 @@ mod tests {
 
         fn start(&mut self, job: Job) -> Option<Box<dyn BackgroundTask>> {
             let mut messages = Vec::new();
-            perform(&job, &mut || 0.0, &mut |message| {
+            perform(&job, &mut |message| {
                 messages.push(message);
                 ControlFlow::Continue(())
             });

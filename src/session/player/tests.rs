@@ -826,7 +826,7 @@ fn a_preset_chosen_live_replaces_solver_keys_set_by_name() {
     let mut player = player("spcmm");
     player.set("solver.tolerance", "1e-9").expect("in range");
     player.set("solver.preset", "accurate").expect("a preset");
-    let tolerance = crate::machine::Preset::Accurate.solver(3).tolerance;
+    let tolerance = crate::machine::Preset::Accurate.solver(&player.pending().machine).tolerance;
     assert_eq!(player.pending().machine.solver.tolerance, tolerance);
     assert_eq!(player.running().machine.solver.tolerance, tolerance);
     player.set("solver.tolerance", "1e-9").expect("in range");

@@ -406,11 +406,6 @@ impl Machine {
         })
     }
 
-    /// Number of ball joints with clearance.
-    pub fn joints_with_clearance(&self) -> usize {
-        self.ball_joints.iter().filter(|joint| joint.contact.clearance > 0.0).count()
-    }
-
     /// Sum of the magnitudes of the element forces on each body, N, without the stretch of springs, which needs the start poses.
     fn element_forces(&self) -> Vec<f64> {
         let mut element_forces = vec![0.0; self.bodies.len()];

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Machine;
 use crate::integrate::Method;
 use crate::words::words;
 
@@ -95,21 +96,35 @@ impl Default for Solver {
 }
 
 impl Preset {
-    /// Number of ball joints with clearance from which the fast presets take steps per impact instead of error-controlled ones.
-    pub const MANY_JOINTS: usize = 8;
+    /// Fewest coupled ball joints for which the fast presets take steps per impact in place of error-controlled ones. With fewer, a
+    /// joint has more of a machine's first impacts, each of which errs by those before it, and the steps that keep the limits of
+    /// error cost as much.
+    const FEWEST_COUPLED: usize = 4;
 
-    /// Stepper settings of the preset for a machine with `joints_with_clearance` ball joints with clearance, chosen by
-    /// measurement (`docs/tradeoff.md`).
-    pub fn solver(self, joints_with_clearance: usize) -> Solver {
-        let many = joints_with_clearance >= Self::MANY_JOINTS;
-        let (method, tolerance, steps_per_impact) = match self {
-            Self::Preview if many => (Method::DiscreteGradient, Solver::default().tolerance, 4),
-            Self::RealTime if many => (Method::DiscreteGradient, Solver::default().tolerance, 16),
-            Self::Preview => (Method::Automatic, 1e-4, 16),
-            Self::RealTime => (Method::Automatic, 1e-6, 16),
-            Self::Accurate => (Method::Automatic, 1e-7, 16),
-            Self::Reference => (Method::DormandPrince5, 1e-11, 16),
+    /// Stepper settings of the preset for `machine`, from what is known before it runs.
+    ///
+    /// Error-controlled steps follow the events of all joints. Where impacts in one joint set off others, n steps per impact of
+    /// the discrete gradient cost about 0.3 + 0.02 n times as much, and less in larger machines (`docs/tradeoff.md`).
+    pub fn solver(self, machine: &Machine) -> Solver {
+        let steps_per_impact = match self {
+            Self::Preview => Some(12),
+            Self::RealTime => Some(24),
+            Self::Accurate | Self::Reference => None,
         };
-        Solver { preset: Some(self), method, tolerance, steps_per_impact, ..Solver::default() }
+        let coupled = machine.coupled_joints();
+        let own = Solver { preset: Some(self), ..Solver::default() };
+        if let Some(steps_per_impact) = steps_per_impact
+            && coupled.joints >= Self::FEWEST_COUPLED
+            && coupled.is_narrow
+        {
+            return Solver { method: Method::DiscreteGradient, steps_per_impact, ..own };
+        }
+        let (method, tolerance) = match self {
+            Self::Preview => (Method::Automatic, 1e-2),
+            Self::RealTime => (Method::Automatic, 1e-3),
+            Self::Accurate => (Method::Automatic, 1e-7),
+            Self::Reference => (Method::DormandPrince5, 1e-11),
+        };
+        Solver { method, tolerance, ..own }
     }
 }

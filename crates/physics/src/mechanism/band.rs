@@ -104,6 +104,11 @@ impl Band {
         &self.columns
     }
 
+    /// Number of products of blocks in the elimination.
+    pub fn products(&self) -> usize {
+        self.targets.len()
+    }
+
     /// Blocks of row `k` right of the diagonal.
     fn after(&self, k: usize) -> Range<usize> {
         self.diagonal[k] + 1..self.starts[k + 1]

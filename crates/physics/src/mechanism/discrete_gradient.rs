@@ -9,6 +9,7 @@
 //! No event is located. The eccentricity at the end is that of the guessed motion, plus h W times the change of V.
 
 use super::band::Band;
+use super::bounds;
 use super::columns::{Column, collect_columns, collect_relative_columns, contact_sides};
 use super::contacts::Contacts;
 use super::coupled::{CoupledRows, add_impulse, apply_inverse_mass, mobility_between};
@@ -377,8 +378,11 @@ impl DiscreteGradient {
         let tolerance = laws.map(|(_, law)| law.slip_high).fold(VELOCITY_TOLERANCE, f64::min);
         let (mut merit, mut cuts, mut part) = (f64::INFINITY, 0, 1.0);
         let mut has_moved_normal_forces = false;
+        let (rows, blocks) = (self.rows.len(), self.band.columns().len());
+        counts.algebra += bounds::coupling_time(rows, blocks) as u64;
         for iteration in 0..ITERATIONS {
             counts.contacts += 1;
+            counts.algebra += bounds::contact_time(rows, self.band.products()) as u64;
             for row in &mut self.rows {
                 let [u, s] = [row.free[0] + row.added[0], row.free[1] + row.added[1]];
                 row.law_force = match &row.law {

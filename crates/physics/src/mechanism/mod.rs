@@ -782,9 +782,19 @@ impl Mechanism {
 
     /// Approximate cost of linear algebra in the latest implicit step, in evaluations.
     pub fn implicit_algebra(&self) -> f64 {
+        self.implicit_time() / self.evaluation_time
+    }
+
+    /// The same, ns.
+    pub fn implicit_time(&self) -> f64 {
         let stiff = self.stiff.as_ref();
         let [coordinates, products] = stiff.map_or([0; 2], |stiff| stiff.size());
-        bounds::implicit_time(coordinates, products) / self.evaluation_time
+        bounds::implicit_time(coordinates, products)
+    }
+
+    /// Approximate time of one evaluation, ns: only its ratio to other such times matters.
+    pub fn evaluation_time(&self) -> f64 {
+        self.evaluation_time
     }
 
     /// Maximum number of velocity coordinates for which the automatic choice considers implicit steps.

@@ -426,6 +426,16 @@ impl Simulation {
         self.state.statistics()
     }
 
+    /// What the run cost so far, in evaluations of the equations: these, the linear algebra of implicit steps and of coupled
+    /// contacts, and what is done once a step. The same on every computer.
+    pub fn counted_cost(&self) -> f64 {
+        let Statistics { steps, rejected, evaluations, algebra, .. } = self.statistics();
+        // Error control and the search for events double what a step costs besides.
+        let controls = if self.conditions().solver.method.is_adaptive() { 2.0 } else { 1.0 };
+        let steps = controls * automatic::STEP_COST * (steps + rejected) as f64;
+        *evaluations as f64 + *algebra as f64 / self.mechanism().evaluation_time() + steps
+    }
+
     /// As [`State::impacts`].
     pub fn impacts(&self) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
         self.state.impacts()

@@ -83,10 +83,12 @@ impl AnyStepper {
         }
     }
 
-    /// Factorisations of the full matrices in the latest attempt by the automatic method's implicit scheme; otherwise 0.
+    /// Factorisations of the full matrices in the latest attempt by an implicit scheme; otherwise 0.
     pub(super) fn factorisations(&self) -> u32 {
         match self {
-            Self::Automatic { stiff, scheme: ActiveScheme::Implicit, .. } => stiff.factorisations(),
+            Self::Radau(stiff) | Self::Automatic { stiff, scheme: ActiveScheme::Implicit, .. } => {
+                stiff.factorisations()
+            }
             _ => 0,
         }
     }

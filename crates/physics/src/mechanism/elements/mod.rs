@@ -66,6 +66,8 @@ pub struct Counts {
     pub contacts: u64,
     /// Evaluations of one contact's friction; 0 in a scene without friction.
     pub friction: u64,
+    /// Approximate time of linear algebra beside the evaluations, ns, as in [`super::bounds`].
+    pub algebra: u64,
 }
 
 impl std::ops::AddAssign for Counts {
@@ -73,6 +75,7 @@ impl std::ops::AddAssign for Counts {
         self.equations += other.equations;
         self.contacts += other.contacts;
         self.friction += other.friction;
+        self.algebra += other.algebra;
     }
 }
 

@@ -26,7 +26,7 @@ const GROWING_STEPS: u32 = 4;
 /// Decay per step of the recorded progress and cost of the explicit scheme.
 const DECAY: f64 = 0.95;
 /// Cost of a step besides evaluations and algebra (events, peaks, energies), and total cost of an explicit step, in evaluations.
-const STEP_COST: f64 = 6.0;
+pub(super) const STEP_COST: f64 = 6.0;
 const EXPLICIT_COST: f64 = STEP_COST + 6.0;
 
 /// Steps of the implicit scheme on trial, and the outcome of earlier trials.

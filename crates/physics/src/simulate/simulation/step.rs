@@ -198,8 +198,10 @@ impl Run<'_> {
         let tolerance = conditions.solver.tolerance;
         let error = stepper.attempt(&mut evaluator, *t, h, y, k, &mut end.y, &mut end.k, tolerance, polynomial);
         attempt.counts += evaluator.counts;
-        attempt.factorisations += stepper.factorisations();
+        let factorisations = stepper.factorisations();
+        attempt.factorisations += factorisations;
         attempt.stiffness = stepper.stiffness(&evaluator, h, &end.y, &end.k);
+        attempt.counts.algebra += u64::from(factorisations) * mechanism.implicit_time() as u64;
         mechanism.freeze_elements(&[]);
         error
     }

@@ -1,0 +1,138 @@
+//! Which loose ball joints act on one another.
+
+use super::{Formulation, Machine};
+
+/// Largest number of products in the elimination of coupled contacts for which presets choose it; the method's own limit is twice
+/// as large (`mechanism::bounds`).
+const MAX_PRODUCTS: usize = 1 << 24;
+
+/// Ball joints with clearance that act on one another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Coupled {
+    /// Those that share with another one what an impact accelerates: a tree of bodies, or trees that ideal joints connect.
+    pub joints: usize,
+    /// Whether few enough of them are coupled at once to be solved for together.
+    pub is_narrow: bool,
+}
+
+impl Machine {
+    /// The loose ball joints that act on one another, in time linear in the size of the machine.
+    pub fn coupled_joints(&self) -> Coupled {
+        let tree_of = self.trees();
+        let mut linked: Vec<usize> = (0..self.bodies.len()).collect();
+        let ideal = self.ball_joints.iter().filter(|joint| joint.contact.clearance == 0.0);
+        let ends = ideal.map(|joint| [joint.socket, joint.ball]);
+        let mut loops = 0;
+        for [a, b] in ends.chain(self.closing_joints.iter().map(super::Joint::points)) {
+            let trees = [a, b].map(|end| end.body.and_then(|body| tree_of[body]));
+            loops += usize::from(trees != [None; 2]);
+            if let [Some(a), Some(b)] = trees {
+                let (a, b) = (root(&mut linked, a), root(&mut linked, b));
+                linked[a.max(b)] = a.min(b);
+            }
+        }
+        // Of each joint, and of each element twice, for its force and its torque: the trees it acts on.
+        let of_joints = self.ball_joints.iter().map(|joint| [joint.socket.body, joint.ball.body]);
+        let points = self.elements.iter().map(|element| element.points(self));
+        let of_elements = points.flat_map(|points| [[0, 1].map(|n| points.get(n).and_then(|point| point.body)); 2]);
+        let rows = of_joints.chain(of_elements).map(|bodies| bodies.map(|body| body.and_then(|body| tree_of[body])));
+        let rows: Vec<[Option<usize>; 2]> = rows.collect();
+        let (mut first, mut bandwidth) = (vec![None; self.bodies.len()], 0);
+        for (row, trees) in rows.iter().enumerate() {
+            for &tree in trees.iter().flatten() {
+                bandwidth = bandwidth.max(row - *first[tree].get_or_insert(row));
+            }
+        }
+        if loops > 0 || self.formulation == Formulation::Lagrange {
+            bandwidth = rows.len();
+        }
+        // Linked trees count as one; a joint within it counts once.
+        let mut on = vec![0; self.bodies.len()];
+        let mut acts_on = Vec::with_capacity(self.ball_joints.len());
+        for (_, trees) in self.ball_joints.iter().zip(&rows).filter(|(joint, _)| joint.contact.clearance > 0.0) {
+            let mut trees = trees.map(|tree| tree.map(|tree| root(&mut linked, tree)));
+            if trees[0] == trees[1] {
+                trees[1] = None;
+            }
+            trees.iter().flatten().for_each(|&tree| on[tree] += 1);
+            acts_on.push(trees);
+        }
+        let is_coupled = |trees: &&[Option<usize>; 2]| trees.iter().flatten().any(|&tree| on[tree] > 1);
+        Coupled {
+            joints: acts_on.iter().filter(is_coupled).count(),
+            is_narrow: 40 * rows.len() * (bandwidth + 1) * (bandwidth + 1) <= MAX_PRODUCTS,
+        }
+    }
+
+    /// The tree of each body, by its first body; `None` if the body moves with time alone.
+    fn trees(&self) -> Vec<Option<usize>> {
+        let mut trees: Vec<Option<usize>> = Vec::with_capacity(self.joints.len());
+        for (body, joint) in self.joints.iter().enumerate() {
+            let above = joint.parent.and_then(|parent| trees[parent]);
+            trees.push(above.or((!joint.is_prescribed()).then_some(body)));
+        }
+        trees
+    }
+}
+
+/// The first of the trees that `linked` connects with `tree`.
+fn root(linked: &mut [usize], mut tree: usize) -> usize {
+    while linked[tree] != tree {
+        linked[tree] = linked[linked[tree]];
+        tree = linked[tree];
+    }
+    tree
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    fn coupled(name: &str, changes: &[(&str, &str)]) -> Coupled {
+        let changes: Vec<_> = changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        Scene::load(name, &changes).expect("loads").machine.coupled_joints()
+    }
+
+    #[test]
+    fn joints_are_coupled_by_the_bodies_between_them() {
+        const IDEAL: (&str, &str) = ("contact.clearance", "0");
+        let one = |joint| (joint, "0.1 mm");
+        for (name, changes, joints) in [
+            ("pendulum", &[][..], 0),
+            ("four-bar", &[], 2),
+            ("spcmm", &[], 3),
+            ("suspension", &[], 4),
+            // Three legs, each of a knee and two arms, carry one platform.
+            ("delta", &[], 12),
+            ("hexapod", &[IDEAL], 0),
+            ("hexapod", &[IDEAL, one("joint.A6.clearance")], 0),
+            // Two legs that nothing but their ideal joints and the platform connects.
+            ("hexapod", &[IDEAL, one("joint.A6.clearance"), one("joint.B1.clearance")], 2),
+            ("chain", &[("chain.links", "1")], 0),
+            ("chain", &[("chain.links", "32")], 32),
+            // A loose joint at either end of an otherwise ideal chain.
+            ("chain", &[IDEAL, one("joint.J1.clearance"), one("joint.J8.clearance")], 2),
+        ] {
+            assert_eq!(coupled(name, changes), Coupled { joints, is_narrow: true }, "{name} {changes:?}");
+        }
+        let eight = coupled("../../tests/trials/slow-eight.toml", &[]);
+        assert_eq!(eight.joints, 0, "eight balls, each in a socket of its own in the world");
+    }
+
+    #[test]
+    fn presets_leave_the_discrete_gradient_to_machines_that_it_accepts() {
+        use crate::machine::Preset;
+        use crate::simulate::Simulation;
+        // Lagrange multipliers couple all joints.
+        for links in ["64", "70", "90", "110"] {
+            let changes = [("chain.links", links), ("formulation", "lagrange"), ("solver.preset", "real-time")];
+            let changes: Vec<_> = changes.map(|(key, value)| (key.to_owned(), value.to_owned())).to_vec();
+            let scene = Scene::load("chain", &changes).expect("loads");
+            assert_eq!(scene.machine.solver, Preset::RealTime.solver(&scene.machine));
+            Simulation::new(&scene.machine).unwrap_or_else(|error| panic!("{links}: {error}"));
+        }
+        assert!(coupled("chain", &[("chain.links", "4096")]).is_narrow);
+        assert!(!coupled("chain", &[("chain.links", "110"), ("formulation", "lagrange")]).is_narrow);
+    }
+}
