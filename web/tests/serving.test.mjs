@@ -272,7 +272,7 @@ test('the page works without a network, and a newer build replaces it completely
     };
     const before = `if (location.search) globalThis.planting = (${plant})().catch(() => {})`;
     const context = { serviceWorkers: 'allow' };
-    const first = await open('scene=pendulum&c=0.2mm&play=0', { at: address, backend: 'webgl', context, before: [{ content: before }] });
+    const first = await open('scene=spcmm&spcmm.frequency=50Hz&play=0', { at: address, backend: 'webgl', context, before: [{ content: before }] });
     try {
         await first.page.evaluate(() => globalThis.planting);
         await first.until(() => first.page.evaluate(() => Boolean(navigator.serviceWorker.controller)), 'nothing is stored');
@@ -294,9 +294,9 @@ test('the page works without a network, and a newer build replaces it completely
         server = await serveFolder(folder, port);
         // The open page continues with its own files; the newer worker would throw.
         await first.page.evaluate(async () => (await navigator.serviceWorker.getRegistration()).update());
-        await first.activate('button', 'Accuracy');
-        await first.activate('button', 'Measure preset');
-        await first.until(async () => (await first.widgets()).some(({ role, value }) => role === 'ProgressIndicator' && value > 0), 'no worker');
+        await first.key('b');
+        await first.activate('button', 'Start sweep');
+        await first.until(async () => (await first.widgets()).some(({ label }) => /^[1-9]\d* of \d+ values/.test(label)), 'no worker');
         assert.equal(await isSecond(first), false);
         await first.until(async () => (await storedBuilds(first)).length === 2, 'the newer build is not stored');
 

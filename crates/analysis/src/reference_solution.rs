@@ -11,8 +11,9 @@ use jointplay_physics::machine::Vec3;
 use jointplay_physics::simulate::{Frame, Impact, Peak, Simulation};
 use jointplay_scene::Scene;
 
-/// Number of impacts to compare.
+/// Number of impacts to compare, and to look for: the next one of the same joint ends the slot of each.
 const IMPACT_COUNT: usize = 6;
+const SOUGHT: usize = 2 * IMPACT_COUNT;
 /// A scene with fewer impacts to compare. Its next impact overlaps an impact of a neighbouring joint by 25 us, and the peak
 /// depends on which of the two begins first. So no method is close to that peak before it resolves the instants to a
 /// microsecond.
@@ -216,10 +217,9 @@ fn first_impacts(setting: &Setting, scene: &Scene, context: &mut RunContext) -> 
     }
     let mut simulation = setting.start(scene)?;
     let end = advance_capped(&mut simulation, IMPACT_TIME_LIMIT, SEARCH_COST, context, |simulation| {
-        let ended = simulation.impacts().len();
-        ended >= IMPACT_COUNT && simulation.impacts().all(|impact| simulation.time() > impact.end + EXTRA_TIME)
+        simulation.impacts().nth(SOUGHT - 1).is_some_and(|last| last.end + EXTRA_TIME < simulation.time())
     })?;
-    // A large scene may reach the cap before its sixth impact; then the impacts so far are compared.
+    // A large scene may reach the cap before its last impact; then the impacts so far are compared.
     if end != End::Capped {
         require_reached(end)?;
     }

@@ -179,7 +179,7 @@ fn a_missing_drive_value_is_requested_in_the_unit_of_its_joint() {
 fn the_help_of_the_presets_states_their_settings() {
     let help = table().iter().find(|p| p.key == "solver.preset").unwrap().help;
     for preset in Preset::ALL {
-        for scene in ["pendulum", "suspension"] {
+        for scene in ["pendulum", "spcmm", "suspension"] {
             let solver = preset.solver(&changed(scene, &[]).machine);
             let value = match solver.method.control() {
                 StepControl::PerImpact => format!("{}, {}", solver.method, solver.steps_per_impact),

@@ -96,32 +96,27 @@ impl Default for Solver {
 }
 
 impl Preset {
-    /// Fewest coupled ball joints for which the fast presets take steps per impact in place of error-controlled ones. With fewer, a
-    /// joint has more of a machine's first impacts, each of which errs by those before it, and the steps that keep the limits of
-    /// error cost as much.
-    const FEWEST_COUPLED: usize = 4;
-
-    /// Stepper settings of the preset for `machine`, from what is known before it runs.
+    /// Stepper settings of the preset for `machine`, from what is known before it runs (`docs/tradeoff.md`).
     ///
     /// Error-controlled steps follow the events of all joints. Where impacts in one joint set off others, n steps per impact of
-    /// the discrete gradient cost about 0.3 + 0.02 n times as much, and less in larger machines (`docs/tradeoff.md`).
+    /// the discrete gradient cost about 0.3 + 0.02 n times as much, and less in larger machines. But an impact errs the more the
+    /// more impacts its joint had before. The fewer joints share the first impacts of a machine, the more steps keep the limit of
+    /// error, until they cost as much.
     pub fn solver(self, machine: &Machine) -> Solver {
-        let steps_per_impact = match self {
-            Self::Preview => Some(12),
-            Self::RealTime => Some(24),
-            Self::Accurate | Self::Reference => None,
-        };
         let coupled = machine.coupled_joints();
+        let steps_per_impact = match (self, coupled.joints) {
+            (Self::Preview, 3..) => Some(16),
+            (Self::RealTime, 4..) => Some(24),
+            _ => None,
+        };
         let own = Solver { preset: Some(self), ..Solver::default() };
-        if let Some(steps_per_impact) = steps_per_impact
-            && coupled.joints >= Self::FEWEST_COUPLED
-            && coupled.is_narrow
-        {
+        if let Some(steps_per_impact) = steps_per_impact.filter(|_| coupled.is_narrow) {
             return Solver { method: Method::DiscreteGradient, steps_per_impact, ..own };
         }
         let (method, tolerance) = match self {
-            Self::Preview => (Method::Automatic, 1e-2),
-            Self::RealTime => (Method::Automatic, 1e-3),
+            // Coarser tolerances are no cheaper: errors in lasting contact then cause further steps.
+            Self::Preview => (Method::Automatic, 3e-3),
+            Self::RealTime => (Method::Automatic, 2e-3),
             Self::Accurate => (Method::Automatic, 1e-7),
             Self::Reference => (Method::DormandPrince5, 1e-11),
         };

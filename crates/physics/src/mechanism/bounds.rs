@@ -241,12 +241,12 @@ pub fn implicit_time(coordinates: usize, products: usize) -> f64 {
 
 /// Approximate time to set up the system of coupled contacts with this number of rows, and of blocks within the band, ns.
 pub fn coupling_time(rows: usize, blocks: usize) -> f64 {
-    1800.0 * rows as f64 + 40.0 * blocks as f64
+    1200.0 * rows as f64 + 25.0 * blocks as f64
 }
 
 /// Approximate time of one iteration for the forces of these rows, ns; `products` of blocks in the elimination.
 pub fn contact_time(rows: usize, products: usize) -> f64 {
-    500.0 * rows as f64 + 10.0 * products as f64
+    350.0 * rows as f64 + 7.0 * products as f64
 }
 
 /// Maximum number of velocity coordinates of the implicit methods, which hold dense matrices.
