@@ -49,7 +49,7 @@ fn the_command_writes_all_files_or_none() {
         assert!(value("span_s") == 0.1 && value("steps") > 0.0, "{row:?}");
         assert!(row[column("end")] != "reached" || value("cost") >= value("evaluations"), "{row:?}");
     }
-    let baseline = rows.iter().find(|row| row[column("method")] == "rk4" && row[column("step_s")] == "1e-5");
+    let baseline = rows.iter().find(|row| row[column("method")] == "rk4" && row[column("step_s")].parse() == Ok(1e-5));
     assert_eq!(baseline.unwrap()[column("ratio")], "1");
 
     let manifest: Json = serde_json::from_str(&fs::read_to_string(out.join("manifest.json")).unwrap()).unwrap();

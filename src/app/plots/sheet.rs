@@ -80,14 +80,7 @@ impl Plots {
         let columns = COLUMNS.min(charts.len());
         let rows = charts.len().div_ceil(columns.max(1)) as u32;
         let size = (CHART_SIZE.0 * columns as u32, CHART_SIZE.1 * rows + FOOTER_HEIGHT);
-        (!charts.is_empty()).then_some(Sheet {
-            title: String::new(),
-            charts,
-            columns,
-            size,
-            note,
-            separate_legends: true,
-        })
+        (!charts.is_empty()).then_some(Sheet { charts, columns, size, note })
     }
 
     fn chart(&self, player: &Player, panel: &Panel<'_>) -> Chart {
