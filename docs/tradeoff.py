@@ -43,7 +43,7 @@ def plain(limit: float) -> str:
 def choices(scene: str, rows: pd.DataFrame) -> list[str]:
     """Setting, cost and peak error of the fast presets, and the cost of the method not chosen."""
     cells = [f"`{scene}`"]
-    for preset, tolerance, steps in (("preview", 3e-3, 16), ("real-time", 2e-3, 24)):
+    for preset, tolerance, steps in (("preview", 1e-3, 16), ("real-time", 5e-4, 24)):
         own = rows[rows.preset == preset].iloc[0]
         discrete = (rows.method == "discrete-gradient") & (rows.steps_per_impact == steps)
         others = rows[(rows.method == "automatic") & (rows.tolerance == tolerance) if own.method == "discrete-gradient" else discrete]

@@ -42,7 +42,7 @@ impl Grid {
         span_s: 0.5,
         max_cost: 1.5e6,
         steps: &[50e-6, 20e-6, 10e-6, 5e-6],
-        tolerances: &[1e-2, 3e-3, 2e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10],
+        tolerances: &[1e-2, 1e-3, 5e-4, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10],
         steps_per_impact: &[4.0, 8.0, 12.0, 16.0, 24.0, 32.0],
     };
 

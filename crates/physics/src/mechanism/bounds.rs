@@ -239,12 +239,12 @@ pub fn implicit_time(coordinates: usize, products: usize) -> f64 {
     800.0 * coordinates as f64 + 6.0 * products as f64
 }
 
-/// Approximate time to set up the system of coupled contacts with this number of rows, and of blocks within the band, ns.
+/// Approximate time to set up the system of this number of coupled contacts, with `blocks` within its band, ns.
 pub fn coupling_time(rows: usize, blocks: usize) -> f64 {
     1200.0 * rows as f64 + 25.0 * blocks as f64
 }
 
-/// Approximate time of one iteration for the forces of these rows, ns; `products` of blocks in the elimination.
+/// Approximate time of one iteration for their forces, ns; `products` of blocks in the elimination.
 pub fn contact_time(rows: usize, products: usize) -> f64 {
     350.0 * rows as f64 + 7.0 * products as f64
 }

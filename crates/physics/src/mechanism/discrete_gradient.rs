@@ -378,7 +378,9 @@ impl DiscreteGradient {
         let tolerance = laws.map(|(_, law)| law.slip_high).fold(VELOCITY_TOLERANCE, f64::min);
         let (mut merit, mut cuts, mut part) = (f64::INFINITY, 0, 1.0);
         let mut has_moved_normal_forces = false;
-        let (rows, blocks) = (self.rows.len(), self.band.columns().len());
+        // An element's row has no law of friction.
+        let rows = self.rows.iter().filter_map(SolvedRow::contact).count();
+        let blocks = self.band.columns().len();
         counts.algebra += bounds::coupling_time(rows, blocks) as u64;
         for iteration in 0..ITERATIONS {
             counts.contacts += 1;
