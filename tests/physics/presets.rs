@@ -152,7 +152,7 @@ fn peaks_of_the_built_in_scenes_are_within_the_stated_error_of_each_preset() {
 
 /// Allowed cost of the setting of a fast preset, over that of the other method where it keeps the limit, too. What a machine will do
 /// is not known when the method is chosen: five rods that rattle each in its own socket cost 1.65 times as much, eight balls that
-/// bounce a fifth. The wrong choice between methods costs up to 14 times as much.
+/// bounce a fifth. The wrong choice between methods costs up to 8 times as much.
 const DEARER: f64 = 1.7;
 
 /// Settings of the fast presets with either method.

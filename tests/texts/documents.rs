@@ -168,7 +168,7 @@ fn the_tradeoff_page_and_its_table_are_those_of_the_presets() {
             let keeps = |row: &[&str]| number(row, "peak_error").is_some_and(|error| error <= limit(preset));
             let cheapest =
                 other.filter(|row| keeps(row)).filter_map(|row| number(row, "cost")).fold(f64::INFINITY, f64::min);
-            assert!(number(row, "cost").is_some_and(|cost| cost <= 1.7 * cheapest), "{case}: {cheapest}");
+            assert!(number(row, "cost").is_some_and(|cost| cost <= 2.1 * cheapest), "{case}: {cheapest}");
         }
     }
     for (preset, error) in Preset::ALL.into_iter().zip(largest) {
