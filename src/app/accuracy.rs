@@ -7,7 +7,7 @@ use super::player::Player;
 use super::{theme, value};
 use crate::analysis::presets;
 use crate::integrate::StepControl;
-use crate::machine::Preset;
+use crate::machine::{Preset, Solver};
 use crate::simulate::Impact;
 
 /// Width of the labels, points.
@@ -83,23 +83,26 @@ fn doubts_ui(ui: &mut Ui, player: &Player) {
     });
 }
 
-/// Measured accuracy of `preset` on the present scene: on a built-in one with its default values.
+/// Measured accuracy of `preset`, or of the default method, on the present scene: on a built-in one with its default values.
 fn measured(player: &Player, preset: Option<Preset>) -> [AccuracyLine; 2] {
     let scene = player.pending();
     let affects_model = |key: &str| !key.starts_with("solver.") && !key.starts_with("view.");
     let is_built_in = scene.source.file.is_none() && !scene.changes.iter().any(|(key, _)| affects_model(key));
-    let measured = preset.filter(|_| is_built_in).and_then(|preset| presets::measured(&scene.name, preset));
+    let (solver, default) = (&scene.machine.solver, Solver::default());
+    let is_default = (solver.method, solver.tolerance) == (default.method, default.tolerance);
+    let word = preset.map(Preset::word).or_else(|| is_default.then_some(presets::DEFAULT));
+    let measured = word.filter(|_| is_built_in).and_then(|word| presets::measured(&scene.name, word));
     let row = |label, error: Option<f64>, what: &str| AccuracyLine {
         label,
         value: match (&measured, error) {
-            (None, _) if preset.is_none() => "no preset".to_owned(),
+            (None, _) if word.is_none() => "no preset".to_owned(),
             (None, _) => "not measured".to_owned(),
             (Some(_), None) => "does not apply".to_owned(),
             (Some(_), Some(error)) => value::percent(error),
         },
         doubtful: error.is_some_and(|error| error > DOUBTFUL_ERROR),
         help: match measured {
-            None if preset.is_none() => what.to_owned(),
+            None if word.is_none() => what.to_owned(),
             None => {
                 format!("{what} It was not measured for these values: `jointplay tradeoff` does it for any scene file.")
             }
@@ -112,13 +115,13 @@ fn measured(player: &Player, preset: Option<Preset>) -> [AccuracyLine; 2] {
         row(
             "Peak force error",
             measured.and_then(|m| m.peak_error),
-            "Largest relative error of the peak forces of the first six impacts under this preset.",
+            "Largest relative error of the peak forces of the first six impacts with these settings of the solver.",
         ),
         row(
             "Settled force error",
             measured.and_then(|m| m.settled_error),
-            "Largest relative error of the mean contact forces in settled motion under this preset; does not apply where \
-             the motion does not settle soon.",
+            "Largest relative error of the mean contact forces in settled motion with these settings of the solver; does not \
+             apply where the motion does not settle soon.",
         ),
     ]
 }

@@ -821,7 +821,14 @@ fn the_accuracy_of_the_running_scene_is_shown_beside_the_controls() {
         let choice = harness.get_by_role_and_label(Role::ComboBox, "Preset");
         choice.value().map(|name| name.to_string())
     };
-    assert_eq!(preset(&harness).as_deref(), Some("real-time"));
+    assert_eq!(preset(&harness).as_deref(), Some("custom"));
+    harness.state_mut().player_mut().set("solver.tolerance", "1e-7").expect("in range");
+    harness.run_steps(2);
+    assert_eq!(preset(&harness).as_deref(), Some("accurate"));
+    harness.state_mut().player_mut().set_original("solver.tolerance").expect("its own value");
+    harness.run_steps(2);
+    // The default has measured errors, too.
+    assert!(harness.query_by_label("no preset").is_none());
     // Nothing has been hit yet, and the rows about impacts say so.
     harness.get_by_label("none yet");
     harness.get_by_label("No warnings so far");
@@ -886,7 +893,7 @@ fn the_accuracy_of_a_preset_is_stated_for_the_values_with_which_it_was_measured(
     harness.get_by_label("Peak force error");
     // Solver and view do not change the model.
     let player = harness.state_mut().player_mut();
-    player.undo_change("contact.clearance").expect("changed");
+    player.set_original("contact.clearance").expect("its own value");
     harness.run_steps(2);
     assert_eq!(unmeasured(&harness), 0);
 }

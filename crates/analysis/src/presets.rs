@@ -1,4 +1,4 @@
-//! Measured speed and error of the presets on the built-in scenes, as stored in the program.
+//! Measured error of the presets and of the default method on the built-in scenes, as stored in the program.
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -6,14 +6,17 @@ use std::sync::OnceLock;
 use serde::{Deserialize, Serialize};
 
 use super::timing::{End, advance_capped};
-use super::{AnalysisError, RunContext, Setting, Tradeoff};
-use jointplay_physics::machine::Preset;
+use super::{AnalysisError, Row, RunContext, Setting, Tradeoff};
+use jointplay_physics::machine::{Preset, Solver};
 use jointplay_scene::Scene;
 
 /// Results of `jointplay tradeoff SCENE… --presets assets/presets.json`.
 const RECORD: &str = include_str!("../../../assets/presets.json");
 
-/// A preset measured on one scene.
+/// Word of the settings of a solver about which nothing is given, beside those of the presets.
+pub const DEFAULT: &str = "default";
+
+/// A setting measured on one scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
     /// Its method and the value that controls its steps, at the time of measurement.
@@ -29,7 +32,7 @@ pub struct Measured {
 pub struct Record {
     /// Computer on which the presets were measured.
     pub machine: String,
-    /// By scene, then by preset.
+    /// By scene, then by preset or [`DEFAULT`].
     pub scenes: BTreeMap<String, BTreeMap<String, Measured>>,
     /// By scene: simulated seconds per clock second of the preset `real-time`, as measured by [`pace`].
     pub pace: BTreeMap<String, f64>,
@@ -38,11 +41,12 @@ pub struct Record {
 impl Record {
     /// Adds what `results` has about the presets on the scene `name`, with its [`pace`].
     pub fn add(&mut self, name: &str, results: &Tradeoff, pace: f64) {
-        let rows = results.rows.iter().filter_map(|row| Some((row.preset?, row)));
-        let measured = rows.map(|(preset, row)| {
+        let default = Setting::automatic(Solver::default().tolerance);
+        let word = |row: &Row| row.preset.map(Preset::word).or_else(|| (row.setting == default).then_some(DEFAULT));
+        let measured = results.rows.iter().filter_map(|row| {
             let setting = (row.setting.method.word().to_owned(), row.setting.value());
             let (peak_error, settled_error) = (row.errors.peak, row.errors.force);
-            (preset.word().to_owned(), Measured { setting, peak_error, settled_error })
+            Some((word(row)?.to_owned(), Measured { setting, peak_error, settled_error }))
         });
         self.scenes.insert(name.to_owned(), measured.collect());
         self.pace.insert(name.to_owned(), pace);
@@ -100,9 +104,9 @@ pub fn record() -> &'static Record {
     PARSED.get_or_init(|| serde_json::from_str(RECORD).expect("a test reads the same file"))
 }
 
-/// Measured performance of `preset` on the built-in scene `scene` with its default parameters.
-pub fn measured(scene: &str, preset: Preset) -> Option<&'static Measured> {
-    record().scenes.get(scene)?.get(preset.word())
+/// Measured errors of a preset or of [`DEFAULT`], by its word, on the built-in scene `scene` with its default parameters.
+pub fn measured(scene: &str, word: &str) -> Option<&'static Measured> {
+    record().scenes.get(scene)?.get(word)
 }
 
 /// Error of the peak forces of the first impacts that a preset must not exceed.
