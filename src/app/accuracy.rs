@@ -157,7 +157,7 @@ fn solver(player: &Player, preset: Option<Preset>) -> AccuracyLine {
         doubtful: false,
         help: format!(
             "Method with its tolerance, or its fixed step: {name}. They are set under Solver; a measured error is given for presets \
-             only."
+             and the default only."
         ),
     }
 }
