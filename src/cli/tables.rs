@@ -1,5 +1,4 @@
-//! Tables as data, written as Markdown for pages, CSV for programs, or aligned columns for terminals. Pages are
-//! templates with gaps for them.
+//! Tables of words, written as Markdown for pages, CSV for programs, or aligned columns for terminals.
 
 use std::fmt::Write as _;
 
@@ -8,8 +7,6 @@ use super::output::significant;
 /// Rows of plain text under headings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Caption in a page; empty if the surrounding text describes the rows.
-    title: String,
     heads: Vec<String>,
     rows: Vec<Vec<String>>,
 }
@@ -18,12 +15,7 @@ impl Table {
     /// Heads are separated by bars: `Run | Largest force (N)`.
     pub fn new(heads: &str, rows: impl IntoIterator<Item = Vec<String>>) -> Self {
         let heads = heads.split(" | ").map(str::to_owned).collect();
-        Self { title: String::new(), heads, rows: rows.into_iter().collect() }
-    }
-
-    /// The same table with a title.
-    pub fn with_title(self, title: &str) -> Self {
-        Self { title: title.to_owned(), ..self }
+        Self { heads, rows: rows.into_iter().collect() }
     }
 
     /// As Markdown.
@@ -60,8 +52,7 @@ impl Table {
             });
             cells.collect::<String>().trim_end().to_owned() + "\n"
         };
-        let title = if self.title.is_empty() { String::new() } else { format!("{}\n", self.title) };
-        std::iter::once(&self.heads).chain(&self.rows).map(line).fold(title, |all, line| all + &line)
+        std::iter::once(&self.heads).chain(&self.rows).map(line).collect()
     }
 }
 
@@ -71,32 +62,10 @@ pub fn quoted(text: &str) -> String {
     if plain { text.to_owned() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
-/// Fills every gap `{name}` of `page`.
-///
-/// # Panics
-/// If there is no text for a gap.
-pub fn fill(page: &str, gaps: &[(&str, String)]) -> String {
-    let mut parts = page.split('{');
-    let mut out = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        let (name, rest) = part.split_once('}').expect("every gap ends");
-        let gap = gaps.iter().find(|(of, _)| *of == name);
-        let (_, text) = gap.unwrap_or_else(|| panic!("no text for the gap {name}"));
-        out.push_str(text);
-        out.push_str(rest);
-    }
-    out
-}
-
 /// A number in CSV; empty if there is none.
 pub fn number(value: impl Into<Option<f64>>) -> String {
     let value = value.into().filter(|v| !v.is_nan());
     value.map_or_else(String::new, |v| significant(v, 12))
-}
-
-/// A yes/no cell.
-pub fn yes_or_no(holds: bool) -> String {
-    if holds { "yes" } else { "no" }.to_owned()
 }
 
 /// Labelled values for a terminal, one per line.
@@ -110,12 +79,6 @@ mod tests {
 
     fn table<const N: usize>(heads: &str, rows: &[[&str; N]]) -> Table {
         Table::new(heads, rows.iter().map(|row| row.map(str::to_owned).to_vec()))
-    }
-
-    #[test]
-    fn gaps_are_filled_once() {
-        let gaps = [("one", "{two}".to_owned()), ("two", String::new())];
-        assert_eq!(fill("a {one} b{two}{one}.", &gaps), "a {two} b{two}.");
     }
 
     #[test]

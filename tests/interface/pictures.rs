@@ -162,12 +162,10 @@ fn the_laws_of_drives_are_drawn_as_curves() {
         ..Chart::default()
     };
     let sheet = Sheet {
-        title: String::new(),
         charts: DRIVES.iter().enumerate().map(chart).collect(),
         columns: 3,
         size: (720, 480),
         note: String::new(),
-        separate_legends: false,
     };
     let folder = tempfile::tempdir().expect("a scratch folder");
     let file = folder.path().join("drives.png");
