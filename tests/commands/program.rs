@@ -59,7 +59,9 @@ pub fn folder() -> TempDir {
 #[cfg(target_os = "linux")]
 /// Polls until `condition` holds, without a time limit.
 pub fn poll_until(condition: impl Fn() -> bool) {
+    let start = std::time::Instant::now();
     while !condition() {
+        assert!(start.elapsed().as_secs() < 120, "the condition does not come");
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
 }
