@@ -3,6 +3,7 @@
 //! Physics, scene files and analysis are separate crates, re-exported here. Above them are the following modules, each using
 //! only those before it (`ARCHITECTURE.md`): [`files`], [`chart`], [`film`] and [`view`], [`render`] and [`session`], [`app`],
 //! and the entries [`cli`], `main.rs` and [`web`].
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_types))]
 
 /// The version that every output file names.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -22,6 +23,7 @@ pub mod chart;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod cli;
 #[cfg(not(target_arch = "wasm32"))]
+#[expect(clippy::disallowed_methods, reason = "the module through which files are written")]
 pub mod files;
 #[cfg(feature = "gui")]
 pub mod film;

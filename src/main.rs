@@ -1,4 +1,5 @@
 //! Desktop entry.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_types))]
 
 #[cfg(not(target_arch = "wasm32"))]
 use jointplay::scene::{visible, visible_line};

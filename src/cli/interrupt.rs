@@ -96,6 +96,7 @@ fn signals() -> Vec<i32> {
 
 /// Whether `nohup` started the program, which then continues when its terminal is closed.
 #[cfg(unix)]
+#[expect(clippy::disallowed_methods, reason = "reads a file of the system")]
 fn outlives_its_terminal() -> bool {
     use std::io::IsTerminal;
     match std::fs::read_to_string("/proc/self/status") {

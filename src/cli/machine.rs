@@ -1,6 +1,7 @@
 //! Name of the machine, which belongs to every timing.
 
 /// Model of the processor, as far as the system reports it.
+#[expect(clippy::disallowed_methods, reason = "reads a file of the system")]
 pub fn name() -> String {
     let model = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
         let line = text.lines().find(|line| line.starts_with("model name"))?;

@@ -12,8 +12,6 @@ mod tests;
 pub use folder::{Folder, MANIFEST};
 pub use output::{Content, OutputFile, PendingFile, publish, spare_older};
 pub use same::same_file;
-// The rest of the program changes nothing on the disk except through this module.
-pub use std::fs::{create_dir_all, remove_file};
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -53,4 +51,14 @@ impl FileError {
             Self::cannot(path, error)
         }
     }
+}
+
+/// Removes a file that is no longer needed.
+pub fn remove_file(path: &Path) -> io::Result<()> {
+    std::fs::remove_file(path)
+}
+
+/// Creates a folder and those above it.
+pub fn create_dir_all(path: &Path) -> io::Result<()> {
+    std::fs::create_dir_all(path)
 }

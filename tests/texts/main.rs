@@ -3,7 +3,6 @@
 mod documents;
 mod drives;
 mod format;
-mod house;
 mod icons;
 mod joints;
 mod meshes;

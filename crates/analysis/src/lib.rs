@@ -36,6 +36,7 @@
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_types))]
 
 pub mod argument;
 pub mod assembly;
@@ -70,6 +71,8 @@ pub mod statistic;
 pub mod study;
 pub mod sweep;
 #[cfg(feature = "native")]
+#[expect(clippy::disallowed_methods, reason = "the record of a sweep grows in place")]
+#[expect(clippy::disallowed_types, reason = "when the file was last brought to the disk; no result depends on it")]
 pub mod sweep_run;
 pub mod sweep_settings;
 pub mod sweep_task;

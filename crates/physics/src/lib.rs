@@ -29,6 +29,7 @@
 //!
 //! A [`Simulation`](simulate::Simulation) is a constant [`Model`](simulate::Model), a [`State`](simulate::State) with all that
 //! changes, and a [`Workspace`](simulate::Workspace); several states of one model can be stepped side by side.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_types))]
 
 pub mod contact;
 pub mod expression;

@@ -27,6 +27,7 @@
 //! The rest of this page is the manual of the file format.
 //!
 #![doc = include_str!("../../../docs/scene-format.md")]
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_types))]
 
 mod access;
 mod assets;
@@ -37,6 +38,7 @@ mod drives;
 mod elements;
 mod error;
 mod field;
+#[expect(clippy::disallowed_methods, reason = "reads within a limit")]
 mod file;
 mod file_number;
 mod format;
@@ -46,6 +48,7 @@ mod instance;
 mod key;
 mod live;
 mod load;
+#[expect(clippy::disallowed_types, reason = "mesh files hold single-precision numbers")]
 pub mod mesh;
 mod model;
 mod numbers;

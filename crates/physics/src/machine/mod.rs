@@ -9,6 +9,7 @@ mod doubts;
 mod drive;
 mod element;
 mod joint;
+#[expect(clippy::disallowed_types, reason = "mesh files hold single-precision numbers")]
 mod mesh;
 mod mesh_unit;
 mod outline;

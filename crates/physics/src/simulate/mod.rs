@@ -5,6 +5,7 @@ mod angles;
 mod channels;
 mod doubt;
 mod frame;
+#[expect(clippy::disallowed_types, reason = "the record for the plots; nothing is computed from it")]
 mod history;
 mod impacts;
 mod ledger;
