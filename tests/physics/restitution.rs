@@ -52,9 +52,7 @@ fn an_undisturbed_impact_has_the_restitution_of_its_law() {
                 ("solver.steps_per_impact", "64"),
             ];
             // First order: errors of some parts in a thousand at 2 us.
-            let bound = match method {
-                _ => 1e-3,
-            };
+            let bound = 1e-3;
             let impacts = impacts(&mut axial_impact(&changes), 0.02);
             let first = impacts.first().unwrap();
             let case = format!("{word} {restitution}, {method}: {first:?}");
