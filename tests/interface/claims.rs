@@ -7,8 +7,8 @@ use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, BUILT_IN_LESSONS};
 use jointplay::simulate::{ContactMode, Simulation};
 
-use crate::impacts::peaks_of_run;
-use crate::lessons::{PHONE, WIDE, open_lesson, play, present, press, shows_text};
+use crate::hands::lesson::{PHONE, WIDE, open_lesson, play, present, press, shows_text};
+use crate::hands::peaks_of_run;
 
 /// Display mode of a lesson.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -7,7 +7,7 @@ use egui_kittest::{
 };
 use jointplay::app::App;
 
-use crate::window::sized;
+use crate::hands::window::sized;
 
 const WIDE: [f32; 2] = [1280.0, 800.0];
 const PORTRAIT: [f32; 2] = [390.0, 844.0];

@@ -6,8 +6,8 @@ use jointplay::app::{App, Player};
 use jointplay::simulate::{Bin, Frame, Quantity, Simulation};
 
 use crate::hands::plain;
-use crate::window::click;
-use crate::window::pixels::{Area, Picture};
+use crate::hands::window::click;
+use crate::pixels::{Area, Picture};
 
 fn window() -> Harness<'static, App> {
     let mut harness = plain("slider-crank", &[], [1280.0, 800.0], Theme::Dark);

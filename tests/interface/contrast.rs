@@ -8,7 +8,7 @@ use egui_kittest::{
 use jointplay::app::App;
 use jointplay::view::{Colour, Palette, Theme};
 
-use crate::window::{click, sized};
+use crate::hands::window::{click, sized};
 
 /// Required contrast of a text.
 const MIN_CONTRAST: f64 = 4.5;

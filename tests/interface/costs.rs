@@ -11,8 +11,8 @@ use jointplay::analysis::study::{NAMED, OneAtATimePlan, RunSpan, StudyRuns, outp
 use jointplay::app::{App, Event};
 use jointplay::scene::Value;
 
-use crate::bench_window::{FAST, click, named_controls, set_number, sized, throttle, throttle_shared, wait};
 use crate::golden::PLAIN;
+use crate::hands::bench::{FAST, click, named_controls, set_number, sized, throttle, throttle_shared, wait};
 use crate::hands::compare_window;
 
 /// Colours of the bars towards the lower and upper ends in a light window.

@@ -12,7 +12,7 @@ use jointplay::app::{App, Host, OpenedFile, SaveFile, Store, StoredSettings};
 use jointplay::scene::{DEFAULT_SCENE, built_in_text};
 
 use crate::hands::type_over;
-use crate::window::{click, shown, window};
+use crate::hands::window::{click, shown, window};
 
 /// Size of the audience's screen, points at zoom 1.
 const SCREEN: egui::Vec2 = vec2(1280.0, 720.0);

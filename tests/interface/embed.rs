@@ -4,7 +4,7 @@ use eframe::egui::{OutputCommand, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, AppOptions, DesktopHost, Verdict};
 
-use crate::page::{click, label, open, verdict, window};
+use crate::hands::page::{click, label, open, verdict, window};
 
 const FRAME: [f32; 2] = [700.0, 500.0];
 const SLIDERS: [&str; 3] = ["Clearance", "Friction coefficient", "Restitution"];

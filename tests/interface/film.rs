@@ -13,7 +13,7 @@ use egui_kittest::kittest::Queryable as _;
 use jointplay::film::{Film, FilmError, Format};
 
 use crate::hands::give_graphics;
-use crate::page::{click, decoded, label, next_file, window};
+use crate::hands::page::{click, decoded, label, next_file, window};
 
 /// A disc of `colour` that moves to the right on a light slope.
 fn picture([width, height]: [u32; 2], k: u32, colour: [u8; 3]) -> Vec<u8> {

@@ -3,34 +3,11 @@
 //! `UPDATE_GOLDEN=1 cargo test --test interface frames::` redraws them; look at each before committing it.
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use serde_json::Value as Json;
 
-use crate::golden::{PLAIN, Picture, TOLERANCE, compare, picture_mismatch};
-
-fn jointplay(folder: &Path, line: &str) -> Output {
-    let output = Command::new(env!("CARGO_BIN_EXE_jointplay"))
-        .args(line.split_whitespace())
-        .current_dir(folder)
-        .env_remove("RUST_LOG")
-        .output()
-        .expect("the program starts");
-    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-    output
-}
-
-/// Options that set [`PLAIN`] steps.
-fn plain() -> String {
-    PLAIN.map(|(key, value)| format!("--set {key}={}", value.replace(' ', ""))).join(" ")
-}
-
-/// Draws one frame by [`PLAIN`] steps into `folder`/frames and returns its file.
-pub fn draw(folder: &Path, arguments: &str) -> PathBuf {
-    jointplay(folder, &format!("render {arguments} {} --out frames --quiet --force", plain()));
-    folder.join("frames/frame_00000.png")
-}
+use crate::golden::{Picture, TOLERANCE, compare, draw, jointplay, picture_mismatch, plain};
 
 #[track_caller]
 fn golden(name: &str, arguments: &str) {

@@ -5,7 +5,8 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
 
 /// Difference of a colour channel, of 255, above which a pixel counts as different, and the allowed number of such pixels.
 ///
@@ -168,4 +169,26 @@ pub fn compare(folder: &str, name: &str, actual: &Picture, source: &str) {
         }
         panic!("{folder}/{name}.png: {why}; see tests/golden/{name}.actual.png and .diff.png ({source})");
     }
+}
+
+pub fn jointplay(folder: &Path, line: &str) -> Output {
+    let output = Command::new(env!("CARGO_BIN_EXE_jointplay"))
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .env_remove("RUST_LOG")
+        .output()
+        .expect("the program starts");
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+/// Options that set [`PLAIN`] steps.
+pub fn plain() -> String {
+    PLAIN.map(|(key, value)| format!("--set {key}={}", value.replace(' ', ""))).join(" ")
+}
+
+/// Draws one frame by [`PLAIN`] steps into `folder`/frames and returns its file.
+pub fn draw(folder: &Path, arguments: &str) -> PathBuf {
+    jointplay(folder, &format!("render {arguments} {} --out frames --quiet --force", plain()));
+    folder.join("frames/frame_00000.png")
 }

@@ -4,37 +4,15 @@ use eframe::egui::{self, Key};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use jointplay::app::{App, AppOptions};
 use jointplay::scene::Scene;
-use jointplay::simulate::{Impact, Peak, Simulation};
+use jointplay::simulate::Impact;
 
-use crate::page::open;
-use crate::window::{click, shown, sized};
+use crate::hands::page::open;
+use crate::hands::peaks_of_run;
+use crate::hands::window::{click, shown, sized};
 
 /// The impacts of a separate run of the same scene until `time`, s, in the order of their starts.
 fn impacts_of_run(app: &App, time: f64) -> Vec<Impact> {
     peaks_of_run(app, time).into_iter().map(|(impact, _)| impact).collect()
-}
-
-/// The same impacts, each with the instant of its largest force, s.
-pub fn peaks_of_run(app: &App, time: f64) -> Vec<(Impact, f64)> {
-    let mut simulation = Simulation::new(&app.player().running().machine).expect("starts");
-    let (mut impacts, mut latest, mut peaks) = (Vec::new(), Vec::new(), Vec::<(usize, Peak)>::new());
-    while simulation.time() < time {
-        simulation.step().expect("runs");
-        simulation.take_impacts(&mut impacts);
-        simulation.take_peaks(&mut latest);
-        peaks.extend(latest.iter().copied().enumerate());
-    }
-    impacts.retain(|impact| impact.end <= time);
-    impacts.sort_by(|a, b| a.start.total_cmp(&b.start));
-    let instant = |impact: &Impact| {
-        let of_it = peaks
-            .iter()
-            .filter(|(joint, peak)| *joint == impact.joint && (impact.start..=impact.end).contains(&peak.time));
-        let largest = of_it.max_by(|a, b| a.1.normal.total_cmp(&b.1.normal)).expect("a force");
-        assert_eq!(largest.1.normal, impact.peak);
-        largest.1.time
-    };
-    impacts.iter().map(|impact| (*impact, instant(impact))).collect()
 }
 
 /// The numbers in a text, in order.

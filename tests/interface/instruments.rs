@@ -8,9 +8,9 @@ use egui_kittest::{
 use jointplay::app::{App, Link};
 use jointplay::simulate::Quantity;
 
+use crate::hands::page::click;
 use crate::hands::{compare_window, opened, plain};
-use crate::page::click;
-use crate::window::pixels::Picture;
+use crate::pixels::Picture;
 
 const WIDE: [f32; 2] = [1280.0, 800.0];
 const PHONE: [f32; 2] = [390.0, 844.0];

@@ -10,9 +10,9 @@ use jointplay::analysis::task::{Job, Message};
 use jointplay::app::{App, BackgroundTask, Event, Host, Link, Log, OpenedFile, Player, Replay, SceneText, Verdict};
 use jointplay::simulate::{ContactMode, Quantity};
 
+use crate::hands::page::Calls;
+use crate::hands::window::{CURVES, WHITE, click, picture, shown, sized, window};
 use crate::hands::{compare_window, fingers, fingers_down, give_graphics, lift, plain};
-use crate::page::Calls;
-use crate::window::{CURVES, WHITE, click, picture, shown, sized, window};
 
 /// Rectangle of the timeline's strip.
 fn strip(harness: &Harness<'_, App>) -> egui::Rect {
@@ -613,7 +613,7 @@ fn share_with_class(class: &mut Lecture, press: impl Fn(&mut Lecture, Role, &str
             press(class, Role::Button, confirm);
         }
         assert!(class.gestures <= 3, "{name}: {}", class.gestures);
-        let file = crate::page::next_file(&mut class.harness, &calls);
+        let file = crate::hands::page::next_file(&mut class.harness, &calls);
         assert!(file.name.ends_with(name), "{}", file.name);
     }
 }

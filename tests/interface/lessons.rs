@@ -9,30 +9,10 @@ use jointplay::integrate::Method;
 use jointplay::simulate::Simulation;
 
 use crate::golden::PLAIN;
+use crate::hands::lesson::{FRAMES, PHONE, WIDE, open_lesson, open_window, play, present, press, settle, shows_text};
+use crate::hands::page;
+use crate::hands::window::sized;
 use crate::hands::{compare_window, fingers};
-use crate::page;
-use crate::window::sized;
-
-pub const WIDE: [f32; 2] = [1280.0, 720.0];
-pub const PHONE: [f32; 2] = [390.0, 844.0];
-
-/// Time between two frames, s: the longest that playback catches up with, since lessons are long.
-const DT: f32 = 0.25;
-
-/// Largest number of frames that a step may take.
-const FRAMES: usize = 4000;
-
-/// The window in a lesson at step `step`, counted from 0.
-pub fn open_lesson(name: &str, step: usize, size: [f32; 2]) -> Harness<'static, App> {
-    let lesson = Lesson::built_in(name).unwrap_or_else(|error| panic!("{error}"));
-    open_window(lesson, step, size)
-}
-
-fn open_window(lesson: Arc<Lesson>, step: usize, size: [f32; 2]) -> Harness<'static, App> {
-    let (mut harness, _) = page::paced(AppOptions::for_lesson(lesson, step), size, DT);
-    settle(&mut harness);
-    harness
-}
 
 /// A built-in lesson whose runs take [`PLAIN`] steps. Every run begins with a state that names an instant, where the settings are added.
 fn plain(name: &str) -> Arc<Lesson> {
@@ -50,50 +30,8 @@ fn plain(name: &str) -> Arc<Lesson> {
     Arc::new(lesson)
 }
 
-/// Runs frames until the machine is set up for the step.
-fn settle(harness: &mut Harness<'_, App>) {
-    for _ in 0..FRAMES {
-        harness.step();
-        if harness.state().course().is_none_or(|course| !course.is_busy()) {
-            // Camera motion and highlights take a few more frames.
-            harness.run_steps(3);
-            return;
-        }
-    }
-    panic!("the machine is never set up");
-}
-
 fn step(harness: &Harness<'_, App>) -> usize {
     harness.state().course().expect("a lesson").step()
-}
-
-pub fn press(harness: &mut Harness<'_, App>, key: Key) {
-    harness.key_press(key);
-    settle(harness);
-}
-
-/// Plays to the end of the step; returns whether it has one.
-pub fn play(harness: &mut Harness<'_, App>) -> bool {
-    let Some(end) = harness.state().course().expect("a lesson").until() else {
-        return false;
-    };
-    press(harness, Key::Space);
-    for _ in 0..FRAMES {
-        if harness.state().course().expect("a lesson").is_reached() {
-            harness.run_steps(2);
-            let player = harness.state().player();
-            assert!(!player.is_playing());
-            assert_eq!(player.pacer.shown(), end);
-            return true;
-        }
-        harness.step();
-    }
-    panic!("{end} s is never reached");
-}
-
-/// Whether a label on show contains `words`.
-pub fn shows_text(harness: &Harness<'_, App>, words: &str) -> bool {
-    harness.query_all_by_label_contains(words).next().is_some()
 }
 
 #[test]
@@ -161,7 +99,7 @@ fn controls_may_be_changed_during_a_step_and_next_sets_the_machine() {
     let s1 = &harness.state().player().frame().joints[0];
     assert!(s1.penetration > 0.0 && s1.normal_force.norm() > 1.0);
     // A presenter remote's other keys work as usual: they seek to the peak of this impact and of the next one.
-    let peaks = crate::impacts::peaks_of_run(harness.state(), 20e-3);
+    let peaks = crate::hands::peaks_of_run(harness.state(), 20e-3);
     let of_s1: Vec<f64> = peaks.iter().filter(|(impact, _)| impact.joint == 0).map(|(_, peak)| *peak).collect();
     for peak in [of_s1[0], of_s1[1]] {
         press(&mut harness, Key::Period);
@@ -323,16 +261,6 @@ fn a_scene_opened_during_a_lesson_stays_after_the_lesson() {
     harness.run_steps(2);
     assert_eq!(harness.state().player().running().name, "delta");
     harness.get_by_label("Accuracy");
-}
-
-/// Presses F5 and resizes the window for its new zoom.
-pub fn present(harness: &mut Harness<'_, App>, screen: [f32; 2]) {
-    harness.key_press(Key::F5);
-    harness.step();
-    let zoom = harness.ctx.zoom_factor();
-    harness.set_size(vec2(screen[0], screen[1]) / zoom);
-    harness.set_pixels_per_point(zoom);
-    settle(harness);
 }
 
 #[test]

@@ -3,6 +3,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/pixels.rs"]
+mod pixels;
 
 mod bench_window;
 mod claims;

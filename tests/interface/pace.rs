@@ -7,7 +7,7 @@ use jointplay::view::Quality;
 
 use crate::common::ticking_clock;
 use crate::hands::paced;
-use crate::window::click;
+use crate::hands::window::click;
 
 const SIZE: [f32; 2] = [1000.0, 700.0];
 const LOWEST: Quality = Quality::LADDER[Quality::LADDER.len() - 1];

@@ -1,12 +1,11 @@
 //! Features that the web page needs and the desktop shares: links, files, touch, small screens, announcements for screen readers.
 
-use std::cell::RefCell;
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::hands::{builder, compare_window, give_graphics, plain, type_over};
+use crate::hands::page::{Calls, click, decoded, label, next_file, open, verdict, window};
+use crate::hands::{compare_window, give_graphics, plain, type_over};
 use eframe::egui::{
     self, Event, Key, Modifiers, PointerButton, Pos2, TouchDeviceId, TouchId, TouchPhase,
     accesskit::{Action, Live, Role},
@@ -16,70 +15,11 @@ use egui_kittest::{
     Harness,
     kittest::{NodeT as _, Queryable as _},
 };
-use jointplay::app::{App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, PlotWindow, SaveFile, Verdict};
+use jointplay::app::{App, AppOptions, CameraPose, DesktopHost, Link, OpenedFile, PlotWindow, Verdict};
 use jointplay::cli::output::Table;
 use jointplay::machine::Drive;
 use jointplay::scene::{DEFAULT_SCENE, Scene, Value};
 use jointplay::simulate::{Channels, Frame, Quantity, Simulation};
-
-/// Records the requests made to a host.
-#[derive(Default)]
-pub struct Calls {
-    pub shared: Vec<String>,
-    pub saved: Vec<SaveFile>,
-    announced: Vec<String>,
-    picked: usize,
-    to_open: VecDeque<Vec<OpenedFile>>,
-}
-
-impl Calls {
-    /// A host that records its requests.
-    pub fn host() -> (Box<dyn Host>, Rc<RefCell<Self>>) {
-        let calls = Rc::new(RefCell::new(Self::default()));
-        (Box::new(PageHost(calls.clone())), calls)
-    }
-}
-
-/// A web page's host without a browser.
-struct PageHost(Rc<RefCell<Calls>>);
-
-impl Host for PageHost {
-    fn address(&self) -> String {
-        "https://example.org/lab/".to_owned()
-    }
-
-    fn publish_link(&mut self, link: &str) -> bool {
-        self.0.borrow_mut().shared.push(link.to_owned());
-        false
-    }
-
-    fn save(&mut self, files: &[SaveFile]) -> Result<String, String> {
-        self.0.borrow_mut().saved.extend_from_slice(files);
-        Ok(format!("Saved {}", files[0].name))
-    }
-
-    fn pick_file(&mut self) -> bool {
-        self.0.borrow_mut().picked += 1;
-        true
-    }
-
-    fn read_dropped(&mut self, files: Vec<Arc<dyn egui::DroppedFile + Send + Sync>>) {
-        let read = |file: &Arc<dyn egui::DroppedFile + Send + Sync>| OpenedFile {
-            name: file.path().display().to_string(),
-            content: file.bytes(),
-        };
-        let files = files.iter().map(read).collect();
-        self.0.borrow_mut().to_open.push_back(files);
-    }
-
-    fn opened(&mut self) -> Option<Vec<OpenedFile>> {
-        self.0.borrow_mut().to_open.pop_front()
-    }
-
-    fn announce(&mut self, text: &str, _event: bool) {
-        self.0.borrow_mut().announced.push(text.to_owned());
-    }
-}
 
 /// A file dropped with the mouse.
 #[derive(Debug)]
@@ -95,62 +35,14 @@ impl egui::DroppedFile for Dropped {
     }
 }
 
-pub fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
-    paced(options, size, 1.0 / 60.0)
-}
-
-/// As [`open`], with `dt` seconds between frames.
-pub fn paced(options: AppOptions, size: [f32; 2], dt: f32) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
-    let mut options = options;
-    options.theme = egui::Theme::Light.into();
-    options.clock = crate::common::ticking_clock::<10>;
-    let (page, calls) = Calls::host();
-    let mut harness = builder(size, egui::Theme::Light).with_step_dt(dt).build_eframe(move |cc| {
-        let mut app = App::new(cc, options).expect("the scene starts");
-        app.set_host(page);
-        app
-    });
-    harness.run_steps(3);
-    (harness, calls)
-}
-
-/// `scene` at t = 0, paused.
-pub fn window(scene: &str, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
-    let mut options = AppOptions::new(Scene::load(scene, &[]).expect("a built-in scene"));
-    options.playing = false;
-    open(options, size)
-}
-
-/// Whether exactly one visible label contains `words`; the announcement for screen readers is not counted.
-pub fn label(harness: &Harness<'_, App>, words: &str) -> bool {
-    let labels = harness.query_all_by_label_contains(words).filter(|node| node.accesskit_node().role() == Role::Label);
-    labels.count() == 1
-}
-
 const LARGE: [f32; 2] = [1280.0, 800.0];
 const PORTRAIT: [f32; 2] = [390.0, 844.0];
 const LANDSCAPE: [f32; 2] = [844.0, 390.0];
 /// A small, ten-year-old phone, or a laptop zoomed to 400 %.
 const TINY: [f32; 2] = [320.0, 480.0];
 
-pub fn click(harness: &mut Harness<'_, App>, label: &str) {
-    harness.get_by_label(label).click();
-    harness.run_steps(3);
-}
-
 fn hash(harness: &Harness<'_, App>) -> u64 {
     harness.state().player().simulation().state_hash()
-}
-
-/// Runs until the link's state has been reproduced or has failed to.
-pub fn verdict(harness: &mut Harness<'_, App>) -> Verdict {
-    for _ in 0..600 {
-        if let Some(verdict) = harness.state().verdict() {
-            return verdict.clone();
-        }
-        harness.step();
-    }
-    panic!("no verdict after ten seconds");
 }
 
 #[test]
@@ -632,25 +524,6 @@ fn scene_record_and_picture_are_saved() {
     let (under, beside) = (pixel(at.x, at.y), pixel(at.x - 16.0, at.y));
     let difference = (0..3).map(|c| (under[c] - beside[c]).abs()).max();
     assert!(difference < Some(6), "{under:?} {beside:?}");
-}
-
-/// The next file that is saved.
-pub fn next_file(harness: &mut Harness<'_, App>, calls: &Rc<RefCell<Calls>>) -> SaveFile {
-    let start = std::time::Instant::now();
-    while calls.borrow().saved.is_empty() {
-        assert!(start.elapsed().as_secs() < 30, "no file was saved");
-        std::thread::sleep(std::time::Duration::from_millis(5));
-        harness.step();
-    }
-    calls.borrow_mut().saved.remove(0)
-}
-
-/// A picture's header and its pixels.
-pub fn decoded(file: &SaveFile) -> (png::Info<'static>, Vec<u8>) {
-    let mut reader = png::Decoder::new(std::io::Cursor::new(file.bytes.as_slice())).read_info().expect("a PNG file");
-    let mut rgba = vec![0; reader.output_buffer_size().expect("fits in memory")];
-    reader.next_frame(&mut rgba).expect("a complete picture");
-    (reader.info().clone(), rgba)
 }
 
 /// Mean colour difference, 0 to 255, between a picture and one of the same view at `times` the size, averaged down.

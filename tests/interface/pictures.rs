@@ -9,8 +9,7 @@ use jointplay::chart::{Axis, Chart, PALETTE, Series, Sheet};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
-use crate::frames::draw;
-use crate::golden::{Picture, compare};
+use crate::golden::{Picture, compare, draw};
 
 const FOLDER: &str = "docs/pictures";
 const SIZE: (u32, u32) = (512, 320);

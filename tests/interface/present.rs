@@ -5,8 +5,8 @@ use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::App;
 use jointplay::simulate::Simulation;
 
+use crate::hands::window::{click, shown, sized};
 use crate::hands::{compare_window, plain};
-use crate::window::{click, shown, sized};
 
 const SCREEN: egui::Vec2 = vec2(1280.0, 720.0);
 

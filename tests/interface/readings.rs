@@ -13,7 +13,7 @@ use jointplay::scene::LiveScene;
 use jointplay::simulate::{Frame, Quantity};
 
 use crate::hands::add_texts;
-use crate::window::sized;
+use crate::hands::window::sized;
 
 /// Collects all texts of several lines on the screen.
 fn collect_tooltips(shape: &Shape, out: &mut Vec<String>) {

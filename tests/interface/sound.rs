@@ -11,7 +11,7 @@ use egui_kittest::{
 use jointplay::app::{App, Click, DroppedFile, Host, MAX_CLICKS, OpenedFile, PITCHES};
 use jointplay::simulate::{Impact, Simulation};
 
-use crate::window::{click, shown, sized, window};
+use crate::hands::window::{click, shown, sized, window};
 
 /// Records of a host that receives sound.
 #[derive(Default)]

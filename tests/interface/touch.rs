@@ -5,7 +5,7 @@ use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, AppOptions};
 
 use crate::hands::fingers;
-use crate::page::{click, label, open, window};
+use crate::hands::page::{click, label, open, window};
 
 const PORTRAIT: [f32; 2] = [390.0, 844.0];
 const LANDSCAPE: [f32; 2] = [844.0, 390.0];

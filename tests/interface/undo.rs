@@ -6,7 +6,7 @@ use jointplay::app::App;
 use jointplay::scene::Value;
 use jointplay::simulate::Quantity;
 
-use crate::window::{click, sized};
+use crate::hands::window::{click, sized};
 
 fn window() -> Harness<'static, App> {
     sized("spcmm", [1280.0, 800.0], egui::Theme::Light)

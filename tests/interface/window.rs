@@ -1,7 +1,7 @@
 //! The window, operated by role and label as by a user with a screen reader.
 
 use crate::golden;
-use crate::hands::{compare_window, opened, plain, type_over};
+use crate::hands::{compare_window, plain, type_over};
 use eframe::egui::{self, Key, accesskit::Role};
 use egui_kittest::{
     Harness,
@@ -11,25 +11,11 @@ use jointplay::app::{App, AppOptions};
 use jointplay::scene::{BUILT_IN, Scene};
 use jointplay::simulate::Quantity;
 
-#[path = "../common/pixels.rs"]
-pub(crate) mod pixels;
-use pixels::{Picture, top};
-
-/// The wide window on `scene` at t = 0, paused.
-pub(crate) fn window(scene: &str) -> Harness<'static, App> {
-    sized(scene, [1280.0, 800.0], egui::Theme::Light)
-}
-
-pub(crate) fn sized(scene: &str, size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
-    opened(scene, &[], size, theme, crate::common::ticking_clock::<10>)
-}
+use crate::hands::window::{CURVES, WHITE, click, picture, shown, sized, window};
+use crate::pixels::top;
 
 fn time(harness: &Harness<'_, App>) -> f64 {
     harness.state().player().simulation().time()
-}
-
-pub(crate) fn shown(harness: &Harness<'_, App>) -> f64 {
-    harness.state().player().pacer.shown()
 }
 
 fn clearance(harness: &Harness<'_, App>) -> f64 {
@@ -40,12 +26,6 @@ fn clearance(harness: &Harness<'_, App>) -> f64 {
 fn peak_force(harness: &Harness<'_, App>) -> f64 {
     let statistics = harness.state().player().simulation().statistics();
     statistics.peak_normal.iter().copied().fold(0.0, f64::max)
-}
-
-pub(crate) fn click(harness: &mut Harness<'_, App>, label: &str) {
-    harness.get_by_role_and_label(Role::Button, label).click();
-    harness.step();
-    harness.step();
 }
 
 /// Replaces the content of a text field and presses Enter.
@@ -897,16 +877,6 @@ fn the_accuracy_of_a_preset_is_stated_for_the_values_with_which_it_was_measured(
     harness.run_steps(2);
     assert_eq!(unmeasured(&harness), 0);
 }
-
-/// Colours of the first three curves in the light theme.
-pub(crate) const CURVES: [[u8; 3]; 3] = [[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00], [0x00, 0x8F, 0x68]];
-
-pub(crate) fn picture(harness: &mut Harness<'_, App>) -> Picture {
-    let image = harness.render().expect("drawn");
-    Picture::new(image.width(), image.into_raw())
-}
-
-pub(crate) const WHITE: [u8; 3] = [255; 3];
 
 /// The pixel area around a value in the plot of the normal force, from `top` N down to just above zero, and the value's row.
 fn spike(harness: &mut Harness<'_, App>, time: f64, force: f64, top: f64) -> ([usize; 4], usize) {

@@ -1,5 +1,10 @@
 //! Opens windows for tests and performs gestures.
 
+pub mod bench;
+pub mod lesson;
+pub mod page;
+pub mod window;
+
 use std::collections::BTreeSet;
 
 use eframe::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, Shape, TouchPhase, accesskit::Role};
@@ -9,6 +14,7 @@ use egui_kittest::{Harness, HarnessBuilder, LazyRenderer, kittest::Queryable as 
 use jointplay::app::{App, AppOptions};
 use jointplay::integrate::Method;
 use jointplay::scene::Scene;
+use jointplay::simulate::{Impact, Peak, Simulation};
 
 use crate::golden::{self, PLAIN, Picture, compare};
 
@@ -203,4 +209,27 @@ fn touch(harness: &mut Harness<'_, App>, finger: usize, phase: TouchPhase, pos: 
     if phase == TouchPhase::End {
         harness.event(Event::PointerGone);
     }
+}
+
+/// The impacts of a separate run of the same scene until `time`, s, in the order of their starts, each with the instant of its largest force, s.
+pub fn peaks_of_run(app: &App, time: f64) -> Vec<(Impact, f64)> {
+    let mut simulation = Simulation::new(&app.player().running().machine).expect("starts");
+    let (mut impacts, mut latest, mut peaks) = (Vec::new(), Vec::new(), Vec::<(usize, Peak)>::new());
+    while simulation.time() < time {
+        simulation.step().expect("runs");
+        simulation.take_impacts(&mut impacts);
+        simulation.take_peaks(&mut latest);
+        peaks.extend(latest.iter().copied().enumerate());
+    }
+    impacts.retain(|impact| impact.end <= time);
+    impacts.sort_by(|a, b| a.start.total_cmp(&b.start));
+    let instant = |impact: &Impact| {
+        let of_it = peaks
+            .iter()
+            .filter(|(joint, peak)| *joint == impact.joint && (impact.start..=impact.end).contains(&peak.time));
+        let largest = of_it.max_by(|a, b| a.1.normal.total_cmp(&b.1.normal)).expect("a force");
+        assert_eq!(largest.1.normal, impact.peak);
+        largest.1.time
+    };
+    impacts.iter().map(|impact| (*impact, instant(impact))).collect()
 }
