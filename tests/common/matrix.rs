@@ -47,6 +47,11 @@ impl Variant {
     }
 }
 
+/// Every method in the formulation `tree`. That `lagrange` moves alike is tested once for all, in `tests/physics/formulations.rs`.
+pub fn in_tree() -> impl Iterator<Item = Variant> {
+    METHODS.into_iter().map(|method| Variant { method, formulation: "tree" })
+}
+
 /// Every method in both formulations.
 pub fn every_variant() -> impl Iterator<Item = Variant> {
     METHODS.into_iter().flat_map(|method| FORMULATIONS.map(|formulation| Variant { method, formulation }))

@@ -17,6 +17,7 @@ mod energy;
 mod equilibrium;
 mod extremes;
 mod flights;
+mod formulations;
 mod guard;
 mod impact;
 mod includes;

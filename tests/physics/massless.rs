@@ -1,7 +1,7 @@
 //! Massless bodies between joints: joints in series, against equivalent single joints and closed-form solutions.
 
 use crate::common::frame_now;
-use crate::common::matrix::every_variant;
+use crate::common::matrix::in_tree;
 use crate::elements::frame_at;
 use crate::joint_elements::start_simulation;
 use crate::two_degrees::{G, train};
@@ -61,7 +61,7 @@ fn joints_in_series_move_as_a_cylindrical_and_a_universal_joint() {
     let scene = Scene::parse(&text, None, &[]).unwrap();
     let index = |name: &str| scene.machine.bodies.iter().position(|body| body.name == name).unwrap();
     let pairs = [(0, index("base")), (1, index("ring")), (2, index("rod"))];
-    for variant in every_variant().filter(|variant| variant.formulation == "tree") {
+    for variant in in_tree() {
         let mut single = start_simulation(&train(-G), &variant.close());
         let mut series = start_simulation(&text, &variant.close());
         let (summary, other) = (single.mechanism().summary(), series.mechanism().summary());

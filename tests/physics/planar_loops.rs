@@ -3,7 +3,7 @@
 //! A planar four-bar of hinges closed by a ball joint is compared with an independent model of its geometry and one-coordinate
 //! dynamics.
 
-use crate::common::matrix::every_variant;
+use crate::common::matrix::in_tree;
 use crate::common::{frame_now, parse, run_until};
 use jointplay::machine::{Quat, Vec3};
 use jointplay::scene::Scene;
@@ -275,7 +275,7 @@ fn every_method_steps_a_planar_loop_ideal_driven_and_with_play() {
             run_until(&mut simulation, 0.02);
             frame_now(&mut simulation)
         };
-        for variant in every_variant() {
+        for variant in in_tree() {
             let mut simulation =
                 Simulation::new(&GRASHOF.scene(Quat::identity(), with, &variant.changes()).machine).unwrap();
             run_until(&mut simulation, 0.02);
