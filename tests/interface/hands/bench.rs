@@ -36,7 +36,7 @@ impl Host for ThrottledHost {
 
     fn start(&mut self, job: Job) -> Option<Box<dyn BackgroundTask>> {
         let mut messages = VecDeque::new();
-        perform(&job, &mut || 0.0, &mut |message| {
+        perform(&job, &mut |message| {
             messages.push_back(message);
             ControlFlow::Continue(())
         });
