@@ -177,3 +177,22 @@ fn the_error_falls_with_the_order_of_the_method() {
     let order = slope(&points);
     assert!((3.7..4.5).contains(&order), "{order}: {points:?}");
 }
+
+#[test]
+fn products_of_inertia_have_the_sign_of_their_definition() {
+    // 0.5 kg at each of (p, q) = (0.1, 0.1) m and (-0.1, -0.1) m in a plane of the axes, and 1e-3 kg m^2 about every axis: the
+    // moment about the line through both is the latter alone, about the line across them it has 2 m (0.1 sqrt 2)^2 more.
+    for (i, j, products) in [(0, 1, "0.01 0 0"), (0, 2, "0 0.01 0"), (1, 2, "0 0 0.01")] {
+        let moments = [0, 1, 2].map(|axis| if axis == i || axis == j { "0.011" } else { "0.021" }).join(" ");
+        let text = format!(
+            "[[body]]\nname = \"b\"\nmass = \"1 kg\"\ninertia = \"{moments} kg m^2\"\nproducts = \"{products} kg m^2\"\n\
+             [[joint]]\nname = \"j\"\nkind = \"free\"\nchild = \"b\"\nstart = {{ position = \"0 0 0 mm\" }}\n"
+        );
+        let inertia = crate::common::parse(&text, &[]).machine.bodies[0].inertia;
+        let [mut along, mut across] = [Vec3::zeros(); 2];
+        (along[i], along[j], across[i], across[j]) = (0.5_f64.sqrt(), 0.5_f64.sqrt(), 0.5_f64.sqrt(), -0.5_f64.sqrt());
+        // Rounding.
+        assert!((along.dot(&(inertia * along)) - 1e-3).abs() < 1e-15, "{products}: {inertia}");
+        assert!((across.dot(&(inertia * across)) - 0.021).abs() < 1e-15, "{products}: {inertia}");
+    }
+}
