@@ -147,18 +147,13 @@ fn motion(law: &str, keys: &str) -> Vec<(f64, f64)> {
 
 #[test]
 fn the_laws_of_drives_are_drawn_as_curves() {
-    let axis = |label: &str, unit: &str, range| Axis {
-        label: label.to_owned(),
-        unit: unit.to_owned(),
-        range: Some(range),
-        ..Axis::default()
-    };
+    let axis =
+        |label: &str, unit: &str, range| Axis { label: label.to_owned(), unit: unit.to_owned(), range: Some(range) };
     let chart = |(n, (law, keys)): (usize, &(&str, &str))| Chart {
         title: (*law).to_owned(),
         x: axis("t", "s", (0.0, 1.0)),
         y: axis("q", "mm", (-55.0, 55.0)),
         series: vec![Series::line("", motion(law, keys), PALETTE[1 + n % (PALETTE.len() - 1)])],
-        ..Chart::default()
     };
     let sheet = Sheet {
         charts: DRIVES.iter().enumerate().map(chart).collect(),
