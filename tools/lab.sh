@@ -1,13 +1,13 @@
 # `./run lab …`: the Python package with all its libraries. Sourced by ./run, never run by itself.
 
-# Environment with the package.
-lab_env=$root/target/lab
+# Environment with the package: one that is ready, or else its own.
+lab_env=${JOINTPLAY_LAB:-$root/target/lab}
 
 # Installs the package, again when its sources have changed, and calls `python -m jointplay` with the given arguments.
 run_lab() {
     local sources=("$root"/{Cargo.lock,assets,crates,python/{Cargo.toml,jointplay,pyproject.toml,src}})
     python3 -c 'import ensurepip, venv' 2> /dev/null || prepare_packages python3 python3-venv
-    if [[ ! -e $lab_env/.done || -n $(find "${sources[@]}" -type f -newer "$lab_env/.done" -print -quit) ]]; then
+    if [[ -z ${JOINTPLAY_LAB:-} ]] && [[ ! -e $lab_env/.done || -n $(find "${sources[@]}" -type f -newer "$lab_env/.done" -print -quit) ]]; then
         say "installing the Python package into $lab_env (this takes some minutes the first time)"
         mkdir -p "$lab_env"
         # The time before the sources are read.

@@ -30,6 +30,10 @@ python_test() {
     "$python_env/bin/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall "$wheels"/*.whl
     # -P: without the current folder in the path, the installed package is tested.
     "$python_env/bin/python" -P -B -m pytest --quiet -p no:cacheprovider python/tests "$@"
+    # `./run lab` forwards to it.
+    JOINTPLAY_LAB=$root/$python_env ./run lab sensitivity four-bar --over 'joint.*.clearance' --rows 8 --duration 5ms --quiet \
+        --out "$record/lab" > /dev/null
+    [[ -s $record/lab/sensitivity.png ]]
 }
 
 # Builds the package with graphics and tests its pictures. Built together with the examples, which share its libraries.

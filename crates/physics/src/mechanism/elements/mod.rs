@@ -66,7 +66,7 @@ pub struct Counts {
     pub contacts: u64,
     /// Evaluations of one contact's friction; 0 in a scene without friction.
     pub friction: u64,
-    /// Approximate time of linear algebra beside the evaluations, ns, as in [`super::bounds`].
+    /// Approximate time of linear algebra beside the evaluations, ns, as estimated for the bounds of a run.
     pub algebra: u64,
 }
 
