@@ -182,6 +182,10 @@ def sentence(found: Sensitivity, target: Target) -> str:
     return f"{goal} requires several changes together: {words(target.together.values)}, which give {show(target.together.output, unit)}"
 
 
+BELOW: dict[str, Any] = {"loc": "upper right", "bbox_to_anchor": (1.0, -0.22), "ncols": 2, "frameon": False, "fontsize": "small"}
+"""Place of a legend, where it covers no bar."""
+
+
 def draw(scene: Scene, found: Sensitivity) -> Any:
     """The tornado of each parameter alone and, beside it, the indices, for every output."""
     has_indices = any(isinstance(indices, Indices) for indices in found.indices.values())
@@ -207,7 +211,7 @@ def draw(scene: Scene, found: Sensitivity) -> Any:
         row[0].axvline(factor * nominal, color=common.GREY, linewidth=1.0)
         row[0].set(title="each parameter alone", xlabel=label)
         handles = [library("matplotlib.patches").Patch(color=colour) for colour in (common.BLUE, common.ORANGE)]
-        row[0].legend(handles, ["lower end", "upper end"], loc="best", frameon=False, fontsize="small")
+        row[0].legend(handles, ["lower end", "upper end"], **BELOW)
         indices = found.indices.get(name)
         if has_indices and isinstance(indices, Indices):
             for side, colour, of, words in (
@@ -221,7 +225,7 @@ def draw(scene: Scene, found: Sensitivity) -> Any:
                 row[1].errorbar(
                     values[0], where, xerr=[values[0] - values[1], values[2] - values[0]], fmt="none", ecolor=common.GREY
                 )
-            row[1].legend(loc="best", frameon=False, fontsize="small")
+            row[1].legend(**BELOW)
             row[1].axvline(0.0, color=common.GREY, linewidth=1.0)
             row[1].set_xlim(-0.1, 1.1)
         if has_indices:
