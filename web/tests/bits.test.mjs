@@ -12,7 +12,7 @@ test('every scene, method and formulation gives the same bits as in the native p
     assert.match(await native('--version'), new RegExp(`\\b${wasm.version().replaceAll('.', '\\.')}\\b`));
     const [scenes, methods] = [wasm.scenes(), wasm.choices('solver.method')];
     assert.equal(scenes.length, 10);
-    assert.equal(methods.length, 6);
+    assert.equal(methods.length, 5);
     const hashes = new Set();
     for (const [at, scene] of scenes.entries()) {
         const lagrange = ['formulation=lagrange', 'contact.clearance=0.4mm', 'contact.friction_velocity=surface'];

@@ -24,15 +24,6 @@ impl Columns {
             Self::Methods => &METHODS,
         }
     }
-
-    /// Heading of its table for a formulation.
-    fn title(self, form: &str) -> String {
-        let about = match self {
-            Self::Presets => "every preset",
-            Self::Methods => "every method",
-        };
-        format!("\n## With {about}, formulation `{form}`\n")
-    }
 }
 
 /// Outcomes of a row: those of each formulation in the order of its columns.
@@ -104,9 +95,10 @@ fn table() -> Vec<(Row, Outcomes)> {
 
 const HEAD: &str = "# Behaviour at the limits of the parameters
 
-Outcome of the first impacts of a scene with extreme parameter values, in both formulations, with every preset, or with every method where
-the row varies step or tolerance. `cargo test --test physics extremes::` computes and checks one cell of each row, with
-`-- --ignored extremes::full` all cells; with `-- --ignored write_the_page` it writes this page.
+Outcomes of the first impacts of a scene with extreme parameter values, in both formulations, with every preset, or with every method where
+the row varies step or tolerance. All are in `docs/extremes.csv`, one line per scene, extreme and formulation.
+`cargo test --test physics extremes::` computes and checks one cell of each row, with `-- --ignored extremes::full` all cells; with
+`-- --ignored extremes::write_the_page` it writes this page and that file.
 
 - **runs**: the run reaches its end. Every number is finite, orientations are rotations, ideal joints are closed to 1e-9 m (1 mm in
   `lagrange`, which only stabilises them), no ball is deeper in its wall than a tenth of its radius, a ball that moves deeper into the
@@ -120,20 +112,19 @@ the row varies step or tolerance. `cargo test --test physics extremes::` compute
 /// Heading of the part of the page that another test writes.
 const LONG_RUN: &str = "\n## 1000 simulated seconds\n";
 
+/// The page: how often each outcome occurs, and the first reason of each outcome in a row.
 fn page(table: &[(Row, Outcomes)]) -> String {
     let mut page = String::from(HEAD);
+    let words = outcome::WORDS.join(" | ");
+    let line = "---|".repeat(outcome::WORDS.len());
+    let _ = write!(page, "\n## How often\n\n| Preset or method | Formulation | {words} |\n|---|---|{line}\n");
     for columns in [Columns::Presets, Columns::Methods] {
-        let rows = || table.iter().filter(move |(row, _)| row.columns == columns);
-        for (f, form) in FORMS.iter().enumerate() {
-            let words = columns.words();
-            let line = "---|".repeat(words.len());
-            let words = words.join(" | ");
-            let title = columns.title(form);
-            let _ = write!(page, "{title}\n| Scene | Extreme | {words} |\n|---|---|{line}\n");
-            for (row, outcomes) in rows() {
-                let words: Vec<&str> = outcomes[f].iter().map(Outcome::word).collect();
-                let words = words.join(" | ");
-                let _ = writeln!(page, "| {} | {} | {words} |", row.scene, row.label);
+        for (n, column) in columns.words().iter().enumerate() {
+            for (f, form) in FORMS.iter().enumerate() {
+                let cells = table.iter().filter(|(row, _)| row.columns == columns);
+                let cells: Vec<&str> = cells.map(|(_, outcomes)| outcomes[f][n].word()).collect();
+                let counts = outcome::WORDS.map(|word| cells.iter().filter(|cell| **cell == word).count().to_string());
+                let _ = writeln!(page, "| {column} | {form} | {} |", counts.join(" | "));
             }
         }
     }
@@ -155,22 +146,54 @@ fn page(table: &[(Row, Outcomes)]) -> String {
     page
 }
 
-fn page_path() -> std::path::PathBuf {
-    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/extremes.md")
+/// Columns of the file of outcomes after those that name the row.
+fn csv_columns() -> Vec<&'static str> {
+    [&PRESETS[..], &METHODS].concat()
 }
 
-/// The stored page: the tables, and the rest.
+/// What a line of the file begins with.
+fn csv_head(row: &Row, form: &str) -> String {
+    format!("{},\"{}\",{form},", row.scene, row.label)
+}
+
+/// Every outcome; a row with presets has empty cells for methods, and the reverse.
+fn csv(table: &[(Row, Outcomes)]) -> String {
+    let columns = csv_columns();
+    let mut csv = format!("scene,extreme,formulation,{}\n", columns.join(","));
+    for (row, outcomes) in table {
+        for (of_form, form) in outcomes.iter().zip(FORMS) {
+            let cell = |column: &&str| {
+                let place = row.columns.words().iter().position(|word| word == column);
+                place.map_or("", |place| of_form[place].word())
+            };
+            let cells: Vec<&str> = columns.iter().map(cell).collect();
+            let _ = writeln!(csv, "{}{}", csv_head(row, form), cells.join(","));
+        }
+    }
+    csv
+}
+
+fn path(ending: &str) -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("docs/extremes.{ending}"))
+}
+
+fn stored_csv() -> String {
+    std::fs::read_to_string(path("csv")).unwrap_or_default()
+}
+
+/// The stored page: the outcomes, and the rest.
 fn stored_page() -> (String, String) {
-    let text = std::fs::read_to_string(page_path()).unwrap_or_default();
+    let text = std::fs::read_to_string(path("md")).unwrap_or_default();
     let at = text.find(LONG_RUN).unwrap_or(text.len());
     (text[..at].to_owned(), text[at..].to_owned())
 }
 
 #[test]
-#[ignore = "writes docs/extremes.md"]
+#[ignore = "writes docs/extremes.md and docs/extremes.csv"]
 fn write_the_page() {
-    let page = page(&table()) + &stored_page().1;
-    std::fs::write(page_path(), page).unwrap();
+    let table = table();
+    std::fs::write(path("csv"), csv(&table)).unwrap();
+    std::fs::write(path("md"), page(&table) + &stored_page().1).unwrap();
 }
 
 /// Prints the reason of an outcome; returns whether it is wrong.
@@ -197,12 +220,12 @@ fn full_every_extreme_ends_in_a_named_outcome() {
         }
     }
     assert_eq!(wrong, 0, "wrong outcomes");
-    assert!(stored_page().0 == page(&table), "{UPDATE_COMMAND}");
+    assert!(stored_csv() == csv(&table) && stored_page().0 == page(&table), "{UPDATE_COMMAND}");
 }
 
 /// Checks one cell of each row, rotating through formulations and columns.
 #[test]
-fn an_outcome_of_every_extreme_agrees_with_the_page() {
+fn an_outcome_of_every_extreme_agrees_with_the_file() {
     let rows = Arc::new(rows());
     let cell_of_row = |(r, row): (usize, &Row)| {
         let words = row.columns.words();
@@ -210,18 +233,15 @@ fn an_outcome_of_every_extreme_agrees_with_the_page() {
     };
     let cells: Vec<Cell> = rows.iter().enumerate().map(cell_of_row).collect();
     let outcomes = outcomes(&rows, cells.clone());
-    let page = stored_page().0;
+    let (stored, columns) = (stored_csv(), csv_columns());
     for ((r, f, word), outcome) in cells.into_iter().zip(outcomes) {
         let (row, form) = (&rows[r], FORMS[f]);
         assert!(!report_outcome(row, form, word, &outcome), "wrong outcome");
-        let (_, table) = page.split_once(&row.columns.title(form)).expect("its table");
-        let head = format!("| {} | {} |", row.scene, row.label);
-        let line = table
-            .lines()
-            .find_map(|line| line.strip_prefix(&*head))
-            .unwrap_or_else(|| panic!("{head}: {UPDATE_COMMAND}"));
-        let column = row.columns.words().iter().position(|other| *other == word).expect("a column");
-        let stored = line.split('|').nth(column).expect("a cell").trim();
-        assert_eq!(outcome.word(), stored, "{head} {form} {word}: {UPDATE_COMMAND}");
+        let head = csv_head(row, form);
+        let line = stored.lines().find_map(|line| line.strip_prefix(&*head));
+        let line = line.unwrap_or_else(|| panic!("{head}: {UPDATE_COMMAND}"));
+        let column = columns.iter().position(|other| *other == word).expect("a column");
+        let stored = line.split(',').nth(column).expect("a cell");
+        assert_eq!(outcome.word(), stored, "{head} {word}: {UPDATE_COMMAND}");
     }
 }

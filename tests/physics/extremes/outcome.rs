@@ -19,6 +19,9 @@ const MAX_STEP_EVALUATIONS: u64 = 2000;
 /// Allowed gain of energy of a passive scene, relative to that exchanged.
 const ALLOWED_GAIN: f64 = 0.02;
 
+/// Words of the outcomes that are not wrong.
+pub const WORDS: [&str; 5] = ["runs", "slow", "doubtful", "stopped", "refused"];
+
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
@@ -26,7 +29,7 @@ pub enum Outcome {
     Ran,
     /// The same, but slower than requested, as reported by the pacer.
     Slow,
-    /// The program raised doubts about the result.
+    /// The program raised doubts about the result, one per line.
     Doubtful(String),
     /// The divergence guard stopped the run at its last good state.
     Stopped(String),
@@ -157,7 +160,7 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
         return Outcome::Wrong("slower than requested without reporting it".to_owned());
     }
     if !doubts.is_empty() {
-        Outcome::Doubtful(doubts.join(" "))
+        Outcome::Doubtful(doubts.join("\n"))
     } else if late {
         Outcome::Slow
     } else {
