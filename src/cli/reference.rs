@@ -2,16 +2,16 @@
 
 use super::tables::Table;
 use crate::scene::{
-    ABOVE_ZERO, DRIVE_LAWS, DefaultRule, FILE, FileKey, FileTable, Kind, ValueType, Variants, file_tables, find,
-    is_element,
+    ABOVE_ZERO, DRIVE_LAWS, DefaultRule, FileKey, FileTable, Kind, ValueType, Variants, file_tables, find,
 };
 use crate::units::{Dimension, dimension_name, format_quantity, si_unit, unit_table};
 
 /// The page at build time.
 const PAGE: &str = include_str!("../../docs/scene-format.md");
-/// Markers before and after a table in the page.
+/// Begins the line before a table in the page; the table ends at the first empty line.
 const START: &str = "<!-- table ";
-const END: &str = "<!-- end of table -->";
+/// Tables that repeat those of a drive for plain numbers, which the page says in words.
+const AS_OF_DRIVE: [&str; 2] = ["factor", "factor_term"];
 
 /// The page of the scene format.
 pub fn page() -> String {
@@ -21,19 +21,20 @@ pub fn page() -> String {
 /// `page` with its tables regenerated.
 ///
 /// # Errors
-/// The name of a table that is unknown or has no end marker.
+/// The name of a table that is unknown or does not end.
 pub fn fill(page: &str) -> Result<String, String> {
     let mut parts = page.split(START);
     let mut out = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let gap = part.split_once(" -->").and_then(|(name, rest)| {
-            let (_, rest) = rest.split_once(END)?;
+        let gap = part.split_once(" -->\n").and_then(|(name, rest)| {
+            // Nothing but the empty line where a new table is to be.
+            let rest = rest.strip_prefix('\n').or_else(|| Some(rest.split_once("\n\n")?.1))?;
             Some((name, table_content(name)?, rest))
         });
         let Some((name, table, rest)) = gap else {
             return Err(part.lines().next().unwrap_or_default().to_owned());
         };
-        out += &format!("{START}{name} -->\n\n{table}\n{END}{rest}");
+        out += &format!("{START}{name} -->\n{table}\n{rest}");
     }
     Ok(out)
 }
@@ -42,16 +43,14 @@ pub fn fill(page: &str) -> Result<String, String> {
 fn table_content(name: &str) -> Option<String> {
     Some(match name {
         "units" => unit_table(),
-        "frames" => frames(),
         "laws" => laws(),
-        "force elements" => elements(),
         _ => keys(file_tables().into_iter().find(|table| table.name == name)?),
     })
 }
 
-/// Whether the page shows this table, under its own name or among the force elements.
+/// Whether the page shows this table, or says what it repeats.
 pub fn contains_table(page: &str, table: &FileTable) -> bool {
-    is_element(table) || page.contains(&format!("{START}{} -->", table.name))
+    AS_OF_DRIVE.contains(&table.name) || page.contains(&format!("{START}{} -->", table.name))
 }
 
 /// The keys of a table, one per row.
@@ -69,17 +68,18 @@ fn keys(table: &FileTable) -> String {
     };
     let heads = ["key", by, "value", "default", "frame", "meaning"].map(str::to_owned);
     let heads = selected(heads);
-    let row = |key: &FileKey| {
-        selected([
-            format!("`{}`", key.name),
-            key.of.join(", "),
-            value(key, table),
-            default_text(key),
-            key.frame.to_owned(),
-            description(key),
-        ])
-    };
-    let mut rows: Vec<Vec<String>> = unshared_keys(table).map(row).collect();
+    let mut rows: Vec<[String; 6]> = Vec::new();
+    for key in unshared_keys(table) {
+        let (of, frame) = (key.of.join(", "), key.frame.to_owned());
+        let row = [format!("`{}`", key.name), of, value(key, table), default_text(key), frame, description(key)];
+        // Variants that describe a key alike share a row.
+        let alike = |other: &&mut [String; 6]| (0..6).all(|cell| cell == 1 || row[cell] == other[cell]);
+        match rows.iter_mut().find(alike) {
+            Some(other) => other[1] += &format!(", {}", row[1]),
+            None => rows.push(row),
+        }
+    }
+    let mut rows: Vec<Vec<String>> = rows.into_iter().map(selected).collect();
     if let Some(also) = table.also {
         let any = format!("any key of {}", markdown_name(also));
         let same = || "as there".to_owned();
@@ -215,38 +215,4 @@ pub fn default_text(key: &FileKey) -> String {
 fn laws() -> String {
     let row = |kind: &crate::scene::DriveLaw| vec![format!("`{}`", kind.word), kind.help.to_owned()];
     Table::new("law | motion", DRIVE_LAWS.iter().map(row)).markdown()
-}
-
-/// All force elements.
-fn elements() -> String {
-    let tables = FILE.keys.iter().filter_map(FileKey::table);
-    let part = |table: &FileTable| {
-        let (head, help) = (markdown_name(table), capital(table.help));
-        format!("### {head}\n\n{help}.\n\n{}", keys(table))
-    };
-    let parts: Vec<String> = tables.filter(|table| is_element(table)).map(part).collect();
-    parts.join("\n")
-}
-
-/// Frames, with the keys whose values are in them.
-fn frames() -> String {
-    let mut frames: Vec<(&str, Vec<String>)> = Vec::new();
-    for table in file_tables() {
-        let mut of_table: Vec<(&str, Vec<&str>)> = Vec::new();
-        for key in unshared_keys(table).filter(|key| !key.frame.is_empty()) {
-            match of_table.iter_mut().find(|(frame, _)| *frame == key.frame) {
-                Some((_, names)) => names.push(key.name),
-                None => of_table.push((key.frame, vec![key.name])),
-            }
-        }
-        for (frame, names) in of_table {
-            let keys = format!("`{}` of {}", names.join("`, `"), markdown_name(table));
-            match frames.iter_mut().find(|(of, _)| *of == frame) {
-                Some((_, all)) => all.push(keys),
-                None => frames.push((frame, vec![keys])),
-            }
-        }
-    }
-    let row = |(frame, keys): (&str, Vec<String>)| vec![frame.to_owned(), keys.join("; ")];
-    Table::new("frame | keys", frames.into_iter().map(row)).markdown()
 }

@@ -1,4 +1,4 @@
-//! The pictures of `docs/scene-format.md`: every complete example has one, and each agrees with the program.
+//! The pictures of `docs/scene-tutorial.md` and `docs/scene-format.md`: every complete example has one, and each agrees with the program.
 //!
 //! `UPDATE_GOLDEN=1 cargo test --test interface pictures::` redraws them; look at each before committing it.
 
@@ -20,15 +20,16 @@ const MAX_SIZE: u64 = 40_000;
 const LAWS: &str = "drives";
 
 /// Instants of pictures other than 0.1 s.
-const INSTANTS: [(&str, &str); 5] =
-    [("shapes", "0s"), ("joints", "0s"), ("own-parameters", "0s"), ("crank", "25ms"), ("flap", "25ms")];
+const INSTANTS: [(&str, &str); 4] = [("shapes", "0s"), ("joints", "0s"), ("crank", "25ms"), ("flap", "25ms")];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// Both pages.
 fn page() -> String {
-    fs::read_to_string(root().join("docs/scene-format.md")).expect("the page")
+    let read = |name| fs::read_to_string(root().join("docs").join(name)).expect("the page");
+    read("scene-tutorial.md") + &read("scene-format.md")
 }
 
 /// Name of the picture at the beginning of `text`, if any.

@@ -304,7 +304,7 @@ fn a_value_that_waits_for_the_reset_says_so() {
 
 #[test]
 fn a_parameter_of_the_file_becomes_a_slider_and_applies_at_the_reset() {
-    let text = include_str!("../../docs/scene-format.md");
+    let text = include_str!("../../docs/scene-tutorial.md");
     let blocks = text.split("```toml\n").skip(1);
     let example = blocks
         .filter_map(|rest| rest.split("```").next())

@@ -304,7 +304,7 @@ const WRONG_FORM: [&str; 19] = [
 #[test]
 fn the_schema_accepts_every_scene_and_refuses_bad_ones() {
     let schema = Schema::new();
-    let page = include_str!("../../docs/scene-format.md");
+    let page = include_str!("../../docs/scene-tutorial.md");
     let blocks = page.split("```toml\n").skip(1);
     let examples = blocks.filter_map(|rest| Some(("example".to_owned(), rest.split("```").next()?.to_owned())));
     for (name, text) in scenes().into_iter().chain(examples) {
