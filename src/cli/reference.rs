@@ -68,8 +68,12 @@ fn keys(table: &FileTable) -> String {
     };
     let heads = ["key", by, "value", "default", "frame", "meaning"].map(str::to_owned);
     let heads = selected(heads);
+    let is_section = |table: &FileTable| table.head.starts_with("[[");
+    let is_part =
+        |key: &&FileKey| matches!(key.value_type, ValueType::List(of, _) if is_section(table) && is_section(of));
+    let (parts, own): (Vec<&FileKey>, Vec<&FileKey>) = unshared_keys(table).partition(is_part);
     let mut rows: Vec<[String; 6]> = Vec::new();
-    for key in unshared_keys(table) {
+    for key in own {
         let (of, frame) = (key.of.join(", "), key.frame.to_owned());
         let row = [format!("`{}`", key.name), of, value(key, table), default_text(key), frame, description(key)];
         // Variants that describe a key alike share a row.
@@ -78,6 +82,12 @@ fn keys(table: &FileTable) -> String {
             Some(other) => other[1] += &format!(", {}", row[1]),
             None => rows.push(row),
         }
+    }
+    if let [first, ..] = parts[..] {
+        let names: Vec<String> = parts.iter().map(|key| format!("`{}`", key.name)).collect();
+        let empty = String::new;
+        let help = "Its contents, as at the top of the file".to_owned();
+        rows.push([names.join(", "), empty(), format!("{}, …", value(first, table)), "none".to_owned(), empty(), help]);
     }
     let mut rows: Vec<Vec<String>> = rows.into_iter().map(selected).collect();
     if let Some(also) = table.also {
