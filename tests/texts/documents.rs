@@ -213,7 +213,11 @@ fn the_readme_leads_to_every_document() {
 #[test]
 fn links_of_the_readme_lead_to_files() {
     let readme = read("README.md");
-/// The page of the trade-off was drawn from its table, which has the presets of the program, within their limits.
+    let targets = readme.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    let files: Vec<&str> = targets.filter(|target| !target.contains("://")).collect();
+    assert!(files.len() > 10, "{files:?}");
+    for file in files {
+        assert!(root().join(file).exists(), "README.md links {file}");
     }
 }
 
