@@ -9,7 +9,7 @@ use serde_json::{Value as Json, json};
 use super::args::{RunArguments, SummaryForm};
 use super::impacts::ImpactsFile;
 use super::link::LinkReplay;
-use super::output::{RowsFile, Table, check_distinct, check_size, significant};
+use super::output::{RowsFile, Table, check_distinct, reserve, significant};
 use super::state::{self, StateFile};
 use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
@@ -104,7 +104,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     };
     table.request(&mut frame);
     if let (Some(times), Some(_)) = (&times, &file) {
-        check_size(times.last().saturating_add(1), table.columns().len())?;
+        reserve(&mut table, times.last().saturating_add(1))?;
     }
     if !arguments.quiet {
         if times.is_some_and(|times| !times.include_the_end()) {

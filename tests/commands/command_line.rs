@@ -1171,12 +1171,22 @@ fn control_characters_of_foreign_text_do_not_reach_the_terminal() {
 }
 
 #[test]
-fn a_command_of_the_package_is_answered_with_the_way_there() {
-    for word in ["sensitivity", "tolerance"] {
+fn a_former_command_is_answered_with_the_way_there() {
+    let package =
+        [("sensitivity", "sensitivity"), ("tolerance", "tolerance"), ("import", "import"), ("reproduce", "paper")];
+    let in_package = package.map(|(word, now)| {
+        let ways = format!("`./run lab {now} …`, or `python -m jointplay {now} …` after `pip install jointplay`");
+        (word, format!("error: `jointplay {word}` is now {ways}\n"))
+    });
+    let gone = [
+        ("bench", "`jointplay tradeoff SCENE…` measures the cost and error of every method on scenes"),
+        ("validate", "`cargo test --test physics validation` compares with the known answers of docs/validation.md"),
+    ];
+    let gone = gone.map(|(word, now)| (word, format!("error: `jointplay {word}` is gone: {now}\n")));
+    for (word, answer) in in_package.into_iter().chain(gone) {
         let run = jointplay(folder().path(), &format!("{word} four-bar --out out")).expect(2);
-        let expected = format!(
-            "error: `jointplay {word}` is now `./run lab {word} …`, or `python -m jointplay {word} …` after `pip install jointplay`\n"
-        );
-        assert_eq!((run.stdout.as_str(), run.stderr), ("", expected));
+        assert_eq!((run.stdout.as_str(), run.stderr), ("", answer));
     }
+    let all = jointplay(folder().path(), "tradeoff --all").expect(2).stderr;
+    assert!(all.starts_with("error: `--all` of `jointplay tradeoff` is gone: name the scenes"), "{all}");
 }

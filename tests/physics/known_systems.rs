@@ -55,9 +55,6 @@ impl<F: Fn(f64, f64, f64) -> f64> System for Force<F> {
     fn dimension(&self) -> usize {
         2
     }
-    fn positions(&self) -> usize {
-        1
-    }
     fn active_ranges(&self) -> &[Range<usize>] {
         std::slice::from_ref(&(0..2))
     }

@@ -49,15 +49,6 @@ impl Regime {
         }
     }
 
-    /// The regime for a code in files and, if periodic, a period; `None` for a point that did not reach its end.
-    pub fn of_code(code: i64, period: usize) -> Option<Self> {
-        let regime = Self::ALL.into_iter().find(|regime| regime.code() == code);
-        regime.map(|regime| match regime {
-            Self::Periodic(_) => Self::Periodic(period),
-            other => other,
-        })
-    }
-
     /// Number of intervals after which the motion repeats; 0 if it does not.
     pub fn period(self) -> usize {
         match self {

@@ -184,20 +184,24 @@ pub fn check_distinct(named: &[(String, PathBuf)]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Rejects a run whose rows would fill a disk.
+/// Makes room for the rows of a run in `table`.
 ///
 /// # Errors
-/// Usage, with the numbers.
-pub fn check_size(rows: u64, columns: usize) -> Result<(), Failure> {
+/// Usage, with the numbers: more rows than a file holds, or than fit into memory.
+pub fn reserve(table: &mut Table, rows: u64) -> Result<(), Failure> {
+    let columns = table.columns().len();
     let values = rows.saturating_mul(columns as u64);
-    if values <= MAX_VALUES {
+    let limit = if values > MAX_VALUES {
+        format!("more than the limit of {} GiB", MAX_VALUES * 8 / (1 << 30))
+    } else if !table.reserve(rows as usize) {
+        "which do not fit into memory".to_owned()
+    } else {
         return Ok(());
-    }
+    };
     Err(Failure::usage(format!(
-        "{rows} rows of {columns} columns are {:.0} GiB of numbers, more than the limit of {} GiB; \
-         choose a longer --every or a shorter --duration (at most {} rows)",
+        "{rows} rows of {columns} columns are {:.1} GiB of numbers, {limit}; choose a longer --every or a shorter --duration (at most {} \
+         rows), or fewer --channels",
         values as f64 * 8.0 / f64::from(1u32 << 30),
-        MAX_VALUES * 8 / (1 << 30),
         MAX_VALUES / columns as u64,
     )))
 }

@@ -124,6 +124,15 @@ impl Table {
         self.columns.first().map_or(0, |column| column.values.len())
     }
 
+    /// Makes room for `rows` more rows; returns whether there is.
+    pub fn reserve(&mut self, rows: usize) -> bool {
+        self.columns.iter_mut().all(|column| match &mut column.values {
+            Values::Numbers(values) => values.try_reserve_exact(rows).is_ok(),
+            Values::Whole(values) => values.try_reserve_exact(rows).is_ok(),
+            Values::Words(words) => words.try_reserve_exact(rows).is_ok(),
+        })
+    }
+
     /// Appends the row of `frame`.
     ///
     /// # Errors

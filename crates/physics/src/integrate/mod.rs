@@ -75,12 +75,10 @@ impl Method {
     }
 }
 
-/// A first-order system y' = f(t, y) whose first [`System::positions`] components are positions.
+/// A first-order system y' = f(t, y).
 pub trait System {
     /// Number of components of y.
     fn dimension(&self) -> usize;
-    /// Number of leading components that are positions; the others are velocities.
-    fn positions(&self) -> usize;
     /// Components that steps advance, in order. All other components are frozen and must not be touched; their derivatives are
     /// zero.
     fn active_ranges(&self) -> &[Range<usize>];
@@ -201,9 +199,6 @@ mod tests {
     impl System for Oscillator {
         fn dimension(&self) -> usize {
             2
-        }
-        fn positions(&self) -> usize {
-            1
         }
         fn active_ranges(&self) -> &[Range<usize>] {
             std::slice::from_ref(&(0..2))

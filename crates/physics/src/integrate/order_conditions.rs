@@ -143,9 +143,6 @@ impl System for Probe {
     fn dimension(&self) -> usize {
         self.scale.len()
     }
-    fn positions(&self) -> usize {
-        0
-    }
     fn active_ranges(&self) -> &[Range<usize>] {
         std::slice::from_ref(&self.all)
     }

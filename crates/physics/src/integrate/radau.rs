@@ -480,9 +480,6 @@ mod tests {
         fn dimension(&self) -> usize {
             2
         }
-        fn positions(&self) -> usize {
-            0
-        }
         fn active_ranges(&self) -> &[Range<usize>] {
             std::slice::from_ref(&(0..2))
         }

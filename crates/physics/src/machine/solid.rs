@@ -107,37 +107,22 @@ impl Solid {
     }
 
     /// The same, displaced by `by`, m.
-    pub fn moved(self, by: Vec3) -> Self {
+    fn moved(self, by: Vec3) -> Self {
         Self { centre: self.centre + by, ..self }
     }
 
-    /// The same volume with its second moments about `point`, m, which takes the place of the centroid.
-    pub fn about(self, point: Vec3) -> Self {
-        let off = point - self.centre;
-        Self::new(self.volume, point, self.second + off * off.transpose() * self.volume)
-    }
-
     /// Tetrahedra between the origin and each of these triangles, m, with signed volumes: for the triangles of a closed surface,
-    /// seen counter-clockwise from outside, the solid that it encloses, by the divergence theorem.
-    pub fn of_tetrahedra(triangles: impl Iterator<Item = [Vec3; 3]>) -> Self {
-        Self::of_simplices(triangles.map(|[a, b, c]| (a.dot(&b.cross(&c)) / 6.0, [a, b, c])), 4.0)
-    }
-
-    /// A shell along these triangles, m; `volume` is its area, m^2, and the moments are per area.
-    pub fn of_surface(triangles: impl Iterator<Item = [Vec3; 3]>) -> Self {
-        Self::of_simplices(triangles.map(|[a, b, c]| (0.5 * (b - a).cross(&(c - a)).norm(), [a, b, c])), 3.0)
-    }
-
-    /// Simplices of signed sizes with `corners` corners, of which a fourth is the origin. Over a simplex, the mean of r is s / n
-    /// and that of r r' is (sum of v v' + s s') / (n (n + 1)), with s the sum of its n corners v.
-    fn of_simplices(parts: impl Iterator<Item = (f64, [Vec3; 3])>, corners: f64) -> Self {
+    /// seen counter-clockwise from outside, the solid that it encloses, by the divergence theorem. Over a tetrahedron, the mean of
+    /// r is s / 4 and that of r r' is (sum of v v' + s s') / 20, with s the sum of its corners v.
+    fn of_tetrahedra(triangles: impl Iterator<Item = [Vec3; 3]>) -> Self {
         let (mut volume, mut first, mut second) = (0.0, Vec3::zeros(), Mat3::zeros());
-        for (part, [a, b, c]) in parts {
+        for [a, b, c] in triangles {
+            let part = a.dot(&b.cross(&c)) / 6.0;
             let sum = a + b + c;
             let squares = a * a.transpose() + b * b.transpose() + c * c.transpose();
             volume += part;
-            first += sum * (part / corners);
-            second += (squares + sum * sum.transpose()) * (part / (corners * (corners + 1.0)));
+            first += sum * (part / 4.0);
+            second += (squares + sum * sum.transpose()) * (part / 20.0);
         }
         let centre = if volume > 0.0 { first / volume } else { first };
         second -= centre * centre.transpose() * volume;

@@ -638,7 +638,7 @@ impl Evaluator<'_> {
         y_end: &mut [f64],
     ) -> bool {
         let StepStart { t, h, y, k, .. } = *from;
-        let positions = self.positions();
+        let positions = self.mechanism.positions();
         // The previous step ended with this measurement, unless the state has changed since.
         if self.mechanism.latest != Latest::Measured(t) || discrete.result != y {
             self.mechanism.measure(t, y);

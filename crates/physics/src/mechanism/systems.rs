@@ -84,10 +84,6 @@ impl System for Evaluator<'_> {
         self.mechanism.dimension()
     }
 
-    fn positions(&self) -> usize {
-        self.mechanism.positions()
-    }
-
     fn prepare_times(&mut self, times: &[f64]) {
         let Mechanism { model, equations, .. } = &mut *self.mechanism;
         equations.driven_mut().prepare(model, times);
