@@ -258,9 +258,9 @@ test('computations run in workers: they report progress, the page keeps running,
     const cores = await lab.page.evaluate(() => navigator.hardwareConcurrency);
     assert.equal(workers(), Math.max(cores - 1, 1));
     // Later messages are held back, even if the computation is already done.
-    await lab.click('Button', 'Play');
+    await lab.activate('button', 'Play');
     await lab.until(async () => (await lab.state()).time_s > 0, 'the page does not continue during the computation');
-    await lab.click('Button', 'Pause');
+    await lab.activate('button', 'Pause');
     await lab.activate('button', 'Cancel sweep');
     await lab.find('Button', 'Start sweep');
     await ended();

@@ -21,7 +21,7 @@ pub struct NoThreads {
 }
 
 /// Performs `work` for each of `jobs` on `threads` threads. `watch` is called on this thread with each result, and without one at
-/// least every 50 ms; no job starts after it breaks. `work` gets a function that returns whether to continue, and returns `None`
+/// least every 50 ms; no job starts after it breaks, and it still gets what is finished. `work` gets a function that returns whether to continue, and returns `None`
 /// if it stopped early.
 ///
 /// # Errors
@@ -47,7 +47,7 @@ pub fn run_parallel<T: Send>(
                 let may_continue = || !stop.load(Ordering::Relaxed);
                 let on_panic = StopOnPanic(stop);
                 if let Some(result) = may_continue().then(|| work(job, &may_continue)).flatten() {
-                    // The receiver is gone once the watcher has stopped.
+                    // The receiver outlives the jobs.
                     let _ = send.send((job, result));
                 }
                 drop(on_panic);
@@ -60,9 +60,9 @@ pub fn run_parallel<T: Send>(
                 Err(RecvTimeoutError::Timeout) => None,
                 Err(RecvTimeoutError::Disconnected) => break,
             };
-            if watch(result).is_break() {
+            let is_stopped = stop.load(Ordering::Relaxed) && result.is_none();
+            if !is_stopped && watch(result).is_break() {
                 stop.store(true, Ordering::Relaxed);
-                break;
             }
         }
     });
@@ -82,6 +82,8 @@ impl Drop for StopOnPanic<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicUsize;
+
     use super::*;
 
     #[test]
@@ -103,20 +105,21 @@ mod tests {
     #[test]
     fn no_job_starts_after_the_watcher_has_stopped() {
         let jobs: Vec<usize> = (0..1000).collect();
-        let mut seen = 0;
-        // Without the watcher's word these jobs would never end.
+        let (mut seen, finished) = (0, AtomicUsize::new(0));
+        // Without the watcher's word the jobs from 8 on would never end.
         let work = |job: usize, may_continue: &dyn Fn() -> bool| {
-            while job > 2 && may_continue() {
+            while job >= 8 && may_continue() {
                 std::thread::yield_now();
             }
-            (job <= 2).then_some(job)
+            (job < 8).then(|| finished.fetch_add(1, Ordering::Relaxed))
         };
         let watch = |result: Option<(usize, usize)>| {
             seen += usize::from(result.is_some());
-            if seen == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if seen >= 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         run_parallel(&jobs, 4, work, watch).expect("threads");
-        assert_eq!(seen, 3);
+        // No finished result is lost.
+        assert!(seen >= 3 && seen == finished.into_inner(), "{seen}");
     }
 
     #[test]

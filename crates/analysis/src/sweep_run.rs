@@ -215,15 +215,18 @@ impl<'a> SweepRun<'a> {
             }
             Some(block.records())
         };
-        let mut outcome = Ok(());
+        let (mut outcome, mut flow) = (Ok(()), ControlFlow::Continue(()));
         run_parallel(&todo, threads, work, |result| {
             if let Some((b, records)) = result {
                 self.insert(b, &records);
-                if let Some(file) = &mut self.file {
+                if let (Some(file), Ok(())) = (&mut self.file, &outcome) {
                     outcome = file.append_block(b, &records);
                 }
             }
-            if outcome.is_err() { ControlFlow::Break(()) } else { watch(points.load(Ordering::Relaxed)) }
+            if flow.is_continue() {
+                flow = if outcome.is_err() { ControlFlow::Break(()) } else { watch(points.load(Ordering::Relaxed)) };
+            }
+            flow
         })?;
         outcome?;
         self.file.as_mut().map_or(Ok(()), BlocksFile::sync)
