@@ -112,8 +112,10 @@ test('a screen reader hears events; elements have names and the places of their 
     await lab.until(async () => /Paused at .*S1 /.test(await lab.summary()), 'the summary does not say that it is paused');
     const aloud = lab.page.locator('[aria-live=polite]');
     await lab.until(async () => (await aloud.textContent()) === (await lab.summary()), 'what happens is not read out');
-    // Outside the canvas, and visible to a screen reader.
-    const tree = await lab.page.locator('body').ariaSnapshot();
+    // Outside the canvas, and visible to a screen reader. Elements follow the picture, within some frames.
+    const outline = () => lab.page.locator('body').ariaSnapshot();
+    await lab.until(async () => (await outline()).includes('region "The machine"'), 'the machine has no region');
+    const tree = await outline();
     for (const part of ['What the mechanism is doing', 'Scene and files', 'Transport', 'The machine']) {
         assert.ok(tree.includes(`region "${part}"`), `${part} is not in ${tree}`);
     }
