@@ -6,7 +6,6 @@ use super::layout::reserve_lines;
 use super::player::Player;
 use super::{theme, value};
 use crate::analysis::presets;
-use crate::integrate::StepControl;
 use crate::machine::{Preset, Solver};
 use crate::simulate::Impact;
 
@@ -53,7 +52,7 @@ impl AccuracyLine {
 
 /// The panel below the selection of the preset.
 pub fn ui(ui: &mut Ui, player: &Player) {
-    let preset = preset_of(player);
+    let preset = player.pending().machine.solver.preset;
     let mut list = vec![solver(player, preset)];
     list.extend(measured(player, preset));
     list.push(capacity(player));
@@ -124,23 +123,6 @@ fn measured(player: &Player, preset: Option<Preset>) -> [AccuracyLine; 2] {
              apply where the motion does not settle soon.",
         ),
     ]
-}
-
-/// The preset that matches the present method and its accuracy, whether or not it was chosen by name.
-pub fn preset_of(player: &Player) -> Option<Preset> {
-    let machine = &player.pending().machine;
-    let solver = &machine.solver;
-    let matches_solver = |preset: &Preset| {
-        let own = preset.solver(machine);
-        own.method == solver.method
-            && match own.method.control() {
-                StepControl::Fixed => own.step == solver.step,
-                StepControl::Error => own.tolerance == solver.tolerance,
-                StepControl::PerImpact => own.steps_per_impact == solver.steps_per_impact,
-            }
-    };
-    let chosen = solver.preset.filter(|preset| matches_solver(preset));
-    chosen.or_else(|| Preset::ALL.into_iter().find(matches_solver))
 }
 
 /// Name of a ball joint.

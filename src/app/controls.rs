@@ -206,12 +206,6 @@ impl Controls {
         if let Some(error) = self.drafts.get(key).and_then(|draft| draft.error.as_ref()) {
             theme::error(ui, value::typeset(error));
         }
-        let overriding_keys = player.keys_overriding_preset();
-        if key == PRESET && !overriding_keys.is_empty() {
-            let names: Vec<&str> = overriding_keys.iter().filter_map(|k| k.split('.').nth(1)).collect();
-            let words = format!("The scene file sets {}, which overrides the preset", names.join(", "));
-            ui.label(RichText::new(words).small().weak());
-        }
         if player.is_pending(key) {
             theme::warning(ui, "Applies at the next reset");
         }
@@ -282,19 +276,14 @@ impl Controls {
             this.default_button(ui, player, row);
             let mut chosen = None;
             let width = ui.available_width().min(170.0);
-            // Method and tolerance may match a preset that was not selected by name, or differ from the selected one.
-            let (now, text) = match (row.key, accuracy::preset_of(player)) {
-                (PRESET, Some(preset)) => (Value::Choice(preset.word()), preset.word().to_owned()),
-                (PRESET, None) => (Value::Unset, "custom".to_owned()),
-                _ => (row.now.clone(), row.shown()),
-            };
+            let text = if row.now == Value::Unset { "custom".to_owned() } else { row.shown() };
             let response = ComboBox::from_id_salt("choice")
                 .width(width)
                 .truncate()
                 .selected_text(text)
                 .show_ui(ui, |ui| {
                     for word in words {
-                        if ui.selectable_label(now == Value::Choice(word), *word).clicked() {
+                        if ui.selectable_label(row.now == Value::Choice(word), *word).clicked() {
                             chosen = Some(*word);
                         }
                     }

@@ -20,7 +20,7 @@ const MAX_CHANGES: usize = 200;
 const MERGE_TIME: f64 = 0.5;
 /// Side of a button in the header, points.
 const BUTTON_SIDE: f32 = 26.0;
-/// This key sets several parameters at once and must be applied first.
+/// This key takes the place of several parameters and must be applied first.
 const PRESET: &str = "solver.preset";
 
 /// View settings chosen by the user.
@@ -106,7 +106,10 @@ impl Entry {
 
     /// Whether `later` continues this change.
     fn is_continued_by(&self, later: &Self) -> bool {
-        self.name == later.name && self.keys() == later.keys()
+        let (own, later_keys) = (self.keys(), later.keys());
+        self.name == later.name
+            && own.is_empty() == later_keys.is_empty()
+            && later_keys.iter().all(|key| own.contains(key))
     }
 
     /// Whether the change has no effect.
@@ -120,8 +123,10 @@ impl Entry {
     fn extend(&mut self, later: Self) {
         match (&mut self.change, later.change) {
             (Change::Parameters(own), Change::Parameters(later)) => {
-                for (own, later) in own.iter_mut().zip(later) {
-                    own.after = later.after;
+                for later in later {
+                    if let Some(own) = own.iter_mut().find(|own| own.key == later.key) {
+                        own.after = later.after;
+                    }
                 }
             }
             (Change::View(own), Change::View(later)) => {
@@ -247,7 +252,8 @@ impl App {
             return;
         }
         self.compare(!held && self.undo.last().is_none_or(|at| now - at > MERGE_TIME));
-        if let Some(edit) = edits.iter().find(|edit| edit.key == PRESET).or(edits.first()) {
+        // Those before the last give way to it: a preset, or the settings whose place it takes.
+        if let Some(edit) = edits.last() {
             let original = self.player.original(&edit.key);
             let scene = self.player.pending();
             let kind = scene.parameter(&edit.key).ok().map(|parameter| &parameter.kind);

@@ -5,7 +5,7 @@
 
 use crate::analysis::section::Schedule;
 use crate::machine::Vec3;
-use crate::scene::{LiveScene, SOLVER_KEYS, SetError, Value};
+use crate::scene::{LiveScene, SetError, Value};
 use crate::simulate::{Effect, MAX_RUN_DURATION, Pull};
 
 /// Largest stiffness, N/m, and damping, N s/m, of a logged pull.
@@ -61,16 +61,7 @@ impl Event {
     /// As [`LiveScene::set`]; the run is left unchanged.
     pub fn apply(&self, run: &mut LiveScene) -> Result<Effect, SetError> {
         match self {
-            Self::Set { key, value } => {
-                let effect = run.set(key, value)?;
-                if key == "solver.preset" {
-                    // A preset chosen live must take effect: it replaces solver keys set by name before.
-                    for solver_key in SOLVER_KEYS {
-                        run.set_value(solver_key, &Value::Unset)?;
-                    }
-                }
-                Ok(effect)
-            }
+            Self::Set { key, value } => run.set(key, value),
             // A ball joint without a value of its own in the file follows the common one again, whatever that is now.
             Self::Original { key } => run.set_value(key, &Value::Unset),
             Self::Pull(pulled) => Ok(run.pull(pulled.map(Pull::from)).map(|()| Effect::Now)?),

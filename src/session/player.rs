@@ -19,7 +19,7 @@ use super::twin::Twin;
 use super::watch::RunWatch;
 use crate::analysis::presets::too_slow;
 use crate::machine::Warning;
-use crate::scene::{LiveScene, SOLVER_KEYS, Scene, SetError, Value};
+use crate::scene::{LiveScene, Scene, SetError, Value};
 use crate::simulate::{
     ChannelInfo, Channels, ContactMode, Effect, Frame, History, Limit, Pacer, Peak, Pull, Simulation, StartError,
     Stopped, Wear,
@@ -543,13 +543,6 @@ impl Player {
         };
         self.after_change();
         Ok(effect)
-    }
-
-    /// Keys that the scene's file sets by name and that therefore override any preset.
-    pub fn keys_overriding_preset(&self) -> Vec<&'static str> {
-        let places = &self.original.source.places;
-        let is_in_file = |key: &&str| places.contains_key(*key);
-        SOLVER_KEYS.into_iter().filter(is_in_file).collect()
     }
 
     /// Reverts the change of a parameter: it has its value in the scene file again, or follows what it follows there.

@@ -161,13 +161,28 @@ fn undo_returns_a_value_to_what_it_followed() {
     set(&mut harness, "contact.clearance", "0.6 mm");
     assert!(clearances(&harness).iter().all(|all| *all == 6e-4), "{:?}", clearances(&harness));
 
-    // The solver follows its preset.
+    // A tolerance takes the place of a preset, and gives it back.
     let tolerance = |harness: &Harness<'_, App>| harness.state().player().pending().machine.solver.tolerance;
     set(&mut harness, "solver.preset", "reference");
     let preset = tolerance(&harness);
+    let changes = |harness: &Harness<'_, App>| harness.state().player().pending().changes.clone();
+    let with_preset = changes(&harness);
     set(&mut harness, "solver.tolerance", "1e-4");
+    let with_tolerance = changes(&harness);
     assert_ne!(tolerance(&harness), preset);
-    assert_eq!(harness.state().player().original("solver.tolerance"), Some(Value::Number(preset)));
+    let words = harness.state().undo_words(false).expect("a change");
+    assert!(words.starts_with("Undo: Tolerance"), "{words}");
     press(&mut harness, UNDO);
-    assert_eq!(tolerance(&harness), preset);
+    assert_eq!((tolerance(&harness), changes(&harness)), (preset, with_preset.clone()));
+    press(&mut harness, redo());
+    assert_eq!(changes(&harness), with_tolerance);
+    set(&mut harness, "solver.preset", "reference");
+    let words = harness.state().undo_words(false).expect("a change");
+    assert!(words.starts_with("Undo: Preset"), "{words}");
+    assert_eq!(changes(&harness), with_preset);
+    press(&mut harness, UNDO);
+    let (mut restored, mut expected) = (changes(&harness), with_tolerance);
+    restored.sort();
+    expected.sort();
+    assert_eq!(restored, expected);
 }

@@ -796,17 +796,17 @@ fn the_accuracy_of_the_running_scene_is_shown_beside_the_controls() {
     harness.get_by_label("Accuracy").click();
     harness.run();
     harness.get_by_label("not measured yet");
-    // Settings that match a preset show its name, even if it was not chosen.
     let preset = |harness: &Harness<'_, App>| {
         let choice = harness.get_by_role_and_label(Role::ComboBox, "Preset");
         choice.value().map(|name| name.to_string())
     };
     assert_eq!(preset(&harness).as_deref(), Some("custom"));
-    harness.state_mut().player_mut().set("solver.tolerance", "1e-7").expect("in range");
+    harness.state_mut().player_mut().set("solver.preset", "accurate").expect("a preset");
     harness.run_steps(2);
     assert_eq!(preset(&harness).as_deref(), Some("accurate"));
-    harness.state_mut().player_mut().set_original("solver.tolerance").expect("its own value");
+    harness.state_mut().player_mut().set_original("solver.preset").expect("its own value");
     harness.run_steps(2);
+    assert_eq!(preset(&harness).as_deref(), Some("custom"));
     // The default has measured errors, too.
     assert!(harness.query_by_label("no preset").is_none());
     // Nothing has been hit yet, and the rows about impacts say so.

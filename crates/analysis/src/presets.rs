@@ -75,8 +75,7 @@ pub struct TooSlow {
 /// Returns the measurement of a built-in `scene` that requests the preset `real-time` but ran slower than real time.
 pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
     let record = record();
-    let is_requested =
-        scene.machine.solver.preset == Some(Preset::RealTime) && Setting::has_preset(&scene.machine, Preset::RealTime);
+    let is_requested = scene.machine.solver.preset == Some(Preset::RealTime);
     let pace = record.pace.get(&scene.name).copied().filter(|_| scene.source.file.is_none());
     pace.filter(|pace| is_requested && *pace < 1.0).map(|pace| TooSlow {
         scene: scene.name.clone(),

@@ -43,11 +43,6 @@ impl Setting {
         Self::of(&preset.solver(machine))
     }
 
-    /// Whether `machine` runs with all settings of `preset`.
-    pub(super) fn has_preset(machine: &Machine, preset: Preset) -> bool {
-        Self::of(&machine.solver) == Self::of_preset(preset, machine)
-    }
-
     /// Runge-Kutta 4 at 10 microseconds, the baseline of speed ratios.
     pub fn baseline() -> Self {
         Self::new(Method::RungeKutta4, 10e-6)

@@ -7,7 +7,21 @@ use super::numbers::row_of_number;
 use super::read::{is_fixed_in_file, replaces_text};
 use super::table::{contact_part, contact_rows, find, joint_part};
 use super::*;
+use jointplay_physics::integrate::StepControl;
+use jointplay_physics::machine::Solver;
 use jointplay_physics::suggest::{did_you_mean, nearest, nearest_name};
+
+/// Keys of changes that set the solver by its method and numbers.
+pub(super) fn sets_solver(changes: &[(String, String)]) -> impl Iterator<Item = &str> {
+    changes.iter().map(|(key, _)| &**key).filter(|key| SOLVER_KEYS.contains(key))
+}
+
+/// What is wrong with a preset beside `key`, one of [`SOLVER_KEYS`].
+pub(super) fn beside_preset(key: &str) -> String {
+    format!(
+        "{PRESET} is given, too: give a preset, or a method with its number, and leave out either {PRESET} or {key}"
+    )
+}
 
 /// A key resolved against a scene: its row, and the joint it applies to.
 struct Resolved {
@@ -130,14 +144,21 @@ impl Scene {
     }
 
     /// Changes a parameter in place and records it in `changes`, or reads the scene again from its source with all changes so
-    /// far.
+    /// far. A preset takes the place of method, step, tolerance and steps per impact, and the reverse: the method and the number
+    /// of a preset that one of them replaces remain, as changes.
     ///
     /// # Errors
     /// Unknown key, wrong unit, out of range, or an inconsistent scene; `self` is then unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<&'static Parameter, SceneError> {
         let mut next = self.clone();
+        let leaves_preset = SOLVER_KEYS.contains(&key) && self.machine.solver.preset.is_some();
+        if key == PRESET {
+            next.changes.retain(|(changed, _)| !SOLVER_KEYS.contains(&&**changed));
+        } else if leaves_preset {
+            next.leave_preset()?;
+        }
         let parameter = next.change(key, value)?;
-        if replaces_text(key) {
+        if leaves_preset || replaces_text(key) {
             next = next.rebuilt()?;
         }
         next.apply_preset();
@@ -174,7 +195,8 @@ impl Scene {
     }
 
     /// The value that `key` has once its change is reverted; `text` is the scene as read from the same text without changes. A ball
-    /// joint without a value of its own in the text then follows the common value, and the solver its preset, as changed since.
+    /// joint without a value of its own in the text then follows the common value, and a solver that no change sets the text's
+    /// preset.
     pub fn value_without_change(&self, text: &Self, key: &str) -> Option<Value> {
         if !self.changes.iter().any(|(changed, _)| changed == key) {
             return self.get(key).ok();
@@ -187,10 +209,12 @@ impl Scene {
         if joint.is_some() && !contact_part(parameter).is_some_and(is_own) {
             return self.get(parameter.key).ok();
         }
-        if SOLVER_KEYS.contains(&key) && !self.source.places.contains_key(key) && self.machine.solver.preset.is_some() {
-            let mut next = self.clone();
-            next.changes.retain(|(changed, _)| changed != key);
-            next.apply_preset();
+        if let (true, Some(preset)) = (SOLVER_KEYS.contains(&key), text.machine.solver.preset) {
+            if sets_solver(&self.changes).any(|changed| changed != key) {
+                return Some(parameter.default.clone());
+            }
+            let mut next = text.clone();
+            next.machine.solver = preset.solver(&self.machine);
             return next.get(key).ok();
         }
         text.get(key).ok()
@@ -234,27 +258,27 @@ impl Scene {
         Ok(parameter)
     }
 
-    /// Applies the solver's preset to this machine, except for keys that the text or a change sets by name.
+    /// Applies the solver's preset to this machine.
     pub(super) fn apply_preset(&mut self) {
-        let Some(preset) = self.machine.solver.preset else {
-            return;
+        if let Some(preset) = self.machine.solver.preset {
+            let energy_ledger = self.machine.solver.energy_ledger;
+            self.machine.solver = Solver { energy_ledger, ..preset.solver(&self.machine) };
+        }
+    }
+
+    /// Puts the method that the preset chose for this machine and its number in the place of the preset.
+    fn leave_preset(&mut self) -> Result<(), SceneError> {
+        let number = match self.machine.solver.method.control() {
+            StepControl::Fixed => "solver.step",
+            StepControl::Error => "solver.tolerance",
+            StepControl::PerImpact => "solver.steps_per_impact",
         };
-        let preset = preset.solver(&self.machine);
-        let given = |key: &str| self.source.places.contains_key(key) || self.changes.iter().any(|(own, _)| own == key);
-        let [method, step, tolerance, steps_per_impact] = SOLVER_KEYS.map(given);
-        let solver = &mut self.machine.solver;
-        if !method {
-            solver.method = preset.method;
+        self.changes.retain(|(changed, _)| changed != PRESET);
+        for key in ["solver.method", number] {
+            let text = self.parameter(key)?.write(&self.get(key)?);
+            self.change(key, &text)?;
         }
-        if !step {
-            solver.step = preset.step;
-        }
-        if !tolerance {
-            solver.tolerance = preset.tolerance;
-        }
-        if !steps_per_impact {
-            solver.steps_per_impact = preset.steps_per_impact;
-        }
+        Ok(())
     }
 
     /// Writes a value already checked against the table; a contact value also applies to joints that do not override it.

@@ -105,5 +105,8 @@ pub struct ViewSettings {
 /// Maximum number of initial plots.
 pub const MAX_PLOTS: usize = 4;
 
-/// Keys set by a preset.
+/// Key of the preset.
+pub(super) const PRESET: &str = "solver.preset";
+
+/// Keys whose place a preset takes.
 pub const SOLVER_KEYS: [&str; 4] = ["solver.method", "solver.step", "solver.tolerance", "solver.steps_per_impact"];

@@ -1,5 +1,6 @@
 //! Reads a scene from TOML: settings first, then bodies, joints and ball joints.
 
+use super::access::beside_preset;
 use super::assets::AssetResolver;
 use super::closed_form::read_closed_form;
 use super::document::{Document, Node, Section, lists};
@@ -137,6 +138,16 @@ impl Scene {
         read_mechanism(&files, &patterns, &mut scene, &mut places)?;
         scene.source.numbers = Arc::new(document.reading.numbers());
         scene.source.own = own;
+        let has_preset = changes.iter().any(|(key, _)| key == PRESET);
+        let mut solver_changes = changes.iter().filter(|(key, _)| SOLVER_KEYS.contains(&&**key));
+        match solver_changes.next() {
+            Some((key, value)) if has_preset => {
+                return Err(SceneError::about(key, Some(value), beside_preset(key)));
+            }
+            // They take the place of the text's preset.
+            Some(_) => scene.machine.solver.preset = None,
+            None => {}
+        }
         for (key, value) in changes {
             if retains(&scene, key) {
                 scene.change(key, value)?;
@@ -164,11 +175,11 @@ fn read_scene_instance<'d>(top: &Section<'_>) -> Result<Option<Instance<'d>>, Sc
     Ok(placement.map(|placement| Instance { group: Group::Scene, placement, outer: None }))
 }
 
-/// Whether a change of a key replaces a value of the text, which is read again: a number of the text, the parameter that places
-/// bodies, or the preset, which other settings override. Other parameters of the table are changed in the machine.
+/// Whether a change of a key replaces a value of the text, which is read again: a number of the text, or the parameter that places
+/// bodies. Other parameters of the table are changed in the machine.
 pub(super) fn replaces_text(key: &str) -> bool {
     let in_table = |(_, part): (&str, &str)| find(&format!("contact.{part}")).is_some();
-    key == "solver.preset" || find(key).is_none() && !joint_part(key).is_some_and(in_table) && !is_fixed_in_file(key)
+    find(key).is_none() && !joint_part(key).is_some_and(in_table) && !is_fixed_in_file(key)
 }
 
 /// Whether a key exists in scene files but can never be changed from outside.
@@ -256,6 +267,11 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
         };
         scene.write(parameter, &node.parameter()?);
         places.insert(parameter.key.to_owned(), node);
+    }
+    if let (true, Some((key, node))) =
+        (places.contains_key(PRESET), SOLVER_KEYS.iter().find_map(|key| places.get_key_value(*key)))
+    {
+        return Err(node.error(&beside_preset(key)));
     }
     Ok(places)
 }

@@ -329,7 +329,7 @@ static TABLE: [Parameter; 25] = [
         Scope::Every,
         "Method and accuracy by name: preview (automatic, 1e-3; discrete-gradient, 16, where 3 or more loose balls act on one another), \
          real-time (automatic, 5e-4; discrete-gradient, 24, where 4 or more do), accurate (automatic, 1e-7), reference (dopri5, 1e-11). \
-         A method, step, tolerance or number of steps per impact that is set as well overrides the preset.",
+         A scene has a preset, or a method with its tolerance, step or steps per impact, not both.",
         "Solves paper eqs. (55), (58) in time",
     ),
     at_reset(row(

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::*;
 use jointplay_physics::integrate::{Method, StepControl};
-use jointplay_physics::machine::ElementKind;
+use jointplay_physics::machine::{ElementKind, Solver};
 
 /// World poses of all bodies at the file's start, without drives.
 fn start_poses(scene: &Scene) -> Vec<(Vec3, Quat)> {
@@ -135,23 +135,76 @@ fn the_last_of_two_changes_wins_and_only_the_result_is_checked() {
 }
 
 #[test]
-fn explicit_solver_settings_override_a_preset_in_either_order() {
+fn a_preset_and_a_method_are_refused_together_and_a_change_replaces_the_one_of_the_text() {
     let preset = ("solver.preset", "reference");
     let method = ("solver.method", "rk4");
+    let owned = |(key, value): (&str, &str)| (key.to_owned(), value.to_owned());
     for changes in [[preset, method], [method, preset]] {
-        let solver = changed("spcmm", &changes).machine.solver;
-        assert_eq!(solver.method, jointplay_physics::integrate::Method::RungeKutta4);
-        assert_eq!(solver.tolerance, 1e-11);
-        assert_eq!(solver.preset, Some(Preset::Reference));
+        let error = Scene::load("spcmm", &changes.map(owned)).unwrap_err();
+        assert_eq!(error.key.as_deref(), Some("solver.method"));
+        assert!(error.message.contains("give a preset, or a method with its number"), "{error}");
     }
-    let text = |solver: &str| format!("{}\n{solver}", built_in_text("pendulum").unwrap());
-    let file = text("[solver]\ntolerance = 1e-5\npreset = \"accurate\"");
-    assert_eq!(Scene::parse(&file, None, &[]).unwrap().machine.solver.tolerance, 1e-5);
-    // A preset requested later does not replace explicit settings of the file either.
-    let change = [("solver.preset".to_owned(), "reference".to_owned())];
-    let solver = Scene::parse(&file, None, &change).unwrap().machine.solver;
-    assert_eq!(solver.tolerance, 1e-5);
-    assert_eq!(solver.method, jointplay_physics::integrate::Method::DormandPrince5);
+    let text = |solver: &str| format!("{}\n[solver]\n{solver}\n", built_in_text("pendulum").unwrap());
+    let parse = |solver: &str, changes: &[(&str, &str)]| {
+        Scene::parse(&text(solver), None, &changes.iter().copied().map(owned).collect::<Vec<_>>())
+    };
+    for key in SOLVER_KEYS {
+        let number = match key {
+            "solver.method" => "method = \"rk4\"",
+            "solver.step" => "step = \"1 us\"",
+            "solver.tolerance" => "tolerance = 1e-5",
+            _ => "steps_per_impact = 8",
+        };
+        let error = parse(&format!("{number}\npreset = \"accurate\""), &[]).unwrap_err();
+        assert!(error.message.contains(&format!("leave out either solver.preset or {key}")), "{error}");
+        assert!(error.position.is_some());
+    }
+    let replaced = parse("tolerance = 1e-5\nmethod = \"rk4\"", &[preset]).unwrap();
+    assert_eq!(replaced.machine.solver, Preset::Reference.solver(&replaced.machine));
+    let replaced = parse("preset = \"reference\"", &[("solver.tolerance", "1e-5")]).unwrap();
+    assert_eq!(replaced.machine.solver, Solver { tolerance: 1e-5, ..Solver::default() });
+    for scene in [parse("tolerance = 1e-5\nmethod = \"rk4\"", &[preset]), Ok(replaced)] {
+        let scene = scene.unwrap();
+        let written = Scene::parse(&scene.to_toml().unwrap(), None, &[]).unwrap();
+        assert_eq!(written.machine.solver, scene.machine.solver);
+    }
+}
+
+#[test]
+fn a_setting_changed_on_top_of_a_preset_keeps_its_method_and_number() {
+    let owned = |pairs: &[(&str, &str)]| pairs.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect::<Vec<_>>();
+    let mut scene = changed("hexapod", &[("solver.preset", "real-time")]);
+    let own = scene.machine.solver;
+    let without = |scene: &Scene, key: &str| scene.value_without_change(&changed("hexapod", &[]), key);
+    scene.set("solver.tolerance", "1e-5").unwrap();
+    assert_eq!(scene.machine.solver, Solver { preset: None, tolerance: 1e-5, ..own });
+    let changes = owned(&[
+        ("solver.method", "discrete-gradient"),
+        ("solver.steps_per_impact", "24"),
+        ("solver.tolerance", "1e-5"),
+    ]);
+    assert_eq!(scene.changes, changes);
+    assert_eq!(without(&scene, "solver.tolerance"), Some(Value::Number(1e-6)));
+    // The same as a list, and back.
+    assert_eq!(Scene::load("hexapod", &changes).unwrap().machine.solver, scene.machine.solver);
+    scene.set("solver.preset", "real-time").unwrap();
+    assert_eq!((scene.machine.solver, scene.changes.len()), (own, 1));
+
+    let text = format!("{}\n[solver]\npreset = \"reference\"\n", built_in_text("pendulum").unwrap());
+    let file = Scene::parse(&text, None, &[]).unwrap();
+    let mut scene = file.clone();
+    scene.set("solver.tolerance", "1e-9").unwrap();
+    assert_eq!(scene.changes, owned(&[("solver.method", "dopri5"), ("solver.tolerance", "1e-9")]));
+    // While another change sets the solver, the preset of the text does not come back.
+    for (key, value) in [("solver.method", Value::Choice("automatic")), ("solver.tolerance", Value::Number(1e-11))] {
+        assert_eq!(scene.value_without_change(&file, key), Some(value.clone()));
+        scene.undo_change(key).unwrap();
+        assert_eq!(scene.get(key), Ok(value));
+    }
+    assert_eq!(scene.machine.solver, file.machine.solver);
+    // A refused value leaves all as it was.
+    assert!(scene.set("solver.tolerance", "-1").is_err());
+    assert_eq!((scene.machine.solver, scene.changes.len()), (file.machine.solver, 0));
 }
 
 #[test]
@@ -852,13 +905,9 @@ fn a_fast_preset_follows_the_number_of_coupled_balls_in_whatever_order_it_is_set
     for changes in [[preset, ideal, one], [ideal, one, preset], [ideal, preset, one]] {
         assert_eq!(solver(&changes), Preset::RealTime.solver(&changed("pendulum", &[]).machine), "{changes:?}");
     }
-    // Explicit settings are unaffected.
-    let explicit = [preset, ("solver.steps_per_impact", "8"), ("solver.tolerance", "1e-5")];
-    let result = solver(&explicit);
-    assert_eq!((result.method, result.steps_per_impact, result.tolerance), (many.method, 8, 1e-5));
-    let mut scene = changed("hexapod", &explicit);
-    scene.undo_change("solver.steps_per_impact").unwrap();
-    assert_eq!(scene.machine.solver.steps_per_impact, many.steps_per_impact);
+    let mut scene = changed("hexapod", &[preset]);
     scene.set("contact.clearance", "0").unwrap();
     assert_eq!(scene.machine.solver.method, Method::Automatic);
+    scene.undo_change("contact.clearance").unwrap();
+    assert_eq!(scene.machine.solver, many);
 }

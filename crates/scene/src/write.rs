@@ -4,9 +4,11 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, TableLike, Value as Tom
 
 use std::collections::BTreeMap;
 
+use super::access::sets_solver;
 use super::file_number::{FileNumber, Place};
+use super::model::PRESET;
 use super::table::joint_part;
-use super::{Scene, SceneError, Value};
+use super::{SOLVER_KEYS, Scene, SceneError, Value};
 use jointplay_physics::units::exact_quantity;
 
 /// Maximum number of components in a vector.
@@ -24,6 +26,16 @@ impl Scene {
             .numbers_in_place()?
             .parse()
             .map_err(|error: toml_edit::TomlError| write_error("", error.message().to_owned()))?;
+        if let Some(solver) = document.get_mut("solver").and_then(Item::as_table_like_mut) {
+            let gone: &[&str] = match self.changes.iter().any(|(key, _)| key == PRESET) {
+                true => &SOLVER_KEYS,
+                false if sets_solver(&self.changes).next().is_some() => &[PRESET],
+                false => &[],
+            };
+            for key in gone {
+                solver.remove(key.trim_start_matches("solver."));
+            }
+        }
         for (key, _) in &self.changes {
             if !self.source.numbers.contains_key(key) {
                 self.write_change(&mut document, key)?;
@@ -236,7 +248,6 @@ mod tests {
             ("contact.clearance", "0.5 mm"),
             ("joint.S1.clearance", "0.2 mm"),
             ("joint.S1.friction", "0.4"),
-            ("solver.method", "rk4"),
             ("solver.preset", "preview"),
             ("gravity.x", "3 m/s^2"),
             ("formulation", "lagrange"),

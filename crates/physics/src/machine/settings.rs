@@ -64,10 +64,10 @@ words!(Preset {
     Reference => "reference",
 });
 
-/// Stepper settings. An explicit method, step or tolerance takes precedence over the preset.
+/// Stepper settings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Solver {
-    /// Preset, which supplies the settings not given.
+    /// Preset from which method, step, tolerance and steps per impact are.
     pub preset: Option<Preset>,
     /// Effective method.
     pub method: Method,
