@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 use jointplay_analysis::assembly::StartReport;
 use jointplay_analysis::ideal_fault::ideal_fault;
 use jointplay_physics::simulate::{ChannelInfo, Frame, Simulation, channels_of};
-use jointplay_scene::{BENCHMARKS, BUILT_IN, Kind, LiveScene, Scene, SceneError, Texts, contact_parts};
+use jointplay_scene::{
+    BENCHMARKS, BUILT_IN, Kind, LiveScene, Scene, SceneError, Texts, check_solver_changes, contact_parts,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -217,6 +219,9 @@ impl PyScene {
 
 /// `scene` with changes; `None` returns to the value of the file.
 fn with_changes(scene: &Scene, changes: &[(String, Option<String>)]) -> Result<Scene, SceneError> {
+    let own: Vec<(String, String)> =
+        changes.iter().filter_map(|(key, text)| Some((key.clone(), text.clone()?))).collect();
+    check_solver_changes(&own)?;
     let one_by_one = || {
         let mut scene = scene.clone();
         for (key, text) in changes {
@@ -231,7 +236,6 @@ fn with_changes(scene: &Scene, changes: &[(String, Option<String>)]) -> Result<S
     let together = |error| {
         let is_changed = |key: &String| changes.iter().any(|(changed, _)| changed == key);
         let earlier = scene.changes.iter().filter(|(key, _)| !is_changed(key)).cloned();
-        let own = changes.iter().filter_map(|(key, text)| Some((key.clone(), text.clone()?)));
         let all: Vec<(String, String)> = earlier.chain(own).collect();
         let source = &scene.source;
         Scene::parse_with(&source.text, source.file.as_deref(), &source.beside, &all).map_err(|_| error)

@@ -116,6 +116,15 @@ def test_a_refused_change_names_key_and_range(change, key, message):
     assert scene.changes == {}
 
 
+def test_a_preset_and_a_method_take_the_place_of_each_other_but_do_not_go_together():
+    scene = jp.Scene.load("four-bar").set({"solver.preset": "reference"})
+    tighter = scene.set({"solver.tolerance": 1e-12})
+    assert tighter.changes == {"solver.method": "dopri5", "solver.tolerance": "1e-12"}
+    assert tighter.set({"solver.preset": "reference"}).changes == scene.changes
+    with pytest.raises(jp.SceneError, match="give a preset, or a method with its number"):
+        scene.set({"solver.preset": "accurate", "solver.tolerance": 1e-9})
+
+
 @pytest.mark.parametrize("value", [True, [1], {}, float("nan"), float("inf"), b"1", object()])
 def test_a_value_that_is_no_number_is_refused(value):
     with pytest.raises(jp.OptionError, match="contact.friction"):

@@ -140,9 +140,8 @@ mod tests {
             if let Some(warning) = warning {
                 assert!(warning.to_string().contains(name), "{warning}");
             }
-            // The preset is not requested, or its values are overridden.
+            // Not requested.
             assert_eq!(slow(name, &[]), None);
-            assert_eq!(slow(name, &[REAL_TIME, ("solver.tolerance", "1e-4")]), None);
         }
     }
 }

@@ -23,6 +23,18 @@ pub(super) fn beside_preset(key: &str) -> String {
     )
 }
 
+/// Checks that `changes` made at once do not ask for a preset and for a method or its number.
+///
+/// # Errors
+/// They do; the error is about the method or the number.
+pub fn check_solver_changes(changes: &[(String, String)]) -> Result<(), SceneError> {
+    let method = changes.iter().find(|(key, _)| SOLVER_KEYS.contains(&&**key));
+    match method.filter(|_| changes.iter().any(|(key, _)| key == PRESET)) {
+        Some((key, value)) => Err(SceneError::about(key, Some(value), beside_preset(key))),
+        None => Ok(()),
+    }
+}
+
 /// A key resolved against a scene: its row, and the joint it applies to.
 struct Resolved {
     parameter: &'static Parameter,

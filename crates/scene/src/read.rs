@@ -1,6 +1,6 @@
 //! Reads a scene from TOML: settings first, then bodies, joints and ball joints.
 
-use super::access::beside_preset;
+use super::access::{beside_preset, check_solver_changes, sets_solver};
 use super::assets::AssetResolver;
 use super::closed_form::read_closed_form;
 use super::document::{Document, Node, Section, lists};
@@ -138,15 +138,10 @@ impl Scene {
         read_mechanism(&files, &patterns, &mut scene, &mut places)?;
         scene.source.numbers = Arc::new(document.reading.numbers());
         scene.source.own = own;
-        let has_preset = changes.iter().any(|(key, _)| key == PRESET);
-        let mut solver_changes = changes.iter().filter(|(key, _)| SOLVER_KEYS.contains(&&**key));
-        match solver_changes.next() {
-            Some((key, value)) if has_preset => {
-                return Err(SceneError::about(key, Some(value), beside_preset(key)));
-            }
+        check_solver_changes(changes)?;
+        if sets_solver(changes).next().is_some() {
             // They take the place of the text's preset.
-            Some(_) => scene.machine.solver.preset = None,
-            None => {}
+            scene.machine.solver.preset = None;
         }
         for (key, value) in changes {
             if retains(&scene, key) {
