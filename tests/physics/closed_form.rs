@@ -2,7 +2,8 @@
 
 use crate::common::parse;
 use jointplay::analysis::ideal_fault::{IdealFault, ideal_fault};
-use jointplay::machine::StartRule;
+use jointplay::machine::{Machine, StartRule};
+use jointplay::mechanism::{Mechanism, MechanismError, periods_of};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation, StopFault};
 
@@ -108,4 +109,80 @@ fn a_run_without_play_stops_where_it_leaves_its_closed_form() {
     let mut simulation = Simulation::new(&scene.machine).expect("starts where it should");
     let stopped = simulation.advance_to(0.5).expect_err("leaves the path");
     assert!(matches!(stopped.fault, StopFault::OffPath { distance } if distance < 2e-5), "{stopped}");
+}
+
+/// The default scene with these keys changed.
+fn paper(changes: &[(&str, &str)]) -> Machine {
+    crate::common::scene("spcmm", changes).machine
+}
+
+/// Position, rate and acceleration of the three sliders, which follow functions of the closed form.
+fn sliders(machine: &Machine, time: f64) -> [[f64; 3]; 3] {
+    let mut simulation = Simulation::new(machine).expect("starts");
+    let mut frame = Frame::default();
+    simulation.advance_to(time).expect("runs");
+    simulation.sample(time, &mut frame);
+    [1, 2, 3].map(|n| {
+        let at = machine.bodies.iter().position(|body| body.name == format!("slider{n}")).expect("a slider");
+        let (body, axis) = (&frame.bodies[at], machine.joints[at].axis);
+        [body.position.dot(&axis), body.velocity.dot(&axis), body.acceleration.dot(&axis)]
+    })
+}
+
+#[test]
+fn sliders_of_the_paper_have_the_reference_values() {
+    let machine = paper(&[]);
+    let expected = [
+        [0.1364935480, -0.11575599, -0.13201567],
+        [0.2409227735, -0.04964883, -0.0671871],
+        [0.1864724056, -0.07282449, -0.08487076],
+    ];
+    for (slider, expected) in sliders(&machine, 0.0).iter().zip(expected) {
+        for ((value, expected), limit) in slider.iter().zip(expected).zip([1e-10, 1e-8, 1e-8]) {
+            assert!((value - expected).abs() < limit, "{slider:?} {expected}");
+        }
+    }
+    for (slider, value) in sliders(&machine, 0.5).iter().zip([0.0902403840, 0.2210909323, 0.1575618239]) {
+        assert!((slider[0] - value).abs() < 1e-10, "{slider:?}");
+    }
+}
+
+#[test]
+fn roots_are_real_in_the_stated_range_of_the_socket_plane() {
+    for (socket_plane, reachable) in [(0.041518, true), (0.041516, false), (0.364482, true), (0.364484, false)] {
+        let machine = paper(&[("spcmm.slider_plane", &format!("{} m", socket_plane - 0.028))]);
+        assert_eq!(Mechanism::new(&machine).is_ok(), reachable, "x_s = {socket_plane}");
+    }
+}
+
+#[test]
+fn the_error_names_the_function_with_the_lowest_negative_value() {
+    let mut machine = paper(&[("spcmm.slider_plane", "0 m")]);
+    let fault = |machine: &Machine| match Mechanism::new(machine) {
+        Err(MechanismError::Unreachable(error)) => error,
+        _ => panic!("the rod is long enough"),
+    };
+    let error = fault(&machine);
+    assert_eq!((error.function.as_str(), error.what.as_str()), ("root1", "slider 1: rod too short"));
+    assert!(error.value.starts_with('-') && error.value.ends_with(" m^2"), "{error}");
+    let functions = &mut machine.closed_form.as_mut().expect("has one").functions;
+    functions.iter_mut().for_each(|function| function.positive = None);
+    let error = fault(&machine);
+    assert!(error.to_string().starts_with("a function has no value at t = 0."), "{error}");
+    assert!(error.function == "f1" && error.value == "NaN m" && error.requirement == "finite", "{error}");
+}
+
+#[test]
+fn a_motion_at_another_pace_is_the_same_motion() {
+    let machine = paper(&[]);
+    let mut slow = machine.clone();
+    slow.closed_form.as_mut().expect("has one").pace = 0.25;
+    assert!(periods_of(&machine).all(|period| period == 2.0) && periods_of(&slow).all(|period| period == 8.0));
+    for (a, b) in sliders(&machine, 0.02).iter().zip(&sliders(&slow, 0.08)) {
+        for ((a, b), [factor, limit]) in a.iter().zip(b).zip([[1.0, 1e-15], [4.0, 1e-14], [16.0, 1e-13]]) {
+            assert!((a - factor * b).abs() < limit, "{a:?} {b:?}");
+        }
+    }
+    let still = paper(&["spcmm.amplitude_x", "spcmm.amplitude_beta"].map(|key| (key, "0")));
+    assert!(periods_of(&still).all(f64::is_infinite));
 }

@@ -1,6 +1,8 @@
 //! Untrustworthy results raise a doubt with its reason; trustworthy ones raise none.
 
 use crate::common::{Changes, frame_now, free_ball, parse, run_until, simulation};
+use jointplay::machine;
+use jointplay::scene::built_in_text;
 use jointplay::simulate::{Doubt, Simulation};
 
 fn doubt_texts(simulation: &Simulation) -> Vec<String> {
@@ -230,4 +232,25 @@ fn a_start_inside_a_stop_raises_a_doubt_with_depth_and_force() {
     assert_eq!(doubts("50"), [expected]);
     // A machine that rests on the stop raises none.
     assert!(doubts("10.05").is_empty() && doubts("5").is_empty());
+}
+
+/// Estimated duration of the pendulum's impacts with these sections added, s, if a step of 10 us does not resolve it.
+fn doubted_duration(sections: &str) -> Option<f64> {
+    let text = format!("{}\n{sections}", built_in_text("pendulum").expect("built in"));
+    let scene = parse(&text, &[("solver.method", "rk4"), ("solver.step", "10 us")]);
+    scene.machine.doubts().into_iter().find_map(|doubt| match doubt {
+        machine::Doubt::Step { duration, .. } => Some(duration),
+        _ => None,
+    })
+}
+
+#[test]
+fn a_load_shortens_the_estimated_impact() {
+    let load = |force: &str| {
+        let on = "{ body = \"rod\", at = [0, 0, 0] }";
+        format!("[[load]]\nname = \"l\"\non = {on}\nforce = \"0 0 {force}\"\n")
+    };
+    assert_eq!(doubted_duration(&load("1 N")), None);
+    let [less, more] = ["-1e4 N", "-1e8 N"].map(|force| doubted_duration(&load(force)).expect("short"));
+    assert!(less < 5e-5 && more < 0.5 * less, "{less:e} {more:e}");
 }

@@ -2,8 +2,11 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/large.rs"]
+mod large;
 
 mod bushings;
+mod channels;
 mod closed_form;
 mod coordinates;
 mod corners;
@@ -19,11 +22,13 @@ mod extremes;
 mod flights;
 mod formulations;
 mod guard;
+mod ideal;
 mod impact;
 mod includes;
 mod independent;
 mod joint_elements;
 mod known_systems;
+mod laws;
 mod ledger;
 mod limits;
 mod live_changes;
@@ -32,6 +37,7 @@ mod loop_joints;
 mod machines;
 mod many_joints;
 mod massless;
+mod mechanism;
 mod order;
 mod paper;
 mod pays_only;
@@ -48,6 +54,7 @@ mod settled;
 mod settled_start;
 mod simultaneous;
 mod spring_curves;
+mod stiff;
 mod tables;
 mod turned;
 mod turns;

@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use crate::common::{MACHINES, SCENES, run_until, scene};
 use jointplay::analysis::{Grid, Row, RunContext, Tradeoff, presets};
 use jointplay::integrate::Method;
-use jointplay::machine::Preset;
+use jointplay::machine::{Coupled, Preset};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Impact, Simulation};
 
@@ -228,4 +228,42 @@ fn fast_presets_leave_the_discrete_gradient_to_machines_that_it_accepts() {
         assert_eq!(machine.solver, Preset::RealTime.solver(&machine));
         Simulation::new(&machine).unwrap_or_else(|error| panic!("{links}: {error}"));
     }
+}
+
+fn coupled(name: &str, changes: &[(&str, &str)]) -> Coupled {
+    scene(name, changes).machine.coupled_joints()
+}
+
+#[test]
+fn joints_are_coupled_by_the_bodies_between_them() {
+    const IDEAL: (&str, &str) = ("contact.clearance", "0");
+    let one = |joint| (joint, "0.1 mm");
+    for (name, changes, joints) in [
+        ("pendulum", &[][..], 0),
+        ("four-bar", &[], 2),
+        ("spcmm", &[], 3),
+        ("suspension", &[], 4),
+        // Three legs, each of a knee and two arms, carry one platform.
+        ("delta", &[], 12),
+        ("hexapod", &[IDEAL], 0),
+        ("hexapod", &[IDEAL, one("joint.A6.clearance")], 0),
+        // Two legs that nothing but their ideal joints and the platform connects.
+        ("hexapod", &[IDEAL, one("joint.A6.clearance"), one("joint.B1.clearance")], 2),
+        ("chain", &[("chain.links", "1")], 0),
+        ("chain", &[("chain.links", "32")], 32),
+        // A loose joint at either end of an otherwise ideal chain.
+        ("chain", &[IDEAL, one("joint.J1.clearance"), one("joint.J8.clearance")], 2),
+    ] {
+        assert_eq!(coupled(name, changes), Coupled { joints, is_narrow: true }, "{name} {changes:?}");
+    }
+    let eight = coupled("tests/trials/slow-eight.toml", &[]);
+    assert_eq!(eight.joints, 0, "eight balls, each in a socket of its own in the world");
+}
+
+#[test]
+fn a_machine_is_narrow_where_few_of_its_joints_are_coupled_at_once() {
+    const MULTIPLIERS: (&str, &str) = ("formulation", "lagrange");
+    assert!(coupled("chain", &[("chain.links", "4096")]).is_narrow);
+    assert!(coupled("chain", &[("chain.links", "64"), MULTIPLIERS]).is_narrow);
+    assert!(!coupled("chain", &[("chain.links", "110"), MULTIPLIERS]).is_narrow);
 }

@@ -1,6 +1,6 @@
 //! Displaced states, and exponents and regimes from twin runs of a mechanism.
 
-use crate::common::{Changes, frame_now, parse, run_until, scene, simulation};
+use crate::common::{Changes, METHODS, frame_now, parse, run_until, scene, simulation};
 use jointplay::analysis::drive::{drive_period, observed};
 use jointplay::analysis::point::{Plan, PointResult, PointRun};
 use jointplay::analysis::regime::Regime;
@@ -248,4 +248,51 @@ fn exponents_agree_with_independent_computations() {
     let result = exponent_of(&carriage("10"), 160, 60);
     assert_eq!(result.regime, Regime::Periodic(2));
     assert!((value(&result) + 12.51).abs() < 0.2, "{}", value(&result));
+}
+
+#[test]
+fn a_twin_that_adopts_the_step_control_takes_the_same_steps() {
+    let mut run = simulation("four-bar", &[("solver.preset", "preview")]);
+    run.advance_to(0.3).expect("runs");
+    let twin = |offset: f64| {
+        let mut twin = run.clone();
+        twin.displace(&[offset; 8]);
+        twin
+    };
+    let (mut follower, mut alone) = (twin(1e-9), twin(1e-9));
+    let before = run.statistics().steps;
+    for _ in 0..400 {
+        run.step().expect("runs");
+        for other in [&mut follower, &mut alone] {
+            while other.time() < run.time() {
+                other.step_until(run.time()).expect("runs");
+            }
+        }
+        follower.adopt_step_control(&run);
+    }
+    // Rounding splits some of the follower's steps in two; a twin that chooses its own is truncated at nearly every one of
+    // the run's.
+    let steps = |of: &Simulation| of.statistics().steps - before;
+    assert!(steps(&follower) < 600, "{}", steps(&follower));
+    assert!(steps(&alone) > 800, "{}", steps(&alone));
+}
+
+#[test]
+fn states_stepped_in_turn_in_one_workspace_have_the_bits_of_states_in_their_own() {
+    for method in METHODS {
+        let mut alone = simulation("pendulum", &[("solver.method", method), ("solver.step", "20 us")]);
+        let model = alone.model().clone();
+        let mut states = [model.start(), model.start()];
+        let mut workspace = model.workspace(&states[0]);
+        while alone.time() < 0.015 {
+            alone.step().expect("runs");
+            for state in &mut states {
+                model.step(state, &mut workspace).expect("runs");
+            }
+        }
+        assert!(alone.statistics().impacts.iter().sum::<u64>() > 0, "{method}");
+        for state in &states {
+            assert!(state == alone.state(), "{method}");
+        }
+    }
 }

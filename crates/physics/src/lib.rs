@@ -42,12 +42,3 @@ pub mod simulate;
 pub mod suggest;
 pub mod units;
 pub mod words;
-
-// Unit tests read scenes. A dependency on `jointplay-scene` would bring in a second copy of this crate's types, so its sources
-// are compiled into the tests.
-#[cfg(test)]
-extern crate self as jointplay_physics;
-#[cfg(test)]
-#[allow(dead_code, unused_imports, reason = "the tests use parts of it")]
-#[path = "../../scene/src/lib.rs"]
-mod scene;

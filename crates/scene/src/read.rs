@@ -266,7 +266,7 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
     if let (true, Some((key, node))) =
         (places.contains_key(PRESET), SOLVER_KEYS.iter().find_map(|key| places.get_key_value(*key)))
     {
-        return Err(node.error(&beside_preset(key)));
+        return Err(node.error(beside_preset(key)));
     }
     Ok(places)
 }

@@ -563,7 +563,6 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
 mod tests {
     use super::*;
     use crate::machine::{Attachment, Body, Element, Joint, Mat3, Spring, SpringSide, Vec3};
-    use crate::scene::{Scene, built_in_text};
 
     /// Fault of a machine with a bob in a socket after `change`.
     fn fault(change: impl FnOnce(&mut Machine)) -> Option<MachineFault> {
@@ -615,28 +614,5 @@ mod tests {
         assert_eq!(curve, Some(MachineFault::Points { what: "s".to_owned() }));
         let wide = fault(|machine| machine.ball_joints[0].contact.clearance = 1.0);
         assert!(matches!(wide, Some(MachineFault::Contact { joint, .. }) if joint == "S1"));
-    }
-
-    /// Estimated duration of the pendulum's impacts with these sections added, s, if a step of 10 us does not resolve it.
-    fn doubted_duration(sections: &str) -> Option<f64> {
-        let text = format!("{}\n{sections}", built_in_text("pendulum").expect("built in"));
-        let method = ("solver.method".to_owned(), "rk4".to_owned());
-        let step = ("solver.step".to_owned(), "10 us".to_owned());
-        let scene = Scene::parse(&text, None, &[method, step]).expect("reads");
-        scene.machine.doubts().into_iter().find_map(|doubt| match doubt {
-            Doubt::Step { duration, .. } => Some(duration),
-            _ => None,
-        })
-    }
-
-    #[test]
-    fn a_load_shortens_the_estimated_impact() {
-        let load = |force: &str| {
-            let on = "{ body = \"rod\", at = [0, 0, 0] }";
-            format!("[[load]]\nname = \"l\"\non = {on}\nforce = \"0 0 {force}\"\n")
-        };
-        assert_eq!(doubted_duration(&load("1 N")), None);
-        let [less, more] = ["-1e4 N", "-1e8 N"].map(|force| doubted_duration(&load(force)).expect("short"));
-        assert!(less < 5e-5 && more < 0.5 * less, "{less:e} {more:e}");
     }
 }

@@ -164,8 +164,6 @@ fn moments_of_revolution(axis: &Vec3, [across, along]: [f64; 2]) -> Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::Quat;
-    use crate::scene::mesh::Format;
 
     /// Whether `point` lies in the shape, from the shape's definition.
     fn contains(geometry: &Geometry, point: &Vec3) -> bool {
@@ -267,78 +265,5 @@ mod tests {
         let whole = Solid::of(&Geometry::Box { centre: Vec3::zeros(), size: Vec3::new(0.2, 0.3, 0.4) });
         let both = Solid::sum([half(-0.05), half(0.05)]);
         assert!((whole.inertia() - both.inertia()).amax() < 1e-16 && both.centre.norm() < 1e-16);
-    }
-
-    /// A shape from the OBJ file `text`, in millimetres, rotated and shifted.
-    fn of_file(text: &str) -> Geometry {
-        let alone = |_: &str| Err(String::new().into());
-        let mesh = Format::Obj.read(text.as_bytes(), &alone).unwrap();
-        assert_eq!(mesh.open_edge(), None);
-        Geometry::Mesh {
-            mesh: mesh.into(),
-            unit: 1e-3,
-            position: Vec3::new(0.1, -0.2, 0.3),
-            rotation: Quat::from_euler_angles(0.4, -0.7, 1.1),
-        }
-    }
-
-    /// Relative errors of volume and inertia against those of the form, and distance of the centroid from `position`, m.
-    fn errors_against(mesh: &Geometry, form: &Geometry) -> [f64; 3] {
-        let Geometry::Mesh { position, rotation, .. } = mesh else { panic!("a mesh") };
-        let (computed, expected) = (Solid::of(mesh), Solid::of(form));
-        let turn = rotation.to_rotation_matrix().into_inner();
-        let inertia = turn * expected.inertia() * turn.transpose();
-        [
-            (computed.volume / expected.volume - 1.0).abs(),
-            (computed.centre - position).norm(),
-            (computed.inertia() - inertia).amax() / inertia.amax(),
-        ]
-    }
-
-    #[test]
-    fn a_mesh_of_a_box_has_the_mass_properties_of_the_box() {
-        let mut text = String::new();
-        for i in 0..8 {
-            let side = |bit: i32, size: f64| if i >> bit & 1 == 1 { size } else { -size };
-            text += &format!("v {} {} {}\n", side(0, 10.0), side(1, 20.0), side(2, 35.0));
-        }
-        text += "f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
-        let size = Vec3::new(0.02, 0.04, 0.07);
-        let centre = Vec3::zeros();
-        let [volume, centroid, inertia] = errors_against(&of_file(&text), &Geometry::Box { centre, size });
-        assert!(volume < 1e-12 && centroid < 1e-12 && inertia < 1e-12);
-    }
-
-    #[test]
-    fn a_mesh_of_a_ball_has_nearly_the_mass_properties_of_the_ball() {
-        let centre = Vec3::zeros();
-        let ball = Geometry::Sphere { centre, radius: 0.05 };
-        let errors = [40_usize, 80].map(|n| {
-            let mut text = format!("v 0 0 {}\nv 0 0 {}\n", 50.0, -50.0);
-            for i in 1..n {
-                for k in 0..2 * n {
-                    let (theta, phi) = (PI * i as f64 / n as f64, PI * k as f64 / n as f64);
-                    let (across, z) = (50.0 * libm::sin(theta), 50.0 * libm::cos(theta));
-                    let (x, y) = (across * libm::cos(phi), across * libm::sin(phi));
-                    text += &format!("v {x} {y} {z}\n");
-                }
-            }
-            let at = |i: usize, k: usize| 3 + (i - 1) * 2 * n + k % (2 * n);
-            for k in 0..2 * n {
-                text += &format!("f 1 {} {}\n", at(1, k), at(1, k + 1));
-                text += &format!("f 2 {} {}\n", at(n - 1, k + 1), at(n - 1, k));
-                for i in 1..n - 1 {
-                    let [a, b, c, d] = [at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)];
-                    text += &format!("f {a} {b} {c} {d}\n");
-                }
-            }
-            errors_against(&of_file(&text), &ball)
-        });
-        // The polyhedron is inscribed in the ball; its error falls with the square of the edge length.
-        assert!(errors[1][0] < 2e-3 && errors[1][1] < 1e-8 && errors[1][2] < 3e-3, "{errors:?}");
-        for i in [0, 2] {
-            let order = errors[0][i] / errors[1][i];
-            assert!((order - 4.0).abs() < 0.05, "{order}");
-        }
     }
 }

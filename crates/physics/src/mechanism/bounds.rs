@@ -282,33 +282,38 @@ pub fn check(machine: &Machine, model: &Model) -> Result<(), MechanismError> {
 }
 
 #[cfg(test)]
-#[path = "../../../../tests/common/large.rs"]
-mod large;
-
-#[cfg(test)]
 mod tests {
-    use super::large::scene_text;
     use super::*;
-    use crate::mechanism::{Mechanism, MechanismError};
-    use crate::scene::Scene;
+    use crate::machine::{Attachment, BallJoint, Body, Joint, Mat3, Vec3};
 
-    fn costs(kind: &str, n: usize) -> [Cost; 2] {
-        let scene = Scene::parse(&scene_text(kind, n, "0 m"), None, &[]).expect("a scene");
-        let model = Model::new(&scene.machine);
-        Formulation::ALL.map(|form| Cost::of(form, &scene.machine, &model, &model.ideal_joints))
+    /// Costs of `n` bodies in both formulations; `joint` is that of body `i`, `ball` the bodies of an ideal ball joint beside it.
+    fn costs(n: usize, joint: impl Fn(usize) -> Joint, ball: impl Fn(usize) -> Option<usize>) -> [Cost; 2] {
+        let mut machine = Machine::default();
+        for i in 0..n {
+            machine.add_body(Body::new(&format!("b{i}"), 1.0, Mat3::identity()), joint(i));
+        }
+        for (i, socket) in (1..n).filter_map(|i| Some((i, ball(i)?))) {
+            let [socket, ball] = [socket, i].map(|body| Attachment::on(body, Vec3::zeros()));
+            machine.ball_joints.push(BallJoint::new(&format!("S{i}"), socket, ball).with_clearance(0.0));
+        }
+        let model = Model::new(&machine);
+        Formulation::ALL.map(|form| Cost::of(form, &machine, &model, &model.ideal_joints))
     }
 
     #[test]
     fn costs_of_sparse_scenes_grow_linearly_and_those_of_dense_ones_by_their_powers() {
         // Growth of (entries, multiplications) from n to 2n parts, for tree and lagrange: 2 is linear.
-        for (kind, tree, lagrange) in [
-            ("free bodies", [1.0, 1.0], [1.0, 1.0]),
-            ("a chain", [2.0, 2.0], [2.0, 2.0]),
-            ("hinges in a row", [4.0, 8.0], [2.0, 2.0]),
-            ("hinges on one body", [4.0, 2.0], [4.0, 8.0]),
-            ("balls of one body", [4.0, 8.0], [4.0, 8.0]),
+        let hinge = |parent: Option<usize>, i: usize| Joint::revolute(parent, i, Vec3::y());
+        let in_a_row = |i: usize| hinge(i.checked_sub(1), i);
+        let on_one = |i: usize| if i == 0 { Joint::free(0) } else { hinge(Some(0), i) };
+        for (kind, both, tree, lagrange) in [
+            ("free bodies", [200, 400].map(|n| costs(n, Joint::free, |_| None)), [1.0, 1.0], [1.0, 1.0]),
+            ("a chain", [200, 400].map(|n| costs(n, Joint::free, |i| Some(i - 1))), [2.0, 2.0], [2.0, 2.0]),
+            ("hinges in a row", [200, 400].map(|n| costs(n, in_a_row, |_| None)), [4.0, 8.0], [2.0, 2.0]),
+            ("hinges on one body", [200, 400].map(|n| costs(n, on_one, |_| None)), [4.0, 2.0], [4.0, 8.0]),
+            ("balls of one body", [200, 400].map(|n| costs(n, Joint::free, |_| Some(0))), [4.0, 8.0], [4.0, 8.0]),
         ] {
-            let (once, twice) = (costs(kind, 200), costs(kind, 400));
+            let [once, twice] = both;
             for (form, growth) in [tree, lagrange].into_iter().enumerate() {
                 let (a, b) = (once[form], twice[form]);
                 let ratio = |a: u64, b: u64| b.max(1) as f64 / a.max(1) as f64;
@@ -318,48 +323,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    /// Whether `kind` with `n` parts is accepted, or the error message.
-    fn acceptance(kind: &str, n: usize, formulation: &str) -> Result<(), String> {
-        let changes = [("formulation".to_owned(), formulation.to_owned())];
-        let scene = Scene::parse(&scene_text(kind, n, "0 m"), None, &changes).expect("a scene");
-        match Mechanism::new(&scene.machine) {
-            Ok(_) => Ok(()),
-            Err(error @ MechanismError::TooCostly { .. }) => Err(error.to_string()),
-            Err(other) => panic!("{other}"),
-        }
-    }
-
-    #[test]
-    fn the_limits_are_those_of_the_documentation() {
-        let page = include_str!("../../../../docs/scene-format.md");
-        for (kind, formulation, row) in [
-            ("hinges in a row", "tree", "hinges in a row"),
-            ("hinges on one body", "tree", "hinges on one free body"),
-            ("hinges on one body", "lagrange", "hinges on one free body"),
-            ("balls of one body", "tree", "bodies on ideal ball joints"),
-            ("balls of one body", "lagrange", "bodies on ideal ball joints"),
-        ] {
-            let line = page.lines().find(|line| line.starts_with(&format!("| {row}")));
-            let column = 2 + usize::from(formulation == "lagrange");
-            let stated = line.expect(row).split('|').nth(column).map(str::trim);
-            let stated: usize = stated.and_then(|most| most.parse().ok()).expect("a number");
-            // One more for the body that carries them.
-            let most = stated + usize::from(kind.ends_with("one body"));
-            assert_eq!(acceptance(kind, most, formulation), Ok(()), "{kind}");
-            let message = acceptance(kind, most + 1, formulation).expect_err("beyond the limit");
-            assert!(message.contains("allowed at most"), "{kind}: {message}");
-        }
-    }
-
-    #[test]
-    fn the_other_formulation_is_advised_if_it_is_within_the_limits() {
-        let message = acceptance("hinges in a row", 5000, "tree").expect_err("too deep");
-        assert!(message.ends_with("choose formulation = lagrange"), "{message}");
-        assert_eq!(acceptance("hinges in a row", 5000, "lagrange"), Ok(()));
-        let message = acceptance("hinges on one body", 1000, "lagrange").expect_err("too wide");
-        assert!(message.ends_with("choose formulation = tree"), "{message}");
-        assert_eq!(acceptance("hinges on one body", 1000, "tree"), Ok(()));
     }
 }

@@ -255,36 +255,24 @@ impl Mechanism {
 mod tests {
     use super::*;
     use crate::integrate::{DormandPrince, Stepper, System};
-    use crate::scene::Scene;
+    use crate::machine::{Attachment, BallJoint, Body, Drive, Joint, JointStart, Machine, Mat3, Quat};
 
     /// A slender body tumbling about all its axes.
     fn tumbling() -> (Mechanism, Vec<f64>) {
-        let text = r#"
-            [gravity]
-            y = "-9.81 m/s^2"
-            [[body]]
-            name = "rod"
-            mass = "0.3 kg"
-            inertia = "1e-4 5e-4 5.5e-4 kg m^2"
-            products = "2e-5 -3e-5 1e-5 kg m^2"
-            [[joint]]
-            name = "rod"
-            kind = "free"
-            child = "rod"
-            start = { position = "0.1 0.2 0.3 m", velocity = "1 2 -0.5 m/s", angular_velocity = "3 -7 11 rad/s" }
-            [[body]]
-            name = "post"
-            mass = "1 kg"
-            inertia = "1e-3 1e-3 1e-3 kg m^2"
-            [[joint]]
-            name = "post"
-            kind = "prismatic"
-            child = "post"
-            axis = [0, 0, 1]
-            drive = { law = "constant", position = 0, velocity = 0 }
-        "#;
-        let scene = Scene::parse(text, None, &[]).expect("a scene");
-        let mut mechanism = Mechanism::new(&scene.machine).expect("equations");
+        let rates = [Vec3::new(1.0, 2.0, -0.5), Vec3::new(3.0, -7.0, 11.0)];
+        let mut machine = Machine { gravity: Vec3::new(0.0, -9.81, 0.0), ..Machine::default() };
+        let inertia = Mat3::new(1e-4, 2e-5, 1e-5, 2e-5, 5e-4, -3e-5, 1e-5, -3e-5, 5.5e-4);
+        let start = JointStart::Pose {
+            position: Vec3::new(0.1, 0.2, 0.3),
+            rotation: Quat::identity(),
+            velocity: rates[0],
+            angular_velocity: rates[1],
+        };
+        machine.add_body(Body::new("rod", 0.3, inertia), Joint { start, ..Joint::free(0) });
+        let still = Drive::Constant { position: 0.0, velocity: 0.0 };
+        let post = Body::new("post", 1.0, Mat3::identity());
+        machine.add_body(post, Joint::prismatic(None, 1, Vec3::z()).with_drive(still));
+        let mut mechanism = Mechanism::new(&machine).expect("equations");
         let y = mechanism.start().expect("a start");
         (mechanism, y)
     }
@@ -322,9 +310,13 @@ mod tests {
 
     #[test]
     fn bodies_in_flight_are_excluded_from_the_active_ranges() {
-        let links = [("chain.links".to_owned(), "4".to_owned())];
-        let scene = Scene::load("chain", &links).expect("a scene");
-        let mut mechanism = Mechanism::new(&scene.machine).expect("equations");
+        let mut machine = Machine::default();
+        for i in 0..4 {
+            machine.add_body(Body::new(&format!("b{i}"), 1.0, Mat3::identity()), Joint::free(i));
+            let socket = Attachment { body: i.checked_sub(1), point: Vec3::zeros() };
+            machine.ball_joints.push(BallJoint::new(&format!("S{i}"), socket, Attachment::on(i, Vec3::zeros())));
+        }
+        let mut mechanism = Mechanism::new(&machine).expect("equations");
         let dimension = mechanism.dimension();
         for flying in [&[][..], &[1], &[0, 1, 3], &[0, 1, 2, 3]] {
             mechanism.suspend(|index| flying.contains(&index));

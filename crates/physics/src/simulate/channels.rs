@@ -265,7 +265,6 @@ fn has_signal(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
 
     #[test]
     fn every_plot_has_a_signal_and_all_columns_differ() {
@@ -273,6 +272,8 @@ mod tests {
             let mut plots = TABLE.iter().filter_map(|signal| signal.plot);
             assert!(plots.any(|plot| plot == quantity), "{quantity:?}");
         }
+        let unnamed = TABLE.iter().filter(|signal| signal.name.is_empty());
+        assert_eq!(unnamed.count(), 1, "only what frames do not contain");
         for in_run in [false, true] {
             let is_listed = |signal: &&Signal| {
                 if in_run { signal.run.is_some() } else { signal.plot.is_some() }
@@ -287,23 +288,5 @@ mod tests {
             columns.dedup();
             assert_eq!(columns.len(), all);
         }
-    }
-
-    #[test]
-    fn columns_at_the_end_of_a_row_keep_their_positions() {
-        let text = crate::scene::built_in_text("slider-crank-driven").expect("built in");
-        let load = "[[load]]\nname = \"wind\"\non = { body = \"rod\" }\nforce = \"1 0 0 N\"\n";
-        let scene = Scene::parse(&format!("{text}\n{load}"), None, &[]).expect("reads");
-        let mut first = Frame::default();
-        let mut simulation = crate::simulate::Simulation::new(&scene.machine).expect("starts");
-        simulation.sample(0.0, &mut first);
-        let (names, readings) = run_columns(&scene.machine, &first);
-        let last = "drive_work_J,gravity_work_J,restitution_loss_J,friction_loss_J,clearance_work_J,energy_residual_J,\
-                    wind_force_x_N,wind_force_y_N,wind_force_z_N,wind_torque_x_Nm,wind_torque_y_Nm,wind_torque_z_Nm,\
-                    damping_loss_J,external_work_J";
-        assert!(names.join(",").ends_with(last), "{names:?}");
-        assert_eq!(names.len(), readings.len());
-        let known = |reading: &Reading| reading.read(&first).is_some_and(f64::is_finite);
-        assert!(readings.iter().all(known));
     }
 }

@@ -156,13 +156,14 @@ impl Statistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::{Attachment, BallJoint, Machine, MachineFault, Vec3};
+    use crate::machine::{Attachment, BallJoint, Body, Joint, Machine, MachineFault, Mat3, Vec3};
 
     #[test]
     fn an_inconsistent_machine_does_not_start() {
         let fault = |machine: &Machine| Simulation::new(machine).err().map(|error| error.0);
         assert_eq!(fault(&Machine::default()), Some(MechanismError::Machine(MachineFault::Empty)));
-        let mut machine = crate::scene::Scene::load("pendulum", &[]).expect("built in").machine;
+        let mut machine = Machine::default();
+        machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
         assert_eq!(fault(&machine), None);
         let [socket, ball] = [Attachment::on(0, Vec3::zeros()), Attachment::on(7, Vec3::zeros())];
         machine.ball_joints.push(BallJoint::new("S2", socket, ball));

@@ -148,6 +148,3 @@ fn step_end_within(start: f64, end: f64, t: f64) -> f64 {
         f64::INFINITY
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -176,37 +176,7 @@ pub fn matches_pattern(pattern: &str, name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::run_columns;
-    use super::super::table::TABLE;
     use super::*;
-    use crate::scene::{Scene, built_in_text};
-    use crate::simulate::Simulation;
-
-    fn scene(changes: &str) -> Scene {
-        let text = built_in_text("slider-crank-driven").expect("built in");
-        Scene::parse(&format!("{text}\n{changes}"), None, &[]).expect("reads")
-    }
-
-    const SPRING: &str = "[[spring]]\nname = \"s\"\nfrom = { body = \"rod\" }\nto = { body = \"world\", at = \"1 0 0 m\" }\n\
-                          length = \"1 m\"\nstiffness = \"1 N/m\"\n";
-
-    fn first(scene: &Scene) -> Frame {
-        let mut frame = Frame { reactions: Some(Vec::new()), ..Frame::default() };
-        let mut simulation = Simulation::new(&scene.machine).expect("starts");
-        simulation.sample(0.0, &mut frame);
-        frame
-    }
-
-    #[test]
-    fn a_part_named_like_an_angle_of_the_output_body_keeps_its_channels() {
-        let text = "[[body]]\nname = \"arm\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
-                    [[joint]]\nname = \"alpha\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 1, 0]\n";
-        let scene = Scene::parse(text, None, &[]).expect("reads");
-        let mut first = Frame::default();
-        crate::simulate::Simulation::new(&scene.machine).expect("starts").sample(0.0, &mut first);
-        let (columns, _) = chosen_columns(&scene.machine, &first, &["alpha.rate".to_owned()]).expect("has one");
-        assert_eq!(columns, ["t_s", "part_alpha_rate_rad_s"]);
-    }
 
     #[test]
     fn patterns_match_with_two_wildcards() {
@@ -228,56 +198,5 @@ mod tests {
         ] {
             assert_eq!(matches_pattern(pattern, name), matching, "{pattern} {name}");
         }
-    }
-
-    #[test]
-    fn channels_begin_with_the_default_columns_and_have_distinct_names() {
-        for text in ["", SPRING] {
-            let scene = scene(text);
-            let first = first(&scene);
-            let list = channels_of(&scene.machine, &first);
-            let unasked = list.iter().filter(|channel| channel.unasked);
-            let unasked: Vec<&str> = unasked.map(|channel| &channel.column[..]).collect();
-            assert_eq!(unasked, run_columns(&scene.machine, &first).0);
-            assert!(list[..unasked.len()].iter().all(|channel| channel.unasked));
-            let names: BTreeSet<&str> = list.iter().map(|channel| &channel.name[..]).collect();
-            assert_eq!(names.len(), list.len());
-            for channel in &list {
-                let value = channel.reading.read(&first);
-                assert!(value.is_some_and(f64::is_finite), "{channel:?}");
-                assert_eq!(channel.unit.is_empty(), channel.name.ends_with(".state"));
-                assert!(!channel.help.is_empty(), "{channel:?}");
-            }
-            let all = chosen_columns(&scene.machine, &first, &["*".to_owned()]).expect("matches");
-            assert_eq!(all.0.len(), list.len());
-        }
-        let unnamed = TABLE.iter().filter(|signal| signal.name.is_empty());
-        assert_eq!(unnamed.count(), 1, "only what frames do not contain");
-    }
-
-    #[test]
-    fn channels_chosen_by_name_are_in_the_order_of_the_scene() {
-        let scene = scene(SPRING);
-        let first = first(&scene);
-        let columns = |patterns: &[&str]| {
-            let patterns: Vec<String> = patterns.iter().map(|&p| p.to_owned()).collect();
-            chosen_columns(&scene.machine, &first, &patterns).map(|found| found.0.join(","))
-        };
-        for (patterns, found) in [
-            (&["B.force", "time"][..], "t_s,B_force_x_N,B_force_y_N,B_force_z_N"),
-            (&["crank.angle", "B.force.z"], "t_s,B_force_z_N,crank_angle_rad"),
-            (&["crank.rate", "slider.rate"], "t_s,crank_rate_rad_s,slider_rate_m_s"),
-            (&["s.length", "*.actuator"], "t_s,crank_actuator_Nm,s_length_m"),
-            (&["energy.k*"], "t_s,kinetic_J,kinetic_change_J"),
-            (&["rod_?_m"], "t_s,rod_x_m,rod_y_m,rod_z_m"),
-            (&["rod.pose"], "t_s,rod_x_m,rod_y_m,rod_z_m,rod_alpha_rad,rod_beta_rad,rod_gamma_rad"),
-        ] {
-            assert_eq!(columns(patterns).expect("matches"), found, "{patterns:?}");
-        }
-        let output = &scene.machine.bodies[scene.machine.output.body].name;
-        let pose = columns(&[&format!("{output}.pose")]).expect("matches");
-        assert_eq!(pose, "t_s,x_m,y_m,z_m,alpha_rad,beta_rad,gamma_rad");
-        let wrong = columns(&["B.force", "B.froce"]).expect_err("no such channel");
-        assert_eq!(wrong.to_string(), "`B.froce` is none of the scene's channels (did you mean `B.force`?)");
     }
 }

@@ -54,38 +54,3 @@ impl Run<'_> {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use crate::scene::Scene;
-    use crate::simulate::Simulation;
-
-    #[test]
-    fn a_twin_that_adopts_the_step_control_takes_the_same_steps() {
-        let change = ("solver.preset".to_owned(), "preview".to_owned());
-        let scene = Scene::load("four-bar", &[change]).expect("loads");
-        let mut run = Simulation::new(&scene.machine).expect("starts");
-        run.advance_to(0.3).expect("runs");
-        let twin = |offset: f64| {
-            let mut twin = run.clone();
-            twin.displace(&[offset; 8]);
-            twin
-        };
-        let (mut follower, mut alone) = (twin(1e-9), twin(1e-9));
-        let before = run.statistics().steps;
-        for _ in 0..400 {
-            run.step().expect("runs");
-            for other in [&mut follower, &mut alone] {
-                while other.time() < run.time() {
-                    other.step_until(run.time()).expect("runs");
-                }
-            }
-            follower.adopt_step_control(&run);
-        }
-        // Rounding splits some of the follower's steps in two; a twin that chooses its own is truncated at nearly every one of
-        // the run's.
-        let steps = |of: &Simulation| of.statistics().steps - before;
-        assert!(steps(&follower) < 600, "{}", steps(&follower));
-        assert!(steps(&alone) > 800, "{}", steps(&alone));
-    }
-}

@@ -102,33 +102,3 @@ pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::Scene;
-    use crate::simulate::Simulation;
-
-    #[test]
-    fn states_stepped_in_turn_in_one_workspace_have_the_bits_of_states_in_their_own() {
-        for method in Method::ALL {
-            let changes = [("solver.method", method.word()), ("solver.step", "20 us")];
-            let changes = changes.map(|(key, value)| (key.to_owned(), value.to_owned()));
-            let scene = Scene::load("pendulum", &changes).expect("loads");
-            let mut alone = Simulation::new(&scene.machine).expect("starts");
-            let model = alone.model().clone();
-            let mut states = [model.start(), model.start()];
-            let mut workspace = model.workspace(&states[0]);
-            while alone.time() < 0.015 {
-                alone.step().expect("runs");
-                for state in &mut states {
-                    model.step(state, &mut workspace).expect("runs");
-                }
-            }
-            assert!(alone.statistics().impacts.iter().sum::<u64>() > 0, "{method}");
-            for state in &states {
-                assert!(state == alone.state(), "{method}");
-            }
-        }
-    }
-}

@@ -5,25 +5,25 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
-use super::{Law, MIN_STEP, Trajectory, periods_of, trajectory_of};
-use crate::scene::Scene;
+use crate::common::parse;
+use jointplay::jet::Jet;
+use jointplay::machine::Machine;
+use jointplay::mechanism::{Law, laws_of, periods_of};
+
+/// Shortest step that a law may impose, s.
+const MIN_STEP: f64 = 1e-9;
 
 /// A body of 1 kg on a slide along x with this drive.
-fn scene(drive: &str) -> Scene {
+fn machine(drive: &str) -> Machine {
     let text = format!(
         "[[body]]\nname = \"a\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n[[joint]]\nname = \"a\"\nkind = \"prismatic\"\n\
          child = \"a\"\naxis = [1, 0, 0]\ndrive = {{ {drive} }}\n"
     );
-    Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"))
+    parse(&text, &[]).machine
 }
 
 fn law(drive: &str) -> Arc<dyn Law> {
-    let joint = &scene(drive).machine.joints[0];
-    let (freedom, drive) = joint.drives().next().expect("driven");
-    match trajectory_of(drive, freedom.turns()) {
-        Trajectory::Own(law) => law,
-        Trajectory::Function(_) => panic!("expected a drive law"),
-    }
+    laws_of(&machine(drive)).next().expect("driven")
 }
 
 fn points(values: &[(f64, f64)]) -> String {
@@ -125,7 +125,7 @@ fn a_ramp_and_a_pulse_have_their_stated_values() {
     let pulse = law("law = \"pulse\", base = \"1 m\", height = \"4 mm\", start = \"1 s\", duration = \"10 ms\"");
     assert!((pulse.at(1.005).value - 1.004).abs() < 1e-15);
     for t in [0.0, 0.999, 1.0, 1.011, 2.0] {
-        assert_eq!(pulse.at(t), crate::jet::Jet::constant(1.0), "{t}");
+        assert_eq!(pulse.at(t), Jet::constant(1.0), "{t}");
     }
 }
 
@@ -175,8 +175,7 @@ fn the_period_of_a_law_is_the_time_after_which_it_repeats() {
         (format!("law = \"table\", repeat = true, points = [{}]", points(&[(0.5, 0.0), (1.0, 1.0), (2.0, 0.0)])), 1.5),
         ("law = \"formula\", formula = \"sin(t)\"".into(), f64::INFINITY),
     ] {
-        let scene = scene(&text);
-        let computed = periods_of(&scene.machine).next().expect("driven");
+        let computed = periods_of(&machine(&text)).next().expect("driven");
         assert!(computed == period || (computed - period).abs() < 1e-9, "{text}: {computed}");
         if period.is_finite() {
             let law = law(&text);
