@@ -1,6 +1,6 @@
 //! CPU cost of one frame of the window without stepping: interface, draw list, tessellation, encoding; of the draw list
-//! alone, and of recording it, also for the longest chain; and of the sound of a frame. Targets: at most 2 ms for the
-//! default scene, of which a presentation and sound take less than 0.5 ms each.
+//! alone, also for the longest chain; and of the sound of a frame. Targets: at most 2 ms for the default scene, of which a
+//! presentation and sound take less than 0.5 ms each. Then the time of whole pictures.
 //!
 //! `cargo bench --bench frame`; without a GPU, drawing itself runs on the same processor and is waited for outside the
 //! measured time, but leaves cold caches and a driver that is part of the frame. To measure only our own part, use a device
@@ -127,15 +127,6 @@ fn longest_chain() -> Scene {
     Scene::load("chain", &[links]).expect("as many are allowed")
 }
 
-/// CPU time before the adapter begins to draw a list. A frame of the longest chain has 16 ms for this and for its draw list.
-fn recording(watch: &Stopwatch) {
-    let mut offscreen = Offscreen::new().expect("a graphics adapter");
-    let stage = Stage::new(longest_chain(), 0.0);
-    let list = stage.list(SIZE);
-    println!("the longest chain: {} triangles", offscreen.triangles(&list));
-    watch.time_part("recording the longest chain", || offscreen.time_to_record(&list).expect("drawn"));
-}
-
 /// The worst case of a frame: every impact that a run stores, all at the lowest pitch and therefore longest. The page computes
 /// the samples within the frame, the desktop in the system's audio thread.
 fn sound(watch: &Stopwatch) {
@@ -161,29 +152,24 @@ fn sound(watch: &Stopwatch) {
     });
 }
 
-/// Time of the graphics adapter alone, by scene and size, if it has timestamps. For a software adapter this is processor time.
+/// Pictures by scene and size: recorded, drawn and read back, until they are in memory.
 fn pictures(watch: &Stopwatch) {
     let mut offscreen = Offscreen::new().expect("a graphics adapter");
     println!("drawn by {}", offscreen.adapter());
-    for name in ["spcmm", "chain", "hexapod"] {
-        let stage = Stage::new(Scene::load(name, &[]).expect("built in"), 0.0);
+    let scenes = ["spcmm", "chain", "hexapod"].map(|name| (name, Scene::load(name, &[]).expect("built in")));
+    for (name, scene) in scenes.into_iter().chain([("the longest chain", longest_chain())]) {
+        let stage = Stage::new(scene, 0.0);
         for size in [[1280, 720], [1920, 1080], [3840, 2160]] {
             let list = stage.list(size);
-            if offscreen.time_of(&list).expect("drawn").is_none() {
-                println!("this adapter has no timestamps");
-                return;
-            }
             let [width, height] = size;
-            watch.time_part(&format!("adapter: {name}, {width}x{height}"), || {
-                offscreen.time_of(&list).expect("drawn").expect("it has timestamps")
-            });
+            watch.time(&format!("picture: {name}, {width}x{height}"), || offscreen.render(&list).expect("drawn"));
         }
     }
 }
 
 fn main() {
     let watch = Stopwatch::new();
-    for part in [frames, draw_list, recording, sound, pictures] {
+    for part in [frames, draw_list, sound, pictures] {
         part(&watch);
     }
 }

@@ -21,7 +21,6 @@ pub struct Offscreen {
     renderer: Renderer,
     finish: Finish,
     frame: Option<Frame>,
-    timer: Option<Timer>,
 }
 
 /// Target and readback buffer for pictures of one size.
@@ -58,7 +57,6 @@ impl Offscreen {
                 .request_device(&wgpu::DeviceDescriptor {
                     label: Some("offscreen"),
                     required_limits: limits,
-                    required_features: adapter.features() & Timer::FEATURES,
                     ..Default::default()
                 })
                 .await;
@@ -67,7 +65,6 @@ impl Offscreen {
                     let renderer = Renderer::new(&device, &adapter);
                     return Some(Self {
                         finish: renderer.finish(&device, PICTURE),
-                        timer: Timer::new(&device),
                         adapter: adapter.get_info(),
                         device,
                         queue,
@@ -116,99 +113,6 @@ impl Offscreen {
             None => Err(device_error("the picture could not be read back")),
         }
     }
-}
-
-/// Measures the time on the adapter with timestamp queries.
-struct Timer {
-    stamps: wgpu::QuerySet,
-    resolved: wgpu::Buffer,
-    read: wgpu::Buffer,
-}
-
-impl Timer {
-    const FEATURES: wgpu::Features =
-        wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
-
-    /// `None` where the device has no timestamps.
-    fn new(device: &wgpu::Device) -> Option<Self> {
-        if !device.features().contains(Self::FEATURES) {
-            return None;
-        }
-        let buffer = |usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("timestamps"),
-                size: 16,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        use wgpu::BufferUsages as Usage;
-        Some(Self {
-            stamps: device.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("timestamps"),
-                ty: wgpu::QueryType::Timestamp,
-                count: 2,
-            }),
-            resolved: buffer(Usage::QUERY_RESOLVE | Usage::COPY_SRC),
-            read: buffer(Usage::COPY_DST | Usage::MAP_READ),
-        })
-    }
-}
-
-impl Offscreen {
-    /// Draws `list` and returns the time on the adapter; `None` without timestamps. For benchmarks.
-    ///
-    /// # Errors
-    /// A size the device cannot draw, or a lost device.
-    pub fn time_of(&mut self, list: &DrawList) -> Result<Option<std::time::Duration>, RenderError> {
-        self.check_size(list.size)?;
-        let frame = self.take_frame(list);
-        let Some(timer) = &self.timer else {
-            return Ok(None);
-        };
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        encoder.write_timestamp(&timer.stamps, 0);
-        self.renderer.draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
-        encode(&self.finish, &mut encoder, &frame.group, &frame.picture);
-        encoder.write_timestamp(&timer.stamps, 1);
-        encoder.resolve_query_set(&timer.stamps, 0..2, &timer.resolved, 0);
-        encoder.copy_buffer_to_buffer(&timer.resolved, 0, &timer.read, 0, 16);
-        self.queue.submit([encoder.finish()]);
-        timer.read.map_async(wgpu::MapMode::Read, .., |_| {});
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
-        let ticks = {
-            let bytes = timer.read.get_mapped_range(..).map_err(device_error)?;
-            let stamps: &[u64] = bytemuck::cast_slice(&bytes);
-            stamps[1].saturating_sub(stamps[0])
-        };
-        timer.read.unmap();
-        self.frame = Some(frame);
-        let nanoseconds = ticks as f64 * f64::from(self.queue.get_timestamp_period());
-        Ok(Some(std::time::Duration::from_nanos(nanoseconds as u64)))
-    }
-
-    /// Number of triangles that the adapter draws for a picture of `list`, its shadows included. For benchmarks.
-    pub fn triangles(&mut self, list: &DrawList) -> u64 {
-        self.renderer.triangles(list)
-    }
-
-    /// Draws `list` and returns the CPU time for it: sorting, packing and uploading instances, recording the passes. Waits for
-    /// the adapter afterwards. For benchmarks.
-    ///
-    /// # Errors
-    /// A size the device cannot draw, or a lost device.
-    pub fn time_to_record(&mut self, list: &DrawList) -> Result<std::time::Duration, RenderError> {
-        self.check_size(list.size)?;
-        let frame = self.take_frame(list);
-        let start = web_time::Instant::now();
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        self.renderer.draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
-        self.queue.submit([encoder.finish()]);
-        let spent = start.elapsed();
-        self.frame = Some(frame);
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
-        Ok(spent)
-    }
 
     /// The stored frame, or a new one if it does not fit `list`.
     fn take_frame(&mut self, list: &DrawList) -> Frame {
@@ -235,6 +139,11 @@ fn encode(finish: &Finish, encoder: &mut wgpu::CommandEncoder, group: &wgpu::Bin
 
 #[cfg(test)]
 impl Offscreen {
+    /// Number of triangles that the adapter draws for a picture of `list`, its shadows included.
+    pub(super) fn triangles(&mut self, list: &DrawList) -> u64 {
+        self.renderer.triangles(list)
+    }
+
     /// Output of the last pass for a row of texels: light, and the share of the theme's colours.
     pub(super) fn finished(&self, texels: &[[f32; 4]]) -> Image {
         // Handles only zero and normal numbers with 11 significant bits.

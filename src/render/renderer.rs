@@ -250,7 +250,7 @@ impl Renderer {
     }
 
     /// Number of triangles of meshes that the passes of `list` draw.
-    #[cfg(not(target_arch = "wasm32"))]
+    #[cfg(test)]
     pub(super) fn triangles(&mut self, list: &DrawList) -> u64 {
         let batches = self.pack(list, list.size);
         let of = |group: Group, count: fn(&Batch) -> u32| {
