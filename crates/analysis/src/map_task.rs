@@ -1,11 +1,10 @@
 //! A map of the tip's error as plain data, for a thread or a worker.
 
-use std::ops::ControlFlow;
-
 use serde::{Deserialize, Serialize};
 
 use super::map::{DIRECTIONS, MapPoint, WorkspaceMap};
 use super::source::{SceneSource, TaskFault};
+use super::task::Message;
 use jointplay_physics::machine::Vec3;
 
 /// Largest number of points that the window shows.
@@ -20,15 +19,6 @@ pub struct MapTask {
     pub over: Vec<String>,
     /// Number of directions at each point.
     pub directions: usize,
-}
-
-/// A message about a map.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum MapMessage {
-    /// The accepted axes: name and values in order, SI. The points follow, with the last axis varying fastest.
-    Axes(Vec<(String, Vec<f64>)>),
-    /// The next point; `None` if it has no result.
-    Point(Option<TipErrors>),
 }
 
 /// Errors of the tip at a point, world axes, m.
@@ -57,7 +47,7 @@ impl TipErrors {
 /// Computes `task` point by point and awaits `rest` after each.
 pub(super) async fn run(
     task: &MapTask,
-    report: &mut dyn FnMut(MapMessage) -> ControlFlow<()>,
+    send: &mut dyn FnMut(Message) -> Result<(), TaskFault>,
     rest: &mut impl AsyncFnMut(),
 ) -> Result<(), TaskFault> {
     let directions = task.directions.clamp(*DIRECTIONS.start(), *DIRECTIONS.end());
@@ -68,19 +58,18 @@ pub(super) async fn run(
     }
     let axes = map.design().axes().iter();
     let axes = axes.map(|axis| (axis.key().to_owned(), axis.numbers().collect()));
-    let mut flow = report(MapMessage::Axes(axes.collect()));
+    send(Message::Axes(axes.collect()))?;
     for point in 0..points {
-        if flow.is_break() {
-            return Err(TaskFault::Cancelled);
-        }
-        flow = report(MapMessage::Point(map.point(point).ok().as_ref().map(TipErrors::of)));
+        send(Message::MapPoint(map.point(point).ok().as_ref().map(TipErrors::of)))?;
         rest().await;
     }
-    if flow.is_break() { Err(TaskFault::Cancelled) } else { Ok(()) }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+
     use super::*;
     use crate::task::{Job, Message, perform};
     use jointplay_scene::Scene;
@@ -105,10 +94,10 @@ mod tests {
         let over = ["crank.angle=0deg,90deg,180deg", "contact.clearance=0.1mm,0.2mm"];
         let all = messages(&over, usize::MAX);
         assert_eq!((all.len(), all.last()), (8, Some(&Message::Done)));
-        let Message::Map(MapMessage::Axes(axes)) = &all[0] else { panic!("{all:?}") };
+        let Message::Axes(axes) = &all[0] else { panic!("{all:?}") };
         assert_eq!((&axes[0].0[..], axes[1].1.len()), ("crank.angle", 2));
         let errors = |message: &Message| match message {
-            Message::Map(MapMessage::Point(Some(errors))) => errors.clone(),
+            Message::MapPoint(Some(errors)) => errors.clone(),
             other => panic!("{other:?}"),
         };
         // Twice the play doubles the error and leaves the ideal tip unchanged.

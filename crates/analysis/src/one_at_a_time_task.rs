@@ -1,13 +1,12 @@
 //! One-at-a-time runs of a study as a job in plain data, which reports every run as soon as it is finished.
 
-use std::ops::ControlFlow;
-
 use serde::{Deserialize, Serialize};
 
 use super::orbit::Orbit as _;
 use super::source::{SceneSource, TaskFault};
 use super::study::{OneAtATimePlan, Output, RunSpan, StudyRuns, outputs};
 use super::sweep_task::{STEPS, Share};
+use super::task::Message;
 use jointplay_physics::simulate::{MAX_RUN_DURATION, Simulation};
 
 /// A request for one-at-a-time runs.
@@ -41,27 +40,13 @@ pub struct OneAtATimeRun {
     pub outputs: Vec<Option<f64>>,
 }
 
-/// Messages of a running task.
-pub(super) enum OneAtATimeMessage {
-    /// Fraction done, 0 to 1.
-    Progress(f64),
-    /// The accepted runs; their results follow.
-    Plan(OneAtATimeReport),
-    /// A finished run.
-    Run(OneAtATimeRun),
-}
-
 /// Computes a share of the runs of `task` one after another, and awaits `rest` every [`STEPS`] steps.
 pub(super) async fn run(
     task: &OneAtATimeTask,
     share: Share,
-    report: &mut dyn FnMut(OneAtATimeMessage) -> ControlFlow<()>,
+    send: &mut dyn FnMut(Message) -> Result<(), TaskFault>,
     rest: &mut impl AsyncFnMut(),
 ) -> Result<(), TaskFault> {
-    let mut send = |message| match report(message) {
-        ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(TaskFault::Cancelled),
-    };
     let RunSpan { duration, from } = task.span;
     if !(0.0 <= from && from < duration && duration <= MAX_RUN_DURATION) {
         return Err(TaskFault::Span { duration, from });
@@ -75,7 +60,7 @@ pub(super) async fn run(
     let known: Vec<Option<Output>> = known.collect();
     let available: Vec<Output> = known.iter().flatten().cloned().collect();
     let runs = StudyRuns::new(&scene, &keys, &available, task.span, &alone.rows())?;
-    send(OneAtATimeMessage::Plan(OneAtATimeReport {
+    send(Message::Plan(OneAtATimeReport {
         nominal: alone.nominal().to_vec(),
         units: known.iter().map(|output| output.as_ref().map(|output| output.unit.to_owned())).collect(),
     }))?;
@@ -86,22 +71,24 @@ pub(super) async fn run(
             rest().await;
             block.advance(STEPS);
             let part = block.current().map_or(0.0, |run| run.machine().time() / duration);
-            send(OneAtATimeMessage::Progress((finished as f64 + part) / all as f64))?;
+            send(Message::Progress((finished as f64 + part) / all as f64))?;
         }
         let mut values = runs.outputs_of(&block.records()).into_iter();
         let mut next =
             |output: &Option<Output>| output.as_ref().and_then(|_| values.next()).filter(|value| value.is_finite());
-        send(OneAtATimeMessage::Run(OneAtATimeRun { index, outputs: known.iter().map(&mut next).collect() }))?;
-        send(OneAtATimeMessage::Progress((finished + 1) as f64 / all as f64))?;
+        send(Message::Run(OneAtATimeRun { index, outputs: known.iter().map(&mut next).collect() }))?;
+        send(Message::Progress((finished + 1) as f64 / all as f64))?;
     }
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+
     use super::*;
     use crate::study::{matching, real_parameter};
-    use crate::task::{Job, Message, perform};
+    use crate::task::{Job, perform};
     use jointplay_scene::Scene;
 
     const OUTPUTS: [&str; 3] = ["tip-error", "peak-force", "impacts"];

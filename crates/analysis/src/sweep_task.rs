@@ -1,7 +1,5 @@
 //! A sweep as a job in plain data, which reports every point as soon as it is finished.
 
-use std::ops::ControlFlow;
-
 use serde::{Deserialize, Serialize};
 
 use super::axis::Axis;
@@ -10,6 +8,7 @@ use super::drive::drive_period;
 use super::point::{Plan, PointResult};
 use super::source::{SceneSource, TaskFault};
 use super::sweep::{BlockRun, Sweep};
+use super::task::Message;
 
 /// Simulation steps between two checks for cancellation.
 pub(super) const STEPS: u32 = 400;
@@ -97,28 +96,14 @@ pub struct SweptPoint {
     pub doubts: u32,
 }
 
-/// Messages of a running sweep.
-pub(super) enum SweepMessage {
-    /// Fraction done, 0 to 1.
-    Progress(f64),
-    /// The accepted ranges; points follow.
-    Ranges(Vec<Range>),
-    /// A point.
-    Point(Box<SweptPoint>),
-}
-
 /// Computes a share of a sweep point by point, from coarse to fine unless points follow each other, and awaits `rest` every
 /// [`STEPS`] steps.
 pub(super) async fn run(
     task: &SweepTask,
     share: Share,
-    report: &mut dyn FnMut(SweepMessage) -> ControlFlow<()>,
+    send: &mut dyn FnMut(Message) -> Result<(), TaskFault>,
     rest: &mut impl AsyncFnMut(),
 ) -> Result<(), TaskFault> {
-    let mut send = |message| match report(message) {
-        ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(TaskFault::Cancelled),
-    };
     let scene = task.scene.scene()?;
     let axes = task.vary.iter().map(|text| Axis::parse(&scene, text));
     let axes = axes.collect::<Result<Vec<_>, _>>()?;
@@ -142,7 +127,7 @@ pub(super) async fn run(
         return Err(TaskFault::TooManySections { points: design.points(), kept, most: MAX_SECTIONS });
     }
     let sweep = Sweep::new(scene, design, plan)?;
-    send(SweepMessage::Ranges(ranges))?;
+    send(Message::Ranges(ranges))?;
     let blocks = sweep.design().blocks();
     let mut completed = 0;
     let order = coarse_first(blocks).into_iter();
@@ -153,10 +138,10 @@ pub(super) async fn run(
             block.advance();
             if let Some(point) = block.latest() {
                 completed += 1;
-                send(SweepMessage::Point(Box::new(point)))?;
+                send(Message::Point(Box::new(point)))?;
             }
             let part = block.run.current().map_or(0.0, |run| run.taken() as f64 / task.periods as f64);
-            send(SweepMessage::Progress((completed as f64 + part) / sweep.design().points() as f64))?;
+            send(Message::Progress((completed as f64 + part) / sweep.design().points() as f64))?;
         }
     }
     Ok(())
@@ -272,8 +257,10 @@ fn set_result(point: &mut SweptPoint, result: &PointResult) {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+
     use super::*;
-    use crate::task::{Job, Message, perform};
+    use crate::task::{Job, perform};
     use jointplay_scene::Scene;
 
     fn task(vary: &[&str]) -> SweepTask {

@@ -6,10 +6,10 @@ use std::task::{Context, Waker};
 
 use serde::{Deserialize, Serialize};
 
-use super::map_task::{self, MapMessage, MapTask};
-use super::one_at_a_time_task::{self, OneAtATimeMessage, OneAtATimeReport, OneAtATimeRun, OneAtATimeTask};
+use super::map_task::{self, MapTask, TipErrors};
+use super::one_at_a_time_task::{self, OneAtATimeReport, OneAtATimeRun, OneAtATimeTask};
 use super::source::TaskFault;
-use super::sweep_task::{self, Range, Share, SweepMessage, SweepTask, SweptPoint};
+use super::sweep_task::{self, Range, Share, SweepTask, SweptPoint};
 
 /// A computation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -35,32 +35,14 @@ pub enum Message {
     Plan(OneAtATimeReport),
     /// A finished one-at-a-time run.
     Run(OneAtATimeRun),
-    /// A message about a map.
-    Map(MapMessage),
+    /// The accepted axes of a map: name and values in order, SI. The points follow, with the last axis varying fastest.
+    Axes(Vec<(String, Vec<f64>)>),
+    /// The next point of a map; `None` if it has no result.
+    MapPoint(Option<TipErrors>),
     /// End of the results.
     Done,
     /// The computation failed, for this reason.
     Failed(String),
-}
-
-impl From<SweepMessage> for Message {
-    fn from(message: SweepMessage) -> Self {
-        match message {
-            SweepMessage::Progress(done) => Self::Progress(done),
-            SweepMessage::Ranges(ranges) => Self::Ranges(ranges),
-            SweepMessage::Point(point) => Self::Point(point),
-        }
-    }
-}
-
-impl From<OneAtATimeMessage> for Message {
-    fn from(message: OneAtATimeMessage) -> Self {
-        match message {
-            OneAtATimeMessage::Progress(done) => Self::Progress(done),
-            OneAtATimeMessage::Plan(plan) => Self::Plan(plan),
-            OneAtATimeMessage::Run(run) => Self::Run(run),
-        }
-    }
 }
 
 /// Runs `job`. `report` receives each message and may cancel. The last message is [`Message::Done`] or [`Message::Failed`], unless
@@ -78,12 +60,14 @@ pub async fn perform_with_rests(
     report: &mut dyn FnMut(Message) -> ControlFlow<()>,
     rest: &mut impl AsyncFnMut(),
 ) {
+    let mut send = |message| match report(message) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(TaskFault::Cancelled),
+    };
     let outcome = match job {
-        Job::Map(task) => map_task::run(task, &mut |message| report(Message::Map(message)), rest).await,
-        Job::Sweep(task, share) => sweep_task::run(task, *share, &mut |message| report(message.into()), rest).await,
-        Job::OneAtATime(task, share) => {
-            one_at_a_time_task::run(task, *share, &mut |message| report(message.into()), rest).await
-        }
+        Job::Map(task) => map_task::run(task, &mut send, rest).await,
+        Job::Sweep(task, share) => sweep_task::run(task, *share, &mut send, rest).await,
+        Job::OneAtATime(task, share) => one_at_a_time_task::run(task, *share, &mut send, rest).await,
     };
     let last = match outcome {
         Ok(()) => Message::Done,

@@ -3,7 +3,7 @@
 use eframe::egui::{Button, ComboBox, ProgressBar, RichText, Slider, TextEdit, Ui, vec2};
 
 use super::in_words;
-use crate::analysis::map_task::{MapMessage, MapTask, TipErrors};
+use crate::analysis::map_task::{MapTask, TipErrors};
 use crate::analysis::source::SceneSource;
 use crate::analysis::task::{Job, Message};
 use crate::app::host::{BackgroundTask, Host};
@@ -152,8 +152,8 @@ impl MapPanel {
         }
         while let Some(message) = self.running.as_mut().and_then(|running| running.poll()) {
             match (message, &mut self.mapped) {
-                (Message::Map(MapMessage::Axes(axes)), Some(mapped)) => mapped.axes = axes,
-                (Message::Map(MapMessage::Point(point)), Some(mapped)) => mapped.points.push(point),
+                (Message::Axes(axes), Some(mapped)) => mapped.axes = axes,
+                (Message::MapPoint(point), Some(mapped)) => mapped.points.push(point),
                 (Message::Done, _) => self.running = None,
                 (Message::Failed(why), mapped) => {
                     let over = mapped.as_ref().map_or(&[][..], |mapped| &mapped.task.over);
