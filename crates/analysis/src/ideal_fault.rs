@@ -24,40 +24,33 @@ const SLOW: f64 = 0.5;
 const MAX_WEIGHTS: f64 = 5.0;
 
 /// A fault of the motion without play.
+#[derive(Debug, thiserror::Error)]
 pub enum IdealFault {
     /// The motion gets stuck at this time, s.
+    #[error("the ideal mechanism has a singular pose near t = {0:.3} s")]
     Stuck(f64),
     /// A reaction beyond the limit: the largest, N, and its time, s.
+    #[error(
+        "the mechanism comes near a singular pose: with ideal joints and a slow drive a reaction reaches {} at t = {:.3} s, \
+         more than {MAX_WEIGHTS} times the weight of all bodies",
+        format_quantity_digits(*.0, "N", 4),
+        .1
+    )]
     HighReaction(f64, f64),
     /// A time, s, and the distance from the path in closed form at that time, m.
+    #[error(
+        "at t = {:.3} s the mechanism without play is {} off the path of its output body in [closed_form], from which tip \
+         errors are measured",
+        .0,
+        format_quantity_digits(*.1, "mm", 4)
+    )]
     OffPath(f64, f64),
     /// No fault up to this time, s, at which the examination was cut short.
+    #[error(
+        "the motion without play was examined for singular poses and for its path only up to t = {0:.3e} s, because that took \
+         too long"
+    )]
     NotExamined(f64),
-}
-
-impl std::fmt::Display for IdealFault {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Stuck(time) => write!(f, "the ideal mechanism has a singular pose near t = {time:.3} s"),
-            Self::HighReaction(largest, when) => write!(
-                f,
-                "the mechanism comes near a singular pose: with ideal joints and a slow drive a reaction reaches {} at \
-                 t = {when:.3} s, more than {MAX_WEIGHTS} times the weight of all bodies",
-                format_quantity_digits(*largest, "N", 4)
-            ),
-            Self::OffPath(time, distance) => write!(
-                f,
-                "at t = {time:.3} s the mechanism without play is {} off the path of its output body in [closed_form], from \
-                 which tip errors are measured",
-                format_quantity_digits(*distance, "mm", 4)
-            ),
-            Self::NotExamined(time) => write!(
-                f,
-                "the motion without play was examined for singular poses and for its path only up to t = {time:.3e} s, because \
-                 that took too long"
-            ),
-        }
-    }
 }
 
 /// Checks the motion without play of a scene whose drives prescribe it: whether it follows its path in closed form, and whether

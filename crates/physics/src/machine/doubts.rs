@@ -1,15 +1,19 @@
 //! Reasons in a scene's settings to doubt its results, as numbers with their wording.
 
-use std::fmt;
-
 use crate::contact::NormalLaw;
 use crate::interpolate::Overshoot;
 use crate::units::{format_quantity, format_quantity_digits};
 
 /// A reason in the settings to distrust any result of a scene. Its `Display` is a sentence for the user.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Doubt {
     /// The normal-force law does not give the requested restitution.
+    #[error(
+        "{joints}: restitution {requested} with {} gives {achieved:.3} in an undisturbed impact; normal_law = gonthier gives \
+         the restitution asked for{}.",
+        .law.word(),
+        if *.requested > 0.0 { "" } else { ", above 0" }
+    )]
     Restitution {
         /// Names of the joints.
         joints: String,
@@ -21,6 +25,12 @@ pub enum Doubt {
         achieved: f64,
     },
     /// A clearance so small that the contact patch is not small compared with the ball.
+    #[error(
+        "{joints}: clearance {} is so small that the contact patch is no longer small against the ball (radius {}), which \
+         Hertz's theory assumes.",
+        format_quantity(*.clearance, "mm"),
+        format_quantity(*.ball_radius, "mm")
+    )]
     Clearance {
         /// Names of the joints.
         joints: String,
@@ -30,6 +40,17 @@ pub enum Doubt {
         ball_radius: f64,
     },
     /// A fixed step too long for the shortest expected impact.
+    #[error(
+        "solver.step {}: {} {}, which a fixed step this long does not resolve; use {} or less, or solver.method = automatic.",
+        format_quantity(*.step, "us"),
+        if *.sliding {
+            format!("friction at ball joint {joint} is estimated to reverse the sliding in")
+        } else {
+            format!("an impact at ball joint {joint} is estimated to last")
+        },
+        format_quantity(libm::round(.duration * 1e8) * 1e-8, "us"),
+        format_quantity(*.recommended, "us")
+    )]
     Step {
         /// Joint with that impact.
         joint: String,
@@ -43,6 +64,7 @@ pub enum Doubt {
         recommended: f64,
     },
     /// A tolerance too loose for impacts.
+    #[error("solver.tolerance {tolerance:e}: impacts may gain or lose much of their energy; use {loosest:e} or less.")]
     Tolerance {
         /// `solver.tolerance`.
         tolerance: f64,
@@ -50,6 +72,15 @@ pub enum Doubt {
         loosest: f64,
     },
     /// A table whose spline leaves the range of the points around it.
+    #[error(
+        "{table}{}: the spline reaches {} at {}, but the points around it lie between {} and {}; interpolation = monotone \
+         stays between the points.",
+        more(*.others),
+        format_quantity_digits(.overshoot.value, .units[1], 4),
+        format_quantity_digits(.overshoot.at, .units[0], 4),
+        format_quantity_digits(.overshoot.range[0], .units[1], 4),
+        format_quantity_digits(.overshoot.range[1], .units[1], 4)
+    )]
     Overshoot {
         /// The one that leaves it furthest: `drive of guide`.
         table: String,
@@ -61,71 +92,21 @@ pub enum Doubt {
         units: [&'static str; 2],
     },
     /// The list of ball joints with distinct settings is incomplete.
+    #[error("Further ball joints have settings of their own; warnings about them are not listed.")]
     MoreJoints,
 }
 
-impl fmt::Display for Doubt {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::MoreJoints => {
-                f.write_str("Further ball joints have settings of their own; warnings about them are not listed.")
-            }
-            Self::Restitution { joints, law, requested, achieved } => write!(
-                f,
-                "{joints}: restitution {requested} with {} gives {achieved:.3} in an undisturbed impact; normal_law = \
-                 gonthier gives the restitution asked for{}.",
-                law.word(),
-                if *requested > 0.0 { "" } else { ", above 0" }
-            ),
-            Self::Clearance { joints, clearance, ball_radius } => write!(
-                f,
-                "{joints}: clearance {} is so small that the contact patch is no longer small against the ball \
-                 (radius {}), which Hertz's theory assumes.",
-                format_quantity(*clearance, "mm"),
-                format_quantity(*ball_radius, "mm")
-            ),
-            Self::Step { joint, step, duration, sliding, recommended } => {
-                let why = if *sliding {
-                    format!("friction at ball joint {joint} is estimated to reverse the sliding in")
-                } else {
-                    format!("an impact at ball joint {joint} is estimated to last")
-                };
-                write!(
-                    f,
-                    "solver.step {}: {why} {}, which a fixed step this long does not resolve; use {} or less, or \
-                     solver.method = automatic.",
-                    format_quantity(*step, "us"),
-                    format_quantity(libm::round(duration * 1e8) * 1e-8, "us"),
-                    format_quantity(*recommended, "us")
-                )
-            }
-            Self::Overshoot { table, others, overshoot, units: [of_x, of_y] } => {
-                let more = if *others > 0 { format!(" (and {others} more)") } else { String::new() };
-                let value = |y: f64| format_quantity_digits(y, of_y, 4);
-                write!(
-                    f,
-                    "{table}{more}: the spline reaches {} at {}, but the points around it lie between {} and {}; interpolation = \
-                     monotone stays between the points.",
-                    value(overshoot.value),
-                    format_quantity_digits(overshoot.at, of_x, 4),
-                    value(overshoot.range[0]),
-                    value(overshoot.range[1])
-                )
-            }
-            Self::Tolerance { tolerance, loosest } => write!(
-                f,
-                "solver.tolerance {tolerance:e}: impacts may gain or lose much of their energy; use {loosest:e} or less."
-            ),
-        }
-    }
-}
-
 /// A warning before a run: a reason to distrust its result, or a cause of slow stepping. Its `Display` is a sentence.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Warning {
     /// A reason to doubt the result.
+    #[error(transparent)]
     Doubt(Doubt),
     /// A friction ramp that needs small steps.
+    #[error(
+        "{joints}: slip_speed_high {} makes friction very stiff; expect small steps.",
+        format_quantity(*.slip_speed_high, "mm/s")
+    )]
     StiffFriction {
         /// Names of the joints.
         joints: String,
@@ -133,6 +114,15 @@ pub enum Warning {
         slip_speed_high: f64,
     },
     /// A mesh much larger or smaller than the machine around it.
+    #[error(
+        "{shape}{}: with the unit {} this mesh reaches {}, the rest of the machine {}; unit = \"{suggested_unit}\" would make \
+         it {}.",
+        more(*.others),
+        length(*.unit),
+        length(*.reach),
+        length(*.rest),
+        length(*.suggested_reach)
+    )]
     MeshUnit {
         /// Key of the shape.
         shape: String,
@@ -183,28 +173,12 @@ impl Warning {
     }
 }
 
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Doubt(doubt) => doubt.fmt(f),
-            Self::StiffFriction { joints, slip_speed_high } => write!(
-                f,
-                "{joints}: slip_speed_high {} makes friction very stiff; expect small steps.",
-                format_quantity(*slip_speed_high, "mm/s")
-            ),
-            Self::MeshUnit { shape, others, unit, reach, rest, suggested_unit, suggested_reach } => {
-                let length = |m: f64| format_quantity_digits(m, if m < 1.0 { "mm" } else { "m" }, 3);
-                let more = if *others > 0 { format!(" (and {others} more)") } else { String::new() };
-                write!(
-                    f,
-                    "{shape}{more}: with the unit {} this mesh reaches {}, the rest of the machine {}; unit = \"{suggested_unit}\" would \
-                     make it {}.",
-                    length(*unit),
-                    length(*reach),
-                    length(*rest),
-                    length(*suggested_reach)
-                )
-            }
-        }
-    }
+/// A length for a warning about meshes.
+fn length(m: f64) -> String {
+    format_quantity_digits(m, if m < 1.0 { "mm" } else { "m" }, 3)
+}
+
+/// How many others a sentence also concerns.
+pub(crate) fn more(others: usize) -> String {
+    if others > 0 { format!(" (and {others} more)") } else { String::new() }
 }

@@ -1,27 +1,16 @@
 //! Reasons to doubt a result, as numbers, and their wording.
 
-use std::fmt;
-
-use crate::machine;
+use crate::machine::{self, more};
 use crate::units::format_quantity_digits;
 
 /// Ball joints that a doubt concerns.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{worst}{}", more(*.others))]
 pub struct AffectedJoints {
     /// Name of the most affected one.
     pub worst: String,
     /// How many others are affected.
     pub others: usize,
-}
-
-impl fmt::Display for AffectedJoints {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.worst)?;
-        match self.others {
-            0 => Ok(()),
-            others => write!(f, " (and {others} more)"),
-        }
-    }
 }
 
 /// A work term of the ledger.
@@ -54,11 +43,13 @@ impl LedgerTerm {
 }
 
 /// Reason why a result may be unreliable. Its `Display` is a sentence for the user.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Doubt {
     /// Follows from the machine's settings, whatever happened in the run.
+    #[error(transparent)]
     Machine(machine::Doubt),
     /// Contacts that lasted fewer fixed steps than needed to resolve their forces.
+    #[error("{joints}: {short} of {contacts} contacts lasted fewer than {steps} steps: their forces are not resolved.")]
     Unresolved {
         /// Affected joints.
         joints: AffectedJoints,
@@ -70,6 +61,11 @@ pub enum Doubt {
         steps: u64,
     },
     /// A contact found only at the end of a step, by a method that should have located its beginning.
+    #[error(
+        "{joints}: a contact was detected late, at a depth of {:.2e} mm: its force and rebound are wrong; use a smaller \
+         tolerance.",
+        1e3 * .depth
+    )]
     Late {
         /// Affected joints.
         joints: AffectedJoints,
@@ -77,6 +73,10 @@ pub enum Doubt {
         depth: f64,
     },
     /// An undisturbed impact that rebounded faster than its law predicts.
+    #[error(
+        "{joints}: an undisturbed impact, which ended at {time:.6} s, rebounded with {achieved:.3} of its approach speed, but \
+         its law gives {law:.3}; use a smaller step or tolerance."
+    )]
     Rebound {
         /// Affected joints.
         joints: AffectedJoints,
@@ -88,6 +88,10 @@ pub enum Doubt {
         law: f64,
     },
     /// Finished contacts that began slower than `impact_speed_floor` or existed at the start.
+    #[error(
+        "{joints}: {slow} of {contacts} contacts began slower than impact_speed_floor or existed at the start: they rebound \
+         higher than asked."
+    )]
     Floored {
         /// Affected joints.
         joints: AffectedJoints,
@@ -97,6 +101,12 @@ pub enum Doubt {
         contacts: u64,
     },
     /// A stop compressed beyond its nominal depth when the run starts.
+    #[error(
+        "{stop}: the machine starts {} inside this stop, whose depth is {}: it pushes with {}; the start or the limit is wrong.",
+        format_quantity_digits(*.depth, if *.turns { "deg" } else { "mm" }, 4),
+        format_quantity_digits(*.usual, if *.turns { "deg" } else { "mm" }, 4),
+        format_quantity_digits(*.force, if *.turns { "N m" } else { "N" }, 4)
+    )]
     StartsInside {
         /// Its name.
         stop: String,
@@ -110,6 +120,7 @@ pub enum Doubt {
         force: f64,
     },
     /// A contact patch that is not small compared with its ball.
+    #[error("{joints}: the contact patch reached {radii:.2} ball radii; Hertz's theory assumes that it is small.")]
     Patch {
         /// Affected joints.
         joints: AffectedJoints,
@@ -117,6 +128,10 @@ pub enum Doubt {
         radii: f64,
     },
     /// More damping than in an undisturbed impact under the same law.
+    #[error(
+        "{joints}: at {time:.6} s a ball was hit again while in contact, and its damping reached {ratio:.2} times the elastic \
+         force, {usual:.2} in an undisturbed impact: this force is an artefact; contact.approach_speed = largest bounds it."
+    )]
     Damping {
         /// Affected joints.
         joints: AffectedJoints,
@@ -128,11 +143,18 @@ pub enum Doubt {
         usual: f64,
     },
     /// Constraints of the `lagrange` form that drifted.
+    #[error("formulation lagrange: the constraints drifted by {distance:.1e} m; formulation = tree has no drift.")]
     Drift {
         /// Largest violation, m.
         distance: f64,
     },
     /// Unaccounted energy, compared with the energy held and lost.
+    #[error(
+        "energy: the integration {} {:.2e} J, {:.2} % of the energy stored and dissipated; use a smaller step or tolerance.",
+        created(*.residual),
+        .residual.abs(),
+        100.0 * .share
+    )]
     Energy {
         /// J.
         residual: f64,
@@ -140,6 +162,10 @@ pub enum Doubt {
         share: f64,
     },
     /// A negative loss: it created energy.
+    #[error(
+        "energy: the {} is negative, {value:.2e} J, so that the integration created energy; use a smaller step or tolerance.",
+        .work.phrase()
+    )]
     Gain {
         /// The loss.
         work: LedgerTerm,
@@ -147,6 +173,12 @@ pub enum Doubt {
         value: f64,
     },
     /// Unaccounted energy, compared with a work term of the ledger.
+    #[error(
+        "energy: the integration {} {:.2e} J, and the {} is {value:.2e} J; use a smaller step or tolerance.",
+        created(*.residual),
+        .residual.abs(),
+        .work.phrase()
+    )]
     Work {
         /// The smallest work term.
         work: LedgerTerm,
@@ -156,6 +188,11 @@ pub enum Doubt {
         residual: f64,
     },
     /// An explicit method whose step size was limited by stability, not by the tolerance.
+    #[error(
+        "solver.method dopri5: stability limited its steps for {:.0} % of the time, and at solver.tolerance {tolerance:e} such \
+         steps create or destroy energy in settled contacts; use {loosest:e} or less, or solver.method = automatic.",
+        100.0 * .share
+    )]
     StabilityLimited {
         /// Fraction of the simulated time.
         share: f64,
@@ -198,88 +235,6 @@ impl Doubt {
             Self::Energy { .. } => 9,
             Self::Gain { .. } | Self::Work { .. } => 10,
             Self::StabilityLimited { .. } => 11,
-        }
-    }
-}
-
-impl fmt::Display for Doubt {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Machine(doubt) => doubt.fmt(f),
-            Self::Unresolved { joints, short, contacts, steps } => write!(
-                f,
-                "{joints}: {short} of {contacts} contacts lasted fewer than {steps} steps: their forces are not resolved."
-            ),
-            Self::Floored { joints, slow, contacts } => write!(
-                f,
-                "{joints}: {slow} of {contacts} contacts began slower than impact_speed_floor or existed at the start: \
-                 they rebound higher than asked."
-            ),
-            Self::Late { joints, depth } => write!(
-                f,
-                "{joints}: a contact was detected late, at a depth of {:.2e} mm: its force and rebound are wrong; use a smaller \
-                 tolerance.",
-                1e3 * depth
-            ),
-            Self::Rebound { joints, time, achieved, law } => write!(
-                f,
-                "{joints}: an undisturbed impact, which ended at {time:.6} s, rebounded with {achieved:.3} of its approach speed, \
-                 but its law gives {law:.3}; use a smaller step or tolerance."
-            ),
-            Self::StartsInside { stop, turns, depth, usual, force } => {
-                let unit = if *turns { "deg" } else { "mm" };
-                write!(
-                    f,
-                    "{stop}: the machine starts {} inside this stop, whose depth is {}: it pushes with {}; the start or the \
-                     limit is wrong.",
-                    format_quantity_digits(*depth, unit, 4),
-                    format_quantity_digits(*usual, unit, 4),
-                    format_quantity_digits(*force, if *turns { "N m" } else { "N" }, 4)
-                )
-            }
-            Self::Patch { joints, radii } => {
-                write!(
-                    f,
-                    "{joints}: the contact patch reached {radii:.2} ball radii; Hertz's theory assumes that it is small."
-                )
-            }
-            Self::Damping { joints, time, ratio, usual } => write!(
-                f,
-                "{joints}: at {time:.6} s a ball was hit again while in contact, and its damping reached {ratio:.2} times the \
-                 elastic force, {usual:.2} in an undisturbed impact: this force is an artefact; \
-                 contact.approach_speed = largest bounds it."
-            ),
-            Self::Drift { distance } => write!(
-                f,
-                "formulation lagrange: the constraints drifted by {distance:.1e} m; formulation = tree has no drift."
-            ),
-            Self::Energy { residual, share } => write!(
-                f,
-                "energy: the integration {} {:.2e} J, {:.2} % of the energy stored and dissipated; use a smaller step or tolerance.",
-                created(*residual),
-                residual.abs(),
-                100.0 * share
-            ),
-            Self::Gain { work, value } => write!(
-                f,
-                "energy: the {} is negative, {value:.2e} J, so that the integration created energy; use a smaller step or \
-                 tolerance.",
-                work.phrase()
-            ),
-            Self::Work { work, value, residual } => write!(
-                f,
-                "energy: the integration {} {:.2e} J, and the {} is {value:.2e} J; use a smaller step or tolerance.",
-                created(*residual),
-                residual.abs(),
-                work.phrase()
-            ),
-            Self::StabilityLimited { share, tolerance, loosest } => write!(
-                f,
-                "solver.method dopri5: stability limited its steps for {:.0} % of the time, and at solver.tolerance \
-                 {tolerance:e} such steps create or destroy energy in settled contacts; use {loosest:e} or less, or \
-                 solver.method = automatic.",
-                100.0 * share
-            ),
         }
     }
 }
