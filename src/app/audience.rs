@@ -1,12 +1,10 @@
 //! The audience window: a second window that shows the presentation while the controls stay in the first. It accepts only keys
 //! and a double-click, and does not affect the run.
 
-use eframe::egui::{
-    self, CentralPanel, ComboBox, Panel, PointerButton, Ui, ViewportBuilder, ViewportCommand, ViewportId, vec2,
-};
+use eframe::egui::{self, CentralPanel, Panel, PointerButton, Ui, ViewportBuilder, ViewportCommand, ViewportId, vec2};
 
 use super::keys::Action;
-use super::{App, keys, present, theme};
+use super::{App, keys, layout, present, theme};
 
 /// Initial size, points at zoom 1.
 const INITIAL_SIZE: egui::Vec2 = vec2(1280.0, 720.0);
@@ -35,17 +33,9 @@ fn id() -> ViewportId {
 pub fn choose_plot(ui: &mut Ui, titles: &[String], chosen: &mut Option<usize>) {
     ui.label("For the class");
     let title = |index: Option<usize>| index.and_then(|index| titles.get(index)).map_or("None", |title| title);
-    ComboBox::from_id_salt("plot for the class")
-        .width(110.0)
-        .selected_text(title(*chosen))
-        .show_ui(ui, |ui| {
-            for index in [None].into_iter().chain((0..titles.len()).map(Some)) {
-                ui.selectable_value(chosen, index, title(index));
-            }
-        })
-        .response
-        .on_hover_text("The plot in the window for the class (key P there)")
-        .accessible_name("For the class");
+    let help = "The plot in the window for the class (key P there)";
+    let all = [None].into_iter().chain((0..titles.len()).map(Some));
+    layout::choice(ui, ["For the class", help], Some(110.0), chosen, all, title);
 }
 
 impl App {

@@ -11,7 +11,7 @@ use eframe::egui::{
 use super::accuracy;
 use super::icons::{Icon, icon_button};
 use super::player::Player;
-use super::{equations, keys, spoken, theme, value};
+use super::{equations, keys, layout, spoken, theme, value};
 use crate::scene::{Kind, OWN_GROUP, Parameter, SceneError, Scope, SetError, Value};
 use crate::simulate::Effect;
 use crate::units::{format_quantity_digits, from_display, to_display};
@@ -165,15 +165,7 @@ impl Controls {
         let header = egui::CollapsingHeader::new(RichText::new("One joint").strong()).open(opens).show(ui, |ui| {
             ui.horizontal(|ui| {
                 ui.label("Joint");
-                ComboBox::from_id_salt("one joint")
-                    .selected_text(&names[self.joint])
-                    .show_ui(ui, |ui| {
-                        for (index, name) in names.iter().enumerate() {
-                            ui.selectable_value(&mut self.joint, index, name);
-                        }
-                    })
-                    .response
-                    .accessible_name("Joint");
+                layout::choice(ui, ["Joint", ""], None, &mut self.joint, 0..names.len(), |index| names[index].as_str());
             });
             let joint = &names[self.joint];
             for parameter in table.iter().filter(|p| p.scope == Scope::Contact) {

@@ -1,13 +1,13 @@
 //! Films of a time window. Each frame is an instant of the run, reached by stepping and drawn off screen like a saved picture, so
 //! the film does not depend on computing speed. Afterwards the run returns to its previous instant.
 
-use eframe::egui::{self, ComboBox, DragValue, RichText, Ui};
+use eframe::egui::{self, DragValue, RichText, Ui};
 
 use super::App;
 use super::canvas::{Canvas, Pending};
 use super::host::SaveFile;
 use super::picture::Contents;
-use super::{transport, value};
+use super::{layout, transport, value};
 use crate::film::{Film, Format};
 
 /// Sizes to choose from, pixels.
@@ -161,17 +161,11 @@ pub fn settings_ui(ui: &mut Ui, settings: &mut FilmSettings, reached: f64) -> bo
 
 /// A combo box of `options` for `value`.
 fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, help: &str, value: &mut T, options: &[(T, String)]) {
-    let chosen = options.iter().find(|(option, _)| option == value);
-    ComboBox::from_id_salt(name)
-        .selected_text(chosen.map_or("custom", |(_, text)| text.as_str()))
-        .show_ui(ui, |ui| {
-            for (option, text) in options {
-                ui.selectable_value(value, *option, text);
-            }
-        })
-        .response
-        .on_hover_text(help)
-        .accessible_name(name);
+    let label = |value: T| {
+        let chosen = options.iter().find(|(option, _)| *option == value);
+        chosen.map_or("custom", |(_, text)| text.as_str())
+    };
+    layout::choice(ui, [name, help], None, value, options.iter().map(|(option, _)| *option), label);
 }
 
 impl App {

@@ -162,9 +162,8 @@ impl App {
 
     fn open_button(&mut self, ui: &mut Ui, name: &str) {
         let help = "Open a scene file; a link can be pasted anywhere, or into Link… in the list of scenes";
-        if ui.button(name).on_hover_text(help).clicked() {
+        if layout::entry(ui, name, help) {
             self.choose_file();
-            layout::close_menu(ui);
         }
     }
 
@@ -187,9 +186,8 @@ impl App {
         if self.page_address().is_empty() {
             help += ". No page address is set: asks for one first";
         }
-        if ui.button("Copy link").on_hover_text(help).clicked() {
+        if layout::entry(ui, "Copy link", &help) {
             self.copy_link(ui.ctx());
-            layout::close_menu(ui);
         }
     }
 
@@ -197,10 +195,9 @@ impl App {
         self.picture_menu(ui);
         ui.separator();
         let help = "A film of a range of the timeline, MP4 or GIF";
-        if ui.button("Film…").on_hover_text(help).clicked() {
+        if layout::entry(ui, "Film…", help) {
             let settings = self.film_to_make();
             self.dialog = Some(Dialog::Film { settings });
-            layout::close_menu(ui);
         }
         #[cfg(not(target_arch = "wasm32"))]
         self.plots_menu(ui);
@@ -209,26 +206,19 @@ impl App {
             "Plots as SVG and PNG are saved by the desktop program: the page leaves out the libraries that draw them, so \
              that it loads fast. Picture… can show them with the view, as PNG, and Data (CSV) has their values",
         );
-        let help = "Everything that the plots have recorded since the reset";
-        if ui.button("Data (CSV)…").on_hover_text(help).clicked() {
+        if layout::entry(ui, "Data (CSV)…", "Everything that the plots have recorded since the reset") {
             self.save_record();
-            layout::close_menu(ui);
         }
-        let help = "A row for each impact up to the instant shown, CSV";
-        if ui.button("Impacts…").on_hover_text(help).clicked() {
+        if layout::entry(ui, "Impacts…", "A row for each impact up to the instant shown, CSV") {
             self.save_impacts();
-            layout::close_menu(ui);
         }
-        let help = "The scene file with the changed values in it, TOML";
-        if ui.button("Scene…").on_hover_text(help).clicked() {
+        if layout::entry(ui, "Scene…", "The scene file with the changed values in it, TOML") {
             self.save_scene();
-            layout::close_menu(ui);
         }
         ui.separator();
         let help = "Copies the HTML line that embeds this scene, in this state and view, in another page or in slides";
-        if ui.button("Embed").on_hover_text(help).clicked() {
+        if layout::entry(ui, "Embed", help) {
             self.copy_embedding(ui.ctx());
-            layout::close_menu(ui);
         }
     }
 
@@ -249,9 +239,8 @@ impl App {
         ui.separator();
         self.undo_entries(ui);
         theme_box(ui);
-        if ui.button("Keys").on_hover_text("Keys (?)").clicked() {
+        if layout::entry(ui, "Keys", "Keys (?)") {
             self.dialog = Some(Dialog::Help);
-            layout::close_menu(ui);
         }
         if ui.button("About").clicked() {
             self.dialog = Some(Dialog::About);
@@ -399,17 +388,8 @@ fn theme_box(ui: &mut Ui) {
     };
     let mut preference = ui.ctx().options(|options| options.theme_preference);
     let before = preference;
-    ComboBox::from_id_salt("theme")
-        .width(104.0)
-        .selected_text(label(preference))
-        .show_ui(ui, |ui| {
-            for choice in [ThemePreference::System, ThemePreference::Light, ThemePreference::Dark] {
-                ui.selectable_value(&mut preference, choice, label(choice));
-            }
-        })
-        .response
-        .on_hover_text("Light or dark (key T)")
-        .accessible_name("Theme");
+    let all = [ThemePreference::System, ThemePreference::Light, ThemePreference::Dark];
+    layout::choice(ui, ["Theme", "Light or dark (key T)"], Some(104.0), &mut preference, all, label);
     if preference != before {
         ui.ctx().set_theme(preference);
     }

@@ -109,6 +109,37 @@ pub(super) fn close_menu(ui: &Ui) {
     }
 }
 
+/// A menu entry with a tooltip, which closes the menu; returns whether it was clicked.
+pub(super) fn entry(ui: &mut Ui, name: &str, help: &str) -> bool {
+    let clicked = ui.button(name).on_hover_text(help).clicked();
+    if clicked {
+        close_menu(ui);
+    }
+    clicked
+}
+
+/// A combo box of `options` for `value`, with its accessible name and its tooltip, if any.
+pub(super) fn choice<T: Copy + PartialEq, W: Into<egui::WidgetText>>(
+    ui: &mut Ui,
+    [name, help]: [&str; 2],
+    width: Option<f32>,
+    value: &mut T,
+    options: impl IntoIterator<Item = T>,
+    label: impl Fn(T) -> W,
+) {
+    let response = egui::ComboBox::from_id_salt(name)
+        .width(width.unwrap_or(ui.spacing().combo_width))
+        .selected_text(label(*value))
+        .show_ui(ui, |ui| {
+            for option in options {
+                ui.selectable_value(value, option, label(option));
+            }
+        })
+        .response;
+    let response = if help.is_empty() { response } else { response.on_hover_text(help) };
+    response.accessible_name(name);
+}
+
 /// Reserves `lines` lines of small text; longer content scrolls, and nothing below moves.
 pub(super) fn reserve_lines(ui: &mut Ui, id: &str, lines: usize, add: impl FnOnce(&mut Ui)) {
     let line = ui.text_style_height(&egui::TextStyle::Small) + 2.0;

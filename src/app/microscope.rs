@@ -3,7 +3,7 @@
 mod draw;
 mod magnified_joint;
 
-use eframe::egui::{self, ComboBox, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
+use eframe::egui::{self, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
 use glam::Vec3;
 
 use super::player::Player;
@@ -97,43 +97,24 @@ impl Microscope {
     fn contents(&mut self, ui: &mut Ui, player: &Player, view: [Vec3; 2]) -> Option<usize> {
         let joints = &player.running().machine.ball_joints;
         self.joint = self.joint.min(joints.len().saturating_sub(1));
-        let mut chosen = None;
+        let mut joint = self.joint;
         ui.horizontal_wrapped(|ui| {
             if ui.available_width() > 300.0 {
                 spoken::heading(&ui.label(RichText::new("Microscope").strong()), "Microscope");
             }
-            let name = joints.get(self.joint).map_or("", |joint| &joint.name);
-            ComboBox::from_id_salt("joint under the microscope")
-                .width(54.0)
-                .selected_text(name)
-                .show_ui(ui, |ui| {
-                    for (index, joint) in joints.iter().enumerate() {
-                        let on = index == self.joint;
-                        if ui.selectable_label(on, &joint.name).clicked() {
-                            chosen = Some(index);
-                        }
-                    }
-                })
-                .response
-                .on_hover_text("Ball joint in focus (a click on it, or keys 5 to 9)")
-                .accessible_name("Ball joint in focus");
-            ComboBox::from_id_salt("plane of the microscope")
-                .width(54.0)
-                .selected_text(self.plane.label())
-                .show_ui(ui, |ui| {
-                    for plane in Plane::ALL {
-                        ui.selectable_value(&mut self.plane, plane, plane.label());
-                    }
-                })
-                .response
-                .on_hover_text("Plane of the picture, seen along its normal: as the 3D view, or that of two world axes")
-                .accessible_name("Plane of the microscope");
+            let help = "Ball joint in focus (a click on it, or keys 5 to 9)";
+            let name = |index: usize| joints.get(index).map_or("", |joint| &joint.name);
+            layout::choice(ui, ["Ball joint in focus", help], Some(54.0), &mut joint, 0..joints.len(), name);
+            let help = "Plane of the picture, seen along its normal: as the 3D view, or that of two world axes";
+            let names = ["Plane of the microscope", help];
+            layout::choice(ui, names, Some(54.0), &mut self.plane, Plane::ALL, Plane::label);
             let close = ui.button("Close").on_hover_text("Esc, or key L");
             if close.clicked() {
                 self.open = false;
             }
         });
-        self.joint = chosen.unwrap_or(self.joint);
+        let chosen = (joint != self.joint).then_some(joint);
+        self.joint = joint;
         let Some(magnified) = MagnifiedJoint::of(player, self.joint) else {
             ui.label("This scene has no ball joint");
             return chosen;

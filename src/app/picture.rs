@@ -113,10 +113,8 @@ impl Picture {
 impl App {
     /// Options and save button of the picture.
     pub(super) fn picture_menu(&mut self, ui: &mut Ui) {
-        let help = "A picture as chosen below, PNG";
-        if ui.button("Picture…").on_hover_text(help).clicked() {
+        if layout::entry(ui, "Picture…", "A picture as chosen below, PNG") {
             self.save_picture(ui.ctx());
-            layout::close_menu(ui);
         }
         let (points, screen) = (self.picture_points(ui.ctx()), ui.ctx().pixels_per_point());
         let picture = &mut self.picture;

@@ -250,9 +250,8 @@ impl App {
     /// Menu entry that resets all settings.
     pub(super) fn new_entry(&mut self, ui: &mut Ui) {
         let help = "Forgets window size, theme, type size, last scene and recent files";
-        if ui.button("Start fresh…").on_hover_text(help).clicked() {
+        if layout::entry(ui, "Start fresh…", help) {
             self.dialog = Some(Dialog::StartAsNew);
-            layout::close_menu(ui);
         }
     }
 

@@ -1,17 +1,21 @@
 //! Replays a run to the instant of a link, within a time budget per frame, and verifies the state.
 
-use std::fmt;
-
 use super::goal::Obstacle;
 use super::link::Link;
 use super::player::Player;
 
 /// The outcome of a link.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Verdict {
     /// The state has the hash of the link.
+    #[error("State reproduced: hash {0:016x} agrees")]
     Agrees(u64),
     /// The state has another hash.
+    #[error(
+        "State differs: hash {found:016x}, the link says {expected:016x}. It was made by {}, this is {}",
+        .version.as_ref().map_or("another version".to_owned(), |version| format!("version {version}")),
+        crate::VERSION
+    )]
     Differs {
         /// Hash of the link.
         expected: u64,
@@ -21,8 +25,10 @@ pub enum Verdict {
         version: Option<String>,
     },
     /// The instant is reached; the link has no hash to compare with.
+    #[error("State of the link reached; it has no hash to compare with")]
     Reached,
     /// The instant could not be reached, for this reason.
+    #[error("State of the link not reproduced: {0}")]
     Failed(String),
 }
 
@@ -33,25 +39,6 @@ impl Verdict {
             None => Self::Reached,
             Some(expected) if expected == found => Self::Agrees(found),
             Some(expected) => Self::Differs { expected, found, version: link.version.clone() },
-        }
-    }
-}
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Agrees(hash) => write!(f, "State reproduced: hash {hash:016x} agrees"),
-            Self::Differs { expected, found, version } => {
-                let origin =
-                    version.as_ref().map_or("another version".to_owned(), |version| format!("version {version}"));
-                write!(
-                    f,
-                    "State differs: hash {found:016x}, the link says {expected:016x}. It was made by {origin}, this is {}",
-                    crate::VERSION
-                )
-            }
-            Self::Reached => f.write_str("State of the link reached; it has no hash to compare with"),
-            Self::Failed(reason) => write!(f, "State of the link not reproduced: {reason}"),
         }
     }
 }

@@ -111,6 +111,11 @@ const fn ideal(fill: u32, opacity: f32, edge: u32) -> GhostLook {
     GhostLook { width: 2.9, slice: 1.0, ..twin(fill, opacity, edge) }
 }
 
+/// Colour of the light or the dark theme.
+const fn pick(dark: bool, light_theme: u32, dark_theme: u32) -> Colour {
+    Colour::hex(if dark { dark_theme } else { light_theme })
+}
+
 /// All colours of one theme.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Palette {
@@ -157,49 +162,31 @@ pub struct Palette {
 impl Palette {
     /// Colours of `theme`. Those of forces remain distinct from each other and from an amber rod for the colour-blind.
     pub const fn of(theme: Theme) -> Self {
-        match theme {
-            Theme::Light => Self {
-                sky: Colour::hex(0xF5F7F9),
-                ground: Colour::hex(0xD5DCE3),
-                floor: Colour::hex(0xE3E8ED),
-                grid: Colour::hex(0x8C99A6),
-                text: Colour::hex(0x1E2A36),
-                normal: Colour::hex(0xB83818),
-                friction: Colour::hex(0x1769C9),
-                external: Colour::hex(0x00796B),
-                flash: Colour::hex(0xFFC61A),
-                gravity: Colour::hex(0x6B3FA0),
-                axes: [Colour::hex(0xC92A2A), Colour::hex(0x27803A), Colour::hex(0x1864AB)],
-                trail: Colour::hex(0xA61E4D),
-                ball: material(0xD8DCE0, 0.22, 0.75),
-                socket: glass(0x6FA8DC, 0.20),
-                ghosts: [twin(0x7B2FBE, 0.85, 0x5A189A), ideal(0xFFFFFF, 0.9, 0x2F4858)],
-                exposure: 1.0,
-                studio: [1.0, 0.42, 0.95, 2.2],
-                outline: Colour::hex(0x20262C),
-                rim: Colour::hex(0xFFD43B),
+        let dark = matches!(theme, Theme::Dark);
+        Self {
+            sky: pick(dark, 0xF5F7F9, 0x2A3138),
+            ground: pick(dark, 0xD5DCE3, 0x181D22),
+            floor: pick(dark, 0xE3E8ED, 0x2A323A),
+            grid: pick(dark, 0x8C99A6, 0x697785),
+            text: pick(dark, 0x1E2A36, 0xE6EBF0),
+            normal: pick(dark, 0xB83818, 0xFF6B6B),
+            friction: pick(dark, 0x1769C9, 0x4DABF7),
+            external: pick(dark, 0x00796B, 0x2FD6BE),
+            flash: pick(dark, 0xFFC61A, 0xFFE27A),
+            gravity: pick(dark, 0x6B3FA0, 0xB197FC),
+            axes: [pick(dark, 0xC92A2A, 0xFF6B6B), pick(dark, 0x27803A, 0x69DB7C), pick(dark, 0x1864AB, 0x4DABF7)],
+            trail: pick(dark, 0xA61E4D, 0xF783AC),
+            ball: material(if dark { 0xE3E7EB } else { 0xD8DCE0 }, 0.22, 0.75),
+            socket: if dark { glass(0x8CC4F0, 0.17) } else { glass(0x6FA8DC, 0.20) },
+            ghosts: if dark {
+                [twin(0xC9A0FF, 0.85, 0xE0C3FF), ideal(0xFFFFFF, 0.5, 0xFFFFFF)]
+            } else {
+                [twin(0x7B2FBE, 0.85, 0x5A189A), ideal(0xFFFFFF, 0.9, 0x2F4858)]
             },
-            Theme::Dark => Self {
-                sky: Colour::hex(0x2A3138),
-                ground: Colour::hex(0x181D22),
-                floor: Colour::hex(0x2A323A),
-                grid: Colour::hex(0x697785),
-                text: Colour::hex(0xE6EBF0),
-                normal: Colour::hex(0xFF6B6B),
-                friction: Colour::hex(0x4DABF7),
-                external: Colour::hex(0x2FD6BE),
-                flash: Colour::hex(0xFFE27A),
-                gravity: Colour::hex(0xB197FC),
-                axes: [Colour::hex(0xFF6B6B), Colour::hex(0x69DB7C), Colour::hex(0x4DABF7)],
-                trail: Colour::hex(0xF783AC),
-                ball: material(0xE3E7EB, 0.22, 0.75),
-                socket: glass(0x8CC4F0, 0.17),
-                ghosts: [twin(0xC9A0FF, 0.85, 0xE0C3FF), ideal(0xFFFFFF, 0.5, 0xFFFFFF)],
-                exposure: 0.92,
-                studio: [1.0, 0.16, 0.62, 2.6],
-                outline: Colour::hex(0x0B0E11),
-                rim: Colour::hex(0xFFF6C2),
-            },
+            exposure: if dark { 0.92 } else { 1.0 },
+            studio: if dark { [1.0, 0.16, 0.62, 2.6] } else { [1.0, 0.42, 0.95, 2.2] },
+            outline: pick(dark, 0x20262C, 0x0B0E11),
+            rim: pick(dark, 0xFFD43B, 0xFFF6C2),
         }
     }
 

@@ -10,7 +10,6 @@ mod tape;
 pub use tape::Tape;
 
 use crate::suggest::{brief, did_you_mean, nearest_name};
-use std::fmt;
 
 /// Longest expression, bytes.
 pub const MAX_EXPRESSION_LENGTH: usize = 4000;
@@ -359,7 +358,8 @@ impl Program {
 }
 
 /// An error in an expression.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{fault}")]
 pub struct ExpressionError {
     /// Byte offset in the text.
     pub at: usize,
@@ -368,9 +368,10 @@ pub struct ExpressionError {
 }
 
 /// Faults of expressions.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
     /// Unexpected text.
+    #[error("{} where {expected} is expected", .found.map_or_else(|| "ends".to_owned(), |found| format!("`{found}`")))]
     Expected {
         /// Expected text.
         expected: &'static str,
@@ -378,6 +379,13 @@ pub enum Fault {
         found: Option<char>,
     },
     /// No variable, constant or function has this name.
+    #[error(
+        "no {} `{}`{}{}",
+        if *.called { "function" } else { "variable" },
+        brief(.name),
+        did_you_mean(.nearest.as_deref()),
+        function_list(*.called)
+    )]
     Unknown {
         /// The name.
         name: String,
@@ -387,6 +395,7 @@ pub enum Fault {
         called: bool,
     },
     /// A function has the wrong number of arguments.
+    #[error("`{function}` takes {}", if *.expected == 1 { "one argument".to_owned() } else { format!("{expected} arguments") })]
     Arguments {
         /// The function.
         function: &'static str,
@@ -394,45 +403,22 @@ pub enum Fault {
         expected: usize,
     },
     /// A function without its arguments.
+    #[error("`{0}` is a function: its argument follows in parentheses")]
     NotCalled(&'static str),
     /// Not a finite f64.
+    #[error("no finite number")]
     NoNumber,
     /// Nested too deeply.
+    #[error("nested too deeply")]
     TooDeep,
     /// Longer than [`MAX_EXPRESSION_LENGTH`].
+    #[error("too long; allowed at most {MAX_EXPRESSION_LENGTH} bytes")]
     TooLong,
 }
 
-impl std::error::Error for ExpressionError {}
-
-impl fmt::Display for ExpressionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.fault {
-            Fault::Expected { expected, found: None } => write!(f, "ends where {expected} is expected"),
-            Fault::Expected { expected, found: Some(found) } => write!(f, "`{found}` where {expected} is expected"),
-            Fault::Unknown { name, nearest, called } => {
-                let what = if *called { "function" } else { "variable" };
-                let nearest = did_you_mean(nearest.as_deref());
-                write!(f, "no {what} `{}`{nearest}", brief(name))?;
-                if *called {
-                    write!(f, "; functions: {}", FUNCTIONS.map(|row| row.0).join(", "))?;
-                }
-                Ok(())
-            }
-            Fault::Arguments { function, expected } => match expected {
-                1 => write!(f, "`{function}` takes one argument"),
-                _ => write!(f, "`{function}` takes {expected} arguments"),
-            },
-            Fault::NotCalled(function) => {
-                write!(f, "`{function}` is a function: its argument follows in parentheses")
-            }
-            Fault::NoNumber => f.write_str("no finite number"),
-            Fault::TooDeep => f.write_str("nested too deeply"),
-            Fault::TooLong => {
-                write!(f, "too long; allowed at most {MAX_EXPRESSION_LENGTH} bytes")
-            }
-        }
-    }
+/// The functions, if one of them was meant.
+fn function_list(called: bool) -> String {
+    if called { format!("; functions: {}", FUNCTIONS.map(|row| row.0).join(", ")) } else { String::new() }
 }
 
 struct Parser<'t> {

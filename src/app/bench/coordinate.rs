@@ -1,8 +1,9 @@
 //! The coordinate of the output body shown in the bench.
 
-use eframe::egui::{ComboBox, Ui};
+use eframe::egui::Ui;
 
 use super::plane::AxisLabel;
+use crate::app::layout;
 use crate::app::watch::Observed;
 use crate::simulate::Quantity;
 
@@ -55,16 +56,7 @@ impl Coordinate {
 
     /// Combo box for the coordinate.
     pub fn ui(&mut self, ui: &mut Ui) {
-        ComboBox::from_id_salt("coordinate")
-            .width(64.0)
-            .selected_text(NAMES[self.0])
-            .show_ui(ui, |ui| {
-                for index in ORDER {
-                    ui.selectable_value(&mut self.0, index, NAMES[index]);
-                }
-            })
-            .response
-            .on_hover_text("Coordinate of the output body that all plots of the bench show")
-            .accessible_name("Coordinate");
+        let names = ["Coordinate", "Coordinate of the output body that all plots of the bench show"];
+        layout::choice(ui, names, Some(64.0), &mut self.0, ORDER, |index| NAMES[index]);
     }
 }

@@ -1,6 +1,6 @@
 //! Bifurcation diagram of a sweep and its other results over the varied parameter; a click selects a section.
 
-use eframe::egui::{ComboBox, Grid, Pos2, Rect, RichText, Sense, Ui};
+use eframe::egui::{Grid, Pos2, Rect, RichText, Sense, Ui};
 use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
 
 use super::coordinate::Coordinate;
@@ -9,7 +9,7 @@ use super::portrait::title;
 use super::sweep_results::SweepResults;
 use crate::analysis::regime::Regime;
 use crate::analysis::sweep_task::SweptPoint;
-use crate::app::{theme, value};
+use crate::app::{layout, theme, value};
 use crate::simulate::Doubt;
 use crate::units::to_display;
 
@@ -177,17 +177,8 @@ impl Diagram {
 
     fn heading_ui(&mut self, ui: &mut Ui, results: &SweepResults) {
         ui.horizontal_wrapped(|ui| {
-            ComboBox::from_id_salt("ordinate")
-                .width(110.0)
-                .selected_text(self.ordinate.label())
-                .show_ui(ui, |ui| {
-                    for ordinate in Ordinate::ALL {
-                        ui.selectable_value(&mut self.ordinate, ordinate, ordinate.label());
-                    }
-                })
-                .response
-                .on_hover_text("What the diagram shows over the varied parameter")
-                .accessible_name("Diagram of");
+            let names = ["Diagram of", "What the diagram shows over the varied parameter"];
+            layout::choice(ui, names, Some(110.0), &mut self.ordinate, Ordinate::ALL, Ordinate::label);
             let computed = results.points.iter().flatten().count();
             let words = format!("{computed} of {} values", results.points.len());
             ui.label(RichText::new(words).small().weak()).on_hover_text("Values computed so far");

@@ -15,7 +15,7 @@ use crate::analysis::source::SceneSource;
 use crate::analysis::sweep_task::SweepTask;
 use crate::analysis::task::{Job, Message};
 use crate::app::host::Host;
-use crate::app::layout::reserve_lines;
+use crate::app::layout::{self, reserve_lines};
 use crate::app::load::Load;
 use crate::app::player::Player;
 use crate::app::{theme, value};
@@ -280,20 +280,10 @@ impl SweepPanel {
         });
         ui.horizontal_wrapped(|ui| {
             ui.label("Start");
-            ComboBox::from_id_salt("start")
-                .width(120.0)
-                .selected_text(start_label(settings.start))
-                .show_ui(ui, |ui| {
-                    for start in [Start::Cold, Start::FollowUp, Start::FollowDown] {
-                        ui.selectable_value(&mut settings.start, start, start_label(start));
-                    }
-                })
-                .response
-                .on_hover_text(
-                    "Each value starts from the scene's own start, or from the end state of its neighbour, so that \
-                     hysteresis shows",
-                )
-                .accessible_name("Start of each value");
+            let help = "Each value starts from the scene's own start, or from the end state of its neighbour, so that \
+                        hysteresis shows";
+            let all = [Start::Cold, Start::FollowUp, Start::FollowDown];
+            layout::choice(ui, ["Start of each value", help], Some(120.0), &mut settings.start, all, start_label);
             ui.checkbox(&mut settings.exponent, "Exponent").on_hover_text(
                 "Computes the largest Lyapunov exponent at each value with a twin run, which about doubles the time",
             );

@@ -1,13 +1,13 @@
 //! Map of the tip's error over the workspace: its axes, its computation, and the arrows in the picture.
 
-use eframe::egui::{Button, ComboBox, ProgressBar, RichText, Slider, TextEdit, Ui, vec2};
+use eframe::egui::{Button, ProgressBar, RichText, Slider, TextEdit, Ui, vec2};
 
 use super::in_words;
 use crate::analysis::map_task::{MapTask, TipErrors};
 use crate::analysis::source::SceneSource;
 use crate::analysis::task::{Job, Message};
 use crate::app::host::{BackgroundTask, Host};
-use crate::app::layout::reserve_lines;
+use crate::app::layout::{self, reserve_lines};
 use crate::app::player::Player;
 use crate::app::{theme, value};
 use crate::machine::{Drive, Machine, Vec3};
@@ -279,19 +279,11 @@ impl MapPanel {
             return;
         };
         ui.horizontal_wrapped(|ui| {
-            let name = |slice: Option<(usize, usize)>| slice.map_or("whole map", |(axis, _)| &*mapped.axes[axis].0);
             let mut axis = self.slice.map(|(axis, _)| axis);
-            ComboBox::from_id_salt("slice")
-                .selected_text(name(self.slice))
-                .show_ui(ui, |ui| {
-                    ui.selectable_value(&mut axis, None, "whole map");
-                    for (n, (key, _)) in mapped.axes.iter().enumerate() {
-                        ui.selectable_value(&mut axis, Some(n), key);
-                    }
-                })
-                .response
-                .on_hover_text("Axis that is fixed, so that only a slice of the map is drawn")
-                .accessible_name("Slice");
+            let names = ["Slice", "Axis that is fixed, so that only a slice of the map is drawn"];
+            let all = [None].into_iter().chain((0..mapped.axes.len()).map(Some));
+            let label = |axis: Option<usize>| axis.map_or("whole map", |axis| &*mapped.axes[axis].0);
+            layout::choice(ui, names, None, &mut axis, all, label);
             let at = self.slice.filter(|(own, _)| Some(*own) == axis).map_or(0, |(_, at)| at);
             self.slice = axis.map(|axis| (axis, at));
             if let Some((axis, at)) = &mut self.slice {

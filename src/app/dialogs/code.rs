@@ -7,7 +7,7 @@ use eframe::egui::{
 use qrcodegen::{QrCode, QrCodeEcc, QrSegment, Version};
 
 use super::Dialog;
-use crate::app::App;
+use crate::app::{App, layout};
 use crate::session::link::{NOT_A_PAGE_ADDRESS, is_page_address};
 
 /// Quiet zone around a code, modules.
@@ -117,9 +117,8 @@ impl App {
     /// Menu entry for the link dialog.
     pub(in crate::app) fn code_button(&mut self, ui: &mut Ui) {
         let help = "The link to this scene in this state and view, to be photographed by a phone";
-        if ui.button("QR code").on_hover_text(help).clicked() {
+        if layout::entry(ui, "QR code", help) {
             self.show_link_dialog();
-            crate::app::layout::close_menu(ui);
         }
     }
 

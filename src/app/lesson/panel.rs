@@ -33,9 +33,8 @@ impl App {
     /// Menu of the built-in lessons.
     pub(in crate::app) fn lesson_menu(&mut self, ui: &mut Ui) {
         for (name, title) in lesson_titles() {
-            if ui.button(title).on_hover_text(format!("Lesson {name}")).clicked() {
+            if layout::entry(ui, title, &format!("Lesson {name}")) {
                 self.open_lesson(name);
-                layout::close_menu(ui);
             }
         }
     }

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use super::{Table, Values};
+use crate::cli::tables::quoted;
 
 /// Writes header and rows.
 pub(super) fn write(out: &mut impl Write, table: &Table) -> io::Result<()> {
@@ -20,12 +21,6 @@ pub(super) fn write(out: &mut impl Write, table: &Table) -> io::Result<()> {
         writeln!(out)?;
     }
     Ok(())
-}
-
-/// A cell.
-fn quoted(text: &str) -> String {
-    let plain = !text.contains([',', '"', '\n']);
-    if plain { text.to_owned() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
 /// Forwards bytes and computes their CRC-32, which tells a reader whether rows and metadata belong together.
