@@ -1,6 +1,7 @@
 //! The bench beside the picture: the chaos bench (phase portrait and Poincaré section of the running scene, sweeps in the background,
 //! a twin run), or what play costs.
 
+mod computation;
 mod coordinate;
 mod cost_study;
 mod costs;
@@ -60,9 +61,10 @@ impl Bench {
 
     /// Reports a frame at time `now`, s; `moves`: whether the picture is animated.
     pub fn report_frame(&mut self, now: f64, moves: bool) {
-        self.sweep.report_frame(now, moves);
+        self.sweep.computation.report_frame(now, moves);
+        self.map.computation.report_frame(now, moves);
         if let Some(costs) = &mut self.costs {
-            costs.report_frame(now, moves);
+            costs.computation.report_frame(now, moves);
         }
     }
 
@@ -90,7 +92,7 @@ impl Bench {
 
     /// Whether such a study is running.
     pub fn is_computing_costs(&self) -> bool {
-        self.costs.as_ref().is_some_and(|costs| costs.is_running())
+        self.costs.as_ref().is_some_and(|costs| costs.computation.is_running())
     }
 
     /// Starts a ready sweep over the displayed `scene`.
@@ -107,7 +109,7 @@ impl Bench {
 
     /// Whether a sweep is running.
     pub fn is_sweeping(&self) -> bool {
-        self.sweep.is_running()
+        self.sweep.computation.is_running()
     }
 
     /// Fraction of the diagram that was visible when it was last drawn, 0 to 1.

@@ -10,8 +10,6 @@ use crate::units::{Dimension, dimension_name, format_quantity, si_unit, unit_tab
 const PAGE: &str = include_str!("../../docs/scene-format.md");
 /// Begins the line before a table in the page; the table ends at the first empty line.
 const START: &str = "<!-- table ";
-/// Tables that repeat those of a drive for plain numbers, which the page says in words.
-const AS_OF_DRIVE: [&str; 2] = ["factor", "factor_term"];
 
 /// The page of the scene format.
 pub fn page() -> String {
@@ -46,11 +44,6 @@ fn table_content(name: &str) -> Option<String> {
         "laws" => laws(),
         _ => keys(file_tables().into_iter().find(|table| table.name == name)?),
     })
-}
-
-/// Whether the page shows this table, or says what it repeats.
-pub fn contains_table(page: &str, table: &FileTable) -> bool {
-    AS_OF_DRIVE.contains(&table.name) || page.contains(&format!("{START}{} -->", table.name))
 }
 
 /// The keys of a table, one per row.

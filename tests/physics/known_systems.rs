@@ -52,9 +52,6 @@ impl<F: Fn(f64) -> f64 + Clone> Orbit for Map<F> {
 struct Force<F>(F);
 
 impl<F: Fn(f64, f64, f64) -> f64> System for Force<F> {
-    fn dimension(&self) -> usize {
-        2
-    }
     fn active_ranges(&self) -> &[Range<usize>] {
         std::slice::from_ref(&(0..2))
     }

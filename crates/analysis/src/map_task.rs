@@ -61,6 +61,7 @@ pub(super) async fn run(
     send(Message::Axes(axes.collect()))?;
     for point in 0..points {
         send(Message::MapPoint(map.point(point).ok().as_ref().map(TipErrors::of)))?;
+        send(Message::Progress((point + 1) as f64 / points as f64))?;
         rest().await;
     }
     Ok(())
@@ -93,7 +94,7 @@ mod tests {
     fn a_map_reports_its_axes_then_its_points_and_ends_when_cancelled() {
         let over = ["crank.angle=0deg,90deg,180deg", "contact.clearance=0.1mm,0.2mm"];
         let all = messages(&over, usize::MAX);
-        assert_eq!((all.len(), all.last()), (8, Some(&Message::Done)));
+        assert_eq!((all.len(), all.last()), (14, Some(&Message::Done)));
         let Message::Axes(axes) = &all[0] else { panic!("{all:?}") };
         assert_eq!((&axes[0].0[..], axes[1].1.len()), ("crank.angle", 2));
         let errors = |message: &Message| match message {
@@ -101,7 +102,7 @@ mod tests {
             other => panic!("{other:?}"),
         };
         // Twice the play doubles the error and leaves the ideal tip unchanged.
-        let (one, two) = (errors(&all[1]), errors(&all[2]));
+        let (one, two) = (errors(&all[1]), errors(&all[3]));
         assert_eq!(one.tip, two.tip);
         let size = |errors: &TipErrors| Vec3::from(errors.largest.expect("an error")).norm();
         assert!((size(&two) / size(&one) - 2.0).abs() < 0.01);

@@ -41,12 +41,6 @@ struct Resolved {
     joint: Option<usize>,
 }
 
-/// A contact parameter of a ball joint by the last part of its key; `None` if there is no such parameter.
-pub fn contact_value(joint: &BallJoint, part: &str) -> Option<Value> {
-    let (_, field) = contact_rows().find(|(of, _)| *of == part)?;
-    Some((field.get)(&joint.contact))
-}
-
 /// Last parts of the keys of contact parameters, which every ball joint has: `clearance` of `joint.S1.clearance`.
 pub fn contact_parts() -> impl Iterator<Item = &'static str> {
     contact_rows().map(|(part, _)| part)

@@ -71,7 +71,7 @@ mod value;
 mod visible;
 mod write;
 
-pub use access::{check_solver_changes, contact_parts, contact_value};
+pub use access::{check_solver_changes, contact_parts};
 pub use assets::{MAX_FILE_SIZE, MAX_MESH_SIZE, file_bytes, max_file_size};
 pub use drives::{DRIVE_LAWS, DriveLaw};
 pub use elements::is_element;

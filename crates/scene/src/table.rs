@@ -41,6 +41,22 @@ const fn contact(
     row(key, Access::Contact(field), label, "Contact", kind, default, Scope::Contact, help, equation)
 }
 
+/// A row of a contact parameter, by its field: a number.
+macro_rules! contact_number {
+    ($field:ident, $label:literal, $kind:expr, $help:literal, $equation:literal $(,)?) => {{
+        let default = Value::Number(DEFAULT.$field);
+        contact(concat!("contact.", stringify!($field)), field!($field), $label, $kind, default, $help, $equation)
+    }};
+}
+
+/// A row of a contact parameter, by its field: a word of an enum.
+macro_rules! contact_choice {
+    ($field:ident, $label:literal, $words:ty, $help:literal, $equation:literal $(,)?) => {{
+        let (kind, default) = (Kind::Choice(<$words>::WORDS), Value::Choice(DEFAULT.$field.word()));
+        contact(concat!("contact.", stringify!($field)), word_field!($field), $label, kind, default, $help, $equation)
+    }};
+}
+
 const fn at_reset(mut parameter: Parameter) -> Parameter {
     parameter.at_reset = true;
     parameter
@@ -76,115 +92,93 @@ const fn gravity(
 }
 
 static TABLE: [Parameter; 25] = [
-    contact(
-        "contact.clearance",
-        field!(clearance),
+    contact_number!(
+        clearance,
         "Clearance",
         number(D::Length, 0.0, 1.0, "mm", (0.0, 1e-3)),
-        Value::Number(DEFAULT.clearance),
         "Radial gap c = R - r between socket and ball. With 0 the joint is ideal: a constraint instead of a contact. \
          It must stay below the ball radius. Larger gaps give longer free flights and harder impacts; at 0.01 mm and \
          below, the contact patch is no longer small against the ball, which Hertz's theory assumes.",
         "Paper eqs. (9), (10); stiffness in (19)",
     ),
-    contact(
-        "contact.friction",
-        field!(friction),
+    contact_number!(
+        friction,
         "Friction coefficient",
         number(D::None, 0.0, 10.0, "", (0.0, 1.0)),
-        Value::Number(DEFAULT.friction),
         "Coulomb coefficient cf of ball on socket. Steel on steel lies between 0.1 (oiled) and 0.8 (dry). With 0 \
          the rattling lasts much longer.",
         "Paper eq. (20)",
     ),
-    contact(
-        "contact.restitution",
-        field!(restitution),
+    contact_number!(
+        restitution,
         "Restitution",
         number(D::None, 0.0, 1.0, "", (0.0, 1.0)),
-        Value::Number(DEFAULT.restitution),
         "Rebound speed over approach speed asked of the normal law; 1 loses no energy. The Lankarani–Nikravesh \
          law is right only near 1: asked for 0.9 it gives 0.913, for 0.8 0.847, for 0 0.66. gonthier gives what is \
          asked for, flores within 0.05; both divide by this number and refuse 0.",
         "Paper eq. (19)",
     ),
-    contact(
-        "contact.youngs_modulus",
-        field!(youngs_modulus),
+    contact_number!(
+        youngs_modulus,
         "Young's modulus",
         logarithmic(D::Stress, 1e6, 1e12, "GPa", (1e9, 1e12)),
-        Value::Number(DEFAULT.youngs_modulus),
         "Stiffness E of the material of ball and socket. Steel has 206 GPa. A softer material gives longer, gentler \
          impacts and deeper penetration, and lets the solver take larger steps.",
         "Paper eq. (19), stiffness K",
     ),
-    contact(
-        "contact.poisson_ratio",
-        field!(poisson_ratio),
+    contact_number!(
+        poisson_ratio,
         "Poisson's ratio",
         number(D::None, 0.0, 0.499, "", (0.0, 0.499)),
-        Value::Number(DEFAULT.poisson_ratio),
         "Lateral contraction over axial extension of the material, nu. Metals have about 0.3. It changes the contact \
          stiffness by at most a third.",
         "Paper eq. (19), stiffness K",
     ),
-    contact(
-        "contact.ball_radius",
-        field!(ball_radius),
+    contact_number!(
+        ball_radius,
         "Ball radius",
         logarithmic(D::Length, 1e-4, 1.0, "mm", (1e-3, 0.1)),
-        Value::Number(DEFAULT.ball_radius),
         "Radius r of the ball; the socket has R = r + c. A larger ball in the same gap fits more closely, so the \
          contact is stiffer.",
         "Paper eqs. (9), (12), (19)",
     ),
-    contact(
-        "contact.friction_velocity",
-        word_field!(friction_velocity),
+    contact_choice!(
+        friction_velocity,
         "Friction velocity",
-        Kind::Choice(FrictionVelocity::WORDS),
-        Value::Choice(DEFAULT.friction_velocity.word()),
+        FrictionVelocity,
         "Sliding velocity of the friction law. centres, the paper's choice, is the relative velocity of the two \
          centres, which neglects the rotation of the ball. surface is the relative velocity of the two material \
          points in contact.",
         "Paper eqs. (15), (16) for centres; (13), (14) with the bodies' rotation for surface",
     ),
-    contact(
-        "contact.slip_speed_low",
-        field!(slip_speed_low),
+    contact_number!(
+        slip_speed_low,
         "Low slip speed",
         logarithmic(D::Speed, 0.0, 1.0, "mm/s", (1e-7, 1e-3)),
-        Value::Number(DEFAULT.slip_speed_low),
         "v_a: below this sliding speed there is no friction, so that its direction never jumps at rest. It must stay \
          below the high slip speed.",
         "Paper eq. (21)",
     ),
-    contact(
-        "contact.slip_speed_high",
-        field!(slip_speed_high),
+    contact_number!(
+        slip_speed_high,
         "High slip speed",
         logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 1e-1)),
-        Value::Number(DEFAULT.slip_speed_high),
         "v_theta: above this sliding speed friction is full; below it a ball creeps where dry friction would hold \
          it. A smaller value creeps less and is stiffer to compute.",
         "Paper eq. (21)",
     ),
-    contact(
-        "contact.impact_speed_floor",
-        field!(impact_speed_floor),
+    contact_number!(
+        impact_speed_floor,
         "Impact speed floor",
         logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 0.1)),
-        Value::Number(DEFAULT.impact_speed_floor),
         "Least approach speed by which the damping term divides. Without a floor the last, softest contacts would be \
          infinitely stiff. A contact that begins more slowly than this rebounds higher than asked.",
         "Paper eq. (19), the speed at the start of contact",
     ),
-    contact(
-        "contact.approach_speed",
-        word_field!(approach_speed),
+    contact_choice!(
+        approach_speed,
         "Approach speed",
-        Kind::Choice(ApproachSpeed::WORDS),
-        Value::Choice(DEFAULT.approach_speed.word()),
+        ApproachSpeed,
         "Speed by which the damping term divides. start, the paper's choice, is the penetration rate at which the \
          contact began. It damps a joint that touches softly and is then hit by its neighbour many times too \
          strongly. largest is \
@@ -192,23 +186,19 @@ static TABLE: [Parameter; 25] = [
          undisturbed impact is the same with both.",
         "Paper eq. (19), the speed at the start of contact",
     ),
-    contact(
-        "contact.normal_law",
-        word_field!(normal_law),
+    contact_choice!(
+        normal_law,
         "Normal law",
-        Kind::Choice(NormalLaw::WORDS),
-        Value::Choice(DEFAULT.normal_law.word()),
+        NormalLaw,
         "Normal force as a function of penetration and its rate. lankarani-nikravesh is the paper's; hertz is \
          elastic; hunt-crossley, flores and gonthier differ in their damping, and gonthier alone gives the restitution \
          asked for.",
         "Paper eq. (19) for lankarani-nikravesh",
     ),
-    contact(
-        "contact.friction_law",
-        word_field!(friction_law),
+    contact_choice!(
+        friction_law,
         "Friction law",
-        Kind::Choice(FrictionLaw::WORDS),
-        Value::Choice(DEFAULT.friction_law.word()),
+        FrictionLaw,
         "Friction force as a function of normal force and sliding velocity. modified-coulomb rises linearly between \
          the two slip speeds; none leaves friction out.",
         "Paper eqs. (20), (21)",

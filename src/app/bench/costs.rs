@@ -1,10 +1,10 @@
 //! What play costs: how far an output moves with the play of each joint alone, as a tornado that fills while it is computed.
 
-use eframe::egui::{Align, Button, ComboBox, DragValue, RichText, Ui, vec2};
+use eframe::egui::{Align, ComboBox, DragValue, RichText, Ui};
 
+use super::computation::Computation;
 use super::cost_study::{CostSettings, CostStudy, VariedParameter};
 use super::request::BenchRequest;
-use super::shared_job::SharedJob;
 use super::tornado::Tornado;
 use crate::analysis::one_at_a_time_task::OneAtATimeTask;
 use crate::analysis::study::NAMED;
@@ -16,8 +16,6 @@ use crate::app::{theme, value};
 use crate::scene::{Kind, Scene, Value};
 use crate::simulate::MAX_RUN_DURATION;
 
-/// Width of the start/stop button, points; fixed, so that it does not move.
-const BUTTON_WIDTH: f32 = 120.0;
 /// Largest part of a run that is a transient.
 const MAX_TRANSIENT: f64 = 0.99;
 /// Shortest run, s.
@@ -32,22 +30,13 @@ pub struct Costs {
     /// Text of the scene that the settings belong to.
     scene: String,
     settings: Option<CostSettings>,
-    requested: Option<OneAtATimeTask>,
-    running: Option<RunningStudy>,
+    pub(super) computation: Computation<OneAtATimeTask>,
     study: Option<CostStudy>,
-    problem: Option<String>,
     /// Index of the displayed output.
     output: usize,
     /// Whether to scroll to the tornado.
     reveal: bool,
     tornado: Tornado,
-}
-
-/// A study being computed.
-struct RunningStudy {
-    task: OneAtATimeTask,
-    job: SharedJob,
-    has_plan: bool,
 }
 
 impl Default for Costs {
@@ -57,10 +46,8 @@ impl Default for Costs {
             is_set_aside: false,
             scene: String::new(),
             settings: None,
-            requested: None,
-            running: None,
+            computation: Computation::default(),
             study: None,
-            problem: None,
             output: 0,
             reveal: false,
             tornado: Tornado::default(),
@@ -73,7 +60,7 @@ impl Costs {
     pub fn was_shown(&mut self) -> bool {
         let drawn = std::mem::take(&mut self.drawn);
         if !drawn {
-            (self.requested, self.running) = (None, None);
+            self.computation.stop();
         }
         drawn || self.is_set_aside
     }
@@ -93,60 +80,25 @@ impl Costs {
         self.study.as_ref()
     }
 
-    /// Whether a study is running.
-    pub fn is_running(&self) -> bool {
-        self.running.is_some() || self.requested.is_some()
-    }
-
-    /// Whether the latest results belong to the requested study, or no study is pending.
-    fn has_current_results(&self) -> bool {
-        self.requested.is_none() && self.running.as_ref().is_none_or(|running| running.has_plan)
-    }
-
     /// Starts a requested study and takes messages from a running one; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
-        if let Some(task) = self.requested.take() {
-            self.problem = None;
-            let most = 1 + 2 * task.over.len();
-            let job = SharedJob::start(host, most, |share| Job::OneAtATime(task.clone(), share));
-            self.running = job.map(|job| RunningStudy { task, job, has_plan: false });
-            if self.running.is_none() {
-                self.problem = Some("Runs cannot be computed here".to_owned());
-            }
-        }
-        let Some(RunningStudy { task, job, has_plan }) = &mut self.running else {
-            return false;
-        };
-        let polled = job.poll(|message| match message {
-            Message::Plan(plan) if !*has_plan => {
-                *has_plan = true;
+        let Self { computation, study, output, tornado, .. } = self;
+        let take = |task: &OneAtATimeTask, message| match message {
+            Message::Plan(plan) => {
                 // An output missing from the scene is replaced by the first available one.
                 let has = |output: &usize| plan.units[*output].is_some();
-                self.output = Some(self.output).filter(has).or((0..NAMED.len()).find(has)).unwrap_or_default();
-                self.study = Some(CostStudy::new(task.clone(), plan));
-                self.tornado.clear();
+                *output = Some(*output).filter(has).or((0..NAMED.len()).find(has)).unwrap_or_default();
+                *study = Some(CostStudy::new(task.clone(), plan));
+                tornado.clear();
             }
             Message::Run(run) => {
-                if let Some(study) = &mut self.study {
+                if let Some(study) = study {
                     study.take(run);
                 }
             }
             _ => {}
-        });
-        match polled {
-            Ok(true) => return true,
-            Ok(false) => {}
-            Err(why) => self.problem = Some(why),
-        }
-        self.running = None;
-        false
-    }
-
-    /// Reports a frame at `now`, s, so that a running study yields time to the picture; `moves`: whether the picture is animated.
-    pub fn report_frame(&mut self, now: f64, moves: bool) {
-        if let Some(running) = &mut self.running {
-            running.job.report_frame(now, moves);
-        }
+        };
+        computation.update(host, "Runs", |task| 1 + 2 * task.over.len(), Job::OneAtATime, take, |_, why| why)
     }
 
     /// Settings, progress and tornado; returns the user's request to the run.
@@ -175,7 +127,7 @@ impl Costs {
         output_ui(ui, &mut self.output, study);
         let tornado = ui.cursor().top();
         let clicked = self.tornado.ui(ui, study, self.output, player, !differences.is_empty());
-        if self.reveal && self.has_current_results() {
+        if self.reveal && self.computation.has_current_results() {
             self.reveal = false;
             let (all, room) = (ui.min_rect(), ui.clip_rect().height());
             let fits = [progress, choice, tornado].into_iter().find(|top| all.bottom() - top <= room);
@@ -245,43 +197,31 @@ impl Costs {
     }
 
     fn start_ui(&mut self, ui: &mut Ui, scene: &Scene) {
-        let running = self.is_running();
-        let (name, help) = if running {
-            ("Stop runs", "Ends the computation; bars so far remain")
-        } else {
-            (
-                "Start runs",
-                "Runs the scene with its current settings, then with each value alone at its lower and at its upper end, in the \
-                 background; the numbers are those of `./run lab sensitivity`",
-            )
-        };
-        let clicked = ui.horizontal(|ui| {
-            let clicked = ui.add(Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0))).on_hover_text(help).clicked();
-            if let Some(running) = &self.running {
-                running.job.ui(ui, "Computed so far", "runs");
-            }
-            clicked
-        });
-        if clicked.inner && running {
-            (self.running, self.requested) = (None, None);
-        } else if clicked.inner {
-            (self.requested, self.problem) = match self.settings.as_ref().map(|settings| settings.task(scene)) {
+        let start = [
+            "Start runs",
+            "Runs the scene with its current settings, then with each value alone at its lower and at its upper end, in the \
+             background; the numbers are those of `./run lab sensitivity`",
+        ];
+        let stop = ["Stop runs", "Ends the computation; bars so far remain"];
+        if self.computation.button(ui, start, stop, ["Computed so far", "runs"]) {
+            let (requested, problem) = match self.settings.as_ref().map(|settings| settings.task(scene)) {
                 Some(Ok(task)) => (Some(task), None),
                 refused => (None, refused.and_then(Result::err)),
             };
-            self.reveal = self.requested.is_some();
+            (self.computation.requested, self.computation.problem) = (requested, problem);
+            self.reveal = self.computation.requested.is_some();
         }
     }
 
     /// The error message, or whether the tornado belongs to the current setting.
     fn state_ui(&self, ui: &mut Ui, differences: &[String]) {
         let weak = |ui: &mut Ui, words: String| ui.label(RichText::new(words).small().weak());
-        if let Some(problem) = &self.problem {
+        if let Some(problem) = &self.computation.problem {
             theme::error(ui, value::typeset(problem));
             return;
         }
-        match self.study.as_ref().filter(|_| self.has_current_results()) {
-            None if self.is_running() => drop(weak(ui, "Starting…".to_owned())),
+        match self.study.as_ref().filter(|_| self.computation.has_current_results()) {
+            None if self.computation.is_running() => drop(weak(ui, "Starting…".to_owned())),
             None => drop(weak(ui, "No results yet".to_owned())),
             Some(_) if !differences.is_empty() => {
                 let words = format!("Of an earlier setting. {}", differences.join("; "));

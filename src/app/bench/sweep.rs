@@ -1,12 +1,12 @@
 //! Background sweep: settings, progress, and the points so far.
 
-use eframe::egui::{Align, Button, ComboBox, DragValue, RichText, TextEdit, Ui, vec2};
+use eframe::egui::{Align, ComboBox, DragValue, RichText, TextEdit, Ui};
 
+use super::computation::Computation;
 use super::coordinate::Coordinate;
 use super::diagram::Diagram;
 use super::in_words;
 use super::request::BenchRequest;
-use super::shared_job::SharedJob;
 use super::sweep_results::{SweepResults, start_label};
 use crate::analysis::design::Start;
 use crate::analysis::point::MAX_EXPONENT_TOLERANCE;
@@ -24,9 +24,6 @@ use crate::scene::{Kind, Parameter, Scene, Value};
 /// Parameter varied by default, and its range.
 const DEFAULT_RANGE: (&str, &str, &str) = ("contact.clearance", "0.01 mm", "1 mm");
 
-/// Width of the start/stop button, points; fixed, so that it does not move.
-const BUTTON_WIDTH: f32 = 120.0;
-
 /// Settings of the next sweep.
 struct Settings {
     /// Name of the scene they belong to.
@@ -41,22 +38,12 @@ struct Settings {
     exponent: bool,
 }
 
-/// A running sweep.
-struct RunningSweep {
-    task: SweepTask,
-    job: SharedJob,
-    /// Whether its ranges are known.
-    has_ranges: bool,
-}
-
 /// The panel.
 #[derive(Default)]
 pub struct SweepPanel {
     settings: Option<Settings>,
-    requested: Option<SweepTask>,
-    running: Option<RunningSweep>,
+    pub(super) computation: Computation<SweepTask>,
     results: Option<SweepResults>,
-    problem: Option<String>,
     diagram: Diagram,
     /// Whether to scroll to the diagram.
     reveal: bool,
@@ -65,57 +52,29 @@ pub struct SweepPanel {
 impl SweepPanel {
     /// Starts a requested sweep and takes messages from a running one; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
-        if let Some(task) = self.requested.take() {
-            self.problem = None;
-            let job = SharedJob::start(host, usize::MAX, |share| Job::Sweep(task.clone(), share));
-            self.running = job.map(|job| RunningSweep { task, job, has_ranges: false });
-            if self.running.is_none() {
-                self.problem = Some("Sweeps cannot be computed here".to_owned());
-            }
-        }
-        let Some(RunningSweep { task, job, has_ranges }) = &mut self.running else {
-            return false;
-        };
-        let polled = job.poll(|message| match message {
-            Message::Ranges(ranges) if !*has_ranges => {
-                *has_ranges = true;
-                self.results = ranges.into_iter().next().map(|range| SweepResults {
+        let Self { computation, results, diagram, .. } = self;
+        let take = |task: &SweepTask, message| match message {
+            Message::Ranges(ranges) => {
+                *results = ranges.into_iter().next().map(|range| SweepResults {
                     task: task.clone(),
                     points: vec![None; range.count],
                     scene: task.scene.scene().ok(),
                     range,
                 });
-                self.diagram.clear();
+                diagram.clear();
             }
             Message::Point(point) => {
-                if let Some(results) = &mut self.results
+                if let Some(results) = results
                     && let Some(slot) = results.points.get_mut(point.index)
                 {
                     *slot = Some(*point);
-                    self.diagram.invalidate();
+                    diagram.invalidate();
                 }
             }
             _ => {}
-        });
-        match polled {
-            Ok(true) => return true,
-            Ok(false) => {}
-            Err(why) => self.problem = Some(in_words(&why, "--vary", &task.vary)),
-        }
-        self.running = None;
-        false
-    }
-
-    /// Reports a frame at `now`, s, so that a running sweep yields time to the picture; `moves`: whether the picture is animated.
-    pub fn report_frame(&mut self, now: f64, moves: bool) {
-        if let Some(sweeping) = &mut self.running {
-            sweeping.job.report_frame(now, moves);
-        }
-    }
-
-    /// Whether a sweep is running.
-    pub fn is_running(&self) -> bool {
-        self.running.is_some() || self.requested.is_some()
+        };
+        let explain = |task: &SweepTask, why: String| in_words(&why, "--vary", &task.vary);
+        computation.update(host, "Sweeps", |_| usize::MAX, Job::Sweep, take, explain)
     }
 
     /// The latest sweep.
@@ -131,7 +90,7 @@ impl SweepPanel {
     /// Starts a ready sweep over its `scene`, replacing any running sweep.
     pub fn start(&mut self, ready: &'static ReadySweep, scene: &Scene) {
         self.settings = Some(Settings::of(ready));
-        self.requested = Some(ready.task(scene));
+        self.computation.requested = Some(ready.task(scene));
         self.reveal = true;
     }
 
@@ -142,17 +101,12 @@ impl SweepPanel {
         ready.or(load.map(BenchRequest::Section))
     }
 
-    /// Whether the diagram belongs to the requested sweep, or no sweep is pending.
-    fn has_diagram(&self) -> bool {
-        self.requested.is_none() && self.running.as_ref().is_none_or(|sweeping| sweeping.has_ranges)
-    }
-
     fn sweep_ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Load> {
         let mut progress = ui.cursor().top();
         match player.watch().period() {
             Err(why) => {
                 ui.label(RichText::new(format!("No sweep: {why}")).weak());
-                if self.is_running() {
+                if self.computation.is_running() {
                     self.start_ui(ui, player);
                 }
             }
@@ -166,7 +120,7 @@ impl SweepPanel {
         let diagram = ui.cursor().top();
         let load = self.diagram_ui(ui, coordinate);
         if self.reveal {
-            self.reveal = !self.has_diagram();
+            self.reveal = !self.computation.has_current_results();
             let room = ui.clip_rect().height();
             let all = ui.min_rect().with_min_y(progress);
             // Includes the progress, and the items above and below it if they fit.
@@ -200,14 +154,14 @@ impl SweepPanel {
     /// The error message, or whether the diagram belongs to the displayed scene.
     fn state_ui(&self, ui: &mut Ui, player: &Player) {
         let small = |words: &str| RichText::new(words).small();
-        if let Some(problem) = &self.problem {
+        if let Some(problem) = &self.computation.problem {
             theme::error(ui, problem);
             return;
         }
-        let running = self.running.as_ref().map(|sweeping| &sweeping.task);
+        let running = self.computation.running.as_ref().map(|running| &running.task);
         let results = self.results.as_ref();
         let Some(results) = results.filter(|results| running.is_none_or(|task| *task == results.task)) else {
-            let words = if self.is_running() { "Starting…" } else { "No results yet" };
+            let words = if self.computation.is_running() { "Starting…" } else { "No results yet" };
             ui.label(small(words).weak());
             return;
         };
@@ -301,35 +255,20 @@ impl SweepPanel {
     }
 
     fn start_ui(&mut self, ui: &mut Ui, player: &Player) {
-        let running = self.is_running();
-        let (name, help) = if running {
-            ("Cancel sweep", "Stops the sweep; points computed so far remain")
-        } else {
-            (
-                "Start sweep",
-                "Runs the scene with its current settings at each value of the varied parameter, in the background, \
-                 and draws the bifurcation diagram as points arrive",
-            )
-        };
-        let clicked = ui.horizontal(|ui| {
-            let button = Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0));
-            let clicked = ui.add(button).on_hover_text(help).clicked();
-            if let Some(sweeping) = &self.running {
-                sweeping.job.ui(ui, "Swept so far", "points");
-            }
-            clicked
-        });
-        let clicked = clicked.inner;
-        if clicked && running {
-            (self.running, self.requested) = (None, None);
-        } else if clicked
+        let start = [
+            "Start sweep",
+            "Runs the scene with its current settings at each value of the varied parameter, in the background, \
+             and draws the bifurcation diagram as points arrive",
+        ];
+        let stop = ["Cancel sweep", "Stops the sweep; points computed so far remain"];
+        if self.computation.button(ui, start, stop, ["Swept so far", "points"])
             && let Some(settings) = &self.settings
             && let Ok(parameter) = player.pending().parameter(settings.key)
         {
             self.reveal = true;
             let end = |text: &str| value::with_display_unit(text, &parameter.kind);
             let Settings { key, from, to, values, .. } = settings;
-            self.requested = Some(SweepTask {
+            self.computation.requested = Some(SweepTask {
                 scene: SceneSource::of(player.pending()),
                 vary: vec![format!("{key}={}..{}:{values}", end(from), end(to))],
                 periods: settings.periods,

@@ -1,12 +1,13 @@
 //! Map of the tip's error over the workspace: its axes, its computation, and the arrows in the picture.
 
-use eframe::egui::{Button, ProgressBar, RichText, Slider, TextEdit, Ui, vec2};
+use eframe::egui::{RichText, Slider, TextEdit, Ui};
 
+use super::computation::Computation;
 use super::in_words;
 use crate::analysis::map_task::{MapTask, TipErrors};
 use crate::analysis::source::SceneSource;
 use crate::analysis::task::{Job, Message};
-use crate::app::host::{BackgroundTask, Host};
+use crate::app::host::Host;
 use crate::app::layout::{self, reserve_lines};
 use crate::app::player::Player;
 use crate::app::{theme, value};
@@ -17,8 +18,6 @@ use crate::view::{Cloud, to_f32};
 
 /// Number of directions searched at each point; the search for the largest error starts from the best of them.
 const DIRECTIONS: usize = 16;
-/// Width of the start button, points; fixed, so that it does not move.
-const BUTTON_WIDTH: f32 = 120.0;
 /// Range and initial value of the scale.
 const SCALE_RANGE: std::ops::RangeInclusive<f32> = 1.0..=1000.0;
 const INITIAL_SCALE: f32 = 100.0;
@@ -94,10 +93,6 @@ struct PartialMap {
 }
 
 impl PartialMap {
-    fn count(&self) -> usize {
-        self.axes.iter().map(|(_, values)| values.len()).product()
-    }
-
     /// Index of `point` along `axis`.
     fn index(&self, axis: usize, point: usize) -> usize {
         let below: usize = self.axes[axis + 1..].iter().map(|(_, values)| values.len()).product();
@@ -110,10 +105,8 @@ pub struct MapPanel {
     /// Name of the scene that `over` belongs to, and what varies, one axis per line.
     scene: String,
     over: String,
-    requested: Option<MapTask>,
-    running: Option<Box<dyn BackgroundTask>>,
+    pub(super) computation: Computation<MapTask>,
     mapped: Option<PartialMap>,
-    problem: Option<String>,
     shown_error: ShownError,
     scale: f32,
     /// Indices of the fixed axis and of its value.
@@ -127,10 +120,8 @@ impl Default for MapPanel {
         Self {
             scene: String::new(),
             over: String::new(),
-            requested: None,
-            running: None,
+            computation: Computation::default(),
             mapped: None,
-            problem: None,
             shown_error: ShownError::default(),
             scale: INITIAL_SCALE,
             slice: None,
@@ -142,28 +133,18 @@ impl Default for MapPanel {
 impl MapPanel {
     /// Starts a requested map and takes messages from a running one; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
-        if let Some(task) = self.requested.take() {
-            (self.problem, self.slice) = (None, None);
-            self.running = host.start(Job::Map(task.clone()));
-            match self.running {
-                Some(_) => self.mapped = Some(PartialMap { task, axes: Vec::new(), points: Vec::new() }),
-                None => self.problem = Some("Maps cannot be computed here".to_owned()),
-            }
-        }
-        while let Some(message) = self.running.as_mut().and_then(|running| running.poll()) {
-            match (message, &mut self.mapped) {
-                (Message::Axes(axes), Some(mapped)) => mapped.axes = axes,
-                (Message::MapPoint(point), Some(mapped)) => mapped.points.push(point),
-                (Message::Done, _) => self.running = None,
-                (Message::Failed(why), mapped) => {
-                    let over = mapped.as_ref().map_or(&[][..], |mapped| &mapped.task.over);
-                    self.problem = Some(in_words(&why, "--over", over));
-                    (self.running, self.mapped) = (None, None);
+        let Self { computation, mapped, .. } = self;
+        let take = |task: &MapTask, message| match message {
+            Message::Axes(axes) => *mapped = Some(PartialMap { task: task.clone(), axes, points: Vec::new() }),
+            Message::MapPoint(point) => {
+                if let Some(mapped) = mapped {
+                    mapped.points.push(point);
                 }
-                _ => {}
             }
-        }
-        self.running.is_some()
+            _ => {}
+        };
+        let explain = |task: &MapTask, why: String| in_words(&why, "--over", &task.over);
+        computation.update(host, "Maps", |_| 1, |task, _| Job::Map(task), take, explain)
     }
 
     /// The arrows of the map of the displayed scene; `None` if the panel was closed in the latest frame.
@@ -223,37 +204,21 @@ impl MapPanel {
     }
 
     fn start_ui(&mut self, ui: &mut Ui, player: &Player) {
-        let running = self.running.is_some() || self.requested.is_some();
-        ui.horizontal(|ui| {
-            let (name, help) = if running {
-                ("Cancel", "End the computation; the points so far stay")
-            } else {
-                (
-                    "Map tip error",
-                    "Computes the error of the tip at every point in the background; the run is not affected",
-                )
-            };
-            if ui.add(Button::new(name).min_size(vec2(BUTTON_WIDTH, 0.0))).on_hover_text(help).clicked() {
-                if running {
-                    (self.running, self.requested) = (None, None);
-                } else {
-                    let over = self.over.lines().map(str::trim).filter(|line| !line.is_empty());
-                    self.requested = Some(MapTask {
-                        scene: SceneSource::of(player.pending()),
-                        over: over.map(str::to_owned).collect(),
-                        directions: DIRECTIONS,
-                    });
-                }
-            }
-            if let Some(mapped) = self.mapped.as_ref().filter(|_| running) {
-                let done = mapped.points.len() as f32 / mapped.count().max(1) as f32;
-                ui.add(ProgressBar::new(done).show_percentage()).accessible_name("Computed so far");
-            }
-        });
+        let help = "Computes the error of the tip at every point in the background; the run is not affected";
+        let stop = ["Cancel", "End the computation; the points so far stay"];
+        if self.computation.button(ui, ["Map tip error", help], stop, ["Computed so far", "points"]) {
+            (self.mapped, self.slice) = (None, None);
+            let over = self.over.lines().map(str::trim).filter(|line| !line.is_empty());
+            self.computation.requested = Some(MapTask {
+                scene: SceneSource::of(player.pending()),
+                over: over.map(str::to_owned).collect(),
+                directions: DIRECTIONS,
+            });
+        }
     }
 
     fn state_ui(&self, ui: &mut Ui, player: &Player) {
-        if let Some(problem) = &self.problem {
+        if let Some(problem) = &self.computation.problem {
             theme::error(ui, problem);
             return;
         }
@@ -304,6 +269,7 @@ mod tests {
     use super::*;
     use crate::analysis::map::WorkspaceMap;
     use crate::analysis::task::perform;
+    use crate::app::host::BackgroundTask;
     use crate::app::{DroppedFile, OpenedFile};
     use crate::scene::Scene;
 
@@ -346,7 +312,8 @@ mod tests {
         let player = Player::new(&scene).expect("starts");
         let over = ["crank.angle=0deg..90deg:3".to_owned(), "contact.clearance=0.1mm,0.2mm".to_owned()];
         let task = MapTask { scene: SceneSource::of(&scene), over: over.to_vec(), directions: DIRECTIONS };
-        let mut panel = MapPanel { requested: Some(task), ..MapPanel::default() };
+        let mut panel = MapPanel::default();
+        panel.computation.requested = Some(task);
         assert!(!panel.update(&mut AtOnce), "it is done");
         assert_eq!(panel.take_cloud(&player), None, "the panel is closed");
         let map = WorkspaceMap::new(scene.clone(), &over, DIRECTIONS).expect("six points");

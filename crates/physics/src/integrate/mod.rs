@@ -77,8 +77,6 @@ impl Method {
 
 /// A first-order system y' = f(t, y).
 pub trait System {
-    /// Number of components of y.
-    fn dimension(&self) -> usize;
     /// Components that steps advance, in order. All other components are frozen and must not be touched; their derivatives are
     /// zero.
     fn active_ranges(&self) -> &[Range<usize>];
@@ -197,9 +195,6 @@ mod tests {
     struct Oscillator;
 
     impl System for Oscillator {
-        fn dimension(&self) -> usize {
-            2
-        }
         fn active_ranges(&self) -> &[Range<usize>] {
             std::slice::from_ref(&(0..2))
         }

@@ -140,9 +140,6 @@ impl Probe {
 }
 
 impl System for Probe {
-    fn dimension(&self) -> usize {
-        self.scale.len()
-    }
     fn active_ranges(&self) -> &[Range<usize>] {
         std::slice::from_ref(&self.all)
     }

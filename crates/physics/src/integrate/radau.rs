@@ -477,9 +477,6 @@ mod tests {
     }
 
     impl System for VanDerPol {
-        fn dimension(&self) -> usize {
-            2
-        }
         fn active_ranges(&self) -> &[Range<usize>] {
             std::slice::from_ref(&(0..2))
         }

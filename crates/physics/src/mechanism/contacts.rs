@@ -154,11 +154,6 @@ impl Contacts {
         self.joints[i].law.clearance
     }
 
-    /// Active clearance ramps, by joint.
-    pub fn ramps(&self) -> &[Option<Ramp>] {
-        &self.ramps
-    }
-
     /// Starts, ends or restores the ramp of joint `i`.
     pub fn set_ramp(&mut self, i: usize, ramp: Option<Ramp>) {
         self.ramps[i] = ramp;

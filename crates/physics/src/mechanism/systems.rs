@@ -80,10 +80,6 @@ impl Evaluator<'_> {
 }
 
 impl System for Evaluator<'_> {
-    fn dimension(&self) -> usize {
-        self.mechanism.dimension()
-    }
-
     fn prepare_times(&mut self, times: &[f64]) {
         let Mechanism { model, equations, .. } = &mut *self.mechanism;
         equations.driven_mut().prepare(model, times);
