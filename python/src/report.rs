@@ -45,21 +45,7 @@ pub fn ledger<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Option<
         return Ok(None);
     };
     let all = PyDict::new(py);
-    for (name, value) in [
-        ("drive_work", ledger.drive_work),
-        ("gravity_work", ledger.gravity_work),
-        ("kinetic_change", ledger.kinetic_change),
-        ("elastic_change", ledger.elastic_change),
-        ("restitution_loss", ledger.restitution_loss),
-        ("friction_loss", ledger.friction_loss),
-        ("clearance_work", ledger.clearance_work),
-        ("damping_loss", ledger.damping_loss),
-        ("external_work", ledger.external_work),
-        ("change_work", ledger.change_work),
-        ("exchanged", ledger.exchanged),
-        ("residual", ledger.residual()),
-        ("relative_residual", ledger.relative_residual()),
-    ] {
+    for (name, value) in ledger.terms() {
         all.set_item(name, value)?;
     }
     Ok(Some(all))

@@ -1,7 +1,7 @@
 //! A run from t = 0 with rows at equal intervals, as `jointplay run` makes it.
 
-use jointplay_analysis::row_times::RowTimes;
-use jointplay_physics::simulate::{ChannelInfo, Frame, Impact, Stopped, matching};
+use jointplay_analysis::row_times::{RowReader, RowTimes};
+use jointplay_physics::simulate::{ChannelInfo, Impact, chosen_channels};
 use jointplay_scene::LiveScene;
 use numpy::ndarray::Array2;
 use pyo3::exceptions::PyMemoryError;
@@ -17,31 +17,15 @@ use crate::scene::{PyScene, channels_at_start};
 /// Number of intervals if their length is not given.
 const INTERVALS: f64 = 1000.0;
 
-/// Why a run ended before its time.
-enum Fault {
-    Stopped(Stopped),
-    NotFinite { channel: String, value: f64, time: f64 },
-}
-
-impl std::fmt::Display for Fault {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Stopped(stopped) => stopped.fmt(f),
-            Self::NotFinite { channel, value, time } => write!(
-                f,
-                "stopped: {channel} is {value} at t = {time:.6e} s; try a smaller solver.step or solver.tolerance"
-            ),
-        }
-    }
-}
+/// Why a run ended before its time, and what to try.
+type Fault = (String, Option<String>);
 
 /// A run in progress and its rows.
 struct Recorder {
     live: LiveScene,
     duration: f64,
-    times: RowTimes,
+    reader: RowReader,
     channels: Vec<ChannelInfo>,
-    frame: Frame,
     /// One column after another, each of `capacity` values.
     values: Vec<f64>,
     capacity: usize,
@@ -54,32 +38,22 @@ impl Recorder {
     /// Takes at most `steps` steps, and returns whether the run is over. A row never shortens a step.
     fn advance(&mut self, steps: u32) -> Result<bool, Fault> {
         for _ in 0..steps {
-            self.record()?;
+            let Self { live, reader, values, rows, capacity, .. } = self;
+            let read = reader.read(live, |row| {
+                for (column, value) in row.iter().enumerate() {
+                    values[column * *capacity + *rows] = *value;
+                }
+                *rows += 1;
+            });
+            read.map_err(|error| (error.to_string(), None))?;
             if self.live.time() >= self.duration {
                 return Ok(true);
             }
-            self.live.step_until(self.duration).map_err(Fault::Stopped)?;
+            let stepped = self.live.step_until(self.duration);
+            stepped.map_err(|stopped| (stopped.to_string(), Some(stopped.advice.to_string())))?;
             self.live.take_impacts(&mut self.impacts);
         }
         Ok(false)
-    }
-
-    /// Records the rows that lie in the latest step.
-    fn record(&mut self) -> Result<(), Fault> {
-        while self.rows < self.capacity && self.times.at(self.rows as u64) <= self.live.time() {
-            let time = self.times.at(self.rows as u64);
-            self.live.sample(time, &mut self.frame);
-            for (c, channel) in self.channels.iter().enumerate() {
-                let value = channel.reading().read(&self.frame);
-                if let Some(value) = value.filter(|value| !value.is_finite()) {
-                    return Err(Fault::NotFinite { channel: channel.name.clone(), value, time });
-                }
-                // There is no tip error after the ideal mechanism has stopped.
-                self.values[c * self.capacity + self.rows] = value.unwrap_or(f64::NAN);
-            }
-            self.rows += 1;
-        }
-        Ok(())
     }
 }
 
@@ -104,16 +78,17 @@ pub fn run<'py>(
     let positive = || option_error(py, "every = 0: the interval between rows must be greater than 0");
     let times = RowTimes::new(duration, every).ok_or_else(positive)?;
     let mut live = scene.start(py)?;
-    let (all, mut frame) = detached(py, || channels_at_start(&mut live))?;
-    let chosen = select_channels(py, all, &channels)?;
+    let (all, _) = detached(py, || channels_at_start(&mut live))?;
+    let failed = |error| option_error(py, &format!("channels: {error}; Scene.channels() lists them"));
+    let channels = chosen_channels(all, &channels).map_err(failed)?;
     let capacity = usize::try_from(times.last()).unwrap_or(usize::MAX).saturating_add(1);
-    let values = allocate(capacity, chosen.len())?;
+    let values = allocate(capacity, channels.len())?;
     if live.load_peaks().is_none() {
         live.track_load_peaks();
     }
-    chosen.iter().for_each(|channel| channel.reading().request(&mut frame));
-    let mut run =
-        Recorder { live, duration, times, channels: chosen, frame, values, capacity, rows: 0, impacts: Vec::new() };
+    let readings = channels.iter().map(|channel| (channel.name.clone(), channel.reading())).collect();
+    let reader = RowReader::new(times, 0, readings);
+    let mut run = Recorder { live, duration, reader, channels, values, capacity, rows: 0, impacts: Vec::new() };
     let fault = loop {
         match detached(py, || run.advance(STEPS_BETWEEN_CHECKS))? {
             Ok(true) => break None,
@@ -122,20 +97,7 @@ pub fn run<'py>(
         }
     };
     report_progress(py, progress, if fault.is_none() { 1.0 } else { run.live.time() / duration })?;
-    results_dict(py, run, fault.as_ref())
-}
-
-/// The channels that match one of `patterns`, and the time; without patterns, those recorded by default.
-fn select_channels(py: Python<'_>, all: Vec<ChannelInfo>, patterns: &[String]) -> PyResult<Vec<ChannelInfo>> {
-    for pattern in patterns {
-        let failed = |error| option_error(py, &format!("channels: {error}; Scene.channels() lists them"));
-        matching(&all, pattern).map_err(failed)?;
-    }
-    let is_chosen = |channel: &ChannelInfo| {
-        let named = patterns.iter().any(|pattern| channel.is_matched_by(pattern));
-        channel.name == "time" || named || (patterns.is_empty() && channel.unasked)
-    };
-    Ok(all.into_iter().filter(is_chosen).collect())
+    results_dict(py, run, fault)
 }
 
 fn allocate(rows: usize, columns: usize) -> PyResult<Vec<f64>> {
@@ -150,7 +112,7 @@ fn allocate(rows: usize, columns: usize) -> PyResult<Vec<f64>> {
     Ok(values)
 }
 
-fn results_dict<'py>(py: Python<'py>, run: Recorder, fault: Option<&Fault>) -> PyResult<Bound<'py, PyDict>> {
+fn results_dict<'py>(py: Python<'py>, run: Recorder, fault: Option<Fault>) -> PyResult<Bound<'py, PyDict>> {
     let live = &run.live;
     let all = PyDict::new(py);
     let channels: Vec<_> = run.channels.iter().map(|c| (&c.name[..], &c.column[..], c.unit, c.help)).collect();
@@ -162,12 +124,9 @@ fn results_dict<'py>(py: Python<'py>, run: Recorder, fault: Option<&Fault>) -> P
     all.set_item("ledger", report::ledger(py, live)?)?;
     all.set_item("statistics", report::statistics(py, live)?)?;
     all.set_item("impacts", report::impacts(py, live, &run.impacts)?)?;
-    all.set_item("fault", fault.map(ToString::to_string))?;
-    let advice = match fault {
-        Some(Fault::Stopped(stopped)) => Some(stopped.advice.to_string()),
-        _ => None,
-    };
-    all.set_item("advice", advice)?;
+    let (fault, advice) = fault.unzip();
+    all.set_item("fault", fault)?;
+    all.set_item("advice", advice.flatten())?;
     let shape = (run.channels.len(), run.capacity);
     let values = Array2::from_shape_vec(shape, run.values);
     // Cannot fail: the shape is that of the allocation.

@@ -14,10 +14,10 @@ use super::state::{self, StateFile};
 use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
 use crate::analysis::assembly::StartReport;
-use crate::analysis::row_times::RowTimes;
+use crate::analysis::row_times::{RowReader, RowTimes};
 use crate::files::{publish, spare_older};
 use crate::scene::{LiveScene, SavedState, Scene, insert_texts};
-use crate::simulate::Frame;
+use crate::simulate::{Frame, channels_of, chosen_channels};
 
 /// Steps between two checks of the clock, the progress bar and Ctrl-C.
 const STEPS_BETWEEN_CHECKS: u32 = 256;
@@ -92,17 +92,13 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     if starts_wear {
         simulation.track_wear();
     }
-    let mut table = if arguments.channels.is_empty() {
-        Table::new(&scene, &frame)
-    } else {
-        Table::of_patterns(&scene, &frame, &arguments.channels).map_err(|error| {
-            Failure::usage(format!(
-                "--channels: {error}; `jointplay check {} --channels` lists them",
-                arguments.scene.name().display()
-            ))
-        })?
-    };
-    table.request(&mut frame);
+    let channels = chosen_channels(channels_of(&scene.machine, &frame), &arguments.channels).map_err(|error| {
+        Failure::usage(format!(
+            "--channels: {error}; `jointplay check {} --channels` lists them",
+            arguments.scene.name().display()
+        ))
+    })?;
+    let mut table = Table::new(channels.iter().map(|channel| &channel.column));
     if let (Some(times), Some(_)) = (&times, &file) {
         reserve(&mut table, times.last().saturating_add(1))?;
     }
@@ -118,10 +114,14 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
 
     let progress = progress::bar(!arguments.quiet, position(duration));
     let mut stopwatch = Duration::ZERO;
+    let rows = times.map(|times| {
+        let channels = channels.into_iter().map(|channel| (channel.column.clone(), channel.reading())).collect();
+        RowReader::new(times, times.first(from, simulation.time()), channels)
+    });
     let end = simulate(
         &mut simulation,
-        (from, duration),
-        times,
+        duration,
+        rows,
         &mut table,
         &mut StepObservers {
             impacts: impacts.as_mut(),
@@ -129,7 +129,6 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
             replay: replay.as_mut(),
             end: requested,
         },
-        &mut frame,
         &mut stopwatch,
         &progress,
     );
@@ -272,30 +271,22 @@ impl StepObservers<'_> {
     }
 }
 
-/// Steps to `duration` and fills `table` with the rows at `from` and later; `stopwatch` runs only while the simulation steps.
+/// Steps to `duration` and fills `table` with the rows; `stopwatch` runs only while the simulation steps.
 fn simulate(
     simulation: &mut LiveScene,
-    (from, duration): (f64, f64),
-    times: Option<RowTimes>,
+    duration: f64,
+    mut rows: Option<RowReader>,
     table: &mut Table,
     observers: &mut StepObservers<'_>,
-    frame: &mut Frame,
     stopwatch: &mut Duration,
     progress: &ProgressBar,
 ) -> End {
-    let mut next = times.map_or(0, |times| times.first(from, simulation.time()));
     loop {
-        // Rows that lie in the latest step (initially: the row at 0).
-        if let Some(times) = times {
-            while next <= times.last() && times.at(next) <= simulation.time() {
-                simulation.sample(times.at(next), frame);
-                if let Err(error) = table.push(frame) {
-                    let message = format!("stopped: {error}; try a smaller solver.step or solver.tolerance");
-                    let failure = Some(Failure::new(Failure::DIVERGED, message));
-                    return End { status: Status::Diverged, failure };
-                }
-                next += 1;
-            }
+        if let Some(rows) = &mut rows
+            && let Err(error) = rows.read(simulation, |row| table.push(row))
+        {
+            let failure = Some(Failure::new(Failure::DIVERGED, error.to_string()));
+            return End { status: Status::Diverged, failure };
         }
         if observers.is_over(simulation, duration) {
             return End { status: Status::Done, failure: None };
@@ -311,7 +302,7 @@ fn simulate(
             };
         }
         let last = if observers.replay.is_some() { f64::INFINITY } else { duration };
-        let row = times.filter(|times| next <= times.last()).map_or(last, |times| times.at(next));
+        let row = rows.as_ref().and_then(RowReader::next_time).unwrap_or(last);
         let started = Instant::now();
         let outcome = step_until_check(simulation, row, duration, observers);
         *stopwatch += started.elapsed();

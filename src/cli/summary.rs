@@ -13,7 +13,7 @@ use crate::analysis::assembly::StartReport;
 use crate::machine::Preset;
 use crate::scene::LiveScene;
 use crate::scene::Scene;
-use crate::simulate::{Impact, Ledger};
+use crate::simulate::Impact;
 use crate::words::words;
 
 /// How a run ended.
@@ -82,32 +82,14 @@ pub fn json(
     }
     peaks::describe(simulation, &mut summary);
     if let Some(ledger) = simulation.ledger() {
-        summary.insert("energy_J".into(), energy(ledger));
+        let terms = ledger.terms().map(|(name, value)| (name.to_owned(), json!(value)));
+        summary.insert("energy_J".into(), Json::Object(terms.into_iter().collect()));
     }
     if let Some(impacts) = impacts {
         let entry = |i: usize| Restitution::of(impacts, i).json();
         summary.insert("restitution".into(), by_joint(&entry));
     }
     summary
-}
-
-/// The ledger as JSON, J; `relative_residual` is the residual relative to the energy exchanged.
-fn energy(ledger: &Ledger) -> Json {
-    json!({
-        "drive_work": ledger.drive_work,
-        "gravity_work": ledger.gravity_work,
-        "kinetic_change": ledger.kinetic_change,
-        "elastic_change": ledger.elastic_change,
-        "restitution_loss": ledger.restitution_loss,
-        "friction_loss": ledger.friction_loss,
-        "clearance_work": ledger.clearance_work,
-        "damping_loss": ledger.damping_loss,
-        "external_work": ledger.external_work,
-        "change_work": ledger.change_work,
-        "exchanged": ledger.exchanged,
-        "residual": ledger.residual(),
-        "relative_residual": ledger.relative_residual(),
-    })
 }
 
 /// The summary as text; `impacts` if all of them were collected.

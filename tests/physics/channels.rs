@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::common::parse;
 use jointplay::machine::Machine;
 use jointplay::scene::{Scene, built_in_text};
-use jointplay::simulate::{Frame, Simulation, channels_of, chosen_columns, run_columns};
+use jointplay::simulate::{ChannelInfo, Frame, Simulation, channels_of, chosen_channels};
 
 fn scene(changes: &str) -> Scene {
     parse(&format!("{}\n{changes}", built_in_text("slider-crank-driven").expect("built in")), &[])
@@ -20,13 +20,29 @@ fn first(machine: &Machine) -> Frame {
     frame
 }
 
+/// The channels of `machine` that a run with these patterns writes; `first` is its frame at the start.
+fn chosen(machine: &Machine, first: &Frame, patterns: &[&str]) -> Result<Vec<ChannelInfo>, String> {
+    let patterns: Vec<String> = patterns.iter().map(|&pattern| pattern.to_owned()).collect();
+    chosen_channels(channels_of(machine, first), &patterns).map_err(|error| error.to_string())
+}
+
+fn columns(channels: &[ChannelInfo]) -> String {
+    channels.iter().map(|channel| &*channel.column).collect::<Vec<_>>().join(",")
+}
+
+fn assert_known(channels: &[ChannelInfo], first: &Frame) {
+    for channel in channels {
+        assert!(channel.reading().read(first).is_some_and(f64::is_finite), "{channel:?}");
+    }
+}
+
 #[test]
 fn a_part_named_like_an_angle_of_the_output_body_keeps_its_channels() {
     let text = "[[body]]\nname = \"arm\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
                 [[joint]]\nname = \"alpha\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 1, 0]\n";
     let machine = parse(text, &[]).machine;
-    let (columns, _) = chosen_columns(&machine, &first(&machine), &["alpha.rate".to_owned()]).expect("has one");
-    assert_eq!(columns, ["t_s", "part_alpha_rate_rad_s"]);
+    let chosen = chosen(&machine, &first(&machine), &["alpha.rate"]).expect("has one");
+    assert_eq!(columns(&chosen), "t_s,part_alpha_rate_rad_s");
 }
 
 #[test]
@@ -35,9 +51,8 @@ fn channels_begin_with_the_default_columns_and_have_distinct_names() {
         let scene = scene(text);
         let first = first(&scene.machine);
         let list = channels_of(&scene.machine, &first);
-        let unasked = list.iter().filter(|channel| channel.unasked);
-        let unasked: Vec<&str> = unasked.map(|channel| &channel.column[..]).collect();
-        assert_eq!(unasked, run_columns(&scene.machine, &first).0);
+        let unasked: Vec<ChannelInfo> = list.iter().filter(|channel| channel.unasked).cloned().collect();
+        assert_eq!(columns(&chosen(&scene.machine, &first, &[]).expect("no pattern fails")), columns(&unasked));
         assert!(list[..unasked.len()].iter().all(|channel| channel.unasked));
         let names: BTreeSet<&str> = list.iter().map(|channel| &channel.name[..]).collect();
         assert_eq!(names.len(), list.len());
@@ -45,11 +60,8 @@ fn channels_begin_with_the_default_columns_and_have_distinct_names() {
             assert_eq!(channel.unit.is_empty(), channel.name.ends_with(".state"));
             assert!(!channel.help.is_empty(), "{channel:?}");
         }
-        let all = chosen_columns(&scene.machine, &first, &["*".to_owned()]).expect("matches");
-        assert_eq!(all.0.len(), list.len());
-        for (column, reading) in all.0.iter().zip(&all.1) {
-            assert!(reading.read(&first).is_some_and(f64::is_finite), "{column}");
-        }
+        assert_known(&list, &first);
+        assert_eq!(chosen(&scene.machine, &first, &["*"]).expect("matches").len(), list.len());
     }
 }
 
@@ -57,10 +69,7 @@ fn channels_begin_with_the_default_columns_and_have_distinct_names() {
 fn channels_chosen_by_name_are_in_the_order_of_the_scene() {
     let scene = scene(SPRING);
     let first = first(&scene.machine);
-    let columns = |patterns: &[&str]| {
-        let patterns: Vec<String> = patterns.iter().map(|&p| p.to_owned()).collect();
-        chosen_columns(&scene.machine, &first, &patterns).map(|found| found.0.join(","))
-    };
+    let columns = |patterns: &[&str]| chosen(&scene.machine, &first, patterns).map(|found| columns(&found));
     for (patterns, found) in [
         (&["B.force", "time"][..], "t_s,B_force_x_N,B_force_y_N,B_force_z_N"),
         (&["crank.angle", "B.force.z"], "t_s,B_force_z_N,crank_angle_rad"),
@@ -76,7 +85,7 @@ fn channels_chosen_by_name_are_in_the_order_of_the_scene() {
     let pose = columns(&[&format!("{output}.pose")]).expect("matches");
     assert_eq!(pose, "t_s,x_m,y_m,z_m,alpha_rad,beta_rad,gamma_rad");
     let wrong = columns(&["B.force", "B.froce"]).expect_err("no such channel");
-    assert_eq!(wrong.to_string(), "`B.froce` is none of the scene's channels (did you mean `B.force`?)");
+    assert_eq!(wrong, "`B.froce` is none of the scene's channels (did you mean `B.force`?)");
 }
 
 #[test]
@@ -84,11 +93,10 @@ fn columns_at_the_end_of_a_row_keep_their_positions() {
     let load = "[[load]]\nname = \"wind\"\non = { body = \"rod\" }\nforce = \"1 0 0 N\"\n";
     let scene = scene(load);
     let first = first(&scene.machine);
-    let (names, readings) = run_columns(&scene.machine, &first);
+    let channels = chosen(&scene.machine, &first, &[]).expect("no pattern fails");
     let last = "drive_work_J,gravity_work_J,restitution_loss_J,friction_loss_J,clearance_work_J,energy_residual_J,\
                 wind_force_x_N,wind_force_y_N,wind_force_z_N,wind_torque_x_Nm,wind_torque_y_Nm,wind_torque_z_Nm,\
                 damping_loss_J,external_work_J";
-    assert!(names.join(",").ends_with(last), "{names:?}");
-    assert_eq!(names.len(), readings.len());
-    assert!(readings.iter().all(|reading| reading.read(&first).is_some_and(f64::is_finite)));
+    assert!(columns(&channels).ends_with(last), "{channels:?}");
+    assert_known(&channels, &first);
 }

@@ -1,4 +1,6 @@
-//! Times of the output rows of a run.
+//! The output rows of a run: their times, and channels at these times.
+
+use jointplay_physics::simulate::{Frame, Reading, Simulation};
 
 /// Row times k x `every`, k = 0..=`last`, of a run of length `duration`, in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +56,62 @@ impl RowTimes {
     /// Whether the last row lies at the end of the run.
     pub fn include_the_end(&self) -> bool {
         self.duration - self.at(self.last) <= 1e-9 * self.duration
+    }
+}
+
+/// A value in a row that is not finite, which ends the run.
+#[derive(Debug, thiserror::Error)]
+#[error("stopped: {name} is {value} at t = {time:.6e} s; try a smaller solver.step or solver.tolerance")]
+pub struct NotFinite {
+    name: String,
+    value: f64,
+    time: f64,
+}
+
+/// Reads the rows of a run while it is stepped.
+pub struct RowReader {
+    times: RowTimes,
+    /// Index of the next row.
+    next: u64,
+    /// Names for messages, and where a frame has the values.
+    channels: Vec<(String, Reading)>,
+    frame: Frame,
+    row: Vec<f64>,
+}
+
+impl RowReader {
+    /// A reader of the rows from number `first` on.
+    pub fn new(times: RowTimes, first: u64, channels: Vec<(String, Reading)>) -> Self {
+        let mut frame = Frame::default();
+        channels.iter().for_each(|(_, reading)| reading.request(&mut frame));
+        Self { times, next: first, channels, frame, row: Vec::new() }
+    }
+
+    /// Time of the next row, s; `None` after the last.
+    pub fn next_time(&self) -> Option<f64> {
+        (self.next <= self.times.last).then(|| self.times.at(self.next))
+    }
+
+    /// Passes the rows that lie in the latest step of `simulation` to `take`; at the start, the row at 0. Values that are unknown,
+    /// as the tip error after the ideal mechanism has stopped, are NaN.
+    ///
+    /// # Errors
+    /// Any other value that is not finite; its row is not passed on.
+    pub fn read(&mut self, simulation: &mut Simulation, mut take: impl FnMut(&[f64])) -> Result<(), NotFinite> {
+        while let Some(time) = self.next_time().filter(|time| *time <= simulation.time()) {
+            simulation.sample(time, &mut self.frame);
+            self.row.clear();
+            for (name, reading) in &self.channels {
+                let value = reading.read(&self.frame);
+                if let Some(value) = value.filter(|value| !value.is_finite()) {
+                    return Err(NotFinite { name: name.clone(), value, time });
+                }
+                self.row.push(value.unwrap_or(f64::NAN));
+            }
+            take(&self.row);
+            self.next += 1;
+        }
+        Ok(())
     }
 }
 

@@ -7,7 +7,7 @@ use super::names::{Names, parameter};
 use crate::app::twin::Twin;
 use crate::scene::LiveScene;
 use crate::scene::{Quantity, Scene};
-use crate::simulate::{Frame, Impact, Peak, Reading, channels_of, chosen_columns};
+use crate::simulate::{ChannelInfo, Frame, Impact, Peak, Reading, channels_of, chosen_channels};
 use crate::units::Dimension;
 
 /// Latest measurable instant, s.
@@ -183,12 +183,11 @@ impl MeasuringRun {
             let mut first = Frame { reactions: Some(Vec::new()), ..Frame::default() };
             self.simulation.sample(0.0, &mut first);
             let pattern = [channel.to_owned()];
-            let (columns, readings) =
-                chosen_columns(&self.scene.machine, &first, &pattern).map_err(|error| error.to_string())?;
-            // The first column is the time.
-            let (columns, readings) = (&columns[1..], &readings[1..]);
             let listed = channels_of(&self.scene.machine, &first);
-            let listed: Vec<_> = listed.iter().filter(|c| columns.contains(&c.column)).collect();
+            let listed = chosen_channels(listed, &pattern).map_err(|error| error.to_string())?;
+            // The first column is the time.
+            let listed = &listed[1..];
+            let readings: Vec<Reading> = listed.iter().map(ChannelInfo::reading).collect();
             if !matches!(readings.len(), 1 | 3) || listed.iter().any(|c| c.unit != listed[0].unit) {
                 let names: Vec<&str> = listed.iter().map(|channel| &*channel.name).collect();
                 return Err(format!(

@@ -7,7 +7,7 @@ mod table;
 
 pub use csv::{ChecksumWriter, significant};
 pub use json::write_meta;
-pub use table::{Column, NotFinite, Table, Values};
+pub use table::{Column, Table, Values};
 
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,5 @@
 //! Columns of results, such as the rows of a run. SI units, world axes.
 
-use crate::scene::Scene;
-use crate::simulate::{Frame, Reading, UnknownChannel, chosen_columns, run_columns};
-
 /// Values of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
@@ -68,50 +65,19 @@ impl Column {
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     columns: Vec<Column>,
-    /// Where in a frame to read the value of each column; empty if the rows are not frames.
-    readings: Vec<Reading>,
-}
-
-/// A value that is not finite.
-#[derive(Debug, thiserror::Error)]
-#[error("{column} is {value} at t = {time:.6e} s")]
-pub struct NotFinite {
-    /// Column.
-    column: String,
-    /// Value.
-    value: f64,
-    /// Time of the row, s.
-    time: f64,
 }
 
 impl Table {
-    /// An empty table with the columns of `scene`; `first` shows whether it has a tip error and a ledger.
-    pub fn new(scene: &Scene, first: &Frame) -> Self {
-        Self::of_channels(run_columns(&scene.machine, first))
+    /// An empty table with columns of numbers.
+    pub fn new(names: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        names.into_iter().map(|name| Column::numbers(name, Vec::new())).collect()
     }
 
-    /// An empty table with the time and the channels that match `patterns`.
-    ///
-    /// # Errors
-    /// A pattern without a match.
-    pub fn of_patterns(scene: &Scene, first: &Frame, patterns: &[String]) -> Result<Self, UnknownChannel> {
-        chosen_columns(&scene.machine, first, patterns).map(Self::of_channels)
-    }
-
-    fn of_channels((names, readings): (Vec<String>, Vec<Reading>)) -> Self {
-        Self { columns: names.into_iter().map(|name| Column::numbers(name, Vec::new())).collect(), readings }
-    }
-
-    /// A table of rows other than those of a run.
+    /// A table of rows.
     pub fn of_rows<const N: usize>(names: [&str; N], rows: impl Iterator<Item = [f64; N]>) -> Self {
-        let mut columns = names.map(|_| Vec::new());
-        rows.for_each(|row| columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value)));
-        names.into_iter().zip(columns).map(|(name, values)| Column::numbers(name, values)).collect()
-    }
-
-    /// Makes `frame` request the quantities that the columns need.
-    pub fn request(&self, frame: &mut Frame) {
-        self.readings.iter().for_each(|reading| reading.request(frame));
+        let mut table = Self::new(names);
+        rows.for_each(|row| table.push(&row));
+        table
     }
 
     /// Its columns.
@@ -133,28 +99,18 @@ impl Table {
         })
     }
 
-    /// Appends the row of `frame`.
-    ///
-    /// # Errors
-    /// A value that is not finite, except one that is unknown in the frame. The table is then unchanged.
-    pub fn push(&mut self, frame: &Frame) -> Result<(), NotFinite> {
-        let is_wrong = |reading: &Reading| reading.read(frame).is_some_and(|value| !value.is_finite());
-        if let Some(c) = self.readings.iter().position(is_wrong) {
-            let value = self.readings[c].read(frame).unwrap_or(f64::NAN);
-            return Err(NotFinite { column: self.columns[c].name.clone(), value, time: frame.time });
-        }
-        for (reading, column) in self.readings.iter().zip(&mut self.columns) {
+    /// Appends a row of numbers.
+    pub fn push(&mut self, row: &[f64]) {
+        for (column, value) in self.columns.iter_mut().zip(row) {
             if let Values::Numbers(values) = &mut column.values {
-                // There is no tip error after the ideal mechanism has stopped.
-                values.push(reading.read(frame).unwrap_or(f64::NAN));
+                values.push(*value);
             }
         }
-        Ok(())
     }
 }
 
 impl FromIterator<Column> for Table {
     fn from_iter<T: IntoIterator<Item = Column>>(columns: T) -> Self {
-        Self { columns: columns.into_iter().collect(), readings: Vec::new() }
+        Self { columns: columns.into_iter().collect() }
     }
 }

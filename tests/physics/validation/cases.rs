@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use jointplay::scene::{Scene, evaluate};
-use jointplay::simulate::{Frame, Impact, Reading, Simulation, chosen_columns};
+use jointplay::simulate::{Frame, Impact, Reading, Simulation, channels_of, chosen_channels};
 
 /// A run of a scene with known results.
 #[derive(Clone, Debug, Deserialize)]
@@ -219,10 +219,12 @@ impl Run {
 
     fn reading(&mut self, channel: &str) -> Reading {
         self.simulation.sample(self.simulation.time(), &mut self.frame);
-        let (_, readings) = chosen_columns(self.simulation.machine(), &self.frame, &[channel.to_owned()]).unwrap();
-        // The first reading is the time.
-        let [_, reading] = readings[..] else { panic!("{channel} is more than one channel") };
-        reading
+        let all = channels_of(self.simulation.machine(), &self.frame);
+        // The first one is the time.
+        let [_, own] = &chosen_channels(all, &[channel.to_owned()]).unwrap()[..] else {
+            panic!("{channel} is more than one channel")
+        };
+        own.reading()
     }
 }
 

@@ -3,7 +3,7 @@
 mod choice;
 mod table;
 
-pub use choice::{ChannelInfo, UnknownChannel, channels_of, chosen_columns, matches_pattern, matching};
+pub use choice::{ChannelInfo, UnknownChannel, channels_of, chosen_channels, matches_pattern, matching};
 use table::TIME;
 pub use table::{PLOT_WORDS, PlotKind, Quantity};
 
@@ -88,7 +88,7 @@ impl Channels {
         Self { list, picked: Vec::new() }
     }
 
-    /// Picks the channels of `machine` that match `patterns`, replacing earlier picks; `first` as in [`run_columns`].
+    /// Picks the channels of `machine` that match `patterns`, replacing earlier picks; `first` as in [`channels_of`].
     pub fn pick(&mut self, machine: &Machine, first: &Frame, patterns: &[String]) {
         self.picked.clear();
         if patterns.is_empty() {
@@ -150,18 +150,6 @@ impl Channels {
         let value = |channel: &Channel| channel.reading.read(frame).unwrap_or(f64::NAN);
         out.extend(self.list.iter().map(value));
     }
-}
-
-/// Names and readings of the columns of `run`, in order. The frame `first` shows whether the machine has a tip error and a
-/// ledger, and what its elements report.
-pub fn run_columns(machine: &Machine, first: &Frame) -> (Vec<String>, Vec<Reading>) {
-    let (mut names, mut readings) = (Vec::new(), Vec::new());
-    let in_run = |signal: &Signal| signal.run;
-    lay_out(machine, Some(first), usize::MAX, in_run, |value| {
-        names.push(value.column);
-        readings.push(value.reading);
-    });
-    (names, readings)
 }
 
 /// One value of a signal.

@@ -50,6 +50,25 @@ impl Ledger {
         if self.exchanged > 0.0 { self.residual() / self.exchanged } else { 0.0 }
     }
 
+    /// Its terms for outputs, with their names: J, and the relative residual.
+    pub fn terms(&self) -> [(&'static str, f64); 13] {
+        [
+            ("drive_work", self.drive_work),
+            ("gravity_work", self.gravity_work),
+            ("kinetic_change", self.kinetic_change),
+            ("elastic_change", self.elastic_change),
+            ("restitution_loss", self.restitution_loss),
+            ("friction_loss", self.friction_loss),
+            ("clearance_work", self.clearance_work),
+            ("damping_loss", self.damping_loss),
+            ("external_work", self.external_work),
+            ("change_work", self.change_work),
+            ("exchanged", self.exchanged),
+            ("residual", self.residual()),
+            ("relative_residual", self.relative_residual()),
+        ]
+    }
+
     /// Magnitude of the residual over [`Self::scale`]; 0 if that is 0.
     pub fn share(&self) -> f64 {
         let scale = self.scale();

@@ -82,8 +82,8 @@ pub fn matching<'a>(list: &'a [ChannelInfo], pattern: &str) -> Result<Vec<&'a Ch
     Ok(chosen)
 }
 
-/// Every channel of `machine` in order: the columns that `run` writes by default, then the others. `first` as in
-/// [`run_columns`](super::run_columns).
+/// Every channel of `machine` in order: the columns that `run` writes by default, then the others. The frame `first` shows whether
+/// the machine has a tip error and a ledger, and what its elements report.
 pub fn channels_of(machine: &Machine, first: &Frame) -> Vec<ChannelInfo> {
     let (mut list, mut names, mut columns) = (Vec::new(), BTreeSet::new(), BTreeSet::new());
     let place = |signal: &super::Signal| {
@@ -111,22 +111,20 @@ pub fn channels_of(machine: &Machine, first: &Frame) -> Vec<ChannelInfo> {
     list
 }
 
-/// Names and readings of the time and of the channels that match one of `patterns`, in the order of [`channels_of`]. In patterns,
-/// `*` matches any characters and `?` exactly one.
+/// The time and the channels of `list` that match one of `patterns`, in the order of the list; without patterns, those that `run`
+/// writes by default. In patterns, `*` matches any characters and `?` exactly one.
 ///
 /// # Errors
 /// A pattern without a match.
-pub fn chosen_columns(
-    machine: &Machine,
-    first: &Frame,
-    patterns: &[String],
-) -> Result<(Vec<String>, Vec<Reading>), UnknownChannel> {
-    let list = channels_of(machine, first);
+pub fn chosen_channels(mut list: Vec<ChannelInfo>, patterns: &[String]) -> Result<Vec<ChannelInfo>, UnknownChannel> {
     for pattern in patterns {
         matching(&list, pattern)?;
     }
-    let chosen = |channel: &&ChannelInfo| channel.name == TIME || patterns.iter().any(|p| channel.is_matched_by(p));
-    Ok(list.iter().filter(chosen).map(|channel| (channel.column.clone(), channel.reading)).unzip())
+    list.retain(|channel| {
+        let is_asked = patterns.iter().any(|pattern| channel.is_matched_by(pattern));
+        channel.name == TIME || is_asked || (patterns.is_empty() && channel.unasked)
+    });
+    Ok(list)
 }
 
 /// Units by column-name suffix, longer suffixes first.
