@@ -42,6 +42,7 @@ const MAX_MARKS: f64 = 5.0;
 const ROUNDING: f64 = 1e-9;
 
 /// The plots and their settings.
+#[derive(Default)]
 pub struct Plots {
     /// Displayed quantities, in the order of [`Quantity::ALL`].
     pub chosen: Vec<Quantity>,
@@ -213,23 +214,7 @@ impl Plots {
 
     /// Initial plots of a window on `scene`.
     pub fn of(scene: &Scene) -> Self {
-        Self {
-            chosen: opening::plots(scene),
-            picked: Vec::new(),
-            search: String::new(),
-            found: None,
-            window: PlotWindow::Automatic,
-            hidden: Vec::new(),
-            traces: Vec::new(),
-            levels: Vec::new(),
-            readings: Vec::new(),
-            earlier: Vec::new(),
-            comparison: Comparison::default(),
-            places: Vec::new(),
-            zoomed: None,
-            cursor: None,
-            cut: None,
-        }
+        Self { chosen: opening::plots(scene), ..Self::default() }
     }
 
     /// Restores the initial plots of a window on `scene`; picked channels stay.

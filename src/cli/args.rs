@@ -94,7 +94,7 @@ pub struct CheckArguments {
 }
 
 /// `view`.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct ViewArguments {
     /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`), which is shown again whenever it is saved
     /// [default: the scene opened last; the first time spcmm at 6 Hz, where its joints rattle in every period].
@@ -451,13 +451,6 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(error)?;
     let edge = |text: &str| text.parse().ok().filter(|e| (16..=MAX_EDGE).contains(e)).ok_or_else(error);
     Ok((edge(width)?, edge(height)?))
-}
-
-impl Default for ViewArguments {
-    /// The arguments of `jointplay` without a command.
-    fn default() -> Self {
-        Self { scene: None, changes: Vec::new(), link: None, lesson: None, page: None, fresh: false }
-    }
 }
 
 #[cfg(test)]

@@ -64,7 +64,7 @@ pub struct Range {
 }
 
 /// One point of a sweep. Unknown values are `None`, because JSON has no NaN.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SweptPoint {
     /// Index in the sweep; the last range varies fastest.
     pub index: usize,
@@ -208,19 +208,12 @@ impl<'a> Block<'a> {
         };
         let mut point = SweptPoint {
             index: *index,
-            values: Vec::new(),
             settings: settings.iter().map(|(key, value)| ((*key).to_owned(), write(key, value))).collect(),
             after: before.filter(|_| !is_cold).map(|(index, _)| index),
             first,
             interval,
-            diverged: None,
-            regime: String::new(),
             regime_code: -1,
-            exponent: None,
-            sections: Vec::new(),
-            peak: None,
-            probe: None,
-            doubts: 0,
+            ..SweptPoint::default()
         };
         let indices = self.sweep.design().indices(*index).into_iter();
         let axes = self.sweep.design().axes().iter().zip(indices);

@@ -22,9 +22,10 @@ const MAX_TRANSIENT: f64 = 0.99;
 const MIN_DURATION: f64 = 1e-3;
 
 /// The panel. It exists while it is open.
+#[derive(Default)]
 pub struct Costs {
-    /// Whether it was drawn since the last frame, or will be.
-    drawn: bool,
+    /// Whether it was asked and not drawn since.
+    unseen: bool,
     /// Whether another panel takes its place while the results are retained.
     is_set_aside: bool,
     /// Text of the scene that the settings belong to.
@@ -39,26 +40,10 @@ pub struct Costs {
     tornado: Tornado,
 }
 
-impl Default for Costs {
-    fn default() -> Self {
-        Self {
-            drawn: true,
-            is_set_aside: false,
-            scene: String::new(),
-            settings: None,
-            computation: Computation::default(),
-            study: None,
-            output: 0,
-            reveal: false,
-            tornado: Tornado::default(),
-        }
-    }
-}
-
 impl Costs {
     /// Whether it is still open: drawn since the last call, or set aside. A hidden panel computes nothing.
     pub fn was_shown(&mut self) -> bool {
-        let drawn = std::mem::take(&mut self.drawn);
+        let drawn = !std::mem::replace(&mut self.unseen, true);
         if !drawn {
             self.computation.stop();
         }
@@ -103,7 +88,7 @@ impl Costs {
 
     /// Settings, progress and tornado; returns the user's request to the run.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<BenchRequest> {
-        (self.drawn, self.is_set_aside) = (true, false);
+        (self.unseen, self.is_set_aside) = (false, false);
         let scene = player.pending();
         if self.scene != scene.source.text {
             let output = self.output;

@@ -17,9 +17,10 @@ const MICROSCOPE: &str = "microscope.";
 const WEAR: [(&str, WearMap); 2] = [("wear-impulse", WearMap::Impulse), ("wear-friction-work", WearMap::FrictionWork)];
 
 /// How much of the past the plots show.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PlotWindow {
     /// The last seconds of viewing time, at any time scale.
+    #[default]
     Automatic,
     /// The last seconds of simulated time.
     Last(f64),

@@ -44,7 +44,7 @@ pub type Quat = nalgebra::UnitQuaternion<f64>;
 ///
 /// Cutting the ball joints and the joints that close loops leaves a forest: each body is attached to its parent by exactly one
 /// entry of `joints`, and parents come before children.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Machine {
     /// Gravity, world axes, m/s^2.
     pub gravity: Vec3,
@@ -72,27 +72,6 @@ pub struct Machine {
     pub elements: Vec<Element>,
     /// Fixed shapes (rails, frame), world axes.
     pub fixed_shapes: Vec<Shape>,
-}
-
-impl Default for Machine {
-    /// The world alone, without gravity.
-    fn default() -> Self {
-        Self {
-            gravity: Vec3::zeros(),
-            contact: contact::Parameters::default(),
-            formulation: Formulation::Tree,
-            solver: Solver::default(),
-            closed_form: None,
-            output: Output { body: 0, probe: None },
-            start: StartRule::default(),
-            bodies: Vec::new(),
-            joints: Vec::new(),
-            ball_joints: Vec::new(),
-            closing_joints: Vec::new(),
-            elements: Vec::new(),
-            fixed_shapes: Vec::new(),
-        }
-    }
 }
 
 impl Machine {
@@ -123,7 +102,7 @@ impl Machine {
 }
 
 /// Contents of the pose columns.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Output {
     /// Index of the body whose frame is reported.
     pub body: usize,

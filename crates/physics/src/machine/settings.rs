@@ -31,9 +31,10 @@ words!(StartRule {
 });
 
 /// Formulation of the equations of motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Formulation {
     /// Generalized coordinates of a spanning forest.
+    #[default]
     Tree,
     /// All bodies, Lagrange multipliers, Baumgarte stabilisation; paper eqs. (44)-(58).
     Lagrange,
