@@ -154,9 +154,9 @@ where
     while !run.is_done() {
         run.step().unwrap();
     }
-    assert_eq!(run.sections().len(), (sections - discard) * width);
+    assert_eq!(run.so_far.kept.len(), (sections - discard) * width);
     let exponent = run.exponent().and_then(|benettin| benettin.result());
-    classify(run.sections(), &vec![resolution; width], interval, exponent)
+    classify(&run.so_far.kept, &vec![resolution; width], interval, exponent)
 }
 
 fn exponent(evidence: &Evidence) -> &Exponent {
@@ -415,7 +415,7 @@ fn a_motion_that_stops_keeps_its_sections() {
         }
     };
     assert_eq!(stop, "wall");
-    assert_eq!(run.sections(), [3.0, 4.0]);
+    assert_eq!(run.so_far.kept, [3.0, 4.0]);
     assert!(run.exponent().is_none());
 }
 

@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::drive::{OBSERVABLES, ObservedError, ObservedRun, observed};
+use super::section::SectionsSoFar;
 use super::statistic::channels;
 use jointplay_physics::simulate::{Frame, Reading, Simulation, StartError, UnknownChannel, matching};
 use jointplay_physics::units::{Dimension, QuantityError, all_units, parse_quantity};
@@ -135,7 +136,7 @@ fn dimension_of(unit: &str) -> Dimension {
 
 /// A run whose sections are the crossings of a channel.
 pub(super) struct CrossingRun {
-    orbit: ObservedRun,
+    pub(super) so_far: SectionsSoFar<ObservedRun>,
     crossing: Crossing,
     reading: Option<Reading>,
     frame: Frame,
@@ -143,13 +144,10 @@ pub(super) struct CrossingRun {
     latest: f64,
     /// Number of crossings to record, including discarded ones.
     count: usize,
-    /// Number of initial crossings to discard.
-    discard: usize,
     /// End of the run, s, even if fewer crossings have occurred.
     end: f64,
-    taken: usize,
-    kept: Vec<f64>,
-    times: Vec<f64>,
+    /// Times of the kept sections, s.
+    pub(super) times: Vec<f64>,
 }
 
 impl CrossingRun {
@@ -160,52 +158,22 @@ impl CrossingRun {
         let reading = list.iter().find(|channel| channel.name == crossing.channel).map(|channel| channel.reading());
         let mut frame = Frame::default();
         reading.iter().for_each(|reading| reading.request(&mut frame));
-        let (kept, times) = (Vec::new(), Vec::new());
-        let crossing = crossing.clone();
-        let mut run = Self { orbit, crossing, reading, frame, latest: 0.0, count, discard, end, taken: 0, kept, times };
-        run.latest = run.deviation_at(run.orbit.simulation().time());
+        let (crossing, times) = (crossing.clone(), Vec::new());
+        let so_far = SectionsSoFar { orbit, taken: 0, discard, kept: Vec::new() };
+        let mut run = Self { so_far, crossing, reading, frame, latest: 0.0, count, end, times };
+        run.latest = run.deviation_at(run.so_far.orbit.simulation().time());
         run
     }
 
-    pub(super) fn orbit(&self) -> &ObservedRun {
-        &self.orbit
-    }
-
-    pub(super) fn orbit_mut(&mut self) -> &mut ObservedRun {
-        &mut self.orbit
-    }
-
-    pub(super) fn into_orbit(self) -> ObservedRun {
-        self.orbit
-    }
-
-    pub(super) fn taken(&self) -> usize {
-        self.taken
-    }
-
-    pub(super) fn discard(&self) -> usize {
-        self.discard
-    }
-
     pub(super) fn is_done(&self) -> bool {
-        self.taken >= self.count || self.orbit.simulation().time() >= self.end
-    }
-
-    /// Kept sections, concatenated, in the order of [`OBSERVABLES`].
-    pub(super) fn sections(&self) -> &[f64] {
-        &self.kept
-    }
-
-    /// Times of the kept sections, s.
-    pub(super) fn times(&self) -> &[f64] {
-        &self.times
+        self.so_far.taken >= self.count || self.so_far.orbit.simulation().time() >= self.end
     }
 
     /// Takes one step; returns `true` if it contains a crossing.
     pub(super) fn step(&mut self) -> Result<bool, ObservedError> {
-        let start = self.orbit.simulation().time();
-        self.orbit.simulation_mut().step_until(self.end)?;
-        let step = self.orbit.simulation().time() - start;
+        let start = self.so_far.orbit.simulation().time();
+        self.so_far.orbit.simulation_mut().step_until(self.end)?;
+        let step = self.so_far.orbit.simulation().time() - start;
         let (mut has_crossed, mut before) = (false, start);
         for k in 1..=SAMPLES_PER_STEP {
             let now = if k == SAMPLES_PER_STEP {
@@ -214,7 +182,7 @@ impl CrossingRun {
                 start + step * f64::from(k) / f64::from(SAMPLES_PER_STEP)
             };
             let deviation = self.deviation_at(now);
-            if self.taken < self.count && self.crossing.is_between(self.latest, deviation) {
+            if self.so_far.taken < self.count && self.crossing.is_between(self.latest, deviation) {
                 has_crossed = true;
                 self.record_crossing(before, now);
             }
@@ -238,18 +206,18 @@ impl CrossingRun {
                 (before, latest) = (middle, deviation);
             }
         }
-        self.taken += 1;
-        if self.taken > self.discard {
+        self.so_far.taken += 1;
+        if self.so_far.taken > self.so_far.discard {
             self.deviation_at(after);
-            self.kept.extend(observed(&self.frame.pose));
+            self.so_far.kept.extend(observed(&self.frame.pose));
             self.times.push(after);
         }
-        debug_assert_eq!(self.kept.len(), OBSERVABLES.len() * self.times.len());
+        debug_assert_eq!(self.so_far.kept.len(), OBSERVABLES.len() * self.times.len());
     }
 
     /// Samples the latest step at `time`, s.
     fn deviation_at(&mut self, time: f64) -> f64 {
-        self.orbit.simulation_mut().sample(time, &mut self.frame);
+        self.so_far.orbit.simulation_mut().sample(time, &mut self.frame);
         let value = self.reading.and_then(|reading| reading.read(&self.frame));
         value.map_or(f64::NAN, |value| self.crossing.deviation(value))
     }
@@ -296,10 +264,10 @@ mod tests {
             let turns =
                 |times: &[f64]| times.windows(2).all(|w| ((w[1] - w[0]) * per_turn / period - 1.0).abs() < 1e-9);
             // The crank turns in one direction, so that crossings in the other direction never occur.
-            assert!(run.taken() == 0 || (run.taken() >= 3 && turns(run.times())), "{text}: {:?}", run.times());
-            assert_eq!(run.sections().len(), 12 * run.times().len());
+            assert!(run.so_far.taken == 0 || (run.so_far.taken >= 3 && turns(&run.times)), "{text}: {:?}", run.times);
+            assert_eq!(run.so_far.kept.len(), 12 * run.times.len());
             if text == "crank.angle=90deg" {
-                assert!(run.taken() >= 3);
+                assert!(run.so_far.taken >= 3);
             }
         }
     }

@@ -4,7 +4,7 @@ use super::crossing::{Crossing, CrossingRun};
 use super::drive::{NoPeriod, OBSERVABLES, ObservedError, ObservedRun, drive_period};
 use super::orbit::Orbit;
 use super::regime::{Evidence, Regime, classify};
-use super::section::{Schedule, SectionRun};
+use super::section::{Schedule, SectionRun, SectionsSoFar};
 use super::statistic::{Accumulator, ChannelStatistic};
 use jointplay_physics::machine::{Machine, Solver};
 use jointplay_physics::simulate::{Effect, Peak};
@@ -206,38 +206,17 @@ enum SpanRun {
 }
 
 impl SpanRun {
-    fn orbit(&self) -> &ObservedRun {
+    fn so_far(&self) -> &SectionsSoFar<ObservedRun> {
         match self {
-            Self::Sections(run) => run.orbit(),
-            Self::Crossings(run) => run.orbit(),
+            Self::Sections(run) => &run.so_far,
+            Self::Crossings(run) => &run.so_far,
         }
     }
 
-    fn orbit_mut(&mut self) -> &mut ObservedRun {
+    fn so_far_mut(&mut self) -> &mut SectionsSoFar<ObservedRun> {
         match self {
-            Self::Sections(run) => run.orbit_mut(),
-            Self::Crossings(run) => run.orbit_mut(),
-        }
-    }
-
-    fn taken(&self) -> usize {
-        match self {
-            Self::Sections(run) => run.taken(),
-            Self::Crossings(run) => run.taken(),
-        }
-    }
-
-    fn discard(&self) -> usize {
-        match self {
-            Self::Sections(run) => run.schedule().discard,
-            Self::Crossings(run) => run.discard(),
-        }
-    }
-
-    fn sections(&self) -> &[f64] {
-        match self {
-            Self::Sections(run) => run.sections(),
-            Self::Crossings(run) => run.sections(),
+            Self::Sections(run) => &mut run.so_far,
+            Self::Crossings(run) => &mut run.so_far,
         }
     }
 }
@@ -306,7 +285,7 @@ impl PointRun {
             peaks,
             transient_peaks: vec![0.0; joints],
         };
-        if run.span_run.discard() == 0 {
+        if run.span_run.so_far().discard == 0 {
             run.begin_recording();
         }
         run
@@ -315,7 +294,7 @@ impl PointRun {
     /// Time of the first section at a phase of the drive, including discarded ones, s; NaN for crossings.
     pub fn first(&self) -> f64 {
         match &self.span_run {
-            SpanRun::Sections(run) => run.schedule().first,
+            SpanRun::Sections(run) => run.schedule.first,
             SpanRun::Crossings(_) => f64::NAN,
         }
     }
@@ -335,17 +314,12 @@ impl PointRun {
 
     /// Number of sections taken, including discarded ones.
     pub fn taken(&self) -> usize {
-        self.span_run.taken()
-    }
-
-    /// Kept sections so far, in the order of [`OBSERVABLES`].
-    pub fn sections(&self) -> &[f64] {
-        self.span_run.sections()
+        self.span_run.so_far().taken
     }
 
     /// The running scene.
     pub fn machine(&self) -> &ObservedRun {
-        self.span_run.orbit()
+        &self.span_run.so_far().orbit
     }
 
     /// Takes one step of the scene.
@@ -357,14 +331,14 @@ impl PointRun {
             SpanRun::Sections(run) => run.step()?,
             SpanRun::Crossings(run) => run.step()?,
         };
-        if self.span_run.taken() < self.span_run.discard() {
+        if self.span_run.so_far().taken < self.span_run.so_far().discard {
             return Ok(());
         }
         if !self.is_recording {
             self.begin_recording();
         } else {
-            self.means.sample(self.span_run.orbit_mut(), at_section);
-            self.statistics.sample(self.span_run.orbit_mut().simulation_mut());
+            self.means.sample(&mut self.span_run.so_far_mut().orbit, at_section);
+            self.statistics.sample(self.span_run.so_far_mut().orbit.simulation_mut());
         }
         Ok(())
     }
@@ -372,7 +346,7 @@ impl PointRun {
     /// Ends the transient and starts recording.
     fn begin_recording(&mut self) {
         self.is_recording = true;
-        let machine = self.span_run.orbit_mut();
+        let machine = &mut self.span_run.so_far_mut().orbit;
         let simulation = machine.simulation_mut();
         simulation.take_peaks(&mut self.peaks);
         for (largest, peak) in self.transient_peaks.iter_mut().zip(&self.peaks) {
@@ -385,7 +359,7 @@ impl PointRun {
 
     /// The result, and the scene in the state of its latest section, from which the next point can continue.
     pub fn finish(mut self) -> (PointResult, ObservedRun) {
-        let simulation = self.span_run.orbit_mut().simulation_mut();
+        let simulation = self.span_run.so_far_mut().orbit.simulation_mut();
         simulation.take_peaks(&mut self.peaks);
         let doubts = simulation.doubts().iter().fold(0, |bits, doubt| bits | 1 << doubt.kind());
         let residual = simulation.ledger().map_or(f64::NAN, |ledger| ledger.share());
@@ -410,11 +384,11 @@ impl PointRun {
             .collect();
         let probe_error = self.means.probe_now.filter(|_| !self.means.probe_lost);
         let probe = probe_error.map(|_| (self.means.probe_largest, (self.means.probe_square / span).sqrt()));
-        let sections = self.span_run.sections().to_vec();
-        let crossings = self.span_run.taken();
+        let sections = self.span_run.so_far().kept.clone();
+        let crossings = self.span_run.so_far().taken;
         let (exponent, times) = match &self.span_run {
             SpanRun::Sections(run) => (run.exponent().and_then(|benettin| benettin.result()), Vec::new()),
-            SpanRun::Crossings(run) => (None, run.times().iter().map(|time| time - self.started).collect()),
+            SpanRun::Crossings(run) => (None, run.times.iter().map(|time| time - self.started).collect()),
         };
         let (regime, evidence) = classify(&sections, &self.resolution, self.interval, exponent);
         let statistics = statistics_of_channels;
@@ -432,8 +406,8 @@ impl PointRun {
             statistics,
         };
         let machine = match self.span_run {
-            SpanRun::Sections(run) => run.into_orbit(),
-            SpanRun::Crossings(run) => run.into_orbit(),
+            SpanRun::Sections(run) => run.so_far.orbit,
+            SpanRun::Crossings(run) => run.so_far.orbit,
         };
         (result, machine)
     }

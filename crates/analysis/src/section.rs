@@ -46,13 +46,23 @@ impl Schedule {
     }
 }
 
+/// A motion and its sections so far.
+pub struct SectionsSoFar<O> {
+    /// The motion.
+    pub orbit: O,
+    /// Number of sections taken, including discarded ones.
+    pub taken: usize,
+    /// Number of initial sections, discarded as a transient.
+    pub discard: usize,
+    /// Kept sections, concatenated, each as long as [`Orbit::observables`].
+    pub kept: Vec<f64>,
+}
+
 /// A motion on its way through its sections.
 pub struct SectionRun<O: Orbit> {
-    orbit: O,
-    schedule: Schedule,
-    taken: usize,
-    /// Kept sections, concatenated.
-    kept: Vec<f64>,
+    /// The motion, and its sections.
+    pub so_far: SectionsSoFar<O>,
+    pub(super) schedule: Schedule,
     twin: Twin<O>,
     /// Requested separation in units of the scales; `None` measures no exponent.
     separation: Option<f64>,
@@ -68,10 +78,13 @@ impl<O: Orbit> SectionRun<O> {
     /// be well above the error of a step and well below the amplitude of the motion; `None` runs no twin.
     pub fn new(orbit: O, schedule: Schedule, separation: Option<f64>) -> Self {
         let mut run = Self {
-            kept: Vec::with_capacity(schedule.kept() * orbit.observables()),
-            orbit,
+            so_far: SectionsSoFar {
+                kept: Vec::with_capacity(schedule.kept() * orbit.observables()),
+                orbit,
+                taken: 0,
+                discard: schedule.discard,
+            },
             schedule,
-            taken: 0,
             twin: Twin::None,
             separation,
         };
@@ -79,39 +92,9 @@ impl<O: Orbit> SectionRun<O> {
         run
     }
 
-    /// Times of the sections.
-    pub fn schedule(&self) -> &Schedule {
-        &self.schedule
-    }
-
-    /// The motion.
-    pub fn orbit(&self) -> &O {
-        &self.orbit
-    }
-
-    /// The motion, mutable for further observation.
-    pub fn orbit_mut(&mut self) -> &mut O {
-        &mut self.orbit
-    }
-
-    /// Returns the motion, in the state of its latest section.
-    pub fn into_orbit(self) -> O {
-        self.orbit
-    }
-
-    /// Number of sections taken so far.
-    pub fn taken(&self) -> usize {
-        self.taken
-    }
-
     /// Whether all sections are taken.
     pub fn is_done(&self) -> bool {
-        self.taken >= self.schedule.sections
-    }
-
-    /// Kept sections so far, concatenated, each as long as [`Orbit::observables`].
-    pub fn sections(&self) -> &[f64] {
-        &self.kept
+        self.so_far.taken >= self.schedule.sections
     }
 
     /// Growth of the twin's separation so far; `None` without a twin, or after the twin failed.
@@ -130,16 +113,16 @@ impl<O: Orbit> SectionRun<O> {
         if self.is_done() {
             return Ok(false);
         }
-        let end = self.schedule.time(self.taken);
-        self.orbit.step_until(end)?;
-        let at_section = self.orbit.time() >= end;
+        let end = self.schedule.time(self.so_far.taken);
+        self.so_far.orbit.step_until(end)?;
+        let at_section = self.so_far.orbit.time() >= end;
         self.follow(at_section);
         if at_section {
-            self.taken += 1;
-            if self.taken > self.schedule.discard {
-                let (start, n) = (self.kept.len(), self.orbit.observables());
-                self.kept.resize(start + n, 0.0);
-                self.orbit.observe(&mut self.kept[start..]);
+            self.so_far.taken += 1;
+            if self.so_far.taken > self.so_far.discard {
+                let (start, n) = (self.so_far.kept.len(), self.so_far.orbit.observables());
+                self.so_far.kept.resize(start + n, 0.0);
+                self.so_far.orbit.observe(&mut self.so_far.kept[start..]);
             }
             self.maybe_start_twin();
         }
@@ -151,13 +134,13 @@ impl<O: Orbit> SectionRun<O> {
             return;
         };
         let start = self.schedule.discard.saturating_sub(ALIGNMENT);
-        if self.taken == start {
-            let mut twin = self.orbit.twin();
+        if self.so_far.taken == start {
+            let mut twin = self.so_far.orbit.twin();
             let mut benettin = Benettin::new(separation, self.schedule.interval, self.schedule.kept());
-            benettin.start(&self.orbit, &mut twin);
+            benettin.start(&self.so_far.orbit, &mut twin);
             self.twin = Twin::Running(Box::new(twin), Box::new(benettin));
         }
-        if self.taken == self.schedule.discard
+        if self.so_far.taken == self.schedule.discard
             && let Twin::Running(_, benettin) = &mut self.twin
         {
             benettin.begin_counting();
@@ -167,7 +150,7 @@ impl<O: Orbit> SectionRun<O> {
     /// Advances the twin to the time of the motion, which never depends on its twin.
     fn follow(&mut self, at_section: bool) {
         if let Twin::Running(twin, benettin) = &mut self.twin
-            && benettin.follow(&self.orbit, twin, at_section).is_err()
+            && benettin.follow(&self.so_far.orbit, twin, at_section).is_err()
         {
             // If the twin fails, only the exponent is lost, not the sections.
             self.twin = Twin::None;
