@@ -9,6 +9,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::analysis::design::Start;
+use crate::words::Words as _;
 
 pub use self::map::MapArguments;
 
@@ -432,8 +433,7 @@ fn parse_change(text: &str) -> Result<(String, String), String> {
 /// Parser for `--start`.
 fn start_parser() -> impl TypedValueParser<Value = Start> {
     let words = Start::ALL.map(|start| PossibleValue::new(start.word()).help(start.meaning()));
-    let start_of_word = |word: String| Start::ALL.into_iter().find(|start| start.word() == word);
-    PossibleValuesParser::new(words).map(move |word| start_of_word(word).expect("one of these"))
+    PossibleValuesParser::new(words).map(|word| Start::of_word(&word).expect("one of these"))
 }
 
 /// Parses a whole number, also one like `1e3`. The upper limit is checked later, when the drive period is known.

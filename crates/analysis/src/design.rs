@@ -3,10 +3,9 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use serde::{Deserialize, Serialize};
-
 use super::argument::Argument;
 use super::axis::{Axis, Coordinate, RangeError};
+use jointplay_physics::words::words;
 use jointplay_scene::{Scene, SceneError, Value};
 
 /// Points per block in a `follow` sweep. Each block starts cold at its first point, so that the predecessor of a point does not
@@ -18,7 +17,7 @@ const MAX_POINTS: usize = 1 << 24;
 const MAX_CHECKED: usize = 4096;
 
 /// State from which a point starts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
     /// The scene's own initial state.
     Cold,
@@ -29,9 +28,6 @@ pub enum Start {
 }
 
 impl Start {
-    /// All variants, in the order of the help.
-    pub const ALL: [Self; 3] = [Self::Cold, Self::FollowUp, Self::FollowDown];
-
     /// Description for the help of the command line.
     pub fn meaning(self) -> &'static str {
         match self {
@@ -40,16 +36,9 @@ impl Start {
             Self::FollowDown => "From the final state of the point with the next higher value",
         }
     }
-
-    /// The word on the command line and in files.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Cold => "cold",
-            Self::FollowUp => "follow-up",
-            Self::FollowDown => "follow-down",
-        }
-    }
 }
+
+words! { Start { Cold => "cold", FollowUp => "follow-up", FollowDown => "follow-down" } }
 
 /// How the values of several parameters combine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

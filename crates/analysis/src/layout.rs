@@ -10,21 +10,17 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// All periods were completed.
-    Done,
+    Done = 0,
     /// The divergence guard stopped the run.
-    Diverged,
+    Diverged = 1,
     /// The scene did not start.
-    NoStart,
+    NoStart = 2,
 }
 
 impl Status {
     /// Status code in files.
     pub fn code(self) -> i64 {
-        match self {
-            Self::Done => 0,
-            Self::Diverged => 1,
-            Self::NoStart => 2,
-        }
+        self as i64
     }
 }
 

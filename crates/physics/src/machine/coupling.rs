@@ -76,7 +76,7 @@ impl Machine {
 }
 
 /// The first of the trees that `linked` connects with `tree`.
-fn root(linked: &mut [usize], mut tree: usize) -> usize {
+pub(crate) fn root(linked: &mut [usize], mut tree: usize) -> usize {
     while linked[tree] != tree {
         linked[tree] = linked[linked[tree]];
         tree = linked[tree];

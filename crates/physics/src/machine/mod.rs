@@ -22,6 +22,7 @@ pub use check::{ContactConflict, ContactFault, MIN_IMPACT_STEPS, MachineFault, M
 pub use closed_form::{ClosedForm, Function, Path};
 pub use conditions::Conditions;
 pub use coupling::Coupled;
+pub(crate) use coupling::root;
 pub use doubts::*;
 pub use drive::*;
 pub use element::*;

@@ -7,7 +7,7 @@ use super::elements::{ActiveSet, At, Contact, ForceElement, Gap, Loads};
 use super::kinematics::Kinematics;
 use super::model::{BallJoint, Model};
 use crate::contact::{Coefficients, Parameters};
-use crate::machine::{Machine, Vec3};
+use crate::machine::{Machine, Vec3, root};
 
 /// A clearance that ramps to a new value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,13 +24,6 @@ pub struct Ramp {
 
 /// Group of each ball joint of `machine`: a tree of bodies, with all trees that joints and force elements connect to it.
 fn groups(machine: &Machine, model: &Model) -> Vec<usize> {
-    fn root(above: &mut [usize], mut block: usize) -> usize {
-        while above[block] != block {
-            above[block] = above[above[block]];
-            block = above[block];
-        }
-        block
-    }
     let block_of = |body: usize| {
         let moves = model.bodies.get(body).is_some_and(|body| !body.driven_only);
         moves.then(|| model.block_of[body])
