@@ -105,7 +105,7 @@ mod tests {
             Quantity::ProbeError => "probe-error".to_owned(),
             _ => quantity.label().to_lowercase().replace(' ', "-"),
         });
-        assert_eq!(words.each_ref().map(String::as_str), crate::simulate::PLOT_WORDS);
+        assert_eq!(words.each_ref().map(String::as_str), Quantity::ALL.map(Quantity::word));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::placement::{ATTACHMENT, ROTATION};
 use super::read_bodies::{Form, MAX_DENSITY, MAX_MASS};
 use super::table::{contact_rows, find};
 use super::*;
-use jointplay_physics::simulate::PLOT_WORDS;
+use jointplay_physics::simulate::Quantity;
 use jointplay_physics::units::Dimension as D;
 use jointplay_physics::words::Words;
 
@@ -219,7 +219,7 @@ static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
         .fixed(),
         key(
             "plots",
-            ValueType::Words(&PLOT_WORDS, at_most(MAX_PLOTS, "plots")),
+            ValueType::Words(Quantity::WORDS, at_most(MAX_PLOTS, "plots")),
             "[\"normal-force\", \"acceleration\"]",
             "plots that a window begins with",
         )

@@ -97,7 +97,7 @@ pub struct ViewSettings {
     pub isometric: Option<(f64, f64)>,
     /// Initial time scale, simulated seconds per second; `None` lets the window choose.
     pub time_scale: Option<f64>,
-    /// Initial plots, each one of [`PLOT_WORDS`](jointplay_physics::simulate::PLOT_WORDS); if the first is `None`, the window
+    /// Initial plots, each a word of a [`Quantity`](jointplay_physics::simulate::Quantity); if the first is `None`, the window
     /// chooses.
     pub plots: [Option<&'static str>; MAX_PLOTS],
 }

@@ -5,7 +5,7 @@ mod table;
 
 pub use choice::{ChannelInfo, UnknownChannel, channels_of, chosen_channels, matches_pattern, matching};
 use table::TIME;
-pub use table::{PLOT_WORDS, PlotKind, Quantity};
+pub use table::{PlotKind, Quantity};
 
 use super::Frame;
 use crate::machine::{Freedom, Joint, JointKind, Machine};

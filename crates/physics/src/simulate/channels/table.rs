@@ -11,6 +11,7 @@ use Source::{
 use crate::machine::Vec3;
 use crate::simulate::angles::pose_of;
 use crate::simulate::{BodyMotion, ContactMode, ElementReport, Frame, JointReport, Ledger, Pose};
+use crate::words::words;
 
 /// A physical quantity that a plot shows; its channels share one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -36,7 +37,6 @@ pub enum Quantity {
 
 /// How a plot presents its quantity.
 struct Plot {
-    quantity: Quantity,
     label: &'static str,
     /// Axis unit, and its value in SI units.
     unit: (&'static str, f64),
@@ -57,165 +57,105 @@ pub enum PlotKind {
     Bands,
 }
 
-/// Words for the plots in scene files and links, in list order.
-pub const PLOT_WORDS: [&str; 16] = [
-    "normal-force",
-    "friction-force",
-    "eccentricity",
-    "penetration",
-    "position",
-    "angles",
-    "velocity",
-    "angle-rates",
-    "acceleration",
-    "angle-accelerations",
-    "actuator-force",
-    "actuator-torque",
-    "energy",
-    "energy-balance",
-    "probe-error",
-    "tip-error",
-];
-
-/// Every plot, in list order.
-const PLOTS: &[Plot] = &[
-    Plot {
-        quantity: Q::NormalForce,
-        label: "Normal force",
-        unit: ("N", 1.0),
-        kind: PlotKind::FromZero,
-        help: "Size of the normal force on each ball; of the whole reaction where a joint is ideal.",
-    },
-    Plot {
-        quantity: Q::FrictionForce,
-        label: "Friction force",
-        unit: ("N", 1.0),
-        kind: PlotKind::FromZero,
-        help: "Size of the friction force on each ball.",
-    },
-    Plot {
-        quantity: Q::Eccentricity,
-        label: "Eccentricity",
-        unit: ("mm", 1e-3),
-        kind: PlotKind::FromZeroWithClearances,
-        help: "Distance of each ball's centre from its socket's centre. Contact begins at the clearance.",
-    },
-    Plot {
-        quantity: Q::Penetration,
-        label: "Indentation",
-        unit: ("µm", 1e-6),
-        kind: PlotKind::Curves,
-        help: "How deep each ball presses into its socket; below zero there is a gap.",
-    },
-    Plot {
-        quantity: Q::Position,
-        label: "Position",
-        unit: ("mm", 1e-3),
-        kind: PlotKind::Curves,
-        help: "Origin of the output body in world axes.",
-    },
-    Plot {
-        quantity: Q::Angles,
-        label: "Angles",
-        unit: ("mrad", 1e-3),
-        kind: PlotKind::Curves,
-        help: "Angles α, β, γ of the output body.",
-    },
-    Plot {
-        quantity: Q::Velocity,
-        label: "Velocity",
-        unit: ("m/s", 1.0),
-        kind: PlotKind::Curves,
-        help: "Velocity of the output body's origin.",
-    },
-    Plot {
-        quantity: Q::AngleRates,
-        label: "Angle rates",
-        unit: ("rad/s", 1.0),
-        kind: PlotKind::Curves,
-        help: "Rates of the angles α, β, γ.",
-    },
-    Plot {
-        quantity: Q::Acceleration,
-        label: "Acceleration",
-        unit: ("m/s²", 1.0),
-        kind: PlotKind::Curves,
-        help: "Acceleration of the output body's origin.",
-    },
-    Plot {
-        quantity: Q::AngleAccelerations,
-        label: "Angle accelerations",
-        unit: ("rad/s²", 1.0),
-        kind: PlotKind::Curves,
-        help: "Second derivatives of the angles α, β, γ.",
-    },
-    Plot {
-        quantity: Q::ActuatorForce,
-        label: "Actuator force",
-        unit: ("N", 1.0),
-        kind: PlotKind::Curves,
-        help: "Force that each driven slide needs, positive along its axis.",
-    },
-    Plot {
-        quantity: Q::ActuatorTorque,
-        label: "Actuator torque",
-        unit: ("N m", 1.0),
-        kind: PlotKind::Curves,
-        help: "Torque that each driven hinge needs, positive about its axis.",
-    },
-    Plot {
-        quantity: Q::Energy,
-        label: "Energy",
-        unit: ("mJ", 1e-3),
-        kind: PlotKind::Curves,
-        help: "Kinetic, potential and elastic energy of the whole mechanism.",
-    },
-    Plot {
-        quantity: Q::EnergyBalance,
-        label: "Energy balance",
-        unit: ("mJ", 1e-3),
-        kind: PlotKind::Bands,
-        help: "Since the start: work of drives, gravity, moving clearances, changed parameters and loads from outside, loss \
-               by restitution, friction and dampers, change of kinetic and elastic energy, and the residual, which is the \
-               error of the integration.",
-    },
-    Plot {
-        quantity: Q::ProbeError,
-        label: "Tip error by axis",
-        unit: ("mm", 1e-3),
-        kind: PlotKind::Curves,
-        help: "Position of the probe tip less that of the ideal mechanism at the same time, by world axis.",
-    },
-    Plot {
-        quantity: Q::TipError,
-        label: "Tip error",
-        unit: ("µm", 1e-6),
-        kind: PlotKind::FromZero,
-        help: "Distance of the output point (the probe tip, or the output body's origin) from where ideal joints have it at the \
-               same time. Recorded while the ideal ghost is on (key G).",
-    },
-];
+words!(Quantity {
+    NormalForce => "normal-force",
+    FrictionForce => "friction-force",
+    Eccentricity => "eccentricity",
+    Penetration => "penetration",
+    Position => "position",
+    Angles => "angles",
+    Velocity => "velocity",
+    AngleRates => "angle-rates",
+    Acceleration => "acceleration",
+    AngleAccelerations => "angle-accelerations",
+    ActuatorForce => "actuator-force",
+    ActuatorTorque => "actuator-torque",
+    Energy => "energy",
+    EnergyBalance => "energy-balance",
+    ProbeError => "probe-error",
+    TipError => "tip-error",
+});
 
 impl Quantity {
-    /// All of them, in list order.
-    pub const ALL: [Self; PLOTS.len()] = {
-        let mut all = [Self::NormalForce; PLOTS.len()];
-        let mut i = 0;
-        while i < all.len() {
-            all[i] = PLOTS[i].quantity;
-            assert!(all[i] as usize == i, "plots stand in the order of the enum");
-            i += 1;
+    fn plot(self) -> Plot {
+        let row = |label, unit, kind, help| Plot { label, unit, kind, help };
+        match self {
+            Self::NormalForce => row(
+                "Normal force",
+                ("N", 1.0),
+                PlotKind::FromZero,
+                "Size of the normal force on each ball; of the whole reaction where a joint is ideal.",
+            ),
+            Self::FrictionForce => {
+                row("Friction force", ("N", 1.0), PlotKind::FromZero, "Size of the friction force on each ball.")
+            }
+            Self::Eccentricity => row(
+                "Eccentricity",
+                ("mm", 1e-3),
+                PlotKind::FromZeroWithClearances,
+                "Distance of each ball's centre from its socket's centre. Contact begins at the clearance.",
+            ),
+            Self::Penetration => row(
+                "Indentation",
+                ("µm", 1e-6),
+                PlotKind::Curves,
+                "How deep each ball presses into its socket; below zero there is a gap.",
+            ),
+            Self::Position => {
+                row("Position", ("mm", 1e-3), PlotKind::Curves, "Origin of the output body in world axes.")
+            }
+            Self::Angles => row("Angles", ("mrad", 1e-3), PlotKind::Curves, "Angles α, β, γ of the output body."),
+            Self::Velocity => row("Velocity", ("m/s", 1.0), PlotKind::Curves, "Velocity of the output body's origin."),
+            Self::AngleRates => row("Angle rates", ("rad/s", 1.0), PlotKind::Curves, "Rates of the angles α, β, γ."),
+            Self::Acceleration => {
+                row("Acceleration", ("m/s²", 1.0), PlotKind::Curves, "Acceleration of the output body's origin.")
+            }
+            Self::AngleAccelerations => row(
+                "Angle accelerations",
+                ("rad/s²", 1.0),
+                PlotKind::Curves,
+                "Second derivatives of the angles α, β, γ.",
+            ),
+            Self::ActuatorForce => row(
+                "Actuator force",
+                ("N", 1.0),
+                PlotKind::Curves,
+                "Force that each driven slide needs, positive along its axis.",
+            ),
+            Self::ActuatorTorque => row(
+                "Actuator torque",
+                ("N m", 1.0),
+                PlotKind::Curves,
+                "Torque that each driven hinge needs, positive about its axis.",
+            ),
+            Self::Energy => row(
+                "Energy",
+                ("mJ", 1e-3),
+                PlotKind::Curves,
+                "Kinetic, potential and elastic energy of the whole mechanism.",
+            ),
+            Self::EnergyBalance => row(
+                "Energy balance",
+                ("mJ", 1e-3),
+                PlotKind::Bands,
+                "Since the start: work of drives, gravity, moving clearances, changed parameters and loads from outside, loss \
+               by restitution, friction and dampers, change of kinetic and elastic energy, and the residual, which is the \
+               error of the integration.",
+            ),
+            Self::ProbeError => row(
+                "Tip error by axis",
+                ("mm", 1e-3),
+                PlotKind::Curves,
+                "Position of the probe tip less that of the ideal mechanism at the same time, by world axis.",
+            ),
+            Self::TipError => row(
+                "Tip error",
+                ("µm", 1e-6),
+                PlotKind::FromZero,
+                "Distance of the output point (the probe tip, or the output body's origin) from where ideal joints have it at the \
+               same time. Recorded while the ideal ghost is on (key G).",
+            ),
         }
-        all
-    };
-
-    fn plot(self) -> &'static Plot {
-        &PLOTS[self as usize]
-    }
-
-    /// Its word in scene files and links.
-    pub fn word(self) -> &'static str {
-        PLOT_WORDS[self as usize]
     }
 
     /// Sentence-case name.
