@@ -8,7 +8,7 @@ pub mod truss;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
 
-use jointplay::scene::{LiveScene, Scene};
+use jointplay::scene::{LiveScene, Scene, SceneError};
 use jointplay::simulate::{Frame, Simulation};
 
 /// Calls `kill` with `JOINTPLAY_KILLS` instants within `length`, by default `default_count`.
@@ -53,6 +53,26 @@ pub const THREE_VARIANTS: [(&str, &str); 3] = [("dopri5", "tree"), ("radau5", "l
 /// A scene from its text with changes.
 pub fn parse(text: &str, changes: &Changes) -> Scene {
     Scene::parse(text, None, &owned(changes)).unwrap()
+}
+
+/// `text` with `new` for `old`, which it must contain.
+pub fn replaced(text: &str, old: &str, new: &str) -> String {
+    assert!(text.contains(old), "{text}\nlacks {old}");
+    text.replacen(old, new, 1)
+}
+
+/// Checks that no line of `cases`, `what -> words | more words`, makes a scene: `read` is given `what`, with line breaks for `; `, and
+/// fails with an error that names a file and contains these words.
+pub fn assert_refused(cases: &str, read: impl Fn(&str) -> Result<Scene, SceneError>) {
+    for case in cases.trim().lines() {
+        let (what, words) = case.trim().split_once("-> ").expect(case);
+        let message = read(&what.trim_end().replace("; ", "\n")).expect_err(case).to_string();
+        let file = message.split_once(':').map_or("", |(file, _)| file);
+        assert!(file.ends_with(".toml") || file.ends_with(".csv"), "{case}\n{message}");
+        for words in words.split(" | ") {
+            assert!(message.contains(words), "{case}\n{message}\nlacks {words}");
+        }
+    }
 }
 
 /// The text of a scene: a free ball of 0.1 kg in a fixed socket, without friction, at `place` (mm) from the centre along z, moving at

@@ -1,6 +1,7 @@
 //! Bushings against closed-form solutions: deflections, natural frequencies, momentum and energy.
 
 use crate::common::matrix::{FORMULATIONS, for_every};
+use crate::common::{assert_refused, replaced};
 use crate::elements::frame_at;
 use crate::joint_elements::{momenta, start_simulation};
 use jointplay::machine::{Quat, Vec3};
@@ -177,32 +178,21 @@ fn a_body_on_a_bushing_is_not_in_free_flight() {
 
 #[test]
 fn invalid_bushings_are_refused_with_their_position() {
-    let start = "position = [0, 0, 0]";
-    for (text, fragments) in [
-        (
-            bushing_scene(start, "").replace("200 300 500 N/m", "200 -300 500 N/m"),
-            ["bushing.b.stiffness", "allowed 0 N/m to"],
-        ),
-        (
-            bushing_scene(start, "").replace("0.3 N m/rad", "0.3 N/m"),
-            ["wrong unit `N/m`", "units of turning stiffness"],
-        ),
-        (
-            bushing_scene(start, "").replace("200 300 500", "0 0 0").replace("0.1 0.2 0.3", "0 0 0"),
-            ["does nothing: stiffness, damping, turning_stiffness", "are 0"],
-        ),
-        (bushing_scene(start, "axes = { axis = [0, 0, 1] }\n"), ["bushing.b.axes.angle", "missing"]),
-        (
-            bushing_scene(start, "").replace("body = \"mass\" }\nstiff", "body = \"world\" }\nstiff"),
-            ["bushing.b.to", "same body"],
-        ),
-    ] {
-        let error = Scene::parse(&text, Some("mine.toml"), &[]).expect_err(&text);
-        let message = error.to_string();
-        for fragment in fragments {
-            assert!(message.contains(fragment), "{message}\nlacks {fragment}");
-        }
-    }
+    let cases = r#"
+        200 300 500 N/m => 200 -300 500 N/m -> bushing.b.stiffness | allowed 0 N/m to
+        0.3 N m/rad => 0.3 N/m -> wrong unit `N/m` | units of turning stiffness
+        stiffness = "200 300 500 N/m"; turning_stiffness = "0.1 0.2 0.3 N m/rad" => -> does nothing: stiffness, damping, turning_stiffness | are 0
+        to = { body = "mass" } => to = { body = "mass" }; axes = { axis = [0, 0, 1] } -> bushing.b.axes.angle | missing
+        body = "mass" }; stiff => body = "world" }; stiff -> bushing.b.to | same body
+    "#;
+    assert_refused(cases, |change| {
+        let (from, to) = change.split_once(" =>").expect(change);
+        Scene::parse(
+            &replaced(&bushing_scene("position = [0, 0, 0]", ""), from, to.trim_start()),
+            Some("mine.toml"),
+            &[],
+        )
+    });
 }
 
 /// Three bodies around the z axis, each 20 mm outside a bushing to the world that is stiffest in the radial direction.

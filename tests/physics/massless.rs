@@ -1,7 +1,7 @@
 //! Massless bodies between joints: joints in series, against equivalent single joints and closed-form solutions.
 
-use crate::common::frame_now;
 use crate::common::matrix::in_tree;
+use crate::common::{assert_refused, frame_now, replaced};
 use crate::elements::frame_at;
 use crate::joint_elements::start_simulation;
 use crate::two_degrees::{G, train};
@@ -174,30 +174,18 @@ fn two_slides_and_a_hinge_move_a_plate_in_its_plane() {
 
 #[test]
 fn a_body_that_needs_its_mass_is_refused_with_its_line() {
-    let parse_error = |text: &str| Scene::parse(text, Some("top.toml"), &[]).expect_err("refused").to_string();
     let good = hinges("0.5 rad");
-    let carried_by_none = good.replace("parent = \"inner\"", "parent = \"outer\"");
-    let loose = "[[ball_joint]]\nname = \"b\"\nsocket = { body = \"world\" }\nball = { body = \"inner\" }\n";
-    let free = good.replace(
-        "kind = \"revolute\"\nchild = \"outer\"\naxis = [1, 0, 0]\nstart = { position = 0, velocity = \"2 rad/s\" }",
-        "kind = \"free\"\nchild = \"outer\"\nstart = { position = [0, 0, 0] }",
-    );
-    for (text, expected) in [
-        (carried_by_none, "body.inner.mass = 0: only a body between joints may have no mass: it carries no body"),
-        (
-            format!("{good}{loose}"),
-            "body.inner.mass = 0: only a body between joints may have no mass: ball joint b is on it",
-        ),
-        (free, "body.outer.mass = 0: only a body between joints may have no mass: it is carried by a free joint"),
-        (
-            good.replacen("inertia = [0, 0, 0]", "inertia = \"1e-6 1e-6 1e-6 kg m^2\"", 1),
-            "body.outer.mass = 0: out of range; allowed above 0",
-        ),
-        (good.replacen("mass = 0", "mass = \"1 kg\"", 1), "allowed above 0; units"),
-    ] {
-        let error = parse_error(&text);
-        assert!(error.contains(expected) && error.starts_with("top.toml:"), "{error}\n  should say `{expected}`");
-    }
+    let cases = r#"
+        parent = "inner" => parent = "outer" -> body.inner.mass = 0: only a body between joints may have no mass: it carries no body
+        [[joint]]; name = "x" => [[ball_joint]]; name = "b"; socket = { body = "world" }; ball = { body = "inner" }; [[joint]]; name = "x" -> body.inner.mass = 0: only a body between joints may have no mass: ball joint b is on it
+        kind = "revolute"; child = "outer"; axis = [1, 0, 0]; start = { position = 0, velocity = "2 rad/s" } => kind = "free"; child = "outer"; start = { position = [0, 0, 0] } -> body.outer.mass = 0: only a body between joints may have no mass: it is carried by a free joint
+        name = "outer"; mass = 0; inertia = [0, 0, 0] => name = "outer"; mass = 0; inertia = "1e-6 1e-6 1e-6 kg m^2" -> body.outer.mass = 0: out of range; allowed above 0
+        name = "outer"; mass = 0 => name = "outer"; mass = "1 kg" -> allowed above 0; units
+    "#;
+    assert_refused(cases, |change| {
+        let (from, to) = change.split_once(" => ").expect(change);
+        Scene::parse(&replaced(&good, from, to), Some("top.toml"), &[])
+    });
     let change = ("formulation".to_owned(), "lagrange".to_owned());
     let scene = Scene::parse(&good, Some("top.toml"), &[change]).unwrap();
     let error = scene.locate(&Simulation::new(&scene.machine).expect_err("refused")).to_string();

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::common::matrix::for_every;
-use crate::common::{THREE_VARIANTS, parse};
+use crate::common::{THREE_VARIANTS, assert_refused, parse};
 use crate::elements::frame_at;
 use jointplay::interpolate::Interpolation;
 use jointplay::machine::{Elastic, ElementKind};
@@ -306,66 +306,23 @@ fn errors_in_a_characteristic_are_located() {
         [[joint]]\nname = \"h\"\nkind = \"revolute\"\naxis = [0, 0, 1]\nchild = \"mass\"\n";
     let spring = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"1 m\"\n";
     let turning = "[[joint_spring]]\nname = \"t\"\njoint = \"h\"\n";
-    for (element, more, fragments) in [
-        (
-            spring,
-            "characteristic = [[0, 0], [\"1 mm\", \"1 N\"]]\nstiffness = \"1 N/m\"",
-            ["spring.s.stiffness", "not allowed here: `characteristic`"],
-        ),
-        (
-            spring,
-            "characteristic = [[0, 0], [\"1 mm\", \"1 N\"]]\npreload = \"1 N\"",
-            ["spring.s.preload", "not allowed here"],
-        ),
-        (
-            spring,
-            "characteristic = [[0, 0], [\"1 mm\", \"1 N\"]]\nfile = \"a.csv\"",
-            ["spring.s.file", "`characteristic` is given as well"],
-        ),
-        (spring, "file = \"a.csv\"", ["spring.s.file", "has no folder"]),
-        (
-            spring,
-            "stiffness = \"1 N/m\"\ninterpolation = \"linear\"",
-            ["spring.s.interpolation", "the spring has no `characteristic`"],
-        ),
-        (
-            spring,
-            "characteristic = [[0, 0], [\"1 mm\", \"1 N\"]]\ninterpolation = \"cubic\"",
-            ["spring.s.interpolation = \"cubic\"", "allowed spline, monotone, linear"],
-        ),
-        (spring, "characteristic = [[0, 0]]", ["spring.s.characteristic", "has 1 points; allowed 2 to 10000"]),
-        (
-            spring,
-            "characteristic = [[0, 0], [\"2 mm\", \"1 N\"], [\"1 mm\", \"2 N\"]]",
-            ["spring.s.characteristic[2][0] = \"1 mm\"", "lengths must rise, by at least 1 nm"],
-        ),
-        (
-            spring,
-            "characteristic = [[0, 0], [\"2 mm\"]]",
-            ["spring.s.characteristic[1]", "needs a length and a tension, has 1 values"],
-        ),
-        (
-            spring,
-            "characteristic = [[0, 0], [\"2 mm\", \"1 mm\"]]",
-            ["spring.s.characteristic[1][1]", "wrong unit `mm`"],
-        ),
-        (spring, "characteristic = [[0, 0], [\"2 mm\", 0]]", ["spring.s", "does nothing"]),
-        (
-            turning,
-            "characteristic = [[0, 0], [\"2 mm\", \"1 N\"]]",
-            ["joint_spring.t.characteristic[1][0]", "wrong unit `mm`"],
-        ),
-        (
-            turning,
-            "characteristic = [[\"1 deg\"]]",
-            ["joint_spring.t.characteristic[0]", "needs an angle and a torque"],
-        ),
-    ] {
-        let text = format!("{start}{element}{more}\n");
-        let error = Scene::parse(&text, Some("mine.toml"), &[]).expect_err(more).to_string();
-        for fragment in fragments {
-            assert!(error.contains(fragment), "{error}\nlacks {fragment}");
-        }
-        assert!(error.starts_with("mine.toml:"), "{error}");
-    }
+    let cases = r#"
+        SPRING; characteristic = [[0, 0], ["1 mm", "1 N"]]; stiffness = "1 N/m" -> spring.s.stiffness | not allowed here: `characteristic`
+        SPRING; characteristic = [[0, 0], ["1 mm", "1 N"]]; preload = "1 N" -> spring.s.preload | not allowed here
+        SPRING; characteristic = [[0, 0], ["1 mm", "1 N"]]; file = "a.csv" -> spring.s.file | `characteristic` is given as well
+        SPRING; file = "a.csv" -> spring.s.file | has no folder
+        SPRING; stiffness = "1 N/m"; interpolation = "linear" -> spring.s.interpolation | the spring has no `characteristic`
+        SPRING; characteristic = [[0, 0], ["1 mm", "1 N"]]; interpolation = "cubic" -> spring.s.interpolation = "cubic" | allowed spline, monotone, linear
+        SPRING; characteristic = [[0, 0]] -> spring.s.characteristic | has 1 points; allowed 2 to 10000
+        SPRING; characteristic = [[0, 0], ["2 mm", "1 N"], ["1 mm", "2 N"]] -> spring.s.characteristic[2][0] = "1 mm" | lengths must rise, by at least 1 nm
+        SPRING; characteristic = [[0, 0], ["2 mm"]] -> spring.s.characteristic[1] | needs a length and a tension, has 1 values
+        SPRING; characteristic = [[0, 0], ["2 mm", "1 mm"]] -> spring.s.characteristic[1][1] | wrong unit `mm`
+        SPRING; characteristic = [[0, 0], ["2 mm", 0]] -> spring.s | does nothing
+        TURNING; characteristic = [[0, 0], ["2 mm", "1 N"]] -> joint_spring.t.characteristic[1][0] | wrong unit `mm`
+        TURNING; characteristic = [["1 deg"]] -> joint_spring.t.characteristic[0] | needs an angle and a torque
+    "#;
+    assert_refused(cases, |more| {
+        let text = start.to_owned() + &more.replace("SPRING\n", spring).replace("TURNING\n", turning);
+        Scene::parse(&text, Some("mine.toml"), &[])
+    });
 }

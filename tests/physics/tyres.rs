@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::common::matrix::for_every;
-use crate::common::{THREE_VARIANTS, parse};
+use crate::common::{THREE_VARIANTS, assert_refused, parse, replaced};
 use crate::elements::frame_at;
 use jointplay::machine::Vec3;
 use jointplay::scene::{LiveScene, Scene};
@@ -171,27 +171,20 @@ fn up_is_opposite_to_the_gravity_of_the_file_unless_given() {
 
 #[test]
 fn errors_in_a_tyre_are_located() {
-    let error = |text: &str| Scene::parse(text, Some("mine.toml"), &[]).unwrap_err().to_string();
-    let without_gravity = wheel(REST, "").replace("z = \"-9.81 m/s^2\"", "x = 0\ny = 0\nz = 0");
-    for (text, fragments) in [
-        (without_gravity, ["tyre.t.up", "without gravity only the file can say which way is up"]),
-        (
-            wheel(REST, "").replace("body = \"wheel\" }\nradius", "body = \"world\" }\nradius"),
-            ["tyre.t.on", "acts on a body, not on the world"],
-        ),
-        (wheel(REST, "").replace("stiffness = \"5e4 N/m\"", "stiffness = 0"), ["tyre.t", "does nothing"]),
-        (wheel(REST, "ground = { law = \"function\", function = \"f\" }"), ["tyre.t.ground.function", "[closed_form]"]),
-        (
-            wheel(REST, "ground = { law = \"pulse\", height = \"1 deg\", duration = \"1 s\" }"),
-            ["tyre.t.ground.height", "wrong unit `deg`"],
-        ),
-        (wheel(REST, "up = [0, 0, 0]"), ["tyre.t.up", "must not be zero"]),
-        (wheel(REST, "ground = \"flat\""), ["tyre.t.ground", "a table"]),
-    ] {
-        let message = error(&text);
-        for fragment in fragments {
-            assert!(message.contains(fragment), "{message}\nlacks {fragment}");
-        }
-        assert!(message.starts_with("mine.toml:"), "{message}");
-    }
+    let cases = r#"
+        z = "-9.81 m/s^2" => x = 0; y = 0; z = 0 -> tyre.t.up | without gravity only the file can say which way is up
+        body = "wheel" }; radius => body = "world" }; radius -> tyre.t.on | acts on a body, not on the world
+        stiffness = "5e4 N/m" => stiffness = 0 -> tyre.t | does nothing
+        ground = { law = "function", function = "f" } -> tyre.t.ground.function | [closed_form]
+        ground = { law = "pulse", height = "1 deg", duration = "1 s" } -> tyre.t.ground.height | wrong unit `deg`
+        up = [0, 0, 0] -> tyre.t.up | must not be zero
+        ground = "flat" -> tyre.t.ground | a table
+    "#;
+    assert_refused(cases, |change| {
+        let text = match change.split_once(" => ") {
+            Some((from, to)) => replaced(&wheel(REST, ""), from, to),
+            None => wheel(REST, change),
+        };
+        Scene::parse(&text, Some("mine.toml"), &[])
+    });
 }
