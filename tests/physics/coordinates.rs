@@ -1,7 +1,7 @@
 //! Force elements and drives on single coordinates of joints with two degrees of freedom, and force elements on joints that close
 //! loops, against closed-form solutions, in every method and both formulations.
 
-use crate::common::matrix::{FORMULATIONS, for_every};
+use crate::common::matrix::for_every;
 use crate::elements::frame_at;
 use crate::joint_elements::{momenta, start_simulation};
 use crate::two_degrees::angle_difference;
@@ -172,19 +172,17 @@ fn a_motor_on_one_coordinate_drives_only_it_and_its_work_counts_as_drive_work() 
         let [_, _, unit, ..] = case.units();
         let key = if case.slides() { "force" } else { "torque" };
         let motor = case.element("motor", &format!("{key} = \"{:e} {unit}\"\n", 5.0 * m));
-        for formulation in FORMULATIONS {
-            let changes = [("formulation", formulation), ("solver.tolerance", "1e-10")];
-            let mut simulation = case.start_at([0.0, -0.4], &motor, &changes);
-            let frame = frame_at(&mut simulation, 0.3);
-            let label = format!("{case:?} {formulation}");
-            let [q, rate] = case.coordinate(&frame);
-            let expected = -0.4 * 0.3 + 0.5 * 5.0 * 0.09;
-            assert!((q - expected).abs() < 1e-8, "{label}: {q} {expected}");
-            assert!((rate - 1.1).abs() < 1e-8, "{label}: {rate}");
-            let ledger = simulation.ledger().unwrap();
-            let work = 5.0 * m * expected;
-            assert!((ledger.drive_work - work).abs() < 1e-7 * m, "{label}: {ledger:?}");
-        }
+        let changes = [("solver.tolerance", "1e-10")];
+        let mut simulation = case.start_at([0.0, -0.4], &motor, &changes);
+        let frame = frame_at(&mut simulation, 0.3);
+        let label = format!("{case:?}");
+        let [q, rate] = case.coordinate(&frame);
+        let expected = -0.4 * 0.3 + 0.5 * 5.0 * 0.09;
+        assert!((q - expected).abs() < 1e-8, "{label}: {q} {expected}");
+        assert!((rate - 1.1).abs() < 1e-8, "{label}: {rate}");
+        let ledger = simulation.ledger().unwrap();
+        let work = 5.0 * m * expected;
+        assert!((ledger.drive_work - work).abs() < 1e-7 * m, "{label}: {ledger:?}");
     }
 }
 
@@ -197,22 +195,20 @@ fn a_stop_reverses_one_coordinate() {
         let stop =
             format!("upper = \"0.05 {length}\"\n{key} = \"{:e} {force}\"\ndepth = \"1e-3 {length}\"\n", 200.0 * m);
         let stop = case.element("stop", &stop);
-        for formulation in FORMULATIONS {
-            let changes = [("formulation", formulation), ("solver.tolerance", "1e-10")];
-            let mut simulation = case.start_at([0.0, 0.5], &stop, &changes);
-            let deepest = (10..=18).map(|n| {
-                let frame = frame_at(&mut simulation, 0.01 * f64::from(n));
-                (case.coordinate(&frame)[0], case.force(&frame))
-            });
-            let deepest = deepest.fold((0.0, 0.0), |a: (f64, f64), b| (a.0.max(b.0), a.1.min(b.1)));
-            let label = format!("{case:?} {formulation}");
-            // Hertz: m v^2 / 2 = 0.4 K d^2.5 with K = 200 m / 0.001^1.5.
-            let max_depth = (0.125 / (0.4 * 200.0) * 1e-3_f64.powf(1.5)).powf(0.4);
-            assert!(deepest.0 - 0.05 < max_depth + 1e-9 && deepest.1 <= 0.0, "{label}: {deepest:?}");
-            let [q, rate] = case.coordinate(&frame_at(&mut simulation, 0.25));
-            assert!((rate + 0.5).abs() < 1e-6, "{label}: {rate}");
-            assert!(q < 0.05, "{label}: {q}");
-        }
+        let changes = [("solver.tolerance", "1e-10")];
+        let mut simulation = case.start_at([0.0, 0.5], &stop, &changes);
+        let deepest = (10..=18).map(|n| {
+            let frame = frame_at(&mut simulation, 0.01 * f64::from(n));
+            (case.coordinate(&frame)[0], case.force(&frame))
+        });
+        let deepest = deepest.fold((0.0, 0.0), |a: (f64, f64), b| (a.0.max(b.0), a.1.min(b.1)));
+        let label = format!("{case:?}");
+        // Hertz: m v^2 / 2 = 0.4 K d^2.5 with K = 200 m / 0.001^1.5.
+        let max_depth = (0.125 / (0.4 * 200.0) * 1e-3_f64.powf(1.5)).powf(0.4);
+        assert!(deepest.0 - 0.05 < max_depth + 1e-9 && deepest.1 <= 0.0, "{label}: {deepest:?}");
+        let [q, rate] = case.coordinate(&frame_at(&mut simulation, 0.25));
+        assert!((rate + 0.5).abs() < 1e-6, "{label}: {rate}");
+        assert!(q < 0.05, "{label}: {q}");
     }
 }
 
@@ -278,40 +274,25 @@ fn a_joint_with_both_coordinates_driven_carries_an_attached_pendulum() {
                     parent_point = \"40 0 0 mm\"\nchild_point = \"0 20 60 mm\"\nstart = { velocity = \"1 rad/s\" }\n";
         let driven = format!("drive = {{ {}, {} }}\n", drive(first, "0.7"), drive(second, "-2"));
         let text = text[..start].to_owned() + &driven + more;
-        let mut ends = Vec::new();
-        for formulation in FORMULATIONS {
-            let changes = [("formulation", formulation), ("solver.tolerance", "1e-11")];
-            let mut simulation = start_simulation(&text, &changes);
-            let summary = simulation.mechanism().summary();
-            assert_eq!((summary.drives, summary.driven_bodies, summary.degrees_of_freedom), (2, 1, 1));
-            let frame = frame_at(&mut simulation, 0.2);
-            let label = format!("{} {formulation}", first.kind);
-            let [own, other] = [0, 1].map(|part| frame.coordinates[part]);
-            assert!((own[0] - 0.14).abs() < 1e-9 && (own[1] - 0.7).abs() < 1e-9, "{label}: {own:?}");
-            assert!((other[0] + 0.4).abs() < 1e-9 && (other[1] + 2.0).abs() < 1e-9, "{label}: {other:?}");
-            let residual = simulation.ledger().unwrap().relative_residual();
-            assert!(residual.abs() < 1e-7, "{label}: {residual:e}");
-            ends.push(frame);
-        }
-        let [tree, lagrange] = &ends[..] else {
-            panic!("two formulations");
-        };
-        let [a, b] = [tree, lagrange].map(|frame| frame.coordinates[2]);
-        assert!((a[0] - b[0]).abs() < 1e-8 && (a[1] - b[1]).abs() < 1e-7, "{a:?} {b:?}");
-        assert_eq!(tree.actuators.len(), 2);
-        for (a, b) in tree.actuators.iter().zip(&lagrange.actuators) {
-            assert!((a - b).abs() < 1e-7 * a.abs().max(0.1), "{}: {a} {b}", first.kind);
-        }
-        let (name, kind) = (first.kind, first.coordinate);
-        let scene = crate::common::parse(&text, &[]);
-        let channels = jointplay::simulate::channels_of(&scene.machine, tree);
+        crate::formulations::check(first.kind, &text);
+        let mut simulation = start_simulation(&text, &[("solver.tolerance", "1e-11")]);
+        let summary = simulation.mechanism().summary();
+        assert_eq!((summary.drives, summary.driven_bodies, summary.degrees_of_freedom), (2, 1, 1));
+        let frame = frame_at(&mut simulation, 0.2);
+        let [own, other] = [0, 1].map(|part| frame.coordinates[part]);
+        assert!((own[0] - 0.14).abs() < 1e-9 && (own[1] - 0.7).abs() < 1e-9, "{own:?}");
+        assert!((other[0] + 0.4).abs() < 1e-9 && (other[1] + 2.0).abs() < 1e-9, "{other:?}");
+        let residual = simulation.ledger().unwrap().relative_residual();
+        assert!(residual.abs() < 1e-7, "{residual:e}");
+        assert_eq!(frame.actuators.len(), 2);
+        let channels = jointplay::simulate::channels_of(simulation.machine(), &frame);
         let columns = channels.iter().filter(|channel| channel.unasked).map(|channel| &channel.column);
-        let own: &[&str] = match name {
+        let own: &[&str] = match first.kind {
             "cylindrical" => &["j_actuator_N", "j_angle_actuator_Nm"],
             _ => &["j_angle_actuator_Nm", "j_child_angle_actuator_Nm"],
         };
         let actuator_columns: Vec<&String> = columns.filter(|column| column.contains("actuator")).collect();
-        assert_eq!(actuator_columns, own, "{kind}");
+        assert_eq!(actuator_columns, own);
     }
 }
 
@@ -391,17 +372,15 @@ fn a_spring_on_a_closing_hinge_loads_the_drive_of_its_loop() {
         + "[[joint]]\nname = \"B\"\nkind = \"revolute\"\nparent = \"coupler\"\nchild = \"rocker\"\ncloses_loop = true\n\
            parent_point = \"0.3 0 0 m\"\nchild_point = \"0.1 0 0 m\"\naxis = [0, 1, 0]\n";
     let spring = "[[joint_spring]]\nname = \"s\"\njoint = \"B\"\nposition = \"0.4 rad\"\nstiffness = \"2 N m/rad\"\n";
-    for formulation in FORMULATIONS {
-        let torque = |text: &str| {
-            let mut simulation = start_simulation(text, &[("formulation", formulation)]);
-            let frame = frame_at(&mut simulation, 0.1);
-            (frame.actuators[0], frame.coordinates.last().copied().expect("one")[0])
-        };
-        let (loaded, angle) = torque(&(text.clone() + spring));
-        // Rocker against coupler: the coupler does not turn.
-        assert!((angle - 1.02).abs() < 1e-8, "{formulation}: {angle}");
-        let spring_torque = 2.0 * (1.02 - 0.4);
-        let difference = loaded - torque(&text).0;
-        assert!((difference - spring_torque).abs() < 1e-6, "{formulation}: {difference} {spring_torque}");
-    }
+    let torque = |text: &str| {
+        let mut simulation = start_simulation(text, &[]);
+        let frame = frame_at(&mut simulation, 0.1);
+        (frame.actuators[0], frame.coordinates.last().copied().expect("one")[0])
+    };
+    let (loaded, angle) = torque(&(text.clone() + spring));
+    // Rocker against coupler: the coupler does not turn.
+    assert!((angle - 1.02).abs() < 1e-8, "{angle}");
+    let spring_torque = 2.0 * (1.02 - 0.4);
+    let difference = loaded - torque(&text).0;
+    assert!((difference - spring_torque).abs() < 1e-6, "{difference} {spring_torque}");
 }

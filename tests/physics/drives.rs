@@ -52,19 +52,14 @@ const LAWS: [&str; 8] = [
 #[test]
 fn the_ledger_balances_under_every_law() {
     for law in LAWS {
-        for formulation in ["tree", "lagrange"] {
-            for clearance in ["0", "0.3 mm"] {
-                let mut simulation = hanging(
-                    law,
-                    &[("formulation", formulation), ("contact.clearance", clearance), ("solver.preset", "accurate")],
-                );
-                run_until(&mut simulation, 0.3);
-                let ledger = simulation.ledger().unwrap();
-                let residual = ledger.relative_residual();
-                println!("{law} {formulation} {clearance}: {residual:.1e}");
-                assert!(residual.abs() < 1e-4, "{law} {formulation} {clearance}: {ledger:?}");
-                assert!(ledger.drive_work.abs() > 1e-6, "{law}: {ledger:?}");
-            }
+        for clearance in ["0", "0.3 mm"] {
+            let mut simulation = hanging(law, &[("contact.clearance", clearance), ("solver.preset", "accurate")]);
+            run_until(&mut simulation, 0.3);
+            let ledger = simulation.ledger().unwrap();
+            let residual = ledger.relative_residual();
+            println!("{law} {clearance}: {residual:.1e}");
+            assert!(residual.abs() < 1e-4, "{law} {clearance}: {ledger:?}");
+            assert!(ledger.drive_work.abs() > 1e-6, "{law}: {ledger:?}");
         }
     }
 }
@@ -73,16 +68,14 @@ fn the_ledger_balances_under_every_law() {
 fn the_ledger_balances_for_kinematic_motion() {
     for law in LAWS {
         let law = law.replace("mm/s", "rad/s").replace("5 mm", "1 rad").replace("mm", "deg");
-        for formulation in ["tree", "lagrange"] {
-            let mut simulation = kinematic(&law, &[("formulation", formulation)]);
-            assert_eq!(simulation.mechanism().is_kinematic(), formulation == "tree");
-            run_until(&mut simulation, 0.3);
-            let ledger = simulation.ledger().unwrap();
-            let residual = ledger.relative_residual();
-            println!("{law} {formulation}: {residual:.1e}");
-            assert!(residual.abs() < 1e-4, "{law} {formulation}: {ledger:?}");
-            assert!(ledger.exchanged > 1e-6, "{law}: {ledger:?}");
-        }
+        let mut simulation = kinematic(&law, &[]);
+        assert!(simulation.mechanism().is_kinematic());
+        run_until(&mut simulation, 0.3);
+        let ledger = simulation.ledger().unwrap();
+        let residual = ledger.relative_residual();
+        println!("{law}: {residual:.1e}");
+        assert!(residual.abs() < 1e-4, "{law}: {ledger:?}");
+        assert!(ledger.exchanged > 1e-6, "{law}: {ledger:?}");
     }
 }
 
@@ -90,13 +83,8 @@ fn the_ledger_balances_for_kinematic_motion() {
 fn no_step_passes_over_a_pulse_after_a_second_of_rest() {
     for (height, duration) in [("2 mm", "5 ms"), ("0.2 mm", "0.5 ms")] {
         let law = format!("law = \"pulse\", height = \"{height}\", start = \"1.0037 s\", duration = \"{duration}\"");
-        let exchanged_energy = |method: &str, formulation: &str| {
-            let changes = [
-                ("contact.clearance", "0"),
-                ("solver.method", method),
-                ("solver.tolerance", "1e-8"),
-                ("formulation", formulation),
-            ];
+        let exchanged_energy = |method: &str| {
+            let changes = [("contact.clearance", "0"), ("solver.method", method), ("solver.tolerance", "1e-8")];
             let mut simulation = hanging(&law, &changes);
             run_until(&mut simulation, 1.0037);
             let before = *simulation.ledger().unwrap();
@@ -104,17 +92,15 @@ fn no_step_passes_over_a_pulse_after_a_second_of_rest() {
             run_until(&mut simulation, 1.05);
             let ledger = *simulation.ledger().unwrap();
             let residual = ledger.relative_residual();
-            assert!(residual.abs() < 1e-5, "{method} {formulation}: {residual:e}");
+            assert!(residual.abs() < 1e-5, "{method}: {residual:e}");
             ledger.exchanged
         };
-        let fixed = exchanged_energy("rk4", "tree");
+        let fixed = exchanged_energy("rk4");
         assert!(fixed > 1e-3, "{fixed}");
         for method in ["dopri5", "automatic", "radau5"] {
-            for formulation in ["tree", "lagrange"] {
-                let ratio = exchanged_energy(method, formulation) / fixed;
-                // The tolerance covers energy that is exchanged and returned within a step.
-                assert!((ratio - 1.0).abs() < 0.02, "{method} {formulation}: {ratio}");
-            }
+            let ratio = exchanged_energy(method) / fixed;
+            // The tolerance covers energy that is exchanged and returned within a step.
+            assert!((ratio - 1.0).abs() < 0.02, "{method}: {ratio}");
         }
     }
 }
@@ -145,7 +131,7 @@ fn equivalent_formula_table_and_sum_move_a_machine_as_the_harmonic_law() {
     let points: Vec<String> = (0..=200)
         .map(|n| {
             let t = f64::from(n) / 800.0;
-            let x = if n == 200 { 0.0 } else { 5e-3 * libm_sin(8.0 * std::f64::consts::PI * t) };
+            let x = if n == 200 { 0.0 } else { 5e-3 * libm::sin(8.0 * std::f64::consts::PI * t) };
             format!("[\"{t} s\", \"{x:e} m\"]")
         })
         .collect();
@@ -155,25 +141,19 @@ fn equivalent_formula_table_and_sum_move_a_machine_as_the_harmonic_law() {
         "law = \"formula\", formula = \"5*sin(8*pi*t)\", unit = \"mm\"".to_owned(),
         format!("law = \"table\", repeat = true, points = [{}]", points.join(", ")),
     ];
-    for formulation in ["tree", "lagrange"] {
-        let end = |law: &str| {
-            let changes = [("contact.clearance", "0"), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
-            let mut simulation = hanging(law, &changes);
-            run_until(&mut simulation, 0.6);
-            let frame = frame_now(&mut simulation);
-            [frame.bodies[0].position, frame.bodies[1].position]
-        };
-        let [slider, rod] = end("law = \"harmonic\", amplitude = \"5 mm\", frequency = \"4 Hz\"");
-        for law in &equivalent {
-            let [s, r] = end(law);
-            assert!((s - slider).norm() < 1e-8, "{formulation} {law}: {s} {slider}");
-            assert!((r - rod).norm() < 1e-7, "{formulation} {law}: {r} {rod}");
-        }
+    let end = |law: &str| {
+        let changes = [("contact.clearance", "0"), ("solver.tolerance", "1e-10")];
+        let mut simulation = hanging(law, &changes);
+        run_until(&mut simulation, 0.6);
+        let frame = frame_now(&mut simulation);
+        [frame.bodies[0].position, frame.bodies[1].position]
+    };
+    let [slider, rod] = end("law = \"harmonic\", amplitude = \"5 mm\", frequency = \"4 Hz\"");
+    for law in &equivalent {
+        let [s, r] = end(law);
+        assert!((s - slider).norm() < 1e-8, "{law}: {s} {slider}");
+        assert!((r - rod).norm() < 1e-7, "{law}: {r} {rod}");
     }
-}
-
-fn libm_sin(x: f64) -> f64 {
-    x.sin()
 }
 
 #[test]

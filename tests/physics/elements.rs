@@ -61,24 +61,22 @@ fn a_damper_dissipates_as_the_closed_form() {
     let d = c / (2.0 * MASS);
     let w = (k / MASS - d * d).sqrt();
     for method in ["dopri5", "radau5", "automatic", "rk4"] {
-        for formulation in ["tree", "lagrange"] {
-            let mut simulation = floating(
-                &format!("{SPRING}damping = \"4 N s/m\"\n"),
-                &[("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)],
-            );
-            let time = 0.25;
-            let frame = frame_at(&mut simulation, time);
-            let (sin, cos) = (w * time).sin_cos();
-            let decay = (-d * time).exp();
-            let expected = 0.1 + 0.03 * decay * (cos + d / w * sin);
-            let error = (frame.bodies[0].position.x - expected).abs();
-            assert!(error < 1e-8, "{method} {formulation}: {error:e}");
-            let speed = -0.03 * decay * (w + d * d / w) * sin;
-            let remaining = 0.5 * MASS * speed * speed + 0.5 * k * (expected - 0.1).powi(2);
-            let lost = simulation.ledger().unwrap().damping_loss;
-            let expected = 0.5 * k * 0.03 * 0.03 - remaining;
-            assert!((lost / expected - 1.0).abs() < 1e-5, "{method} {formulation}: {lost} {expected}");
-        }
+        let mut simulation = floating(
+            &format!("{SPRING}damping = \"4 N s/m\"\n"),
+            &[("solver.method", method), ("solver.tolerance", "1e-10")],
+        );
+        let time = 0.25;
+        let frame = frame_at(&mut simulation, time);
+        let (sin, cos) = (w * time).sin_cos();
+        let decay = (-d * time).exp();
+        let expected = 0.1 + 0.03 * decay * (cos + d / w * sin);
+        let error = (frame.bodies[0].position.x - expected).abs();
+        assert!(error < 1e-8, "{method}: {error:e}");
+        let speed = -0.03 * decay * (w + d * d / w) * sin;
+        let remaining = 0.5 * MASS * speed * speed + 0.5 * k * (expected - 0.1).powi(2);
+        let lost = simulation.ledger().unwrap().damping_loss;
+        let expected = 0.5 * k * 0.03 * 0.03 - remaining;
+        assert!((lost / expected - 1.0).abs() < 1e-5, "{method}: {lost} {expected}");
     }
 }
 
@@ -124,36 +122,29 @@ fn loads_accelerate_a_body_as_in_the_newton_euler_equations() {
         )
     };
     let (spin_up, time) = (0.02 / 4e-4, 0.1);
-    for formulation in ["tree", "lagrange"] {
-        for method in ["dopri5", "radau5", "rk4"] {
-            let changes = [
-                ("solver.method", method),
-                ("solver.tolerance", "1e-10"),
-                ("solver.step", "50 us"),
-                ("formulation", formulation),
-            ];
-            let mut simulation = floating(&push("world"), &changes);
-            let body = frame_at(&mut simulation, time).bodies[0];
-            let moved = body.position - Vec3::new(0.13, 0.5 * 3.0 / MASS * time * time, 0.0);
-            assert!(moved.norm() < 1e-9, "{method} {formulation}: {moved}");
-            assert!((body.angular_velocity.z - spin_up * time).abs() < 1e-8);
-            let kinetic = 0.5 * MASS * body.velocity.norm_squared() + 0.5 * 4e-4 * (spin_up * time).powi(2);
-            let work = simulation.ledger().unwrap().external_work;
-            assert!((work / kinetic - 1.0).abs() < 1e-6, "{work} {kinetic}");
-            // In body axes the force rotates by spin_up t^2 / 2: its impulse is a Fresnel integral.
-            let mut rotating = floating(&push("body"), &changes);
-            let velocity = frame_at(&mut rotating, time).bodies[0].velocity;
-            let (mut x, mut y) = (0.0, 0.0);
-            let n = 20_000;
-            for i in 0..n {
-                let t = (f64::from(i) + 0.5) * time / f64::from(n);
-                let (sin, cos) = (0.5 * spin_up * t * t).sin_cos();
-                x -= 3.0 * sin / MASS * time / f64::from(n);
-                y += 3.0 * cos / MASS * time / f64::from(n);
-            }
-            let error = (velocity - Vec3::new(x, y, 0.0)).norm();
-            assert!(error < 1e-6, "{method} {formulation}: {error:e}");
+    for method in ["dopri5", "radau5", "rk4"] {
+        let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("solver.step", "50 us")];
+        let mut simulation = floating(&push("world"), &changes);
+        let body = frame_at(&mut simulation, time).bodies[0];
+        let moved = body.position - Vec3::new(0.13, 0.5 * 3.0 / MASS * time * time, 0.0);
+        assert!(moved.norm() < 1e-9, "{method}: {moved}");
+        assert!((body.angular_velocity.z - spin_up * time).abs() < 1e-8);
+        let kinetic = 0.5 * MASS * body.velocity.norm_squared() + 0.5 * 4e-4 * (spin_up * time).powi(2);
+        let work = simulation.ledger().unwrap().external_work;
+        assert!((work / kinetic - 1.0).abs() < 1e-6, "{work} {kinetic}");
+        // In body axes the force rotates by spin_up t^2 / 2: its impulse is a Fresnel integral.
+        let mut rotating = floating(&push("body"), &changes);
+        let velocity = frame_at(&mut rotating, time).bodies[0].velocity;
+        let (mut x, mut y) = (0.0, 0.0);
+        let n = 20_000;
+        for i in 0..n {
+            let t = (f64::from(i) + 0.5) * time / f64::from(n);
+            let (sin, cos) = (0.5 * spin_up * t * t).sin_cos();
+            x -= 3.0 * sin / MASS * time / f64::from(n);
+            y += 3.0 * cos / MASS * time / f64::from(n);
         }
+        let error = (velocity - Vec3::new(x, y, 0.0)).norm();
+        assert!(error < 1e-6, "{method}: {error:e}");
     }
 }
 
@@ -205,16 +196,13 @@ fn a_spring_on_a_driven_slide_stores_the_work_of_the_drive() {
         drive = { law = \"constant\", position = \"100 mm\", velocity = \"50 mm/s\" }\n\
         [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = { position = \"0 500 0 mm\" }\n\
         [[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"slide\" }\nlength = \"100 mm\"\nstiffness = \"300 N/m\"\n";
-    for formulation in ["tree", "lagrange"] {
-        let changes = [("formulation".to_owned(), formulation.to_owned())];
-        let mut simulation = Simulation::new(&Scene::parse(text, None, &changes).unwrap().machine).unwrap();
-        let frame = frame_at(&mut simulation, 0.2);
-        let stored = 0.5 * 300.0 * 0.01 * 0.01;
-        assert!((frame.elastic - stored).abs() < 1e-6 * stored, "{formulation}");
-        let ledger = simulation.ledger().unwrap();
-        assert!((ledger.drive_work / stored - 1.0).abs() < 1e-5, "{formulation}: {ledger:?}");
-        assert!((frame.actuators[0] - 300.0 * 0.01).abs() < 1e-5, "{formulation}");
-    }
+    let mut simulation = Simulation::new(&parse(text, &[]).machine).unwrap();
+    let frame = frame_at(&mut simulation, 0.2);
+    let stored = 0.5 * 300.0 * 0.01 * 0.01;
+    assert!((frame.elastic - stored).abs() < 1e-6 * stored, "");
+    let ledger = simulation.ledger().unwrap();
+    assert!((ledger.drive_work / stored - 1.0).abs() < 1e-5, "{ledger:?}");
+    assert!((frame.actuators[0] - 300.0 * 0.01).abs() < 1e-5, "");
 }
 
 #[test]

@@ -1,13 +1,17 @@
 //! `tree` and `lagrange` are two derivations of the same equations, with different unknowns: every kind of joint, element and drive must
-//! move the same by both.
+//! move the same by both. Tests of such a part need only one of them where its scene is checked here or by [`check`].
 
 use std::path::Path;
 
-use crate::common::{MACHINES, SCENES, parse};
+use crate::common::matrix::FORMULATIONS;
+use crate::common::{MACHINES, SCENES, frame_now, parse, run_until, simulation};
+use crate::stiff::{ELEMENT_CASES, serial_chain};
+use crate::two_degrees::{G, train};
 use jointplay::scene::built_in_text;
 use jointplay::simulate::{Frame, Simulation};
 
-/// Position and turn of bodies, m and rad: errors of 1e-10 per step, which add up over some hundred steps and grow in impacts.
+/// Position and turn of bodies and coordinates, m and rad: errors of 1e-10 per step, which add up over some hundred steps and grow in
+/// impacts. Their rates are larger by the rate of an impact, 1e3 1/s; forces, relative to the largest of their kind, by its square.
 const TOLERANCE: f64 = 1e-7;
 /// Length of a run, s.
 const END: f64 = 10e-3;
@@ -17,18 +21,40 @@ fn end(name: &str, text: &str, formulation: &str) -> Frame {
     let scene = parse(text, &changes);
     let mut simulation = Simulation::new(&scene.machine).unwrap_or_else(|error| panic!("{name}: {error}"));
     simulation.advance_to(END).unwrap_or_else(|error| panic!("{name}: {error}"));
-    let mut frame = Frame::default();
+    let mut frame = Frame { reactions: Some(Vec::new()), ..Frame::default() };
     simulation.sample(END, &mut frame);
     frame
 }
 
-fn check(name: &str, text: &str) {
-    let [tree, lagrange] = ["tree", "lagrange"].map(|formulation| end(name, text, formulation));
-    assert!(tree.bodies.len() == lagrange.bodies.len() && !tree.bodies.is_empty(), "{name}");
-    for (a, b) in tree.bodies.iter().zip(&lagrange.bodies) {
-        let (moved, turned) = ((a.position - b.position).norm(), (a.rotation - b.rotation).norm());
-        println!("{name}: {moved:e} m, {turned:e} rad");
-        assert!(moved < TOLERANCE && turned < TOLERANCE, "{name}: {moved:e} m, {turned:e} rad");
+/// Numbers of a frame by kind, each with its bound; relative to the largest of its kind if so marked.
+fn numbers(frame: &Frame) -> [(&'static str, f64, bool, Vec<f64>); 6] {
+    let bodies = || frame.bodies.iter();
+    let poses = bodies().flat_map(|body| body.position.iter().chain(&body.rotation).copied().collect::<Vec<_>>());
+    let rates =
+        bodies().flat_map(|body| body.velocity.iter().chain(&body.angular_velocity).copied().collect::<Vec<_>>());
+    let (coordinates, coordinate_rates): (Vec<_>, Vec<_>) = frame.coordinates.iter().map(|&[q, v]| (q, v)).unzip();
+    let loads = frame.reactions.iter().flatten().chain(&frame.closing).flatten().flatten().copied();
+    [
+        ("pose", TOLERANCE, false, poses.collect()),
+        ("velocity", 1e3 * TOLERANCE, false, rates.collect()),
+        ("coordinate", TOLERANCE, false, coordinates),
+        ("rate", 1e3 * TOLERANCE, false, coordinate_rates),
+        ("actuator", 1e4 * TOLERANCE, true, frame.actuators.clone()),
+        ("reaction", 1e4 * TOLERANCE, true, loads.collect()),
+    ]
+}
+
+/// Checks that a scene moves alike by both formulations.
+pub fn check(name: &str, text: &str) {
+    let [tree, lagrange] = FORMULATIONS.map(|formulation| numbers(&end(name, text, formulation)));
+    assert!(!tree[0].3.is_empty(), "{name}: no bodies");
+    for ((kind, bound, relative, a), (.., b)) in tree.into_iter().zip(lagrange) {
+        assert_eq!(a.len(), b.len(), "{name}: {kind}");
+        let largest = a.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
+        let off = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let bound = if relative { bound * largest.max(1e-3) } else { bound };
+        println!("{name}: {kind} {off:e} of {largest:e}");
+        assert!(off < bound, "{name}: {kind} off by {off:e} of {largest:e}");
     }
 }
 
@@ -54,36 +80,27 @@ fn both_formulations_move_every_built_in_scene_alike() {
 }
 
 #[test]
-fn both_formulations_report_the_same_joint_coordinates() {
-    for name in ["slider-crank", "slider-crank-driven"] {
-        let at = |form: &str| {
-            let scene = crate::common::scene(name, &[("formulation", form), ("solver.preset", "accurate")]);
-            let mut simulation = Simulation::new(&scene.machine).expect("starts");
-            // The driven crank turns more than once; the other stays within half a turn.
-            let time = if name == "slider-crank" { 0.1 } else { 1.3 };
-            simulation.advance_to(time).expect("runs");
-            let mut frame = Frame::default();
-            simulation.sample(time, &mut frame);
-            let moving = scene.machine.joints.iter().flat_map(|joint| joint.kind.freedoms());
-            assert_eq!(frame.coordinates.len(), moving.count());
-            frame
-        };
-        let (tree, lagrange) = (at("tree"), at("lagrange"));
-        assert_eq!(tree.coordinates.len(), 2);
-        for (a, b) in tree.coordinates.iter().zip(&lagrange.coordinates) {
-            for (a, b) in a.iter().zip(b) {
-                assert!((a - b).abs() < 1e-3 * a.abs().max(1.0), "{name}: {a} {b}");
-            }
-        }
-        let [crank, slider] = tree.coordinates[..] else {
-            unreachable!();
-        };
-        let body = &tree.bodies[0];
-        // The crank turns about the world's x axis, along which the slider moves.
+fn both_formulations_move_every_kind_of_joint_and_every_element_on_it_alike() {
+    check("cylindrical and universal", &train(-G));
+    check("hinges, slides and a driven one", &serial_chain(""));
+    for (name, elements) in ELEMENT_CASES {
+        check(name, &serial_chain(elements));
+    }
+}
+
+/// The crank turns about the world's x axis, along which the slider moves.
+#[test]
+fn coordinates_are_the_angles_and_travels_of_the_joints() {
+    for (name, time) in [("slider-crank", 0.1), ("slider-crank-driven", 1.3)] {
+        let mut simulation = simulation(name, &[]);
+        run_until(&mut simulation, time);
+        let frame = frame_now(&mut simulation);
+        let [crank, slider] = frame.coordinates[..] else { panic!("{:?}", frame.coordinates) };
+        let body = &frame.bodies[0];
         let angle = libm::atan2(body.rotation.m32, body.rotation.m22);
         assert!(libm::sin(0.5 * (crank[0] - angle)).abs() < 1e-12);
         assert!((crank[1] - body.angular_velocity.x).abs() < 1e-12);
-        assert!((slider[0] - tree.pose.position.x).abs() < 1e-12);
-        assert!((slider[1] - tree.pose.velocity.x).abs() < 1e-12);
+        assert!((slider[0] - frame.pose.position.x).abs() < 1e-12);
+        assert!((slider[1] - frame.pose.velocity.x).abs() < 1e-12);
     }
 }

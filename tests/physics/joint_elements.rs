@@ -1,7 +1,7 @@
 //! Force elements on a slide or a hinge against closed-form solutions, in every method and both formulations.
 
 use crate::common::assert_refused;
-use crate::common::matrix::{FORMULATIONS, for_every};
+use crate::common::matrix::for_every;
 use crate::elements::frame_at;
 use jointplay::machine::{Machine, Vec3};
 use jointplay::scene::Scene;
@@ -133,24 +133,22 @@ fn damping_and_preload_of_a_joint_spring_match_the_closed_form() {
         let (k, c, preload) = (400.0 * m, 8.0 * m, 2.0 * m);
         let spring = joint.spring(k, c) + &format!("preload = \"{preload:e} {}\"\n", joint.units()[2]);
         for method in ["dopri5", "radau5", "automatic", "rk4"] {
-            for formulation in FORMULATIONS {
-                let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
-                let mut simulation = joint.start_at([0.13, 0.0], &spring, &changes);
-                let frame = frame_at(&mut simulation, 0.25);
-                // The oscillation is about the zero-force position.
-                let rest = -preload / k;
-                let [offset, rate] = damped_oscillation([m, c, k], [0.03 - rest, 0.0], 0.25);
-                let label = format!("{joint:?} {method} {formulation}");
-                let error = (joint.coordinate(&frame) - 0.1 - rest - offset).abs();
-                assert!(error < 1e-8, "{label}: {error:e}");
-                let energy = |x: f64, v: f64| 0.5 * (m * v * v + k * x * x);
-                let lost = energy(0.03 - rest, 0.0) - energy(offset, rate);
-                let ledger = simulation.ledger().unwrap();
-                assert!((ledger.damping_loss / lost - 1.0).abs() < 1e-5, "{label}: {ledger:?}");
-                let deflection = joint.coordinate(&frame) - 0.1;
-                let stored = deflection * (preload + 0.5 * k * deflection);
-                assert!((frame.elastic - stored).abs() < 1e-12, "{label}");
-            }
+            let changes = [("solver.method", method), ("solver.tolerance", "1e-10")];
+            let mut simulation = joint.start_at([0.13, 0.0], &spring, &changes);
+            let frame = frame_at(&mut simulation, 0.25);
+            // The oscillation is about the zero-force position.
+            let rest = -preload / k;
+            let [offset, rate] = damped_oscillation([m, c, k], [0.03 - rest, 0.0], 0.25);
+            let label = format!("{joint:?} {method}");
+            let error = (joint.coordinate(&frame) - 0.1 - rest - offset).abs();
+            assert!(error < 1e-8, "{label}: {error:e}");
+            let energy = |x: f64, v: f64| 0.5 * (m * v * v + k * x * x);
+            let lost = energy(0.03 - rest, 0.0) - energy(offset, rate);
+            let ledger = simulation.ledger().unwrap();
+            assert!((ledger.damping_loss / lost - 1.0).abs() < 1e-5, "{label}: {ledger:?}");
+            let deflection = joint.coordinate(&frame) - 0.1;
+            let stored = deflection * (preload + 0.5 * k * deflection);
+            assert!((frame.elastic - stored).abs() < 1e-12, "{label}");
         }
     }
 }
@@ -159,24 +157,21 @@ fn damping_and_preload_of_a_joint_spring_match_the_closed_form() {
 fn the_error_of_a_joint_spring_falls_with_the_order_of_the_method() {
     let m = Hinge.inertia();
     let k = 400.0 * m;
-    let error = |method: &str, formulation: &str, key: &str, value: f64| {
+    let error = |method: &str, key: &str, value: f64| {
         let value = format!("{value:e}{}", if key == "solver.step" { " s" } else { "" });
-        let changes = [("solver.method", method), ("formulation", formulation), (key, &*value)];
+        let changes = [("solver.method", method), (key, &*value)];
         let mut simulation = Hinge.start_at([0.13, 0.0], &Hinge.spring(k, 4.0 * m), &changes);
         let frame = frame_at(&mut simulation, 0.2);
         let [offset, _] = damped_oscillation([m, 4.0 * m, k], [0.03, 0.0], 0.2);
         (Hinge.coordinate(&frame) - 0.1 - offset).abs()
     };
-    for formulation in FORMULATIONS {
-        let [coarse, fine] = [4e-3, 2e-3].map(|step| error("rk4", formulation, "solver.step", step));
-        let observed = (coarse / fine).log2();
-        assert!((observed - 4.0).abs() < 0.2, "rk4 {formulation}: {observed}");
-        for method in ["dopri5", "radau5", "automatic"] {
-            let [loose, tight] =
-                [1e-4, 1e-8].map(|tolerance| error(method, formulation, "solver.tolerance", tolerance));
-            let label = format!("{method} {formulation}: {loose:e} {tight:e}");
-            assert!(loose < 1e-4 && tight < 1e-8 && tight < loose, "{label}");
-        }
+    let [coarse, fine] = [4e-3, 2e-3].map(|step| error("rk4", "solver.step", step));
+    let observed = (coarse / fine).log2();
+    assert!((observed - 4.0).abs() < 0.2, "rk4: {observed}");
+    for method in ["dopri5", "radau5", "automatic"] {
+        let [loose, tight] = [1e-4, 1e-8].map(|tolerance| error(method, "solver.tolerance", tolerance));
+        let label = format!("{method}: {loose:e} {tight:e}");
+        assert!(loose < 1e-4 && tight < 1e-8 && tight < loose, "{label}");
     }
 }
 
@@ -185,21 +180,19 @@ fn stiff_elements_on_joints_do_not_slow_implicit_methods() {
     for joint in [Slide, Hinge] {
         let m = joint.inertia();
         let stiff = joint.spring(1.6e8 * m, 2e4 * m);
-        for formulation in FORMULATIONS {
-            let evaluations = |method: &str| {
-                let changes = [("solver.method", method), ("solver.tolerance", "1e-6"), ("formulation", formulation)];
-                let mut simulation = joint.start_at([0.13, 0.0], &stiff, &changes);
-                let frame = frame_at(&mut simulation, 1.0);
-                let error = joint.coordinate(&frame) - 0.1;
-                assert!(error.abs() < 1e-6, "{joint:?} {method} {formulation}: {error:e}");
-                simulation.statistics().evaluations
-            };
-            let explicit = evaluations("dopri5");
-            for method in ["radau5", "automatic"] {
-                let implicit = evaluations(method);
-                println!("{joint:?} {formulation} {method} {implicit}, dopri5 {explicit}");
-                assert!(4 * implicit < explicit, "{joint:?} {method}: {implicit} {explicit}");
-            }
+        let evaluations = |method: &str| {
+            let changes = [("solver.method", method), ("solver.tolerance", "1e-6")];
+            let mut simulation = joint.start_at([0.13, 0.0], &stiff, &changes);
+            let frame = frame_at(&mut simulation, 1.0);
+            let error = joint.coordinate(&frame) - 0.1;
+            assert!(error.abs() < 1e-6, "{joint:?} {method}: {error:e}");
+            simulation.statistics().evaluations
+        };
+        let explicit = evaluations("dopri5");
+        for method in ["radau5", "automatic"] {
+            let implicit = evaluations(method);
+            println!("{joint:?} {method} {implicit}, dopri5 {explicit}");
+            assert!(4 * implicit < explicit, "{joint:?} {method}: {implicit} {explicit}");
         }
     }
 }
@@ -305,16 +298,14 @@ fn a_joint_spring_on_a_drive_loads_it() {
             joint.units()[0],
             joint.spring(300.0, 0.0)
         );
-        for formulation in FORMULATIONS {
-            let mut simulation = start_simulation(&text, &[("formulation", formulation)]);
-            let frame = frame_at(&mut simulation, 0.2);
-            let stored = 0.5 * 300.0 * 0.01 * 0.01;
-            assert!((frame.elastic / stored - 1.0).abs() < 1e-6, "{joint:?} {formulation}");
-            let work = simulation.ledger().unwrap().drive_work;
-            assert!((work / stored - 1.0).abs() < 1e-5, "{joint:?} {formulation}: {work}");
-            let force = frame.actuators[0];
-            assert!((force - 300.0 * 0.01).abs() < 1e-5, "{joint:?} {formulation}: {force}");
-        }
+        let mut simulation = start_simulation(&text, &[]);
+        let frame = frame_at(&mut simulation, 0.2);
+        let stored = 0.5 * 300.0 * 0.01 * 0.01;
+        assert!((frame.elastic / stored - 1.0).abs() < 1e-6, "{joint:?}");
+        let work = simulation.ledger().unwrap().drive_work;
+        assert!((work / stored - 1.0).abs() < 1e-5, "{joint:?}: {work}");
+        let force = frame.actuators[0];
+        assert!((force - 300.0 * 0.01).abs() < 1e-5, "{joint:?}: {force}");
     }
 }
 
@@ -451,20 +442,18 @@ fn a_motor_does_not_exceed_its_limit() {
         // At full force until 0.2 from the target, then oscillating freely about it.
         let release_time = (2.0 * 0.8 / 20.0_f64).sqrt();
         for method in ["dopri5", "radau5", "automatic"] {
-            for formulation in FORMULATIONS {
-                let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
-                let label = format!("{joint:?} {method} {formulation}");
-                let mut simulation = joint.start_at([0.0, 0.0], &motor, &changes);
-                let t = 0.99 * release_time;
-                let frame = frame_at(&mut simulation, t);
-                assert!((joint.force(&frame, 0) / limit - 1.0).abs() < 1e-12, "{label}");
-                assert!((joint.coordinate(&frame) - 10.0 * t * t).abs() < 1e-8, "{label}");
-                let t = release_time + 0.05;
-                let frame = frame_at(&mut simulation, t);
-                let [offset, _] = damped_oscillation([m, 0.0, k], [-0.2, 20.0 * release_time], 0.05);
-                let error = (joint.coordinate(&frame) - 1.0 - offset).abs();
-                assert!(error < 1e-7, "{label}: {error:e}");
-            }
+            let changes = [("solver.method", method), ("solver.tolerance", "1e-10")];
+            let label = format!("{joint:?} {method}");
+            let mut simulation = joint.start_at([0.0, 0.0], &motor, &changes);
+            let t = 0.99 * release_time;
+            let frame = frame_at(&mut simulation, t);
+            assert!((joint.force(&frame, 0) / limit - 1.0).abs() < 1e-12, "{label}");
+            assert!((joint.coordinate(&frame) - 10.0 * t * t).abs() < 1e-8, "{label}");
+            let t = release_time + 0.05;
+            let frame = frame_at(&mut simulation, t);
+            let [offset, _] = damped_oscillation([m, 0.0, k], [-0.2, 20.0 * release_time], 0.05);
+            let error = (joint.coordinate(&frame) - 1.0 - offset).abs();
+            assert!(error < 1e-7, "{label}: {error:e}");
         }
         // A constant force alone.
         let push = format!("[[motor]]\nname = \"m\"\njoint = \"j\"\n{} = \"{limit:e} {force}\"\n", joint.force_key());

@@ -5,6 +5,7 @@ use crate::common::matrix::FORMULATIONS;
 use crate::common::matrix::every_variant;
 use crate::common::{frame_now, parse, run_until};
 use crate::elements::frame_at;
+use crate::formulations;
 use crate::joint_elements::start_simulation;
 use crate::two_degrees::angle_difference;
 use jointplay::machine::{Mat3, Quat, Vec3};
@@ -114,38 +115,36 @@ fn a_body_on_a_closing_joint_moves_as_with_the_joint_in_the_tree() {
                 pair.kind,
                 pair.keys
             );
-            for formulation in FORMULATIONS {
-                let label = format!("{} {formulation}, driven: {driven}", pair.kind);
-                let change = [("formulation", formulation)];
-                let mut simulation = start_simulation(&two_bodies(driven, &free), &change);
-                let summary = simulation.mechanism().summary();
-                let free = pair.freedoms + usize::from(!driven);
-                assert_eq!(summary.degrees_of_freedom, free, "{label}");
-                assert_eq!((summary.closing_joints, summary.dependent_rows), (1, 0), "{label}");
-                assert_eq!(simulation.indeterminate_forces(), Default::default(), "{label}");
-                let frame = frame_at(&mut simulation, 0.25);
-                for (a, b) in frame.bodies.iter().zip(&end.bodies) {
-                    let error = (a.position - b.position).norm();
-                    assert!(error < 2e-7, "{label}: {error:e}");
-                    let error = (a.rotation - b.rotation).amax();
-                    assert!(error < 2e-6, "{label}: {error:e}");
-                    let error = (a.angular_acceleration - b.angular_acceleration).norm();
-                    assert!(error < 2e-4 * b.angular_acceleration.norm().max(1.0), "{label}: {error:e}");
-                }
-                assert_eq!(frame.coordinates.len(), end.coordinates.len());
-                for (a, b) in frame.coordinates.iter().zip(&end.coordinates) {
-                    assert!(angle_difference(a[0], b[0]) < 2e-6 && (a[1] - b[1]).abs() < 2e-5, "{label}: {a:?} {b:?}");
-                }
-                for (a, b) in frame.actuators.iter().zip(&end.actuators) {
-                    assert!((a - b).abs() < 1e-5, "{label}: {a} {b}");
-                }
-                for (own, expected) in frame.closing[0].iter().zip(joint_load(&frame.bodies[1])) {
-                    let error = (own - expected).norm();
-                    assert!(error < 2e-4, "{label}: {own} {expected}");
-                }
-                let residual = simulation.ledger().unwrap().relative_residual();
-                assert!(residual.abs() < 1e-6, "{label}: {residual:e}");
+            let label = format!("{}, driven: {driven}", pair.kind);
+            formulations::check(&label, &two_bodies(driven, &free));
+            let mut simulation = start_simulation(&two_bodies(driven, &free), &[]);
+            let summary = simulation.mechanism().summary();
+            let free = pair.freedoms + usize::from(!driven);
+            assert_eq!(summary.degrees_of_freedom, free, "{label}");
+            assert_eq!((summary.closing_joints, summary.dependent_rows), (1, 0), "{label}");
+            assert_eq!(simulation.indeterminate_forces(), Default::default(), "{label}");
+            let frame = frame_at(&mut simulation, 0.25);
+            for (a, b) in frame.bodies.iter().zip(&end.bodies) {
+                let error = (a.position - b.position).norm();
+                assert!(error < 2e-7, "{label}: {error:e}");
+                let error = (a.rotation - b.rotation).amax();
+                assert!(error < 2e-6, "{label}: {error:e}");
+                let error = (a.angular_acceleration - b.angular_acceleration).norm();
+                assert!(error < 2e-4 * b.angular_acceleration.norm().max(1.0), "{label}: {error:e}");
             }
+            assert_eq!(frame.coordinates.len(), end.coordinates.len());
+            for (a, b) in frame.coordinates.iter().zip(&end.coordinates) {
+                assert!(angle_difference(a[0], b[0]) < 2e-6 && (a[1] - b[1]).abs() < 2e-5, "{label}: {a:?} {b:?}");
+            }
+            for (a, b) in frame.actuators.iter().zip(&end.actuators) {
+                assert!((a - b).abs() < 1e-5, "{label}: {a} {b}");
+            }
+            for (own, expected) in frame.closing[0].iter().zip(joint_load(&frame.bodies[1])) {
+                let error = (own - expected).norm();
+                assert!(error < 2e-4, "{label}: {own} {expected}");
+            }
+            let residual = simulation.ledger().unwrap().relative_residual();
+            assert!(residual.abs() < 1e-6, "{label}: {residual:e}");
         }
     }
 }
@@ -341,32 +340,30 @@ fn scotch_yoke(crank: &str) -> String {
 #[test]
 fn a_scotch_yoke_follows_its_closed_form() {
     let inertia = |angle: f64| 4e-4 + YOKE * YOKE * (0.2 + 1.5 * angle.sin().powi(2));
-    for formulation in FORMULATIONS {
-        let bound = if formulation == "tree" { 1e-9 } else { 1e-6 };
-        let change = [("formulation", formulation)];
-        let free = "start = { position = \"0.5 rad\", velocity = \"9 rad/s\" }";
-        let mut simulation = start_simulation(&scotch_yoke(free), &change);
-        let summary = simulation.mechanism().summary();
-        assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (3, 1));
-        let frame = frame_at(&mut simulation, 0.5);
-        let [[angle, rate], _, [x, speed], [slot, _]] = frame.coordinates[..] else {
-            panic!("{:?}", frame.coordinates);
-        };
-        assert!((x - YOKE * angle.cos()).abs() < bound, "{formulation}: {x}");
-        assert!((speed + YOKE * rate * angle.sin()).abs() < 100.0 * bound);
-        assert!((slot - YOKE * angle.sin()).abs() < bound, "{formulation}: {slot}");
-        let expected = 9.0 * (inertia(0.5) / inertia(angle)).sqrt();
-        assert!((rate - expected).abs() < 1e-6, "{formulation}: {rate} {expected}");
-        // At a constant rate the torque follows from the changing inertia.
-        let drive = "drive = { law = \"constant\", position = \"0.5 rad\", velocity = \"9 rad/s\" }";
-        let mut simulation = start_simulation(&scotch_yoke(drive), &change);
-        let frame = frame_at(&mut simulation, 0.3);
-        let angle: f64 = 0.5 + 9.0 * 0.3;
-        let torque = 1.5 * YOKE * YOKE * 81.0 * angle.sin() * angle.cos();
-        let error = frame.actuators[0] - torque;
-        assert!(error.abs() < 1e-5 * torque.abs().max(1.0), "{formulation}: {error:e}");
-        assert_eq!(simulation.indeterminate_forces().actuators, [0; 0]);
-    }
+    let bound = 1e-9;
+    let free = "start = { position = \"0.5 rad\", velocity = \"9 rad/s\" }";
+    formulations::check("scotch yoke", &scotch_yoke(free));
+    let mut simulation = start_simulation(&scotch_yoke(free), &[]);
+    let summary = simulation.mechanism().summary();
+    assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (3, 1));
+    let frame = frame_at(&mut simulation, 0.5);
+    let [[angle, rate], _, [x, speed], [slot, _]] = frame.coordinates[..] else {
+        panic!("{:?}", frame.coordinates);
+    };
+    assert!((x - YOKE * angle.cos()).abs() < bound, "{x}");
+    assert!((speed + YOKE * rate * angle.sin()).abs() < 100.0 * bound);
+    assert!((slot - YOKE * angle.sin()).abs() < bound, "{slot}");
+    let expected = 9.0 * (inertia(0.5) / inertia(angle)).sqrt();
+    assert!((rate - expected).abs() < 1e-6, "{rate} {expected}");
+    // At a constant rate the torque follows from the changing inertia.
+    let drive = "drive = { law = \"constant\", position = \"0.5 rad\", velocity = \"9 rad/s\" }";
+    let mut simulation = start_simulation(&scotch_yoke(drive), &[]);
+    let frame = frame_at(&mut simulation, 0.3);
+    let angle: f64 = 0.5 + 9.0 * 0.3;
+    let torque = 1.5 * YOKE * YOKE * 81.0 * angle.sin() * angle.cos();
+    let error = frame.actuators[0] - torque;
+    assert!(error.abs() < 1e-5 * torque.abs().max(1.0), "{error:e}");
+    assert_eq!(simulation.indeterminate_forces().actuators, [0; 0]);
 }
 
 /// Two shafts at an angle, connected by a universal joint; the bearing of the second one closes the loop.
@@ -387,27 +384,25 @@ fn a_universal_joint_turns_a_shaft_at_its_known_ratio() {
             vector_text(Vec3::new(0.2 * bend.cos(), 0.2 * bend.sin(), 0.0), "m"),
             plain_vector_text(Vec3::new(bend.cos(), bend.sin(), 0.0)),
         );
-        for formulation in FORMULATIONS {
-            let mut simulation = start_simulation(&text, &[("formulation", formulation)]);
-            let summary = simulation.mechanism().summary();
-            assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (dependent, 0), "{bearing}");
-            let (near, fast) = if formulation == "tree" { (1e-9, 1e-8) } else { (1e-5, 1e-3) };
-            for k in 1..=20 {
-                let t = 0.04 * f64::from(k);
-                let frame = frame_at(&mut simulation, t);
-                let (sin, cos) = (10.0 * t).sin_cos();
-                let angle = sin.atan2(cos * bend.cos());
-                let ratio = bend.cos() / (1.0 - (bend.sin() * cos).powi(2));
-                let [own, rate] = frame.coordinates[frame.coordinates.len() - 1];
-                assert!(angle_difference(own, angle) < near, "{bearing} {formulation} {t}: {own} {angle}");
-                assert!((rate - 10.0 * ratio).abs() < 10.0 * fast, "{bearing} {formulation} {t}: {rate}");
-                // The torque only accelerates the second shaft.
-                let slope =
-                    -bend.cos() * 2.0 * bend.sin().powi(2) * cos * sin / (1.0 - (bend.sin() * cos).powi(2)).powi(2);
-                let torque = 2e-3 * ratio * slope * 100.0;
-                let error = (frame.actuators[0] - torque).abs();
-                assert!(error < 2e-3 * fast.max(1e-6) * 100.0, "{bearing} {formulation} {t}: {error:e}");
-            }
+        formulations::check("universal joint", &text);
+        let mut simulation = start_simulation(&text, &[]);
+        let summary = simulation.mechanism().summary();
+        assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (dependent, 0), "{bearing}");
+        let (near, fast) = (1e-9, 1e-8);
+        for k in 1..=20 {
+            let t = 0.04 * f64::from(k);
+            let frame = frame_at(&mut simulation, t);
+            let (sin, cos) = (10.0 * t).sin_cos();
+            let angle = sin.atan2(cos * bend.cos());
+            let ratio = bend.cos() / (1.0 - (bend.sin() * cos).powi(2));
+            let [own, rate] = frame.coordinates[frame.coordinates.len() - 1];
+            assert!(angle_difference(own, angle) < near, "{bearing} {t}: {own} {angle}");
+            assert!((rate - 10.0 * ratio).abs() < 10.0 * fast, "{bearing} {t}: {rate}");
+            // The torque only accelerates the second shaft.
+            let slope = -bend.cos() * 2.0 * bend.sin().powi(2) * cos * sin / (1.0 - (bend.sin() * cos).powi(2)).powi(2);
+            let torque = 2e-3 * ratio * slope * 100.0;
+            let error = (frame.actuators[0] - torque).abs();
+            assert!(error < 2e-3 * fast.max(1e-6) * 100.0, "{bearing} {t}: {error:e}");
         }
     }
 }
@@ -470,25 +465,24 @@ fn a_bennett_linkage_follows_its_closed_form() {
             ),
         ]
         .concat();
-        for formulation in FORMULATIONS {
-            let label = format!("{formulation}, driven: {driven}");
-            let mut simulation = start_simulation(&text, &[("formulation", formulation)]);
-            let summary = simulation.mechanism().summary();
-            let free = usize::from(!driven);
-            assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (3, free), "{label}");
-            let bound = if formulation == "tree" { 1e-9 } else { 1e-5 };
-            for k in 1..=8 {
-                let frame = frame_at(&mut simulation, 0.1 * f64::from(k));
-                let [[q1, _], [q2, _], [q3, _], [q4, _]] = frame.coordinates[..] else {
-                    panic!("{label}: {:?}", frame.coordinates);
-                };
-                for (own, expected) in [(q2, second(q1)), (q3, -q1), (q4, second(q1))] {
-                    assert!(angle_difference(own, expected) < bound, "{label}: {own} {expected}");
-                }
+        let label = format!("driven: {driven}");
+        formulations::check("Bennett linkage", &text);
+        let mut simulation = start_simulation(&text, &[]);
+        let summary = simulation.mechanism().summary();
+        let free = usize::from(!driven);
+        assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (3, free), "{label}");
+        let bound = 1e-9;
+        for k in 1..=8 {
+            let frame = frame_at(&mut simulation, 0.1 * f64::from(k));
+            let [[q1, _], [q2, _], [q3, _], [q4, _]] = frame.coordinates[..] else {
+                panic!("{label}: {:?}", frame.coordinates);
+            };
+            for (own, expected) in [(q2, second(q1)), (q3, -q1), (q4, second(q1))] {
+                assert!(angle_difference(own, expected) < bound, "{label}: {own} {expected}");
             }
-            let residual = simulation.ledger().unwrap().relative_residual();
-            assert!(residual.abs() < 1e-5, "{label}: {residual:e}");
         }
+        let residual = simulation.ledger().unwrap().relative_residual();
+        assert!(residual.abs() < 1e-5, "{label}: {residual:e}");
     }
 }
 
@@ -554,35 +548,34 @@ fn an_rccc_loop_keeps_angles_and_distances_of_its_axes() {
         ),
     ]
     .concat();
-    for formulation in FORMULATIONS {
-        let mut simulation = start_simulation(&text, &[("formulation", formulation)]);
-        let summary = simulation.mechanism().summary();
-        assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (0, 0));
-        let (joint, gap) = simulation.mechanism().assembly().widest.unwrap();
-        assert!(joint == 0 && gap > 1e-3, "{joint} {gap}");
-        let bound = if formulation == "tree" { 1e-9 } else { 1e-5 };
-        let mut max_slide = 0.0_f64;
-        for k in 0..=10 {
-            let t = 0.1 * f64::from(k);
-            let frame = frame_at(&mut simulation, t);
-            let [_, _, _, [slid, _], [turned, _], ..] = frame.coordinates[..] else {
-                panic!("{:?}", frame.coordinates);
-            };
-            // Axis 2 follows from the input's angle alone, axis 3 from the output's coordinates alone.
-            let input = rotation_about(Vec3::z(), 6.0 * t);
-            let (z2, p2) = (input * z12, input * p12);
-            let output = rotation_about(z41, turned) * of_output;
-            let (z3, p3) = (output * z34, p41 + z41 * slid + output * p34);
-            let angle = z2.dot(&z3) - degrees(80.0).cos();
-            assert!(angle.abs() < bound, "{formulation} {t}: {angle:e}");
-            let distance = (p3 - p2).dot(&z2.cross(&z3));
-            // In the coupler axis 2 is z through the origin.
-            let expected = p23.dot(&Vec3::z().cross(&z23));
-            assert!((distance - expected).abs() < bound, "{formulation} {t}: {distance} {expected}");
-            max_slide = max_slide.max(slid.abs());
-        }
-        assert!(max_slide > 1e-3, "it slides: {max_slide}");
+    formulations::check("RCCC loop", &text);
+    let mut simulation = start_simulation(&text, &[]);
+    let summary = simulation.mechanism().summary();
+    assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (0, 0));
+    let (joint, gap) = simulation.mechanism().assembly().widest.unwrap();
+    assert!(joint == 0 && gap > 1e-3, "{joint} {gap}");
+    let bound = 1e-9;
+    let mut max_slide = 0.0_f64;
+    for k in 0..=10 {
+        let t = 0.1 * f64::from(k);
+        let frame = frame_at(&mut simulation, t);
+        let [_, _, _, [slid, _], [turned, _], ..] = frame.coordinates[..] else {
+            panic!("{:?}", frame.coordinates);
+        };
+        // Axis 2 follows from the input's angle alone, axis 3 from the output's coordinates alone.
+        let input = rotation_about(Vec3::z(), 6.0 * t);
+        let (z2, p2) = (input * z12, input * p12);
+        let output = rotation_about(z41, turned) * of_output;
+        let (z3, p3) = (output * z34, p41 + z41 * slid + output * p34);
+        let angle = z2.dot(&z3) - degrees(80.0).cos();
+        assert!(angle.abs() < bound, "{t}: {angle:e}");
+        let distance = (p3 - p2).dot(&z2.cross(&z3));
+        // In the coupler axis 2 is z through the origin.
+        let expected = p23.dot(&Vec3::z().cross(&z23));
+        assert!((distance - expected).abs() < bound, "{t}: {distance} {expected}");
+        max_slide = max_slide.max(slid.abs());
     }
+    assert!(max_slide > 1e-3, "it slides: {max_slide}");
 }
 
 fn start_error(text: &str) -> String {
@@ -653,28 +646,27 @@ fn loops_of_a_pattern_close_in_every_instance() {
              start = {{ position = \"100 0 20 mm\", velocity = \"0 300 0 mm/s\", angular_velocity = \"0 0 3 rad/s\" }}\n\
              [[pattern.joint]]\nname = \"weld\"\nkind = \"fixed\"\nparent = \"{parent}\"\nchild = \"{child}\"\n{points}\ncloses_loop = true\n"
         );
-        for formulation in FORMULATIONS {
-            let mut simulation = start_simulation(&text, &[("formulation", formulation)]);
-            assert_eq!(simulation.mechanism().summary().degrees_of_freedom, 6);
-            run_until(&mut simulation, 0.02);
-            let frame = frame_now(&mut simulation);
-            let hub = &frame.bodies[0];
-            for (k, leg) in (0..).zip(&frame.bodies[1..]) {
-                let third = rotation_about(Vec3::z(), f64::from(k) * std::f64::consts::TAU / 3.0);
-                let third: Mat3 = hub.rotation * third.to_rotation_matrix().into_inner();
-                let error = (leg.rotation - third).amax();
-                assert!(error < 1e-6, "{formulation} {parent} {k}: {error:e}");
-                let ends = [
-                    hub.position + third * Vec3::new(0.1, 0.0, 0.02),
-                    leg.position + leg.rotation * Vec3::new(0.0, 0.0, -0.05),
-                ];
-                assert!((ends[0] - ends[1]).norm() < 1e-6, "{parent} {k}");
-            }
-            // The assembly falls as one body.
-            let parts = frame.bodies.iter().zip([1.0, 0.2, 0.2, 0.2]);
-            let parts = parts.map(|(body, mass)| body.acceleration * (mass / 1.6));
-            let falls = parts.sum::<Vec3>() + Vec3::new(0.0, 0.0, G);
-            assert!(falls.norm() < 1e-6, "{falls}");
+        formulations::check("pattern", &text);
+        let mut simulation = start_simulation(&text, &[]);
+        assert_eq!(simulation.mechanism().summary().degrees_of_freedom, 6);
+        run_until(&mut simulation, 0.02);
+        let frame = frame_now(&mut simulation);
+        let hub = &frame.bodies[0];
+        for (k, leg) in (0..).zip(&frame.bodies[1..]) {
+            let third = rotation_about(Vec3::z(), f64::from(k) * std::f64::consts::TAU / 3.0);
+            let third: Mat3 = hub.rotation * third.to_rotation_matrix().into_inner();
+            let error = (leg.rotation - third).amax();
+            assert!(error < 1e-6, "{parent} {k}: {error:e}");
+            let ends = [
+                hub.position + third * Vec3::new(0.1, 0.0, 0.02),
+                leg.position + leg.rotation * Vec3::new(0.0, 0.0, -0.05),
+            ];
+            assert!((ends[0] - ends[1]).norm() < 1e-6, "{parent} {k}");
         }
+        // The assembly falls as one body.
+        let parts = frame.bodies.iter().zip([1.0, 0.2, 0.2, 0.2]);
+        let parts = parts.map(|(body, mass)| body.acceleration * (mass / 1.6));
+        let falls = parts.sum::<Vec3>() + Vec3::new(0.0, 0.0, G);
+        assert!(falls.norm() < 1e-6, "{falls}");
     }
 }

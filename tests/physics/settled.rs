@@ -42,20 +42,6 @@ fn a_resumed_implicit_run_gives_the_same_bits() {
 }
 
 #[test]
-fn both_formulations_settle_equally_under_the_implicit_method() {
-    let run = |formulation: &str| {
-        let mut simulation = simulation(
-            "spcmm",
-            &[("solver.method", "automatic"), ("solver.tolerance", "1e-5"), ("formulation", formulation)],
-        );
-        mean_forces(&mut simulation, 0.3, 0.4)
-    };
-    for (tree, lagrange) in run("tree").iter().zip(run("lagrange")) {
-        assert!((tree / lagrange - 1.0).abs() < 0.01, "{tree} {lagrange}");
-    }
-}
-
-#[test]
 fn a_scene_too_large_for_a_dense_matrix_is_refused_by_name() {
     let scene = crate::common::scene("chain", &[("chain.links", "200"), ("solver.method", "radau5")]);
     let error = Simulation::new(&scene.machine).err().unwrap().to_string();

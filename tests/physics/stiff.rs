@@ -81,7 +81,7 @@ fn implicit_steps_of_contacts_agree_with_central_differences() {
 
 /// A serial chain from a free body, with a hinge, a slide, a fixed joint, and a hinge on a driven slide; moving, and loaded
 /// by `elements`.
-fn serial_chain(elements: &str, formulation: &str) -> (Mechanism, Vec<f64>) {
+pub fn serial_chain(elements: &str) -> String {
     let body =
         |name: &str| format!("[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"2e-2 3e-2 4e-2 kg m^2\"\n");
     let joint = |kind: &str, parent: &str, child: &str, more: &str| {
@@ -96,24 +96,22 @@ fn serial_chain(elements: &str, formulation: &str) -> (Mechanism, Vec<f64>) {
     let bodies = ["base", "arm", "rod", "table", "wheel"].map(body).concat();
     let free = "start = { position = \"0 0 1 m\", rotation = { axis = [3, 1, 2], angle = \"50 deg\" } }";
     let driven = "axis = [0, 1, 0]\ndrive = { law = \"harmonic\", amplitude = \"1 mm\", frequency = \"1 Hz\" }";
-    let text = bodies
+    bodies
         + &joint("free", "world", "base", free)
         + &joint("revolute", "base", "arm", &format!("axis = [1, 0, 2]\n{at}\n{turns}"))
         + &joint("prismatic", "arm", "rod", &format!("axis = [0, 1, 1]\n{at}\n{slow}"))
         + &joint("prismatic", "world", "table", driven)
         + &joint("revolute", "table", "wheel", &format!("axis = [0, 1, 2]\n{at}\n{turns}"))
-        + elements;
-    let scene = parse(&text, &[("formulation", formulation)]);
-    let mut mechanism = Mechanism::new(&scene.machine).unwrap();
-    let y = mechanism.start().unwrap();
-    (mechanism, y)
+        + elements
 }
 
 #[test]
 fn implicit_steps_of_elements_agree_with_central_differences_in_both_formulations() {
     for (name, elements) in ELEMENT_CASES {
         for formulation in ["tree", "lagrange"] {
-            let (mut m, y) = serial_chain(elements, formulation);
+            let scene = parse(&serial_chain(elements), &[("formulation", formulation)]);
+            let mut m = Mechanism::new(&scene.machine).unwrap();
+            let y = m.start().unwrap();
             for s in [1e3, 1e4, 1e5] {
                 let case = format!("{name} {formulation}, s = {s}");
                 check_solutions(&case, &mut m, ActiveSet::Nothing, (0.1, &y), s, [1e-6, 1e-6]);
@@ -122,7 +120,7 @@ fn implicit_steps_of_elements_agree_with_central_differences_in_both_formulation
     }
 }
 
-const ELEMENT_CASES: [(&str, &str); 7] = [
+pub const ELEMENT_CASES: [(&str, &str); 7] = [
     (
         "coordinates of two degrees",
         "[[body]]\nname = \"ring\"\nmass = \"1 kg\"\ninertia = \"2e-2 3e-2 4e-2 kg m^2\"\n\
