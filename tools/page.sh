@@ -9,9 +9,7 @@ build_page() {
     say "building the page (the first time takes some minutes)"
     # Panic messages name the sources of dependencies; their full paths would be private, and make the page larger.
     local sources=${CARGO_HOME:-$HOME/.cargo}/registry/src
-    # The default threshold makes the page 5 % larger and no faster. Functions marked #[inline], such as all arithmetic, have a
-    # separate limit.
-    compile_page web "--remap-path-prefix=$sources=" -Cllvm-args=-inline-threshold=25
+    compile_page web "--remap-path-prefix=$sources="
     pack_page web "$@"
 }
 

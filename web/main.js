@@ -274,6 +274,8 @@ async function showFirstPicture() {
     await frame();
     if (aborted()) return;
     $('notice').hidden = true;
+    // What the notice says from now on concerns the user's own machine.
+    $('poster')?.remove();
     if (window === window.top) $('laboratory').focus();
     laboratory.ready = true;
     performance.mark('first picture');

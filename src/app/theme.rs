@@ -107,14 +107,11 @@ pub fn error(ui: &mut Ui, words: impl Into<String>) -> Response {
     ui.label(RichText::new(words).small().color(colour))
 }
 
-/// Ubuntu Light, as `build.rs` writes it.
-const FONT: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/ubuntu-light.ttf"));
-
 /// One font for everything: its digits have equal widths, so a running clock does not jitter.
 pub fn fonts() -> FontDefinitions {
     const NAME: &str = "Ubuntu-Light";
     let mut fonts = FontDefinitions::empty();
-    let face = FontData::from_static(FONT);
+    let face = FontData::from_static(epaint_default_fonts::UBUNTU_LIGHT);
     fonts.font_data.insert(NAME.to_owned(), Arc::new(face));
     for family in fonts.families.values_mut() {
         family.push(NAME.to_owned());
@@ -258,31 +255,5 @@ mod tests {
         assert_eq!(missing, "");
         // The font does not cover everything.
         assert!(!ctx.fonts_mut(|fonts| fonts.has_glyph(&font, '\u{6f22}')));
-    }
-
-    #[test]
-    fn the_tables_removed_from_the_font_change_no_pixel() {
-        let picture = |face: &'static [u8]| {
-            let mut fonts = fonts();
-            for data in fonts.font_data.values_mut() {
-                *data = Arc::new(FontData::from_static(face));
-            }
-            let ctx = eframe::egui::Context::default();
-            ctx.set_fonts(fonts);
-            let mut output = ctx.run_ui(Default::default(), |ui| {
-                for size in [9.0, 12.5, 14.0, 20.0, 31.0] {
-                    let words = "AV To 0123456789 ±µ·αβγ Ж Ünité, fi ffl";
-                    ui.label(RichText::new(words).size(size));
-                }
-            });
-            let size = ctx.fonts_mut(|fonts| {
-                fonts.layout_no_wrap("AVAV".into(), FontId::proportional(40.0), Color32::BLACK).size()
-            });
-            output.textures_delta.clear();
-            (ctx.fonts(|fonts| fonts.image()), size)
-        };
-        let whole = epaint_default_fonts::UBUNTU_LIGHT;
-        assert!(FONT.len() + 40_000 < whole.len(), "{} bytes", FONT.len());
-        assert!(picture(FONT) == picture(whole));
     }
 }

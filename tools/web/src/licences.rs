@@ -1,4 +1,4 @@
-//! The licences of what the page contains: fonts and libraries of others.
+//! The licences of what the page and the program contain: fonts and libraries of others.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,8 +9,7 @@ use serde_json::Value;
 
 use crate::pack::{failed, files};
 
-/// The target of the page's library, and its package.
-const TARGET: &str = "wasm32-unknown-unknown";
+/// The package of the program and of the page's library.
 const PACKAGE: &str = "jointplay";
 /// Texts for packages that come without one, the first choice first.
 const STANDARD: [(&str, &str); 3] =
@@ -18,15 +17,17 @@ const STANDARD: [(&str, &str); 3] =
 const APACHE: &str = "LICENSE-APACHE";
 const MIT: &str = "LICENSE-MIT";
 
-/// A list of the parts of the page with their licences, and the texts of these, each once. `root`: folder of the project.
-pub fn licences(root: &Path) -> Result<String, String> {
+/// A list of the parts of the program, or the page, with their licences, and the texts of these, each once. `root`: folder of the
+/// project; `features`: arguments of cargo that choose them.
+pub fn licences(root: &Path, target: &str, features: &[&str]) -> Result<String, String> {
     let standard = |name: &str| read(&root.join(name));
     let apache = standard(APACHE)?;
     let mut document = Document::default();
     document.add("Jointplay", "MIT OR Apache-2.0", &[standard(MIT)?, apache.clone()]);
     document.add("Standard library of Rust", "MIT OR Apache-2.0", &[apache]);
-    let contained = contained(root)?;
-    let metadata = cargo(root, &["metadata", "--format-version", "1", "--filter-platform", TARGET])?;
+    let contained = contained(root, target, features)?;
+    let metadata =
+        cargo(root, &[&["metadata", "--format-version", "1", "--filter-platform", target], features].concat())?;
     let metadata: Value = serde_json::from_str(&metadata).map_err(|e| format!("cargo metadata: {e}"))?;
     for package in metadata["packages"].as_array().into_iter().flatten() {
         let field = |key: &str| package[key].as_str().unwrap_or_default();
@@ -58,10 +59,10 @@ pub fn licences(root: &Path) -> Result<String, String> {
     Ok(document.text())
 }
 
-/// The packages in the page, as name and version: neither build tools nor what only other members of the workspace need.
-fn contained(root: &Path) -> Result<BTreeSet<String>, String> {
+/// The packages in the program, as name and version: neither build tools nor what only other members of the workspace need.
+fn contained(root: &Path, target: &str, features: &[&str]) -> Result<BTreeSet<String>, String> {
     let edges = ["--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"];
-    let tree = cargo(root, &[&["tree", "--package", PACKAGE, "--target", TARGET][..], &edges].concat())?;
+    let tree = cargo(root, &[&["tree", "--package", PACKAGE, "--target", target], features, &edges].concat())?;
     let packages = tree.lines().filter_map(|line| {
         let (name, rest) = line.split_once(" v")?;
         Some(format!("{name} {}", rest.split(' ').next()?))
@@ -149,17 +150,15 @@ impl Document {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn root() -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-    }
+    use crate::pack::root;
 
     #[test]
     fn every_font_and_library_of_the_page_is_listed_with_a_text() {
-        let text = licences(&root()).expect("the licences");
+        const TARGET: &str = "wasm32-unknown-unknown";
+        let text = licences(&root(), TARGET, &[]).expect("the licences");
         let (list, texts) = text.split_once("\n---------- 1 ----------\n").expect("a list and texts");
         let listed: BTreeSet<&str> = list.lines().filter_map(|line| Some(line.split_once(": ")?.0)).collect();
-        let packages = contained(&root()).expect("packages");
+        let packages = contained(&root(), TARGET, &[]).expect("packages");
         assert!(packages.len() > 100, "{packages:?}");
         for package in packages.iter().filter(|package| !package.starts_with(PACKAGE)) {
             assert!(listed.contains(package.as_str()), "{package}");
@@ -180,6 +179,24 @@ mod tests {
             assert!(texts.contains(part), "{part}");
         }
         assert!(!texts.contains("GNU GENERAL PUBLIC LICENSE"));
+    }
+
+    #[test]
+    fn libraries_of_the_program_are_those_of_its_target_and_features() {
+        let listed = |target: &str, features: &[&str], name: &str| {
+            let text = licences(&root(), target, features).expect("the licences");
+            text.lines().any(|line| line.starts_with(&format!("{name} ")) && line.contains(" (text "))
+        };
+        let (linux, windows) = ("x86_64-unknown-linux-gnu", "x86_64-pc-windows-gnu");
+        for (target, features, name, is_listed) in [
+            (linux, &["--features", "sound"][..], "winit", true),
+            (linux, &["--features", "sound"], "cpal", true),
+            (linux, &["--features", "sound"], "proptest", false),
+            (windows, &["--no-default-features"], "winit", false),
+            (windows, &["--no-default-features"], "ctrlc", true),
+        ] {
+            assert_eq!(listed(target, features, name), is_listed, "{target} {name}");
+        }
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Builds and serves the page of Jointplay.
 //!
 //! `jointplay-web pack LIBRARY.wasm FOLDER [--compress]` writes the page; `jointplay-web serve FOLDER [PORT [HOST]]` serves a folder
-//! until it is stopped: to this machine only, or on its address HOST (0.0.0.0: all its addresses).
+//! until it is stopped: to this machine only, or on its address HOST (0.0.0.0: all its addresses). `jointplay-web licences TARGET
+//! [FEATURES…]` prints the licences of what the program contains for a target of Rust, built with these arguments of cargo.
 
 mod licences;
 mod pack;
@@ -12,7 +13,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 const USAGE: &str = "usage: jointplay-web pack LIBRARY.wasm FOLDER [--compress]
-       jointplay-web serve FOLDER [PORT [HOST]]";
+       jointplay-web serve FOLDER [PORT [HOST]]
+       jointplay-web licences TARGET [--no-default-features] [--features FEATURES]";
 
 /// An address that only this machine can reach.
 const LOCALHOST: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
@@ -36,6 +38,9 @@ fn main() -> ExitCode {
             });
             serve::serve(Path::new(folder), host?, port)
         }),
+        ["licences", target, ref features @ ..] => {
+            licences::licences(&pack::root(), target, features).map(|text| print!("{text}"))
+        }
         _ => Err(USAGE.to_owned()),
     };
     match outcome {

@@ -19,7 +19,7 @@ const PAGE: &str = "index.html";
 /// Service worker that stores the page for offline use; it lists all its files.
 const SERVICE_WORKER: &str = "web/offline.js";
 /// Scripts, style and icons beside it, copied as they are.
-const PARTS: [&str; 11] = [
+const PARTS: [&str; 12] = [
     "web/stuck.js",
     "web/main.js",
     "web/host.js",
@@ -30,6 +30,7 @@ const PARTS: [&str; 11] = [
     "web/page.css",
     "web/icon.svg",
     "web/icon-192.png",
+    "web/poster.webp",
     "web/page.webmanifest",
 ];
 
@@ -41,10 +42,15 @@ const PREVIEW: &str = "web/preview.png";
 /// Content codings of the precompressed copies beside a file, best first, each with its file extension.
 const CODINGS: [(&str, &str); 2] = [("br", "br"), ("gzip", "gz")];
 
+/// The project's folder.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
 /// Writes the page into `folder`, which is built from scratch and replaced only as a whole: each file, and beside it
 /// `<file>.gz`. `compress`: also `<file>.br`, and a table of sizes is printed.
 pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = root();
     check_replaceable(folder)?;
     let scratch = scratch_beside(folder)?;
     fs::create_dir_all(&scratch).map_err(|e| failed(&scratch, &e))?;
@@ -69,7 +75,7 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
         let name = from.file_name().expect("a file");
         fs::copy(&from, scratch.join(name)).map_err(|e| failed(&from, &e))?;
     }
-    let licences = licences(&root)?;
+    let licences = licences(&root, "wasm32-unknown-unknown", &[])?;
     let to = scratch.join(LICENCES);
     fs::write(&to, &licences).map_err(|e| failed(&to, &e))?;
     let mut all = code.clone();
