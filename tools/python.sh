@@ -1,4 +1,4 @@
-# Builds and tests the package for Python. Sourced by ./test, never run by itself.
+# Builds and tests the package for Python. Sourced by ./run and ./test, never run by itself.
 
 # Environment in which the package is built and tested, with the packages of python/requirements.txt.
 python_env=target/python
@@ -22,11 +22,24 @@ prepare_robots() {
     echo "${packages[*]}" > target/robots/.from
 }
 
+# Prepares an environment in folder $1 with what builds wheels.
+prepare_maturin() {
+    python3 -c 'import ensurepip, venv' 2> /dev/null || prepare_packages python3 python3-venv
+    [[ ! -x $1/bin/maturin ]] || return 0
+    [[ -x $1/bin/pip ]] || python3 -m venv "$1"
+    "$1/bin/pip" install --quiet --disable-pip-version-check "$(grep '^maturin==' "$root/python/requirements.txt")"
+}
+
+# Builds the wheel with the environment in folder $1 into folder $2; further arguments go to maturin.
+build_wheel() {
+    "$1/bin/maturin" build --quiet --locked --manifest-path "$root/python/Cargo.toml" --out "${@:2}"
+}
+
 # Builds the wheel, installs it as a user would, and tests it.
 python_test() {
     local wheels=$python_env/wheels
     rm -rf "$wheels"
-    "$python_env/bin/maturin" build --quiet --locked --profile dev --features alike --manifest-path python/Cargo.toml --out "$wheels"
+    build_wheel "$python_env" "$wheels" --profile dev --features alike
     "$python_env/bin/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall "$wheels"/*.whl
     # -P: without the current folder in the path, the installed package is tested.
     "$python_env/bin/python" -P -B -m pytest --quiet -p no:cacheprovider python/tests "$@"
