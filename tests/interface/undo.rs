@@ -185,4 +185,13 @@ fn undo_returns_a_value_to_what_it_followed() {
     restored.sort();
     expected.sort();
     assert_eq!(restored, expected);
+
+    // A drag that begins on the preset is one change.
+    set(&mut harness, "solver.preset", "reference");
+    for dragged in ["1e-6", "1e-5", "1e-4"] {
+        harness.state_mut().player_mut().set("solver.tolerance", dragged).expect("in range");
+        harness.run_steps(1);
+    }
+    press(&mut harness, UNDO);
+    assert_eq!((tolerance(&harness), changes(&harness)), (preset, with_preset));
 }
