@@ -13,7 +13,7 @@ run_lab() {
         : > "$lab_env/.begun"
         prepare_maturin "$lab_env"
         rm -rf "$lab_env/wheels"
-        build_wheel "$lab_env" "$lab_env/wheels" --release
+        build_wheel "$lab_env" "$lab_env/wheels" --profile local
         "$lab_env/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps "$lab_env"/wheels/*.whl
         "$lab_env/bin/pip" install --quiet --disable-pip-version-check "$(echo "$lab_env"/wheels/*.whl)[lab]"
         mv "$lab_env/.begun" "$lab_env/.done"

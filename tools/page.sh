@@ -76,8 +76,8 @@ run_web() {
                 exit 1
             fi
             build_page "$folder"
-            cargo build --release --locked "${sound[@]}" --manifest-path "$root/Cargo.toml"
-            node "$root/web/bench.mjs" "$folder" "$root/target/release/jointplay"
+            cargo build --profile local --locked "${features[@]}" --manifest-path "$root/Cargo.toml"
+            node "$root/web/bench.mjs" "$folder" "$root/target/local/jointplay"
             ;;
         *)
             say "./run web [--port PORT] [--host ADDRESS] | --build FOLDER | --bench"

@@ -10,8 +10,8 @@ packages=(
 
 # Further packages for sound, which is optional.
 sound_packages=(libasound2-dev pkg-config)
-# Arguments for cargo if they are installed.
-sound=()
+# Arguments for cargo: `sound` if they are installed.
+features=()
 
 say() {
     printf '== %s\n' "$*" >&2
@@ -136,7 +136,15 @@ prepare_sound() {
             fi
             ;;
     esac
-    sound=(--features sound)
+    features=(--features sound)
+}
+
+# Adds what tells a screen reader about the window where assistive technology is in use: on Linux that takes long to build.
+prepare_screen_reader() {
+    if [[ $(uname) != Linux ]] ||
+        busctl --user get-property org.a11y.Bus /org/a11y/bus org.a11y.Status IsEnabled 2> /dev/null | grep -q true; then
+        features+=(--features screen-reader)
+    fi
 }
 
 prepare() {

@@ -52,7 +52,7 @@ python_test() {
 # Builds the package with graphics and tests its pictures. Built together with the examples, which share its libraries.
 python_pictures_test() {
     local site=$python_env/pictures
-    cargo build --quiet --locked --workspace "${sound[@]}" --features jointplay-python/render --lib --examples
+    cargo build --quiet --locked --workspace "${features[@]}" --features jointplay-python/render --lib --examples
     rm -rf "$site"
     mkdir -p "$site"
     cp -r python/jointplay "$site"

@@ -23,9 +23,9 @@ run_release() {
     mkdir -p "$parts"
 
     say "the program for Linux"
-    cargo build --release --locked "${sound[@]}"
+    cargo build --release --locked "${features[@]}" --features screen-reader
     local linux=$parts/jointplay-$version-linux-x86_64
-    release_folder "$linux" target/release/jointplay x86_64-unknown-linux-gnu "${sound[@]}"
+    release_folder "$linux" target/release/jointplay x86_64-unknown-linux-gnu "${features[@]}" --features screen-reader
     cp tools/release/jointplay.desktop web/icon.svg "$linux"
     archive "$linux"
 

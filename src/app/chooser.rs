@@ -111,7 +111,7 @@ impl Chooser {
 #[cfg(all(unix, not(target_os = "macos")))]
 fn has_dialogs() -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
-    pollster::block_on(has_portal()).is_ok() || std::env::split_paths(&path).any(|at| at.join("zenity").is_file())
+    PORTAL_QUERIES.iter().any(answers) || std::env::split_paths(&path).any(|at| at.join("zenity").is_file())
 }
 
 /// The system always has file dialogs.
@@ -120,15 +120,41 @@ fn has_dialogs() -> bool {
     true
 }
 
-/// Queries the version of the portal's file chooser. A portal without a desktop backend has none.
+/// Queries of the version of the portal's file chooser, which a portal without a desktop backend does not have, with at most five
+/// seconds to start the portal: by the tools of systemd and of D-Bus, one of which is on every desktop.
 #[cfg(all(unix, not(target_os = "macos")))]
-async fn has_portal() -> zbus::Result<()> {
-    /// Timeout for starting the portal, s.
-    const TIMEOUT: u64 = 5;
-    let bus = zbus::connection::Builder::session()?;
-    let bus = bus.method_timeout(std::time::Duration::from_secs(TIMEOUT)).build().await?;
-    let (portal, object) = ("org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop");
-    let property = ("org.freedesktop.portal.FileChooser", "version");
-    bus.call_method(Some(portal), object, Some("org.freedesktop.DBus.Properties"), "Get", &property).await?;
-    Ok(())
+const PORTAL_QUERIES: [(&str, &[&str]); 2] = [
+    (
+        "busctl",
+        &[
+            "--user",
+            "--timeout=5",
+            "get-property",
+            "org.freedesktop.portal.Desktop",
+            "/org/freedesktop/portal/desktop",
+            "org.freedesktop.portal.FileChooser",
+            "version",
+        ],
+    ),
+    (
+        "dbus-send",
+        &[
+            "--session",
+            "--print-reply",
+            "--reply-timeout=5000",
+            "--dest=org.freedesktop.portal.Desktop",
+            "/org/freedesktop/portal/desktop",
+            "org.freedesktop.DBus.Properties.Get",
+            "string:org.freedesktop.portal.FileChooser",
+            "string:version",
+        ],
+    ),
+];
+
+#[cfg(all(unix, not(target_os = "macos")))]
+fn answers((tool, arguments): &(&str, &[&str])) -> bool {
+    use std::process::{Command, Stdio};
+    let mut query = Command::new(tool);
+    query.args(*arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    query.status().is_ok_and(|status| status.success())
 }

@@ -232,7 +232,7 @@ fn documents_use_commands_and_options_that_exist() {
         let blocks = page.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next());
         for line in blocks.flat_map(str::lines) {
             let line = line.split(" #").next().unwrap_or(line);
-            let is_program = |word: &str| ["./run", "jointplay", "target/release/jointplay"].contains(&word);
+            let is_program = |word: &str| ["./run", "jointplay", "target/local/jointplay"].contains(&word);
             let mut words = line.split_whitespace().skip_while(|word| !is_program(word));
             // `web` and `release` are commands of the script, and what follows `lab` or `python -m jointplay` one of the Python package, whose
             // own tests check it.
