@@ -4,7 +4,6 @@ use std::fmt::Write;
 
 use super::args::CheckArguments;
 use super::measuring::within;
-use super::output::significant;
 use super::summary::count;
 use super::{Failure, load, print, start};
 use crate::analysis::assembly::StartReport;
@@ -16,6 +15,7 @@ use crate::machine::{BallJoint, Body, Element, Joint, JointKind};
 use crate::mechanism::{ElementReport, Summary};
 use crate::scene::Scene;
 use crate::simulate::{ChannelInfo, Frame, Peak, channels_of};
+use crate::units::significant;
 use crate::units::{format_quantity, format_quantity_digits, to_display};
 
 /// Runs `check`.

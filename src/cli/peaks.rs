@@ -2,9 +2,9 @@
 
 use serde_json::{Map, Value as Json, json};
 
-use super::output::significant;
 use crate::machine::JointKind;
 use crate::simulate::{LoadPeak, Simulation};
+use crate::units::significant;
 
 /// Units of force and torque, with the summary keys of the peak value and its time.
 const LOADS: [(&str, &str, &str); 2] =

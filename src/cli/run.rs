@@ -9,7 +9,7 @@ use serde_json::{Value as Json, json};
 use super::args::{RunArguments, SummaryForm};
 use super::impacts::ImpactsFile;
 use super::link::LinkReplay;
-use super::output::{RowsFile, Table, check_distinct, reserve, significant};
+use super::output::{RowsFile, Table, check_distinct, reserve};
 use super::state::{self, StateFile};
 use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
@@ -18,6 +18,7 @@ use crate::analysis::row_times::{RowReader, RowTimes};
 use crate::files::{publish, spare_older};
 use crate::scene::{LiveScene, SavedState, Scene, insert_texts};
 use crate::simulate::{Frame, channels_of, chosen_channels};
+use crate::units::significant;
 
 /// Steps between two checks of the clock, the progress bar and Ctrl-C.
 const STEPS_BETWEEN_CHECKS: u32 = 256;

@@ -6,7 +6,6 @@ use std::path::Path;
 use serde_json::{Map, Value as Json, json};
 
 use super::impacts::Restitution;
-use super::output::significant;
 use super::peaks::{self, parts};
 use super::provenance;
 use crate::analysis::assembly::StartReport;
@@ -14,6 +13,7 @@ use crate::machine::Preset;
 use crate::scene::LiveScene;
 use crate::scene::Scene;
 use crate::simulate::Impact;
+use crate::units::significant;
 use crate::words::words;
 
 /// How a run ended.

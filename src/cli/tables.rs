@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::output::significant;
+use crate::units::significant;
 
 /// Rows of plain text under headings.
 #[derive(Clone, Debug, PartialEq)]

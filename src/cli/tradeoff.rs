@@ -5,7 +5,6 @@ use std::io::Write as _;
 use serde_json::{Value as Json, json};
 
 use super::args::{SceneArguments, TradeoffArguments};
-use super::output::significant;
 use super::tables::{self, Table, number};
 use super::{Failure, interrupt, load, machine, measuring, print, provenance, warn};
 use crate::analysis::presets::{Record, limit, pace};
@@ -15,6 +14,7 @@ use crate::integrate::StepControl;
 use crate::machine::Preset;
 use crate::scene::Scene;
 use crate::units::format_quantity;
+use crate::units::significant;
 
 /// Runs `tradeoff`.
 ///

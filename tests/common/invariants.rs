@@ -1,7 +1,7 @@
 //! Invariants of a frame, whatever the scene and the method.
 
-use jointplay::machine::{BallJoint, Machine, Vec3};
-use jointplay::simulate::{Frame, JointReport};
+use jointplay_physics::machine::{BallJoint, Machine, Vec3};
+use jointplay_physics::simulate::{Frame, JointReport};
 
 /// Penetration over ball radius beyond which a ball has left its socket.
 const OUT_OF_SOCKET: f64 = 0.1;
@@ -39,7 +39,7 @@ pub fn violation(frame: &Frame, machine: &Machine, form: &str) -> Option<String>
         return Some(format!("not finite at t = {:e} s", frame.time));
     }
     for b in &frame.bodies {
-        let skew = (b.rotation.tr_mul(&b.rotation) - jointplay::machine::Mat3::identity()).amax();
+        let skew = (b.rotation.tr_mul(&b.rotation) - jointplay_physics::machine::Mat3::identity()).amax();
         if skew > 1e-9 {
             return Some(format!("orientation off by {skew:e} at t = {:e} s", frame.time));
         }

@@ -8,8 +8,8 @@ pub mod truss;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
 
-use jointplay::scene::{LiveScene, Scene, SceneError};
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::{LiveScene, Scene, SceneError};
 
 /// Calls `kill` with `JOINTPLAY_KILLS` instants within `length`, by default `default_count`.
 pub fn at_random_instants(length: Duration, default_count: u32, mut kill: impl FnMut(Duration)) {

@@ -4,8 +4,8 @@ use crate::common::matrix::for_every;
 use crate::common::{assert_refused, replaced};
 use crate::elements::frame_at;
 use crate::joint_elements::{momenta, start_simulation};
-use jointplay::machine::{Quat, Vec3};
-use jointplay::scene::Scene;
+use jointplay_physics::machine::{Quat, Vec3};
+use jointplay_scene::Scene;
 
 /// A free body of 0.5 kg with the pose `start`, and a bushing from the world at (0.1, 0.2, 0.3) m to its centroid; `more` has further keys.
 fn bushing_scene(start: &str, more: &str) -> String {
@@ -163,12 +163,12 @@ fn a_tumbling_pair_on_a_soft_bushing_conserves_momentum_and_energy() {
 #[test]
 fn a_body_on_a_bushing_is_not_in_free_flight() {
     // Bodies without contact are excluded from the steps, unless a force element acts on them.
-    let text = jointplay::scene::built_in_text("chain").unwrap();
+    let text = jointplay_scene::built_in_text("chain").unwrap();
     let bushing = "[[bushing]]\nname = \"b\"\nfrom = { body = \"world\", at = \"0 0 0 mm\" }\nto = { body = \"link3\" }\n\
                    stiffness = \"0 2 0 N/m\"\nrotation = { axis = [1, 0, 0], angle = \"0 deg\" }\n\
                    turning_stiffness = \"0 0 0.4 N m/rad\"\n";
     let scene = Scene::parse(&format!("{text}\n{bushing}"), None, &[]).unwrap();
-    let mut simulation = jointplay::simulate::Simulation::new(&scene.machine).unwrap();
+    let mut simulation = jointplay_physics::simulate::Simulation::new(&scene.machine).unwrap();
     frame_at(&mut simulation, 0.05);
     let residual = simulation.ledger().unwrap().relative_residual();
     assert!(residual.abs() < 1e-4, "{residual:e}");

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use crate::common::parse;
-use jointplay::machine::Machine;
-use jointplay::scene::{Scene, built_in_text};
-use jointplay::simulate::{ChannelInfo, Frame, Simulation, channels_of, chosen_channels};
+use jointplay_physics::machine::Machine;
+use jointplay_physics::simulate::{ChannelInfo, Frame, Simulation, channels_of, chosen_channels};
+use jointplay_scene::{Scene, built_in_text};
 
 fn scene(changes: &str) -> Scene {
     parse(&format!("{}\n{changes}", built_in_text("slider-crank-driven").expect("built in")), &[])

@@ -1,11 +1,11 @@
 //! A scene whose drive follows functions of `[closed_form]`: the path must be that of the machine.
 
 use crate::common::parse;
-use jointplay::analysis::ideal_fault::{IdealFault, ideal_fault};
-use jointplay::machine::{Machine, StartRule};
-use jointplay::mechanism::{Mechanism, MechanismError, periods_of};
-use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation, StopFault};
+use jointplay_analysis::ideal_fault::{IdealFault, ideal_fault};
+use jointplay_physics::machine::{Machine, StartRule};
+use jointplay_physics::mechanism::{Mechanism, MechanismError, periods_of};
+use jointplay_physics::simulate::{Frame, Simulation, StopFault};
+use jointplay_scene::Scene;
 
 /// A crank of 30 mm that turns at 2 Hz and pushes a block through a rod of `length`: x = r cos + sqrt(L^2 - r^2 sin^2).
 fn slider_crank(length: &str) -> Scene {

@@ -5,7 +5,7 @@ use crate::common::matrix::for_every;
 use crate::elements::frame_at;
 use crate::joint_elements::{momenta, start_simulation};
 use crate::two_degrees::angle_difference;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::simulate::{Frame, Simulation};
 
 const MASS: f64 = 0.5;
 /// Equal about every axis through the centroid, where the joint is, so that the angles of a universal joint are decoupled.
@@ -285,7 +285,7 @@ fn a_joint_with_both_coordinates_driven_carries_an_attached_pendulum() {
         let residual = simulation.ledger().unwrap().relative_residual();
         assert!(residual.abs() < 1e-7, "{residual:e}");
         assert_eq!(frame.actuators.len(), 2);
-        let channels = jointplay::simulate::channels_of(simulation.machine(), &frame);
+        let channels = jointplay_physics::simulate::channels_of(simulation.machine(), &frame);
         let columns = channels.iter().filter(|channel| channel.unasked).map(|channel| &channel.column);
         let own: &[&str] = match first.kind {
             "cylindrical" => &["j_actuator_N", "j_angle_actuator_Nm"],

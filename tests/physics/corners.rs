@@ -1,7 +1,7 @@
 //! Corners of the friction law are events: a step ends at each, and a sliding contact stays on its branch of the law.
 
 use crate::common::{frame_now, simulation};
-use jointplay::contact::FrictionBranch;
+use jointplay_physics::contact::FrictionBranch;
 
 #[test]
 fn settled_sliding_keeps_its_law_branch_and_corners_cost_few_rejections() {

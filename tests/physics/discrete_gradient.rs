@@ -2,9 +2,9 @@
 //! forces are right, and peaks and losses are within the bounds for its steps per impact.
 
 use crate::common::{Changes, MACHINES, SCENES, frame_now, free_ball, live, mean_forces, parse, run_until, simulation};
-use jointplay::contact::{NormalLaw, damping_factor, undisturbed_restitution};
-use jointplay::scene::LiveScene;
-use jointplay::simulate::{Frame, Impact, Ledger, Simulation};
+use jointplay_physics::contact::{NormalLaw, damping_factor, undisturbed_restitution};
+use jointplay_physics::simulate::{Frame, Impact, Ledger, Simulation};
+use jointplay_scene::LiveScene;
 
 const METHOD: (&str, &str) = ("solver.method", "discrete-gradient");
 
@@ -298,7 +298,7 @@ fn a_torque_below_the_friction_limit_turns_a_ball_at_the_creep_speed() {
 /// up to twice their speed. Nothing was doubted: the balls of separate sockets counted as disturbing each other.
 #[test]
 fn slow_impacts_of_separate_balls_return_no_more_than_their_law() {
-    let text = std::fs::read_to_string("tests/trials/slow-eight.toml").unwrap();
+    let text = std::fs::read_to_string(crate::trial("slow-eight")).unwrap();
     for preset in ["preview", "real-time"] {
         for gravity in ["-0.02", "-0.05", "-0.2", "-0.7", "-3", "-9.81"] {
             let gravity = format!("{gravity} m/s^2");

@@ -5,7 +5,7 @@
 //! in between. Contract: no instant has a penetration beyond rounding and no force.
 
 use crate::common::simulation;
-use jointplay::simulate::Frame;
+use jointplay_physics::simulate::Frame;
 
 #[test]
 fn no_ball_penetrates_its_wall_without_a_force() {

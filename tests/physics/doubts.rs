@@ -1,9 +1,9 @@
 //! Untrustworthy results raise a doubt with its reason; trustworthy ones raise none.
 
 use crate::common::{Changes, frame_now, free_ball, parse, run_until, simulation};
-use jointplay::machine;
-use jointplay::scene::built_in_text;
-use jointplay::simulate::{Doubt, Simulation};
+use jointplay_physics::machine;
+use jointplay_physics::simulate::{Doubt, Simulation};
+use jointplay_scene::built_in_text;
 
 fn doubt_texts(simulation: &Simulation) -> Vec<String> {
     let doubts = simulation.doubts();
@@ -130,27 +130,6 @@ fn a_reset_clears_doubts_and_a_snapshot_keeps_them() {
     assert!(simulation.doubts().is_empty());
     simulation.restore(&snapshot);
     assert_eq!(simulation.doubts(), expected);
-}
-
-#[test]
-fn the_summary_of_a_run_reports_doubts() {
-    let run = |form: &str, floor: &str| {
-        let output = std::process::Command::new(env!("CARGO_BIN_EXE_jointplay"))
-            .args(["run", "pendulum", "--duration", "20ms", "--quiet", "--summary", form])
-            .args(["--set", floor])
-            .output()
-            .unwrap();
-        assert!(output.status.success(), "{output:?}");
-        String::from_utf8(output.stdout).unwrap()
-    };
-    let (doubtful, trusted) = ("contact.impact_speed_floor=10m/s", "contact.impact_speed_floor=1mm/s");
-    let json: serde_json::Value = serde_json::from_str(&run("json", doubtful)).unwrap();
-    assert_eq!(json["doubts"].as_array().unwrap().len(), 1, "{json}");
-    assert_eq!(json["slower_than_asked"], false);
-    let json: serde_json::Value = serde_json::from_str(&run("json", trusted)).unwrap();
-    assert!(json["doubts"].as_array().unwrap().is_empty(), "{json}");
-    assert!(run("text", doubtful).contains("Not trusted       S1: "), "{}", run("text", doubtful));
-    assert!(!run("text", trusted).contains("Not trusted"));
 }
 
 /// Lines of `[contact]`.

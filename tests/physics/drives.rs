@@ -1,7 +1,7 @@
 //! Laws of drives in running machines: short pulses are not stepped over, and every joule is accounted for.
 
 use crate::common::{Changes, frame_now, parse, run_until};
-use jointplay::simulate::Simulation;
+use jointplay_physics::simulate::Simulation;
 
 /// A slider with this drive along x and a rod that hangs from it on a ball joint.
 fn hanging(drive: &str, changes: &Changes) -> Simulation {

@@ -2,9 +2,9 @@
 
 use crate::common::matrix::in_tree;
 use crate::common::{THREE_VARIANTS, assert_refused, parse};
-use jointplay::machine::Vec3;
-use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::Scene;
 
 const MASS: f64 = 0.5;
 
@@ -150,7 +150,7 @@ fn loads_accelerate_a_body_as_in_the_newton_euler_equations() {
 
 #[test]
 fn elements_are_fixed_to_links_of_a_chain() {
-    let text = jointplay::scene::built_in_text("chain").unwrap();
+    let text = jointplay_scene::built_in_text("chain").unwrap();
     let with = |element: &str| Scene::parse(&format!("{text}\n{element}"), None, &[]);
     // The load is strong, so the link moves freely before its balls cross their clearances.
     let scene = with("[[load]]\nname = \"push\"\non = { body = \"link3\" }\nforce = \"0 40 0 N\"\n");

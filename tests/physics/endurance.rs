@@ -7,9 +7,9 @@ use std::sync::Mutex;
 use crate::common::invariants::{finite, violation};
 use crate::common::matrix::in_parallel;
 use crate::common::{frame_now, scene};
-use jointplay::machine::Mat3;
-use jointplay::scene::LiveScene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::machine::Mat3;
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::LiveScene;
 
 /// Pseudo-random numbers from a seed (xorshift64*), so that every run of a test is the same.
 struct Random(u64);
@@ -347,7 +347,7 @@ fn write_a_thousand_seconds_of_every_kind() {
         );
         check_limits(case, preset, &d);
     }
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/extremes.md");
+    let path = std::path::Path::new(crate::ROOT).join("docs/extremes.md");
     let text = std::fs::read_to_string(&path).unwrap();
     let at = text.find("\n## 1000 simulated seconds\n").unwrap_or(text.len());
     std::fs::write(path, text[..at].to_owned() + &page).unwrap();

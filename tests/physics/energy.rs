@@ -1,8 +1,8 @@
 //! Energy is conserved without actuators and dissipation, and the work of actuators equals the gain of energy.
 
 use crate::common::{Changes, parse, simulation};
-use jointplay::scene::built_in_text;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::built_in_text;
 
 /// Elastic and frictionless contacts, with a tolerance at which impacts conserve energy to 1e-6.
 const ELASTIC: [(&str, &str); 3] =
@@ -137,10 +137,10 @@ fn power_balance(simulation: &mut Simulation, duration: f64) -> (f64, f64, u64) 
     assert!(drives.iter().all(|j| j.parent.is_none()));
     let power = |frame: &Frame| -> f64 {
         assert_eq!(frame.actuators.len(), drives.len());
-        let rate = |joint: &&jointplay::machine::Joint| {
+        let rate = |joint: &&jointplay_physics::machine::Joint| {
             let body = &frame.bodies[joint.child];
             let along = match joint.kind {
-                jointplay::machine::JointKind::Revolute => body.angular_velocity,
+                jointplay_physics::machine::JointKind::Revolute => body.angular_velocity,
                 _ => body.velocity,
             };
             joint.axis.dot(&along)

@@ -2,11 +2,11 @@
 //! a minimum of the potential energy, downhill from the start values.
 
 use crate::common::{parse, scene};
-use jointplay::contact::{Coefficients, settled_penetration};
-use jointplay::machine::Vec3;
-use jointplay::mechanism::UnstableRest;
-use jointplay::scene::{BUILT_IN, LiveScene, Scene};
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::contact::{Coefficients, settled_penetration};
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::mechanism::UnstableRest;
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::{BUILT_IN, LiveScene, Scene};
 
 const G: f64 = 9.81;
 

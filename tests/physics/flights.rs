@@ -1,8 +1,8 @@
 //! Bodies in free flight are left out of the evaluations that impacts elsewhere need.
 
 use crate::common::{frame_now, simulation};
-use jointplay::machine::Vec3;
-use jointplay::simulate::{ContactMode, Frame, Simulation};
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::simulate::{ContactMode, Frame, Simulation};
 
 const CHAIN: [(&str, &str); 2] = [("chain.links", "8"), ("solver.tolerance", "1e-5")];
 

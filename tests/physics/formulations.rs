@@ -7,8 +7,8 @@ use crate::common::matrix::FORMULATIONS;
 use crate::common::{MACHINES, SCENES, frame_now, parse, run_until, simulation};
 use crate::stiff::{ELEMENT_CASES, serial_chain};
 use crate::two_degrees::{G, train};
-use jointplay::scene::built_in_text;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::built_in_text;
 
 /// Position and turn of bodies and coordinates, m and rad: errors of 1e-10 per step, which add up over some hundred steps and grow in
 /// impacts. Their rates are larger by the rate of an impact, 1e3 1/s; forces, relative to the largest of their kind, by its square.
@@ -61,7 +61,7 @@ pub fn check(name: &str, text: &str) {
 /// The corpus covers every key of the format: each kind of joint, element and drive.
 #[test]
 fn both_formulations_move_every_scene_of_the_corpus_alike() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
+    let folder = Path::new(crate::ROOT).join("tests/fuzz/corpus");
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();

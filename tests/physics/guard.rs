@@ -1,9 +1,9 @@
 //! A run that cannot continue stops with place, time and advice, and keeps its last good state.
 
 use crate::common::{frame_now, live, parse, run_until, scene, simulation};
-use jointplay::scene::{LiveScene, built_in_text};
-use jointplay::simulate::{Simulation, StopAdvice, StopFault, Stopped};
-use jointplay::units::format_quantity_digits;
+use jointplay_physics::simulate::{Simulation, StopAdvice, StopFault, Stopped};
+use jointplay_physics::units::format_quantity_digits;
+use jointplay_scene::{LiveScene, built_in_text};
 
 /// Steps until the guard stops the run.
 fn run_to_stop(simulation: &mut Simulation) -> Stopped {
@@ -21,7 +21,7 @@ fn check_last_good_state(simulation: &mut Simulation, stopped: &Stopped) {
     let hash = simulation.state_hash();
     assert!(simulation.state_vector().iter().all(|x| x.is_finite()));
     for time in [simulation.step_start(), simulation.time()] {
-        let mut frame = jointplay::simulate::Frame::default();
+        let mut frame = jointplay_physics::simulate::Frame::default();
         simulation.sample(time, &mut frame);
         let text = format!("{frame:?}");
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
@@ -75,7 +75,7 @@ fn following_the_advice_in_mid_run_lets_the_run_continue() {
     assert!(simulation.time() > stopped.time);
 }
 
-fn start_error(scene: &jointplay::scene::Scene) -> String {
+fn start_error(scene: &jointplay_scene::Scene) -> String {
     match LiveScene::new(scene) {
         Ok(_) => panic!("started"),
         Err(error) => error.to_string(),

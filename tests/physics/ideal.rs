@@ -1,8 +1,8 @@
 //! The ideal motion with which a probe is compared: the same machine without play, in closed form or simulated alongside.
 
 use crate::common::scene;
-use jointplay::machine::{Machine, Vec3};
-use jointplay::simulate::{Effect, Frame, Simulation};
+use jointplay_physics::machine::{Machine, Vec3};
+use jointplay_physics::simulate::{Effect, Frame, Simulation};
 
 /// Tip of the probe in the ideal motion at `time`.
 fn ideal_tip(simulation: &mut Simulation, time: f64) -> Vec3 {

@@ -1,9 +1,11 @@
 //! One ball and one socket: restitution of every law, friction, and contacts at the start.
 
 use crate::common::{frame_now, parse};
-use jointplay::contact::{NormalLaw, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution};
-use jointplay::machine::Vec3;
-use jointplay::simulate::{ContactMode, Frame, Simulation};
+use jointplay_physics::contact::{
+    NormalLaw, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution,
+};
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::simulate::{ContactMode, Frame, Simulation};
 
 const MASS: f64 = 0.5;
 const INERTIA: f64 = 2e-5;
@@ -163,7 +165,7 @@ fn slow_impacts_use_the_speed_floor_and_rebound_higher() {
 
 /// A ball pressed against the wall at +x by its weight, with the given tangential velocity and spin.
 fn pressed(velocity: Vec3, spin: Vec3, changes: &[(&str, &str)]) -> (Simulation, Frame) {
-    let parameters = jointplay::contact::Parameters::default();
+    let parameters = jointplay_physics::contact::Parameters::default();
     let load = MASS * 9.81;
     let depth = settled_penetration(hertz_stiffness(&parameters, CLEARANCE), load);
     let position = Vec3::x() * (CLEARANCE + depth);

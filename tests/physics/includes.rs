@@ -2,9 +2,9 @@
 
 use crate::common::{assert_refused, replaced};
 use crate::elements::frame_at;
-use jointplay::machine::Vec3;
-use jointplay::scene::{Scene, SceneError, Texts};
-use jointplay::simulate::Simulation;
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::simulate::Simulation;
+use jointplay_scene::{Scene, SceneError, Texts};
 
 /// A leg on the scene's chassis, with two toes, a spring, a stop and a foot on the world.
 const LEG: &str = r#"

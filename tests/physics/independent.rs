@@ -2,8 +2,8 @@
 //! `tests/reference/solver`.
 
 use crate::common::{Changes, frame_now, run_until, scene};
-use jointplay::mechanism::Mechanism;
-use jointplay::simulate::Simulation;
+use jointplay_physics::mechanism::Mechanism;
+use jointplay_physics::simulate::Simulation;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
 
@@ -29,7 +29,7 @@ type Contact = (usize, f64, f64, f64);
 
 /// The stored run of `solver` with `equations` that are the program's (`borrowed`) or independent (`again`).
 fn stored_run(name: &str, changes: &Changes, equations: &str, solver: &str, end: f64) -> Run {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/solver.toml");
+    let file = format!("{}/tests/reference/solver.toml", crate::ROOT);
     let rows: Rows = toml::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
     let mut runs = rows.run.into_iter();
     let run = runs.find(|run| {

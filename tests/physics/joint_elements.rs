@@ -3,9 +3,9 @@
 use crate::common::assert_refused;
 use crate::common::matrix::for_every;
 use crate::elements::frame_at;
-use jointplay::machine::{Machine, Vec3};
-use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::machine::{Machine, Vec3};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::Scene;
 
 /// The joint that connects the single body with the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -494,7 +494,7 @@ fn columns_follow_the_kind_of_joint() {
         let text = joint.text([0.13, 0.0], &joint.spring(200.0, 0.0));
         let scene = Scene::parse(&text, None, &[]).unwrap();
         let frame = frame_at(&mut Simulation::new(&scene.machine).unwrap(), 0.0);
-        let columns = jointplay::simulate::channels_of(&scene.machine, &frame);
+        let columns = jointplay_physics::simulate::channels_of(&scene.machine, &frame);
         columns
             .into_iter()
             .filter(|channel| channel.unasked)

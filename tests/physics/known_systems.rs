@@ -1,10 +1,10 @@
 //! Sections, exponents and regimes of systems with known answers, by the same code as for mechanisms.
 
-use jointplay::analysis::exponent::Exponent;
-use jointplay::analysis::orbit::Orbit;
-use jointplay::analysis::regime::{Evidence, Regime, classify};
-use jointplay::analysis::section::{Schedule, SectionRun};
-use jointplay::integrate::{Controller, DormandPrince, RungeKutta4, Stepper, System};
+use jointplay_analysis::exponent::Exponent;
+use jointplay_analysis::orbit::Orbit;
+use jointplay_analysis::regime::{Evidence, Regime, classify};
+use jointplay_analysis::section::{Schedule, SectionRun};
+use jointplay_physics::integrate::{Controller, DormandPrince, RungeKutta4, Stepper, System};
 use std::ops::Range;
 
 /// A map of the line or the circle, x' = f(x).

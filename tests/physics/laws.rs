@@ -6,9 +6,9 @@ use std::sync::Arc;
 use proptest::prelude::*;
 
 use crate::common::parse;
-use jointplay::jet::Jet;
-use jointplay::machine::Machine;
-use jointplay::mechanism::{Law, laws_of, periods_of};
+use jointplay_physics::jet::Jet;
+use jointplay_physics::machine::Machine;
+use jointplay_physics::mechanism::{Law, laws_of, periods_of};
 
 /// Shortest step that a law may impose, s.
 const MIN_STEP: f64 = 1e-9;

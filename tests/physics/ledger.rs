@@ -1,7 +1,7 @@
 //! The energy ledger: every joule is accounted for. `promises.rs` checks that keeping the ledger does not change a run.
 
 use crate::common::{Changes, METHODS, SCENES, live, run_until, simulation};
-use jointplay::simulate::{Frame, Ledger, Simulation};
+use jointplay_physics::simulate::{Frame, Ledger, Simulation};
 
 /// Bound on the residual with the preset `accurate`, relative to the energy exchanged.
 const RESIDUAL_BOUND: f64 = 1e-4;

@@ -1,15 +1,15 @@
 //! The numbers of `docs/limits.md` are those that the program computes.
 
 use crate::common::{Changes, frame_now, free_ball, parse, run_until, simulation};
-use jointplay::contact::{
+use jointplay_physics::contact::{
     NormalLaw, Parameters, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution,
 };
-use jointplay::machine::Vec3;
-use jointplay::simulate::{ContactMode, Frame, Simulation};
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::simulate::{ContactMode, Frame, Simulation};
 
 /// Asserts that the page contains this sentence, regardless of line breaks.
 fn assert_documented(sentence: &str) {
-    let page = std::fs::read_to_string("docs/limits.md").unwrap();
+    let page = std::fs::read_to_string(format!("{}/docs/limits.md", crate::ROOT)).unwrap();
     let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(words(&page).contains(&words(sentence)), "docs/limits.md lacks: {sentence}");
 }

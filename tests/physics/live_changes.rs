@@ -1,8 +1,8 @@
 //! Parameters changed while the simulation runs: no burst of energy, no jump, and no effect of refused changes.
 
 use crate::common::{frame_now, live, simulation};
-use jointplay::scene::LiveScene;
-use jointplay::simulate::{CLEARANCE_SPEED, Effect, Frame, Simulation};
+use jointplay_physics::simulate::{CLEARANCE_SPEED, Effect, Frame, Simulation};
+use jointplay_scene::LiveScene;
 
 /// The default scene with its balls at rest on their socket walls.
 fn settled() -> LiveScene {
@@ -142,7 +142,7 @@ fn a_growing_clearance_does_not_drop_the_balls() {
     assert!(extremes.force > 20.0 && extremes.force < 871.0, "{extremes:?}");
     assert!(extremes.impacts >= 3);
     // The balls have settled again.
-    let distance = |joint: &jointplay::simulate::JointReport| joint.eccentricity.norm();
+    let distance = |joint: &jointplay_physics::simulate::JointReport| joint.eccentricity.norm();
     assert!(frame_now(&mut simulation).joints.iter().all(|j| (distance(j) - 0.4e-3).abs() < 5e-6));
 }
 
@@ -226,7 +226,7 @@ fn clearance_to_and_from_zero_waits_for_the_reset() {
     simulation.reset().unwrap();
     assert_eq!(simulation.mechanism().summary().ideal_joints, 1);
     let frame = frame_now(&mut simulation);
-    assert_eq!(frame.joints[0].state, jointplay::simulate::ContactMode::Ideal);
+    assert_eq!(frame.joints[0].state, jointplay_physics::simulate::ContactMode::Ideal);
     assert_eq!(simulation.conditions().joints[1].friction, 0.4);
     // And back.
     assert_eq!(simulation.set("joint.S1.clearance", "0.2 mm"), Ok(Effect::AtReset));
@@ -415,7 +415,7 @@ fn a_parameter_of_the_scene_acts_at_once_if_only_contacts_and_gravity_depend_on_
              [[ball_joint]]\nname = \"S1\"\nsocket = {{ body = \"world\" }}\nball = {{ body = \"rod\", at = \"0 0 100 mm\" }}\n"
         )
     };
-    let clearance = |scene: &jointplay::scene::Scene| scene.machine.ball_joints[0].contact.clearance;
+    let clearance = |scene: &jointplay_scene::Scene| scene.machine.ball_joints[0].contact.clearance;
     let run = |mass: &str| {
         let mut simulation = LiveScene::new(&crate::common::parse(&scene(mass), &[])).unwrap();
         simulation.advance_to(1e-3).unwrap();

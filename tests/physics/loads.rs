@@ -4,10 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use crate::common::{THREE_VARIANTS, assert_refused, parse};
 use crate::elements::frame_at;
-use jointplay::machine::Vec3;
-use jointplay::mechanism::periods_of;
-use jointplay::scene::{Scene, Texts};
-use jointplay::simulate::Simulation;
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::mechanism::periods_of;
+use jointplay_physics::simulate::Simulation;
+use jointplay_scene::{Scene, Texts};
 
 const MASS: f64 = 0.5;
 

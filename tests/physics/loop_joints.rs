@@ -8,8 +8,8 @@ use crate::elements::frame_at;
 use crate::formulations;
 use crate::joint_elements::start_simulation;
 use crate::two_degrees::angle_difference;
-use jointplay::machine::{Mat3, Quat, Vec3};
-use jointplay::simulate::{BodyMotion, Frame, Simulation};
+use jointplay_physics::machine::{Mat3, Quat, Vec3};
+use jointplay_physics::simulate::{BodyMotion, Frame, Simulation};
 
 const G: f64 = 9.81;
 

@@ -3,9 +3,9 @@
 
 use super::independent::compare_with_other_solver;
 use crate::common::{Changes, MACHINES, SCENES, frame_now, parse, run_until, scene, simulation};
-use jointplay::machine::{Machine, Mat3, Vec3};
-use jointplay::scene::{BUILT_IN, Value};
-use jointplay::simulate::{ContactMode, Frame, Simulation};
+use jointplay_physics::machine::{Machine, Mat3, Vec3};
+use jointplay_physics::simulate::{ContactMode, Frame, Simulation};
+use jointplay_scene::{BUILT_IN, Value};
 use std::f64::consts::{PI, TAU};
 
 const IDEAL: (&str, &str) = ("contact.clearance", "0");
@@ -528,11 +528,11 @@ fn each_machine_assembles_at_the_ends_of_its_parameters() {
     for name in MACHINES {
         let plain = scene(name, &[]);
         let mut parameters = plain.parameters();
-        parameters.retain(|row| row.scope == jointplay::scene::Scope::Own);
+        parameters.retain(|row| row.scope == jointplay_scene::Scope::Own);
         assert!(!parameters.is_empty(), "{name}");
         for corner in 0..1_u32 << parameters.len() {
             let ends = parameters.iter().enumerate().map(|(n, row)| {
-                let jointplay::scene::Kind::Number { min, max, .. } = row.kind else {
+                let jointplay_scene::Kind::Number { min, max, .. } = row.kind else {
                     panic!("{} is no number", row.key)
                 };
                 let end = if corner >> n & 1 == 1 { max } else { min };

@@ -1,9 +1,18 @@
-//! Tests of the mechanics: reference values, energy, contacts, methods, stops and doubts.
+//! Tests of the mechanics: reference values, energy, contacts, methods, stops and doubts. A test of the analysis crate, so that an edit
+//! in physics is tested without building the window.
 
 #[path = "../common/mod.rs"]
 mod common;
 #[path = "../common/large.rs"]
 mod large;
+
+/// The project's folder.
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
+/// Path of a scene in `tests/trials`.
+fn trial(name: &str) -> String {
+    format!("{ROOT}/tests/trials/{name}.toml")
+}
 
 mod bushings;
 mod channels;

@@ -2,7 +2,7 @@
 //! same peaks, and `automatic` gives the same forces in a long chain at rest.
 
 use crate::common::{Changes, simulation};
-use jointplay::simulate::Impact;
+use jointplay_physics::simulate::Impact;
 
 /// An impact: its joint, how many the joint had before, its start (s) and its peak force (N).
 type ImpactRow = (usize, usize, f64, f64);

@@ -5,10 +5,10 @@ use crate::common::{assert_refused, frame_now, replaced};
 use crate::elements::frame_at;
 use crate::joint_elements::start_simulation;
 use crate::two_degrees::{G, train};
-use jointplay::machine::{MachineFault, Vec3};
-use jointplay::mechanism::MechanismError;
-use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::machine::{MachineFault, Vec3};
+use jointplay_physics::mechanism::MechanismError;
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::Scene;
 
 fn link(name: &str) -> String {
     format!("[[body]]\nname = \"{name}\"\nmass = 0\ninertia = [0, 0, 0]\n")

@@ -2,9 +2,9 @@
 
 use crate::common::{parse, scene};
 use crate::large::scene_text;
-use jointplay::machine::Vec3;
-use jointplay::mechanism::{ActiveSet, Mechanism, MechanismError};
-use jointplay::scene::BUILT_IN;
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::mechanism::{ActiveSet, Mechanism, MechanismError};
+use jointplay_scene::BUILT_IN;
 
 #[test]
 fn computing_the_actuator_forces_again_changes_no_load() {

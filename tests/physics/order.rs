@@ -1,9 +1,9 @@
 //! Each stepper converges with its order on smooth motions of the mechanisms.
 
 use crate::common::{run_until, scene, simulation, slope};
-use jointplay::contact::ContactState;
-use jointplay::integrate::{DormandPrince, RungeKutta4, Stepper, System};
-use jointplay::mechanism::{ActiveSet, Mechanism, StepStart};
+use jointplay_physics::contact::ContactState;
+use jointplay_physics::integrate::{DormandPrince, RungeKutta4, Stepper, System};
+use jointplay_physics::mechanism::{ActiveSet, Mechanism, StepStart};
 
 /// Largest difference of two states relative to the scales of their components.
 fn distance(a: &[f64], b: &[f64], scale: &[f64]) -> f64 {

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::Scene;
 
 /// A run: clearance and friction; largest normal force of each ball joint, N; largest distance of x, m, and of beta, rad, from the
 /// motion without clearance, at whole milliseconds; last separation of any joint, s.

@@ -1,8 +1,8 @@
 //! The cost of a scene depends only on the features that it uses, and its summary lists them.
 
 use crate::common::{frame_now, scene, simulation};
-use jointplay::mechanism::{Mechanism, Summary};
-use jointplay::simulate::ContactMode;
+use jointplay_physics::mechanism::{Mechanism, Summary};
+use jointplay_physics::simulate::ContactMode;
 
 fn summary(name: &str, changes: &[(&str, &str)]) -> Summary {
     Mechanism::new(&scene(name, changes).machine).unwrap().summary()
@@ -12,7 +12,7 @@ const IDEAL: (&str, &str) = ("contact.clearance", "0");
 
 #[test]
 fn rigid_scenes_evaluate_no_contact() {
-    for name in jointplay::scene::BUILT_IN {
+    for name in jointplay_scene::BUILT_IN {
         for form in ["tree", "lagrange"] {
             let changes = [IDEAL, ("formulation", form)];
             let mut simulation = simulation(name, &changes);

@@ -5,9 +5,9 @@
 
 use crate::common::matrix::in_tree;
 use crate::common::{frame_now, parse, run_until};
-use jointplay::machine::{Quat, Vec3};
-use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::machine::{Quat, Vec3};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::Scene;
 
 const G: f64 = 9.81;
 

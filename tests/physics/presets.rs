@@ -5,11 +5,11 @@
 use std::ops::ControlFlow;
 
 use crate::common::{MACHINES, SCENES, run_until, scene};
-use jointplay::analysis::{Grid, Row, RunContext, Tradeoff, presets};
-use jointplay::integrate::Method;
-use jointplay::machine::{Coupled, Preset};
-use jointplay::scene::Scene;
-use jointplay::simulate::{Impact, Simulation};
+use jointplay_analysis::{Grid, Row, RunContext, Tradeoff, presets};
+use jointplay_physics::integrate::Method;
+use jointplay_physics::machine::{Coupled, Preset};
+use jointplay_physics::simulate::{Impact, Simulation};
+use jointplay_scene::Scene;
 
 /// A machine, and the peak forces of impacts: (joint, which of its impacts, N).
 struct Trial {
@@ -106,7 +106,7 @@ fn peak(scene: &Scene, impacts: &[Impact], name: &str, n: usize) -> Option<f64> 
 #[test]
 fn peaks_of_unknown_machines_are_within_the_stated_error_of_each_preset() {
     for trial in &TRIALS {
-        let path = format!("tests/trials/{}.toml", trial.scene);
+        let path = crate::trial(trial.scene);
         let changes: Vec<_> =
             trial.changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
         let scene = Scene::load(&path, &changes).unwrap();
@@ -192,7 +192,8 @@ fn assert_chosen_well(name: &str, changes: &[(&str, &str)]) {
 const IDEAL: (&str, &str) = ("contact.clearance", "0");
 
 #[test]
-fn fast_presets_choose_the_cheaper_method_on_variants_of_built_in_machines() {
+#[ignore = "full: half a minute"]
+fn full_fast_presets_choose_the_cheaper_method_on_variants_of_built_in_machines() {
     assert_chosen_well("chain", &[("chain.links", "4")]);
     assert_chosen_well("chain", &[("chain.links", "32")]);
     assert_chosen_well("hexapod", &[IDEAL, ("joint.A6.clearance", "0.1 mm")]);
@@ -205,16 +206,17 @@ fn fast_presets_choose_the_cheaper_method_on_variants_of_built_in_machines() {
 }
 
 #[test]
-fn fast_presets_choose_the_cheaper_method_on_trial_machines() {
+#[ignore = "full: half a minute"]
+fn full_fast_presets_choose_the_cheaper_method_on_trial_machines() {
     // The fourth impact of that linkage is slower than 3 mm/s: the discrete gradient takes it in three steps (`docs/numerics.md`).
     for trial in TRIALS.iter().filter(|trial| trial.scene != "peaucellier") {
-        assert_chosen_well(&format!("tests/trials/{}.toml", trial.scene), trial.changes);
+        assert_chosen_well(&crate::trial(trial.scene), trial.changes);
     }
     let falls = [("gravity.z", "-9.81 m/s^2"), ("gravity.x", "1 m/s^2")];
-    assert_chosen_well("tests/trials/peaucellier.toml", &falls);
+    assert_chosen_well(&crate::trial("peaucellier"), &falls);
     // Machines that came later.
     for name in ["door", "swing", "five-rods", "tied-arm"] {
-        assert_chosen_well(&format!("tests/trials/{name}.toml"), &[]);
+        assert_chosen_well(&crate::trial(name), &[]);
     }
 }
 
@@ -256,7 +258,7 @@ fn joints_are_coupled_by_the_bodies_between_them() {
     ] {
         assert_eq!(coupled(name, changes), Coupled { joints, is_narrow: true }, "{name} {changes:?}");
     }
-    let eight = coupled("tests/trials/slow-eight.toml", &[]);
+    let eight = coupled(&crate::trial("slow-eight"), &[]);
     assert_eq!(eight.joints, 0, "eight balls, each in a socket of its own in the world");
 }
 

@@ -9,9 +9,9 @@ use crate::common::matrix::{FORMULATIONS, Variant, every_variant, for_every};
 use crate::common::{FOUR_VARIANTS, MACHINES, METHODS, SCENES, frame_now, parse, run_until, scene};
 use crate::planar_loops::{Extras, GRASHOF, PLAIN};
 use crate::{loop_joints, two_degrees};
-use jointplay::machine::Quat;
-use jointplay::scene::{LiveScene, Scene, built_in_text};
-use jointplay::simulate::{Frame, Ledger, Model, Simulation};
+use jointplay_physics::machine::Quat;
+use jointplay_physics::simulate::{Frame, Ledger, Model, Simulation};
+use jointplay_scene::{LiveScene, Scene, built_in_text};
 
 /// Steps before and after the snapshot of a run without contacts.
 const BEFORE: u32 = 10;
@@ -204,7 +204,7 @@ fn machines_and_loops_keep_the_promises() {
 /// The corpus covers every key of the format.
 #[test]
 fn scenes_of_the_corpus_keep_the_promises() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
+    let folder = Path::new(crate::ROOT).join("tests/fuzz/corpus");
     let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     // A rod of 1e-300 kg has no second impact.

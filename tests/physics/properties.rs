@@ -5,9 +5,9 @@ use std::sync::LazyLock;
 
 use crate::common::invariants::finite;
 use crate::common::{METHODS, SCENES};
-use jointplay::machine::Doubt as MachineDoubt;
-use jointplay::scene::{BUILT_IN, Kind, LiveScene, Parameter, Scene, Scope, Value, table};
-use jointplay::simulate::{Doubt, Frame};
+use jointplay_physics::machine::Doubt as MachineDoubt;
+use jointplay_physics::simulate::{Doubt, Frame};
+use jointplay_scene::{BUILT_IN, Kind, LiveScene, Parameter, Scene, Scope, Value, table};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseError};
 
@@ -199,8 +199,8 @@ proptest! {
             let impacts_of_joint = || impacts.iter().filter(move |impact| impact.joint == j);
             prop_assert!(impacts_of_joint().count() as u64 <= statistics.impacts[j], "{}", name);
             prop_assert!(joint.contact.clearance > 0.0 || impacts_of_joint().count() == 0, "{}", name);
-            let chi = jointplay::contact::damping_factor(joint.contact.normal_law, joint.contact.restitution);
-            let largest = joint.contact.approach_speed == jointplay::contact::ApproachSpeed::Largest;
+            let chi = jointplay_physics::contact::damping_factor(joint.contact.normal_law, joint.contact.restitution);
+            let largest = joint.contact.approach_speed == jointplay_physics::contact::ApproachSpeed::Largest;
             for impact in impacts_of_joint() {
                 prop_assert!(impact.peak <= from_steps * (1.0 + 1e-12), "{:?} beyond {}", impact, from_steps);
                 prop_assert!(impact.start < impact.end && impact.end <= plain.time(), "{:?}", impact);

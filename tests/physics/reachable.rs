@@ -2,10 +2,10 @@
 
 use crate::common::truss::{Guide, Rod, TIP, TWO_RODS, support, truss};
 use crate::common::{parse, run_until, scene};
-use jointplay::machine::{Machine, Vec3};
-use jointplay::mechanism::{Farthest, HeldError, HeldMachine};
-use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::machine::{Machine, Vec3};
+use jointplay_physics::mechanism::{Farthest, HeldError, HeldMachine};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::Scene;
 
 fn held_machine(scene: &Scene, positions: &[Option<f64>]) -> HeldMachine {
     HeldMachine::new(&scene.machine, positions).unwrap_or_else(|error| panic!("{error}"))

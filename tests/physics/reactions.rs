@@ -2,9 +2,9 @@
 
 use crate::common::matrix::FORMULATIONS;
 use crate::common::{parse, scene};
-use jointplay::machine::{JointKind, Vec3};
-use jointplay::scene::Scene;
-use jointplay::simulate::{BodyMotion, Frame, Simulation};
+use jointplay_physics::machine::{JointKind, Vec3};
+use jointplay_physics::simulate::{BodyMotion, Frame, Simulation};
+use jointplay_scene::Scene;
 
 /// A frame that requests reactions.
 fn with_reactions() -> Frame {

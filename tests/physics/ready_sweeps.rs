@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 
 use crate::common::matrix::in_parallel;
 use crate::common::simulation;
-use jointplay::analysis::ready_sweeps::{READY_SWEEPS, ReadySweep};
-use jointplay::analysis::sweep_task::{Share, SweptPoint};
-use jointplay::analysis::task::{Job, Message, perform};
+use jointplay_analysis::ready_sweeps::{READY_SWEEPS, ReadySweep};
+use jointplay_analysis::sweep_task::{Share, SweptPoint};
+use jointplay_analysis::task::{Job, Message, perform};
 
 /// The points of a sweep that varies its parameter as `vary` says, with exponents or without.
 fn points(ready: &ReadySweep, vary: Option<&str>, exponent: bool) -> Vec<SweptPoint> {

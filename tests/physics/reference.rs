@@ -1,7 +1,7 @@
 //! Reference values of the physics contract: single numbers, trajectories, and agreement between the two formulations.
 
-use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::Scene;
 
 fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
     let changes: Vec<(String, String)> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
@@ -14,7 +14,7 @@ fn simulation(name: &str, changes: &[(&str, &str)]) -> Simulation {
 
 /// Rows of a file in `tests/reference/`: 16 columns.
 fn reference(file: &str) -> Vec<[f64; 16]> {
-    let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/tests/reference/{file}", crate::ROOT);
     let text = std::fs::read_to_string(path).unwrap();
     text.lines()
         .skip(1)

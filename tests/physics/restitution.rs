@@ -1,9 +1,9 @@
 //! The restitution check: each impact reports the requested coefficient, the one its law gives, and the achieved one.
 
 use crate::common::{Changes, METHODS, live, parse, simulation};
-use jointplay::contact::{NormalLaw, damping_factor, undisturbed_restitution};
-use jointplay::scene::{LiveScene, built_in_text};
-use jointplay::simulate::{Doubt, Impact, Simulation};
+use jointplay_physics::contact::{NormalLaw, damping_factor, undisturbed_restitution};
+use jointplay_physics::simulate::{Doubt, Impact, Simulation};
+use jointplay_scene::{LiveScene, built_in_text};
 
 /// All impacts that end before `end`, collected step by step.
 fn impacts(simulation: &mut Simulation, end: f64) -> Vec<Impact> {
@@ -225,7 +225,7 @@ fn struck_contact(method: &str, approach_speed: &str) -> LiveScene {
 /// or stays at its initial value. Returns the largest force and the largest ratio of damping to elastic force in the first 200 us.
 fn reference_contact(largest: bool) -> (f64, f64) {
     let scene = crate::common::scene("pendulum", &[]);
-    let c = jointplay::contact::Coefficients::new(&scene.machine.contact, scene.machine.contact.clearance);
+    let c = jointplay_physics::contact::Coefficients::new(&scene.machine.contact, scene.machine.contact.clearance);
     let (mass, g, h) = (scene.machine.bodies[0].mass, 981.0, 1e-9);
     let (mut x, mut v, mut v0) = (0.0_f64, 2e-3_f64, 2e-3_f64);
     let (mut force, mut ratio) = (0.0_f64, 0.0_f64);

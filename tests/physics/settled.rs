@@ -1,7 +1,7 @@
 //! The implicit methods on settled contacts: the forces of the explicit method in far fewer steps, and bit-identical resumption.
 
 use crate::common::{mean_forces, simulation};
-use jointplay::simulate::Simulation;
+use jointplay_physics::simulate::Simulation;
 
 #[test]
 fn settled_forces_are_those_of_a_converged_explicit_run() {

@@ -1,9 +1,9 @@
 //! `start = "settled"`: each ball starts with the penetration at which it transmits the reaction of the machine without play.
 
 use crate::common::{frame_now, scene};
-use jointplay::machine::{BallJoint, StartRule};
-use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::machine::{BallJoint, StartRule};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::Scene;
 
 fn start_simulation(name: &str, changes: &[(&str, &str)]) -> Simulation {
     Simulation::new(&scene(name, changes).machine).unwrap_or_else(|error| panic!("{name}: {error}"))
@@ -62,7 +62,7 @@ fn a_settled_start_has_no_impact_peaks() {
 
 #[test]
 fn a_hanging_pendulum_rests_on_its_wall() {
-    let text = jointplay::scene::built_in_text("pendulum").expect("built in");
+    let text = jointplay_scene::built_in_text("pendulum").expect("built in");
     let scene = Scene::parse(text, None, &[]).expect("reads");
     let mut scene = scene;
     scene.set("start", "settled").expect("a choice");
@@ -72,7 +72,7 @@ fn a_hanging_pendulum_rests_on_its_wall() {
     let joint = &frame.joints[0];
     let contact = &scene.machine.ball_joints[0].contact;
     // Hertz: F = K delta^1.5, with the force of the ideal joint.
-    let stiffness = jointplay::contact::Coefficients::new(contact, contact.clearance).stiffness;
+    let stiffness = jointplay_physics::contact::Coefficients::new(contact, contact.clearance).stiffness;
     let depth = (reactions("pendulum")[0] / stiffness).powf(2.0 / 3.0);
     assert!((joint.penetration / depth - 1.0).abs() < 0.01, "{} {depth}", joint.penetration);
     assert!((joint.eccentricity.norm() - contact.clearance - depth).abs() < 1e-9);

@@ -7,8 +7,8 @@
 use std::fmt::Write as _;
 
 use crate::common::{parse, run_until};
-use jointplay::scene::Scene;
-use jointplay::simulate::{Impact, Simulation};
+use jointplay_physics::simulate::{Impact, Simulation};
+use jointplay_scene::Scene;
 
 /// Approach speeds of the first two impacts, m/s: of a fall through the clearance of 0.1 mm, and after a rebound with 0.79491.
 const APPROACHES: [f64; 2] = [0.044_294_469_180_7, 0.035_210_189_03];
@@ -108,7 +108,7 @@ fn two_four_and_eight_balls_strike_alike_with_every_method() {
 
 #[test]
 fn equal_gaps_of_a_straight_line_linkage_are_crossed_at_one_speed() {
-    let text = std::fs::read_to_string("tests/trials/peaucellier.toml").unwrap();
+    let text = std::fs::read_to_string(crate::trial("peaucellier")).unwrap();
     let gravity = [("gravity.z", "-9.81 m/s^2"), ("gravity.x", "1 m/s^2")];
     for tolerance in ["1e-6", "1e-8", "1e-11"] {
         let scene = parse(&text, &[&gravity[..], &[("solver.tolerance", tolerance)]].concat());
@@ -123,7 +123,7 @@ fn equal_gaps_of_a_straight_line_linkage_are_crossed_at_one_speed() {
 
 #[test]
 fn both_inner_balls_of_a_steering_strike_at_one_speed() {
-    let scene = Scene::load("tests/trials/steer.toml", &[]).unwrap();
+    let scene = Scene::load(&crate::trial("steer"), &[]).unwrap();
     let all = impacts(&scene, 1.2e-3);
     let inner = |side: &str| {
         let name = format!("{side}.inner");

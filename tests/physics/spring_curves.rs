@@ -5,10 +5,10 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use crate::common::matrix::for_every;
 use crate::common::{THREE_VARIANTS, assert_refused, parse};
 use crate::elements::frame_at;
-use jointplay::interpolate::Interpolation;
-use jointplay::machine::{Elastic, ElementKind};
-use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay_physics::interpolate::Interpolation;
+use jointplay_physics::machine::{Elastic, ElementKind};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::Scene;
 
 const MASS: f64 = 0.5;
 /// Moment of inertia of the hinged body about its hinge.

@@ -1,9 +1,9 @@
 //! The linearised equations that implicit steps solve, beside central differences of the equations.
 
 use crate::common::{parse, scene};
-use jointplay::contact::ContactState;
-use jointplay::integrate::{StiffSystem, System};
-use jointplay::mechanism::{ActiveSet, Mechanism};
+use jointplay_physics::contact::ContactState;
+use jointplay_physics::integrate::{StiffSystem, System};
+use jointplay_physics::mechanism::{ActiveSet, Mechanism};
 
 /// Asserts that the solutions x of (s I - J) x = b, for each unit rate b, satisfy s x - J x = b with central differences of the
 /// equations along x for J x. `most` are the largest changes of positions and rates, SI.

@@ -2,9 +2,9 @@
 
 use crate::common::{THREE_VARIANTS, parse};
 use crate::elements::frame_at;
-use jointplay::machine::Doubt as MachineDoubt;
-use jointplay::scene::Scene;
-use jointplay::simulate::{Doubt, Simulation};
+use jointplay_physics::machine::Doubt as MachineDoubt;
+use jointplay_physics::simulate::{Doubt, Simulation};
+use jointplay_scene::Scene;
 
 /// A force of 0, then 100 N from 0.101 s to 0.2 s, then 0, on 1 kg.
 const SQUARE: &str = include_str!("../trials/square.toml");

@@ -2,9 +2,9 @@
 
 use crate::common::parse;
 use crate::elements::frame_at;
-use jointplay::machine::{Quat, Vec3};
-use jointplay::scene::{Scene, Texts, built_in_text};
-use jointplay::simulate::Simulation;
+use jointplay_physics::machine::{Quat, Vec3};
+use jointplay_physics::simulate::Simulation;
+use jointplay_scene::{Scene, Texts, built_in_text};
 
 const SHIFT: [f64; 3] = [0.3, -0.2, 0.1];
 const POSE: &str = "position = \"0.3 -0.2 0.1 m\"\nrotation = { axis = [1, 2, -2], angle = \"50 deg\" }\n";

@@ -4,8 +4,8 @@ use crate::common::matrix::{FORMULATIONS, every_variant};
 use crate::common::{frame_now, parse, run_until};
 use crate::elements::frame_at;
 use crate::joint_elements::start_simulation;
-use jointplay::machine::Vec3;
-use jointplay::simulate::Simulation;
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::simulate::Simulation;
 
 /// Moment of inertia about the hinge, kg m^2; the centroid is on the axis.
 const INERTIA: f64 = 0.01;
@@ -292,7 +292,7 @@ fn samples_inside_a_step_count_the_turns_of_their_own_instant() {
             let (from, to) = (simulation.step_start(), simulation.time());
             for part in 0..=4 {
                 let t = from + 0.25 * f64::from(part) * (to - from);
-                let mut frame = jointplay::simulate::Frame::default();
+                let mut frame = jointplay_physics::simulate::Frame::default();
                 simulation.sample(t, &mut frame);
                 let expected = 60.0 * t - 5.0 * t * t;
                 assert!((frame.coordinates[0][0] - expected).abs() < 1e-4, "{known:?} {t}");

@@ -1,10 +1,10 @@
 //! Displaced states, and exponents and regimes from twin runs of a mechanism.
 
 use crate::common::{Changes, METHODS, frame_now, parse, run_until, scene, simulation};
-use jointplay::analysis::drive::{drive_period, observed};
-use jointplay::analysis::point::{Plan, PointResult, PointRun};
-use jointplay::analysis::regime::Regime;
-use jointplay::simulate::Simulation;
+use jointplay_analysis::drive::{drive_period, observed};
+use jointplay_analysis::point::{Plan, PointResult, PointRun};
+use jointplay_analysis::regime::Regime;
+use jointplay_physics::simulate::Simulation;
 
 /// Displaces coordinate `i` by `by` and nothing else.
 fn displace_coordinate(simulation: &mut Simulation, i: usize, by: f64) {
@@ -168,7 +168,7 @@ fn drives_report_their_common_period() {
 }
 
 /// Sections and exponent of a scene over `periods` periods, of which the first `discard` are discarded.
-fn exponent_of(scene: &jointplay::scene::Scene, periods: usize, discard: usize) -> PointResult {
+fn exponent_of(scene: &jointplay_scene::Scene, periods: usize, discard: usize) -> PointResult {
     let period = drive_period(scene).expect("a drive");
     let plan = Plan { periods, discard, phase: 0.0, exponent: true };
     let mut run = PointRun::cold(scene, &plan.into(), period).expect("starts");

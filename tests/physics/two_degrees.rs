@@ -4,8 +4,8 @@ use crate::common::matrix::in_tree;
 use crate::common::{frame_now, slope};
 use crate::elements::frame_at;
 use crate::joint_elements::start_simulation;
-use jointplay::machine::{Quat, Vec3};
-use jointplay::simulate::Frame;
+use jointplay_physics::machine::{Quat, Vec3};
+use jointplay_physics::simulate::Frame;
 
 pub const G: f64 = 9.81;
 

@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use crate::common::matrix::for_every;
 use crate::common::{THREE_VARIANTS, assert_refused, parse, replaced};
 use crate::elements::frame_at;
-use jointplay::machine::Vec3;
-use jointplay::scene::{LiveScene, Scene};
-use jointplay::simulate::Frame;
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::simulate::Frame;
+use jointplay_scene::{LiveScene, Scene};
 
 const MASS: f64 = 20.0;
 const STIFFNESS: f64 = 50e3;

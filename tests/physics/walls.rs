@@ -1,8 +1,8 @@
 //! Contacts that begin without a sign change: a ball that starts on its wall, or is exactly on it where a search interval ends.
 
 use crate::common::{free_ball, parse};
-use jointplay::scene::LiveScene;
-use jointplay::simulate::{Impact, Simulation};
+use jointplay_physics::simulate::{Impact, Simulation};
+use jointplay_scene::LiveScene;
 
 fn impacts_of(text: &str, changes: &[(&str, &str)], duration: f64) -> (Simulation, Vec<Impact>) {
     let mut simulation = Simulation::new(&parse(text, changes).machine).expect("starts");

@@ -1,9 +1,9 @@
 //! Wear maps: the cells add up to the totals of the run, lie at the contact points, and do not affect the run.
 
 use crate::common::{Changes, METHODS, SCENES, live, run_until, simulation};
-use jointplay::machine::Mat3;
-use jointplay::scene::LiveScene;
-use jointplay::simulate::{Cell, Frame, Simulation, Wear};
+use jointplay_physics::machine::Mat3;
+use jointplay_physics::simulate::{Cell, Frame, Simulation, Wear};
+use jointplay_scene::LiveScene;
 
 /// A run over `duration` with its wear map; the last step is cut at its end.
 fn run_with_map(name: &str, changes: &Changes, duration: f64) -> LiveScene {

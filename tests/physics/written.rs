@@ -3,12 +3,12 @@
 
 use crate::common::invariants::finite;
 use crate::properties::config;
-use jointplay::machine::{Quat, Vec3};
-use jointplay::scene::{
+use jointplay_physics::machine::{Quat, Vec3};
+use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_physics::units::{Dimension, si_unit};
+use jointplay_scene::{
     ABOVE_ZERO, DefaultRule, FileKey, FileTable, Scene, SceneError, Texts, ValueType, file_tables, is_element,
 };
-use jointplay::simulate::{Frame, Simulation};
-use jointplay::units::{Dimension, si_unit};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 

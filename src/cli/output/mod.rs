@@ -5,7 +5,7 @@ mod json;
 mod npz;
 mod table;
 
-pub use csv::{ChecksumWriter, significant};
+pub use csv::ChecksumWriter;
 pub use json::write_meta;
 pub use table::{Column, Table, Values};
 

@@ -174,7 +174,7 @@ fn csv(table: &[(Row, Outcomes)]) -> String {
 }
 
 fn path(ending: &str) -> std::path::PathBuf {
-    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("docs/extremes.{ending}"))
+    std::path::Path::new(crate::ROOT).join(format!("docs/extremes.{ending}"))
 }
 
 fn stored_csv() -> String {

@@ -1,6 +1,6 @@
 //! One cell of the table: a run and its outcome.
 
-use jointplay::simulate::{Frame, Pacer, Simulation};
+use jointplay_physics::simulate::{Frame, Pacer, Simulation};
 
 use super::rows::Row;
 use crate::common::frame_now;

@@ -1,8 +1,8 @@
 //! The extreme cases: their scenes and changes, and the methods or presets of each.
 
-use jointplay::machine::{JointStart, Vec3};
-use jointplay::scene::Scene;
-use jointplay::simulate::Simulation;
+use jointplay_physics::machine::{JointStart, Vec3};
+use jointplay_physics::simulate::Simulation;
+use jointplay_scene::Scene;
 
 /// Simulated time, s, that includes the first impacts of every scene.
 const DURATION: f64 = 0.03;

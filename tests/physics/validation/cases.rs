@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use jointplay::scene::{Scene, evaluate};
-use jointplay::simulate::{Frame, Impact, Reading, Simulation, channels_of, chosen_channels};
+use jointplay_physics::simulate::{Frame, Impact, Reading, Simulation, channels_of, chosen_channels};
+use jointplay_scene::{Scene, evaluate};
 
 /// A run of a scene with known results.
 #[derive(Clone, Debug, Deserialize)]

@@ -2,8 +2,8 @@
 
 mod cases;
 
-use jointplay::cli::output::significant;
-use jointplay::scene::BENCHMARKS;
+use jointplay_physics::units::significant;
+use jointplay_scene::BENCHMARKS;
 
 use self::cases::{CASES, Case, Check, Comparison, ImpactProperty, MODELS, Measure, ReferenceValue};
 
@@ -22,7 +22,7 @@ fn every_case_is_within_its_bound_and_the_page_is_current() {
     assert!(missed.is_empty(), "not within their bounds: {missed:#?}");
     let sources: String = CASES.iter().map(source).collect();
     let page = include_str!("page.md").replace("{rows}", &rows).replace("{sources}", &sources);
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation.md");
+    let path = std::path::Path::new(crate::ROOT).join("docs/validation.md");
     if std::env::var_os("UPDATE_PAGES").is_some() {
         std::fs::write(&path, &page).unwrap();
     }
