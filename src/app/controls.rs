@@ -440,8 +440,7 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
         if let Some(shown_law) = &shown_law {
             ui.label(RichText::new(format!("{}: {}", shown_law.law, shown_law.formula)).small());
         }
-        let elsewhere = shown_law.and_then(|shown_law| shown_law.elsewhere).map(str::to_owned);
-        let equation = elsewhere.unwrap_or_else(|| equations::source(parameter.equation));
+        let equation = shown_law.and_then(|shown_law| shown_law.elsewhere).unwrap_or(parameter.equation);
         if !equation.is_empty() {
             ui.label(RichText::new(equation).small());
         }

@@ -627,7 +627,8 @@ static PARAMETER: FileTable = FileTable::new(
         key("help", ValueType::Text, "\"How far it goes.\"", "what it is").default_text("none"),
         key("group", ValueType::Text, "\"Drive\"", "heading under which the window folds it away")
             .default_text("shown first"),
-        key("equation", ValueType::Text, "\"Paper eq. (59)\"", "the equation that it enters").default_text("none"),
+        key("equation", ValueType::Text, "\"Sheng & Chen (2024), eq. 59\"", "the equation that it enters")
+            .default_text("none"),
     ],
 );
 

@@ -87,7 +87,7 @@ const fn gravity(
         Value::Number(default),
         Scope::Every,
         help,
-        "Weight in the force vector of paper eqs. (52), (53)",
+        "Weight in the force vector of Sheng & Chen (2024), eqs. 52, 53",
     )
 }
 
@@ -99,7 +99,7 @@ static TABLE: [Parameter; 25] = [
         "Radial gap c = R - r between socket and ball. With 0 the joint is ideal: a constraint instead of a contact. \
          It must stay below the ball radius. Larger gaps give longer free flights and harder impacts; at 0.01 mm and \
          below, the contact patch is no longer small against the ball, which Hertz's theory assumes.",
-        "Paper eqs. (9), (10); stiffness in (19)",
+        "Sheng & Chen (2024), eqs. 9, 10; stiffness in eq. 19",
     ),
     contact_number!(
         friction,
@@ -107,7 +107,7 @@ static TABLE: [Parameter; 25] = [
         number(D::None, 0.0, 10.0, "", (0.0, 1.0)),
         "Coulomb coefficient cf of ball on socket. Steel on steel lies between 0.1 (oiled) and 0.8 (dry). With 0 \
          the rattling lasts much longer.",
-        "Paper eq. (20)",
+        "Sheng & Chen (2024), eq. 20",
     ),
     contact_number!(
         restitution,
@@ -116,7 +116,7 @@ static TABLE: [Parameter; 25] = [
         "Rebound speed over approach speed asked of the normal law; 1 loses no energy. The Lankarani–Nikravesh \
          law is right only near 1: asked for 0.9 it gives 0.913, for 0.8 0.847, for 0 0.66. gonthier gives what is \
          asked for, flores within 0.05; both divide by this number and refuse 0.",
-        "Paper eq. (19)",
+        "Sheng & Chen (2024), eq. 19",
     ),
     contact_number!(
         youngs_modulus,
@@ -124,7 +124,7 @@ static TABLE: [Parameter; 25] = [
         logarithmic(D::Stress, 1e6, 1e12, "GPa", (1e9, 1e12)),
         "Stiffness E of the material of ball and socket. Steel has 206 GPa. A softer material gives longer, gentler \
          impacts and deeper penetration, and lets the solver take larger steps.",
-        "Paper eq. (19), stiffness K",
+        "Sheng & Chen (2024), eq. 19, stiffness K",
     ),
     contact_number!(
         poisson_ratio,
@@ -132,7 +132,7 @@ static TABLE: [Parameter; 25] = [
         number(D::None, 0.0, 0.499, "", (0.0, 0.499)),
         "Lateral contraction over axial extension of the material, nu. Metals have about 0.3. It changes the contact \
          stiffness by at most a third.",
-        "Paper eq. (19), stiffness K",
+        "Sheng & Chen (2024), eq. 19, stiffness K",
     ),
     contact_number!(
         ball_radius,
@@ -140,7 +140,7 @@ static TABLE: [Parameter; 25] = [
         logarithmic(D::Length, 1e-4, 1.0, "mm", (1e-3, 0.1)),
         "Radius r of the ball; the socket has R = r + c. A larger ball in the same gap fits more closely, so the \
          contact is stiffer.",
-        "Paper eqs. (9), (12), (19)",
+        "Sheng & Chen (2024), eqs. 9, 12, 19",
     ),
     contact_choice!(
         friction_velocity,
@@ -149,7 +149,7 @@ static TABLE: [Parameter; 25] = [
         "Sliding velocity of the friction law. centres, the paper's choice, is the relative velocity of the two \
          centres, which neglects the rotation of the ball. surface is the relative velocity of the two material \
          points in contact.",
-        "Paper eqs. (15), (16) for centres; (13), (14) with the bodies' rotation for surface",
+        "Sheng & Chen (2024), eqs. 15, 16 for centres; eqs. 13, 14 with the bodies' rotation for surface",
     ),
     contact_number!(
         slip_speed_low,
@@ -157,7 +157,7 @@ static TABLE: [Parameter; 25] = [
         logarithmic(D::Speed, 0.0, 1.0, "mm/s", (1e-7, 1e-3)),
         "v_a: below this sliding speed there is no friction, so that its direction never jumps at rest. It must stay \
          below the high slip speed.",
-        "Paper eq. (21)",
+        "Sheng & Chen (2024), eq. 21",
     ),
     contact_number!(
         slip_speed_high,
@@ -165,7 +165,7 @@ static TABLE: [Parameter; 25] = [
         logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 1e-1)),
         "v_theta: above this sliding speed friction is full; below it a ball creeps where dry friction would hold \
          it. A smaller value creeps less and is stiffer to compute.",
-        "Paper eq. (21)",
+        "Sheng & Chen (2024), eq. 21",
     ),
     contact_number!(
         impact_speed_floor,
@@ -173,7 +173,7 @@ static TABLE: [Parameter; 25] = [
         logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 0.1)),
         "Least approach speed by which the damping term divides. Without a floor the last, softest contacts would be \
          infinitely stiff. A contact that begins more slowly than this rebounds higher than asked.",
-        "Paper eq. (19), the speed at the start of contact",
+        "Sheng & Chen (2024), eq. 19, the speed at the start of contact",
     ),
     contact_choice!(
         approach_speed,
@@ -184,7 +184,7 @@ static TABLE: [Parameter; 25] = [
          strongly. largest is \
          the largest rate of the contact so far, which limits damping to that of an undisturbed impact; an \
          undisturbed impact is the same with both.",
-        "Paper eq. (19), the speed at the start of contact",
+        "Sheng & Chen (2024), eq. 19, the speed at the start of contact",
     ),
     contact_choice!(
         normal_law,
@@ -193,7 +193,7 @@ static TABLE: [Parameter; 25] = [
         "Normal force as a function of penetration and its rate. lankarani-nikravesh is the paper's; hertz is \
          elastic; hunt-crossley, flores and gonthier differ in their damping, and gonthier alone gives the restitution \
          asked for.",
-        "Paper eq. (19) for lankarani-nikravesh",
+        "Sheng & Chen (2024), eq. 19 for lankarani-nikravesh",
     ),
     contact_choice!(
         friction_law,
@@ -201,7 +201,7 @@ static TABLE: [Parameter; 25] = [
         FrictionLaw,
         "Friction force as a function of normal force and sliding velocity. modified-coulomb rises linearly between \
          the two slip speeds; none leaves friction out.",
-        "Paper eqs. (20), (21)",
+        "Sheng & Chen (2024), eqs. 20, 21",
     ),
     gravity(
         "gravity.x",
@@ -236,7 +236,7 @@ static TABLE: [Parameter; 25] = [
          are cut. \
          lagrange is the paper's: all bodies free, every joint a constraint with a multiplier, stabilised after \
          Baumgarte. Both give the same motion; tree is faster.",
-        "Paper eqs. (44) to (58) for lagrange",
+        "Sheng & Chen (2024), eqs. 44 to 58 for lagrange",
     )),
     at_reset(row(
         "start",
@@ -250,7 +250,7 @@ static TABLE: [Parameter; 25] = [
          joint, with the balls in the middle of their sockets: they drop first. settled lays each ball on the wall of its \
          socket where the mechanism without play presses it, as deep as that force needs. equilibrium continues from there to where \
          springs, bushings, tyres, stops, contacts and gravity are in balance.",
-        "Constraints of paper eq. (45); (19) at rest for settled; accelerations of 0 for equilibrium",
+        "Constraints of Sheng & Chen (2024), eq. 45; eq. 19 at rest for settled; accelerations of 0 for equilibrium",
     )),
     row(
         "solver.method",
@@ -265,7 +265,7 @@ static TABLE: [Parameter; 25] = [
          loose, to a few per cent; dopri5 (Dormand-Prince, order 5) chooses its steps by the tolerance and finds the instants at \
          which contacts begin and end; radau5 (Radau IIA, implicit, order 5) does so too and takes longer steps where contacts have \
          settled; automatic changes between dopri5 and radau5.",
-        "Solves paper eqs. (55), (58) in time",
+        "Solves Sheng & Chen (2024), eqs. 55, 58 in time",
     ),
     row(
         "solver.step",
@@ -277,7 +277,7 @@ static TABLE: [Parameter; 25] = [
         Scope::Every,
         "Step of a fixed-step method, first step of another one. An impact lasts about 0.1 ms: a fixed step \
          above 20 us no longer resolves it.",
-        "Solves paper eqs. (55), (58) in time",
+        "Solves Sheng & Chen (2024), eqs. 55, 58 in time",
     ),
     row(
         "solver.tolerance",
@@ -291,7 +291,7 @@ static TABLE: [Parameter; 25] = [
          steps, which carry it through impacts. The motion between impacts is sensitive: use 1e-9 or less to compare \
          single \
          impacts.",
-        "Solves paper eqs. (55), (58) in time",
+        "Solves Sheng & Chen (2024), eqs. 55, 58 in time",
     ),
     row(
         "solver.steps_per_impact",
@@ -303,7 +303,7 @@ static TABLE: [Parameter; 25] = [
         Scope::Every,
         "Steps that discrete-gradient takes in the time in which a ball strikes its wall and rebounds (the Hertz time). Peaks of the \
          first impacts err by a few per cent with 4, by about one with 16; beyond 16 all other steps shrink, too. Other methods ignore it.",
-        "Step of paper eqs. (55), (58); duration of (21) without damping",
+        "Step of Sheng & Chen (2024), eqs. 55, 58; duration of eq. 21 without damping",
     ),
     row(
         "solver.preset",
@@ -320,7 +320,7 @@ static TABLE: [Parameter; 25] = [
         "Method and accuracy by name: preview (automatic, 1e-3; discrete-gradient, 16, where 3 or more loose balls act on one another), \
          real-time (automatic, 5e-4; discrete-gradient, 24, where 4 or more do), accurate (automatic, 1e-7), reference (dopri5, 1e-11). \
          A scene has a preset, or a method with its tolerance, step or steps per impact, not both.",
-        "Solves paper eqs. (55), (58) in time",
+        "Solves Sheng & Chen (2024), eqs. 55, 58 in time",
     ),
     at_reset(row(
         "solver.energy_ledger",

@@ -1,7 +1,7 @@
 //! The contact force over a whole step: the discrete gradient of the elastic potential, the law's damping, and friction at the
 //! velocity with which the step ends.
 //!
-//! With F_el = (U(d1) - U(d0)) / (d1 - d0), U = 2/5 K delta^2.5, the elastic work over the step is the change of U exactly,
+//! With F_el = (U(d1) - U(d0)) / (d1 - d0), U the energy of the elastic law, the elastic work over the step is the change of U exactly,
 //! whatever the step, and a contact that begins or ends within the step is in U (Gonzalez 1996; McLachlan, Quispel & Robidoux
 //! 1999).
 
@@ -64,7 +64,7 @@ impl Coefficients {
     /// at their mean rates; this returns what the law leaves, and never creates any.
     pub fn rebound(&self, mass: f64, penetration: f64, rate: f64, separation: f64) -> f64 {
         let missing = 0.5 * mass * (separation * separation - rate * rate);
-        (missing / self.elastic_energy(penetration)).clamp(0.0, 1.0)
+        (missing / self.elastic.energy(penetration)).clamp(0.0, 1.0)
     }
 
     /// Force over `step` for the mean velocity `velocity` of the centres (m/s), so that e1 = e0 + h u, and the mean velocity
@@ -123,15 +123,15 @@ impl Coefficients {
 
     /// Elastic force over the step between the penetrations `d0` and `d1` (m), N, and its derivative with respect to `d1`, N/m.
     fn elastic_force(&self, d0: f64, d1: f64) -> (f64, f64) {
-        let force = |d: f64| if d > 0.0 { self.stiffness * d * d.sqrt() } else { 0.0 };
-        let slope = |d: f64| if d > 0.0 { 1.5 * self.stiffness * d.sqrt() } else { 0.0 };
+        let force = |d: f64| if d > 0.0 { self.elastic.force(d) } else { 0.0 };
+        let slope = |d: f64| if d > 0.0 { self.elastic.slope(d) } else { 0.0 };
         let change = d1 - d0;
         if change.abs() < NEARLY_EQUAL * d0.abs().max(d1.abs()) {
             let middle = 0.5 * (d0 + d1);
             let mean = (force(d0) + 4.0 * force(middle) + force(d1)) / 6.0;
             (mean, (2.0 * slope(middle) + slope(d1)) / 6.0)
         } else {
-            let mean = (self.elastic_energy(d1) - self.elastic_energy(d0)) / change;
+            let mean = (self.elastic.energy(d1) - self.elastic.energy(d0)) / change;
             (mean, (force(d1) - mean) / change)
         }
     }
@@ -166,9 +166,9 @@ mod tests {
             let velocity = step.start.normalize() * speed + Vec3::new(0.01, 0.02, 0.0);
             let result = elastic.step_force(&step, &velocity, &Vec3::zeros(), 0.0);
             let end = (step.start + velocity * step.h).norm() - 3e-4;
-            let gain = elastic.elastic_energy(end) - elastic.elastic_energy(depth);
+            let gain = elastic.elastic.energy(end) - elastic.elastic.energy(depth);
             let work = result.force.dot(&velocity) * step.h;
-            assert!((work + gain).abs() < 1e-9 * elastic.elastic_energy(3e-6), "{depth} {speed}: {work:e} {gain:e}");
+            assert!((work + gain).abs() < 1e-9 * elastic.elastic.energy(3e-6), "{depth} {speed}: {work:e} {gain:e}");
         }
     }
 

@@ -1,7 +1,7 @@
 //! The force between a ball and its socket wall, and its derivatives with respect to displacement and velocity. Every contact
 //! force and derivative is computed here.
 
-use super::{Coefficients, ContactState, FrictionBranch, FrictionVelocity, Mat3, Vec3};
+use super::{Coefficients, ContactState, ElasticLaw, FrictionBranch, FrictionVelocity, Mat3, Vec3};
 
 /// Position and motion of a ball in its socket.
 #[derive(Clone, Copy, Debug, Default)]
@@ -142,12 +142,11 @@ impl Coefficients {
         let approach = contact_state.approach(self, rate);
         let tangent = Mat3::identity() - n * n.transpose();
         let normal_by_displacement = tangent / distance;
-        let root = penetration.sqrt();
-        let by_penetration = 1.5 * self.stiffness * root * (1.0 + self.damping * rate / approach);
+        let by_penetration = self.elastic.slope(penetration) * (1.0 + self.damping * rate / approach);
         let by_rate = if contact_state.approach_follows_rate(self, rate) {
             0.0
         } else {
-            self.stiffness * penetration * root * self.damping / approach
+            self.elastic.force(penetration) * self.damping / approach
         };
         // F = -F_N (n + p v_t), p the friction per normal force and speed.
         let mut along = -n;
@@ -190,31 +189,20 @@ impl Coefficients {
                 && self.excess_over_branch(contact_state.friction_branch, force.slip_speed) > 0.0)
     }
 
-    /// Energy stored by the elastic part, 2/5 K delta^2.5, J.
-    #[inline]
-    pub fn elastic_energy(&self, penetration: f64) -> f64 {
-        if penetration <= 0.0 {
-            return 0.0;
-        }
-        0.4 * self.stiffness * penetration * penetration * penetration.sqrt()
-    }
-
-    /// Power dissipated by the damping part of `force`, W: (F_N - K delta^1.5) d(delta)/dt.
+    /// Power dissipated by the damping part of `force`, W: (F_N - F) d(delta)/dt.
     #[inline]
     pub fn restitution_power(&self, gap: &Separation, force: f64) -> f64 {
-        let elastic = self.stiffness * gap.penetration * gap.penetration.sqrt();
-        (force - elastic) * gap.rate
+        (force - self.elastic.force(gap.penetration)) * gap.rate
     }
 
-    /// Power supplied by a ramping clearance, W: -F_N dc/dt + 2/5 dK/dt delta^2.5.
+    /// Power supplied by a ramping clearance, W: -F_N dc/dt + dU/dc dc/dt.
     #[inline]
     pub fn clearance_power(&self, gap: &Separation, force: f64) -> f64 {
         if self.clearance_rate == 0.0 {
             return 0.0;
         }
-        // K ~ sqrt((r + c) / c).
-        let by_clearance = 0.5 * (1.0 / (self.ball_radius + self.clearance) - 1.0 / self.clearance);
-        let stiffening = by_clearance * self.elastic_energy(gap.penetration);
+        let by_clearance = ElasticLaw::relative_stiffening(self.ball_radius, self.clearance);
+        let stiffening = by_clearance * self.elastic.energy(gap.penetration);
         (stiffening - force) * self.clearance_rate
     }
 }

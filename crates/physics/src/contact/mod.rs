@@ -2,6 +2,7 @@
 
 mod approach;
 mod discrete;
+mod elastic;
 mod force;
 mod law;
 mod slip;
@@ -9,11 +10,9 @@ mod state;
 
 pub use approach::ApproachBranch;
 pub use discrete::{ContactStep, StepForce};
+pub use elastic::ElasticLaw;
 pub use force::{Force, Separation, Stiffness};
-pub use law::{
-    Coefficients, damping_factor, hertz_stiffness, impact_duration, settled_half_period, settled_penetration,
-    undisturbed_restitution,
-};
+pub use law::{Coefficients, ShownLaw, undisturbed_restitution};
 pub use slip::FrictionBranch;
 pub use state::{ContactPhase, ContactState};
 

@@ -350,7 +350,7 @@ impl Machine {
                 break;
             }
             let (law, requested) = (contact.normal_law, contact.restitution);
-            let achieved = contact::undisturbed_restitution(contact::damping_factor(law, requested));
+            let achieved = contact::undisturbed_restitution(law.damping_factor(requested));
             if contact.clearance > 0.0 && (achieved - requested).abs() > RESTITUTION_ERROR {
                 doubts.push(Doubt::Restitution { joints: joints.clone(), law, requested, achieved });
             }
@@ -455,9 +455,9 @@ impl Machine {
         let load = forces.iter().map(|(force, _)| force).sum();
         let fall = (2.0 * self.max_acceleration(forces) * c.clearance).sqrt();
         let speed = fall.max(c.impact_speed_floor);
-        let (stiffness, damping) = (coefficients.stiffness, coefficients.damping);
-        let duration = contact::impact_duration(stiffness, damping, 1.0 / normal, speed)
-            .min(contact::settled_half_period(stiffness, 1.0 / normal, load));
+        let contact::Coefficients { elastic, damping, .. } = coefficients;
+        let duration =
+            elastic.impact_duration(damping, 1.0 / normal, speed).min(elastic.half_period_under(1.0 / normal, load));
         (duration, (coefficients.friction * sliding / normal).max(1.0))
     }
 

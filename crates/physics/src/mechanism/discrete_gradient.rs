@@ -240,7 +240,7 @@ impl DiscreteGradient {
                 rate: gap.separation.rate,
                 slip: contacts.slip_velocity(j, &gap.separation.normal, motion),
                 clearances: [contacts.clearance(j); 2],
-                stored: contacts.coefficients(j).elastic_energy(gap.separation.penetration),
+                stored: contacts.coefficients(j).elastic.energy(gap.separation.penetration),
             };
         }
     }
@@ -719,13 +719,13 @@ impl Evaluator<'_> {
             let end = (row.step.start + u * h).norm() - row.step.clearances[1];
             let start = row.step.start.norm() - row.step.clearances[0];
             let law = contacts.coefficients(joint);
-            let stored = law.elastic_energy(end) - law.elastic_energy(start);
+            let stored = law.elastic.energy(end) - law.elastic.energy(start);
             row.normal_force = normal;
             row.friction_power = -(row.force + n * normal).dot(&s);
             powers.restitution += (normal * (end - start) - stored) / h;
             powers.friction += row.friction_power;
             // A clearance that shrinks also stiffens the contact.
-            let stiffened = law.elastic_energy(start) - discrete.starts[joint].stored;
+            let stiffened = law.elastic.energy(start) - discrete.starts[joint].stored;
             powers.clearance += (stiffened - normal * (row.step.clearances[1] - row.step.clearances[0])) / h;
         }
         if sources.none {
@@ -858,7 +858,7 @@ mod tests {
         const STARTS: u32 = 8;
         let law = Coefficients::new(&contact, contact.clearance);
         let speed = 0.08;
-        let depth = libm::pow(1.25 * 0.1 * speed * speed / law.stiffness, 0.4);
+        let depth = law.elastic.deepest(0.0, 0.1, speed);
         let h = 2.9432 * depth / speed / n;
         let mut sum = 0.0;
         for start in 0..STARTS {

@@ -3,7 +3,7 @@
 
 use super::assembly::Settled;
 use super::{ActiveSet, Mechanism, MechanismError};
-use crate::contact::{Coefficients, Parameters, settled_penetration};
+use crate::contact::{Coefficients, Parameters};
 use crate::machine::{Formulation, Machine, StartRule, Vec3};
 
 /// Fixed-point iterations between reactions and ball positions. The positions change the reactions by about the ratio of
@@ -58,8 +58,7 @@ pub(super) fn without_play(machine: &Machine) -> Machine {
 fn resting_eccentricity(contact: &Parameters, force: Vec3) -> Vec3 {
     let (size, clearance) = (force.norm(), contact.clearance);
     if size > 0.0 {
-        let stiffness = Coefficients::new(contact, clearance).stiffness;
-        let depth = settled_penetration(stiffness, size);
+        let depth = Coefficients::new(contact, clearance).elastic.depth(size);
         force * (-(clearance + depth) / size)
     } else {
         Vec3::zeros()

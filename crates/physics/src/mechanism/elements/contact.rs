@@ -190,7 +190,7 @@ impl ForceElement for Contact {
     }
 
     fn stored(&self, _: f64, _: &[Kinematics]) -> f64 {
-        self.law.elastic_energy(self.gap.separation.penetration)
+        self.law.elastic.energy(self.gap.separation.penetration)
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {

@@ -6,7 +6,7 @@
 
 use super::coordinate::{AngleReference, Coordinate, CoordinateState, Slopes};
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement};
-use crate::contact::{NormalLaw, damping_factor};
+use crate::contact::{ElasticLaw, NormalLaw};
 use crate::machine;
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
@@ -21,8 +21,8 @@ struct Stop {
     upper: f64,
     /// Depth at which the stop exerts the given force, m or rad.
     depth: f64,
-    /// K, N/m^1.5 or N m/rad^1.5.
-    stiffness: f64,
+    /// Force, or moment, by depth.
+    elastic: ElasticLaw,
     /// a, s/m or s/rad.
     damping: f64,
     /// Contact state frozen over a step, if any.
@@ -36,7 +36,7 @@ struct StopContact {
     /// d, m or rad, and its rate.
     depth: f64,
     rate: f64,
-    /// K d^1.5 and F, N or N m.
+    /// ElasticLaw part and force, N or N m.
     elastic: f64,
     force: f64,
 }
@@ -48,14 +48,14 @@ pub(super) fn make(stop: &machine::Stop, on: Coordinate) -> Box<dyn SceneElement
         (true, false) => lower,
         _ => upper,
     };
-    let chi = damping_factor(NormalLaw::Gonthier, stop.restitution);
+    let chi = NormalLaw::Gonthier.damping_factor(stop.restitution);
     Box::new(Stop {
         on,
         middle,
         lower: lower - middle,
         upper: upper - middle,
         depth,
-        stiffness: stop.force / (depth * depth.sqrt()),
+        elastic: ElasticLaw::through(depth, stop.force),
         damping: if chi > 0.0 { chi / stop.speed } else { 0.0 },
         frozen: None,
     })
@@ -75,7 +75,7 @@ impl Stop {
         let [above, below] = [state.deviation - self.upper, self.lower - state.deviation];
         let (side, depth) = if above > below { (1.0, above) } else { (-1.0, below) };
         let rate = side * state.rate;
-        let elastic = self.stiffness * depth * depth.abs().sqrt();
+        let elastic = self.elastic.force(depth);
         let force = elastic * (1.0 + self.damping * rate);
         // A frozen stop follows its law smoothly beyond the edge, where the step then ends.
         let force = if self.frozen.is_some() { force } else { force.max(0.0) };
@@ -99,7 +99,7 @@ impl ForceElement for Stop {
         let (state, contact) = self.at(at.t, at.motion);
         let contact = contact.filter(|contact| contact.force > 0.0 || self.frozen.is_some())?;
         let slopes = Slopes {
-            by_position: -1.5 * self.stiffness * contact.depth.abs().sqrt() * (1.0 + self.damping * contact.rate),
+            by_position: -self.elastic.slope(contact.depth) * (1.0 + self.damping * contact.rate),
             by_rate: -contact.elastic * self.damping,
         };
         Some(self.on.coupling(&state, &slopes, at.motion))
@@ -107,7 +107,7 @@ impl ForceElement for Stop {
 
     fn stored(&self, t: f64, motion: &[Kinematics]) -> f64 {
         let contact = self.at(t, motion).1;
-        contact.map_or(0.0, |contact| 0.4 * contact.elastic * contact.depth)
+        contact.map_or(0.0, |contact| self.elastic.energy(contact.depth))
     }
 
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {

@@ -11,10 +11,8 @@
 //!
 //! Beyond [`COARSE`] steps per impact the last three shrink, too, so that the motion converges.
 
-use std::f64::consts::PI;
-
 use super::{DiscreteControl, NEARLY, Run, State, StepEnd, store_gaps};
-use crate::contact::{self, ContactPhase};
+use crate::contact::{ContactPhase, ElasticLaw};
 use crate::mechanism::{ActiveSet, Counts, Mechanism, StepStart};
 use crate::simulate::peaks::PenetrationCubic;
 use crate::simulate::{StopAdvice, StopFault, Stopped};
@@ -88,9 +86,9 @@ impl DiscreteControl {
     }
 }
 
-/// Stiffness K of ball joint `j`, N/m^1.5. Samples leave the mechanism at other instants, so that its own may be another.
-fn stiffness(state: &State, j: usize) -> f64 {
-    contact::hertz_stiffness(&state.conditions.joints[j], state.clearance(j))
+/// ElasticLaw law of ball joint `j`. Samples leave the mechanism at other instants, so that its own may be another.
+fn elastic(state: &State, j: usize) -> ElasticLaw {
+    ElasticLaw::of_ball(&state.conditions.joints[j], state.clearance(j))
 }
 
 /// Longest step in an impact of ball joint `j` at `speed`, m/s, in s: a part of the Hertz time.
@@ -98,7 +96,7 @@ fn step_in_impact(state: &State, j: usize, speed: f64) -> f64 {
     let mass = 1.0 / state.control.discrete.mobility[j];
     let steps = state.conditions.solver.steps_per_impact;
     let steps = if speed > SLOW { steps } else { steps.min(SLOW_STEPS) };
-    contact::impact_duration(stiffness(state, j), 0.0, mass, speed) / f64::from(steps)
+    elastic(state, j).impact_duration(0.0, mass, speed) / f64::from(steps)
 }
 
 /// Force over elastic force with which each ball rebounds in a step of `h` seconds, for those that need one.
@@ -114,14 +112,14 @@ fn set_rebounds(state: &State, mechanism: &Mechanism, h: f64, rebounds: &mut [Op
             continue;
         };
         let mass = 1.0 / control.mobility[j];
-        let few = h * FEW_STEPS > contact::impact_duration(stiffness(state, j), 0.0, mass, approach);
+        let few = h * FEW_STEPS > elastic(state, j).impact_duration(0.0, mass, approach);
         *rebound = few.then(|| law.rebound(mass, gap.penetration, gap.rate, separation));
     }
 }
 
 /// Half a period of the ringing of ball joint `j` about `penetration`, m, in s.
 fn half_period(state: &State, j: usize, penetration: f64) -> f64 {
-    PI / (1.5 * stiffness(state, j) * penetration.sqrt() * state.control.discrete.mobility[j]).sqrt()
+    elastic(state, j).half_period_at(penetration, state.control.discrete.mobility[j])
 }
 
 /// Steps of a run over those of the coarse ones, at least 1.

@@ -1,7 +1,7 @@
 //! Reasons to doubt a result, from the scene's settings and from the course of the run.
 
 use super::{Model, State};
-use crate::contact::{Coefficients, FrictionVelocity, settled_penetration};
+use crate::contact::{Coefficients, FrictionVelocity};
 use crate::integrate::Method;
 use crate::machine::{BallJoint, MIN_IMPACT_STEPS, Machine};
 use crate::simulate::{AffectedJoints, Doubt, Ledger, LedgerTerm};
@@ -177,7 +177,7 @@ impl DoubtContext<'_> {
         }
         let c = self.coefficients(j);
         let (radius, clearance) = (c.ball_radius, c.clearance);
-        let depth = settled_penetration(c.stiffness, self.state.statistics().peak_normal[j]);
+        let depth = c.elastic.depth(self.state.statistics().peak_normal[j]);
         // Hertz: a^2 = delta R r / (R - r).
         (depth * (radius + clearance) / (clearance * radius)).sqrt()
     }

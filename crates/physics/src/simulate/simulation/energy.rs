@@ -180,7 +180,7 @@ fn energies(mechanism: &Mechanism, state: &State) -> Energies {
     let contacts = &mechanism.contacts;
     let in_contacts: f64 = (0..contacts.len())
         .filter(|&j| contacts.has_clearance(j))
-        .map(|j| contacts.coefficients(j).elastic_energy(state.now.gaps[j].penetration))
+        .map(|j| contacts.coefficients(j).elastic.energy(state.now.gaps[j].penetration))
         .sum();
     let elastic = in_contacts + mechanism.energy_in_elements(state.now.t);
     Energies { kinetic, gravitational, elastic, in_contacts }

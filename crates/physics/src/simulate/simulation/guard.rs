@@ -77,7 +77,7 @@ impl Run<'_> {
         let least = least.fold(f64::INFINITY, f64::min);
         let pull = self.machine.max_acceleration([(push, least)]);
         let speed = start.speed + pull * h + coefficients.speed_floor;
-        let times = coefficients.elastic_energy(end.penetration) / (0.5 * mass * speed * speed);
+        let times = coefficients.elastic.energy(end.penetration) / (0.5 * mass * speed * speed);
         (times > MAX_OVERSHOOT).then_some(times)
     }
 }
