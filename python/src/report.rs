@@ -64,7 +64,7 @@ pub fn statistics<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Bou
         let own = PyDict::new(py);
         own.set_item("peak_normal", force)?;
         own.set_item("peak_time", time)?;
-        own.set_item("impacts", statistics.impacts[j])?;
+        own.set_item("impacts", statistics.joints[j].impacts)?;
         joints.set_item(&joint.name, own)?;
     }
     all.set_item("joints", joints)?;

@@ -501,7 +501,7 @@ mod tests {
         assert!(rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
         assert!(rows.iter().all(|row| row.len() == header.len() && row[least] <= row[peak]));
         let strongest = rows.iter().map(|row| row[peak]).fold(0.0, f64::max);
-        let in_record = player.simulation().statistics().peak_normal[0];
+        let in_record = player.simulation().statistics().joints[0].peak_normal;
         assert!((strongest / in_record - 1.0).abs() < 1e-6, "{strongest} {in_record}");
         let last = rows.last().expect("rows");
         let channels = player.channels().list();

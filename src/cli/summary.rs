@@ -66,8 +66,8 @@ pub fn json(
         "steps": statistics.steps,
         "evaluations": statistics.evaluations,
         "rejected": statistics.rejected,
-        "impacts": by_joint(&|i| json!(statistics.impacts[i])),
-        "floored": by_joint(&|i| json!(statistics.floored[i])),
+        "impacts": by_joint(&|i| json!(statistics.joints[i].impacts)),
+        "floored": by_joint(&|i| json!(statistics.joints[i].floored)),
         "peak_normal_N": by_joint(&|i| json!(simulation.peak(i).0)),
         "peak_time_s": by_joint(&|i| json!(simulation.peak(i).1)),
         "constraint_drift_m": statistics.constraint_drift,
@@ -123,8 +123,8 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
         } else if force == 0.0 {
             "no contact".to_owned()
         } else {
-            let impacts = count(statistics.impacts[i], "impact");
-            match statistics.floored[i] {
+            let impacts = count(statistics.joints[i].impacts, "impact");
+            match statistics.joints[i].floored {
                 0 => format!("{impacts}, {peak}"),
                 // Below the floor the damping term divides by the floor, so these rebound higher than requested.
                 slow => format!("{impacts} ({slow} slower than impact_speed_floor), {peak}"),

@@ -383,7 +383,7 @@ impl Laboratory {
             "shown_s": player.pacer.shown(),
             "steps": player.simulation().statistics().steps,
             "pull_N": player.frame().pull.map(|pull| pull.force.norm()),
-            "peak_normal_N": player.simulation().statistics().peak_normal,
+            "peak_normal_N": player.simulation().statistics().joints.iter().map(|joint| joint.peak_normal).collect::<Vec<_>>(),
             "state_hash": format!("{:016x}", player.simulation().state_hash()),
             "camera": camera,
             "renderer": self.renderer,

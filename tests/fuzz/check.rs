@@ -123,8 +123,8 @@ fn run(scene: &Scene) -> Outcome {
         assert!(simulation.time() > before, "a step that does not advance the time");
     }
     assert!(simulation.state_vector().iter().all(|x| x.is_finite()));
-    let peaks = &simulation.statistics().peak_normal;
-    assert!(peaks.iter().all(|peak| *peak >= 0.0 && peak.is_finite()));
+    let joints = &simulation.statistics().joints;
+    assert!(joints.iter().all(|joint| joint.peak_normal >= 0.0 && joint.peak_normal.is_finite()));
     for doubt in simulation.doubts() {
         let words = doubt.to_string();
         assert_eq!(visible(&words), words);

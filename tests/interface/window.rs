@@ -25,7 +25,7 @@ fn clearance(harness: &Harness<'_, App>) -> f64 {
 /// Largest normal force since the reset, N.
 fn peak_force(harness: &Harness<'_, App>) -> f64 {
     let statistics = harness.state().player().simulation().statistics();
-    statistics.peak_normal.iter().copied().fold(0.0, f64::max)
+    statistics.joints.iter().map(|joint| joint.peak_normal).fold(0.0, f64::max)
 }
 
 /// Replaces the content of a text field and presses Enter.
@@ -899,10 +899,10 @@ fn plotted_peaks_are_those_of_the_run() {
         harness.run();
         let player = harness.state().player();
         let statistics = player.simulation().statistics().clone();
-        let peak = statistics.peak_normal.iter().copied().fold(0.0, f64::max);
+        let peak = statistics.joints.iter().map(|joint| joint.peak_normal).fold(0.0, f64::max);
         let drawn = picture(&mut harness);
         for (joint, colour) in CURVES.into_iter().enumerate() {
-            let (time, force) = (statistics.peak_time[joint], statistics.peak_normal[joint]);
+            let (time, force) = (statistics.joints[joint].peak_time, statistics.joints[joint].peak_normal);
             let (area, row) = spike(&mut harness, time, force, 1.04 * peak);
             let highest = top(&drawn.covered(area, colour, WHITE)).expect("every joint is seen");
             assert!(highest.abs_diff(row) <= 1, "{size:?}: {force} N of joint {joint} in row {highest}, not {row}");

@@ -2,7 +2,7 @@
 //! forces are right, and peaks and losses are within the bounds for its steps per impact.
 
 use crate::common::{Changes, MACHINES, SCENES, frame_now, free_ball, live, mean_forces, parse, run_until, simulation};
-use jointplay_physics::contact::{NormalLaw, damping_factor, undisturbed_restitution};
+use jointplay_physics::contact::{NormalLaw, undisturbed_restitution};
 use jointplay_physics::simulate::{Frame, Impact, Ledger, Simulation};
 use jointplay_scene::LiveScene;
 
@@ -24,7 +24,7 @@ fn rebound(word: &str, law: NormalLaw, parts: &str) -> f64 {
         simulation.take_impacts(&mut impacts);
     }
     let speed = -frame_now(&mut simulation).bodies[0].velocity.z;
-    speed / (0.08 * undisturbed_restitution(damping_factor(law, 0.9)))
+    speed / (0.08 * undisturbed_restitution(law.damping_factor(0.9)))
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn the_peak_of_an_ideal_joint_is_that_of_its_rows() {
             rows = rows.max(frame.joints[0].normal_force.norm());
         }
     }
-    let peak = simulation.statistics().peak_normal[0];
+    let peak = simulation.statistics().joints[0].peak_normal;
     assert!(rows > 200.0 && (peak / rows - 1.0).abs() < 2e-2, "{peak} {rows}");
     assert!(simulation.peak(0).0 >= rows);
 }

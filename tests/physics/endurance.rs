@@ -108,7 +108,7 @@ fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64)
         "{name}, {preset}, seed {seed}: {frames} frames, {shown:.2} s, {} steps, {} evaluations, {} impacts, {restored} restored",
         statistics.steps,
         statistics.evaluations,
-        statistics.impacts.iter().sum::<u64>()
+        statistics.impacts()
     );
     assert!(restored > frames / 700);
 }
@@ -239,7 +239,7 @@ fn long_run(case: &LongRun, preset: usize, duration: f64) -> Drift {
     let mut frame = Frame::default();
     let mut first: Option<(Frame, u64)> = None;
     let halves = 2 * (duration / case.period).ceil() as u32;
-    let contacts = |simulation: &Simulation| simulation.statistics().impacts.iter().sum::<u64>();
+    let contacts = |simulation: &Simulation| simulation.statistics().impacts();
     for n in 1..=halves {
         let now = f64::from(n) * 0.5 * case.period;
         simulation.advance_to(now).unwrap();

@@ -23,7 +23,7 @@ fn drift(simulation: &mut Simulation, duration: f64) -> (f64, u64) {
         worst = worst.max((frame.kinetic + frame.potential - start).abs());
         largest = largest.max(frame.kinetic + frame.elastic);
     }
-    (worst / largest, simulation.statistics().impacts.iter().sum())
+    (worst / largest, simulation.statistics().impacts())
 }
 
 #[test]
@@ -165,7 +165,7 @@ fn power_balance(simulation: &mut Simulation, duration: f64) -> (f64, f64, u64) 
         worst = worst.max((frame.kinetic + frame.potential - start - work).abs());
         max_work = max_work.max(work.abs());
     }
-    (worst, max_work, simulation.statistics().impacts.iter().sum())
+    (worst, max_work, simulation.statistics().impacts())
 }
 
 #[test]

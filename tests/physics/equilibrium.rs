@@ -2,7 +2,7 @@
 //! a minimum of the potential energy, downhill from the start values.
 
 use crate::common::{parse, scene};
-use jointplay_physics::contact::{Coefficients, settled_penetration};
+use jointplay_physics::contact::Coefficients;
 use jointplay_physics::machine::Vec3;
 use jointplay_physics::mechanism::UnstableRest;
 use jointplay_physics::simulate::{Frame, Simulation};
@@ -102,7 +102,7 @@ fn a_rod_with_play_hangs_at_rest() {
     let frame = frame_at_start(&scene);
     let contact = &scene.machine.ball_joints[0].contact;
     let weight = scene.machine.bodies.iter().map(|body| body.mass).sum::<f64>() * G;
-    let depth = settled_penetration(Coefficients::new(contact, contact.clearance).stiffness, weight);
+    let depth = Coefficients::new(contact, contact.clearance).elastic.depth(weight);
     let joint = &frame.joints[0];
     assert!((joint.penetration / depth - 1.0).abs() < 1e-6, "{} {depth}", joint.penetration);
     assert!((joint.normal_force.norm() / weight - 1.0).abs() < 1e-6, "{}", joint.normal_force);

@@ -1,9 +1,7 @@
 //! One ball and one socket: restitution of every law, friction, and contacts at the start.
 
 use crate::common::{frame_now, parse};
-use jointplay_physics::contact::{
-    NormalLaw, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution,
-};
+use jointplay_physics::contact::{ElasticLaw, NormalLaw, undisturbed_restitution};
 use jointplay_physics::machine::Vec3;
 use jointplay_physics::simulate::{ContactMode, Frame, Simulation};
 
@@ -86,7 +84,7 @@ fn restitution_by_quadrature(chi: f64) -> f64 {
 /// Restitution of the first impact of a ball that moves along x.
 fn rebound(speed: f64, changes: &[(&str, &str)]) -> (f64, Simulation) {
     let mut simulation = ball(Vec3::zeros(), Vec3::x() * speed, Vec3::zeros(), 0.0, changes);
-    while simulation.statistics().last_separation[0].is_none() {
+    while simulation.statistics().joints[0].last_separation.is_none() {
         simulation.step().unwrap();
         assert!(simulation.time() < 1.0);
     }
@@ -111,7 +109,7 @@ fn head_on_impacts_give_the_restitution_of_their_law() {
             if number == 0.0 && matches!(law, NormalLaw::Flores | NormalLaw::Gonthier) {
                 continue;
             }
-            let chi = damping_factor(law, number);
+            let chi = law.damping_factor(number);
             let expected = undisturbed_restitution(chi);
             if chi > 0.0 {
                 let quadrature = restitution_by_quadrature(chi);
@@ -133,11 +131,11 @@ fn elastic_impacts_have_the_peak_force_of_hertz() {
     let speed = 0.1;
     let (_, simulation) = rebound(speed, &[("contact.normal_law", "hertz")]);
     let contact = simulation.machine().contact;
-    let k = hertz_stiffness(&contact, CLEARANCE);
+    let k = ElasticLaw::of_ball(&contact, CLEARANCE).stiffness;
     // m v^2 / 2 = 2/5 K delta^2.5.
     let deepest = (1.25 * MASS * speed * speed / k).powf(0.4);
     let expected = k * deepest.powf(1.5);
-    let peak = simulation.statistics().peak_normal[0];
+    let peak = simulation.statistics().joints[0].peak_normal;
     println!("peak {peak:.6} N, expected {expected:.6} N");
     assert!((peak / expected - 1.0).abs() < 1e-4, "{peak} {expected}");
 }
@@ -145,7 +143,7 @@ fn elastic_impacts_have_the_peak_force_of_hertz() {
 #[test]
 fn slow_impacts_use_the_speed_floor_and_rebound_higher() {
     let mut simulation = ball(Vec3::zeros(), Vec3::x() * 4e-4, Vec3::zeros(), 0.0, &[]);
-    while simulation.statistics().impacts[0] == 0 {
+    while simulation.statistics().joints[0].impacts == 0 {
         simulation.step().unwrap();
     }
     let contact = simulation.contact_state(0);
@@ -155,7 +153,7 @@ fn slow_impacts_use_the_speed_floor_and_rebound_higher() {
     let (fast, _) = rebound(0.1, &[]);
     assert!(slow > fast + 0.01 && slow < 1.0, "{slow} {fast}");
     let mut above = ball(Vec3::zeros(), Vec3::x() * 0.1, Vec3::zeros(), 0.0, &[]);
-    while above.statistics().impacts[0] == 0 {
+    while above.statistics().joints[0].impacts == 0 {
         above.step().unwrap();
     }
     let contact = above.contact_state(0);
@@ -167,7 +165,7 @@ fn slow_impacts_use_the_speed_floor_and_rebound_higher() {
 fn pressed(velocity: Vec3, spin: Vec3, changes: &[(&str, &str)]) -> (Simulation, Frame) {
     let parameters = jointplay_physics::contact::Parameters::default();
     let load = MASS * 9.81;
-    let depth = settled_penetration(hertz_stiffness(&parameters, CLEARANCE), load);
+    let depth = ElasticLaw::of_ball(&parameters, CLEARANCE).depth(load);
     let position = Vec3::x() * (CLEARANCE + depth);
     let mut simulation = ball(position, velocity, spin, 9.81, changes);
     let frame = frame_now(&mut simulation);
@@ -183,7 +181,7 @@ fn contacts_at_the_start_have_the_floor_as_approach_speed() {
     let contact = simulation.contact_state(0);
     assert!(contact.active && contact.floored);
     assert_eq!(contact.approach_speed, 1e-3);
-    assert_eq!(simulation.statistics().impacts[0], 1);
+    assert_eq!(simulation.statistics().joints[0].impacts, 1);
     assert_eq!(frame.joints[0].state, ContactMode::Creep);
     assert_eq!(frame.joints[0].friction_force, Vec3::zeros());
     assert!(frame.bodies[0].acceleration.norm() < 1e-6);

@@ -1,9 +1,7 @@
 //! The numbers of `docs/limits.md` are those that the program computes.
 
 use crate::common::{Changes, frame_now, free_ball, parse, run_until, simulation};
-use jointplay_physics::contact::{
-    NormalLaw, Parameters, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution,
-};
+use jointplay_physics::contact::{ElasticLaw, NormalLaw, Parameters, undisturbed_restitution};
 use jointplay_physics::machine::Vec3;
 use jointplay_physics::simulate::{ContactMode, Frame, Simulation};
 
@@ -22,8 +20,8 @@ fn ball_on_wall(angle: f64, start: &str, changes: &Changes) -> Simulation {
     let law = ("contact.friction_law", "modified-coulomb");
     let changes = [&[law], changes].concat();
     let parameters = Parameters::default();
-    let stiffness = hertz_stiffness(&parameters, parameters.clearance);
-    let depth = settled_penetration(stiffness, 0.1 * 9.81 * angle.cos());
+    let elastic = ElasticLaw::of_ball(&parameters, parameters.clearance);
+    let depth = elastic.depth(0.1 * 9.81 * angle.cos());
     let distance = 1e3 * (parameters.clearance + depth);
     let from = "position = \"0 0 0 mm\", velocity = \"0 0 0 m/s\"";
     assert!(text.contains(from), "{text}");
@@ -142,7 +140,7 @@ fn friction_changes_the_angular_momentum_of_a_machine_in_space() {
 
 #[test]
 fn contact_laws_and_patch_radii_have_the_documented_values() {
-    let restitution = |law, nominal| undisturbed_restitution(damping_factor(law, nominal));
+    let restitution = |law: NormalLaw, nominal| undisturbed_restitution(law.damping_factor(nominal));
     assert_documented(&format!(
         "gives {:.3} when asked for 0.9 and {:.3} when asked for 0.8",
         restitution(NormalLaw::LankaraniNikravesh, 0.9),
@@ -158,7 +156,7 @@ fn contact_laws_and_patch_radii_have_the_documented_values() {
     let contact = &simulation.machine().ball_joints[0].contact;
     let (r, c) = (contact.ball_radius, contact.clearance);
     let force = (0..3).map(|j| simulation.peak(j).0).fold(0.0, f64::max);
-    let depth = settled_penetration(hertz_stiffness(contact, c), force);
+    let depth = ElasticLaw::of_ball(contact, c).depth(force);
     let patch = (depth * (r + c) * r / c).sqrt() / r;
     assert_documented(&format!("reaches {patch:.2} ball radii in the hardest impact of `spcmm`, of {force:.0} N"));
     let first = &impacts[0];

@@ -33,7 +33,7 @@ fn watch(simulation: &mut Simulation, end: f64) -> Extremes {
     let (mut frame, mut reference) = (Frame::default(), Frame::default());
     let mut peaks = Vec::new();
     simulation.take_peaks(&mut peaks);
-    let impacts = simulation.statistics().impacts.iter().sum::<u64>();
+    let impacts = simulation.statistics().impacts();
     let mut before = frame_now(simulation);
     while simulation.time() < end {
         simulation.step().unwrap();
@@ -59,7 +59,7 @@ fn watch(simulation: &mut Simulation, end: f64) -> Extremes {
         extremes.force = peaks.iter().map(|p| p.normal).fold(extremes.force, f64::max);
         std::mem::swap(&mut before, &mut frame);
     }
-    extremes.impacts = simulation.statistics().impacts.iter().sum::<u64>() - impacts;
+    extremes.impacts = simulation.statistics().impacts() - impacts;
     extremes
 }
 

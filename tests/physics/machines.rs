@@ -126,9 +126,9 @@ fn the_springs_of_the_delta_reduce_impacts_of_its_rods() {
     let impacts = |grip: &str| {
         let mut simulation = simulation("delta", &[("parameter.grip", grip)]);
         simulation.advance_to(0.1).unwrap();
-        let before: u64 = simulation.statistics().impacts.iter().sum();
+        let before: u64 = simulation.statistics().impacts();
         simulation.advance_to(0.3).unwrap();
-        simulation.statistics().impacts.iter().sum::<u64>() - before
+        simulation.statistics().impacts() - before
     };
     let (gripped, free) = (impacts("50 N"), impacts("0.001 N"));
     assert!(2 * gripped < free, "{gripped} impacts with springs, {free} without");
@@ -505,7 +505,7 @@ fn each_machine_balances_its_energy_in_both_formulations() {
             let residual = ledger.relative_residual().abs();
             assert!(residual < ENERGY_TOLERANCE, "{name}, {form}: {residual:e} {ledger:?}");
             assert!(ledger.exchanged > 0.0 && ledger.drive_work != 0.0, "{name}");
-            let impacts: u64 = simulation.statistics().impacts.iter().sum();
+            let impacts: u64 = simulation.statistics().impacts();
             assert!(impacts > 0, "{name}, {form}");
         }
     }

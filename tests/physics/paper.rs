@@ -101,9 +101,10 @@ fn the_five_runs_of_the_paper_have_their_peaks_deviations_and_last_separations()
             ];
             let (simulation, deviation) = run(&changes);
             let statistics = simulation.statistics();
-            let last = statistics.last_separation.iter().flatten().copied().fold(0.0, f64::max);
+            let last = statistics.joints.iter().filter_map(|joint| joint.last_separation).fold(0.0, f64::max);
+            let peaks: Vec<f64> = statistics.joints.iter().map(|joint| joint.peak_normal).collect();
             let pairs = [
-                (&statistics.peak_normal[..], &expected.peaks[..]),
+                (&peaks[..], &expected.peaks[..]),
                 (&deviation[..], &expected.deviation[..]),
                 (&[last], &[expected.last_separation]),
             ];
@@ -124,5 +125,5 @@ fn without_clearance_the_machine_follows_its_trajectory() {
     let (simulation, deviation) = run(&[("contact.clearance", "0")]);
     // Rounding errors of positions of 0.2 m, and of the closed form.
     assert!(deviation.iter().all(|deviation| *deviation < 1e-12), "{deviation:?}");
-    assert!(simulation.statistics().last_separation.iter().all(Option::is_none));
+    assert!(simulation.statistics().joints.iter().all(|joint| joint.last_separation.is_none()));
 }

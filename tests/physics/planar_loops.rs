@@ -280,7 +280,7 @@ fn every_method_steps_a_planar_loop_ideal_driven_and_with_play() {
                 Simulation::new(&GRASHOF.scene(Quat::identity(), with, &variant.changes()).machine).unwrap();
             run_until(&mut simulation, 0.02);
             let frame = frame_now(&mut simulation);
-            let impacts = simulation.statistics().impacts[0];
+            let impacts = simulation.statistics().joints[0].impacts;
             assert_eq!(impacts > 0, clearance != "0");
             for (a, b) in frame.bodies.iter().zip(&reference.bodies) {
                 let error = (a.position - b.position).norm();

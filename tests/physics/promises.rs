@@ -26,7 +26,7 @@ fn step_into_contact(simulation: &mut Simulation) -> u32 {
         return BEFORE;
     }
     let mut steps = 0;
-    while simulation.statistics().impacts.iter().sum::<u64>() < 2 {
+    while simulation.statistics().impacts() < 2 {
         simulation.step().unwrap();
         steps += 1;
         assert!(steps < MAX_STEPS, "no impact");

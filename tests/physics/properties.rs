@@ -191,20 +191,20 @@ proptest! {
         for (j, joint) in scene.machine.ball_joints.iter().enumerate() {
             let (row, name) = (rows[j], &joint.name);
             // Peaks as printed by a run, which has rows, and by a sweep, which has none.
-            let (printed, from_steps) = (sampled.peak(j).0, statistics.peak_normal[j]);
+            let (printed, from_steps) = (sampled.peak(j).0, statistics.joints[j].peak_normal);
             prop_assert!(printed >= row, "{}: {} below the rows' {}", name, printed, row);
             let agrees = from_steps >= row * (1.0 - BELOW) - 1.0 && from_steps <= row * (1.0 + ABOVE) + 1.0;
             prop_assert!(!resolved || agrees, "{}: {}, rows {}", name, from_steps, row);
-            prop_assert!((0.0..=plain.time()).contains(&statistics.peak_time[j]));
+            prop_assert!((0.0..=plain.time()).contains(&statistics.joints[j].peak_time));
             let impacts_of_joint = || impacts.iter().filter(move |impact| impact.joint == j);
-            prop_assert!(impacts_of_joint().count() as u64 <= statistics.impacts[j], "{}", name);
+            prop_assert!(impacts_of_joint().count() as u64 <= statistics.joints[j].impacts, "{}", name);
             prop_assert!(joint.contact.clearance > 0.0 || impacts_of_joint().count() == 0, "{}", name);
-            let chi = jointplay_physics::contact::damping_factor(joint.contact.normal_law, joint.contact.restitution);
+            let chi = joint.contact.normal_law.damping_factor(joint.contact.restitution);
             let largest = joint.contact.approach_speed == jointplay_physics::contact::ApproachSpeed::Largest;
             for impact in impacts_of_joint() {
                 prop_assert!(impact.peak <= from_steps * (1.0 + 1e-12), "{:?} beyond {}", impact, from_steps);
                 prop_assert!(impact.start < impact.end && impact.end <= plain.time(), "{:?}", impact);
-                prop_assert!(impact.damping <= statistics.damping[j], "{:?}", impact);
+                prop_assert!(impact.damping <= statistics.joints[j].damping, "{:?}", impact);
                 prop_assert!(!largest || impact.damping <= chi * (1.0 + 2e-6), "{:?}", impact);
             }
         }

@@ -1,7 +1,7 @@
 //! The restitution check: each impact reports the requested coefficient, the one its law gives, and the achieved one.
 
 use crate::common::{Changes, METHODS, live, parse, simulation};
-use jointplay_physics::contact::{NormalLaw, damping_factor, undisturbed_restitution};
+use jointplay_physics::contact::{NormalLaw, undisturbed_restitution};
 use jointplay_physics::simulate::{Doubt, Impact, Simulation};
 use jointplay_scene::{LiveScene, built_in_text};
 
@@ -42,7 +42,7 @@ fn an_undisturbed_impact_has_the_restitution_of_its_law() {
     ];
     for (word, restitution, law) in laws {
         let requested: f64 = restitution.parse().unwrap();
-        let expected = undisturbed_restitution(damping_factor(law, requested));
+        let expected = undisturbed_restitution(law.damping_factor(requested));
         for method in METHODS {
             let changes = [
                 ("contact.normal_law", word),
@@ -64,7 +64,7 @@ fn an_undisturbed_impact_has_the_restitution_of_its_law() {
             assert!(first.end > first.start && first.steps > 5, "{case}");
         }
     }
-    let zero = undisturbed_restitution(damping_factor(NormalLaw::LankaraniNikravesh, 0.0));
+    let zero = undisturbed_restitution(NormalLaw::LankaraniNikravesh.damping_factor(0.0));
     assert!((zero - 0.66).abs() < 5e-3, "{zero}");
 }
 
@@ -72,12 +72,12 @@ fn an_undisturbed_impact_has_the_restitution_of_its_law() {
 fn an_impact_reports_its_depth_force_and_time() {
     let mut simulation = axial_impact(&[("contact.normal_law", "hertz"), ("solver.tolerance", "1e-10")]);
     let first = impacts(&mut simulation, 0.01)[0];
-    let k = simulation.mechanism().contacts.coefficients(0).stiffness;
+    let k = simulation.mechanism().contacts.coefficients(0).elastic.stiffness;
     // Elastic: the peak is at the deepest point.
     let peak = k * first.deepest.powf(1.5);
     assert!((first.peak / peak - 1.0).abs() < 1e-4, "{first:?}");
     let statistics = simulation.statistics();
-    assert!((first.peak / statistics.peak_normal[0] - 1.0).abs() < 1e-9);
+    assert!((first.peak / statistics.joints[0].peak_normal - 1.0).abs() < 1e-9);
     // 2.94 delta / v.
     let duration = first.end - first.start;
     let expected = 2.943 * first.deepest / first.approach_speed;
@@ -169,7 +169,7 @@ fn recent_impacts_are_kept_all_can_be_taken_and_snapshots_contain_them() {
         simulation.step().unwrap();
         simulation.take_impacts(&mut taken);
     }
-    let started: u64 = simulation.statistics().impacts.iter().sum();
+    let started: u64 = simulation.statistics().impacts();
     let joints = simulation.machine().ball_joints.len();
     let touching = (0..joints).filter(|&j| simulation.contact_state(j).active);
     assert_eq!(started as usize, taken.len() + touching.count());
@@ -247,7 +247,7 @@ fn reference_contact(largest: bool) -> (f64, f64) {
 fn damping_of_a_joint_hit_again_is_bounded_by_chi_with_the_largest_speed() {
     for (word, largest) in [("start", false), ("largest", true)] {
         let (force, ratio) = reference_contact(largest);
-        let chi = damping_factor(NormalLaw::LankaraniNikravesh, 0.9);
+        let chi = NormalLaw::LankaraniNikravesh.damping_factor(0.9);
         assert_eq!(ratio > 1.01 * chi, !largest, "{ratio}");
         for method in METHODS {
             let mut simulation = struck_contact(method, word);
@@ -256,7 +256,7 @@ fn damping_of_a_joint_hit_again_is_bounded_by_chi_with_the_largest_speed() {
                 simulation.step().unwrap();
             }
             let statistics = simulation.statistics();
-            let (peak, damping) = (statistics.peak_normal[0], statistics.damping[0]);
+            let (peak, damping) = (statistics.joints[0].peak_normal, statistics.joints[0].damping);
             let ledger = simulation.ledger().unwrap();
             let case = format!("{word}, {method}: {peak} against {force}, {damping} against {ratio}");
             println!("{case}; residual {:.1e}", ledger.relative_residual());
@@ -290,7 +290,7 @@ fn an_undisturbed_impact_is_the_same_with_start_and_with_largest_speed() {
         for (a, b) in [(start.achieved(), largest.achieved()), (start.peak, largest.peak), (start.end, largest.end)] {
             assert!((a / b - 1.0).abs() < 1e-6, "{method}: {start:?} {largest:?}");
         }
-        let chi = damping_factor(NormalLaw::LankaraniNikravesh, 0.9);
+        let chi = NormalLaw::LankaraniNikravesh.damping_factor(0.9);
         assert!((start.damping / chi - 1.0).abs() < 1e-2, "{method}: {start:?}");
     }
 }
@@ -308,10 +308,10 @@ fn damping_in_a_chain_is_bounded_by_chi_with_the_largest_speed() {
             let mut simulation = simulation("chain", &changes);
             let impacts = impacts(&mut simulation, 0.04);
             let max_damping = impacts.iter().map(|impact| impact.damping).fold(0.0, f64::max);
-            let chi = damping_factor(NormalLaw::LankaraniNikravesh, 0.9);
+            let chi = NormalLaw::LankaraniNikravesh.damping_factor(0.9);
             println!("{method}, {word}: {max_damping:.3} in {} impacts", impacts.len());
             assert_eq!(max_damping <= chi * (1.0 + 2e-6), bounded, "{method}, {word}: {max_damping}");
-            assert!(simulation.statistics().damping.iter().all(|d| !bounded || *d <= chi * (1.0 + 2e-6)));
+            assert!(simulation.statistics().joints.iter().all(|joint| !bounded || joint.damping <= chi * (1.0 + 2e-6)));
         }
     }
 }

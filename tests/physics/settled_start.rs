@@ -72,7 +72,7 @@ fn a_hanging_pendulum_rests_on_its_wall() {
     let joint = &frame.joints[0];
     let contact = &scene.machine.ball_joints[0].contact;
     // Hertz: F = K delta^1.5, with the force of the ideal joint.
-    let stiffness = jointplay_physics::contact::Coefficients::new(contact, contact.clearance).stiffness;
+    let stiffness = jointplay_physics::contact::Coefficients::new(contact, contact.clearance).elastic.stiffness;
     let depth = (reactions("pendulum")[0] / stiffness).powf(2.0 / 3.0);
     assert!((joint.penetration / depth - 1.0).abs() < 0.01, "{} {depth}", joint.penetration);
     assert!((joint.eccentricity.norm() - contact.clearance - depth).abs() < 1e-9);

@@ -269,7 +269,7 @@ impl PointRun {
         if simulation.time() > 0.0 {
             simulation.take_peaks(&mut peaks);
         }
-        let impacts = simulation.statistics().impacts.clone();
+        let impacts: Vec<u64> = simulation.statistics().joints.iter().map(|joint| joint.impacts).collect();
         let joints = impacts.len();
         let started = simulation.time();
         let mut run = Self {
@@ -352,7 +352,8 @@ impl PointRun {
         for (largest, peak) in self.transient_peaks.iter_mut().zip(&self.peaks) {
             *largest = peak.normal;
         }
-        self.impacts_at_discard.clone_from(&simulation.statistics().impacts);
+        self.impacts_at_discard.clear();
+        self.impacts_at_discard.extend(simulation.statistics().joints.iter().map(|joint| joint.impacts));
         self.means.begin(machine);
         self.statistics.begin(machine.simulation_mut());
     }
@@ -375,9 +376,14 @@ impl PointRun {
                 peak: self.peaks[j].normal.max(self.transient_peaks[j]),
                 peak_kept: peak_kept(j),
                 mean: self.means.normal[j] / span,
-                impacts: statistics.impacts[j] - self.impacts_at_start[j],
-                impacts_kept: if self.is_recording { statistics.impacts[j] - self.impacts_at_discard[j] } else { 0 },
-                last_separation: statistics.last_separation[j]
+                impacts: statistics.joints[j].impacts - self.impacts_at_start[j],
+                impacts_kept: if self.is_recording {
+                    statistics.joints[j].impacts - self.impacts_at_discard[j]
+                } else {
+                    0
+                },
+                last_separation: statistics.joints[j]
+                    .last_separation
                     .filter(|&time| time > self.started)
                     .map(|time| time - self.started),
             })

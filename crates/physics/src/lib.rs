@@ -23,7 +23,7 @@
 //! simulation.sample_now(&mut frame);
 //! // It has fallen through the play, struck the wall, and bounces there.
 //! assert!(frame.bodies[0].position.norm() < 0.21e-3);
-//! assert!(simulation.statistics().impacts[0] > 1);
+//! assert!(simulation.statistics().joints[0].impacts > 1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -76,7 +76,7 @@ fn record_and_peaks_contain_nothing_after_the_displayed_instant() {
     assert!(frames_within_steps > 20, "in the middle of long steps: {frames_within_steps}");
     // Strictly after the peak of the second impact: the record contains the peak, and its last value is the displayed one.
     let forces = recorded(&player, Quantity::NormalForce, 1.0);
-    let peak = player.simulation().statistics().peak_normal[0];
+    let peak = player.simulation().statistics().joints[0].peak_normal;
     let top = forces.iter().map(|p| p[1]).fold(0.0, f64::max);
     assert!((top / peak - 1.0).abs() < 1e-6, "{top} {peak}");
     for back in 0..6 {
@@ -800,7 +800,7 @@ fn the_wear_map_includes_only_completed_steps() {
             let expected = first_contacts.iter().filter(|time| **time < shown).count();
             assert_eq!(contacts(&player), expected as u64, "t = {shown}");
         }
-        let computed: u64 = player.simulation().statistics().impacts.iter().sum();
+        let computed: u64 = player.simulation().statistics().impacts();
         ahead += usize::from(computed > contacts(&player));
     }
     assert!(ahead > 0, "the run is ahead of the displayed instant");

@@ -76,13 +76,19 @@ impl Impact {
     }
 }
 
+/// The impact of one joint under way, if any, and the law of its impacts.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Contacting {
+    impact: Option<Impact>,
+    /// Damping factor, and the restitution that results: kept, because computing it takes an iteration.
+    law: (f64, f64),
+}
+
 /// Impacts under way and the latest finished ones: part of a simulation's state. Allocates nothing after `new`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Impacts {
     /// By joint.
-    under_way: Vec<Option<Impact>>,
-    /// (damping factor, resulting restitution), by joint: cached, because computing it takes an iteration.
-    laws: Vec<(f64, f64)>,
+    joints: Vec<Contacting>,
     /// Finished ones, as a ring buffer: impact n is at index n modulo its length.
     finished: Vec<Impact>,
     /// Number of finished ones, and of those handed out.
@@ -100,8 +106,7 @@ impl Impacts {
     /// between two steps.
     pub(super) fn new(joints: usize) -> Self {
         Self {
-            under_way: vec![None; joints],
-            laws: vec![(0.0, 1.0); joints],
+            joints: vec![Contacting { impact: None, law: (0.0, 1.0) }; joints],
             finished: vec![Impact::default(); STORED_IMPACTS.max(joints)],
             count: 0,
             handed_out: 0,
@@ -111,9 +116,8 @@ impl Impacts {
     /// Whether they fit a scene with `joints` ball joints.
     pub(super) fn fits(&self, joints: usize) -> bool {
         let own = Self::new(joints);
-        let mut known = self.under_way.iter().flatten().chain(&self.finished);
-        self.under_way.len() == joints
-            && self.laws.len() == joints
+        let mut known = self.joints.iter().filter_map(|joint| joint.impact.as_ref()).chain(&self.finished);
+        self.joints.len() == joints
             && self.finished.len() == own.finished.len()
             && self.handed_out <= self.count
             && known.all(|impact| impact.joint < joints.max(1))
@@ -132,19 +136,21 @@ impl Impacts {
         in_contact: bool,
         interacts: impl Fn(usize) -> bool,
     ) {
-        for other in self.under_way.iter_mut().flatten().filter(|other| interacts(other.joint)) {
+        let under_way = self.joints.iter_mut().filter_map(|joint| joint.impact.as_mut());
+        for other in under_way.filter(|other| interacts(other.joint)) {
             other.disturbed = true;
         }
-        let law = &mut self.laws[joint];
+        let law = &mut self.joints[joint].law;
         if law.0 != coefficients.damping {
             *law = (coefficients.damping, undisturbed_restitution(coefficients.damping));
         }
-        self.under_way[joint] = (speed > 0.0).then_some(Impact {
+        let law = law.1;
+        self.joints[joint].impact = (speed > 0.0).then_some(Impact {
             joint,
             start: time,
             approach_speed: speed,
             asked,
-            law: law.1,
+            law,
             floored: speed < coefficients.speed_floor,
             disturbed: in_contact,
             push,
@@ -155,7 +161,7 @@ impl Impacts {
     /// Updates the contact of `joint` over a step in which it was, or became, active, from its penetration, its largest normal
     /// force (N) and its largest ratio of damping to elastic force.
     pub(super) fn update(&mut self, joint: usize, cubic: &PenetrationCubic, force: f64, damping: f64) {
-        if let Some(impact) = &mut self.under_way[joint] {
+        if let Some(impact) = &mut self.joints[joint].impact {
             impact.steps += 1;
             impact.damping = impact.damping.max(damping);
             impact.deepest = impact.deepest.max(cubic.deepest());
@@ -168,20 +174,20 @@ impl Impacts {
     /// is the loss, to first order.
     pub(super) fn speeds_under_way(&self, joint: usize, floor: f64) -> Option<[f64; 2]> {
         let is_own = |impact: &&Impact| !impact.disturbed && impact.external_work() < MAX_WORK_IN_REBOUND;
-        let impact = self.under_way[joint].as_ref().filter(is_own)?;
+        let impact = self.joints[joint].impact.as_ref().filter(is_own)?;
         let (speed, law) = (impact.approach_speed, impact.law);
         Some([speed, speed * (1.0 - (1.0 - law) * (speed / floor).min(1.0))])
     }
 
     /// Largest normal force so far in the current impact of `joint`, N; infinite without one.
     pub(super) fn peak_under_way(&self, joint: usize) -> f64 {
-        let impact = &self.under_way[joint];
+        let impact = &self.joints[joint].impact;
         impact.as_ref().map_or(f64::INFINITY, |impact| impact.peak)
     }
 
     /// Ends the contact of `joint` at `time` with the penetration rate `rate`. Returns the impact, if it was one.
     pub(super) fn end(&mut self, joint: usize, time: f64, rate: f64) -> Option<Impact> {
-        let mut impact = self.under_way[joint].take()?;
+        let mut impact = self.joints[joint].impact.take()?;
         impact.end = time;
         impact.separation_speed = (-rate).max(0.0);
         let slot = (self.count % self.finished.len() as u64) as usize;
@@ -192,7 +198,7 @@ impl Impacts {
 
     /// Records that a live change altered the contact of `joint`, or ended it if `in_contact` is false.
     pub(super) fn change(&mut self, joint: usize, in_contact: bool) {
-        let impact = &mut self.under_way[joint];
+        let impact = &mut self.joints[joint].impact;
         if in_contact {
             if let Some(impact) = impact {
                 impact.disturbed = true;

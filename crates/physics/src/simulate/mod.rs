@@ -86,63 +86,49 @@ pub struct Statistics {
     pub rejected: u64,
     /// Steps that ended at a corner of the friction law.
     pub corners: u64,
-    /// Contacts begun, per ball joint.
-    pub impacts: Vec<u64>,
-    /// Finished contacts that began slower than the scene's `impact_speed_floor` or existed at the start, per ball joint: they
-    /// rebounded higher than requested.
-    pub floored: Vec<u64>,
-    /// Contacts that lasted fewer fixed steps than needed to resolve one, per ball joint; 0 with an adaptive method.
-    pub coarse: Vec<u64>,
-    /// Deepest penetration at which a contact was found although its beginning should have been located, per ball joint, m; 0 if
-    /// all were, or with fixed steps.
-    pub late: Vec<f64>,
-    /// The undisturbed impact whose restitution most exceeds its law's prediction, if any does, per ball joint.
-    pub astray: Vec<Option<Impact>>,
-    /// Largest continuous-time normal force (reaction of an ideal joint), per ball joint, N.
-    pub peak_normal: Vec<f64>,
-    /// When it occurred, per ball joint, s.
-    pub peak_time: Vec<f64>,
-    /// Time of the last separation, if any, per ball joint, s.
-    pub last_separation: Vec<Option<f64>>,
     /// Simulated time that an explicit adaptive method spent in steps limited by stability, s.
     pub stability_limited_time: f64,
-    /// Largest ratio of damping to elastic force in any contact, per ball joint.
-    pub damping: Vec<f64>,
-    /// When it occurred, per ball joint, s.
-    pub damping_time: Vec<f64>,
     /// Largest constraint violation of the `lagrange` form so far, m (rad for orientation rows).
     pub constraint_drift: f64,
+    /// Of each ball joint.
+    pub joints: Vec<JointStatistics>,
+}
+
+/// What has happened in one ball joint since the last reset.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct JointStatistics {
+    /// Contacts begun.
+    pub impacts: u64,
+    /// Finished contacts that began slower than the scene's `impact_speed_floor` or existed at the start: they rebounded higher than
+    /// requested.
+    pub floored: u64,
+    /// Contacts that lasted fewer fixed steps than needed to resolve one; 0 with an adaptive method.
+    pub coarse: u64,
+    /// Deepest penetration at which a contact was found although its beginning should have been located, m; 0 if all were, or with
+    /// fixed steps.
+    pub late: f64,
+    /// The undisturbed impact whose restitution most exceeds its law's prediction, if any does.
+    pub excessive_rebound: Option<Impact>,
+    /// Largest continuous-time normal force (reaction, if the joint is ideal), N.
+    pub peak_normal: f64,
+    /// When it occurred, s.
+    pub peak_time: f64,
+    /// Time of the last separation, if any, s.
+    pub last_separation: Option<f64>,
+    /// Largest ratio of damping to elastic force in any contact.
+    pub damping: f64,
+    /// When it occurred, s.
+    pub damping_time: f64,
 }
 
 impl Statistics {
     fn new(joints: usize) -> Self {
-        Self {
-            impacts: vec![0; joints],
-            floored: vec![0; joints],
-            coarse: vec![0; joints],
-            late: vec![0.0; joints],
-            astray: vec![None; joints],
-            peak_normal: vec![0.0; joints],
-            peak_time: vec![0.0; joints],
-            last_separation: vec![None; joints],
-            damping: vec![0.0; joints],
-            damping_time: vec![0.0; joints],
-            ..Self::default()
-        }
+        Self { joints: vec![JointStatistics::default(); joints], ..Self::default() }
     }
 
-    /// Whether they fit a scene with `joints` ball joints.
-    fn fits(&self, joints: usize) -> bool {
-        self.impacts.len() == joints
-            && self.floored.len() == joints
-            && self.coarse.len() == joints
-            && self.late.len() == joints
-            && self.astray.len() == joints
-            && self.peak_normal.len() == joints
-            && self.peak_time.len() == joints
-            && self.last_separation.len() == joints
-            && self.damping.len() == joints
-            && self.damping_time.len() == joints
+    /// Contacts begun in all joints.
+    pub fn impacts(&self) -> u64 {
+        self.joints.iter().map(|joint| joint.impacts).sum()
     }
 
     fn count(&mut self, counts: Counts) {

@@ -106,9 +106,8 @@ pub struct State {
     quarter_turns: Vec<i64>,
     /// Gravity, contacts and stepper with the live changes so far.
     conditions: Conditions,
-    /// Active clearance ramps, and clearances without them, m.
-    ramps: Vec<Option<Ramp>>,
-    clearances: Vec<f64>,
+    /// What each ball joint remembers.
+    joints: Vec<JointState>,
     /// The hand's pull, if any.
     pull: Option<Pull>,
     /// Flights of the bodies excluded from the latest step, indexed like the mechanism's free-flight bodies.
@@ -125,6 +124,24 @@ pub struct State {
     ideal: Option<Box<IdealState>>,
     #[serde(skip)]
     workspace_id: WorkspaceId,
+}
+
+/// What one ball joint remembers from step to step, besides its gap and its contact.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct JointState {
+    /// Active ramp of the clearance, and the clearance without it, m.
+    ramp: Option<Ramp>,
+    clearance: f64,
+    /// Effect of a unit normal force on the opening at the latest contact, 1/kg, and the phase of the contact: for the
+    /// discrete-gradient method.
+    mobility: f64,
+    phase: ContactPhase,
+    /// Steps since the current contact began.
+    contact_steps: u64,
+    /// Reaction at the latest two instants, if the joint is ideal, for its peak between steps.
+    reaction: Recent,
+    /// Peak since it was last taken.
+    peak: Peak,
 }
 
 /// State vector, derivative, gaps and contact state at one instant.
@@ -166,10 +183,6 @@ struct Control {
 /// Step control of the discrete-gradient method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct DiscreteControl {
-    /// Effect of a unit normal force at each ball joint on its opening, at its latest contact, 1/kg.
-    mobility: Vec<f64>,
-    /// Phases of the contacts.
-    phases: Vec<ContactPhase>,
     /// The latest step, s, and the derivative of the velocities without contact forces at its middle; no step yet if 0.
     h: f64,
     acceleration: Vec<f64>,
@@ -184,12 +197,6 @@ struct Record {
     wear: Option<Wear>,
     impacts: Impacts,
     statistics: Statistics,
-    /// Reactions of the ideal joints at the latest two instants, for their peaks between steps.
-    reactions: Vec<Recent>,
-    /// Steps since the current contact began, by joint.
-    contact_steps: Vec<u64>,
-    /// Peaks of each ball joint since they were last taken.
-    peaks: Vec<Peak>,
     /// The stop that starts deepest relative to its nominal depth, if any exceeds that: index, [depth, nominal depth] (m or rad),
     /// force (N or N m).
     starts_inside: Option<(usize, [f64; 2], f64)>,
@@ -529,9 +536,7 @@ impl Simulation {
     /// Moves the peaks of each ball joint since the last call into `out`, in joint order.
     pub fn take_peaks(&mut self, out: &mut Vec<Peak>) {
         out.clear();
-        let peaks = &mut self.state.record.peaks;
-        out.extend_from_slice(peaks);
-        peaks.fill(Peak::default());
+        out.extend(self.state.joints.iter_mut().map(|joint| std::mem::take(&mut joint.peak)));
     }
 
     /// Appends to `out` the impacts that finished since the last call. None is lost if it is called after every step;

@@ -35,8 +35,8 @@ impl State {
         let among_others = active.any(|(other, _)| interacts(other));
         self.record.impacts.begin(j, time, rate, asked, push, coefficients, among_others, interacts);
         let contact_state = ContactState::at_onset(coefficients, rate);
-        self.record.statistics.impacts[j] += 1;
-        let peak = &mut self.record.peaks[j];
+        self.record.statistics.joints[j].impacts += 1;
+        let peak = &mut self.joints[j].peak;
         peak.impacts += 1;
         peak.approach_speed = peak.approach_speed.max(rate);
         self.control.contact_began = true;
@@ -58,9 +58,9 @@ impl State {
     ) {
         let (damping, theta) = cubic.most_damped(c, contact_state, from);
         self.record.impacts.update(j, cubic, force, damping);
-        if damping > self.record.statistics.damping[j] {
-            self.record.statistics.damping[j] = damping;
-            self.record.statistics.damping_time[j] = start + theta * (self.now.t - start);
+        if damping > self.record.statistics.joints[j].damping {
+            self.record.statistics.joints[j].damping = damping;
+            self.record.statistics.joints[j].damping_time = start + theta * (self.now.t - start);
         }
     }
 }
@@ -86,7 +86,7 @@ impl Run<'_> {
                     state.begin(j, 0.0, rate, UNKNOWN_PUSH, contact.restitution, &mechanism.contacts);
             } else {
                 state.now.contact_states[j] = ContactState::at_onset(coefficients, f64::NEG_INFINITY);
-                state.record.statistics.impacts[j] += 1;
+                state.record.statistics.joints[j].impacts += 1;
             }
         }
     }
@@ -102,7 +102,7 @@ impl Run<'_> {
                 let asked = state.conditions.joints[j].restitution;
                 state.now.contact_states[j] =
                     state.begin(j, state.now.t, gap.rate, UNKNOWN_PUSH, asked, &mechanism.contacts);
-                state.record.contact_steps[j] = 0;
+                state.joints[j].contact_steps = 0;
                 begins = true;
             }
         }
@@ -140,7 +140,7 @@ impl Run<'_> {
             let at_wall = end.penetration.abs() <= at_wall && end.rate != 0.0 && active == (end.rate < 0.0);
             let switches = located.is_some_and(|located| located == j || at_wall);
             let in_contact = if switches { !active || turned_back } else { end.penetration > 0.0 || end.is_arriving() };
-            state.record.contact_steps[j] += 1;
+            state.joints[j].contact_steps += 1;
             if in_contact == state.now.contact_states[j].active {
                 if in_contact {
                     let fastest = || PenetrationCubic::new(start, end, h, rounding).fastest(0.0).0;
@@ -151,7 +151,7 @@ impl Run<'_> {
             }
             changes.contacts = true;
             changes.forces |= fixed;
-            let steps = std::mem::replace(&mut state.record.contact_steps[j], 0);
+            let steps = std::mem::replace(&mut state.joints[j].contact_steps, 0);
             if in_contact {
                 let cubic = PenetrationCubic::new(start, end, h, rounding);
                 let crosses = start.penetration <= 0.0 && end.penetration > 0.0;
@@ -164,7 +164,7 @@ impl Run<'_> {
                 let push = if is_known { (rate - start.rate) / approach_time } else { UNKNOWN_PUSH };
                 let mut contact_state = state.begin(j, time, rate, push, asked, &mechanism.contacts);
                 if !fixed && !switches && end.penetration > AT_WALL * mechanism.contacts.clearance(j) {
-                    let late = &mut state.record.statistics.late[j];
+                    let late = &mut state.record.statistics.joints[j].late;
                     *late = late.max(end.penetration);
                 }
                 // A located contact begins where the step ends.
@@ -184,17 +184,18 @@ impl Run<'_> {
                     (state.now.t, end.rate)
                 };
                 let statistics = &mut state.record.statistics;
-                statistics.floored[j] += u64::from(state.now.contact_states[j].floored);
+                statistics.joints[j].floored += u64::from(state.now.contact_states[j].floored);
                 if let Some(impact) = state.record.impacts.end(j, time, rate) {
-                    let farthest = statistics.astray[j].map_or(0.0, |impact| impact.restitution_excess());
+                    let farthest =
+                        statistics.joints[j].excessive_rebound.map_or(0.0, |impact| impact.restitution_excess());
                     if impact.restitution_excess() > farthest {
-                        statistics.astray[j] = Some(impact);
+                        statistics.joints[j].excessive_rebound = Some(impact);
                     }
                 }
                 let coarse = counts_steps && steps < MIN_IMPACT_STEPS;
-                state.record.statistics.coarse[j] += u64::from(coarse);
+                state.record.statistics.joints[j].coarse += u64::from(coarse);
                 state.now.contact_states[j] = ContactState::default();
-                state.record.statistics.last_separation[j] = Some(state.now.t);
+                state.record.statistics.joints[j].last_separation = Some(state.now.t);
             }
         }
         changes
@@ -223,14 +224,14 @@ impl Run<'_> {
                 cubic.strongest(coefficients, &ContactState::within_step(coefficients))
             };
             let time = before.t + theta * h;
-            attempt.may_contain_peak |= force > NEAR_PEAK * state.record.statistics.peak_normal[j];
-            if force > state.record.statistics.peak_normal[j] {
-                state.record.statistics.peak_normal[j] = force;
-                state.record.statistics.peak_time[j] = time;
+            attempt.may_contain_peak |= force > NEAR_PEAK * state.record.statistics.joints[j].peak_normal;
+            if force > state.record.statistics.joints[j].peak_normal {
+                state.record.statistics.joints[j].peak_normal = force;
+                state.record.statistics.joints[j].peak_time = time;
             }
-            if force > state.record.peaks[j].normal {
+            if force > state.joints[j].peak.normal {
                 let gap = mechanism.contacts.gap(j);
-                let peak = &mut state.record.peaks[j];
+                let peak = &mut state.joints[j].peak;
                 peak.normal = force;
                 peak.time = time;
                 peak.normal_force = gap.separation.normal * -force;

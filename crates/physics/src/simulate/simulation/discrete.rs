@@ -11,7 +11,7 @@
 //!
 //! Beyond [`COARSE`] steps per impact the last three shrink, too, so that the motion converges.
 
-use super::{DiscreteControl, NEARLY, Run, State, StepEnd, store_gaps};
+use super::{DiscreteControl, JointState, NEARLY, Run, State, StepEnd, store_gaps};
 use crate::contact::{ContactPhase, ElasticLaw};
 use crate::mechanism::{ActiveSet, Counts, Mechanism, StepStart};
 use crate::simulate::peaks::PenetrationCubic;
@@ -44,31 +44,18 @@ const SMOOTH: f64 = 3e-8;
 const SCALE_TIME: f64 = 0.1;
 
 impl DiscreteControl {
-    /// At the start, where any joint may touch for the first time.
+    /// At the start.
     pub(super) fn new(mechanism: &Mechanism) -> Self {
-        let joints = mechanism.contacts.len();
-        Self {
-            mobility: (0..joints).map(|j| mechanism.max_contact_mobility(j)).collect(),
-            phases: vec![ContactPhase::default(); joints],
-            h: 0.0,
-            acceleration: vec![0.0; mechanism.dimension() - mechanism.positions()],
-            smooth: LONGEST,
-        }
-    }
-
-    /// Whether it has the dimensions of `own`.
-    pub(super) fn fits(&self, own: &Self) -> bool {
-        let sizes = |control: &Self| [control.mobility.len(), control.phases.len(), control.acceleration.len()];
-        sizes(self) == sizes(own)
+        Self { h: 0.0, acceleration: vec![0.0; mechanism.dimension() - mechanism.positions()], smooth: LONGEST }
     }
 
     /// Records the step just accepted, of size `h`, that ends at `now`; with `finer` times the steps of the coarse ones.
-    fn record(&mut self, mechanism: &Mechanism, h: f64, now: &StepEnd, finer: f64) {
-        for (j, phase) in self.phases.iter_mut().enumerate() {
+    fn record(&mut self, mechanism: &Mechanism, h: f64, joints: &mut [JointState], now: &StepEnd, finer: f64) {
+        for (j, joint) in joints.iter_mut().enumerate() {
             let touches = now.contact_states[j].active;
-            *phase = if touches { phase.after(now.gaps[j].rate) } else { ContactPhase::default() };
+            joint.phase = if touches { joint.phase.after(now.gaps[j].rate) } else { ContactPhase::default() };
             if let Some(found) = mechanism.contact_mobility(j) {
-                self.mobility[j] = found;
+                joint.mobility = found;
             }
         }
         // The midpoint rule errs by h^3 / 12 times the rate at which the acceleration changes.
@@ -93,7 +80,7 @@ fn elastic(state: &State, j: usize) -> ElasticLaw {
 
 /// Longest step in an impact of ball joint `j` at `speed`, m/s, in s: a part of the Hertz time.
 fn step_in_impact(state: &State, j: usize, speed: f64) -> f64 {
-    let mass = 1.0 / state.control.discrete.mobility[j];
+    let mass = 1.0 / state.joints[j].mobility;
     let steps = state.conditions.solver.steps_per_impact;
     let steps = if speed > SLOW { steps } else { steps.min(SLOW_STEPS) };
     elastic(state, j).impact_duration(0.0, mass, speed) / f64::from(steps)
@@ -101,17 +88,16 @@ fn step_in_impact(state: &State, j: usize, speed: f64) -> f64 {
 
 /// Force over elastic force with which each ball rebounds in a step of `h` seconds, for those that need one.
 fn set_rebounds(state: &State, mechanism: &Mechanism, h: f64, rebounds: &mut [Option<f64>]) {
-    let control = &state.control.discrete;
     for (j, rebound) in rebounds.iter_mut().enumerate() {
         let gap = state.now.gaps[j];
-        let rises = gap.penetration > 0.0 && control.phases[j] == ContactPhase::Restitution;
+        let rises = gap.penetration > 0.0 && state.joints[j].phase == ContactPhase::Restitution;
         let law = mechanism.contacts.coefficients(j);
         let speeds = state.record.impacts.speeds_under_way(j, law.speed_floor);
         let Some([approach, separation]) = speeds.filter(|_| rises) else {
             *rebound = None;
             continue;
         };
-        let mass = 1.0 / control.mobility[j];
+        let mass = 1.0 / state.joints[j].mobility;
         let few = h * FEW_STEPS > elastic(state, j).impact_duration(0.0, mass, approach);
         *rebound = few.then(|| law.rebound(mass, gap.penetration, gap.rate, separation));
     }
@@ -119,7 +105,7 @@ fn set_rebounds(state: &State, mechanism: &Mechanism, h: f64, rebounds: &mut [Op
 
 /// Half a period of the ringing of ball joint `j` about `penetration`, m, in s.
 fn half_period(state: &State, j: usize, penetration: f64) -> f64 {
-    elastic(state, j).half_period_at(penetration, state.control.discrete.mobility[j])
+    elastic(state, j).half_period_at(penetration, state.joints[j].mobility)
 }
 
 /// Steps of a run over those of the coarse ones, at least 1.
@@ -138,7 +124,7 @@ pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
             continue;
         }
         if contact_state.active && gap.penetration > 0.0 {
-            let lasts = control.phases[j] == ContactPhase::Lasting;
+            let lasts = state.joints[j].phase == ContactPhase::Lasting;
             // A ball at its wall may be struck again.
             let speed = if lasts { gap.rate.abs() } else { contact_state.approach_speed.max(gap.rate.abs()) };
             if speed > SLOW || (speed > floor(j) && !lasts) {
@@ -189,9 +175,9 @@ impl Run<'_> {
                 _ => {
                     self.accept_closed(t_end, size, open)?;
                     let finer = finer(self.state);
-                    let State { now, control, .. } = &mut *self.state;
+                    let State { now, control, joints, .. } = &mut *self.state;
                     control.h_next = if t_end == limit { h } else { size };
-                    control.discrete.record(self.mechanism, size, now, finer);
+                    control.discrete.record(self.mechanism, size, joints, now, finer);
                     return Ok(());
                 }
             }

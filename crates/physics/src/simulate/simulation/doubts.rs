@@ -52,36 +52,37 @@ impl DoubtContext<'_> {
         let machine = self.machine.doubts().into_iter().map(Doubt::Machine);
         let mut doubts: Vec<Doubt> = machine.collect();
         let statistics = self.state.statistics();
-        let part = |part: &[u64], j: usize| part[j] as f64 / statistics.impacts[j].max(1) as f64;
-        let unresolved = self.worst(0.0, |j| part(&statistics.coarse, j));
+        let part = |part: u64, j: usize| part as f64 / statistics.joints[j].impacts.max(1) as f64;
+        let unresolved = self.worst(0.0, |j| part(statistics.joints[j].coarse, j));
         doubts.extend(unresolved.map(|(joints, j)| Doubt::Unresolved {
             joints,
-            short: statistics.coarse[j],
-            contacts: statistics.impacts[j],
+            short: statistics.joints[j].coarse,
+            contacts: statistics.joints[j].impacts,
             steps: MIN_IMPACT_STEPS,
         }));
-        let floored = self.worst(MAX_FLOORED, |j| part(&statistics.floored, j));
+        let floored = self.worst(MAX_FLOORED, |j| part(statistics.joints[j].floored, j));
         doubts.extend(floored.map(|(joints, j)| Doubt::Floored {
             joints,
-            slow: statistics.floored[j],
-            contacts: statistics.impacts[j],
+            slow: statistics.joints[j].floored,
+            contacts: statistics.joints[j].impacts,
         }));
-        let late = self.worst(0.0, |j| statistics.late[j]);
-        doubts.extend(late.map(|(joints, j)| Doubt::Late { joints, depth: statistics.late[j] }));
-        let rebounds = self
-            .worst(MAX_RESTITUTION_EXCESS, |j| statistics.astray[j].map_or(0.0, |impact| impact.restitution_excess()));
+        let late = self.worst(0.0, |j| statistics.joints[j].late);
+        doubts.extend(late.map(|(joints, j)| Doubt::Late { joints, depth: statistics.joints[j].late }));
+        let rebounds = self.worst(MAX_RESTITUTION_EXCESS, |j| {
+            statistics.joints[j].excessive_rebound.map_or(0.0, |impact| impact.restitution_excess())
+        });
         doubts.extend(rebounds.and_then(|(joints, j)| {
-            let impact = statistics.astray[j]?;
+            let impact = statistics.joints[j].excessive_rebound?;
             Some(Doubt::Rebound { joints, time: impact.end, achieved: impact.achieved(), law: impact.law })
         }));
         let patch = self.worst(MAX_PATCH, |j| self.largest_patch(j));
         doubts.extend(patch.map(|(joints, j)| Doubt::Patch { joints, radii: self.largest_patch(j) }));
         let usual = |j: usize| self.coefficients(j).damping;
-        let damping = self.worst(MAX_DAMPING, |j| statistics.damping[j] - usual(j));
+        let damping = self.worst(MAX_DAMPING, |j| statistics.joints[j].damping - usual(j));
         doubts.extend(damping.map(|(joints, j)| Doubt::Damping {
             joints,
-            time: statistics.damping_time[j],
-            ratio: statistics.damping[j],
+            time: statistics.joints[j].damping_time,
+            ratio: statistics.joints[j].damping,
             usual: usual(j),
         }));
         doubts.extend(self.state.record.starts_inside.map(|(i, [depth, usual], force)| {
@@ -177,7 +178,7 @@ impl DoubtContext<'_> {
         }
         let c = self.coefficients(j);
         let (radius, clearance) = (c.ball_radius, c.clearance);
-        let depth = c.elastic.depth(self.state.statistics().peak_normal[j]);
+        let depth = c.elastic.depth(self.state.statistics().joints[j].peak_normal);
         // Hertz: a^2 = delta R r / (R - r).
         (depth * (radius + clearance) / (clearance * radius)).sqrt()
     }

@@ -144,13 +144,13 @@ impl Run<'_> {
         let distance = gap.separation.penetration + now;
         let clearance = if contact.clearance < now && distance > contact.clearance {
             let ramp = Ramp { start: state.now.t, from: now, rate: -CLEARANCE_SPEED, to: contact.clearance };
-            state.ramps[j] = Some(ramp);
+            state.joints[j].ramp = Some(ramp);
             now
         } else {
-            state.ramps[j] = None;
+            state.joints[j].ramp = None;
             contact.clearance
         };
-        state.clearances[j] = clearance;
+        state.joints[j].clearance = clearance;
         // The wall has moved away from the ball. The state of a ball just arriving or leaving does not change.
         if clearance > now && state.now.contact_states[j].active && distance <= clearance {
             state.now.contact_states[j] = ContactState::default();
@@ -161,19 +161,18 @@ impl Run<'_> {
     /// End of the active clearance ramp that finishes first, s.
     pub(super) fn ramp_end(&self) -> f64 {
         let end = |r: &Ramp| r.start + (r.to - r.from) / r.rate;
-        self.state.ramps.iter().flatten().map(end).fold(f64::INFINITY, f64::min)
+        self.state.joints.iter().filter_map(|joint| joint.ramp.as_ref()).map(end).fold(f64::INFINITY, f64::min)
     }
 
     pub(super) fn finish_ramps(&mut self) {
         let t = self.state.now.t;
         let mut finished = false;
-        for j in 0..self.state.ramps.len() {
-            let Some(ramp) = self.state.ramps[j] else {
+        for joint in &mut self.state.joints {
+            let Some(ramp) = joint.ramp else {
                 continue;
             };
             if t >= ramp.start + (ramp.to - ramp.from) / ramp.rate {
-                self.state.ramps[j] = None;
-                self.state.clearances[j] = ramp.to;
+                (joint.ramp, joint.clearance) = (None, ramp.to);
                 finished = true;
             }
         }

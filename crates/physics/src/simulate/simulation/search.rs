@@ -22,7 +22,7 @@ impl Run<'_> {
                 continue;
             };
             let (size, time) = (reaction.norm(), self.state.now.t);
-            let vertex = self.state.record.reactions[j].push_and_find_peak(time, size);
+            let vertex = self.state.joints[j].reaction.push_and_find_peak(time, size);
             self.take_reaction(j, if smooth { vertex } else { size }, time);
         }
     }
@@ -39,9 +39,8 @@ impl Run<'_> {
             }
             let cubic = PenetrationCubic::new(self.before.gaps[j], self.state.now.gaps[j], h, rounding);
             let c = *self.mechanism.contacts.coefficients(j);
-            let run_peak = self.state.record.statistics.peak_normal[j];
-            let least =
-                run_peak.min(self.state.record.peaks[j].normal).min(self.state.record.impacts.peak_under_way(j));
+            let run_peak = self.state.record.statistics.joints[j].peak_normal;
+            let least = run_peak.min(self.state.joints[j].peak.normal).min(self.state.record.impacts.peak_under_way(j));
             if cubic.force_bound(&c, &contact_state) <= least.min(NEAR_PEAK * run_peak) {
                 self.attempt.peak_forces[j] = (0.0, 1.0);
                 continue;
@@ -104,8 +103,8 @@ impl Run<'_> {
                 let gap = self.mechanism.contacts.gap(j);
                 let (normal, size, friction) = (gap.separation.normal, gap.normal_force, gap.friction);
                 if self.is_peak(j, size, time) {
-                    self.state.record.peaks[j].normal_force = normal * -size;
-                    self.state.record.peaks[j].friction_force = friction;
+                    self.state.joints[j].peak.normal_force = normal * -size;
+                    self.state.joints[j].peak.friction_force = friction;
                 }
             }
         }
@@ -120,10 +119,10 @@ impl Run<'_> {
         }
         let (t0, t) = (self.before.t, self.state.now.t);
         for j in 0..joints {
-            let Some((start, end)) = self.state.record.reactions[j].ends(t0, t) else {
+            let Some((start, end)) = self.state.joints[j].reaction.ends(t0, t) else {
                 continue;
             };
-            if start.max(end) <= NEAR_PEAK * self.state.record.statistics.peak_normal[j] {
+            if start.max(end) <= NEAR_PEAK * self.state.record.statistics.joints[j].peak_normal {
                 continue;
             }
             let middle = self.reaction_at(j, 0.5 * (t0 + t));
@@ -148,18 +147,18 @@ impl Run<'_> {
         if self.is_peak(j, size, time)
             && let Some(reaction) = self.mechanism.reaction(j)
         {
-            self.state.record.peaks[j].normal_force = reaction;
+            self.state.joints[j].peak.normal_force = reaction;
         }
     }
 
     /// Records a force if it is the largest so far; returns whether it is the largest since the peaks were last taken.
     fn is_peak(&mut self, j: usize, size: f64, time: f64) -> bool {
         let statistics = &mut self.state.record.statistics;
-        if size > statistics.peak_normal[j] {
-            statistics.peak_normal[j] = size;
-            statistics.peak_time[j] = time;
+        if size > statistics.joints[j].peak_normal {
+            statistics.joints[j].peak_normal = size;
+            statistics.joints[j].peak_time = time;
         }
-        let peak = &mut self.state.record.peaks[j];
+        let peak = &mut self.state.joints[j].peak;
         let largest = size > peak.normal;
         if largest {
             (peak.normal, peak.time) = (size, time);

@@ -2,10 +2,10 @@
 
 use super::automatic::{SchemeSelector, controller_of};
 use super::{
-    Control, DiscreteControl, FIRST_CONTACT_STEP, LONGEST_STEP, Model, Record, State, StateMismatch, StepEnd,
-    WorkspaceId,
+    Control, DiscreteControl, FIRST_CONTACT_STEP, JointState, LONGEST_STEP, Model, Record, State, StateMismatch,
+    StepEnd, WorkspaceId,
 };
-use crate::contact::ContactState;
+use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::Polynomial;
 use crate::machine::Conditions;
 use crate::mechanism::{Flight, Mechanism, Pull};
@@ -15,6 +15,21 @@ use crate::simulate::load_peaks::LoadPeaks;
 use crate::simulate::peaks::{Approach, Recent};
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
 use crate::simulate::{Peak, Statistics, Wear};
+
+impl JointState {
+    /// At the start, where any joint may touch for the first time.
+    fn new(mechanism: &Mechanism, j: usize) -> Self {
+        Self {
+            ramp: None,
+            clearance: mechanism.contacts.clearance(j),
+            mobility: mechanism.max_contact_mobility(j),
+            phase: ContactPhase::default(),
+            contact_steps: 0,
+            reaction: Recent::default(),
+            peak: Peak::default(),
+        }
+    }
+}
 
 impl StepEnd {
     pub(super) fn new(y: Vec<f64>, joints: usize) -> Self {
@@ -52,8 +67,7 @@ impl State {
         let [quarter_turns, other_turns] = mechanism.quarter_turns();
         Self {
             quarter_turns,
-            ramps: vec![None; joints],
-            clearances: (0..joints).map(|j| mechanism.contacts.clearance(j)).collect(),
+            joints: (0..joints).map(|j| JointState::new(mechanism, j)).collect(),
             pull: None,
             flights: vec![None; mechanism.free_flight_bodies().len()],
             control: Control {
@@ -75,9 +89,6 @@ impl State {
                 wear: None,
                 impacts: Impacts::new(joints),
                 statistics: Statistics::new(joints),
-                reactions: vec![Recent::default(); joints],
-                contact_steps: vec![0; joints],
-                peaks: vec![Peak::default(); joints],
                 starts_inside: None,
                 determinant_positive: true,
                 quarter_turns: other_turns,
@@ -118,7 +129,7 @@ impl State {
 
     /// Clearance of ball joint `j`, m.
     pub fn clearance(&self, j: usize) -> f64 {
-        self.ramps[j].map_or(self.clearances[j], |ramp| ramp.at(self.now.t).0)
+        self.joints[j].ramp.map_or(self.joints[j].clearance, |ramp| ramp.at(self.now.t).0)
     }
 
     /// The pull of the hand, if any.
@@ -156,7 +167,7 @@ impl State {
     /// [`Statistics`], found from the ends of steps, or a larger one from a sample.
     pub fn peak(&self, j: usize) -> (f64, f64) {
         let statistics = self.statistics();
-        let found = (statistics.peak_normal[j], statistics.peak_time[j]);
+        let found = (statistics.joints[j].peak_normal, statistics.joints[j].peak_time);
         if self.sampled[j].0 > found.0 { self.sampled[j] } else { found }
     }
 
@@ -217,8 +228,7 @@ impl State {
             && record.quarter_turns.len() == own.record.quarter_turns.len()
             && loose(conditions) == loose(&own.conditions)
             && model.machine().with_conditions(conditions).check().is_ok()
-            && self.ramps.len() == joints
-            && self.clearances.len() == joints
+            && self.joints.len() == joints
             && self.flights.len() == own.flights.len()
             // Only a window has a hand.
             && self.pull.is_none()
@@ -226,12 +236,9 @@ impl State {
             && record.account.fits()
             && record.starts_inside.is_none_or(|(element, ..)| element < model.machine().elements.len())
             && record.impacts.fits(joints)
-            && record.statistics.fits(joints)
+            && record.statistics.joints.len() == joints
             && worn.is_none_or(|wear| wear.fits(model.machine()))
-            && record.reactions.len() == joints
-            && record.contact_steps.len() == joints
-            && self.control.discrete.fits(&own.control.discrete)
-            && record.peaks.len() == joints
+            && self.control.discrete.acceleration.len() == own.control.discrete.acceleration.len()
             && self.sampled.len() == joints
             && self.loads.as_ref().is_none_or(|loads| loads.fits(&LoadPeaks::new(model.machine())));
         if !fits {

@@ -131,7 +131,7 @@ impl Run<'_> {
         store_gaps(mechanism, &mut now.gaps);
         self.count_turns();
         // Forces jump here: a parabola across the jump would have a spurious peak.
-        self.state.record.reactions.fill(Recent::default());
+        self.state.joints.iter_mut().for_each(|joint| joint.reaction = Recent::default());
         self.invalidate();
         self.begin_contacts_at_walls();
         self.discard_previous_step();

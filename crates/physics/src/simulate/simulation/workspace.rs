@@ -97,8 +97,8 @@ pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &
     }
     for (j, contact) in state.conditions.joints.iter().enumerate() {
         if contact.clearance > 0.0 {
-            mechanism.contacts.set_ramp(j, state.ramps[j]);
-            mechanism.contacts.set_parameters(j, contact, state.clearances[j]);
+            mechanism.contacts.set_ramp(j, state.joints[j].ramp);
+            mechanism.contacts.set_parameters(j, contact, state.joints[j].clearance);
         }
     }
 }
