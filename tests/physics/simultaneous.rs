@@ -123,7 +123,7 @@ fn equal_gaps_of_a_straight_line_linkage_are_crossed_at_one_speed() {
 
 #[test]
 fn both_inner_balls_of_a_steering_strike_at_one_speed() {
-    let scene = Scene::load(&crate::trial("steer"), &[]).unwrap();
+    let scene = Scene::load(crate::trial("steer"), &[]).unwrap();
     let all = impacts(&scene, 1.2e-3);
     let inner = |side: &str| {
         let name = format!("{side}.inner");
