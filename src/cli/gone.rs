@@ -10,7 +10,11 @@ const IN_PACKAGE: &[(&str, &str)] =
 const GONE: &[(&str, &str, &str)] = &[
     ("bench", "", "`jointplay tradeoff SCENE…` measures the cost and error of every method on scenes"),
     ("tradeoff", "--all", "name the scenes: `jointplay tradeoff SCENE… --out FOLDER`"),
-    ("validate", "", "`cargo test --test physics validation` compares with the known answers of docs/validation.md"),
+    (
+        "validate",
+        "",
+        "`cargo test -p jointplay-analysis --test physics validation` compares with the known answers of docs/validation.md",
+    ),
     (
         "merge",
         "",

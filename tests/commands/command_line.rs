@@ -1180,7 +1180,10 @@ fn a_former_command_is_answered_with_the_way_there() {
     });
     let gone = [
         ("bench", "`jointplay tradeoff SCENE…` measures the cost and error of every method on scenes"),
-        ("validate", "`cargo test --test physics validation` compares with the known answers of docs/validation.md"),
+        (
+            "validate",
+            "`cargo test -p jointplay-analysis --test physics validation` compares with the known answers of docs/validation.md",
+        ),
     ];
     let gone = gone.map(|(word, now)| (word, format!("error: `jointplay {word}` is gone: {now}\n")));
     for (word, answer) in in_package.into_iter().chain(gone) {

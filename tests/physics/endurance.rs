@@ -318,7 +318,7 @@ fn full_a_thousand_settled_seconds_do_not_drift() {
 fn write_a_thousand_seconds_of_every_kind() {
     let mut page = String::from(
         "\n## 1000 simulated seconds\n\n\
-         Written by `cargo test --release --test physics -- --ignored endurance::write` within an hour. Energy and normal force are the\n\
+         Written by `cargo test --release -p jointplay-analysis --test physics -- --ignored endurance::write` within an hour. Energy and normal force are the\n\
          largest changes from the end of the third period to the end of any later one, relative to the largest kinetic energy and to the\n\
          largest normal force. The energy residual is that of the whole run, relative to the energy exchanged. The free mechanisms have no\n\
          period; their energy is sampled every second, and the motion of pendulum and chain decays.\n\n\

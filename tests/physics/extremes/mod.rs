@@ -97,7 +97,7 @@ const HEAD: &str = "# Behaviour at the limits of the parameters
 
 Outcomes of the first impacts of a scene with extreme parameter values, in both formulations, with every preset, or with every method where
 the row varies step or tolerance. All are in `docs/extremes.csv`, one line per scene, extreme and formulation.
-`cargo test --test physics extremes::` computes and checks one cell of each row, with `-- --ignored extremes::full` all cells; with
+`cargo test -p jointplay-analysis --test physics extremes::` computes and checks one cell of each row, with `-- --ignored extremes::full` all cells; with
 `-- --ignored extremes::write_the_page` it writes this page and that file.
 
 - **runs**: the run reaches its end. Every number is finite, orientations are rotations, ideal joints are closed to 1e-9 m (1 mm in
@@ -205,7 +205,7 @@ fn report_outcome(row: &Row, form: &str, column: &str, outcome: &Outcome) -> boo
     matches!(outcome, Outcome::Wrong(_))
 }
 
-const UPDATE_COMMAND: &str = "cargo test --test physics -- --ignored extremes::write_the_page";
+const UPDATE_COMMAND: &str = "cargo test -p jointplay-analysis --test physics -- --ignored extremes::write_the_page";
 
 #[test]
 #[ignore = "full: half a minute"]
