@@ -5,6 +5,7 @@
 //! simulated time, slow motion spreads the clicks but does not change them. Loudness: a power below one of the impulse, so that
 //! soft impacts are audible beside hard ones.
 
+use crate::contact::ElasticLaw;
 use crate::scene::Scene;
 use crate::simulate::Impact;
 
@@ -50,7 +51,7 @@ pub struct TimeWindow {
 /// after Hertz, and is at most `mass`, kg, the total. Forces during lasting contact are excluded: a ball that settles softly and
 /// leaves after a second makes no bang.
 pub fn impulse(impact: &Impact, mass: f64) -> f64 {
-    let energy = 0.4 * impact.peak * impact.deepest;
+    let energy = ElasticLaw::energy_at(impact.deepest, impact.peak);
     let effective_mass = 2.0 * energy / (impact.approach_speed * impact.approach_speed);
     effective_mass.min(mass) * (impact.approach_speed + impact.separation_speed)
 }

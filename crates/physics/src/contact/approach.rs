@@ -73,7 +73,7 @@ mod tests {
             let branch = c.approach_branch_at(stored, rate);
             assert_eq!(c.approach(branch, stored, rate), full, "{rate}");
             assert!(c.damping * rate / full <= c.damping * (1.0 + 1e-15));
-            let elastic = c.elastic.force(1e-6);
+            let elastic = c.elastic.stiffness * libm::pow(1e-6, 1.5);
             let force = c.normal_force(1e-6, rate, full);
             assert!(force <= elastic * (1.0 + c.damping) * (1.0 + 1e-12));
         }

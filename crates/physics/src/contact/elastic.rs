@@ -6,6 +6,14 @@ use super::{Parameters, ShownLaw};
 /// Power of the penetration in Hertz's theory of spheres.
 const EXPONENT: f64 = 1.5;
 
+/// The force as the formulas of the normal laws show it.
+macro_rules! elastic_force {
+    () => {
+        "K d^1.5"
+    };
+}
+pub(super) use elastic_force;
+
 /// Hertz's law of a ball in its socket, paper eq. (19): F = K d^1.5, K = 4 / (3 (s + s)) sqrt(R r / (R - r)).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ElasticLaw {

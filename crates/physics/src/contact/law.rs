@@ -3,6 +3,7 @@
 //! Every normal law here has the form F_N = F(delta) (1 + chi delta_dot / delta_dot0), cut off below 0, with the elastic law F of
 //! `elastic.rs`: they differ only in the damping factor chi(ce), so the force itself is one kernel.
 
+use super::elastic::elastic_force;
 use super::{ApproachSpeed, ElasticLaw, FrictionLaw, FrictionVelocity, NormalLaw, Parameters};
 
 /// A law as a tooltip shows it.
@@ -27,7 +28,11 @@ impl NormalLaw {
             Self::LankaraniNikravesh => (
                 ShownLaw {
                     law: "Lankarani–Nikravesh normal force",
-                    formula: "N = K d^1.5 (1 + ¾ (1 - e²) d' / d'0), d: penetration, d'0: approach speed",
+                    formula: concat!(
+                        "N = ",
+                        elastic_force!(),
+                        " (1 + ¾ (1 - e²) d' / d'0), d: penetration, d'0: approach speed"
+                    ),
                     elsewhere: None,
                 },
                 |ce| 0.75 * (1.0 - ce * ce),
@@ -35,7 +40,7 @@ impl NormalLaw {
             Self::Hertz => (
                 ShownLaw {
                     law: "Hertz normal force, without damping",
-                    formula: "N = K d^1.5, d: penetration",
+                    formula: concat!("N = ", elastic_force!(), ", d: penetration"),
                     elsewhere: Some("Hertz (1882)"),
                 },
                 |_| 0.0,
@@ -43,7 +48,11 @@ impl NormalLaw {
             Self::HuntCrossley => (
                 ShownLaw {
                     law: "Hunt–Crossley normal force",
-                    formula: "N = K d^1.5 (1 + 1.5 (1 - e) d' / d'0), d: penetration, d'0: approach speed",
+                    formula: concat!(
+                        "N = ",
+                        elastic_force!(),
+                        " (1 + 1.5 (1 - e) d' / d'0), d: penetration, d'0: approach speed"
+                    ),
                     elsewhere: Some("Hunt & Crossley (1975)"),
                 },
                 |ce| 1.5 * (1.0 - ce),
@@ -51,7 +60,11 @@ impl NormalLaw {
             Self::Flores => (
                 ShownLaw {
                     law: "Normal force of Flores et al.",
-                    formula: "N = K d^1.5 (1 + 1.6 (1 - e) / e · d' / d'0), d: penetration, d'0: approach speed",
+                    formula: concat!(
+                        "N = ",
+                        elastic_force!(),
+                        " (1 + 1.6 (1 - e) / e · d' / d'0), d: penetration, d'0: approach speed"
+                    ),
                     elsewhere: Some("Flores et al. (2011)"),
                 },
                 |ce| 8.0 * (1.0 - ce) / (5.0 * ce),
@@ -59,7 +72,11 @@ impl NormalLaw {
             Self::Gonthier => (
                 ShownLaw {
                     law: "Normal force of Gonthier et al.",
-                    formula: "N = K d^1.5 (1 + χ d' / d'0), χ (1 + e) = ln((1 + χ) / (1 - e χ)), d: penetration, d'0: approach speed",
+                    formula: concat!(
+                        "N = ",
+                        elastic_force!(),
+                        " (1 + χ d' / d'0), χ (1 + e) = ln((1 + χ) / (1 - e χ)), d: penetration, d'0: approach speed"
+                    ),
                     elsewhere: Some("Gonthier et al. (2004)"),
                 },
                 exact_damping_factor,

@@ -36,7 +36,7 @@ struct StopContact {
     /// d, m or rad, and its rate.
     depth: f64,
     rate: f64,
-    /// ElasticLaw part and force, N or N m.
+    /// Elastic part and force, N or N m.
     elastic: f64,
     force: f64,
 }
