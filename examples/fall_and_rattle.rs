@@ -5,7 +5,7 @@
 
 use std::error::Error;
 
-use jointplay_physics::machine::{Attachment, BallJoint, Body, Joint, Machine, Mat3, Vec3};
+use jointplay_physics::machine::{Attachment, Body, Joint, LooseJoint, Machine, Mat3, Vec3};
 use jointplay_physics::simulate::Simulation;
 
 const GRAVITY: f64 = 9.81;
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         gravity: Vec3::new(0.0, 0.0, -GRAVITY),
         bodies: vec![Body::new("bob", 0.4, Mat3::identity() * 1e-3)],
         joints: vec![Joint::free(0)],
-        ball_joints: vec![BallJoint::new("S1", socket, ball).with_clearance(CLEARANCE)],
+        loose_joints: vec![LooseJoint::ball("S1", socket, ball).with_clearance(CLEARANCE)],
         ..Machine::default()
     };
 

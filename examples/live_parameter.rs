@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("it closes at {} mm/s", CLEARANCE_SPEED * 1e3);
 
     assert_eq!(live.set("contact.clearance", "0 mm")?, Effect::AtReset);
-    let clearance = |scene: &Scene| scene.machine.ball_joints[0].contact.clearance;
+    let clearance = |scene: &Scene| scene.machine.loose_joints[0].contact.clearance;
     println!("runs with {} m, pending {} m", clearance(live.running()), clearance(live.pending()));
     assert_eq!((clearance(live.running()), clearance(live.pending())), (0.1e-3, 0.0));
 

@@ -6,7 +6,7 @@
 use std::error::Error;
 use std::f64::consts::TAU;
 
-use jointplay_physics::machine::{Attachment, BallJoint, Body, Drive, Joint, Machine, Mat3, StartRule, Vec3};
+use jointplay_physics::machine::{Attachment, Body, Drive, Joint, LooseJoint, Machine, Mat3, StartRule, Vec3};
 use jointplay_physics::simulate::{Frame, Simulation};
 
 // Indices of the bodies. The mechanism lies in the x-z plane, and the crank turns about y.
@@ -27,9 +27,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let turning = Drive::Constant { position: 0.0, velocity: TURNS * TAU };
     let along = |x: f64| Vec3::new(x, 0.0, 0.0);
 
-    let pin = BallJoint::new("pin", Attachment::on(CRANK, along(RADIUS)), Attachment::on(ROD, along(-LENGTH / 2.0)));
+    let pin = LooseJoint::ball("pin", Attachment::on(CRANK, along(RADIUS)), Attachment::on(ROD, along(-LENGTH / 2.0)));
     let mut loose =
-        BallJoint::new("loose", Attachment::on(SLIDER, along(0.0)), Attachment::on(ROD, along(LENGTH / 2.0)));
+        LooseJoint::ball("loose", Attachment::on(SLIDER, along(0.0)), Attachment::on(ROD, along(LENGTH / 2.0)));
     loose.contact.friction = 0.05;
     let machine = Machine {
         gravity: Vec3::new(0.0, 0.0, -9.81),
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             Joint::free_at(ROD, along(RADIUS + LENGTH / 2.0)),
             Joint::prismatic(None, SLIDER, Vec3::x()).with_start(RADIUS + LENGTH, 0.0),
         ],
-        ball_joints: vec![pin.with_clearance(0.0), loose.with_clearance(0.1e-3)],
+        loose_joints: vec![pin.with_clearance(0.0), loose.with_clearance(0.1e-3)],
         // The positions above are initial guesses; the velocities follow from the drive.
         start: StartRule::Ideal,
         ..Machine::default()

@@ -24,7 +24,7 @@ pub type Impacts<'py> = (Vec<String>, Vec<&'static str>, Bound<'py, PyArray2<f64
 
 /// The impacts of a simulation.
 pub fn impacts<'py>(py: Python<'py>, simulation: &Simulation, impacts: &[Impact]) -> PyResult<Impacts<'py>> {
-    let joints = simulation.machine().ball_joints.iter().map(|joint| joint.name.clone()).collect();
+    let joints = simulation.machine().loose_joints.iter().map(|joint| joint.name.clone()).collect();
     let mut values = Array2::zeros((COLUMNS.len(), impacts.len()));
     for (i, impact) in impacts.iter().enumerate() {
         for (column, value) in row(impact).into_iter().enumerate() {
@@ -59,7 +59,7 @@ pub fn statistics<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Bou
     all.set_item("evaluations", statistics.evaluations)?;
     all.set_item("rejected", statistics.rejected)?;
     let joints = PyDict::new(py);
-    for (j, joint) in simulation.machine().ball_joints.iter().enumerate() {
+    for (j, joint) in simulation.machine().loose_joints.iter().enumerate() {
         let (force, time) = simulation.peak(j);
         let own = PyDict::new(py);
         own.set_item("peak_normal", force)?;

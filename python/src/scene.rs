@@ -117,8 +117,8 @@ impl PyScene {
 
     /// Names of the ball joints, in scene order.
     #[getter]
-    fn ball_joints(&self) -> Vec<&str> {
-        self.scene.machine.ball_joints.iter().map(|joint| &joint.name[..]).collect()
+    fn loose_joints(&self) -> Vec<&str> {
+        self.scene.machine.loose_joints.iter().map(|joint| &joint.name[..]).collect()
     }
 
     /// Names of the bodies, in scene order.
@@ -130,7 +130,7 @@ impl PyScene {
     /// Keys of the parameters: those of the scene, then those of each ball joint.
     fn keys(&self) -> Vec<String> {
         let own = self.scene.parameters().into_iter().map(|parameter| parameter.key.to_owned());
-        let joints = self.scene.machine.ball_joints.iter();
+        let joints = self.scene.machine.loose_joints.iter();
         let of_joints =
             joints.flat_map(|joint| contact_parts().map(move |part| format!("joint.{}.{part}", joint.name)));
         own.chain(of_joints).collect()

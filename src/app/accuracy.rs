@@ -127,7 +127,7 @@ fn measured(player: &Player, preset: Option<Preset>) -> [AccuracyLine; 2] {
 
 /// Name of a ball joint.
 fn joint(player: &Player, index: usize) -> &str {
-    let joints = &player.running().machine.ball_joints;
+    let joints = &player.running().machine.loose_joints;
     joints.get(index).map_or("", |joint| &joint.name)
 }
 

@@ -86,7 +86,7 @@ fn sentences(player: &Player, news: &str, strongest: Option<(usize, f64, f64)>) 
     });
     parts.extend(joints(player));
     if let Some((joint, force, time)) = strongest
-        && let Some(joint) = scene.machine.ball_joints.get(joint)
+        && let Some(joint) = scene.machine.loose_joints.get(joint)
     {
         parts.push(format!(
             "Largest normal force since the last report: {} at {}, at {}.",
@@ -116,7 +116,7 @@ fn joints(player: &Player) -> Option<String> {
     }
     let each: Vec<String> = scene
         .machine
-        .ball_joints
+        .loose_joints
         .iter()
         .zip(reports)
         .map(|(joint, report)| {

@@ -151,7 +151,7 @@ impl Controls {
 
     /// Contact parameters of a ball joint, which override those of the scene.
     fn one_joint(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
-        let names: Vec<String> = player.pending().machine.ball_joints.iter().map(|j| j.name.clone()).collect();
+        let names: Vec<String> = player.pending().machine.loose_joints.iter().map(|j| j.name.clone()).collect();
         if names.is_empty() {
             return;
         }

@@ -8,7 +8,7 @@ use crate::scene::Scene;
 pub fn law(key: &str, scene: &Scene) -> Option<ShownLaw> {
     let (group, last) = key.rsplit_once('.')?;
     let contact = match group.strip_prefix("joint.") {
-        Some(name) => &scene.machine.ball_joints.iter().find(|joint| joint.name == name)?.contact,
+        Some(name) => &scene.machine.loose_joints.iter().find(|joint| joint.name == name)?.contact,
         None if group == "contact" => &scene.machine.contact,
         None => return None,
     };

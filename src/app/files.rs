@@ -39,7 +39,7 @@ impl App {
         let player = &self.player;
         let (plots, window) = self.plots.changes_from_initial(player.pending());
         let followed = self.viewport.followed();
-        let joints = &player.running().machine.ball_joints;
+        let joints = &player.running().machine.loose_joints;
         let under_microscope = joints.get(self.microscope.joint());
         let instruments = Instruments {
             microscope: under_microscope.filter(|_| self.microscope.is_open()).map(|joint| joint.name.clone()),

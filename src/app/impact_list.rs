@@ -86,7 +86,7 @@ fn cells(player: &Player, number: u64, impact: &Impact) -> [String; COLUMNS.len(
 }
 
 fn joint(player: &Player, joint: usize) -> String {
-    let joints = &player.running().machine.ball_joints;
+    let joints = &player.running().machine.loose_joints;
     joints.get(joint).map_or_else(String::new, |joint| joint.name.clone())
 }
 
@@ -263,7 +263,7 @@ impl App {
             // Writing to a String cannot fail.
             let _ = writeln!(text, "{}", values.join(","));
         }
-        let names: Vec<&str> = player.running().machine.ball_joints.iter().map(|joint| joint.name.as_str()).collect();
+        let names: Vec<&str> = player.running().machine.loose_joints.iter().map(|joint| joint.name.as_str()).collect();
         let extra = [
             ("rows", json!(rows)),
             // Indices in the column `joint` start at 0.

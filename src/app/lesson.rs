@@ -418,7 +418,7 @@ impl App {
     /// Draws rings around the step's highlighted items, over everything, without affecting the layout.
     pub(super) fn ring_highlights(&self, ui: &egui::Ui) {
         let wanted = self.course().map_or(&[][..], |running| &running.current_step().highlight);
-        let joints = &self.player.running().machine.ball_joints;
+        let joints = &self.player.running().machine.loose_joints;
         let joint = |name: &String| joints.iter().position(|joint| joint.name == *name);
         let places = ControlFinder::places(ui.ctx(), &self.pointed_controls());
         let stroke = egui::Stroke::new(3.0, super::theme::series(1, ui.visuals().dark_mode));
@@ -445,7 +445,7 @@ impl App {
     /// Names of the highlighted controls of the step.
     fn pointed_controls(&self) -> Vec<String> {
         let wanted = self.course().map_or(&[][..], |running| &running.current_step().highlight);
-        let joints = &self.player.running().machine.ball_joints;
+        let joints = &self.player.running().machine.loose_joints;
         wanted.iter().filter(|name| joints.iter().all(|joint| joint.name != **name)).cloned().collect()
     }
 }

@@ -95,7 +95,7 @@ impl Microscope {
     }
 
     fn contents(&mut self, ui: &mut Ui, player: &Player, view: [Vec3; 2]) -> Option<usize> {
-        let joints = &player.running().machine.ball_joints;
+        let joints = &player.running().machine.loose_joints;
         self.joint = self.joint.min(joints.len().saturating_sub(1));
         let mut joint = self.joint;
         ui.horizontal_wrapped(|ui| {
@@ -149,7 +149,7 @@ impl Microscope {
     fn sphere(&mut self, ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3; 2], size: egui::Vec2) {
         let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
         let report = &magnified.report;
-        let name = player.running().machine.ball_joints.get(self.joint);
+        let name = player.running().machine.loose_joints.get(self.joint);
         let words = format!(
             "Ball joint {} under the microscope. {}. Ball's centre {} from the socket's, clearance {}.",
             name.map_or("", |joint| &joint.name),

@@ -907,7 +907,7 @@ impl App {
                 }
             }
             Action::CloseUp(joint) => {
-                if joint < self.player.running().machine.ball_joints.len() {
+                if joint < self.player.running().machine.loose_joints.len() {
                     self.microscope.focus(joint);
                     self.viewport.show_close_up(&self.player, joint);
                 }

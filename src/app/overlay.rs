@@ -148,7 +148,7 @@ pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
     let newtons = |force: &crate::machine::Vec3| format_quantity_digits(force.norm(), "N", 4);
     scene
         .machine
-        .ball_joints
+        .loose_joints
         .iter()
         .zip(&frame.joints)
         .map(|(joint, report)| match report.state {
@@ -375,7 +375,7 @@ mod tests {
             view.build(&shot, &mut list);
             let named = |kind| matches!(kind, LabelKind::Joint(_));
             list.labels.retain(|label| named(label.kind));
-            assert_eq!(list.labels.len(), joints.min(scene.machine.ball_joints.len()));
+            assert_eq!(list.labels.len(), joints.min(scene.machine.loose_joints.len()));
             let rect = Rect::from_min_size(Pos2::ZERO, vec2(640.0, 400.0));
             let (mut plates, mut ends) = (Vec::new(), Vec::new());
             for shape in shapes_of(&list, rect) {

@@ -280,7 +280,7 @@ impl Plots {
                 }
             }
         }
-        if player.running().machine.ball_joints.len() > RECORDED_JOINTS {
+        if player.running().machine.loose_joints.len() > RECORDED_JOINTS {
             ui.label(RichText::new(format!("The first {RECORDED_JOINTS} ball joints are recorded")).small().weak());
         }
         ui.separator();

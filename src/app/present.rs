@@ -225,7 +225,7 @@ impl App {
         let player = &self.player;
         let shown = player.pacer.shown();
         let impact = player.impact_record().last_ended(shown, shown)?;
-        let name = &player.running().machine.ball_joints[impact.joint].name;
+        let name = &player.running().machine.loose_joints[impact.joint].name;
         let force = value::quantity(impact.peak, "N", 3);
         let duration_ms = (impact.end - impact.start) * 1e3;
         Some(format!("{name}, {force}, {} ms", value::number(duration_ms, 2)))

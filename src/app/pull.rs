@@ -21,7 +21,7 @@ impl Grip {
         let scene = player.running();
         let body = match hit.what {
             ScenePart::Body(body) => body,
-            ScenePart::Joint(joint) => scene.machine.ball_joints.get(joint)?.ball.body?,
+            ScenePart::Joint(joint) => scene.machine.loose_joints.get(joint)?.carried().body?,
             ScenePart::Fixed(_) => return None,
         };
         let motion = player.frame().bodies.get(body)?;

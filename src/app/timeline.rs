@@ -51,7 +51,7 @@ impl Timeline {
         let mut moved = false;
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            let target = focus.and_then(|joint| player.running().machine.ball_joints.get(joint));
+            let target = focus.and_then(|joint| player.running().machine.loose_joints.get(joint));
             let target = target.map_or("any ball joint".to_owned(), |joint| joint.name.clone());
             let past = player.pacer.shown() > 0.0;
             ui.add_enabled_ui(past, |ui| {
@@ -327,7 +327,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         Some(player.contact_history())
     };
     if let (Some(joint), Some(contacts)) = (pointed_joint, contacts) {
-        let name = &player.running().machine.ball_joints[joint].name;
+        let name = &player.running().machine.loose_joints[joint].name;
         let state = contacts.states(joint, time, time + MIN_RANGE).next();
         let words = match state {
             None => "not recorded",

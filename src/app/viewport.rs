@@ -882,7 +882,7 @@ fn name_of(player: &Player, picked: ScenePart) -> Option<&str> {
     let scene = player.running();
     match picked {
         ScenePart::Body(index) => scene.machine.bodies.get(index).map(|body| body.name.as_str()),
-        ScenePart::Joint(index) => scene.machine.ball_joints.get(index).map(|joint| joint.name.as_str()),
+        ScenePart::Joint(index) => scene.machine.loose_joints.get(index).map(|joint| joint.name.as_str()),
         ScenePart::Fixed(_) => None,
     }
 }

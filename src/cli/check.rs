@@ -11,7 +11,7 @@ use crate::analysis::ideal_fault::ideal_fault;
 use crate::analysis::initial_peaks::InitialPeaks;
 use crate::contact::FrictionLaw;
 use crate::integrate::{Method, StepControl};
-use crate::machine::{BallJoint, Body, Element, Joint, JointKind};
+use crate::machine::{Body, Element, Joint, JointKind, LooseJoint};
 use crate::mechanism::{ElementReport, Summary};
 use crate::scene::Scene;
 use crate::simulate::{ChannelInfo, Frame, Peak, channels_of};
@@ -54,7 +54,7 @@ fn channels(all: &[ChannelInfo]) -> String {
     out
 }
 
-fn is_ideal(joint: &BallJoint) -> bool {
+fn is_ideal(joint: &LooseJoint) -> bool {
     joint.contact.clearance == 0.0
 }
 
@@ -99,7 +99,7 @@ fn report(
         line(&format!("  {}", joint.name), &reaction);
     }
     line("Ball joints", &format!("{} with clearance, {} ideal", contents.contacts, contents.ideal_joints));
-    for (joint, report) in scene.machine.ball_joints.iter().zip(&start.joints) {
+    for (joint, report) in scene.machine.loose_joints.iter().zip(&start.joints) {
         line(
             &format!("  {}", joint.name),
             &ball_joint(joint, report.normal_force.norm(), start_report.indeterminate_parts(&joint.name)),
@@ -120,7 +120,7 @@ fn report(
             String::new()
         };
         line("Beginning", &format!("largest contact forces of the first {until}{cut}"));
-        let loose = scene.machine.ball_joints.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
+        let loose = scene.machine.loose_joints.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
         for (joint, peak) in loose.take(MAX_LISTED) {
             line(&format!("  {}", joint.name), &first_contact(peak));
         }
@@ -199,7 +199,7 @@ fn not_unique(parts: Option<&str>) -> String {
     parts.map_or_else(String::new, |parts| format!(" (not unique: {parts})"))
 }
 
-fn ball_joint(joint: &BallJoint, force: f64, indeterminate_parts: Option<&str>) -> String {
+fn ball_joint(joint: &LooseJoint, force: f64, indeterminate_parts: Option<&str>) -> String {
     let contact = &joint.contact;
     if is_ideal(joint) {
         return format!("ideal; reaction at the start {} N{}", significant(force, 6), not_unique(indeterminate_parts));
@@ -296,7 +296,7 @@ fn method(scene: &Scene, contents: &Summary) -> String {
 
 /// Descriptions of the parts that the run computes, and of those that it skips.
 fn computed_and_skipped(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
-    let with = |ideal| names(scene.machine.ball_joints.iter().filter(move |j| is_ideal(j) == ideal).map(|j| &j.name));
+    let with = |ideal| names(scene.machine.loose_joints.iter().filter(move |j| is_ideal(j) == ideal).map(|j| &j.name));
     let (mut computed, mut skipped) = (Vec::new(), Vec::new());
     let mut list = |needed: bool, yes: String, no: &str| {
         if needed { computed.push(yes) } else { skipped.push(no.to_owned()) }
@@ -315,10 +315,10 @@ fn computed_and_skipped(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<
         format!("contact forces at {}", with(false)),
         "contact forces: no ball joint has clearance",
     );
-    let has_friction = |joint: &&BallJoint| {
+    let has_friction = |joint: &&LooseJoint| {
         !is_ideal(joint) && joint.contact.friction > 0.0 && joint.contact.friction_law != FrictionLaw::None
     };
-    let with_friction = || scene.machine.ball_joints.iter().filter(has_friction).map(|joint| &joint.name);
+    let with_friction = || scene.machine.loose_joints.iter().filter(has_friction).map(|joint| &joint.name);
     list(
         with_friction().next().is_some(),
         format!("friction at {}", names(with_friction())),

@@ -58,7 +58,7 @@ impl ImpactsFile {
     /// # Errors
     /// As [`RowsFile::fill`].
     pub fn fill(self, scene: &Scene, mut meta: Map<String, Json>) -> Result<(usize, Vec<PendingFile>), Failure> {
-        let names: Vec<&str> = scene.machine.ball_joints.iter().map(|j| j.name.as_str()).collect();
+        let names: Vec<&str> = scene.machine.loose_joints.iter().map(|j| j.name.as_str()).collect();
         meta.insert("rows".into(), json!(self.impacts.len()));
         // Indices in the column `joint`, from 0.
         meta.insert("ball_joints".into(), json!(names));

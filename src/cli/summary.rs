@@ -56,7 +56,7 @@ pub fn json(
     let statistics = simulation.statistics();
     let time = simulation.time();
     let by_joint = |value: &dyn Fn(usize) -> Json| -> Json {
-        let entries = scene.machine.ball_joints.iter().enumerate();
+        let entries = scene.machine.loose_joints.iter().enumerate();
         Json::Object(entries.map(|(i, joint)| (joint.name.clone(), value(i))).collect())
     };
     let mut summary = provenance::meta(scene);
@@ -115,7 +115,7 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
         "Steps",
         format!("{} ({} rejected), {} evaluations", statistics.steps, statistics.rejected, statistics.evaluations),
     );
-    for (i, joint) in scene.machine.ball_joints.iter().enumerate() {
+    for (i, joint) in scene.machine.loose_joints.iter().enumerate() {
         let (force, at) = simulation.peak(i);
         let peak = format!("peak {} N at {} s", significant(force, 6), significant(at, 6));
         let description = if joint.contact.clearance == 0.0 {

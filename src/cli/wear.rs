@@ -35,7 +35,7 @@ pub fn fill(
 ) -> Result<(usize, Vec<PendingFile>), Failure> {
     let mut rows = Vec::new();
     let mut axes = Map::new();
-    for (j, joint) in scene.machine.ball_joints.iter().enumerate() {
+    for (j, joint) in scene.machine.loose_joints.iter().enumerate() {
         let area = map.area(j);
         for (cell, totals) in map.cells(j).iter().enumerate() {
             let Edges { polar, azimuth } = map.grid().edges(cell);
@@ -56,10 +56,10 @@ pub fn fill(
         }
         let grid = map.grid_from_body(j);
         let axis = |i: usize| [0, 1, 2].map(|k| grid[(i, k)]);
-        let body = joint.socket.body.map(|b| scene.machine.bodies[b].name.as_str());
+        let body = joint.carrier().body.map(|b| scene.machine.bodies[b].name.as_str());
         axes.insert(joint.name.clone(), json!({"body": body, "x": axis(0), "y": axis(1), "z": axis(2)}));
     }
-    let names: Vec<&str> = scene.machine.ball_joints.iter().map(|j| j.name.as_str()).collect();
+    let names: Vec<&str> = scene.machine.loose_joints.iter().map(|j| j.name.as_str()).collect();
     meta.insert("rows".into(), json!(rows.len()));
     // Indices in the column `joint`, from 0.
     meta.insert("ball_joints".into(), json!(names));

@@ -221,16 +221,16 @@ fn in_a_row(order: [usize; 3], behind: bool) -> (Scene, Frame, Camera) {
     // No socket is cut in the middle of the picture.
     let openings = [right + up - back, up - right + 0.5 * back, right - 2.0 * up - 1.5 * back];
     let double = |v: Vec3| Vec3d::new(v.x.into(), v.y.into(), v.z.into());
-    let (joint, report) = (scene.machine.ball_joints[0].clone(), frame.joints[0]);
+    let (joint, report) = (scene.machine.loose_joints[0].clone(), frame.joints[0]);
     let (body, motion) = (scene.machine.bodies[0].clone(), frame.bodies[0]);
-    (scene.machine.ball_joints, frame.joints) = Default::default();
+    (scene.machine.loose_joints, frame.joints) = Default::default();
     (scene.machine.bodies, frame.bodies) = Default::default();
     for k in order {
         let by = double(back * (0.05 * (k as f32 - 1.0)));
         let mut joint = joint.clone();
         joint.opening = double(openings[k].normalize());
-        joint.ball.body = Some(scene.machine.bodies.len());
-        scene.machine.ball_joints.push(joint);
+        joint.frames[1].origin.body = Some(scene.machine.bodies.len());
+        scene.machine.loose_joints.push(joint);
         let mut report = report;
         report.socket_centre += by;
         report.ball_centre += by;
@@ -545,7 +545,7 @@ fn ghosts_are_outlined_and_coincident_ghosts_do_not_flicker() {
     let both = drawn(&[Ghost::Ideal, Ghost::Twin]);
     let report = &ghost.joints[0];
     let centre = to_f32(&(report.socket_centre + 20.0 * report.eccentricity));
-    let radius = scene.machine.ball_joints[0].contact.ball_radius as f32;
+    let radius = scene.machine.loose_joints[0].contact.ball_radius as f32;
     let palette = Palette::of(options.theme);
     let near = |image: &Image, point: Vec3, colour: [u8; 4]| {
         let [r, g, b, _] = colour;
@@ -585,7 +585,7 @@ fn every_standard_view_shows_the_moving_parts() {
         let mut frame = Frame::default();
         let mut simulation = crate::simulate::Simulation::new(&scene.machine).expect("starts");
         // Twelve loose joints take long to simulate.
-        let later = (scene.machine.ball_joints.len() <= 8).then_some(0.3);
+        let later = (scene.machine.loose_joints.len() <= 8).then_some(0.3);
         for (turn, time) in std::iter::once(0.0).chain(later).enumerate() {
             simulation.advance_to(time).expect("runs");
             simulation.sample(time, &mut frame);
@@ -966,8 +966,8 @@ fn moved(scene: &Scene, frame: &Frame, by: Vec3d) -> (Scene, Frame) {
             other => panic!("{other:?}"),
         }
     }
-    for joint in &mut scene.machine.ball_joints {
-        for end in [&mut joint.socket, &mut joint.ball] {
+    for joint in &mut scene.machine.loose_joints {
+        for end in joint.frames.iter_mut().map(|frame| &mut frame.origin) {
             if end.body.is_none() {
                 end.point += by;
             }

@@ -189,7 +189,7 @@ mod tests {
             let [mut with, mut without] = [(); 2].map(|()| Player::new(&scene).expect("starts"));
             with.set_ideal(true);
             // Many loose joints take long to simulate.
-            let part = if scene.machine.ball_joints.len() > 3 { 0.4 } else { 1.0 };
+            let part = if scene.machine.loose_joints.len() > 3 { 0.4 } else { 1.0 };
             for (turn, time) in [0.013, 0.03, 0.021_3].map(|time| part * time).into_iter().enumerate() {
                 if turn == 2 {
                     // Back to the start and there again.

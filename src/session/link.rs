@@ -503,11 +503,11 @@ impl Link {
         let Some(name) = self.instruments.as_ref().and_then(|i| i.microscope.as_ref()) else {
             return Ok(None);
         };
-        let mut joints = scene.machine.ball_joints.iter();
+        let mut joints = scene.machine.loose_joints.iter();
         match joints.position(|joint| joint.name == *name) {
             Some(joint) => Ok(Some(joint)),
             None => {
-                let known: Vec<_> = scene.machine.ball_joints.iter().map(|j| j.name.as_str()).collect();
+                let known: Vec<_> = scene.machine.loose_joints.iter().map(|j| j.name.as_str()).collect();
                 let message = format!("no such ball joint; allowed: {}", known.join(", "));
                 Err(link_error("show", &format!("microscope.{name}"), message))
             }

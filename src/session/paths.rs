@@ -39,8 +39,8 @@ pub fn axes_of(frame: &Frame, body: Option<usize>) -> Mat3 {
 impl Paths {
     /// Empty paths for `scene`.
     pub fn new(scene: &Scene) -> Self {
-        let joints = scene.machine.ball_joints.iter().take(RECORDED_JOINTS);
-        let path = |joint: &crate::machine::BallJoint| Path { carrier: joint.socket.body, points: Vec::new() };
+        let joints = scene.machine.loose_joints.iter().take(RECORDED_JOINTS);
+        let path = |joint: &crate::machine::LooseJoint| Path { carrier: joint.carrier().body, points: Vec::new() };
         Self { joints: joints.map(path).collect() }
     }
 
@@ -104,7 +104,7 @@ mod tests {
         player.run_to(0.05);
         let mut other = Simulation::new(&scene.machine).expect("starts");
         let mut frame = Frame::default();
-        for (joint, spec) in scene.machine.ball_joints.iter().enumerate() {
+        for (joint, spec) in scene.machine.loose_joints.iter().enumerate() {
             let points = player.paths().between(joint, ALL.0, ALL.1);
             assert!(points.len() > 100, "{}: {}", spec.name, points.len());
             assert!(points.is_sorted_by(|a, b| a.time < b.time));
@@ -118,7 +118,7 @@ mod tests {
             }
             other.sample(point.time, &mut frame);
             let joint = &frame.joints[0];
-            let carrier = axes_of(&frame, scene.machine.ball_joints[0].socket.body);
+            let carrier = axes_of(&frame, scene.machine.loose_joints[0].carrier().body);
             let eccentricity = carrier * crate::machine::Vec3::from(point.position.map(f64::from));
             let deviation = (eccentricity - joint.eccentricity).norm();
             assert!(deviation < 1e-9, "{deviation:e} m at {} s", point.time);

@@ -157,7 +157,7 @@ mod tests {
             // Smaller than the ball's eccentricity: the wall closes in over many steps.
             original.set("contact.clearance", "0.1 mm").expect("in range");
             play(&mut original, 3);
-            let joint = original.running().machine.ball_joints[0].name.clone();
+            let joint = original.running().machine.loose_joints[0].name.clone();
             let joint_key = format!("joint.{joint}.clearance");
             original.set(&joint_key, "0.4 mm").expect("in range");
             original.set_playing(false);

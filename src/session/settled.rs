@@ -68,15 +68,15 @@ impl Settling {
             Err(NoPeriod::Different { first, second, .. }) => Some(first.max(second)),
             Err(NoPeriod::None { .. }) => None,
         };
-        let play = |joint: &crate::machine::BallJoint| {
+        let play = |joint: &crate::machine::LooseJoint| {
             let clearance = joint.contact.clearance;
-            (clearance > 0.0).then_some((joint.socket.body, clearance))
+            (clearance > 0.0).then_some((joint.carrier().body, clearance))
         };
         Self {
             period,
             laws: if period.is_none() { laws_of(&scene.machine).collect() } else { Vec::new() },
             size: 0.0,
-            joints: scene.machine.ball_joints.iter().map(play).collect(),
+            joints: scene.machine.loose_joints.iter().map(play).collect(),
             past: Vec::new(),
             latest: Instant::default(),
             quiet_since: None,

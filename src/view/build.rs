@@ -101,7 +101,7 @@ impl SceneView {
             initial_joints: joints,
             parts,
             plates: plates.into(),
-            joint_names: scene.machine.ball_joints.iter().map(|joint| joint.name.as_str().into()).collect(),
+            joint_names: scene.machine.loose_joints.iter().map(|joint| joint.name.as_str().into()).collect(),
             axis_names: ["X", "Y", "Z", "g"].map(Arc::from),
             bounds,
             down: scene.view.down,

@@ -62,7 +62,7 @@ pub(super) fn cast_ball(centre: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
 /// `joints` drawn without magnification. Parts that it already touches, or that end at its outer face, do not limit it.
 pub(super) fn max_outer_radii(scene: &Scene, parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<f32> {
     let max_outer_radius = |(i, joint): (usize, &DrawnJoint)| {
-        let body = scene.machine.ball_joints[i].socket.body;
+        let body = scene.machine.loose_joints[i].carrier().body;
         parts
             .iter()
             .filter(|part| part.body == body && !part.reaches_socket(i))

@@ -182,7 +182,7 @@ pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
     }
     let is_probe_drawn = parts.iter().any(|part| part.role == Role::Probe);
     if let (Some(tip), false) = (&scene.machine.output.probe, is_probe_drawn) {
-        let size = scene.machine.ball_joints.first().map_or(0.01, |joint| joint.contact.ball_radius) as f32;
+        let size = scene.machine.loose_joints.first().map_or(0.01, |joint| joint.contact.ball_radius) as f32;
         let form = Form::Ball { centre: to_f32(tip), radius: 0.4 * size };
         parts.push(DrawnShape {
             body: Some(scene.machine.output.body),
@@ -210,11 +210,10 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
         Geometry::Box { centre, size } => Some(Form::Box { centre: to_f32(centre), size: to_f32(size) }),
         Geometry::Sphere { centre, radius } => {
             // The joint draws its own ball.
-            let is_joint_ball = scene
-                .machine
-                .ball_joints
-                .iter()
-                .any(|j| j.ball.body == body && (j.ball.point - centre).norm() < 0.1 * j.contact.ball_radius);
+            let is_joint_ball =
+                scene.machine.loose_joints.iter().any(|j| {
+                    j.carried().body == body && (j.carried().point - centre).norm() < 0.1 * j.contact.ball_radius
+                });
             (!is_joint_ball).then(|| Form::Ball { centre: to_f32(centre), radius: *radius as f32 })
         }
         Geometry::Plate { corners, triangles, thickness } => {
@@ -276,13 +275,13 @@ impl Meshes {
 
 /// The ball joint that a bar's end reaches into, if any.
 fn joint_at_end(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<JointEnd> {
-    for (i, joint) in scene.machine.ball_joints.iter().enumerate() {
+    for (i, joint) in scene.machine.loose_joints.iter().enumerate() {
         let radius = joint.contact.ball_radius as f32;
-        if joint.ball.body == body && to_f32(&joint.ball.point).distance(end) < 1.3 * radius {
+        if joint.carried().body == body && to_f32(&joint.carried().point).distance(end) < 1.3 * radius {
             return Some(JointEnd::Ball(i));
         }
-        if joint.socket.body == body
-            && to_f32(&joint.socket.point).distance(end) < (MAX_SOCKET_RADIUS + WALL_THICKNESS) * radius
+        if joint.carrier().body == body
+            && to_f32(&joint.carrier().point).distance(end) < (MAX_SOCKET_RADIUS + WALL_THICKNESS) * radius
         {
             return Some(JointEnd::Socket(i));
         }
@@ -326,7 +325,7 @@ fn plate(corners: &[Vec3], triangles: &[[usize; 3]], thickness: f32) -> Option<M
 /// `max_outer_radii`, m.
 pub(super) fn magnification(scene: &Scene, frame: &Frame, max_outer_radii: &[f32], requested: f32) -> f32 {
     let requested = if requested.is_finite() { requested.clamp(1.0, 100.0) } else { 1.0 };
-    let limits = scene.machine.ball_joints.iter().zip(&frame.joints).enumerate().map(|(i, (joint, now))| {
+    let limits = scene.machine.loose_joints.iter().zip(&frame.joints).enumerate().map(|(i, (joint, now))| {
         let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
         let radius = joint.contact.ball_radius as f32;
         let room = max_outer_radii.get(i).copied().unwrap_or(f32::INFINITY) - WALL_THICKNESS * radius;
@@ -337,12 +336,12 @@ pub(super) fn magnification(scene: &Scene, frame: &Frame, max_outer_radii: &[f32
 
 /// Every ball joint as drawn at magnification `m`.
 pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
-    let drawn = scene.machine.ball_joints.iter().zip(&frame.joints).map(|(joint, now)| {
+    let drawn = scene.machine.loose_joints.iter().zip(&frame.joints).map(|(joint, now)| {
         let socket_centre = to_f32(&now.socket_centre);
         let ball_radius = joint.contact.ball_radius as f32;
         let eccentricity = to_f32(&now.eccentricity);
         let gap = if now.clearance > 0.0 { m * now.clearance as f32 } else { IDEAL_GAP * ball_radius };
-        let opening = Pose::in_frame(frame, joint.socket.body).rotation * to_f32(&joint.opening);
+        let opening = Pose::in_frame(frame, joint.carrier().body).rotation * to_f32(&joint.opening);
         DrawnJoint {
             socket_centre,
             ball_centre: socket_centre + m * eccentricity,

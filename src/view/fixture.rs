@@ -1,7 +1,6 @@
 //! Hand-built scenes and frames for tests of view and render: nothing here is simulated.
 
-use crate::contact;
-use crate::machine::{Attachment, BallJoint, Body, Geometry, Machine, Mat3, Output, Quat, Role, Shape, Vec3};
+use crate::machine::{Attachment, Body, Geometry, LooseJoint, Machine, Mat3, Output, Quat, Role, Shape, Vec3};
 use crate::scene::{MAX_PLOTS, Scene, SignedAxis, ViewSettings};
 use crate::simulate::{BodyMotion, ContactMode, Frame, JointReport, Peak};
 
@@ -31,7 +30,7 @@ fn scene(
     name: &str,
     down: SignedAxis,
     bodies: Vec<Body>,
-    ball_joints: Vec<BallJoint>,
+    loose_joints: Vec<LooseJoint>,
     fixed_shapes: Vec<Shape>,
 ) -> Scene {
     let mut scene = Scene::load("pendulum", &[]).expect("a built-in scene");
@@ -42,15 +41,15 @@ fn scene(
         output: Output { body: 0, probe: None },
         bodies,
         joints: Vec::new(),
-        ball_joints,
+        loose_joints,
         fixed_shapes,
         ..scene.machine
     };
     scene
 }
 
-fn joint(name: &str, socket: Attachment, ball: Attachment, opening: Vec3) -> BallJoint {
-    BallJoint { name: name.to_owned(), socket, ball, opening, contact: contact::Parameters::default() }
+fn joint(name: &str, socket: Attachment, ball: Attachment, opening: Vec3) -> LooseJoint {
+    LooseJoint { opening, ..LooseJoint::ball(name, socket, ball) }
 }
 
 /// Report of a joint whose ball touches the wall in the direction `n` (unit) with `normal` newtons.

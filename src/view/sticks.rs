@@ -16,8 +16,8 @@ pub(super) fn sticks(scene: &Scene) -> BTreeMap<usize, Vec<Shape>> {
     let mut points: BTreeMap<usize, Vec<Vec3>> = bodies_without_shapes.map(|(i, _)| (i, Vec::new())).collect();
     let constrained = scene.machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
     let tree = constrained.flat_map(|joint| joint.points());
-    let balls = scene.machine.ball_joints.iter();
-    let balls = balls.flat_map(|joint| [joint.socket, joint.ball]);
+    let balls = scene.machine.loose_joints.iter();
+    let balls = balls.flat_map(|joint| [joint.carrier(), joint.carried()]);
     for end in tree.chain(balls) {
         if let Some(points) = end.body.and_then(|body| points.get_mut(&body)) {
             points.push(end.point);

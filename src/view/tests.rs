@@ -117,7 +117,7 @@ fn a_magnified_socket_does_not_intersect_its_carrier() {
         let view = SceneView::new(&scene, &frame);
         let plain = drawn::joints(&scene, &frame, 1.0);
         // Twelve loose joints take long to simulate.
-        let later: &[f64] = match scene.machine.ball_joints.len() {
+        let later: &[f64] = match scene.machine.loose_joints.len() {
             0..=8 => &[0.1, 0.4],
             _ => &[],
         };
@@ -128,7 +128,7 @@ fn a_magnified_socket_does_not_intersect_its_carrier() {
             assert!(m > 15.0, "{name}: ×{m}");
             let joints = drawn::joints(&scene, &frame, m);
             for (i, joint) in joints.iter().enumerate() {
-                let ball = scene.machine.ball_joints[i].ball.body;
+                let ball = scene.machine.loose_joints[i].carried().body;
                 for part in view.parts.iter().filter(|part| part.body != ball) {
                     let solid = part.place(&frame, &joints);
                     let Some(distance) = super::cast::distance(&solid, joint.socket_centre) else {

@@ -70,7 +70,7 @@ impl SceneView {
         }
         let relative = RelativeShot::of(shot);
         let shot = &relative.as_ref().map_or(*shot, |relative| relative.shot(shot));
-        let joints = 0..shot.scene.machine.ball_joints.len().min(shot.frame.joints.len());
+        let joints = 0..shot.scene.machine.loose_joints.len().min(shot.frame.joints.len());
         let value = |joint: usize, cell: &Cell| map.value(cell, wear.area(joint));
         let values = joints.clone().flat_map(|j| wear.cells(j).iter().map(move |cell| value(j, cell)));
         let scale = WearScale { map, largest: values.fold(0.0, f32::max) };
@@ -80,7 +80,7 @@ impl SceneView {
         }
         let drawn = drawn::joints(shot.scene, shot.frame, out.magnification);
         for j in joints {
-            let body = Pose::in_frame(shot.frame, shot.scene.machine.ball_joints[j].socket.body).rotation;
+            let body = Pose::in_frame(shot.frame, shot.scene.machine.loose_joints[j].carrier().body).rotation;
             let grid = wear.grid_from_body(j);
             // Rows of a rotation are columns of its inverse.
             let axis = |i: usize| super::to_f32(&grid.row(i).transpose());

@@ -339,7 +339,7 @@ impl Laboratory {
 
     fn impacts(&self, time: f64) -> String {
         let player = self.app.player();
-        let joints = &player.running().machine.ball_joints;
+        let joints = &player.running().machine.loose_joints;
         let shown = player.pacer.shown();
         let ended = player.simulation().impacts();
         let ended = ended.filter(|impact| impact.end > time && impact.end <= shown);

@@ -1,6 +1,6 @@
 //! Invariants of a frame, whatever the scene and the method.
 
-use jointplay_physics::machine::{BallJoint, Machine, Vec3};
+use jointplay_physics::machine::{LooseJoint, Machine, Vec3};
 use jointplay_physics::simulate::{Frame, JointReport};
 
 /// Penetration over ball radius beyond which a ball has left its socket.
@@ -44,14 +44,14 @@ pub fn violation(frame: &Frame, machine: &Machine, form: &str) -> Option<String>
             return Some(format!("orientation off by {skew:e} at t = {:e} s", frame.time));
         }
     }
-    let pairs = frame.joints.iter().zip(&machine.ball_joints);
+    let pairs = frame.joints.iter().zip(&machine.loose_joints);
     pairs
         .filter_map(|(report, joint)| joint_violation(report, joint, form))
         .next()
         .map(|what| format!("{what} at t = {:e} s", frame.time))
 }
 
-fn joint_violation(report: &JointReport, joint: &BallJoint, form: &str) -> Option<String> {
+fn joint_violation(report: &JointReport, joint: &LooseJoint, form: &str) -> Option<String> {
     let radius = joint.contact.ball_radius;
     if joint.contact.clearance == 0.0 {
         // The `lagrange` formulation only stabilises its constraints.

@@ -153,7 +153,7 @@ pub fn ticking_clock<const MICROSECONDS: u32>() -> f64 {
 /// Mean magnitude of each contact force between `from` and `to`, N, sampled at 1001 instants.
 pub fn mean_forces(simulation: &mut Simulation, from: f64, to: f64) -> Vec<f64> {
     let mut frame = Frame::default();
-    let mut sums = vec![0.0; simulation.machine().ball_joints.len()];
+    let mut sums = vec![0.0; simulation.machine().loose_joints.len()];
     for n in 0..=1000 {
         let t = from + (to - from) * f64::from(n) / 1000.0;
         simulation.advance_to(t).unwrap();

@@ -55,7 +55,7 @@ fn f5_shows_the_picture_with_large_type_and_does_not_affect_the_run() {
         let words = harness.state().last_impact().expect("an impact");
         harness.get_by_label(&words);
         let mut parts = words.split(", ");
-        let joints = &simulation.machine().ball_joints;
+        let joints = &simulation.machine().loose_joints;
         assert_eq!(parts.next(), Some(joints[last.joint].name.as_str()));
         let number = |text: &str| -> f64 {
             let digits: String = text.chars().take_while(|c| !c.is_whitespace()).collect();

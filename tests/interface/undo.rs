@@ -143,7 +143,7 @@ fn undo_returns_a_value_to_what_it_followed() {
         harness.run_steps(45);
     };
     let clearances = |harness: &Harness<'_, App>| -> Vec<f64> {
-        let joints = &harness.state().player().pending().machine.ball_joints;
+        let joints = &harness.state().player().pending().machine.loose_joints;
         joints.iter().map(|joint| joint.contact.clearance).collect()
     };
     // The file has 0.3 mm for all joints.

@@ -316,7 +316,7 @@ fn a_parameter_of_the_file_becomes_a_slider_and_applies_at_the_reset() {
     harness.run();
     let length = |harness: &Harness<'_, App>| {
         let player = harness.state().player();
-        player.simulation().pending().machine.ball_joints[0].socket.point.x
+        player.simulation().pending().machine.loose_joints[0].carrier().point.x
     };
     // It is visible without opening a group.
     assert!(harness.query_all_by_label("Crank radius").count() > 1);
@@ -819,7 +819,7 @@ fn the_accuracy_of_the_running_scene_is_shown_beside_the_controls() {
     let player = harness.state().player();
     let impact = *player.simulation().impacts().next_back().expect("hit");
     assert!(impact.steps >= 10, "{impact:?}");
-    let joint = &player.running().machine.ball_joints[impact.joint].name;
+    let joint = &player.running().machine.loose_joints[impact.joint].name;
     let comparable = impact.has_own_restitution();
     let kind = match (comparable, impact.disturbed) {
         (true, _) => "undisturbed",

@@ -29,7 +29,7 @@ impl Random {
 
 /// One frame's change: a key and its value.
 fn change(random: &mut Random, simulation: &Simulation) -> (String, String) {
-    let joints = &simulation.machine().ball_joints;
+    let joints = &simulation.machine().loose_joints;
     let joint = random.below(2 * joints.len());
     let target = match joints.get(joint) {
         Some(joint) => format!("joint.{}", joint.name),
@@ -250,7 +250,7 @@ fn long_run(case: &LongRun, preset: usize, duration: f64) -> Drift {
         let running = simulation.running();
         assert_eq!(violation(&end, &running.machine, "tree"), None);
         kinetic = kinetic.max(frame.kinetic);
-        for (joint, of_scene) in frame.joints.iter().zip(&running.machine.ball_joints) {
+        for (joint, of_scene) in frame.joints.iter().zip(&running.machine.loose_joints) {
             if of_scene.contact.clearance == 0.0 {
                 drift.open = drift.open.max(joint.eccentricity.norm());
             }

@@ -100,7 +100,7 @@ fn a_mass_starts_where_its_weight_and_its_springs_balance() {
 fn a_rod_with_play_hangs_at_rest() {
     let scene = scene("pendulum", &[("start", "equilibrium")]);
     let frame = frame_at_start(&scene);
-    let contact = &scene.machine.ball_joints[0].contact;
+    let contact = &scene.machine.loose_joints[0].contact;
     let weight = scene.machine.bodies.iter().map(|body| body.mass).sum::<f64>() * G;
     let depth = Coefficients::new(contact, contact.clearance).elastic.depth(weight);
     let joint = &frame.joints[0];

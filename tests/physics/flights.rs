@@ -8,9 +8,9 @@ const CHAIN: [(&str, &str); 2] = [("chain.links", "8"), ("solver.tolerance", "1e
 
 /// Whether any ball joint of body `b` is in contact.
 fn in_contact(simulation: &Simulation, frame: &Frame, b: usize) -> bool {
-    let joints = &simulation.machine().ball_joints;
+    let joints = &simulation.machine().loose_joints;
     joints.iter().zip(&frame.joints).any(|(joint, report)| {
-        (joint.ball.body == Some(b) || joint.socket.body == Some(b)) && report.state != ContactMode::Free
+        (joint.carried().body == Some(b) || joint.carrier().body == Some(b)) && report.state != ContactMode::Free
     })
 }
 

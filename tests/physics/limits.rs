@@ -153,7 +153,7 @@ fn contact_laws_and_patch_radii_have_the_documented_values() {
         simulation.step().unwrap();
         simulation.take_impacts(&mut impacts);
     }
-    let contact = &simulation.machine().ball_joints[0].contact;
+    let contact = &simulation.machine().loose_joints[0].contact;
     let (r, c) = (contact.ball_radius, contact.clearance);
     let force = (0..3).map(|j| simulation.peak(j).0).fold(0.0, f64::max);
     let depth = ElasticLaw::of_ball(contact, c).depth(force);

@@ -215,8 +215,8 @@ fn clearance_to_and_from_zero_waits_for_the_reset() {
     let hash = simulation.state_hash();
     assert_eq!(simulation.set("joint.S1.clearance", "0"), Ok(Effect::AtReset));
     assert_eq!(simulation.state_hash(), hash);
-    assert_eq!(simulation.running().machine.ball_joints[0].contact.clearance, 0.3e-3);
-    assert_eq!(simulation.pending().machine.ball_joints[0].contact.clearance, 0.0);
+    assert_eq!(simulation.running().machine.loose_joints[0].contact.clearance, 0.3e-3);
+    assert_eq!(simulation.pending().machine.loose_joints[0].contact.clearance, 0.0);
     simulation.advance_to(0.025).unwrap();
     // Other changes act at once while that one waits.
     assert_eq!(simulation.set("contact.friction", "0.4"), Ok(Effect::Now));
@@ -415,7 +415,7 @@ fn a_parameter_of_the_scene_acts_at_once_if_only_contacts_and_gravity_depend_on_
              [[ball_joint]]\nname = \"S1\"\nsocket = {{ body = \"world\" }}\nball = {{ body = \"rod\", at = \"0 0 100 mm\" }}\n"
         )
     };
-    let clearance = |scene: &jointplay_scene::Scene| scene.machine.ball_joints[0].contact.clearance;
+    let clearance = |scene: &jointplay_scene::Scene| scene.machine.loose_joints[0].contact.clearance;
     let run = |mass: &str| {
         let mut simulation = LiveScene::new(&crate::common::parse(&scene(mass), &[])).unwrap();
         simulation.advance_to(1e-3).unwrap();

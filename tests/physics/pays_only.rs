@@ -25,7 +25,7 @@ fn rigid_scenes_evaluate_no_contact() {
             assert!(frame.joints.iter().all(|j| j.state == ContactMode::Ideal));
             let summary = simulation.mechanism().summary();
             assert_eq!((summary.contacts, summary.frictional_contacts), (0, 0));
-            assert_eq!(summary.ideal_joints, simulation.machine().ball_joints.len());
+            assert_eq!(summary.ideal_joints, simulation.machine().loose_joints.len());
         }
         // With play the counter is not zero.
         let mut simulation = simulation(name, &[]);

@@ -99,7 +99,7 @@ fn with(scene: &Scene, key: &str, value: &str) -> Scene {
 
 /// Peak force of the `n`th impact of the ball joint `name`, N.
 fn peak(scene: &Scene, impacts: &[Impact], name: &str, n: usize) -> Option<f64> {
-    let joint = scene.machine.ball_joints.iter().position(|joint| joint.name == name).expect(name);
+    let joint = scene.machine.loose_joints.iter().position(|joint| joint.name == name).expect(name);
     impacts.iter().filter(|impact| impact.joint == joint).nth(n).map(|impact| impact.peak)
 }
 

@@ -32,7 +32,7 @@ fn step_into_contact(simulation: &mut Simulation) -> u32 {
         assert!(steps < MAX_STEPS, "no impact");
     }
     simulation.step().unwrap();
-    let joints = 0..simulation.machine().ball_joints.len();
+    let joints = 0..simulation.machine().loose_joints.len();
     assert!(joints.into_iter().any(|j| simulation.contact_state(j).active), "nothing touches");
     steps + 1
 }
@@ -41,7 +41,7 @@ fn step_into_contact(simulation: &mut Simulation) -> u32 {
 fn change_parameters(simulation: &mut LiveScene) {
     simulation.set("contact.friction", "0.1").unwrap();
     let machine = simulation.machine().clone();
-    let loose = machine.ball_joints.iter().find(|joint| joint.contact.clearance > 0.0);
+    let loose = machine.loose_joints.iter().find(|joint| joint.contact.clearance > 0.0);
     if let Some(joint) = loose {
         let key = format!("joint.{}.clearance", joint.name);
         let smaller = format!("{:e} m", 0.9 * joint.contact.clearance);

@@ -71,7 +71,7 @@ fn rows() -> impl Strategy<Value = &'static Parameter> {
 /// A row of the table as a key of `scene`: for all joints, or for one of them.
 fn key(scene: &Scene, parameter: &Parameter, joint: usize) -> String {
     // Two thirds of the keys are for all joints.
-    let joints = &scene.machine.ball_joints;
+    let joints = &scene.machine.loose_joints;
     match parameter.key.strip_prefix("contact.") {
         Some(part) if joint.is_multiple_of(3) => {
             format!("joint.{}.{part}", joints[joint / 3 % joints.len()].name)
@@ -138,7 +138,7 @@ fn mixed() -> impl Strategy<Value = Mixed> {
             if scene == "chain" {
                 changes.push(("chain.links".to_owned(), "3".to_owned()));
             }
-            let names = Scene::load(scene, &changes).unwrap().machine.ball_joints;
+            let names = Scene::load(scene, &changes).unwrap().machine.loose_joints;
             for (joint, clearance) in names.iter().zip(&joints) {
                 let key = format!("joint.{}.clearance", joint.name);
                 let value = clearance.map_or("0".to_owned(), |c| format!("{c:.4} mm"));
@@ -168,7 +168,7 @@ proptest! {
         let (Ok(mut plain), Ok(mut sampled)) = (LiveScene::new(&scene), LiveScene::new(&scene)) else {
             return Ok(());
         };
-        let joints = scene.machine.ball_joints.len();
+        let joints = scene.machine.loose_joints.len();
         let mut frame = Frame::default();
         let (mut rows, mut impacts) = (vec![0.0_f64; joints], Vec::new());
         while plain.time() < 0.012 && plain.step().is_ok() {
@@ -188,7 +188,7 @@ proptest! {
         let unresolved = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { .. } | Doubt::Machine(MachineDoubt::Step { .. }));
         // Within a step longer than an impact the force depends on the interpolation; such runs raise a doubt.
         let resolved = !plain.doubts().iter().any(unresolved);
-        for (j, joint) in scene.machine.ball_joints.iter().enumerate() {
+        for (j, joint) in scene.machine.loose_joints.iter().enumerate() {
             let (row, name) = (rows[j], &joint.name);
             // Peaks as printed by a run, which has rows, and by a sweep, which has none.
             let (printed, from_steps) = (sampled.peak(j).0, statistics.joints[j].peak_normal);

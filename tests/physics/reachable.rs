@@ -175,9 +175,9 @@ fn the_error_of_a_slider_is_the_clearance_along_its_rod() {
 /// Tip of `machine` with its balls fixed at `places` in their sockets, in the bodies' axes, m.
 fn tip_with_balls_at(machine: &Machine, places: &[Vec3]) -> Option<Vec3> {
     let mut fixed = machine.clone();
-    for (joint, place) in fixed.ball_joints.iter_mut().zip(places) {
+    for (joint, place) in fixed.loose_joints.iter_mut().zip(places) {
         joint.contact.clearance = 0.0;
-        joint.ball.point -= place;
+        joint.frames[1].origin.point -= place;
     }
     HeldMachine::new(&fixed, &[]).ok().map(|held_machine| held_machine.ideal_tip())
 }
@@ -199,7 +199,7 @@ fn no_position_of_the_balls_exceeds_the_computed_error() {
         for _ in 0..150 {
             let places: Vec<Vec3> = scene
                 .machine
-                .ball_joints
+                .loose_joints
                 .iter()
                 .map(|joint| {
                     // Mostly on the walls, where the extremes are.

@@ -153,10 +153,10 @@ fn residuals(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
         push(Some(joint.child), point, force, torque);
         push(joint.parent, point, -force, -torque);
     }
-    for (joint, report) in scene.machine.ball_joints.iter().zip(&frame.joints) {
+    for (joint, report) in scene.machine.loose_joints.iter().zip(&frame.joints) {
         let force = report.normal_force + report.friction_force;
-        push(joint.ball.body, report.contact_point, force, Vec3::zeros());
-        push(joint.socket.body, report.contact_point, -force, Vec3::zeros());
+        push(joint.carried().body, report.contact_point, force, Vec3::zeros());
+        push(joint.carrier().body, report.contact_point, -force, Vec3::zeros());
     }
     for (element, report) in scene.machine.elements.iter().zip(&frame.elements) {
         let torque = report.torque.unwrap_or_else(Vec3::zeros);

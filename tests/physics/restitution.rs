@@ -170,7 +170,7 @@ fn recent_impacts_are_kept_all_can_be_taken_and_snapshots_contain_them() {
         simulation.take_impacts(&mut taken);
     }
     let started: u64 = simulation.statistics().impacts();
-    let joints = simulation.machine().ball_joints.len();
+    let joints = simulation.machine().loose_joints.len();
     let touching = (0..joints).filter(|&j| simulation.contact_state(j).active);
     assert_eq!(started as usize, taken.len() + touching.count());
     let latest: Vec<Impact> = simulation.impacts().copied().collect();

@@ -1,7 +1,7 @@
 //! `start = "settled"`: each ball starts with the penetration at which it transmits the reaction of the machine without play.
 
 use crate::common::{frame_now, scene};
-use jointplay_physics::machine::{BallJoint, StartRule};
+use jointplay_physics::machine::{LooseJoint, StartRule};
 use jointplay_physics::simulate::{Frame, Simulation};
 use jointplay_scene::Scene;
 
@@ -25,8 +25,8 @@ fn every_contact_begins_with_the_force_of_the_ideal_joint() {
             let changes = [("start", "settled"), ("contact.friction", "0"), ("formulation", formulation)];
             let mut simulation = start_simulation(name, &changes);
             let frame: Frame = frame_now(&mut simulation);
-            let loose = |joint: &&BallJoint| joint.contact.clearance > 0.0;
-            let loose = simulation.machine().ball_joints.iter().filter(loose).count();
+            let loose = |joint: &&LooseJoint| joint.contact.clearance > 0.0;
+            let loose = simulation.machine().loose_joints.iter().filter(loose).count();
             let touching = frame.joints.iter().filter(|joint| joint.penetration > 0.0);
             assert_eq!(touching.count(), loose, "{name}");
             for (joint, ideal) in frame.joints.iter().zip(reactions(name)) {
@@ -47,7 +47,7 @@ fn a_settled_start_has_no_impact_peaks() {
             let changes = [("start", start), ("contact.friction", "0")];
             let mut simulation = start_simulation(name, &changes);
             simulation.advance_to(0.02).expect("runs");
-            let peaks = (0..simulation.machine().ball_joints.len()).map(|j| {
+            let peaks = (0..simulation.machine().loose_joints.len()).map(|j| {
                 let (force, _) = simulation.peak(j);
                 force
             });
@@ -70,7 +70,7 @@ fn a_hanging_pendulum_rests_on_its_wall() {
     let mut simulation = Simulation::new(&scene.machine).expect("starts");
     let frame = frame_now(&mut simulation);
     let joint = &frame.joints[0];
-    let contact = &scene.machine.ball_joints[0].contact;
+    let contact = &scene.machine.loose_joints[0].contact;
     // Hertz: F = K delta^1.5, with the force of the ideal joint.
     let stiffness = jointplay_physics::contact::Coefficients::new(contact, contact.clearance).elastic.stiffness;
     let depth = (reactions("pendulum")[0] / stiffness).powf(2.0 / 3.0);

@@ -59,7 +59,7 @@ fn plate(balls: usize, height: f64, solver: &str) -> String {
 fn impacts(scene: &Scene, end: f64) -> Vec<Vec<Impact>> {
     let mut simulation = Simulation::new(&scene.machine).unwrap();
     run_until(&mut simulation, end);
-    let mut all = vec![Vec::new(); scene.machine.ball_joints.len()];
+    let mut all = vec![Vec::new(); scene.machine.loose_joints.len()];
     simulation.impacts().for_each(|impact| all[impact.joint].push(*impact));
     all
 }
@@ -113,7 +113,7 @@ fn equal_gaps_of_a_straight_line_linkage_are_crossed_at_one_speed() {
     for tolerance in ["1e-6", "1e-8", "1e-11"] {
         let scene = parse(&text, &[&gravity[..], &[("solver.tolerance", tolerance)]].concat());
         let all = impacts(&scene, 4.7e-3);
-        let joint = |name: &str| scene.machine.ball_joints.iter().position(|joint| joint.name == name).unwrap();
+        let joint = |name: &str| scene.machine.loose_joints.iter().position(|joint| joint.name == name).unwrap();
         for name in ["AP1", "BP1"] {
             let first = all[joint(name)][0];
             assert!(relative(first.approach_speed, 0.044_409_09) < 1e-7, "{tolerance}: {name}: {first:?}");
@@ -127,7 +127,7 @@ fn both_inner_balls_of_a_steering_strike_at_one_speed() {
     let all = impacts(&scene, 1.2e-3);
     let inner = |side: &str| {
         let name = format!("{side}.inner");
-        all[scene.machine.ball_joints.iter().position(|joint| joint.name == name).unwrap()][0].approach_speed
+        all[scene.machine.loose_joints.iter().position(|joint| joint.name == name).unwrap()][0].approach_speed
     };
     for side in ["left", "right"] {
         assert!(relative(inner(side), 0.157_171_438) < 1e-7, "{side}: {}", inner(side));

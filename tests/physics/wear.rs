@@ -127,15 +127,15 @@ fn a_cell_lies_where_the_ball_touches() {
         simulation.advance_to(0.5).unwrap();
         simulation.track_wear();
         let (empty, mut frame) = (wear(&simulation).clone(), Frame::default());
-        let joints = simulation.machine().ball_joints.len();
+        let joints = simulation.machine().loose_joints.len();
         let mut expected = vec![vec![0.0; empty.grid().cells()]; joints];
         while simulation.time() < 0.6 {
             simulation.step().unwrap();
             simulation.sample(simulation.time(), &mut frame);
             let h = simulation.time() - simulation.step_start();
             let machine = simulation.machine().clone();
-            for (j, joint) in machine.ball_joints.iter().enumerate() {
-                let rotation = match joint.socket.body {
+            for (j, joint) in machine.loose_joints.iter().enumerate() {
+                let rotation = match joint.carrier().body {
                     Some(b) => frame.bodies[b].rotation,
                     None => Mat3::identity(),
                 };

@@ -20,8 +20,8 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Name of a cut joint.
 fn cut_joint(machine: &Machine, joint: usize) -> &str {
-    let closing = || &machine.closing_joints[joint - machine.ball_joints.len()].name;
-    let ball = machine.ball_joints.get(joint).map(|ball| &ball.name);
+    let closing = || &machine.closing_joints[joint - machine.loose_joints.len()].name;
+    let ball = machine.loose_joints.get(joint).map(|ball| &ball.name);
     ball.unwrap_or_else(closing)
 }
 

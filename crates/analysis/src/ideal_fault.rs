@@ -65,7 +65,7 @@ pub fn ideal_fault(scene: &Scene, mut may_continue: impl FnMut() -> bool) -> Opt
     // At a low frequency only weight loads the joints; the poses do not depend on the frequency.
     form.pace = if form.frequency > 0.0 { SLOW / form.frequency } else { 1.0 };
     let (pace, period) = (form.pace, 1.0 / SLOW);
-    for joint in &mut rigid.machine.ball_joints {
+    for joint in &mut rigid.machine.loose_joints {
         joint.contact.clearance = 0.0;
     }
     let limit = MAX_WEIGHTS * 9.81 * rigid.machine.bodies.iter().map(|body| body.mass).sum::<f64>();

@@ -110,7 +110,7 @@ impl Layout {
             add(name, *whole, false);
         }
         let by_default = protocol.keep.is_empty() || protocol.joints;
-        let joints = scene.machine.ball_joints.iter().filter(|_| by_default);
+        let joints = scene.machine.loose_joints.iter().filter(|_| by_default);
         let joints: Vec<String> = joints.map(|joint| joint.name.clone()).collect();
         for joint in &joints {
             for (quantity, whole, _) in JOINT {

@@ -372,7 +372,7 @@ impl PointRun {
         let statistics_of_channels = self.statistics.values(machine, peak_kept);
         let joints = (0..self.peaks.len())
             .map(|j| JointResult {
-                name: machine.ball_joints[j].name.clone(),
+                name: machine.loose_joints[j].name.clone(),
                 peak: self.peaks[j].normal.max(self.transient_peaks[j]),
                 peak_kept: peak_kept(j),
                 mean: self.means.normal[j] / span,

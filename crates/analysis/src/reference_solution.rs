@@ -119,7 +119,7 @@ impl ReferenceSolution {
             position: Vec3::zeros(),
             settled: None,
         };
-        let joints = if first.is_empty() { scene.machine.ball_joints.len() } else { 0 };
+        let joints = if first.is_empty() { scene.machine.loose_joints.len() } else { 0 };
         reference.slots = (0..joints).map(|joint| Slot { joint, span: (0.0, span_s), peak: 0.0 }).collect();
         for (index, impact) in first.iter().enumerate() {
             let same = |other: &&Impact| other.joint == impact.joint;
@@ -212,7 +212,7 @@ fn require_reached(end: End) -> Result<(), AnalysisError> {
 
 /// The first impacts of the reference to have ended, in the order in which they begin, and some more.
 fn first_impacts(setting: &Setting, scene: &Scene, context: &mut RunContext) -> Result<Vec<Impact>, AnalysisError> {
-    if scene.machine.ball_joints.iter().all(|joint| joint.contact.clearance == 0.0) {
+    if scene.machine.loose_joints.iter().all(|joint| joint.contact.clearance == 0.0) {
         return Ok(Vec::new());
     }
     let mut simulation = setting.start(scene)?;
@@ -235,7 +235,7 @@ fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<Simul
     let mut simulation = Setting::automatic(SETTLING_TOLERANCE).start(scene)?;
     let mut peaks: Vec<Peak> = Vec::new();
     let (mut since, mut settled) = (0.0, false);
-    let joints = scene.machine.ball_joints.iter().enumerate();
+    let joints = scene.machine.loose_joints.iter().enumerate();
     let loose: Vec<usize> = joints.filter(|(_, joint)| joint.contact.clearance > 0.0).map(|(j, _)| j).collect();
     advance_capped(&mut simulation, SETTLING_TIME_LIMIT, SEARCH_COST, context, |simulation| {
         simulation.take_peaks(&mut peaks);
@@ -257,7 +257,7 @@ fn mean_forces(
 ) -> Result<Option<Vec<f64>>, AnalysisError> {
     let mut simulation = setting.resume(start)?;
     let from = start.time() + WARM_UP;
-    let (mut means, mut next) = (vec![0.0; start.machine().ball_joints.len()], 0);
+    let (mut means, mut next) = (vec![0.0; start.machine().loose_joints.len()], 0);
     let mut frame = Frame::default();
     let end = advance_capped(&mut simulation, from + SETTLED_SPAN, max_cost, context, |simulation| {
         while next < SAMPLES {

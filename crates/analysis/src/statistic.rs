@@ -142,7 +142,7 @@ impl ChannelStatistic {
     /// Index of the ball joint, if this is the largest normal force of a ball joint, which is known in continuous time.
     fn peak_of(&self, machine: &Machine) -> Option<usize> {
         let name = self.channel.strip_suffix(".normal").filter(|_| self.statistic == Statistic::Max)?;
-        machine.ball_joints.iter().position(|joint| joint.name == name)
+        machine.loose_joints.iter().position(|joint| joint.name == name)
     }
 }
 

@@ -334,7 +334,7 @@ mod tests {
             let first = value("x_end_m") - 0.04 * value("vx_mean_m_s");
             assert!((first - x[0]).abs() < 1e-5, "{first} {}", x[0]);
             assert!(result.statistics.iter().all(|value| value.is_finite()));
-            let joint = &scene.machine.ball_joints[0].name;
+            let joint = &scene.machine.loose_joints[0].name;
             let peak = value(&format!("{joint}_normal_max_N"));
             assert_eq!(peak, peaks[0].normal);
             assert!(forces.iter().all(|force| *force <= peak * (1.0 + 1e-12)));

@@ -8,14 +8,14 @@
 //!
 //! ```
 //! use jointplay_physics::machine::{
-//!     Attachment, BallJoint, Body, Joint, JointKind, JointStart, Machine, Mat3, Vec3,
+//!     Attachment, LooseJoint, Body, Joint, JointKind, JointStart, Machine, Mat3, Vec3,
 //! };
 //! use jointplay_physics::simulate::{Frame, Simulation};
 //!
 //! let mut machine = Machine { gravity: Vec3::new(0.0, 0.0, -9.81), ..Machine::default() };
 //! let bob = machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
-//! let joint = BallJoint::new("S1", Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros()));
-//! machine.ball_joints.push(joint.with_clearance(0.2e-3));
+//! let joint = LooseJoint::ball("S1", Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros()));
+//! machine.loose_joints.push(joint.with_clearance(0.2e-3));
 //!
 //! let mut simulation = Simulation::new(&machine)?;
 //! simulation.advance_to(0.1)?;

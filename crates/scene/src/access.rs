@@ -74,7 +74,7 @@ impl Scene {
         let Some((name, part)) = joint_part(key) else {
             return Some(Resolved { parameter: find(key)?, joint: None });
         };
-        let joint = self.machine.ball_joints.iter().position(|joint| joint.name == name)?;
+        let joint = self.machine.loose_joints.iter().position(|joint| joint.name == name)?;
         Some(Resolved { parameter: find(&format!("contact.{part}"))?, joint: Some(joint) })
     }
 
@@ -96,7 +96,7 @@ impl Scene {
             return format!("unknown key{near}");
         };
         let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
-        let balls = &self.machine.ball_joints;
+        let balls = &self.machine.loose_joints;
         if balls.iter().any(|joint| joint.name == name) {
             let near = nearest_name(part, parts.iter().copied()).map(|near| format!("joint.{name}.{near}"));
             return format!("unknown key{}", did_you_mean(near.as_deref()));
@@ -130,7 +130,7 @@ impl Scene {
         let Resolved { parameter, joint } = self.resolve(key)?;
         Ok(match parameter.access {
             Access::Contact(field) => {
-                let own = joint.map(|joint| &self.machine.ball_joints[joint].contact);
+                let own = joint.map(|joint| &self.machine.loose_joints[joint].contact);
                 (field.get)(own.unwrap_or(&self.machine.contact))
             }
             Access::Scene(field) => (field.get)(self),
@@ -245,7 +245,7 @@ impl Scene {
         let value = parameter.read(text).map_err(|error| SceneError::about(key, Some(text), error.to_string()))?;
         match (parameter.access, joint) {
             (Access::Contact(field), Some(joint)) => {
-                (field.set)(&mut self.machine.ball_joints[joint].contact, &value);
+                (field.set)(&mut self.machine.loose_joints[joint].contact, &value);
                 let part = contact_part(parameter).unwrap_or_default();
                 if !self.overrides[joint].contains(&part) {
                     self.overrides[joint].push(part);
@@ -293,7 +293,7 @@ impl Scene {
             Access::Contact(field) => {
                 (field.set)(&mut self.machine.contact, value);
                 let part = contact_part(parameter).unwrap_or_default();
-                let joints = self.machine.ball_joints.iter_mut().zip(&self.overrides);
+                let joints = self.machine.loose_joints.iter_mut().zip(&self.overrides);
                 for (joint, _) in joints.filter(|(_, overrides)| !overrides.contains(&part)) {
                     (field.set)(&mut joint.contact, value);
                 }

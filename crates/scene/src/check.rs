@@ -78,7 +78,7 @@ impl Scene {
     pub(super) fn keys_of(&self, conflict: &ContactConflict) -> Vec<String> {
         let key = |part| match conflict.joint {
             Some(joint) if self.overrides[joint].contains(&part) => {
-                format!("joint.{}.{part}", self.machine.ball_joints[joint].name)
+                format!("joint.{}.{part}", self.machine.loose_joints[joint].name)
             }
             _ => format!("contact.{part}"),
         };
@@ -89,7 +89,7 @@ impl Scene {
     }
 
     fn conflict_text(&self, conflict: &ContactConflict, key: &str) -> String {
-        match conflict.joint.map(|index| &self.machine.ball_joints[index].name) {
+        match conflict.joint.map(|index| &self.machine.loose_joints[index].name) {
             Some(name) if !key.starts_with("joint.") => {
                 format!("{} (in ball joint {name})", conflict.fault)
             }

@@ -130,7 +130,7 @@ pub(super) fn no_body<'a>(name: &str, names: impl Iterator<Item = &'a str> + Clo
 }
 
 /// "No such ball joint", with the nearest name and all names.
-pub(super) fn no_ball_joint(name: &str, joints: &[super::BallJoint]) -> String {
+pub(super) fn no_ball_joint(name: &str, joints: &[super::LooseJoint]) -> String {
     no_such(["ball joint", "ball joints"], name, joints.iter().map(|joint| joint.name.as_str()))
 }
 

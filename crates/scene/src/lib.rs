@@ -10,7 +10,7 @@
 //!
 //! let mut scene = Scene::load("pendulum", &[])?;
 //! scene.set("contact.clearance", "0.2 mm")?;
-//! assert_eq!(scene.machine.ball_joints[0].contact.clearance, 0.2e-3);
+//! assert_eq!(scene.machine.loose_joints[0].contact.clearance, 0.2e-3);
 //! let error = scene.set("contact.clearence", "0.2 mm").unwrap_err();
 //! assert!(error.to_string().contains("did you mean `contact.clearance`?"));
 //!
@@ -20,7 +20,7 @@
 //! // Without play the ball joint is a constraint: other equations, from the next reset on.
 //! assert_eq!(live.set("contact.clearance", "0 mm")?, Effect::AtReset);
 //! live.reset()?;
-//! assert_eq!(live.running().machine.ball_joints[0].contact.clearance, 0.0);
+//! assert_eq!(live.running().machine.loose_joints[0].contact.clearance, 0.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -94,7 +94,7 @@ pub use value::Value;
 pub use visible::{visible, visible_line};
 
 use jointplay_physics::machine::{
-    Attachment, BallJoint, Body, Drive, Formulation, Freedom, Geometry, Harmonic, Joint, JointKind, JointStart,
+    Attachment, Body, Drive, Formulation, Freedom, Geometry, Harmonic, Joint, JointKind, JointStart, LooseJoint,
     Machine, Mat3, Output, Preset, Quat, Role, Shape, StartRule, Vec3,
 };
 use jointplay_physics::units::{Dimension, format_quantity, parse_quantity, si_unit, unit_names};

@@ -12,7 +12,7 @@ use super::instance::{Group, Instance};
 use super::pattern::{Pattern, read_patterns};
 use super::placement::read_placement;
 use super::read_bodies::{read_body, read_shape};
-use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, read_own_contact, sort_forest};
+use super::read_joints::{JointText, LooseJointText, read_ball_joint, read_joint, read_own_contact, sort_forest};
 use super::reading::Reading;
 use super::table::joint_part;
 use super::user_parameters::read_user_parameters;
@@ -328,7 +328,7 @@ fn read_mechanism<'d>(
         });
     }
     for node in list("ball_joint")? {
-        let BallJointText { joint, section, places: own } = read_ball_joint(&node, scene, &by_name)?;
+        let LooseJointText { joint, section, places: own } = read_ball_joint(&node, scene, &by_name)?;
         joint_names.add(&section, "joint", &joint.name)?;
         let title = format!("joint.{}", joint.name);
         if section.document.include.is_none() {
@@ -336,7 +336,7 @@ fn read_mechanism<'d>(
         }
         scene.overrides.push(own.keys().copied().collect());
         places.extend(own.into_iter().map(|(part, node)| (format!("joint.{}.{part}", joint.name), node)));
-        scene.machine.ball_joints.push(joint);
+        scene.machine.loose_joints.push(joint);
     }
     for node in list("fixed_shape")? {
         let shape = read_shape(&node, true)?;
@@ -379,7 +379,7 @@ fn read_joint_contacts<'d>(top: &Section<'d>, scene: &mut Scene, places: &mut Pl
         let node = section.require("name")?;
         let name = node.text()?;
         names.add(&section, "[[joint_contact]]", name)?;
-        let joints = &mut scene.machine.ball_joints;
+        let joints = &mut scene.machine.loose_joints;
         let Some(index) = joints.iter().position(|joint| joint.name == name) else {
             return Err(node.error(no_ball_joint(name, joints)));
         };

@@ -24,8 +24,8 @@ pub(super) struct JointText<'d> {
 }
 
 /// A ball joint with the positions of its contact keys.
-pub(super) struct BallJointText<'d> {
-    pub joint: BallJoint,
+pub(super) struct LooseJointText<'d> {
+    pub joint: LooseJoint,
     pub section: Section<'d>,
     pub places: BTreeMap<&'static str, Node<'d>>,
 }
@@ -323,7 +323,7 @@ pub(super) fn read_ball_joint<'d>(
     node: &Node<'d>,
     scene: &Scene,
     bodies: &BTreeMap<String, usize>,
-) -> Result<BallJointText<'d>, SceneError> {
+) -> Result<LooseJointText<'d>, SceneError> {
     let section = node.section_as(node.title("joint"))?;
     let name = section.require("name")?.name()?.into_owned();
     let attachment = |key: &str| read_attachment(&section, key, scene, bodies);
@@ -334,9 +334,9 @@ pub(super) fn read_ball_joint<'d>(
     let opening = section.get("opening").map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
     let on = socket.body.map(|body| &*scene.machine.bodies[body].name);
     let opening = node.document.instance.map_or(opening, |instance| instance.direction(on, opening));
-    let mut joint = BallJoint { name, socket, ball, opening, contact: scene.machine.contact };
+    let mut joint = LooseJoint { opening, contact: scene.machine.contact, ..LooseJoint::ball(&name, socket, ball) };
     let places = read_own_contact(&section, &mut joint)?;
-    Ok(BallJointText { joint, section, places })
+    Ok(LooseJointText { joint, section, places })
 }
 
 /// Applies the contact overrides of `section` to `joint`; returns their nodes by parameter.
@@ -345,7 +345,7 @@ pub(super) fn read_ball_joint<'d>(
 /// A value that is invalid or out of range.
 pub(super) fn read_own_contact<'d>(
     section: &Section<'d>,
-    joint: &mut BallJoint,
+    joint: &mut LooseJoint,
 ) -> Result<BTreeMap<&'static str, Node<'d>>, SceneError> {
     let mut places = BTreeMap::new();
     for (part, field) in contact_rows() {

@@ -36,15 +36,15 @@ fn every_ball_of_every_built_in_scene_starts_in_the_centre_of_its_socket() {
     for name in BUILT_IN {
         let scene = Scene::load(name, &[]).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(scene.name, name);
-        assert!(!scene.machine.ball_joints.is_empty(), "{name}");
+        assert!(!scene.machine.loose_joints.is_empty(), "{name}");
         if scene.machine.start == StartRule::Ideal {
             // Assembled at the start: see `tests/physics/machines.rs`.
             continue;
         }
         let poses = start_poses(&scene);
         let point = |end: Attachment| end.body.map_or(end.point, |body| poses[body].0 + poses[body].1 * end.point);
-        for joint in &scene.machine.ball_joints {
-            let e = point(joint.ball) - point(joint.socket);
+        for joint in &scene.machine.loose_joints {
+            let e = point(joint.carried()) - point(joint.carrier());
             assert!(e.norm() < 1e-9, "{name}: {} starts {:e} m off its socket's centre", joint.name, e.norm());
         }
     }
@@ -112,7 +112,7 @@ fn a_joint_value_overrides_the_scene_value_whichever_is_set_last() {
             if key.starts_with("joint") { "0.7 mm" } else { "0.1 mm" }
         };
         let scene = changed("spcmm", &[(first, value(first)), (second, value(second))]);
-        let clearances: Vec<f64> = scene.machine.ball_joints.iter().map(|joint| joint.contact.clearance).collect();
+        let clearances: Vec<f64> = scene.machine.loose_joints.iter().map(|joint| joint.contact.clearance).collect();
         assert_eq!(clearances, [0.7e-3, 0.1e-3, 0.1e-3]);
         assert_eq!(scene.get("contact.clearance"), Ok(Value::Number(0.1e-3)));
         assert_eq!(scene.get("joint.S2.clearance"), Ok(Value::Number(0.1e-3)));
@@ -120,8 +120,8 @@ fn a_joint_value_overrides_the_scene_value_whichever_is_set_last() {
     }
     // The override at B in the file is unaffected.
     let scene = changed("slider-crank", &[("contact.clearance", "0.5 mm")]);
-    assert_eq!(scene.machine.ball_joints[0].contact.clearance, 0.0);
-    assert_eq!(scene.machine.ball_joints[1].contact.clearance, 0.5e-3);
+    assert_eq!(scene.machine.loose_joints[0].contact.clearance, 0.0);
+    assert_eq!(scene.machine.loose_joints[1].contact.clearance, 0.5e-3);
 }
 
 #[test]
@@ -131,7 +131,7 @@ fn the_last_of_two_changes_wins_and_only_the_result_is_checked() {
     assert_eq!(scene.changes, [("contact.friction".to_owned(), "0.3".to_owned())]);
     // A gap wider than the file's ball is valid with the larger ball set by the same changes.
     let scene = changed("spcmm", &[("contact.clearance", "12 mm"), ("contact.ball_radius", "20 mm")]);
-    assert_eq!(scene.machine.ball_joints[2].contact.clearance, 0.012);
+    assert_eq!(scene.machine.loose_joints[2].contact.clearance, 0.012);
 }
 
 #[test]
@@ -256,10 +256,10 @@ fn a_change_can_be_undone() {
 #[test]
 fn a_chain_is_rebuilt_when_its_number_of_links_changes() {
     let mut scene = changed("chain", &[("joint.J2.friction", "0.4"), ("joint.J7.friction", "0.5")]);
-    assert_eq!((scene.machine.bodies.len(), scene.machine.ball_joints.len()), (8, 8));
+    assert_eq!((scene.machine.bodies.len(), scene.machine.loose_joints.len()), (8, 8));
     scene.set("chain.links", "3").unwrap();
-    assert_eq!((scene.machine.bodies.len(), scene.machine.joints.len(), scene.machine.ball_joints.len()), (3, 3, 3));
-    assert_eq!(scene.machine.ball_joints[1].contact.friction, 0.4);
+    assert_eq!((scene.machine.bodies.len(), scene.machine.joints.len(), scene.machine.loose_joints.len()), (3, 3, 3));
+    assert_eq!(scene.machine.loose_joints[1].contact.friction, 0.4);
     assert_eq!(scene.machine.output.body, 2);
     assert_eq!(scene.get("chain.links"), Ok(Value::Count(3)));
     // A change of a joint that no longer exists is dropped, too.
@@ -379,7 +379,7 @@ fn the_slider_crank_starts_with_consistent_velocities() {
     assert_eq!(*law, Drive::Constant { position: 0.0, velocity: 6.0 });
     // Otherwise they are the same mechanism.
     assert_eq!(driven.machine.bodies, scene.machine.bodies);
-    assert_eq!(driven.machine.ball_joints, scene.machine.ball_joints);
+    assert_eq!(driven.machine.loose_joints, scene.machine.loose_joints);
 }
 
 #[test]
@@ -594,13 +594,13 @@ role = \"frame\"
         let angle = std::f64::consts::TAU / 3.0 * copy as f64;
         let radial = Vec3::new(libm::cos(angle), libm::sin(angle), 0.0);
         let place = Vec3::new(0.01, 0.0, 0.005 * copy as f64) + 0.01 * radial;
-        let joint = &scene.machine.ball_joints[copy];
+        let joint = &scene.machine.loose_joints[copy];
         assert_eq!(joint.name, format!("S{}", copy + 1));
-        near(joint.socket.point, place);
+        near(joint.carrier().point, place);
         // Points in the rod's frame are the same in every copy.
-        near(joint.ball.point, Vec3::new(0.0, 0.0, 0.001));
+        near(joint.carried().point, Vec3::new(0.0, 0.0, 0.001));
         near(joint.opening, radial);
-        assert_eq!(joint.ball.body, Some(copy + 1));
+        assert_eq!(joint.carried().body, Some(copy + 1));
         let JointStart::Pose { position, velocity, rotation, .. } = scene.machine.joints[copy + 1].start else {
             panic!("free");
         };
@@ -689,10 +689,10 @@ ball = { body = \"leg\" }
     };
     let mut scene = with(leg, text, &[("body.leg.mass", "3 kg")]).expect("reads");
     assert_eq!(scene.machine.bodies[0].mass, 3.0);
-    assert_eq!(scene.machine.ball_joints[0].socket.point.x, 0.03);
+    assert_eq!(scene.machine.loose_joints[0].carrier().point.x, 0.03);
     // A rebuild uses the file contents read before.
     scene.set("parameter.reach", "40 mm").expect("a key");
-    assert_eq!(scene.machine.ball_joints[0].socket.point.x, 0.04);
+    assert_eq!(scene.machine.loose_joints[0].carrier().point.x, 0.04);
     assert_eq!(scene.machine.bodies[0].mass, 3.0);
     let error = scene.to_toml().expect_err("two files").to_string();
     assert!(error.contains("another file, which this one includes"), "{error}");

@@ -221,7 +221,7 @@ mod tests {
                 };
                 let mut keys = vec![parameter.key.to_owned()];
                 if let Some(part) = contact_part(parameter) {
-                    keys.push(format!("joint.{}.{part}", plain.machine.ball_joints[0].name));
+                    keys.push(format!("joint.{}.{part}", plain.machine.loose_joints[0].name));
                 }
                 for key in keys {
                     let mut changed = plain.clone();
@@ -301,7 +301,7 @@ mod tests {
             let written = changed.to_toml().expect("has its places");
             let read = Scene::parse(&written, None, &[]).expect("reads");
             assert_eq!(bits(&read), bits(&changed), "{written}");
-            assert_eq!(read.machine.ball_joints[1].contact.clearance, 0.5e-3);
+            assert_eq!(read.machine.loose_joints[1].contact.clearance, 0.5e-3);
             assert_eq!(written.contains("# the second"), text.contains("# the second"));
             // A second time: the entries exist now.
             let mut again = read;

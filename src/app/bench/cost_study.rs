@@ -65,7 +65,7 @@ impl CostSettings {
         if let Some(VariedParameter { parameter, .. }) = self.varied.iter().find(reversed) {
             return Err(format!("{}: the first value must be below the second", parameter.label));
         }
-        for joint in &scene.machine.ball_joints {
+        for joint in &scene.machine.loose_joints {
             for VariedParameter { parameter, range, .. } in self.varied.iter().filter(|varied| varied.on) {
                 let last = parameter.key.rsplit('.').next().unwrap_or_default();
                 let key = format!("joint.{}.{last}", joint.name);

@@ -94,7 +94,7 @@ impl Costs {
             let output = self.output;
             *self = Self { scene: scene.source.text.clone(), output, ..Self::default() };
         }
-        if scene.machine.ball_joints.is_empty() {
+        if scene.machine.loose_joints.is_empty() {
             ui.label(RichText::new("This scene has no ball joint").weak());
             return None;
         }

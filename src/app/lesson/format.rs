@@ -534,7 +534,7 @@ impl Lesson {
             parameter(scene, key)?;
         }
         if let Some(joint) = kind.joint().filter(|name| *name != "any") {
-            let mut names = scene.machine.ball_joints.iter().map(|joint| &*joint.name);
+            let mut names = scene.machine.loose_joints.iter().map(|joint| &*joint.name);
             if !names.clone().any(|name| name == joint) {
                 let known: Vec<&str> = names.by_ref().take(12).collect();
                 return Err(format!("no ball joint `{joint}`; allowed: any, {}", known.join(", ")));
@@ -612,7 +612,7 @@ fn resolve_scene_path(scene: &str, file: Option<&str>) -> String {
 
 /// Parses a camera target.
 fn parse_camera_target(word: &str, scene: &Scene) -> Result<CameraTarget, String> {
-    let joints = || scene.machine.ball_joints.iter().map(|joint| &*joint.name);
+    let joints = || scene.machine.loose_joints.iter().map(|joint| &*joint.name);
     if let Some(joint) = joints().position(|name| name == word) {
         return Ok(CameraTarget::At(joint));
     }

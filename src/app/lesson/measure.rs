@@ -216,7 +216,7 @@ impl MeasuringRun {
     }
 
     fn joint(&self, name: &str) -> Result<usize, String> {
-        let joints = &self.scene.machine.ball_joints;
+        let joints = &self.scene.machine.loose_joints;
         joints.iter().position(|j| j.name == name).ok_or_else(|| {
             let known: Vec<&str> = joints.iter().map(|joint| &*joint.name).collect();
             format!("no ball joint `{name}`; allowed: {}", known.join(", "))

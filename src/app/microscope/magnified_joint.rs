@@ -61,13 +61,13 @@ impl MagnifiedJoint {
     /// State of ball joint `joint`; `None` if the scene has no such joint.
     pub fn of(player: &Player, joint: usize) -> Option<Self> {
         let (frame, shown) = (player.frame(), player.pacer.shown());
-        let spec = player.running().machine.ball_joints.get(joint)?;
+        let spec = player.running().machine.loose_joints.get(joint)?;
         let report = *frame.joints.get(joint)?;
         let distance = report.eccentricity.norm();
         let ideal = report.state == ContactMode::Ideal;
         let normal = (distance > 0.0 && !ideal).then(|| report.eccentricity / distance);
-        let (ball, ball_spin) = velocity_of(frame, &spec.ball);
-        let (socket, socket_spin) = velocity_of(frame, &spec.socket);
+        let (ball, ball_spin) = velocity_of(frame, &spec.carried());
+        let (socket, socket_spin) = velocity_of(frame, &spec.carrier());
         let velocity = ball - socket;
         let touches = matches!(report.state, ContactMode::Creep | ContactMode::Slip);
         let sliding = normal.filter(|_| touches).map(|normal| {
@@ -87,7 +87,7 @@ impl MagnifiedJoint {
             deepest: impact.map_or(0.0, |impact| impact.deepest),
         });
         Some(Self {
-            carrier: axes_of(frame, spec.socket.body),
+            carrier: axes_of(frame, spec.carrier().body),
             report,
             normal,
             velocity,
@@ -171,7 +171,7 @@ mod tests {
     fn the_patch_carries_the_force_of_its_penetration() {
         // Hertz: F = 4/3 E* a³ / R, E* = E / (2 (1 - nu²)); the scene's law without damping is the same number.
         let player = player("spcmm", &[]);
-        let contact = player.running().machine.ball_joints[0].contact;
+        let contact = player.running().machine.loose_joints[0].contact;
         let magnified = MagnifiedJoint::of(&player, 0).expect("has a joint");
         let patch = ContactPatch { penetration: 3e-6, ..magnified.patch.expect("has clearance") };
         let modulus = contact.youngs_modulus / (2.0 * (1.0 - contact.poisson_ratio.powi(2)));

@@ -41,7 +41,7 @@ pub fn npz(results: &Results, target: OutputFile) -> Result<PendingFile, FileErr
     };
     let unbounded = points().map(|point| results.unbounded(point).len() as i64);
     let joint = points().map(|point| results.largest_joint(point).map_or(-1, |joint| joint as i64));
-    let joints = results.map.scene().machine.ball_joints.len();
+    let joints = results.map.scene().machine.loose_joints.len();
     let axes = results.map.design().axes().iter().map(|axis| axis_column(axis, axis.key(), 0..axis.count()));
     let mut columns: Vec<Column> = axes.collect();
     columns.push(Column::whole("status", points().map(status).collect()).shaped(shape.clone()));

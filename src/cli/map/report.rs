@@ -51,7 +51,7 @@ pub fn text(results: &Results, out: &[PathBuf]) -> String {
         );
     }
     text += &format!("Settled error     {SETTLED}\nLargest error     of {REACHABLE}\n\n");
-    let joints = &results.map.scene().machine.ball_joints;
+    let joints = &results.map.scene().machine.loose_joints;
     let rows = notable(results).into_iter().map(|(which, point)| {
         let largest = results.largest(point).norm();
         let settled = results.settled(point).norm();
@@ -94,7 +94,7 @@ pub fn json(results: &Results, out: &[PathBuf]) -> Map<String, Json> {
     all.insert("no_pose".into(), json!(no_pose));
     all.insert("no_rest".into(), json!(no_rest));
     all.insert("unbounded".into(), json!(unbounded));
-    let joints = &results.map.scene().machine.ball_joints;
+    let joints = &results.map.scene().machine.loose_joints;
     for (which, point) in notable(results) {
         let indices = results.map.design().indices(point);
         let at = results.map.design().axes().iter().zip(indices).map(|(axis, i)| {

@@ -56,7 +56,7 @@ impl Results {
 
     /// Share of each ball joint in the support along the direction of the largest error, m; NaN without one.
     pub fn shares(&self, point: usize) -> Vec<f64> {
-        let joints = self.map.scene().machine.ball_joints.len();
+        let joints = self.map.scene().machine.loose_joints.len();
         let largest = self.computed(point).and_then(|at_point| at_point.largest.as_ref());
         let mut shares = largest.map_or_else(Vec::new, |largest| largest.shares.clone());
         shares.resize(joints, f64::NAN);
@@ -142,7 +142,7 @@ impl Results {
         });
         meta.insert("over".into(), axes.collect());
         meta.insert("directions".into(), json!(self.map.directions()));
-        let joints = scene.machine.ball_joints.iter();
+        let joints = scene.machine.loose_joints.iter();
         meta.insert("ball_joints".into(), joints.map(|joint| json!(joint.name)).collect());
         let faults = self.points.iter().enumerate().filter_map(|(point, at_point)| {
             let fault = match at_point {

@@ -37,8 +37,8 @@ pub fn camera(
     }
     match &arguments.close_up {
         Some(name) => {
-            let joint = scene.machine.ball_joints.iter().position(|joint| joint.name == *name).ok_or_else(|| {
-                let names: Vec<&str> = scene.machine.ball_joints.iter().map(|joint| joint.name.as_str()).collect();
+            let joint = scene.machine.loose_joints.iter().position(|joint| joint.name == *name).ok_or_else(|| {
+                let names: Vec<&str> = scene.machine.loose_joints.iter().map(|joint| joint.name.as_str()).collect();
                 Failure::usage(format!("--close-up {name}: no such ball joint; there are {}", names.join(", ")))
             })?;
             view.close_up(&mut camera, joint, scene, frame, options);
@@ -47,7 +47,7 @@ pub fn camera(
             let size = [arguments.size.0, arguments.size.1];
             if arguments.overlay {
                 // A line per joint, and one for the wear map.
-                let lines = scene.machine.ball_joints.len() + usize::from(arguments.wear.is_some());
+                let lines = scene.machine.loose_joints.len() + usize::from(arguments.wear.is_some());
                 let whole = Rect::from_min_size(Pos2::ZERO, vec2(size[0] as f32, size[1] as f32));
                 let corners = |plate: Rect| [plate.min, plate.max].map(|corner| Vec2::new(corner.x, corner.y));
                 let plates: Vec<_> = plates(whole, lines, options).into_iter().map(corners).collect();

@@ -163,7 +163,7 @@ pub fn write_window(window: PlotWindow) -> String {
 /// # Errors
 /// There is no such part; lists the allowed ones.
 pub fn find_followed(scene: &Scene, text: &str) -> Result<ScenePart, String> {
-    let joints = || scene.machine.ball_joints.iter().map(|joint| joint.name.as_str());
+    let joints = || scene.machine.loose_joints.iter().map(|joint| joint.name.as_str());
     let bodies = || scene.machine.bodies.iter().map(|body| body.name.as_str());
     let found = match text.split_once('.') {
         Some(("joint", name)) => joints().position(|joint| joint == name).map(ScenePart::Joint),
@@ -181,7 +181,7 @@ pub fn find_followed(scene: &Scene, text: &str) -> Result<ScenePart, String> {
 pub fn name_followed(scene: &Scene, part: ScenePart) -> Option<String> {
     match part {
         ScenePart::Joint(index) => {
-            let joint = scene.machine.ball_joints.get(index)?;
+            let joint = scene.machine.loose_joints.get(index)?;
             Some(format!("joint.{}", joint.name))
         }
         ScenePart::Body(index) => Some(format!("body.{}", scene.machine.bodies.get(index)?.name)),

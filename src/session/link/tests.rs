@@ -164,7 +164,7 @@ fn a_handwritten_link_accepts_short_names_and_full_keys() {
     let link = Link::parse("joint.S1.clearance=0.5+mm&view.down=%2Bx").expect("a link");
     assert_eq!(link.scene, SceneText::BuiltIn(DEFAULT_SCENE.to_owned()));
     let scene = link.load().expect("known keys");
-    assert_eq!(scene.machine.ball_joints[0].contact.clearance, 0.5e-3);
+    assert_eq!(scene.machine.loose_joints[0].contact.clearance, 0.5e-3);
     assert!(!link.has_instant());
 
     // The fragment overrides the query, and replaces it if it names a scene.

@@ -42,7 +42,7 @@ impl Record {
     /// An empty record of a run of `scene`.
     pub fn new(scene: &Scene) -> Self {
         let channels = Channels::of(&scene.machine);
-        let joints = scene.machine.ball_joints.len().min(RECORDED_JOINTS);
+        let joints = scene.machine.loose_joints.len().min(RECORDED_JOINTS);
         Self {
             peaks: Vec::new(),
             upcoming_peaks: Vec::new(),

@@ -20,7 +20,7 @@ impl ProgramEquations {
     pub fn new(scene: &Scene) -> Self {
         Self {
             mechanism: RefCell::new(Mechanism::new(&scene.machine).unwrap()),
-            contact_states: RefCell::new(vec![ContactState::default(); scene.machine.ball_joints.len()]),
+            contact_states: RefCell::new(vec![ContactState::default(); scene.machine.loose_joints.len()]),
             speed_floor: scene.machine.contact.impact_speed_floor,
         }
     }

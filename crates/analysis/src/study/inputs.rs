@@ -79,7 +79,7 @@ pub fn read_unchecked(scene: &Scene, key: &str, text: &str) -> Result<f64, Study
 fn real_keys(scene: &Scene) -> Vec<String> {
     let own = scene.parameters().into_iter();
     let own = own.filter(|parameter| matches!(parameter.kind, Kind::Number { .. })).map(|p| p.key.to_owned());
-    let joints = scene.machine.ball_joints.iter();
+    let joints = scene.machine.loose_joints.iter();
     let of_joints = joints.flat_map(|joint| contact_parts().map(move |part| format!("joint.{}.{part}", joint.name)));
     let all = own.chain(of_joints);
     all.filter(|key| matches!(scene.get(key), Ok(Value::Number(_)))).collect()

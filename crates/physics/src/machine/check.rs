@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::{BallJoint, Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointKind, Machine, Warning};
+use super::{Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointKind, LooseJoint, Machine, Warning};
 use crate::contact::{self, FrictionLaw, NormalLaw};
 use crate::integrate::StepControl;
 use crate::interpolate::{Ends, Interpolant, Interpolation, Overshoot};
@@ -130,9 +130,9 @@ impl Machine {
     /// That body, and why.
     pub fn check_massless(&self) -> Result<(), (usize, MasslessFault)> {
         let mut massless = self.bodies.iter().zip(&self.joints).enumerate().filter(|(_, (body, _))| body.mass == 0.0);
-        let ends = |joint: &BallJoint| [joint.socket.body, joint.ball.body];
+        let ends = |joint: &LooseJoint| [joint.carrier().body, joint.carried().body];
         massless.try_for_each(|(index, (_, joint))| {
-            let ball = self.ball_joints.iter().find(|ball| ends(ball).contains(&Some(index)));
+            let ball = self.loose_joints.iter().find(|ball| ends(ball).contains(&Some(index)));
             let why = match ball {
                 _ if joint.kind == JointKind::Free => MasslessFault::Free,
                 _ if self.joints.iter().all(|joint| joint.parent != Some(index)) => MasslessFault::Leaf,
@@ -179,8 +179,8 @@ impl Machine {
         for joint in &self.closing_joints {
             exists(&joint.name, joint.parent.max(Some(joint.child)))?;
         }
-        for joint in &self.ball_joints {
-            exists(&joint.name, joint.socket.body.max(joint.ball.body))?;
+        for joint in &self.loose_joints {
+            exists(&joint.name, joint.carrier().body.max(joint.carried().body))?;
         }
         for element in &self.elements {
             let has = |on: JointCoordinate| {
@@ -195,7 +195,7 @@ impl Machine {
         exists("output", Some(self.output.body))?;
         self.check_laws()?;
         self.check_contacts().map_err(|conflict| {
-            let joint = conflict.joint.map_or("contact", |joint| &self.ball_joints[joint].name);
+            let joint = conflict.joint.map_or("contact", |joint| &self.loose_joints[joint].name);
             MachineFault::Contact { joint: joint.to_owned(), fault: conflict.fault }
         })
     }
@@ -294,7 +294,7 @@ impl Machine {
     /// Length scale of relative tolerances, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
     /// most 1 m. A loop-closing joint counts as a ball joint of the scene's radius, as does a scene without any of these.
     pub fn length_scale(&self) -> f64 {
-        let radii = self.ball_joints.iter().map(|joint| joint.contact.ball_radius);
+        let radii = self.loose_joints.iter().map(|joint| joint.contact.ball_radius);
         let closing = self.closing_joints.iter().map(|_| self.contact.ball_radius);
         let depths = self.elements.iter().filter_map(|element| match &element.kind {
             ElementKind::Stop(stop) if !element.is_on_hinge() => Some(DEPTH_FACTOR * stop.depth),
@@ -312,7 +312,7 @@ impl Machine {
 
     /// Checks the contact parameters of each joint for consistency.
     pub fn check_contacts(&self) -> Result<(), ContactConflict> {
-        let joints = self.ball_joints.iter().enumerate();
+        let joints = self.loose_joints.iter().enumerate();
         let own = joints.map(|(index, joint)| (Some(index), &joint.contact));
         for (joint, contact) in std::iter::once((None, &self.contact)).chain(own) {
             check_contact(contact).map_err(|fault| ContactConflict { joint, fault })?;
@@ -370,7 +370,7 @@ impl Machine {
 
     /// Warns of a tolerance too loose for impacts.
     fn tolerance_warning(&self) -> Option<Doubt> {
-        let has_clearance = self.ball_joints.iter().any(|j| j.contact.clearance > 0.0);
+        let has_clearance = self.loose_joints.iter().any(|j| j.contact.clearance > 0.0);
         let loose = self.solver.method.is_adaptive() && self.solver.tolerance > LOOSEST_TOLERANCE;
         (has_clearance && loose)
             .then_some(Doubt::Tolerance { tolerance: self.solver.tolerance, loosest: LOOSEST_TOLERANCE })
@@ -381,7 +381,7 @@ impl Machine {
         if self.solver.method.control() != StepControl::Fixed {
             return None;
         }
-        let clearances = self.ball_joints.iter().filter(|j| j.contact.clearance > 0.0);
+        let clearances = self.loose_joints.iter().filter(|j| j.contact.clearance > 0.0);
         let element_forces = self.element_forces();
         let (joint, duration) = clearances
             .map(|joint| (joint, self.impact_duration(joint, &element_forces)))
@@ -426,13 +426,13 @@ impl Machine {
     /// Estimated duration of the first impact of a joint with clearance, s, when gravity and the forces `element_forces` (N, by
     /// body) drive its bodies through the gap, or of the oscillation under those forces, if shorter. The second value is how many
     /// times within it friction could reverse sliding at the approach speed, at least 1.
-    fn impact_duration(&self, joint: &BallJoint, element_forces: &[f64]) -> (f64, f64) {
+    fn impact_duration(&self, joint: &LooseJoint, element_forces: &[f64]) -> (f64, f64) {
         let c = &joint.contact;
         let coefficients = contact::Coefficients::new(c, c.clearance);
         // Inverse effective masses at the ball's centre, normal and in sliding: a force there also rotates the body.
         let (mut normal, mut sliding) = (0.0, 0.0);
         let mut forces = Vec::new();
-        for attachment in [&joint.ball, &joint.socket] {
+        for attachment in [&joint.carried(), &joint.carrier()] {
             let Some(b) = attachment.body else { continue };
             let (body, joint) = (&self.bodies[b], &self.joints[b]);
             if joint.is_prescribed() {
@@ -463,12 +463,12 @@ impl Machine {
 
     /// Groups of ball joints with equal contact parameters, with their names.
     fn contact_groups(&self) -> Vec<(String, contact::Parameters)> {
-        let mut joints: Vec<_> = self.ball_joints.iter().enumerate().collect();
+        let mut joints: Vec<_> = self.loose_joints.iter().enumerate().collect();
         // No value is NaN: the parameter ranges exclude it.
         joints.sort_by(|a, b| a.1.contact.partial_cmp(&b.1.contact).unwrap_or(Ordering::Equal));
         let mut groups: Vec<_> = joints.chunk_by(|a, b| a.1.contact == b.1.contact).collect();
         groups.sort_by_key(|group| group[0].0);
-        let title = |group: &[(usize, &BallJoint)]| match group {
+        let title = |group: &[(usize, &LooseJoint)]| match group {
             [first, .., last] if group.len() > 6 => format!("{} to {}", first.1.name, last.1.name),
             _ => group.iter().map(|(_, joint)| joint.name.as_str()).collect::<Vec<_>>().join(", "),
         };
@@ -569,7 +569,7 @@ mod tests {
         let mut machine = Machine::default();
         let bob = machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
         let [socket, ball] = [Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros())];
-        machine.ball_joints.push(BallJoint::new("S1", socket, ball));
+        machine.loose_joints.push(LooseJoint::ball("S1", socket, ball));
         change(&mut machine);
         machine.check().err()
     }
@@ -581,7 +581,7 @@ mod tests {
         assert_eq!(fault(|machine| machine.joints.clear()), Some(MachineFault::Joints { body: 0 }));
         assert_eq!(fault(|machine| machine.joints[0].parent = Some(0)), Some(MachineFault::Order { body: 0 }));
         let beyond = |what: &str| Some(MachineFault::NoBody { what: what.to_owned(), body: 3, bodies: 1 });
-        assert_eq!(fault(|machine| machine.ball_joints[0].ball.body = Some(3)), beyond("S1"));
+        assert_eq!(fault(|machine| machine.loose_joints[0].frames[1].origin.body = Some(3)), beyond("S1"));
         assert_eq!(fault(|machine| machine.output.body = 3), beyond("output"));
         for mass in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(fault(|machine| machine.bodies[0].mass = mass), Some(MachineFault::Inertia { .. })));
@@ -612,7 +612,7 @@ mod tests {
             machine.elements.push(Element { name: "s".to_owned(), kind: ElementKind::Spring(spring) });
         });
         assert_eq!(curve, Some(MachineFault::Points { what: "s".to_owned() }));
-        let wide = fault(|machine| machine.ball_joints[0].contact.clearance = 1.0);
+        let wide = fault(|machine| machine.loose_joints[0].contact.clearance = 1.0);
         assert!(matches!(wide, Some(MachineFault::Contact { joint, .. }) if joint == "S1"));
     }
 }

@@ -24,7 +24,7 @@ impl Machine {
         Conditions {
             gravity: self.gravity,
             contact: self.contact,
-            joints: self.ball_joints.iter().map(|joint| joint.contact).collect(),
+            joints: self.loose_joints.iter().map(|joint| joint.contact).collect(),
             solver: self.solver,
         }
     }
@@ -34,7 +34,7 @@ impl Machine {
         let mut machine = self.clone();
         machine.gravity = conditions.gravity;
         machine.contact = conditions.contact;
-        for (joint, contact) in machine.ball_joints.iter_mut().zip(&conditions.joints) {
+        for (joint, contact) in machine.loose_joints.iter_mut().zip(&conditions.joints) {
             joint.contact = *contact;
         }
         machine.solver = conditions.solver;

@@ -20,8 +20,8 @@ impl Machine {
     pub fn coupled_joints(&self) -> Coupled {
         let tree_of = self.trees();
         let mut linked: Vec<usize> = (0..self.bodies.len()).collect();
-        let ideal = self.ball_joints.iter().filter(|joint| joint.contact.clearance == 0.0);
-        let ends = ideal.map(|joint| [joint.socket, joint.ball]);
+        let ideal = self.loose_joints.iter().filter(|joint| joint.contact.clearance == 0.0);
+        let ends = ideal.map(|joint| [joint.carrier(), joint.carried()]);
         let mut loops = 0;
         for [a, b] in ends.chain(self.closing_joints.iter().map(super::Joint::points)) {
             let trees = [a, b].map(|end| end.body.and_then(|body| tree_of[body]));
@@ -32,7 +32,7 @@ impl Machine {
             }
         }
         // Of each joint, and of each element twice, for its force and its torque: the trees it acts on.
-        let of_joints = self.ball_joints.iter().map(|joint| [joint.socket.body, joint.ball.body]);
+        let of_joints = self.loose_joints.iter().map(|joint| [joint.carrier().body, joint.carried().body]);
         let points = self.elements.iter().map(|element| element.points(self));
         let of_elements = points.flat_map(|points| [[0, 1].map(|n| points.get(n).and_then(|point| point.body)); 2]);
         let rows = of_joints.chain(of_elements).map(|bodies| bodies.map(|body| body.and_then(|body| tree_of[body])));
@@ -48,8 +48,8 @@ impl Machine {
         }
         // Linked trees count as one; a joint within it counts once.
         let mut on = vec![0; self.bodies.len()];
-        let mut acts_on = Vec::with_capacity(self.ball_joints.len());
-        for (_, trees) in self.ball_joints.iter().zip(&rows).filter(|(joint, _)| joint.contact.clearance > 0.0) {
+        let mut acts_on = Vec::with_capacity(self.loose_joints.len());
+        for (_, trees) in self.loose_joints.iter().zip(&rows).filter(|(joint, _)| joint.contact.clearance > 0.0) {
             let mut trees = trees.map(|tree| tree.map(|tree| root(&mut linked, tree)));
             if trees[0] == trees[1] {
                 trees[1] = None;

@@ -1,7 +1,6 @@
-//! Joints: tree joints, loop-closing joints, and ball-and-socket joints.
+//! Joints without play: tree joints and loop-closing joints.
 
 use super::{Drive, Quat, Vec3};
-use crate::contact;
 use crate::words::words;
 
 /// A joint between `child` and `parent`, in the tree or closing a loop.
@@ -233,34 +232,5 @@ impl Attachment {
     /// A point of a body, in its frame, m.
     pub fn on(body: usize, point: Vec3) -> Self {
         Self { body: Some(body), point }
-    }
-}
-
-/// A ball-and-socket joint: ideal if its clearance is 0, otherwise a contact.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BallJoint {
-    /// Unique name.
-    pub name: String,
-    /// Socket centre Z_i.
-    pub socket: Attachment,
-    /// Ball centre Z_j.
-    pub ball: Attachment,
-    /// Unit vector in the socket body's frame: the drawn socket is cut open on that side, so that the rod can pass and the
-    /// ball inside is visible. It has no effect on the motion.
-    pub opening: Vec3,
-    /// Contact parameters.
-    pub contact: contact::Parameters,
-}
-
-impl BallJoint {
-    /// Ball joint with default contact parameters and the drawn socket open towards -z.
-    pub fn new(name: &str, socket: Attachment, ball: Attachment) -> Self {
-        Self { name: name.to_owned(), socket, ball, opening: -Vec3::z(), contact: contact::Parameters::default() }
-    }
-
-    /// The same joint with a radial clearance of `clearance`, m; 0 makes it ideal.
-    pub fn with_clearance(mut self, clearance: f64) -> Self {
-        self.contact.clearance = clearance;
-        self
     }
 }

@@ -96,7 +96,7 @@ impl Machine {
     /// Attachment points of all joints and force elements.
     pub(crate) fn points(&self) -> impl Iterator<Item = Attachment> {
         let joints = self.joints.iter().chain(&self.closing_joints).flat_map(Joint::points);
-        let balls = self.ball_joints.iter().flat_map(|joint| [joint.socket, joint.ball]);
+        let balls = self.loose_joints.iter().flat_map(|joint| [joint.carrier(), joint.carried()]);
         let elements = self.elements.iter().flat_map(|element| element.points(self));
         joints.chain(balls).chain(elements)
     }

@@ -9,6 +9,7 @@ mod doubts;
 mod drive;
 mod element;
 mod joint;
+mod loose_joint;
 #[expect(clippy::disallowed_types, reason = "mesh files hold single-precision numbers")]
 mod mesh;
 mod mesh_unit;
@@ -27,6 +28,7 @@ pub use doubts::*;
 pub use drive::*;
 pub use element::*;
 pub use joint::*;
+pub use loose_joint::*;
 pub use mesh::Mesh;
 pub use outline::{OutlineFault, triangulate};
 pub use settings::*;
@@ -65,8 +67,8 @@ pub struct Machine {
     pub bodies: Vec<Body>,
     /// One tree joint for each body, in body order: `joints[i].child == i`.
     pub joints: Vec<Joint>,
-    /// Ball joints; all are cut.
-    pub ball_joints: Vec<BallJoint>,
+    /// Joints with play, or without it if their clearance is 0; all are cut.
+    pub loose_joints: Vec<LooseJoint>,
     /// Loop-closing joints, between bodies that have their own tree joints. They have neither drive nor start values.
     pub closing_joints: Vec<Joint>,
     /// Force elements: springs, external loads.
@@ -86,7 +88,7 @@ impl Machine {
 
     /// Names of the cut joints in index order: ball joints, then loop-closing joints.
     pub fn cut_joints(&self) -> impl Iterator<Item = &str> {
-        let balls = self.ball_joints.iter().map(|joint| joint.name.as_str());
+        let balls = self.loose_joints.iter().map(|joint| joint.name.as_str());
         balls.chain(self.closing_joints.iter().map(|joint| joint.name.as_str()))
     }
 

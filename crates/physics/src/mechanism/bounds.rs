@@ -140,7 +140,7 @@ impl Cost {
         let mut rows = Vec::with_capacity(3 * joints.len());
         let balls = joints.iter().map(|&j| {
             let joint = &model.joints[j];
-            ([joint.ball.body, joint.socket.body], 3)
+            ([joint.carried.body, joint.carrier.body], 3)
         });
         let closures = model.closures.iter().flat_map(|pair| {
             let bodies = [pair.child.body, pair.parent.body];
@@ -284,7 +284,7 @@ pub fn check(machine: &Machine, model: &Model) -> Result<(), MechanismError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::{Attachment, BallJoint, Body, Joint, Mat3, Vec3};
+    use crate::machine::{Attachment, Body, Joint, LooseJoint, Mat3, Vec3};
 
     /// Costs of `n` bodies in both formulations; `joint` is that of body `i`, `ball` the bodies of an ideal ball joint beside it.
     fn costs(n: usize, joint: impl Fn(usize) -> Joint, ball: impl Fn(usize) -> Option<usize>) -> [Cost; 2] {
@@ -294,7 +294,7 @@ mod tests {
         }
         for (i, socket) in (1..n).filter_map(|i| Some((i, ball(i)?))) {
             let [socket, ball] = [socket, i].map(|body| Attachment::on(body, Vec3::zeros()));
-            machine.ball_joints.push(BallJoint::new(&format!("S{i}"), socket, ball).with_clearance(0.0));
+            machine.loose_joints.push(LooseJoint::ball(&format!("S{i}"), socket, ball).with_clearance(0.0));
         }
         let model = Model::new(&machine);
         Formulation::ALL.map(|form| Cost::of(form, &machine, &model, &model.ideal_joints))

@@ -128,7 +128,7 @@ impl Constraints {
             |b: BodyIndex| (b < model.bodies.len() && !model.bodies[b].driven_only).then(|| model.block_of[b]);
         let balls = joints.iter().map(|&j| {
             let joint = &model.joints[j];
-            [joint.ball.body, joint.socket.body]
+            [joint.carried.body, joint.carrier.body]
         });
         let others = units.iter().map(|unit| {
             let pair = &model.closures[unit.closure];
@@ -316,8 +316,8 @@ impl Constraints {
             let force = Vec3::from_column_slice(part::<3>(multipliers, 3 * k));
             let joint = &model.joints[j];
             let [ball, socket] = joint.arms(motion);
-            push(joint.ball.body, ball, force);
-            push(joint.socket.body, socket, -force);
+            push(joint.carried.body, ball, force);
+            push(joint.carrier.body, socket, -force);
         }
         for unit in self.units.iter().filter(|unit| !unit.turns) {
             let pair = &model.closures[unit.closure];
@@ -354,7 +354,7 @@ impl Constraints {
         self.jacobian.fill(0.0);
         for (k, &j) in self.joints.iter().enumerate() {
             let joint = &model.joints[j];
-            for (anchor, sign) in [(&joint.ball, 1.0), (&joint.socket, -1.0)] {
+            for (anchor, sign) in [(&joint.carried, 1.0), (&joint.carrier, -1.0)] {
                 let m = &tree.motion[anchor.body];
                 let point = m.position + m.rotation * anchor.offset;
                 let Some(side) = self.sides[k].iter().find(|s| {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::elements::{ActiveSet, At, Contact, ForceElement, Gap, Loads};
 use super::kinematics::Kinematics;
-use super::model::{BallJoint, Model};
+use super::model::{LooseJoint, Model};
 use crate::contact::{Coefficients, Parameters};
 use crate::machine::{Machine, Vec3, root};
 
@@ -38,7 +38,7 @@ fn groups(machine: &Machine, model: &Model) -> Vec<usize> {
         }
     };
     for joint in &model.joints {
-        connect(&mut [joint.ball.body, joint.socket.body].into_iter());
+        connect(&mut [joint.carried.body, joint.carrier.body].into_iter());
     }
     for pair in &model.closures {
         connect(&mut [pair.child.body, pair.parent.body].into_iter());
@@ -46,8 +46,8 @@ fn groups(machine: &Machine, model: &Model) -> Vec<usize> {
     for element in &machine.elements {
         connect(&mut element.points(machine).iter().filter_map(|point| point.body));
     }
-    let group = |joint: &BallJoint| {
-        let block = block_of(joint.ball.body).or_else(|| block_of(joint.socket.body));
+    let group = |joint: &LooseJoint| {
+        let block = block_of(joint.carried.body).or_else(|| block_of(joint.carrier.body));
         block.map_or(usize::MAX, |block| root(&mut above, block))
     };
     model.joints.iter().map(group).collect()
@@ -77,7 +77,7 @@ pub struct Contacts {
 impl Contacts {
     /// Contacts of `machine`.
     pub fn new(machine: &Machine, model: &Model) -> Self {
-        let parameters: Vec<Parameters> = machine.ball_joints.iter().map(|j| j.contact).collect();
+        let parameters: Vec<Parameters> = machine.loose_joints.iter().map(|j| j.contact).collect();
         let joints: Vec<Contact> = model
             .joints
             .iter()

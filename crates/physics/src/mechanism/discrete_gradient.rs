@@ -202,7 +202,7 @@ impl DiscreteGradient {
     ) -> Result<Self, MechanismError> {
         let n = dimension - positions;
         let joints = model.joints.len();
-        let of_joints = model.joints.iter().map(|joint| [joint.ball.body, joint.socket.body]);
+        let of_joints = model.joints.iter().map(|joint| [joint.carried.body, joint.carrier.body]);
         let of_elements = elements.iter().flat_map(|ends| [ends.map(|end| end.body); 2]);
         let coupled = CoupledRows::new(model, n, within, of_joints.chain(of_elements))?;
         let (rows, bandwidth) = (coupled.spans.len(), coupled.bandwidth);
@@ -328,7 +328,7 @@ impl DiscreteGradient {
                 let (joint, n) = (&model.joints[row.index], row.normal);
                 let motion = equations.motion();
                 let spin = |body: usize| &motion[body].angular_velocity;
-                let (ball, socket) = (spin(joint.ball.body), spin(joint.socket.body));
+                let (ball, socket) = (spin(joint.carried.body), spin(joint.carrier.body));
                 let mean = row.guessed[0];
                 row.guessed[1] = law.slip_velocity(&n, &mean, ball, socket);
                 row.guessed[2] = law.surface_velocity(&n, &mean, ball, socket);
@@ -585,7 +585,7 @@ impl Mechanism {
     /// Upper bound on the effect of a force at ball joint `j` on its opening, 1/kg.
     pub fn max_contact_mobility(&self, j: usize) -> f64 {
         let joint = &self.model.joints[j];
-        max_mobility(&self.model, &[joint.ball, joint.socket])[0]
+        max_mobility(&self.model, &[joint.carried, joint.carrier])[0]
     }
 
     /// n . W M^-1 W^T n of ball joint `j` in the latest step, 1/kg; `None` if it did not touch.
@@ -746,10 +746,10 @@ impl Evaluator<'_> {
                 // Only friction has a lever arm about the centres.
                 let n = row.law_force.normal;
                 let turning = row.normal.cross(&(row.force - n * row.force.dot(&n)));
-                let ball = &mut wrench[joint.ball.body];
+                let ball = &mut wrench[joint.carried.body];
                 ball.force += row.force;
                 ball.torque += arm_ball.cross(&row.force) + turning * law.ball_radius;
-                let socket = &mut wrench[joint.socket.body];
+                let socket = &mut wrench[joint.carrier.body];
                 socket.force -= row.force;
                 socket.torque -= arm_socket.cross(&row.force) + turning * (law.ball_radius + law.clearance);
             }
@@ -774,7 +774,7 @@ impl Evaluator<'_> {
 mod tests {
     use super::*;
     use crate::contact::{NormalLaw, Parameters};
-    use crate::machine::{Attachment, BallJoint, Body, Formulation, Joint, JointStart, Machine, Quat};
+    use crate::machine::{Attachment, Body, Formulation, Joint, JointStart, LooseJoint, Machine, Quat};
 
     /// A free joint that starts in this motion.
     fn starting(position: Vec3, velocity: Vec3, angular_velocity: Vec3) -> Joint {
@@ -788,9 +788,9 @@ mod tests {
         let body = Body::new("ball", 0.1, Mat3::identity() * 1e-4);
         let body = machine.add_body(body, starting(Vec3::zeros(), Vec3::x() * 0.08, Vec3::zeros()));
         let origin = Vec3::zeros();
-        let mut joint = BallJoint::new("S", Attachment::world(origin), Attachment::on(body, origin));
+        let mut joint = LooseJoint::ball("S", Attachment::world(origin), Attachment::on(body, origin));
         joint.contact = contact;
-        machine.ball_joints.push(joint);
+        machine.loose_joints.push(joint);
         machine
     }
 
@@ -809,7 +809,7 @@ mod tests {
             let mut mechanism = Mechanism::new(machine).expect("a machine");
             let y = mechanism.start().expect("a start");
             mechanism.prepare_discrete_gradient().expect("few contacts");
-            let contact_states = vec![ContactState::default(); machine.ball_joints.len()];
+            let contact_states = vec![ContactState::default(); machine.loose_joints.len()];
             Self { mechanism, t: 0.0, k: vec![0.0; y.len()], y, contact_states, powers: Powers::default() }
         }
 
@@ -899,8 +899,8 @@ mod tests {
             machine.add_body(Body::new(name, 0.2, inertia), starting(position, spin * 0.01, spin));
         }
         let at = Vec3::x() * 0.05;
-        let joint = BallJoint::new("S", Attachment::on(0, at), Attachment::on(1, -at));
-        machine.ball_joints.push(joint.with_clearance(0.1e-3));
+        let joint = LooseJoint::ball("S", Attachment::on(0, at), Attachment::on(1, -at));
+        machine.loose_joints.push(joint.with_clearance(0.1e-3));
         machine
     }
 

@@ -13,7 +13,7 @@ use super::model::Model;
 use super::settled::{settle, without_play};
 use super::{ActiveSet, Mechanism, MechanismError};
 use crate::contact::ContactState;
-use crate::machine::{BallJoint, Drive, ElementKind, Formulation, Machine, Mat3, StartRule, Vec3};
+use crate::machine::{Drive, ElementKind, Formulation, LooseJoint, Machine, Mat3, StartRule, Vec3};
 use search::Search;
 
 /// Maximum number of velocity coordinates: the derivative of the forces is taken by differences and is dense.
@@ -32,9 +32,9 @@ pub(super) fn rest_state(machine: &Machine, near: Option<&[f64]>) -> Result<Sett
     let Settled { mut state, mut assembly } = settle(machine, near)?;
     let mut constant = with_constant_laws(machine);
     constant.formulation = Formulation::Tree;
-    let play = |joint: &BallJoint| joint.contact.clearance > 0.0;
+    let play = |joint: &LooseJoint| joint.contact.clearance > 0.0;
     let mut without = None;
-    if constant.ball_joints.iter().any(play) {
+    if constant.loose_joints.iter().any(play) {
         let ideal = without_play(&constant);
         // If there is no rest without play, the search with play reports where it ended.
         if let Ok(rest) = rest_near(&ideal, state.clone()) {

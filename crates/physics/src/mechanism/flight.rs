@@ -43,9 +43,9 @@ impl FreeFlightBody {
         }
         let mut joints = vec![Vec::new(); model.bodies.len() + 1];
         for (j, joint) in model.joints.iter().enumerate() {
-            joints[joint.ball.body].push(j);
-            if joint.socket.body != joint.ball.body {
-                joints[joint.socket.body].push(j);
+            joints[joint.carried.body].push(j);
+            if joint.carrier.body != joint.carried.body {
+                joints[joint.carrier.body].push(j);
             }
         }
         // In order of body index, like the blocks.
@@ -213,7 +213,7 @@ impl Mechanism {
     pub fn free_flight_bodies_of(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
         let joint = &self.model.joints[j];
         let of = |b: BodyIndex| self.free_flight_bodies.binary_search_by_key(&b, |body| body.body).ok();
-        [of(joint.ball.body), of(joint.socket.body)].into_iter().flatten()
+        [of(joint.carried.body), of(joint.carrier.body)].into_iter().flatten()
     }
 
     /// Free flight of `body` from the state `y` at `t`.
@@ -255,7 +255,7 @@ impl Mechanism {
 mod tests {
     use super::*;
     use crate::integrate::{DormandPrince, Stepper, System};
-    use crate::machine::{Attachment, BallJoint, Body, Drive, Joint, JointStart, Machine, Mat3, Quat};
+    use crate::machine::{Attachment, Body, Drive, Joint, JointStart, LooseJoint, Machine, Mat3, Quat};
 
     /// A slender body tumbling about all its axes.
     fn tumbling() -> (Mechanism, Vec<f64>) {
@@ -314,7 +314,7 @@ mod tests {
         for i in 0..4 {
             machine.add_body(Body::new(&format!("b{i}"), 1.0, Mat3::identity()), Joint::free(i));
             let socket = Attachment { body: i.checked_sub(1), point: Vec3::zeros() };
-            machine.ball_joints.push(BallJoint::new(&format!("S{i}"), socket, Attachment::on(i, Vec3::zeros())));
+            machine.loose_joints.push(LooseJoint::ball(&format!("S{i}"), socket, Attachment::on(i, Vec3::zeros())));
         }
         let mut mechanism = Mechanism::new(&machine).expect("equations");
         let dimension = mechanism.dimension();

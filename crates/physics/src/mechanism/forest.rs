@@ -3,7 +3,7 @@
 use super::constraints::Constraints;
 use super::equations::Equations;
 use super::kinematics::{Driven, Kinematics, Wrench};
-use super::model::{BallJoint, BodyIndex, Model, Motion};
+use super::model::{BodyIndex, LooseJoint, Model, Motion};
 use super::path::Path;
 use super::power::inverse_dynamics;
 use super::tree::{self, Tree};
@@ -108,7 +108,7 @@ impl Equations for Forest {
         self.tree.update_suspended(model, y);
     }
 
-    fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path> {
+    fn path(&self, model: &Model, joint: &LooseJoint) -> Option<Path> {
         Path::of(model, joint)
     }
 

@@ -98,11 +98,11 @@ impl HeldMachine {
         }
         let mut own = Self {
             machine: Machine {
-                ball_joints: machine.ball_joints.clone(),
+                loose_joints: machine.loose_joints.clone(),
                 start: StartRule::Equilibrium,
                 ..stationary.clone()
             },
-            play: machine.ball_joints.iter().map(|joint| joint.contact.clearance).collect(),
+            play: machine.loose_joints.iter().map(|joint| joint.contact.clearance).collect(),
             model,
             tree,
             constraints,

@@ -1,7 +1,7 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
 use super::closed_form::{ClosedMotion, Values};
-use super::model::{Anchor, BallJoint, Body, BodyIndex, Model, Motion};
+use super::model::{Anchor, Body, BodyIndex, LooseJoint, Model, Motion};
 use super::path::Path;
 use crate::jet::Jet;
 use crate::machine::{Mat3, Quat, Vec3};
@@ -86,20 +86,20 @@ pub fn angular_velocity_of(q: &[f64], d: &[f64]) -> [f64; 3] {
     ]
 }
 
-impl BallJoint {
+impl LooseJoint {
     /// Centres of ball and socket from the centroids of their bodies, m.
     // Inlined: called three times per evaluation, and shorter than the call.
     #[inline(always)]
     pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
         let arm = |anchor: &Anchor| motion[anchor.body].rotation * anchor.offset;
-        [arm(&self.ball), arm(&self.socket)]
+        [arm(&self.carried), arm(&self.carrier)]
     }
 
     /// e and de/dt, m and m/s, given the arms of both centres.
     // Inlined: every evaluation needs it for every contact, and a call would cost a few per cent.
     #[inline(always)]
     pub fn opening(&self, motion: &[Kinematics], [ball, socket]: &[Vec3; 2]) -> (Vec3, Vec3) {
-        let (b, s) = (&motion[self.ball.body], &motion[self.socket.body]);
+        let (b, s) = (&motion[self.carried.body], &motion[self.carrier.body]);
         ((b.position + ball) - (s.position + socket), b.point_velocity(ball) - s.point_velocity(socket))
     }
 
@@ -116,7 +116,7 @@ impl BallJoint {
     /// d2e/dt2, m/s^2.
     pub fn opening_acceleration(&self, motion: &[Kinematics]) -> Vec3 {
         let [ball, socket] = &self.arms(motion);
-        motion[self.ball.body].point_acceleration(ball) - motion[self.socket.body].point_acceleration(socket)
+        motion[self.carried.body].point_acceleration(ball) - motion[self.carrier.body].point_acceleration(socket)
     }
 }
 

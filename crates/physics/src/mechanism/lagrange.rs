@@ -5,7 +5,7 @@
 
 use super::equations::{Equations, LEAST_PIVOT};
 use super::kinematics::{self, Driven, Kinematics, Wrench, part};
-use super::model::{Anchor, BallJoint, BodyIndex, Model, Motion, Pair};
+use super::model::{Anchor, BodyIndex, LooseJoint, Model, Motion, Pair};
 use super::pairs::{JacobianRow, Rows};
 use super::path::Path;
 use super::rows::RowSystem;
@@ -129,8 +129,8 @@ impl Layout {
             .iter()
             .map(|&j| {
                 let joint = &model.joints[j];
-                let point = Rows::Point { child: joint.ball.offset, parent: joint.socket.offset };
-                add(point, joint.ball.body, joint.socket.body)
+                let point = Rows::Point { child: joint.carried.offset, parent: joint.carrier.offset };
+                add(point, joint.carried.body, joint.carrier.body)
             })
             .collect();
         let mut closure_rows = Vec::with_capacity(model.closures.len());
@@ -378,7 +378,7 @@ impl Equations for Lagrange {
         }
     }
 
-    fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path> {
+    fn path(&self, model: &Model, joint: &LooseJoint) -> Option<Path> {
         Some(Path::of_bodies(model, joint))
     }
 

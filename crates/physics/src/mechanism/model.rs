@@ -94,11 +94,13 @@ pub struct Anchor {
     pub offset: Vec3,
 }
 
-/// A cut ball joint.
+/// A cut joint that may have play.
 #[derive(Clone, Copy, Debug)]
-pub struct BallJoint {
-    pub socket: Anchor,
-    pub ball: Anchor,
+pub struct LooseJoint {
+    /// The centre of the socket.
+    pub carrier: Anchor,
+    /// The centre of the ball.
+    pub carried: Anchor,
     /// Index among the ideal joints; `None` with clearance.
     pub ideal: Option<usize>,
 }
@@ -163,7 +165,7 @@ pub struct Model {
     pub blocks: Vec<TreeBlock>,
     /// Block of each body; unspecified for a body without coordinates.
     pub block_of: Vec<usize>,
-    pub joints: Vec<BallJoint>,
+    pub joints: Vec<LooseJoint>,
     pub ideal_joints: Vec<usize>,
     pub drives: Vec<DriveLaw>,
     pub closed_form: Option<ClosedForm>,
@@ -343,14 +345,14 @@ impl Model {
             bounding,
         };
         model.number_coordinates(machine, &root);
-        for (index, joint) in machine.ball_joints.iter().enumerate() {
+        for (index, joint) in machine.loose_joints.iter().enumerate() {
             let ideal = (joint.contact.clearance == 0.0).then(|| {
                 model.ideal_joints.push(index);
                 model.ideal_joints.len() - 1
             });
-            model.joints.push(BallJoint {
-                socket: model.anchor(machine, &joint.socket),
-                ball: model.anchor(machine, &joint.ball),
+            model.joints.push(LooseJoint {
+                carrier: model.anchor(machine, &joint.carrier()),
+                carried: model.anchor(machine, &joint.carried()),
                 ideal,
             });
         }
@@ -373,7 +375,7 @@ impl Model {
             let body = &self.bodies[b];
             centroids[b] = centroids[body.parent] + body.from_parent.norm() + body.to_centroid.norm();
         }
-        let balls = self.joints.iter().flat_map(|joint| [joint.socket, joint.ball]);
+        let balls = self.joints.iter().flat_map(|joint| [joint.carrier, joint.carried]);
         let closures = self.closures.iter().flat_map(|pair| [pair.child, pair.parent]);
         let anchors: Vec<f64> = balls.chain(closures).map(|at| centroids[at.body] + at.offset.norm()).collect();
         anchors.into_iter().chain(centroids)
@@ -523,7 +525,7 @@ impl Model {
     /// The same of the points of each body alone, from a point that is `base` before its centroid, m.
     fn own_reaches(&self, machine: &Machine, base: impl Fn(&Body) -> Vec3) -> Vec<f64> {
         let mut reaches: Vec<f64> = self.bodies.iter().map(|body| base(body).norm()).collect();
-        let balls = machine.ball_joints.iter().flat_map(|joint| [joint.socket, joint.ball]);
+        let balls = machine.loose_joints.iter().flat_map(|joint| [joint.carrier(), joint.carried()]);
         let closures = machine.closing_joints.iter().flat_map(Joint::points);
         let elements = machine.elements.iter().flat_map(|element| element.points(machine));
         let points = balls.chain(closures).chain(elements).map(|point| self.anchor(machine, &point));

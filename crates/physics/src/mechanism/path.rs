@@ -1,6 +1,6 @@
 //! The few bodies that determine the gap of one ball joint, so that event location need not evaluate the others.
 
-use super::model::{BallJoint, BodyIndex, Model, Motion};
+use super::model::{BodyIndex, LooseJoint, Model, Motion};
 use std::ops::Range;
 
 /// Maximum path length: longer paths save too little.
@@ -21,9 +21,9 @@ pub struct Path {
 
 impl Path {
     /// Path of `joint` in tree coordinates; `None` if it is too long.
-    pub fn of(model: &Model, joint: &BallJoint) -> Option<Self> {
+    pub fn of(model: &Model, joint: &LooseJoint) -> Option<Self> {
         let mut bodies = Vec::with_capacity(LONGEST);
-        for mut b in [joint.ball.body, joint.socket.body] {
+        for mut b in [joint.carried.body, joint.carrier.body] {
             while b != model.world() {
                 if bodies.len() == LONGEST {
                     return None;
@@ -52,9 +52,9 @@ impl Path {
     }
 
     /// Path of `joint` if each body has its own seven positions and six velocities.
-    pub fn of_bodies(model: &Model, joint: &BallJoint) -> Self {
+    pub fn of_bodies(model: &Model, joint: &LooseJoint) -> Self {
         let mut path = Self::default();
-        for b in [joint.ball.body, joint.socket.body] {
+        for b in [joint.carried.body, joint.carrier.body] {
             if b != model.world() && !path.dynamic.contains(&b) {
                 path.dynamic.push(b);
                 path.add_parts(7 * b..7 * b + 7, 7 * model.massive + 6 * b, 6);

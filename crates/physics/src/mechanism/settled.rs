@@ -24,7 +24,7 @@ pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled,
     for _ in 0..ITERATIONS {
         let mut rate = vec![0.0; state.len()];
         mechanism.evaluator(ActiveSet::Nothing).evaluate_fully(0.0, &state, &mut rate);
-        for (j, joint) in machine.ball_joints.iter().enumerate() {
+        for (j, joint) in machine.loose_joints.iter().enumerate() {
             if joint.contact.clearance == 0.0 {
                 continue;
             }
@@ -32,12 +32,12 @@ pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled,
             let force = mechanism.reaction(j).filter(|_| mechanism.is_reaction_unique(j));
             let force = force.unwrap_or_default();
             let eccentricity = resting_eccentricity(&joint.contact, force);
-            let in_body_axes = match joint.ball.body {
+            let in_body_axes = match joint.carried().body {
                 Some(body) => mechanism.motion()[body].rotation.tr_mul(&eccentricity),
                 None => eccentricity,
             };
             // Without play, this point of the ball's body coincides with the socket centre.
-            ideal.ball_joints[j].ball.point = joint.ball.point - in_body_axes;
+            ideal.loose_joints[j].frames[1].origin.point = joint.carried().point - in_body_axes;
         }
         mechanism = Mechanism::with_guess(&ideal, near)?;
         state = mechanism.start_off_path()?;
@@ -48,7 +48,7 @@ pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled,
 /// `machine` with every ball joint ideal, in tree coordinates, to be assembled.
 pub(super) fn without_play(machine: &Machine) -> Machine {
     let mut ideal = machine.clone();
-    for joint in &mut ideal.ball_joints {
+    for joint in &mut ideal.loose_joints {
         joint.contact.clearance = 0.0;
     }
     Machine { start: StartRule::Ideal, formulation: Formulation::Tree, ..ideal }

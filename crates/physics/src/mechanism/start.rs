@@ -372,13 +372,13 @@ fn place_output_body(model: &Model, ideal: &ClosedMotion, y: &mut [f64]) {
 fn turn_hinges(model: &Model, motion: &[Kinematics], y: &mut [f64]) {
     for joint in &model.joints {
         let motion_of = |b: usize| model.bodies.get(b).map(|body| body.motion);
-        let Some(Motion::Revolute { q, .. }) = motion_of(joint.ball.body) else {
+        let Some(Motion::Revolute { q, .. }) = motion_of(joint.carried.body) else {
             continue;
         };
-        let body = &motion[joint.ball.body];
+        let body = &motion[joint.carried.body];
         let hinge = body.position - body.arm;
         let centre = |a: &model::Anchor| motion[a.body].position + motion[a.body].rotation * a.offset - hinge;
-        let (ball, socket, axis) = (centre(&joint.ball), centre(&joint.socket), body.axis);
+        let (ball, socket, axis) = (centre(&joint.carried), centre(&joint.carrier), body.axis);
         let sine = axis.dot(&ball.cross(&socket));
         let cosine = ball.dot(&socket) - axis.dot(&ball) * axis.dot(&socket);
         y[q] += libm::atan2(sine, cosine);

@@ -357,7 +357,7 @@ fn multiply(parts: &[Range<usize>], re: &mut [f64], im: &mut [f64], by: Complex<
 fn trees_of(model: &Model) -> Vec<Range<usize>> {
     let mut joints = vec![0; model.blocks.len()];
     for joint in &model.joints {
-        for anchor in [&joint.ball, &joint.socket] {
+        for anchor in [&joint.carried, &joint.carrier] {
             if anchor.body < model.bodies.len() && !model.bodies[anchor.body].driven_only {
                 joints[model.block_of[anchor.body]] += 1;
             }

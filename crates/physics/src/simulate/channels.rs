@@ -197,7 +197,7 @@ fn lay_out(
 
 /// Names of the parts for which a signal is repeated; for a joint coordinate also the freedom that it measures.
 fn parts_of(machine: &Machine, repetition: Repetition) -> Vec<(&str, Option<Freedom>)> {
-    let joints = machine.ball_joints.iter().map(|joint| joint.name.as_str());
+    let joints = machine.loose_joints.iter().map(|joint| joint.name.as_str());
     let elements = machine.elements.iter().map(|element| element.name.as_str());
     let coordinates = |joint: &'_ Joint| joint.kind.freedoms().iter().map(|freedom| Some(*freedom));
     let holding = machine.joints.iter().filter(|j| j.kind != JointKind::Free);

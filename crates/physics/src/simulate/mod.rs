@@ -142,7 +142,7 @@ impl Statistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::{Attachment, BallJoint, Body, Joint, Machine, MachineFault, Mat3, Vec3};
+    use crate::machine::{Attachment, Body, Joint, LooseJoint, Machine, MachineFault, Mat3, Vec3};
 
     #[test]
     fn an_inconsistent_machine_does_not_start() {
@@ -152,7 +152,7 @@ mod tests {
         machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
         assert_eq!(fault(&machine), None);
         let [socket, ball] = [Attachment::on(0, Vec3::zeros()), Attachment::on(7, Vec3::zeros())];
-        machine.ball_joints.push(BallJoint::new("S2", socket, ball));
+        machine.loose_joints.push(LooseJoint::ball("S2", socket, ball));
         let beyond = MachineFault::NoBody { what: "S2".to_owned(), body: 7, bodies: 1 };
         assert_eq!(fault(&machine), Some(MechanismError::Machine(beyond)));
     }

@@ -3,7 +3,7 @@
 use super::angles::pose_of;
 use super::frame::{BodyMotion, ContactMode, Frame, JointReport};
 use crate::contact::ContactState;
-use crate::machine::{Attachment, BallJoint, Machine, Vec3};
+use crate::machine::{Attachment, LooseJoint, Machine, Vec3};
 use crate::mechanism::Mechanism;
 
 /// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at (`time`, `y`), with the
@@ -30,7 +30,7 @@ pub(super) fn fill(
     }
     out.pose = pose_of(&out.bodies[machine.output.body]);
     out.joints.clear();
-    for (j, joint) in machine.ball_joints.iter().enumerate() {
+    for (j, joint) in machine.loose_joints.iter().enumerate() {
         out.joints.push(joint_report(mechanism, joint, &contact_states[j], j));
     }
     out.closing.clear();
@@ -52,7 +52,7 @@ pub(super) fn fill(
     }
 }
 
-fn joint_report(mechanism: &Mechanism, joint: &BallJoint, contact_state: &ContactState, j: usize) -> JointReport {
+fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_state: &ContactState, j: usize) -> JointReport {
     let motion = mechanism.motion();
     let centre = |a: &Attachment| match a.body {
         None => a.point,
@@ -64,9 +64,9 @@ fn joint_report(mechanism: &Mechanism, joint: &BallJoint, contact_state: &Contac
     let gap = mechanism.contacts.gap(j);
     let contacts = &mechanism.contacts;
     let coefficients = contacts.coefficients(j);
-    let ball_centre = centre(&joint.ball);
+    let ball_centre = centre(&joint.carried());
     let mut report = JointReport {
-        socket_centre: centre(&joint.socket),
+        socket_centre: centre(&joint.carrier()),
         ball_centre,
         eccentricity: gap.eccentricity,
         clearance: contacts.clearance(j),

@@ -72,8 +72,8 @@ fn shortest_step(t: f64) -> f64 {
 /// # use jointplay_physics::{machine::*, simulate::*};
 /// # let mut machine = Machine { gravity: Vec3::new(0.0, 0.0, -9.81), ..Machine::default() };
 /// # let bob = machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
-/// # let joint = BallJoint::new("S1", Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros()));
-/// # machine.ball_joints.push(joint.with_clearance(0.2e-3));
+/// # let joint = LooseJoint::ball("S1", Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros()));
+/// # machine.loose_joints.push(joint.with_clearance(0.2e-3));
 /// let model = Model::new(&machine)?;
 /// let mut state = model.start();
 /// let mut workspace = model.workspace(&state);

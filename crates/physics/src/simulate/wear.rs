@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::machine::{BallJoint, Machine, Mat3, Vec3};
+use crate::machine::{LooseJoint, Machine, Mat3, Vec3};
 use crate::mechanism::{Mechanism, WallContact};
 
 /// Cells on each socket: about 14 degrees across.
@@ -191,7 +191,7 @@ impl Wear {
     /// An empty map.
     pub(super) fn new(machine: &Machine) -> Self {
         let grid = grid_of_sockets();
-        let socket = |joint: &BallJoint| {
+        let socket = |joint: &LooseJoint| {
             let contact = &joint.contact;
             let ideal = contact.clearance == 0.0;
             let cells = vec![Cell::default(); if ideal { 0 } else { grid.cells() }];
@@ -201,7 +201,7 @@ impl Wear {
                 cells: cells.into(),
             }
         };
-        let sockets: Vec<Socket> = machine.ball_joints.iter().map(socket).collect();
+        let sockets: Vec<Socket> = machine.loose_joints.iter().map(socket).collect();
         let most = MAX_ENTRIES * sockets.len();
         Self { presses: Vec::with_capacity(most), latest: Vec::with_capacity(most), sockets, grid }
     }

@@ -5,7 +5,7 @@ use crate::contact::{Coefficients, Force, Separation};
 use crate::machine::Vec3;
 use crate::mechanism::columns::contact_sides;
 use crate::mechanism::kinematics::Kinematics;
-use crate::mechanism::model::{Anchor, BallJoint};
+use crate::mechanism::model::{Anchor, LooseJoint};
 use crate::mechanism::{Powers, WallContact};
 
 /// One ball joint at the latest evaluation.
@@ -30,13 +30,13 @@ pub struct Gap {
 pub struct Contact {
     /// Index among the ball joints, also that of its contact state.
     index: usize,
-    pub joint: BallJoint,
+    pub joint: LooseJoint,
     pub law: Coefficients,
     pub gap: Gap,
 }
 
 impl Contact {
-    pub fn new(index: usize, joint: BallJoint, law: Coefficients) -> Self {
+    pub fn new(index: usize, joint: LooseJoint, law: Coefficients) -> Self {
         Self { index, joint, law, gap: Gap::default() }
     }
 
@@ -79,7 +79,7 @@ impl Contact {
     /// Unit vector from the socket centre to the ball centre at the latest evaluation, in the axes of the socket's body. It
     /// points to the point of the wall nearest to the ball; the two centres must differ.
     pub fn wall_direction(&self, motion: &[Kinematics]) -> Vec3 {
-        let socket = &motion[self.joint.socket.body];
+        let socket = &motion[self.joint.carrier.body];
         socket.rotation.tr_mul(&self.direction())
     }
 
@@ -91,7 +91,7 @@ impl Contact {
     /// Angular velocities of ball and socket, rad/s.
     #[inline]
     fn spins<'a>(&self, motion: &'a [Kinematics]) -> [&'a Vec3; 2] {
-        [self.joint.ball.body, self.joint.socket.body].map(|body| &motion[body].angular_velocity)
+        [self.joint.carried.body, self.joint.carrier.body].map(|body| &motion[body].angular_velocity)
     }
 
     /// Relative velocity used by friction for the normal `n`, m/s.
@@ -141,7 +141,7 @@ impl ForceElement for Contact {
         let force = law.force(contact_state, &separation, || {
             counts.friction += 1;
             let spin = |anchor: &Anchor| &at.motion[anchor.body].angular_velocity;
-            let (ball, socket) = (spin(&joint.ball), spin(&joint.socket));
+            let (ball, socket) = (spin(&joint.carried), spin(&joint.carrier));
             law.slip_velocity(&separation.normal, &velocity, ball, socket)
         });
         if let Some(has_left_branch) = loads.has_left_branch.get_mut(self.index) {
@@ -157,16 +157,16 @@ impl ForceElement for Contact {
         let on_ball = n * -force.normal + force.friction;
         let radius = law.ball_radius;
         let [arm_ball, arm_socket] = arms;
-        let ball = &mut loads.wrench[joint.ball.body];
+        let ball = &mut loads.wrench[joint.carried.body];
         ball.force += on_ball;
         ball.torque += (arm_ball + n * radius).cross(&on_ball);
-        let socket = &mut loads.wrench[joint.socket.body];
+        let socket = &mut loads.wrench[joint.carrier.body];
         socket.force -= on_ball;
         socket.torque -= (arm_socket + n * (radius + clearance)).cross(&on_ball);
     }
 
     fn ends(&self, _: &[Kinematics]) -> Option<[Anchor; 2]> {
-        Some([self.joint.socket, self.joint.ball])
+        Some([self.joint.carrier, self.joint.carried])
     }
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {

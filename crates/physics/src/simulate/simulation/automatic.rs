@@ -212,7 +212,7 @@ pub(in crate::simulate) fn prepare_implicit(mechanism: &mut Mechanism, method: M
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::{Attachment, BallJoint, Body, Joint, Machine, Mat3, Vec3};
+    use crate::machine::{Attachment, Body, Joint, LooseJoint, Machine, Mat3, Vec3};
     use crate::simulate::Simulation;
 
     #[test]
@@ -220,7 +220,7 @@ mod tests {
         let mut machine = Machine { gravity: Vec3::new(0.0, 0.0, -9.81), ..Machine::default() };
         let bob = machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
         let [socket, ball] = [Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros())];
-        machine.ball_joints.push(BallJoint::new("S1", socket, ball).with_clearance(0.2e-3));
+        machine.loose_joints.push(LooseJoint::ball("S1", socket, ball).with_clearance(0.2e-3));
         let mut simulation = Simulation::new(&machine).unwrap();
         simulation.advance_to(1.0).unwrap();
         let (model, mut state) = (simulation.model(), simulation.state().clone());

@@ -3,7 +3,7 @@
 use super::{Model, State};
 use crate::contact::{Coefficients, FrictionVelocity};
 use crate::integrate::Method;
-use crate::machine::{BallJoint, MIN_IMPACT_STEPS, Machine};
+use crate::machine::{LooseJoint, MIN_IMPACT_STEPS, Machine};
 use crate::simulate::{AffectedJoints, Doubt, Ledger, LedgerTerm};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
@@ -89,7 +89,7 @@ impl DoubtContext<'_> {
             let element = &self.machine.elements[i];
             Doubt::StartsInside { stop: element.name.clone(), turns: element.is_on_hinge(), depth, usual, force }
         }));
-        let clearances = self.machine.ball_joints.iter().map(|j| j.contact.clearance);
+        let clearances = self.machine.loose_joints.iter().map(|j| j.contact.clearance);
         let least = clearances.filter(|c| *c > 0.0).reduce(f64::min);
         let distance = statistics.constraint_drift;
         if distance > least.map_or(DRIFT, |c| DRIFT.min(DRIFT_OF_CLEARANCE * c)) {
@@ -105,17 +105,17 @@ impl DoubtContext<'_> {
     /// Doubts about unaccounted energy, compared with the energy held and lost or with each work, and about negative losses.
     fn energy_doubt(&self, ledger: &Ledger) -> Option<Doubt> {
         let residual = ledger.residual();
-        let clearances = self.machine.ball_joints.iter().map(|j| j.contact.clearance);
+        let clearances = self.machine.loose_joints.iter().map(|j| j.contact.clearance);
         let least = clearances.filter(|c| *c > 0.0).fold(DRIFT, f64::min);
         let mass: f64 = self.machine.bodies.iter().map(|body| body.mass).sum();
         let slow = mass * (least / CROSSING_TIME) * (least / CROSSING_TIME);
         let scale = ledger.scale() + slow;
-        let may_drive = |joint: &BallJoint| joint.contact.friction_velocity != FrictionVelocity::Surface;
+        let may_drive = |joint: &LooseJoint| joint.contact.friction_velocity != FrictionVelocity::Surface;
         let losses = [
             (LedgerTerm::Restitution, ledger.restitution_loss),
             (
                 LedgerTerm::Friction,
-                if self.machine.ball_joints.iter().any(may_drive) { 0.0 } else { ledger.friction_loss },
+                if self.machine.loose_joints.iter().any(may_drive) { 0.0 } else { ledger.friction_loss },
             ),
             (LedgerTerm::Damping, ledger.damping_loss),
         ];
@@ -159,7 +159,7 @@ impl DoubtContext<'_> {
 
     /// The joint for which `measure` is largest and above `limit`, and how many others are above it.
     fn worst(&self, limit: f64, measure: impl Fn(usize) -> f64) -> Option<(AffectedJoints, usize)> {
-        let joints = &self.machine.ball_joints;
+        let joints = &self.machine.loose_joints;
         let beyond = || (0..joints.len()).filter(|&j| measure(j) > limit);
         let worst = beyond().max_by(|&a, &b| measure(a).total_cmp(&measure(b)))?;
         let joints = AffectedJoints { worst: joints[worst].name.clone(), others: beyond().count() - 1 };
@@ -168,12 +168,12 @@ impl DoubtContext<'_> {
 
     /// Coefficients of joint `j`.
     fn coefficients(&self, j: usize) -> Coefficients {
-        Coefficients::new(&self.machine.ball_joints[j].contact, self.state.clearance(j))
+        Coefficients::new(&self.machine.loose_joints[j].contact, self.state.clearance(j))
     }
 
     /// Radius of the contact patch at the largest force so far, in ball radii; 0 for an ideal joint.
     fn largest_patch(&self, j: usize) -> f64 {
-        if self.machine.ball_joints[j].contact.clearance == 0.0 {
+        if self.machine.loose_joints[j].contact.clearance == 0.0 {
             return 0.0;
         }
         let c = self.coefficients(j);

@@ -33,13 +33,13 @@ impl Run<'_> {
             let penetration = self.attempt.end.gaps[j].penetration;
             let radius = self.mechanism.contacts.coefficients(j).ball_radius;
             if !(penetration <= LEFT_SOCKET * radius) {
-                return Some(StopFault::LeftSocket { joint: self.machine.ball_joints[j].name.clone(), penetration });
+                return Some(StopFault::LeftSocket { joint: self.machine.loose_joints[j].name.clone(), penetration });
             }
             if self.state.conditions.solver.method.control() == StepControl::Fixed
                 && let Some(times) = self.overshoot_energy_ratio(j, h)
             {
                 return Some(StopFault::Overshoot {
-                    joint: self.machine.ball_joints[j].name.clone(),
+                    joint: self.machine.loose_joints[j].name.clone(),
                     penetration,
                     times,
                 });

@@ -49,7 +49,7 @@ impl IdealSource {
         let Some(probe) = machine.output.probe.filter(|_| !closed_form) else {
             return Self::ClosedForm;
         };
-        if machine.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
+        if machine.loose_joints.iter().all(|j| j.contact.clearance == 0.0) {
             return Self::SelfReference;
         }
         match Model::new(&closed(machine)) {
@@ -160,7 +160,7 @@ impl IdealState {
 /// has no probe.
 pub fn closed(machine: &Machine) -> Machine {
     let mut ideal = machine.clone();
-    for joint in &mut ideal.ball_joints {
+    for joint in &mut ideal.loose_joints {
         joint.contact.clearance = 0.0;
     }
     // Balls may start off-centre in their play.

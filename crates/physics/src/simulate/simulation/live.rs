@@ -51,7 +51,7 @@ pub(in crate::simulate) fn check_pull(machine: &Machine, pull: &Pull) -> Result<
 impl Run<'_> {
     /// As [`Simulation::adopt`](crate::simulate::Simulation::adopt).
     pub(in crate::simulate) fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
-        let pairs = self.machine.ball_joints.iter().zip(&next.ball_joints);
+        let pairs = self.machine.loose_joints.iter().zip(&next.loose_joints);
         let clearances = pairs.map(|(a, b)| (a.contact.clearance, b.contact.clearance));
         let changes_equations = clearances.into_iter().any(|(a, b)| (a == 0.0) != (b == 0.0));
         if changes_equations || !self.machine.differs_only_in_conditions(next) {
