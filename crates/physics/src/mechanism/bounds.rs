@@ -138,16 +138,11 @@ impl Cost {
         let mut first_on = vec![u64::MAX; model.blocks.len()];
         let mut sides_on = vec![0_u64; model.blocks.len()];
         let mut rows = Vec::with_capacity(3 * joints.len());
-        let balls = joints.iter().map(|&j| {
-            let joint = &model.joints[j];
-            ([joint.carried.body, joint.carrier.body], 3)
+        let units = model.cuts(joints).flat_map(|cut| {
+            let bodies = [cut.child.body, cut.parent.body];
+            cut.rows.map(|rows| (bodies, rows.iter().map(Rows::count).sum::<usize>()))
         });
-        let closures = model.closures.iter().flat_map(|pair| {
-            let bodies = [pair.child.body, pair.parent.body];
-            let count = |rows: Vec<Rows>| rows.iter().map(Rows::count).sum();
-            pair.rows().map(|rows| (bodies, count(rows)))
-        });
-        for (bodies, count) in balls.chain(closures) {
+        for (bodies, count) in units.filter(|(_, count)| *count > 0) {
             let at = rows.len() as u64;
             let mut first = at;
             let [ball, socket] = bodies.map(block_of);

@@ -1,9 +1,9 @@
-//! Loop closure in tree coordinates: three constraint rows for each ideal ball joint, (45), up to six for other joints, solved
-//! for their Lagrange multipliers, and the projection onto the constraints.
+//! Loop closure in tree coordinates: the constraint rows of each joint that closes a loop, (45) to (47), solved for their Lagrange
+//! multipliers, and the projection onto the constraints.
 
 use super::kinematics::{Kinematics, Wrench, part};
-use super::model::{Anchor, BodyIndex, Model};
-use super::pairs::Rows;
+use super::model::{BodyIndex, Model};
+use super::pairs::{Cut, Rows};
 use super::rows::RowSystem;
 use super::tree::{Tree, visit_columns};
 use crate::machine::{Mat3, Vec3};
@@ -11,7 +11,7 @@ use std::ops::Range;
 
 mod openings;
 
-/// Rows of one joint in one block: Jacobian J and W = M^-1 J^T, both 3 x n, row-major from `offset`.
+/// Rows of one unit in one block: Jacobian J and W = M^-1 J^T, both 3 x n, row-major from `offset`.
 struct Side {
     block: usize,
     offset: usize,
@@ -37,16 +37,19 @@ impl Side {
     }
 }
 
-/// Translational or rotational part of a loop-closing joint. Its three rows in the blocks are the relative velocity, or angular
-/// velocity, of its bodies in world axes; up to three directions of these are constrained.
+/// Translational or rotational part of a joint that closes a loop. Its three rows in the blocks are the relative velocity, or
+/// angular velocity, of its bodies in world axes; up to three directions of these are constrained.
 struct Unit {
-    /// Index of the joint among those that close loops.
-    closure: usize,
+    /// Index of its joint among the cut ones.
+    joint: usize,
     turns: bool,
     rows: Vec<Rows>,
     /// First constraint row, and number of rows.
     first: usize,
     count: usize,
+    sides: Vec<Side>,
+    /// If two points coincide: the block of its rows, which are along the world's axes.
+    point: Option<usize>,
     /// Constrained directions, and violation with its first and second derivative, at the latest motion.
     along: [Vec3; 3],
     state: [[f64; 3]; 3],
@@ -58,9 +61,8 @@ impl Unit {
     }
 
     /// Updates directions and violations.
-    fn measure(&mut self, model: &Model, motion: &[Kinematics]) {
-        let pair = &model.closures[self.closure];
-        let (c, p) = (&motion[pair.child.body], &motion[pair.parent.body]);
+    fn measure(&mut self, cut: &Cut, motion: &[Kinematics]) {
+        let (c, p) = (&motion[cut.child.body], &motion[cut.parent.body]);
         let mut at = 0;
         for rows in &self.rows {
             rows.linearise(c, p, &[], |i, row, state| {
@@ -73,25 +75,27 @@ impl Unit {
 
     /// Force or torque of this unit, given the multipliers of all rows.
     fn load(&self, multipliers: &[f64]) -> Vec3 {
+        if self.point.is_some() {
+            return Vec3::from_column_slice(part::<3>(multipliers, self.first));
+        }
         let own = self.along.iter().zip(&multipliers[self.range()]);
         own.map(|(along, x)| along * *x).sum()
     }
 }
 
-/// Constraint rows of a set of ball joints and of all other loop-closing joints.
+/// Constraint rows of a set of joints that close loops.
 pub struct Constraints {
+    /// The joints by their index among the cut ones of the machine, as rows, and the units of each.
     joints: Vec<usize>,
-    /// Units follow the ball joints.
+    cuts: Vec<Cut>,
+    units_of: Vec<Range<usize>>,
     units: Vec<Unit>,
-    sides: Vec<Vec<Side>>,
-    /// (i, j, side of i, side of j) with j <= i for every shared block, between ball joints.
+    /// (i, j, side of i, side of j) with j <= i for every block that units share.
     pairs: Vec<(usize, usize, usize, usize)>,
-    /// The same if i is a unit.
-    unit_pairs: Vec<(usize, usize, usize, usize)>,
     jacobian: Vec<f64>,
     weighted: Vec<f64>,
     matrix: RowSystem,
-    /// Multipliers of the latest solve: force on the ball, N, three per joint; then those of the units, N or N m.
+    /// Multipliers of the latest solve, N or N m.
     multipliers: Vec<f64>,
     scratch: Vec<f64>,
     step: Vec<f64>,
@@ -104,83 +108,72 @@ pub struct Constraints {
 }
 
 impl Constraints {
-    /// Rows of the ball joints with these indices and of all other loop-closing joints.
+    /// Rows of the loose joints with these indices as if they had no play, and of all other joints that close loops.
     pub fn new(model: &Model, joints: &[usize]) -> Self {
-        let mut total = 0;
-        let mut count = 3 * joints.len();
-        let mut units = Vec::new();
-        for (closure, pair) in model.closures.iter().enumerate() {
-            for (rows, turns) in pair.rows().into_iter().zip([false, true]) {
+        let cuts: Vec<Cut> = model.cuts(joints).collect();
+        let block_of =
+            |b: BodyIndex| (b < model.bodies.len() && !model.bodies[b].driven_only).then(|| model.block_of[b]);
+        let (mut total, mut count) = (0, 0);
+        let mut units: Vec<Unit> = Vec::new();
+        let mut units_of = Vec::with_capacity(cuts.len());
+        for (joint, cut) in cuts.iter().enumerate() {
+            let of = units.len();
+            for (rows, turns) in cut.rows.iter().zip([false, true]).filter(|(rows, _)| !rows.is_empty()) {
                 let first = count;
                 count += rows.iter().map(Rows::count).sum::<usize>();
+                let mut blocks: Vec<usize> =
+                    [cut.child.body, cut.parent.body].into_iter().filter_map(block_of).collect();
+                blocks.dedup();
+                let side = |block: usize| {
+                    let n = model.blocks[block].n;
+                    let side = Side { block, offset: total, n };
+                    total += 3 * n;
+                    side
+                };
                 units.push(Unit {
-                    closure,
+                    joint,
                     turns,
-                    rows,
+                    rows: rows.clone(),
                     first,
                     count: count - first,
+                    sides: blocks.into_iter().map(side).collect(),
+                    point: None,
                     along: [Vec3::zeros(); 3],
                     state: [[0.0; 3]; 3],
                 });
             }
+            units_of.push(of..units.len());
         }
-        let block_of =
-            |b: BodyIndex| (b < model.bodies.len() && !model.bodies[b].driven_only).then(|| model.block_of[b]);
-        let balls = joints.iter().map(|&j| {
-            let joint = &model.joints[j];
-            [joint.carried.body, joint.carrier.body]
-        });
-        let others = units.iter().map(|unit| {
-            let pair = &model.closures[unit.closure];
-            [pair.child.body, pair.parent.body]
-        });
-        let sides: Vec<Vec<Side>> = balls
-            .chain(others)
-            .map(|bodies| {
-                let mut blocks: Vec<usize> = bodies.into_iter().filter_map(block_of).collect();
-                blocks.dedup();
-                blocks
-                    .into_iter()
-                    .map(|block| {
-                        let n = model.blocks[block].n;
-                        let side = Side { block, offset: total, n };
-                        total += 3 * n;
-                        side
-                    })
-                    .collect()
-            })
-            .collect();
-        let balls = joints.len();
-        let rows_of = |i: usize| match i.checked_sub(balls) {
-            None => 3 * i..3 * i + 3,
-            Some(unit) => units[unit].range(),
-        };
         let mut pairs = Vec::new();
         let mut columns = vec![Vec::new(); count];
-        // (joint, side) pairs that act on each block so far.
+        // (unit, side) pairs that act on each block so far.
         let mut on_block = vec![Vec::new(); model.blocks.len()];
-        for (i, sides) in sides.iter().enumerate() {
+        for (i, unit) in units.iter().enumerate() {
             let from = pairs.len();
-            for (si, side) in sides.iter().enumerate() {
+            for (si, side) in unit.sides.iter().enumerate() {
                 on_block[side.block].push((i, si));
                 pairs.extend(on_block[side.block].iter().map(|&(j, sj)| (i, j, si, sj)));
             }
             pairs[from..].sort_unstable();
-            for row in rows_of(i) {
-                let others = pairs[from..].iter().flat_map(|&(_, j, ..)| rows_of(j));
+            for row in unit.range() {
+                let others = pairs[from..].iter().flat_map(|&(_, j, ..)| units[j].range());
                 columns[row].extend(others.filter(|&column| column < row));
             }
         }
-        let unit_pairs = pairs.split_off(pairs.partition_point(|&(i, ..)| i < balls));
+        let matrix = RowSystem::new(columns);
+        for unit in &mut units {
+            let is_point = matches!(unit.rows[..], [Rows::Point { .. }]);
+            unit.point = if is_point { matrix.whole_block(unit.first) } else { None };
+        }
         Self {
-            joints: joints.to_vec(),
+            joints: joints.iter().copied().chain(model.joints.len()..).take(cuts.len()).collect(),
+            cuts,
+            units_of,
             units,
-            sides,
             pairs,
-            unit_pairs,
             jacobian: vec![0.0; total],
             weighted: vec![0.0; total],
-            matrix: RowSystem::new(columns),
+            matrix,
             multipliers: vec![0.0; count],
             scratch: vec![0.0; count],
             step: vec![0.0; model.nv],
@@ -203,21 +196,8 @@ impl Constraints {
         let a = &mut self.square;
         a.resize(n * n, 0.0);
         a.fill(0.0);
-        let (of_balls, of_units) = self.sides.split_at(self.joints.len());
-        for (k, sides) in of_balls.iter().enumerate() {
-            for side in sides {
-                let first = model.blocks[side.block].v;
-                for i in 0..3 {
-                    let Some(at) = place(3 * k + i) else { continue };
-                    let row = &self.jacobian[side.offset + i * side.n..][..side.n];
-                    for (a, j) in a[at * n + first..].iter_mut().zip(row) {
-                        *a += j;
-                    }
-                }
-            }
-        }
-        for (unit, sides) in self.units.iter().zip(of_units) {
-            for side in sides {
+        for unit in &self.units {
+            for side in &unit.sides {
                 let first = model.blocks[side.block].v;
                 let [x, y, z] = side.rows(&self.jacobian);
                 for (row, along) in unit.range().zip(&unit.along) {
@@ -233,8 +213,7 @@ impl Constraints {
 
     /// From now on treats the rows as dependent, with a rank of at most `rank`.
     pub fn treat_as_dependent(&mut self, rank: usize) {
-        let units = self.units_of_rows();
-        let group = units.flat_map(|rows| rows.clone().map(move |_| rows.start));
+        let group = self.units.iter().flat_map(|unit| std::iter::repeat_n(unit.first, unit.count));
         let group = group.collect();
         self.matrix.treat_as_dependent(rank, 0, group);
         self.time = None;
@@ -250,34 +229,21 @@ impl Constraints {
         self.matrix.rank()
     }
 
-    /// Whether the reaction of joint `k` is unique at the latest factorisation; ball joints come first, then other loop-closing
-    /// joints.
+    /// Whether the load of joint `k` is unique at the latest factorisation.
     pub fn is_unique(&self, k: usize) -> bool {
-        let rows = match k.checked_sub(self.joints.len()) {
-            None => 3 * k..3 * k + 3,
-            Some(closure) => self.units[2 * closure].first..self.units[2 * closure + 1].range().end,
-        };
-        self.matrix.is_unique(rows.start, rows.len())
+        let units = &self.units[self.units_of[k].clone()];
+        let rows = units.iter().map(Unit::range).reduce(|a, b| a.start..b.end);
+        rows.is_none_or(|rows| self.matrix.is_unique(rows.start, rows.len()))
     }
 
-    /// Changes of the load of joint `k`, counted as in [`Self::is_unique`], that the motion does not determine: force and torque,
-    /// each up to a common factor.
+    /// Changes of the load of joint `k` that the motion does not determine: force and torque, each up to a common factor.
     pub fn null_loads(&self, k: usize) -> Vec<[Vec3; 2]> {
-        self.matrix.null_loads(|null| match k.checked_sub(self.joints.len()) {
-            None => [Vec3::from_column_slice(part::<3>(null, 3 * k)), Vec3::zeros()],
-            Some(closure) => self.closure_load_of(closure, null),
-        })
-    }
-
-    /// Row ranges: each ball joint, then the translational and rotational part of each other loop-closing joint.
-    fn units_of_rows(&self) -> impl Iterator<Item = Range<usize>> {
-        let balls = (0..self.joints.len()).map(|k| 3 * k..3 * k + 3);
-        balls.chain(self.units.iter().map(Unit::range))
+        self.matrix.null_loads(|null| self.load_of(k, null))
     }
 
     /// After a plain factorisation: the smallest ratio of a pivot to the largest diagonal entry of its joint.
     pub fn least_joint_pivot(&self) -> f64 {
-        self.matrix.least_joint_pivot(self.units_of_rows())
+        self.matrix.least_joint_pivot(self.units.iter().map(Unit::range))
     }
 
     /// The system J M^-1 J^T.
@@ -285,7 +251,7 @@ impl Constraints {
         &self.matrix
     }
 
-    /// Ball joints by their index in the scene.
+    /// The joints by their index among the cut ones: loose joints, then other joints that close loops.
     pub fn joints(&self) -> &[usize] {
         &self.joints
     }
@@ -300,47 +266,39 @@ impl Constraints {
         &self.multipliers
     }
 
-    /// Force on the ball of the `k`-th constrained joint, N.
-    pub fn reaction(&self, k: usize) -> Vec3 {
-        Vec3::from_column_slice(&self.multipliers[3 * k..3 * k + 3])
-    }
-
     /// Adds the loads exerted on the bodies by `multipliers` of all rows to `wrench`.
-    pub fn load(&self, model: &Model, multipliers: &[f64], motion: &[Kinematics], wrench: &mut [Wrench]) {
+    pub fn load(&self, multipliers: &[f64], motion: &[Kinematics], wrench: &mut [Wrench]) {
         let mut push = |body: BodyIndex, arm: Vec3, force: Vec3| {
             let w = &mut wrench[body];
             w.force += force;
             w.torque += arm.cross(&force);
         };
-        for (k, &j) in self.joints.iter().enumerate() {
-            let force = Vec3::from_column_slice(part::<3>(multipliers, 3 * k));
-            let joint = &model.joints[j];
-            let [ball, socket] = joint.arms(motion);
-            push(joint.carried.body, ball, force);
-            push(joint.carrier.body, socket, -force);
-        }
         for unit in self.units.iter().filter(|unit| !unit.turns) {
-            let pair = &model.closures[unit.closure];
+            let cut = &self.cuts[unit.joint];
             let force = unit.load(multipliers);
-            let [child, parent] = pair.arms(motion);
-            push(pair.child.body, child, force);
-            push(pair.parent.body, parent, -force);
+            let [child, parent] = cut.arms(motion);
+            push(cut.child.body, child, force);
+            push(cut.parent.body, parent, -force);
         }
         for unit in self.units.iter().filter(|unit| unit.turns) {
-            let pair = &model.closures[unit.closure];
+            let cut = &self.cuts[unit.joint];
             let torque = unit.load(multipliers);
-            wrench[pair.child.body].torque += torque;
-            wrench[pair.parent.body].torque -= torque;
+            wrench[cut.child.body].torque += torque;
+            wrench[cut.parent.body].torque -= torque;
         }
     }
 
-    /// Force, N, and torque, N m, exerted on its child by the `c`-th loop-closing joint.
-    pub fn closure_load(&self, c: usize) -> [Vec3; 2] {
-        self.closure_load_of(c, &self.multipliers)
+    /// Force, N, and torque, N m, exerted on its child by joint `k`.
+    pub fn load_on_child(&self, k: usize) -> [Vec3; 2] {
+        self.load_of(k, &self.multipliers)
     }
 
-    fn closure_load_of(&self, c: usize, multipliers: &[f64]) -> [Vec3; 2] {
-        [2 * c, 2 * c + 1].map(|unit| self.units[unit].load(multipliers))
+    fn load_of(&self, k: usize, multipliers: &[f64]) -> [Vec3; 2] {
+        let mut load = [Vec3::zeros(); 2];
+        for unit in &self.units[self.units_of[k].clone()] {
+            load[usize::from(unit.turns)] = unit.load(multipliers);
+        }
+        load
     }
 
     /// Computes the Jacobians and factors J M^-1 J^T, unless the latest call was for the same (t, q). Kinematics and mass
@@ -352,62 +310,20 @@ impl Constraints {
         self.time = Some(t);
         self.positions.copy_from_slice(q);
         self.jacobian.fill(0.0);
-        for (k, &j) in self.joints.iter().enumerate() {
-            let joint = &model.joints[j];
-            for (anchor, sign) in [(&joint.carried, 1.0), (&joint.carrier, -1.0)] {
-                let m = &tree.motion[anchor.body];
-                let point = m.position + m.rotation * anchor.offset;
-                let Some(side) = self.sides[k].iter().find(|s| {
-                    anchor.body < model.bodies.len()
-                        && !model.bodies[anchor.body].driven_only
-                        && s.block == model.block_of[anchor.body]
-                }) else {
-                    continue;
-                };
-                let [x, y, z] = side.rows_mut(&mut self.jacobian);
-                visit_columns(model, &tree.motion, anchor.body, &point, |column, velocity, _| {
-                    x[column] += sign * velocity.x;
-                    y[column] += sign * velocity.y;
-                    z[column] += sign * velocity.z;
-                });
-            }
-        }
-        self.add_unit_columns(model, &tree.motion);
-        self.weighted.copy_from_slice(&self.jacobian);
-        for side in self.sides.iter().flatten() {
-            for row in side.rows_mut(&mut self.weighted) {
-                tree.solve_block(model, side.block, row);
-            }
-        }
-        self.matrix.clear();
-        for &(i, j, si, sj) in &self.pairs {
-            let (a, b) = (&self.sides[i][si], &self.sides[j][sj]);
-            let (left, right) = (a.rows(&self.jacobian), b.rows(&self.weighted));
-            let block = left.map(|left| right.map(|right| dot(left, right)));
-            self.matrix.add_block(i, j, &block);
-        }
-        self.add_unit_blocks();
-        self.least_pivot = self.matrix.factor();
-    }
-
-    /// Jacobians of the units.
-    fn add_unit_columns(&mut self, model: &Model, motion: &[Kinematics]) {
-        let balls = self.joints.len();
-        for (unit, sides) in self.units.iter_mut().zip(&self.sides[balls..]) {
-            unit.measure(model, motion);
-            let pair = &model.closures[unit.closure];
-            let arms = pair.arms(motion);
-            let ends = [(&pair.child, arms[0], 1.0), (&pair.parent, arms[1], -1.0)];
-            for (&Anchor { body, .. }, arm, sign) in ends {
+        for unit in &mut self.units {
+            let cut = &self.cuts[unit.joint];
+            unit.measure(cut, &tree.motion);
+            let arms = cut.arms(&tree.motion);
+            for ((body, arm), sign) in [cut.child.body, cut.parent.body].into_iter().zip(arms).zip([1.0, -1.0]) {
                 let moves = model.bodies.get(body).is_some_and(|own| !own.driven_only);
                 let own = |side: &&Side| moves && side.block == model.block_of[body];
-                let Some(side) = sides.iter().find(own) else {
+                let Some(side) = unit.sides.iter().find(own) else {
                     continue;
                 };
-                let point = motion[body].position + arm;
+                let point = tree.motion[body].position + arm;
                 let [x, y, z] = side.rows_mut(&mut self.jacobian);
                 let turns = unit.turns;
-                visit_columns(model, motion, body, &point, |column, velocity, omega| {
+                visit_columns(model, &tree.motion, body, &point, |column, velocity, omega| {
                     let moved = if turns { omega } else { velocity };
                     x[column] += sign * moved.x;
                     y[column] += sign * moved.y;
@@ -415,38 +331,41 @@ impl Constraints {
                 });
             }
         }
+        self.weighted.copy_from_slice(&self.jacobian);
+        for side in self.units.iter().flat_map(|unit| &unit.sides) {
+            for row in side.rows_mut(&mut self.weighted) {
+                tree.solve_block(model, side.block, row);
+            }
+        }
+        self.matrix.clear();
+        self.add_blocks();
+        self.least_pivot = self.matrix.factor();
     }
 
-    /// Blocks of J M^-1 J^T that involve units.
-    fn add_unit_blocks(&mut self) {
-        let balls = self.joints.len();
-        let world = [Vec3::x(), Vec3::y(), Vec3::z()];
-        for unit in &self.units {
+    /// The blocks of J M^-1 J^T.
+    fn add_blocks(&mut self) {
+        for unit in self.units.iter().filter(|unit| self.cuts[unit.joint].turns()) {
             self.matrix.set_reference(unit.first, 0.0);
         }
         let mut diagonal_sum = (usize::MAX, 0.0);
-        for &(i, j, si, sj) in &self.unit_pairs {
-            let (a, b) = (&self.sides[i][si], &self.sides[j][sj]);
-            let (left, right) = (a.rows(&self.jacobian), b.rows(&self.weighted));
+        for &(i, j, si, sj) in &self.pairs {
+            let (unit, other) = (&self.units[i], &self.units[j]);
+            let (left, right) = (unit.sides[si].rows(&self.jacobian), other.sides[sj].rows(&self.weighted));
             let block = left.map(|left| right.map(|right| dot(left, right)));
-            let block = Mat3::from_fn(|r, c| block[r][c]);
-            let unit = &self.units[i - balls];
-            if i == j {
+            if i == j && self.cuts[unit.joint].turns() {
                 // Sum over both sides, if there are two.
                 let before = if diagonal_sum.0 == i { diagonal_sum.1 } else { 0.0 };
-                diagonal_sum = (i, before + block.trace());
+                diagonal_sum = (i, before + (block[0][0] + block[1][1] + block[2][2]));
                 self.matrix.set_reference(unit.first, diagonal_sum.1);
             }
-            let (first, others) = match j.checked_sub(balls) {
-                None => (3 * j, &world[..]),
-                Some(other) => {
-                    let other = &self.units[other];
-                    (other.first, &other.along[..other.count])
-                }
-            };
+            if let (Some(i), Some(j)) = (unit.point, other.point) {
+                self.matrix.add_block(i, j, &block);
+                continue;
+            }
+            let block = Mat3::from_fn(|r, c| block[r][c]);
             for (row, along) in unit.range().zip(&unit.along) {
                 let moved = block.tr_mul(along);
-                for (column, other) in (first..=row).zip(others) {
+                for (column, other) in (other.first..=row).zip(&other.along[..other.count]) {
                     self.matrix.add(row, column, moved.dot(other));
                 }
             }
@@ -457,10 +376,10 @@ impl Constraints {
         self.time == Some(t) && self.positions == q
     }
 
-    /// x = J v for the three rows of joint or unit `k`.
+    /// x = J v for the three rows of unit `k`.
     fn apply(&self, model: &Model, k: usize, v: &[f64]) -> Vec3 {
         let mut sum = Vec3::zeros();
-        for side in &self.sides[k] {
+        for side in &self.units[k].sides {
             let v = &v[model.blocks[side.block].v..][..side.n];
             let rows = side.rows(&self.jacobian);
             sum += Vec3::from(rows.map(|row| dot(row, v)));
@@ -470,68 +389,43 @@ impl Constraints {
 
     /// v += M^-1 J^T x.
     fn add_weighted(&self, model: &Model, x: &[f64], v: &mut [f64]) {
-        let (of_balls, of_units) = self.sides.split_at(self.joints.len());
-        for (k, sides) in of_balls.iter().enumerate() {
-            self.add_weighted_rows(model, sides, part(x, 3 * k), v);
-        }
-        for (unit, sides) in self.units.iter().zip(of_units) {
-            self.add_weighted_rows(model, sides, &unit.load(x).into(), v);
-        }
-    }
-
-    /// The same for the three rows of `sides`.
-    #[inline(always)]
-    fn add_weighted_rows(&self, model: &Model, sides: &[Side], &[x1, x2, x3]: &[f64; 3], v: &mut [f64]) {
-        for side in sides {
-            let v = &mut v[model.blocks[side.block].v..][..side.n];
-            let [w1, w2, w3] = side.rows(&self.weighted);
-            for (c, v) in v.iter_mut().enumerate() {
-                *v = *v + w1[c] * x1 + w2[c] * x2 + w3[c] * x3;
+        for unit in &self.units {
+            let [x1, x2, x3] = unit.load(x).into();
+            for side in &unit.sides {
+                let v = &mut v[model.blocks[side.block].v..][..side.n];
+                let [w1, w2, w3] = side.rows(&self.weighted);
+                for (c, v) in v.iter_mut().enumerate() {
+                    *v = *v + w1[c] * x1 + w2[c] * x2 + w3[c] * x3;
+                }
             }
         }
     }
 
-    /// Sets each unit's multipliers to the negative of its violation (`order` 0), its rate (1) or its second derivative (2) at
-    /// `motion`. Returns the largest magnitude.
-    fn set_unit_residuals(&mut self, model: &Model, motion: &[Kinematics], order: usize) -> f64 {
+    /// Sets the multipliers of all rows to the negative of their violation (`order` 0), its rate (1) or its second derivative (2)
+    /// at `motion`. Returns the largest distance or angle.
+    fn set_residuals(&mut self, motion: &[Kinematics], order: usize) -> f64 {
         let mut largest: f64 = 0.0;
         for unit in &mut self.units {
-            unit.measure(model, motion);
-            for (x, state) in self.multipliers[unit.first..].iter_mut().zip(&unit.state[..unit.count]) {
+            unit.measure(&self.cuts[unit.joint], motion);
+            let own = &mut self.multipliers[unit.first..][..unit.count];
+            for (x, state) in own.iter_mut().zip(&unit.state) {
                 *x = -state[order];
-                largest = largest.max(x.abs());
             }
+            largest = largest.max(match *own {
+                [x, y, z] if !self.cuts[unit.joint].turns() => Vec3::new(x, y, z).norm(),
+                _ => own.iter().fold(0.0, |most, x| x.abs().max(most)),
+            });
         }
         largest
-    }
-
-    /// Sets the multipliers of all rows to their negative openings at `motion`. Returns the largest distance or angle.
-    fn set_residuals(&mut self, model: &Model, motion: &[Kinematics]) -> f64 {
-        let mut largest: f64 = 0.0;
-        for (k, &j) in self.joints.iter().enumerate() {
-            let e = model.joints[j].eccentricity(motion);
-            largest = largest.max(e.norm());
-            for i in 0..3 {
-                self.multipliers[3 * k + i] = -e[i];
-            }
-        }
-        largest.max(self.set_unit_residuals(model, motion, 0))
     }
 
     /// Corrects the unconstrained accelerations `vdot` so that the joints stay closed, and stores the multipliers. Bias
     /// accelerations and mass matrices of the tree must be up to date at the same state.
     pub fn correct(&mut self, model: &Model, tree: &Tree, t: f64, q: &[f64], vdot: &mut [f64]) {
         self.factor(model, tree, t, q);
-        for k in 0..self.joints.len() {
-            let bias = model.joints[self.joints[k]].opening_acceleration(&tree.motion);
-            let residual = bias + self.apply(model, k, vdot);
-            for i in 0..3 {
-                self.multipliers[3 * k + i] = -residual[i];
-            }
-        }
-        self.set_unit_residuals(model, &tree.motion, 2);
+        self.set_residuals(&tree.motion, 2);
         for (u, unit) in self.units.iter().enumerate() {
-            let moved = self.apply(model, self.joints.len() + u, vdot);
+            let moved = self.apply(model, u, vdot);
             let own = self.multipliers[unit.range()].iter_mut();
             for (x, along) in own.zip(&unit.along) {
                 *x -= along.dot(&moved);
@@ -549,7 +443,7 @@ impl Constraints {
         let mut error = f64::INFINITY;
         for _ in 0..30 {
             tree.update_kinematics(model, t, y);
-            let largest = self.set_residuals(model, &tree.motion);
+            let largest = self.set_residuals(&tree.motion, 0);
             // Newton converges quadratically: stop once another step would only change rounding errors. Dependent rows leave a
             // residual, the inconsistency of the dimensions.
             let stagnation_limit = if self.is_dependent() { 1e-8 } else { 1e-13 };
@@ -570,13 +464,7 @@ impl Constraints {
             self.step = step;
         }
         self.prepare(model, tree, t, &y[..model.nq], &gravity);
-        for (k, &j) in self.joints.iter().enumerate() {
-            let rate = model.joints[j].opening_rate(&tree.motion);
-            for i in 0..3 {
-                self.multipliers[3 * k + i] = -rate[i];
-            }
-        }
-        self.set_unit_residuals(model, &tree.motion, 1);
+        self.set_residuals(&tree.motion, 1);
         self.matrix.solve(&mut self.multipliers);
         let mut step = std::mem::take(&mut self.step);
         step.fill(0.0);

@@ -126,24 +126,15 @@ pub(super) trait Equations: Send + Sync {
     /// For such a motion: whether the determinant of the loops' Jacobian is positive. Its sign changes across a singular pose.
     fn is_determinant_positive(&mut self, model: &Model) -> bool;
 
-    /// Force on the ball of the `k`-th ideal joint at the latest evaluation, N.
-    fn reaction(&self, k: usize) -> Vec3;
-
-    /// Whether that reaction is unique.
-    fn is_reaction_unique(&self, k: usize) -> bool;
-
-    /// Changes of that reaction that the motion does not determine: a force, and no torque, each up to a factor.
-    fn null_reactions(&self, k: usize) -> Vec<[Vec3; 2]>;
-
-    /// Force, N, at the child's point and torque, N m, exerted on its child by the `c`-th loop-closing joint at the latest
-    /// evaluation.
-    fn closure_load(&self, c: usize) -> [Vec3; 2];
+    /// Force, N, at the child's point and torque, N m, exerted on its child at the latest evaluation by the `k`-th joint that closes
+    /// a loop, counted as [`Model::closed_joints`].
+    fn closing_load(&self, k: usize) -> [Vec3; 2];
 
     /// Whether that load is unique.
-    fn is_closure_unique(&self, c: usize) -> bool;
+    fn is_closing_load_unique(&self, k: usize) -> bool;
 
     /// Changes of that load that the motion does not determine, each up to a factor.
-    fn null_closure_loads(&self, c: usize) -> Vec<[Vec3; 2]>;
+    fn null_closing_loads(&self, k: usize) -> Vec<[Vec3; 2]>;
 
     /// Force (N) or torque (N m) of every actuator, given the true accelerations in [`Self::motion`].
     fn actuator_forces(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]);

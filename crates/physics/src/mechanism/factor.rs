@@ -287,11 +287,16 @@ impl Skyline {
         self.blocks[self.offset[i] + j - self.first[i]][row][column] += value;
     }
 
-    /// Adds to block (i, j), j <= i, inside the envelope, if every block has three rows. Entries above the diagonal are never
-    /// read.
+    /// The block of rows that consists of `first` and the two that follow, if there is one.
+    pub fn whole_block(&self, first: usize) -> Option<usize> {
+        let (block, place) = *self.place.get(first)?;
+        (place == 0 && self.size[block] == SIDE).then_some(block)
+    }
+
+    /// Adds to block (i, j), j <= i, of three rows each, inside the envelope. Entries above the diagonal are never read.
     #[inline]
     pub fn add_block(&mut self, i: usize, j: usize, block: &Block) {
-        debug_assert_eq!((self.place[SIDE * i], self.place[SIDE * j]), ((i, 0), (j, 0)));
+        debug_assert_eq!([self.size[i], self.size[j]], [SIDE; 2]);
         let sum = &mut self.blocks[self.offset[i] + j - self.first[i]];
         for (sum, row) in sum.iter_mut().zip(block) {
             for (sum, value) in sum.iter_mut().zip(row) {

@@ -43,7 +43,7 @@ impl Forest {
         let Self { tree: Tree { motion, wrench, driven, .. }, constraints, transmitted } = self;
         transmitted.copy_from_slice(wrench);
         if let Some(constraints) = constraints.as_ref().filter(|_| closed) {
-            constraints.load(model, constraints.multipliers(), motion, transmitted);
+            constraints.load(constraints.multipliers(), motion, transmitted);
         }
         inverse_dynamics(model, motion, transmitted, gravity, moved, |drive, force| visit(driven, drive, force));
     }
@@ -223,31 +223,16 @@ impl Equations for Forest {
         }
     }
 
-    fn reaction(&self, k: usize) -> Vec3 {
-        let constraints = self.constraints.as_ref();
-        constraints.map_or_else(Vec3::zeros, |c| c.reaction(k))
+    fn closing_load(&self, k: usize) -> [Vec3; 2] {
+        self.constraints.as_ref().map_or([Vec3::zeros(); 2], |own| own.load_on_child(k))
     }
 
-    fn is_reaction_unique(&self, k: usize) -> bool {
-        self.constraints.as_ref().is_none_or(|c| c.is_unique(k))
+    fn is_closing_load_unique(&self, k: usize) -> bool {
+        self.constraints.as_ref().is_none_or(|own| own.is_unique(k))
     }
 
-    fn null_reactions(&self, k: usize) -> Vec<[Vec3; 2]> {
+    fn null_closing_loads(&self, k: usize) -> Vec<[Vec3; 2]> {
         self.constraints.as_ref().map_or_else(Vec::new, |own| own.null_loads(k))
-    }
-
-    fn closure_load(&self, c: usize) -> [Vec3; 2] {
-        let constraints = self.constraints.as_ref();
-        constraints.map_or([Vec3::zeros(); 2], |constraints| constraints.closure_load(c))
-    }
-
-    fn is_closure_unique(&self, c: usize) -> bool {
-        let constraints = self.constraints.as_ref();
-        constraints.is_none_or(|own| own.is_unique(own.joints().len() + c))
-    }
-
-    fn null_closure_loads(&self, c: usize) -> Vec<[Vec3; 2]> {
-        self.constraints.as_ref().map_or_else(Vec::new, |own| own.null_loads(own.joints().len() + c))
     }
 
     fn actuator_forces(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
@@ -267,7 +252,7 @@ impl Equations for Forest {
         let mut force_under = |multipliers: Option<&[f64]>| {
             wrench.fill(Wrench::zero());
             if let Some(multipliers) = multipliers {
-                constraints.load(model, multipliers, motion, &mut wrench);
+                constraints.load(multipliers, motion, &mut wrench);
             }
             let mut force = 0.0;
             let visit = |drive, value| {

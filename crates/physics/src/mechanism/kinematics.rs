@@ -2,6 +2,7 @@
 
 use super::closed_form::{ClosedMotion, Values};
 use super::model::{Anchor, Body, BodyIndex, LooseJoint, Model, Motion};
+use super::pairs::Cut;
 use super::path::Path;
 use crate::jet::Jet;
 use crate::machine::{Mat3, Quat, Vec3};
@@ -113,10 +114,9 @@ impl LooseJoint {
         self.opening(motion, &self.arms(motion)).1
     }
 
-    /// d2e/dt2, m/s^2.
-    pub fn opening_acceleration(&self, motion: &[Kinematics]) -> Vec3 {
-        let [ball, socket] = &self.arms(motion);
-        motion[self.carried.body].point_acceleration(ball) - motion[self.carrier.body].point_acceleration(socket)
+    /// The joint without play.
+    pub fn closed(&self) -> Cut {
+        Cut::point(self.carried, self.carrier)
     }
 }
 

@@ -57,9 +57,8 @@ pub struct Lagrange {
     groups: Vec<Group>,
     /// Row of each driven coordinate.
     driver_row: Vec<usize>,
-    /// First row of each ideal ball joint, and the rows of each other loop-closing joint.
-    ideal_row: Vec<usize>,
-    closure_rows: Vec<Range<usize>>,
+    /// Rows of each joint that closes a loop; they follow all others.
+    closing_rows: Vec<Range<usize>>,
     rows: Vec<Row>,
     /// Group of each row.
     group_of: Vec<usize>,
@@ -85,10 +84,9 @@ pub struct Layout {
     pub groups: Vec<Group>,
     /// Number of rows.
     rows: usize,
-    /// First row of each driven coordinate and of each ideal ball joint, and the rows of each other loop-closing joint.
+    /// Row of each driven coordinate.
     driver_row: Vec<usize>,
-    ideal_row: Vec<usize>,
-    closure_rows: Vec<Range<usize>>,
+    closing_rows: Vec<Range<usize>>,
 }
 
 impl Layout {
@@ -124,31 +122,21 @@ impl Layout {
                 }
             }
         }
-        let ideal_row = model
-            .ideal_joints
-            .iter()
-            .map(|&j| {
-                let joint = &model.joints[j];
-                let point = Rows::Point { child: joint.carried.offset, parent: joint.carrier.offset };
-                add(point, joint.carried.body, joint.carrier.body)
-            })
-            .collect();
-        let mut closure_rows = Vec::with_capacity(model.closures.len());
-        for pair in &model.closures {
-            let (child, parent) = (pair.child.body, pair.parent.body);
-            let own = pair.rows().into_iter().flatten();
-            let own = own.map(|of| (add(of, child, parent), of.count()));
+        let mut closing_rows = Vec::new();
+        for cut in model.cuts(&model.ideal_joints) {
+            let own = cut.rows.into_iter().flatten();
+            let own = own.map(|of| (add(of, cut.child.body, cut.parent.body), of.count()));
             let ends = own.map(|(first, count)| first..first + count);
-            closure_rows.extend(ends.reduce(|a, b| a.start..b.end));
+            closing_rows.extend(ends.reduce(|a, b| a.start..b.end));
         }
-        Self { groups, rows, driver_row, ideal_row, closure_rows }
+        Self { groups, rows, driver_row, closing_rows }
     }
 }
 
 impl Lagrange {
     /// For `machine` compiled as `model`.
     pub fn new(machine: &Machine, model: &Model) -> Self {
-        let Layout { groups, rows, driver_row, ideal_row, closure_rows } = Layout::new(machine, model);
+        let Layout { groups, rows, driver_row, closing_rows } = Layout::new(machine, model);
         let group_of: Vec<usize> =
             groups.iter().enumerate().flat_map(|(g, group)| std::iter::repeat_n(g, group.rows.count())).collect();
         let pairs = pairs_of(&groups, model.world());
@@ -168,8 +156,7 @@ impl Lagrange {
             driven,
             groups,
             driver_row,
-            ideal_row,
-            closure_rows,
+            closing_rows,
             rows: vec![Row::default(); rows],
             group_of,
             pairs,
@@ -323,9 +310,7 @@ impl Equations for Lagrange {
     }
 
     fn treat_as_dependent(&mut self, rank: usize) {
-        let closures = self.closure_rows.iter().map(|rows| rows.start);
-        let mut cut = self.ideal_row.iter().copied().chain(closures);
-        let cut = cut.next().unwrap_or(self.rows.len());
+        let cut = self.closing_rows.first().map_or(self.rows.len(), |rows| rows.start);
         let group = |&g: &usize| self.groups[g].first;
         let group = self.group_of.iter().map(group).collect();
         self.matrix.treat_as_dependent(cut + rank, cut, group);
@@ -555,30 +540,17 @@ impl Equations for Lagrange {
         true
     }
 
-    fn reaction(&self, k: usize) -> Vec3 {
-        Vec3::from_column_slice(&self.multipliers[self.ideal_row[k]..][..3])
+    fn closing_load(&self, k: usize) -> [Vec3; 2] {
+        self.closing_load_of(k, &self.multipliers)
     }
 
-    fn is_reaction_unique(&self, k: usize) -> bool {
-        self.matrix.is_unique(self.ideal_row[k], 3)
-    }
-
-    fn null_reactions(&self, k: usize) -> Vec<[Vec3; 2]> {
-        let first = self.ideal_row[k];
-        self.matrix.null_loads(|null| [Vec3::from_column_slice(&null[first..][..3]), Vec3::zeros()])
-    }
-
-    fn closure_load(&self, c: usize) -> [Vec3; 2] {
-        self.closure_load_of(c, &self.multipliers)
-    }
-
-    fn is_closure_unique(&self, c: usize) -> bool {
-        let rows = &self.closure_rows[c];
+    fn is_closing_load_unique(&self, k: usize) -> bool {
+        let rows = &self.closing_rows[k];
         self.matrix.is_unique(rows.start, rows.len())
     }
 
-    fn null_closure_loads(&self, c: usize) -> Vec<[Vec3; 2]> {
-        self.matrix.null_loads(|null| self.closure_load_of(c, null))
+    fn null_closing_loads(&self, k: usize) -> Vec<[Vec3; 2]> {
+        self.matrix.null_loads(|null| self.closing_load_of(k, null))
     }
 
     fn actuator_forces(&mut self, _: &Model, _: &Vec3, out: &mut [f64]) {
@@ -590,9 +562,8 @@ impl Equations for Lagrange {
     /// From the multipliers of tree joints, whose rows precede those of loop-closing joints.
     fn joint_loads(&mut self) -> (&[Kinematics], &[Wrench]) {
         self.wrench.fill(Wrench::zero());
-        let closures = self.closure_rows.iter().map(|rows| rows.start);
-        let cut = self.ideal_row.iter().copied().chain(closures).min();
-        let rows = &self.rows[..cut.unwrap_or(self.rows.len())];
+        let cut = self.closing_rows.first().map_or(self.rows.len(), |rows| rows.start);
+        let rows = &self.rows[..cut];
         for ((row, &group), lambda) in rows.iter().zip(&self.group_of).zip(&self.multipliers) {
             let [along, about] = row.j.child;
             let load = &mut self.wrench[self.groups[group].child];
@@ -624,10 +595,10 @@ impl Equations for Lagrange {
 }
 
 impl Lagrange {
-    /// Force and torque on the child of the `c`-th loop-closing joint from the `multipliers` of all rows.
-    fn closure_load_of(&self, c: usize, multipliers: &[f64]) -> [Vec3; 2] {
+    /// Force and torque on the child of the `k`-th joint that closes a loop from the `multipliers` of all rows.
+    fn closing_load_of(&self, k: usize, multipliers: &[f64]) -> [Vec3; 2] {
         let mut load = [Vec3::zeros(); 2];
-        for i in self.closure_rows[c].clone() {
+        for i in self.closing_rows[k].clone() {
             let part = usize::from(self.groups[self.group_of[i]].rows.turns());
             load[part] += self.rows[i].j.child[part] * multipliers[i];
         }

@@ -579,39 +579,39 @@ impl Mechanism {
         Some(self.model.path()?.1.at(&self.equations.driven().functions.latest))
     }
 
-    /// Constraint force on the ball of joint `j` at the latest evaluation, N; `None` for a joint with clearance.
+    /// Constraint force on the carried part of loose joint `j` at the latest evaluation, N; `None` for a joint with clearance.
     pub fn reaction(&self, j: usize) -> Option<Vec3> {
         let k = self.model.joints[j].ideal?;
-        Some(self.equations.reaction(k))
+        Some(self.equations.closing_load(k)[0])
     }
 
-    /// Whether the reaction of cut joint `j` is unique at the latest evaluation; ball joints come first, then other loop-closing
+    /// Index of cut joint `j`, loose joints first, among those that close loops; `None` for a joint with clearance.
+    fn closed_index(&self, j: usize) -> Option<usize> {
+        match self.model.joints.get(j) {
+            Some(joint) => joint.ideal,
+            None => Some(self.model.ideal_joints.len() + j - self.model.joints.len()),
+        }
+    }
+
+    /// Whether the reaction of cut joint `j` is unique at the latest evaluation; loose joints come first, then other loop-closing
     /// joints. If a direction is constrained redundantly, [`Self::reaction`] minimises the sum of squares over all such joints,
     /// in N and N m.
     pub fn is_reaction_unique(&self, j: usize) -> bool {
-        match self.model.joints.get(j) {
-            Some(joint) => joint.ideal.is_none_or(|k| self.equations.is_reaction_unique(k)),
-            None => {
-                let c = j - self.model.joints.len();
-                self.equations.is_closure_unique(c)
-            }
-        }
+        self.closed_index(j).is_none_or(|k| self.equations.is_closing_load_unique(k))
     }
 
     /// Directions in which the force, and about which the torque, of cut joint `j` is not unique at the latest evaluation, counted
     /// as in [`Self::is_reaction_unique`]: orthogonal unit vectors, world axes.
     pub fn undetermined_directions(&self, j: usize) -> [Vec<Vec3>; 2] {
-        let loads = match self.model.joints.get(j) {
-            Some(joint) => joint.ideal.map_or_else(Vec::new, |k| self.equations.null_reactions(k)),
-            None => self.equations.null_closure_loads(j - self.model.joints.len()),
-        };
+        let loads = self.closed_index(j).map_or_else(Vec::new, |k| self.equations.null_closing_loads(k));
         [0, 1].map(|part| span(loads.iter().map(|load| load[part])))
     }
 
     /// Force, N, at the child's point and torque, N m, exerted on its child by each loop-closing joint at the latest evaluation.
     pub fn closing_loads(&self) -> impl Iterator<Item = [Vec3; 2]> {
-        let all = 0..self.model.closures.len();
-        all.map(|c| self.equations.closure_load(c))
+        let first = self.model.ideal_joints.len();
+        let all = first..first + self.model.closures.len();
+        all.map(|k| self.equations.closing_load(k))
     }
 
     /// Number of cut joints: ball joints, then other joints that close loops.

@@ -5,6 +5,8 @@ use std::sync::{Arc, OnceLock};
 use super::assembly::{Assembled, Settled};
 use super::drives::{Law, Trajectory, trajectory_of};
 use super::factor::{NONE, Pattern};
+use super::kinematics::Kinematics;
+use super::pairs::{Cut, Opening};
 use crate::expression::Tape;
 use crate::jet::Jet;
 use crate::machine::{
@@ -547,6 +549,34 @@ impl Model {
     /// Scale of speeds, m/s.
     pub fn speed_scale(&self) -> f64 {
         self.length_scale / SPEED_TIME
+    }
+
+    /// What closes loops if the loose joints with these indices have no play: they, then all other joints that close loops.
+    pub fn cuts(&self, joints: &[usize]) -> impl Iterator<Item = Cut> {
+        let loose = joints.iter().map(|&j| self.joints[j].closed());
+        loose.chain(self.closures.iter().map(Pair::cut))
+    }
+
+    /// Violation at `motion` of cut joint `k`, a loose joint or one that closes a loop, as if it had no play.
+    pub fn opening(&self, k: usize, motion: &[Kinematics]) -> Opening {
+        match self.joints.get(k) {
+            Some(joint) => Opening { apart: joint.eccentricity(motion), turned: 0.0 },
+            None => self.closures[k - self.joints.len()].opening(motion),
+        }
+    }
+
+    /// Its rate.
+    pub fn opening_rate(&self, k: usize, motion: &[Kinematics]) -> Opening {
+        match self.joints.get(k) {
+            Some(joint) => Opening { apart: joint.opening_rate(motion), turned: 0.0 },
+            None => self.closures[k - self.joints.len()].opening_rate(motion),
+        }
+    }
+
+    /// Cut joints whose rows close loops, in the order of [`Self::cuts`] of the ideal ones.
+    pub fn closed_joints(&self) -> impl Iterator<Item = usize> {
+        let others = self.joints.len()..self.joints.len() + self.closures.len();
+        self.ideal_joints.iter().copied().chain(others)
     }
 
     /// Whether any joint closes a loop.

@@ -2,7 +2,7 @@
 //! same in every formulation.
 
 use super::kinematics::Kinematics;
-use super::model::Pair;
+use super::model::{Anchor, Pair};
 use crate::jet::Jet;
 use crate::machine::{JointKind, Vec3};
 
@@ -106,6 +106,39 @@ impl Rows {
     }
 }
 
+/// A joint that closes a loop, as constraint rows.
+#[derive(Clone, Debug)]
+pub struct Cut {
+    /// Joint points.
+    pub child: Anchor,
+    pub parent: Anchor,
+    /// Rows for position, then for orientation.
+    pub rows: [Vec<Rows>; 2],
+}
+
+impl Cut {
+    /// Two points that coincide.
+    pub fn point(child: Anchor, parent: Anchor) -> Self {
+        let point = Rows::Point { child: child.offset, parent: parent.offset };
+        Self { child, parent, rows: [vec![point], Vec::new()] }
+    }
+
+    /// Whether it constrains orientation.
+    pub fn turns(&self) -> bool {
+        !self.rows[1].is_empty()
+    }
+
+    /// Joint points of child and parent relative to the centroids of their bodies, m. If the child's point slides, both arms lead
+    /// to it.
+    #[inline]
+    pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
+        let (c, p) = (&motion[self.child.body], &motion[self.parent.body]);
+        let arm = c.rotation * self.child.offset;
+        let slides = !matches!(self.rows[0][..], [Rows::Point { .. }]);
+        [arm, if slides { c.position + arm - p.position } else { p.rotation * self.parent.offset }]
+    }
+}
+
 /// Constraint violation of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Opening {
@@ -173,13 +206,9 @@ impl Pair {
         [&motion[self.child.body], &motion[self.parent.body]]
     }
 
-    /// Joint points of child and parent relative to the centroids of their bodies, m. For a sliding joint, both arms lead to the
-    /// child's point.
-    pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
-        let [c, p] = self.ends(motion);
-        let arm = c.rotation * self.child.offset;
-        let other = if self.slides() { c.position + arm - p.position } else { p.rotation * self.parent.offset };
-        [arm, other]
+    /// The joint as constraint rows, without drives.
+    pub fn cut(&self) -> Cut {
+        Cut { child: self.child, parent: self.parent, rows: self.rows() }
     }
 
     /// Coordinates with their rates, m or rad, in the order of [`JointKind::freedoms`]; angles between -pi and pi.

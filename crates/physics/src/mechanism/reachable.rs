@@ -90,7 +90,7 @@ impl HeldMachine {
             let mut vdot = self.tip_load(direction);
             self.tree.solve(&self.model, &mut vdot);
             self.constraints.balance_loads(&self.model, &mut vdot, &mut loads);
-            self.constraints.openings(&self.model, &self.tree.motion, &mut openings);
+            self.constraints.openings(&self.tree.motion, &mut openings);
             let null: Vec<Vec<f64>> = self.constraints.system().null_multipliers().map(<[f64]>::to_vec).collect();
             let displaced = minimise(&self.play, &null, &openings, &mut loads);
             if pose == 0 {

@@ -99,7 +99,12 @@ impl RowSystem {
         self.skyline.add(i, j, value);
     }
 
-    /// Adds a block at row 3 i and column 3 j, j <= i, if rows couple in groups of three.
+    /// The block of rows that consists of `first` and the two that follow, if there is one.
+    pub fn whole_block(&self, first: usize) -> Option<usize> {
+        self.skyline.whole_block(first)
+    }
+
+    /// Adds to block (i, j), j <= i, of three rows each.
     #[inline]
     pub fn add_block(&mut self, i: usize, j: usize, block: &[[f64; 3]; 3]) {
         self.skyline.add_block(i, j, block);

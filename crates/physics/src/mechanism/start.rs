@@ -81,7 +81,7 @@ impl Mechanism {
             if all.contains(&j) {
                 // An assembled start needs only a rough guess, from which Newton's method closes the joints.
                 if d > MAX_GIVEN_GAP && !assembled {
-                    let given = self.gap_of(j, model.joints[j].eccentricity(&guess));
+                    let given = self.gap(j, model.opening(j, &guess));
                     return Err(MechanismError::Open { given });
                 }
             } else if d > clearance + 0.01 * self.contacts.coefficients(j).ball_radius {
@@ -186,34 +186,18 @@ impl Mechanism {
         OpenJoint { joint: self.joint_names[joint].clone(), ball: joint < self.model.joints.len(), opening }
     }
 
-    /// Ball joint `joint`, given e = Z_j - Z_i or its rate.
-    fn gap_of(&self, joint: usize, apart: Vec3) -> OpenJoint {
-        self.gap(joint, Opening { apart, turned: 0.0 })
-    }
-
     /// Gaps of the joints that `constraints` closes.
     fn gaps(&self, constraints: &Constraints, motion: &[Kinematics]) -> Vec<OpenJoint> {
-        let model = &self.model;
-        let balls = constraints.joints().iter();
-        let balls = balls.map(|&j| self.gap_of(j, model.joints[j].eccentricity(motion)));
-        let others = (model.joints.len()..).zip(&model.closures);
-        let others = others.map(|(j, pair)| self.gap(j, pair.opening(motion)));
-        balls.chain(others).collect()
+        let gap = |&j: &usize| self.gap(j, self.model.opening(j, motion));
+        constraints.joints().iter().map(gap).collect()
     }
 
     /// Checks that no ideal joint opens at the velocities in `y`: redundant constraints, for example by drives, may contradict
     /// one another.
     fn check_opening_rates(&self, tree: &mut Tree, y: &[f64]) -> Result<(), MechanismError> {
         tree.update_kinematics(&self.model, 0.0, y);
-        for &j in &self.model.ideal_joints {
-            let rate = self.model.joints[j].opening_rate(&tree.motion);
-            if !(rate.norm() <= MAX_OPENING_RATE) {
-                let rate = self.gap_of(j, rate);
-                return Err(MechanismError::InconsistentDrives { rate });
-            }
-        }
-        for (j, pair) in (self.model.joints.len()..).zip(&self.model.closures) {
-            let rate = pair.opening_rate(&tree.motion);
+        for j in self.model.closed_joints() {
+            let rate = self.model.opening_rate(j, &tree.motion);
             let stays_closed = rate.apart.norm() <= MAX_OPENING_RATE && rate.turned <= MAX_OPENING_RATE;
             if !stays_closed {
                 let rate = self.gap(j, rate);
@@ -264,9 +248,7 @@ impl Mechanism {
                 return MechanismError::Singular;
             }
             factor_at(model, &mut constraints, tree, T, y);
-            let closures = model.joints.len()..self.cut_joints();
-            let names = model.ideal_joints.iter().copied().chain(closures);
-            let shared = names.enumerate().filter(|&(k, _)| !constraints.is_unique(k));
+            let shared = model.closed_joints().enumerate().filter(|&(k, _)| !constraints.is_unique(k));
             MechanismError::Branching { joints: shared.map(|(_, j)| self.joint_names[j].clone()).collect() }
         })
     }

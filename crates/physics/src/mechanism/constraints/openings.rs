@@ -8,14 +8,8 @@ impl Constraints {
     /// Removes the part of the accelerations `vdot` that would open the joints: the linear part of [`Self::correct`], with its
     /// matrices.
     pub fn project_accelerations(&mut self, model: &Model, vdot: &mut [f64]) {
-        for k in 0..self.joints.len() {
-            let residual = self.apply(model, k, vdot);
-            for i in 0..3 {
-                self.scratch[3 * k + i] = -residual[i];
-            }
-        }
         for (u, unit) in self.units.iter().enumerate() {
-            let moved = self.apply(model, self.joints.len() + u, vdot);
+            let moved = self.apply(model, u, vdot);
             let own = self.scratch[unit.range()].iter_mut();
             for (x, along) in own.zip(&unit.along) {
                 *x = -along.dot(&moved);
@@ -25,9 +19,9 @@ impl Constraints {
         self.add_weighted(model, &self.scratch, vdot);
     }
 
-    /// Writes the opening of every row at `motion` to `out`: e of the ball joints, m, then the violations of the units, m or rad.
-    pub fn openings(&mut self, model: &Model, motion: &[Kinematics], out: &mut [f64]) {
-        self.set_residuals(model, motion);
+    /// Writes the violation of every row at `motion` to `out`, m or rad.
+    pub fn openings(&mut self, motion: &[Kinematics], out: &mut [f64]) {
+        self.set_residuals(motion, 0);
         for (out, x) in out.iter_mut().zip(&self.multipliers) {
             *out = -x;
         }
