@@ -62,6 +62,9 @@ impl Unit {
 
     /// Updates directions and violations.
     fn measure(&mut self, cut: &Cut, motion: &[Kinematics]) {
+        if self.point.is_some() {
+            return;
+        }
         let (c, p) = (&motion[cut.child.body], &motion[cut.parent.body]);
         let mut at = 0;
         for rows in &self.rows {
@@ -73,7 +76,26 @@ impl Unit {
         }
     }
 
+    /// Derivative of this order (0, 1 or 2) of the violation at the motion last measured, which is `motion`.
+    #[inline(always)]
+    fn violation(&self, cut: &Cut, motion: &[Kinematics], order: usize) -> [f64; 3] {
+        match self.point {
+            Some(_) => cut.separation(motion, order).into(),
+            None => self.state.map(|state| state[order]),
+        }
+    }
+
+    /// Components of `moved`, the relative velocity or angular velocity of its bodies, along the constrained directions.
+    #[inline(always)]
+    fn components(&self, moved: Vec3) -> [f64; 3] {
+        match self.point {
+            Some(_) => moved.into(),
+            None => self.along.map(|along| along.dot(&moved)),
+        }
+    }
+
     /// Force or torque of this unit, given the multipliers of all rows.
+    #[inline(always)]
     fn load(&self, multipliers: &[f64]) -> Vec3 {
         if self.point.is_some() {
             return Vec3::from_column_slice(part::<3>(multipliers, self.first));
@@ -138,7 +160,7 @@ impl Constraints {
                     count: count - first,
                     sides: blocks.into_iter().map(side).collect(),
                     point: None,
-                    along: [Vec3::zeros(); 3],
+                    along: [Vec3::x(), Vec3::y(), Vec3::z()],
                     state: [[0.0; 3]; 3],
                 });
             }
@@ -322,13 +344,16 @@ impl Constraints {
                 };
                 let point = tree.motion[body].position + arm;
                 let [x, y, z] = side.rows_mut(&mut self.jacobian);
-                let turns = unit.turns;
-                visit_columns(model, &tree.motion, body, &point, |column, velocity, omega| {
-                    let moved = if turns { omega } else { velocity };
+                let mut add = |column: usize, moved: &Vec3| {
                     x[column] += sign * moved.x;
                     y[column] += sign * moved.y;
                     z[column] += sign * moved.z;
-                });
+                };
+                if unit.turns {
+                    visit_columns(model, &tree.motion, body, &point, |column, _, omega| add(column, &omega));
+                } else {
+                    visit_columns(model, &tree.motion, body, &point, |column, velocity, _| add(column, &velocity));
+                }
             }
         }
         self.weighted.copy_from_slice(&self.jacobian);
@@ -377,6 +402,7 @@ impl Constraints {
     }
 
     /// x = J v for the three rows of unit `k`.
+    #[inline(always)]
     fn apply(&self, model: &Model, k: usize, v: &[f64]) -> Vec3 {
         let mut sum = Vec3::zeros();
         for side in &self.units[k].sides {
@@ -406,13 +432,14 @@ impl Constraints {
     fn set_residuals(&mut self, motion: &[Kinematics], order: usize) -> f64 {
         let mut largest: f64 = 0.0;
         for unit in &mut self.units {
-            unit.measure(&self.cuts[unit.joint], motion);
+            let cut = &self.cuts[unit.joint];
+            unit.measure(cut, motion);
             let own = &mut self.multipliers[unit.first..][..unit.count];
-            for (x, state) in own.iter_mut().zip(&unit.state) {
-                *x = -state[order];
+            for (x, violation) in own.iter_mut().zip(unit.violation(cut, motion, order)) {
+                *x = -violation;
             }
             largest = largest.max(match *own {
-                [x, y, z] if !self.cuts[unit.joint].turns() => Vec3::new(x, y, z).norm(),
+                [x, y, z] if !cut.turns() => Vec3::new(x, y, z).norm(),
                 _ => own.iter().fold(0.0, |most, x| x.abs().max(most)),
             });
         }
@@ -427,8 +454,8 @@ impl Constraints {
         for (u, unit) in self.units.iter().enumerate() {
             let moved = self.apply(model, u, vdot);
             let own = self.multipliers[unit.range()].iter_mut();
-            for (x, along) in own.zip(&unit.along) {
-                *x -= along.dot(&moved);
+            for (x, moved) in own.zip(unit.components(moved)) {
+                *x -= moved;
             }
         }
         self.matrix.solve(&mut self.multipliers);

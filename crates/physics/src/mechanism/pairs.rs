@@ -137,6 +137,18 @@ impl Cut {
         let slides = !matches!(self.rows[0][..], [Rows::Point { .. }]);
         [arm, if slides { c.position + arm - p.position } else { p.rotation * self.parent.offset }]
     }
+
+    /// Separation of two points that coincide, m, or its first or second derivative.
+    #[inline]
+    pub fn separation(&self, motion: &[Kinematics], order: usize) -> Vec3 {
+        let (c, p) = (&motion[self.child.body], &motion[self.parent.body]);
+        let (child, parent) = (c.rotation * self.child.offset, p.rotation * self.parent.offset);
+        match order {
+            0 => (c.position + child) - (p.position + parent),
+            1 => c.point_velocity(&child) - p.point_velocity(&parent),
+            _ => c.point_acceleration(&child) - p.point_acceleration(&parent),
+        }
+    }
 }
 
 /// Constraint violation of a joint.

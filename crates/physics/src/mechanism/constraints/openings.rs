@@ -11,8 +11,8 @@ impl Constraints {
         for (u, unit) in self.units.iter().enumerate() {
             let moved = self.apply(model, u, vdot);
             let own = self.scratch[unit.range()].iter_mut();
-            for (x, along) in own.zip(&unit.along) {
-                *x = -along.dot(&moved);
+            for (x, moved) in own.zip(unit.components(moved)) {
+                *x = -moved;
             }
         }
         self.matrix.solve(&mut self.scratch);
