@@ -33,7 +33,7 @@ pub enum Format {
 
 impl Format {
     /// Supported file name extensions.
-    pub const ENDINGS: &'static str = ".stl, .obj, .gltf, .glb";
+    pub(crate) const ENDINGS: &'static str = ".stl, .obj, .gltf, .glb";
 
     /// The format of a file, by its extension.
     pub fn of(name: &str) -> Option<Self> {
