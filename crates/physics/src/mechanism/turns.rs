@@ -236,13 +236,13 @@ impl Mechanism {
     }
 
     /// Nearest numbers of quarter turns of the angles that follow from poses: of those that elements act on, and of the others.
-    pub fn quarter_turns(&self) -> [Vec<i64>; 2] {
+    pub(crate) fn quarter_turns(&self) -> [Vec<i64>; 2] {
         let (with_elements, others) = self.turns.counted.split_at(self.turns.with_elements);
         [with_elements, others].map(|all| all.iter().map(|counted| quarter_turns(counted.reference.angle)).collect())
     }
 
     /// Sets these numbers for the time `t`, s, with those of the angles that elements act on first. A run begins.
-    pub fn set_quarter_turns<'a>(&mut self, t: f64, all: impl Iterator<Item = &'a i64>) {
+    pub(crate) fn set_quarter_turns<'a>(&mut self, t: f64, all: impl Iterator<Item = &'a i64>) {
         let Self { turns, elements, .. } = self;
         turns.is_running = true;
         for (counted, &quarters) in turns.counted.iter_mut().zip(all) {
@@ -251,7 +251,7 @@ impl Mechanism {
     }
 
     /// Updates these numbers to the motion at (`t`, `y`), which is the end of a step.
-    pub fn count_turns<'a>(&mut self, t: f64, y: &[f64], all: impl Iterator<Item = &'a mut i64>) {
+    pub(crate) fn count_turns<'a>(&mut self, t: f64, y: &[f64], all: impl Iterator<Item = &'a mut i64>) {
         if self.turns.counted.is_empty() {
             return;
         }

@@ -56,7 +56,7 @@ impl Impact {
 
     /// Excess of its restitution over its law's prediction, which friction and the motion it causes can only lower; 0 if the two
     /// cannot be compared, as in [`Self::has_own_restitution`].
-    pub fn restitution_excess(&self) -> f64 {
+    pub(crate) fn restitution_excess(&self) -> f64 {
         if self.has_own_restitution() { (self.achieved() - self.law).max(0.0) } else { 0.0 }
     }
 
