@@ -84,7 +84,7 @@ impl Run<'_> {
             }
             if penetration <= AT_WALL * contact.clearance && rate > 0.0 {
                 state.now.contact_states[j] =
-                    state.begin(j, 0.0, rate, UNKNOWN_PUSH, contact.restitution, &mechanism.contacts);
+                    state.begin(j, 0.0, rate, UNKNOWN_PUSH, &mechanism.contacts);
             } else {
                 state.now.contact_states[j] = ContactState::at_onset(coefficients, f64::NEG_INFINITY);
                 state.record.statistics.joints[j].impacts += 1;
