@@ -107,7 +107,7 @@ impl ObservedRun {
     }
 
     /// The simulation, to change a parameter between two sections or read its peaks.
-    pub fn simulation_mut(&mut self) -> &mut Simulation {
+    pub(crate) fn simulation_mut(&mut self) -> &mut Simulation {
         &mut self.simulation
     }
 

@@ -300,7 +300,7 @@ impl PointRun {
     }
 
     /// Whether the point started from the scene's own initial state.
-    pub fn is_cold(&self) -> bool {
+    pub(crate) fn is_cold(&self) -> bool {
         self.started == 0.0
     }
 

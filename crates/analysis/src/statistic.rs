@@ -12,7 +12,7 @@ use jointplay_scene::Scene;
 
 /// A number that summarises the values of a channel over time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Statistic {
+pub(crate) enum Statistic {
     /// Largest value.
     Max,
     /// Smallest value.

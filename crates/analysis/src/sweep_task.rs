@@ -13,7 +13,7 @@ use super::task::Message;
 /// Simulation steps between two checks for cancellation.
 pub(super) const STEPS: u32 = 400;
 /// Coordinates of the output body: x, y, z in m, alpha, beta, gamma in rad.
-pub const COORDINATES: usize = 6;
+pub(crate) const COORDINATES: usize = 6;
 /// Largest total number of kept sections that a window holds and draws.
 const MAX_SECTIONS: usize = 50_000;
 

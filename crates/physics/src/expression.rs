@@ -12,7 +12,7 @@ pub use tape::Tape;
 use crate::suggest::{brief, did_you_mean, nearest_name};
 
 /// Longest expression, bytes.
-pub const MAX_EXPRESSION_LENGTH: usize = 4000;
+pub(crate) const MAX_EXPRESSION_LENGTH: usize = 4000;
 /// Maximum nesting of parentheses, calls, signs and powers.
 const MAX_DEPTH: usize = 60;
 /// Maximum number of intermediate results on the stack.
@@ -153,7 +153,7 @@ impl<N: Number, const COUNT: usize> Number for [N; COUNT] {
 }
 
 /// 10 x^3 - 15 x^4 + 6 x^5 between 0 and 1, constant outside, with its first two derivatives: all three are continuous.
-pub fn smooth_step(x: f64) -> (f64, f64, f64) {
+pub(crate) fn smooth_step(x: f64) -> (f64, f64, f64) {
     if x <= 0.0 {
         return (0.0, 0.0, 0.0);
     }
@@ -411,7 +411,7 @@ pub enum Fault {
     /// Nested too deeply.
     #[error("nested too deeply")]
     TooDeep,
-    /// Longer than [`MAX_EXPRESSION_LENGTH`].
+    /// Longer than 4000 characters.
     #[error("too long; allowed at most {MAX_EXPRESSION_LENGTH} bytes")]
     TooLong,
 }

@@ -35,16 +35,16 @@ pub enum Ends {
 
 impl Ends {
     /// Ends of a motion between rest and rest, or of one period if it `repeats`.
-    pub fn of_motion(repeats: bool) -> Self {
+    pub(crate) fn of_motion(repeats: bool) -> Self {
         if repeats { Self::Periodic } else { Self::Clamped }
     }
 }
 
 /// A function through points, from its first point to its last.
 #[derive(Debug)]
-pub struct Interpolant {
+pub(crate) struct Interpolant {
     /// Abscissas of the points.
-    pub knots: Vec<f64>,
+    pub(crate) knots: Vec<f64>,
     /// Coefficients of the cubic on each interval, in the distance from its left point, lowest power first.
     pub cubics: Vec<[f64; 4]>,
 }
@@ -109,7 +109,7 @@ impl Interpolant {
     }
 
     /// The same on the cubic of interval `i`, continued beyond its ends.
-    pub fn on_cubic(&self, i: usize, x: f64) -> Jet {
+    pub(crate) fn on_cubic(&self, i: usize, x: f64) -> Jet {
         let [a, b, c, d] = self.cubics[i];
         let s = x - self.knots[i];
         Jet::new(a + s * (b + s * (c + s * d)), b + s * (2.0 * c + 3.0 * s * d), 2.0 * c + 6.0 * s * d)

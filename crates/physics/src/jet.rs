@@ -45,7 +45,7 @@ impl Jet {
     }
 
     /// 1 / self.
-    pub fn recip(self) -> Self {
+    pub(crate) fn recip(self) -> Self {
         let g = 1.0 / self.value;
         self.chain(g, -g * g, 2.0 * g * g * g)
     }

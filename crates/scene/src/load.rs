@@ -39,13 +39,13 @@ pub const DEFAULT_SCENE: &str = BUILT_IN[0];
 /// Maximum number of bodies in a scene.
 pub const MAX_BODIES: usize = 10_000;
 /// Maximum number of ball joints in a scene.
-pub const MAX_BALL_JOINTS: usize = 10_000;
+pub(crate) const MAX_BALL_JOINTS: usize = 10_000;
 /// Maximum number of shapes in a scene, on bodies and fixed.
 pub const MAX_SHAPES: usize = 50_000;
 /// Maximum number of force elements of each kind.
-pub const MAX_ELEMENTS: usize = 10_000;
+pub(crate) const MAX_ELEMENTS: usize = 10_000;
 /// Maximum number of corners of a plate.
-pub const MAX_CORNERS: usize = 100;
+pub(crate) const MAX_CORNERS: usize = 100;
 /// Maximum number of changed parameters.
 pub const MAX_CHANGES: usize = 4096;
 

@@ -109,4 +109,5 @@ pub const MAX_PLOTS: usize = 4;
 pub(super) const PRESET: &str = "solver.preset";
 
 /// Keys whose place a preset takes.
-pub const SOLVER_KEYS: [&str; 4] = ["solver.method", "solver.step", "solver.tolerance", "solver.steps_per_impact"];
+pub(crate) const SOLVER_KEYS: [&str; 4] =
+    ["solver.method", "solver.step", "solver.tolerance", "solver.steps_per_impact"];

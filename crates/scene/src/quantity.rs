@@ -56,7 +56,7 @@ impl Quantity {
     }
 
     /// Whether it is a pure number.
-    pub fn is_pure(&self) -> bool {
+    pub(crate) fn is_pure(&self) -> bool {
         matches!(self.powers, Ok([0, 0, 0, 0]))
     }
 

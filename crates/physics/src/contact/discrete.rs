@@ -37,14 +37,14 @@ pub struct StepForce {
     /// Mean normal n = (e0 + e1) / (|e0| + |e1|): |e1| - |e0| = n . (e1 - e0).
     pub normal: Vec3,
     /// dF/du for the mean velocity u of the centres, N s/m.
-    pub by_velocity: Mat3,
+    pub(crate) by_velocity: Mat3,
     /// dF/ds for the mean velocity s used by friction, N s/m.
-    pub by_slip: Mat3,
+    pub(crate) by_slip: Mat3,
 }
 
 impl ContactStep {
     /// Mean normal for the mean velocity `velocity` of the centres, m/s; zero for a ball that stays centred.
-    pub fn mean_normal(&self, velocity: &Vec3) -> Vec3 {
+    pub(crate) fn mean_normal(&self, velocity: &Vec3) -> Vec3 {
         let end = self.start + velocity * self.h;
         let sum = self.start.norm() + end.norm();
         if sum > 0.0 { (self.start + end) / sum } else { Vec3::zeros() }
@@ -70,7 +70,7 @@ impl Coefficients {
     /// Force over `step` for the mean velocity `velocity` of the centres (m/s), so that e1 = e0 + h u, and the mean velocity
     /// `slip` used by friction (m/s). `slip_change` is the change of `slip` by the latest iteration, m/s, infinite before the first:
     /// the derivatives depend on it, the force does not.
-    pub fn step_force(&self, step: &ContactStep, velocity: &Vec3, slip: &Vec3, slip_change: f64) -> StepForce {
+    pub(crate) fn step_force(&self, step: &ContactStep, velocity: &Vec3, slip: &Vec3, slip_change: f64) -> StepForce {
         let ContactStep { h, start, clearances, .. } = *step;
         let end = start + velocity * h;
         let (before, after) = (start.norm(), end.norm());

@@ -65,7 +65,7 @@ impl ElasticLaw {
 
     /// Derivative of the energy by the clearance at the same penetration `d` (m) over the energy, 1/m, for a ball of `radius` (m) in
     /// a gap of `clearance`, m: K ~ sqrt((r + c) / c).
-    pub fn relative_stiffening(radius: f64, clearance: f64) -> f64 {
+    pub(crate) fn relative_stiffening(radius: f64, clearance: f64) -> f64 {
         0.5 * (1.0 / (radius + clearance) - 1.0 / clearance)
     }
 
@@ -92,7 +92,7 @@ impl ElasticLaw {
 
     /// Estimated duration of an impact of a mass `mass` (kg) at `speed` (m/s) with the damping factor `damping`, s: 2.94 d / v
     /// with the maximum penetration of Hertz's theory (K. L. Johnson, Contact Mechanics, section 11.4), reduced for strong damping.
-    pub fn impact_duration(&self, damping: f64, mass: f64, speed: f64) -> f64 {
+    pub(crate) fn impact_duration(&self, damping: f64, mass: f64, speed: f64) -> f64 {
         2.94 * self.deepest(damping, mass, speed) / speed
     }
 
@@ -103,12 +103,12 @@ impl ElasticLaw {
     }
 
     /// Half the oscillation period of a mass `mass` (kg) that rests on the contact under `force` (N), s; infinite without force.
-    pub fn half_period_under(&self, mass: f64, force: f64) -> f64 {
+    pub(crate) fn half_period_under(&self, mass: f64, force: f64) -> f64 {
         std::f64::consts::PI * (mass / self.slope_under(force)).sqrt()
     }
 
     /// Half the oscillation period about the penetration `d` (m) of a mass whose inverse is `mobility` (1/kg), s.
-    pub fn half_period_at(&self, d: f64, mobility: f64) -> f64 {
+    pub(crate) fn half_period_at(&self, d: f64, mobility: f64) -> f64 {
         std::f64::consts::PI / (self.slope(d) * mobility).sqrt()
     }
 }

@@ -39,23 +39,23 @@ pub struct Force {
 #[derive(Clone, Copy, Debug)]
 pub struct Stiffness {
     /// dF/de, N/m.
-    pub by_displacement: Mat3,
+    pub(crate) by_displacement: Mat3,
     /// Derivative with respect to the centres' relative velocity, through the penetration rate, N s/m.
     pub by_rate: Mat3,
     /// Derivative with respect to the velocity [`Coefficients::slip_velocity`], N s/m.
-    pub by_slip: Mat3,
+    pub(crate) by_slip: Mat3,
     /// dn/de, 1/m.
     pub normal: Mat3,
 }
 
 impl Stiffness {
     /// Adds the effect of the derivative `by_normal` (m/s) of the friction velocity with respect to the normal.
-    pub fn add_normal_rotation(&mut self, by_normal: &Mat3) {
+    pub(crate) fn add_normal_rotation(&mut self, by_normal: &Mat3) {
         self.by_displacement += self.by_slip * by_normal * self.normal;
     }
 
     /// Derivatives of a force between two points.
-    pub fn between_points(by_displacement: Mat3, by_rate: Mat3) -> Self {
+    pub(crate) fn between_points(by_displacement: Mat3, by_rate: Mat3) -> Self {
         Self { by_displacement, by_rate, by_slip: Mat3::zeros(), normal: Mat3::zeros() }
     }
 }
@@ -77,14 +77,14 @@ impl Coefficients {
 
     /// Velocity of the ball's contact point relative to the socket's, m/s, from de/dt and the angular velocities of both.
     #[inline]
-    pub fn surface_velocity(&self, normal: &Vec3, velocity: &Vec3, ball: &Vec3, socket: &Vec3) -> Vec3 {
+    pub(crate) fn surface_velocity(&self, normal: &Vec3, velocity: &Vec3, ball: &Vec3, socket: &Vec3) -> Vec3 {
         let radius = self.ball_radius;
         velocity + ball.cross(&(normal * radius)) - socket.cross(&(normal * (radius + self.clearance)))
     }
 
     /// Derivative of [`Self::slip_velocity`] with respect to the normal, m/s. The play is so small that a slight motion of the
     /// ball turns its normal a lot, which changes the sliding velocity of spinning bodies.
-    pub fn slip_velocity_by_normal(&self, ball: &Vec3, socket: &Vec3) -> Mat3 {
+    pub(crate) fn slip_velocity_by_normal(&self, ball: &Vec3, socket: &Vec3) -> Mat3 {
         match self.friction_velocity {
             FrictionVelocity::Centres => Mat3::zeros(),
             FrictionVelocity::Surface => {
@@ -95,7 +95,7 @@ impl Coefficients {
     }
 
     /// Relative velocity used by friction, not yet projected onto the tangent plane, m/s; arguments as in
-    /// [`Self::surface_velocity`].
+    /// `surface_velocity`.
     #[inline]
     pub fn slip_velocity(&self, normal: &Vec3, velocity: &Vec3, ball: &Vec3, socket: &Vec3) -> Vec3 {
         match self.friction_velocity {
@@ -105,7 +105,7 @@ impl Coefficients {
     }
 
     /// Whether friction uses the velocity of the surfaces rather than that of the centres.
-    pub fn uses_surface_velocity(&self) -> bool {
+    pub(crate) fn uses_surface_velocity(&self) -> bool {
         self.friction_velocity == FrictionVelocity::Surface
     }
 
@@ -181,7 +181,7 @@ impl Coefficients {
 
     /// Whether a contact may have left its frozen branches of the laws: the step is then searched for corners.
     #[inline]
-    pub fn leaves_branch(&self, contact_state: &ContactState, gap: &Separation, force: &Force) -> bool {
+    pub(crate) fn leaves_branch(&self, contact_state: &ContactState, gap: &Separation, force: &Force) -> bool {
         contact_state.may_leave_approach_branch(gap.rate)
             || (force.normal > 0.0
                 && self.friction > 0.0
@@ -191,13 +191,13 @@ impl Coefficients {
 
     /// Power dissipated by the damping part of `force`, W: (F_N - F) d(delta)/dt.
     #[inline]
-    pub fn restitution_power(&self, gap: &Separation, force: f64) -> f64 {
+    pub(crate) fn restitution_power(&self, gap: &Separation, force: f64) -> f64 {
         (force - self.elastic.force(gap.penetration)) * gap.rate
     }
 
     /// Power supplied by a ramping clearance, W: -F_N dc/dt + dU/dc dc/dt.
     #[inline]
-    pub fn clearance_power(&self, gap: &Separation, force: f64) -> f64 {
+    pub(crate) fn clearance_power(&self, gap: &Separation, force: f64) -> f64 {
         if self.clearance_rate == 0.0 {
             return 0.0;
         }

@@ -159,7 +159,7 @@ pub struct Coefficients {
     /// Coulomb coefficient; 0 if the friction law is none.
     pub friction: f64,
     /// v_a, m/s.
-    pub slip_low: f64,
+    pub(crate) slip_low: f64,
     /// v_theta, m/s.
     pub slip_high: f64,
     /// Lower bound of the approach speed in the damping term, m/s.
@@ -171,9 +171,9 @@ pub struct Coefficients {
     /// Current clearance c > 0, m.
     pub clearance: f64,
     /// Rate of the clearance while it ramps, m/s.
-    pub clearance_rate: f64,
+    pub(crate) clearance_rate: f64,
     /// Whether the damping term divides by the contact's largest rate so far instead of its rate at the start.
-    pub uses_largest_rate: bool,
+    pub(crate) uses_largest_rate: bool,
 }
 
 impl Coefficients {
@@ -198,7 +198,7 @@ impl Coefficients {
     }
 
     /// Sets the current clearance of a ramp (m), its rate (m/s), and the corresponding elastic law.
-    pub fn set_clearance(&mut self, parameters: &Parameters, clearance: f64, rate: f64) {
+    pub(crate) fn set_clearance(&mut self, parameters: &Parameters, clearance: f64, rate: f64) {
         self.elastic = ElasticLaw::of_ball(parameters, clearance);
         (self.clearance, self.clearance_rate) = (clearance, rate);
     }
@@ -214,7 +214,7 @@ impl Coefficients {
 
     /// F_T / F_N: Coulomb coefficient times the dynamic correction cd of (21), for a sliding speed in m/s.
     #[inline]
-    pub fn friction_ratio(&self, slip_speed: f64) -> f64 {
+    pub(crate) fn friction_ratio(&self, slip_speed: f64) -> f64 {
         if slip_speed >= self.slip_high {
             self.friction
         } else if slip_speed <= self.slip_low {
@@ -226,7 +226,7 @@ impl Coefficients {
 
     /// Derivative of [`Self::friction_ratio`] with respect to the sliding speed, s/m.
     #[inline]
-    pub fn friction_slope(&self, slip_speed: f64) -> f64 {
+    pub(crate) fn friction_slope(&self, slip_speed: f64) -> f64 {
         if slip_speed <= self.slip_low || slip_speed >= self.slip_high {
             0.0
         } else {

@@ -23,7 +23,7 @@ pub enum FrictionBranch {
 
 impl Coefficients {
     /// Branch at a sliding speed (m/s).
-    pub fn friction_branch_at(&self, speed: f64) -> FrictionBranch {
+    pub(crate) fn friction_branch_at(&self, speed: f64) -> FrictionBranch {
         if speed >= self.slip_high {
             FrictionBranch::Full
         } else if speed > self.slip_low || self.slip_low == 0.0 {
@@ -47,7 +47,7 @@ impl Coefficients {
 
     /// Friction force divided by normal force and sliding velocity, s/m, for a branch continued beyond its corners: twice
     /// continuously differentiable, even through zero velocity.
-    pub fn friction_per_speed(&self, branch: FrictionBranch, speed: f64) -> f64 {
+    pub(crate) fn friction_per_speed(&self, branch: FrictionBranch, speed: f64) -> f64 {
         match branch {
             FrictionBranch::Unfrozen => {
                 let ratio = self.friction_ratio(speed);
@@ -64,7 +64,7 @@ impl Coefficients {
     }
 
     /// Derivative of [`Self::friction_per_speed`] with respect to the sliding speed, s^2/m^2.
-    pub fn friction_per_speed_slope(&self, branch: FrictionBranch, speed: f64) -> f64 {
+    pub(crate) fn friction_per_speed_slope(&self, branch: FrictionBranch, speed: f64) -> f64 {
         match branch {
             FrictionBranch::Unfrozen => {
                 let (ratio, slope) = (self.friction_ratio(speed), self.friction_slope(speed));

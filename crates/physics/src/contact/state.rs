@@ -13,7 +13,7 @@ pub struct ContactState {
     /// floor; 0 while free.
     pub approach_speed: f64,
     /// Whether the floor applied: this contact then rebounds higher than requested.
-    pub floored: bool,
+    pub below_speed_floor: bool,
     /// Active branch of the friction law.
     pub friction_branch: FrictionBranch,
     /// Active branch of the approach-speed rule.
@@ -45,23 +45,28 @@ impl ContactPhase {
 
 impl ContactState {
     /// State of a contact that begins at the penetration rate `rate` (m/s).
-    pub fn at_onset(c: &Coefficients, rate: f64) -> Self {
-        Self { active: true, approach_speed: c.with_floor(rate), floored: rate < c.speed_floor, ..Self::default() }
+    pub(crate) fn at_onset(c: &Coefficients, rate: f64) -> Self {
+        Self {
+            active: true,
+            approach_speed: c.with_floor(rate),
+            below_speed_floor: rate < c.speed_floor,
+            ..Self::default()
+        }
     }
 
     /// State of a contact that begins and ends within a step: its approach speed is the current rate.
-    pub fn within_step(c: &Coefficients) -> Self {
+    pub(crate) fn within_step(c: &Coefficients) -> Self {
         Self { approach_branch: ApproachBranch::Rising, ..Self::at_onset(c, c.speed_floor) }
     }
 
     /// The same state with the full laws instead of single branches.
-    pub fn unfrozen(self) -> Self {
+    pub(crate) fn unfrozen(self) -> Self {
         Self { friction_branch: FrictionBranch::Unfrozen, approach_branch: ApproachBranch::Unfrozen, ..self }
     }
 
     /// Updates the largest rate, if the law uses it, after a step that ends at the rate `end`; `fastest` gives the largest rate
     /// within the step. Returns whether the update changes the force at the end of the step.
-    pub fn update_largest_rate(&mut self, c: &Coefficients, end: f64, fastest: impl FnOnce() -> f64) -> bool {
+    pub(crate) fn update_largest_rate(&mut self, c: &Coefficients, end: f64, fastest: impl FnOnce() -> f64) -> bool {
         if !c.uses_largest_rate {
             return false;
         }
@@ -75,7 +80,7 @@ impl ContactState {
 
     /// Selects the current branch of the approach-speed rule if none is frozen. A rate below the largest so far exceeds it only
     /// at a corner, but a rising rate may have stopped rising.
-    pub fn freeze_approach(&mut self, c: &Coefficients, rate: f64) {
+    pub(crate) fn freeze_approach(&mut self, c: &Coefficients, rate: f64) {
         if self.active && self.approach_branch == ApproachBranch::Unfrozen {
             self.approach_branch = c.approach_branch_at(self.approach_speed, rate);
         } else if self.approach_branch == ApproachBranch::Rising && rate < self.approach_speed {
@@ -90,7 +95,7 @@ impl ContactState {
     }
 
     /// Whether the approach speed is the rate itself, so that the damping term does not depend on it.
-    pub fn approach_follows_rate(&self, c: &Coefficients, rate: f64) -> bool {
+    pub(crate) fn approach_follows_rate(&self, c: &Coefficients, rate: f64) -> bool {
         self.active && c.approach_follows_rate(self.approach_branch, self.approach_speed, rate)
     }
 

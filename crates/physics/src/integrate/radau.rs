@@ -126,7 +126,7 @@ pub struct Radau {
 impl Radau {
     /// Interior nodes within a step; the third node is the end. Interpolation of a quantity through them has the order of the
     /// step.
-    pub const INTERIOR: [f64; 2] = [C[0], C[1]];
+    pub(crate) const INTERIOR: [f64; 2] = [C[0], C[1]];
 
     /// Stepper for `dimension` components.
     pub fn new(dimension: usize) -> Self {
@@ -201,7 +201,7 @@ impl Radau {
     }
 
     /// Number of factorisations in the latest attempt.
-    pub fn factorisations(&self) -> u32 {
+    pub(crate) fn factorisations(&self) -> u32 {
         self.factorisations
     }
 

@@ -418,7 +418,7 @@ impl Machine {
     }
 
     /// Bound on the relative acceleration of bodies under gravity and forces, given as pairs of N and kg, m/s^2.
-    pub fn max_acceleration(&self, element_forces: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+    pub(crate) fn max_acceleration(&self, element_forces: impl IntoIterator<Item = (f64, f64)>) -> f64 {
         let element_forces = element_forces.into_iter().map(|(force, mass)| force / mass);
         element_forces.fold(self.gravity.norm(), |sum, push| sum + push)
     }

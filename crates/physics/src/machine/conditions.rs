@@ -30,7 +30,7 @@ impl Machine {
     }
 
     /// This machine under other conditions, given for as many ball joints.
-    pub fn with_conditions(&self, conditions: &Conditions) -> Self {
+    pub(crate) fn with_conditions(&self, conditions: &Conditions) -> Self {
         let mut machine = self.clone();
         machine.gravity = conditions.gravity;
         machine.contact = conditions.contact;

@@ -267,7 +267,7 @@ impl Element {
     }
 
     /// Whether it acts between two points of its own.
-    pub fn is_between_points(&self) -> bool {
+    pub(crate) fn is_between_points(&self) -> bool {
         matches!(self.kind, ElementKind::Spring(_) | ElementKind::Bushing(_))
     }
 
@@ -282,7 +282,7 @@ impl Element {
     }
 
     /// Whether it acts on an angle.
-    pub fn is_on_hinge(&self) -> bool {
+    pub(crate) fn is_on_hinge(&self) -> bool {
         self.coordinate().is_some_and(|on| on.freedom.turns())
     }
 

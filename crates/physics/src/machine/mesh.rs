@@ -56,7 +56,7 @@ impl Mesh {
 
     /// Vertices, relative to `point`, of the tetrahedra that join it to each triangle. The signed volumes add up to that of a
     /// closed mesh.
-    pub fn tetrahedra(&self, point: [f32; 3]) -> impl Iterator<Item = [Vector3<f64>; 3]> {
+    pub(crate) fn tetrahedra(&self, point: [f32; 3]) -> impl Iterator<Item = [Vector3<f64>; 3]> {
         let point = Vector3::from(point.map(f64::from));
         let corner = move |i: u32| Vector3::from(self.vertices[i as usize].map(f64::from)) - point;
         self.triangles.iter().map(move |triangle| triangle.map(corner))

@@ -126,7 +126,7 @@ pub struct Constraints {
     time: Option<f64>,
     positions: Vec<f64>,
     /// Smallest pivot ratio of the latest factorisation.
-    pub least_pivot: f64,
+    pub(crate) least_pivot: f64,
 }
 
 impl Constraints {

@@ -107,7 +107,7 @@ impl Contacts {
     }
 
     /// Whether joint `i` has a clearance.
-    pub fn has_clearance(&self, i: usize) -> bool {
+    pub(crate) fn has_clearance(&self, i: usize) -> bool {
         self.joints[i].has_clearance()
     }
 
@@ -148,13 +148,13 @@ impl Contacts {
     }
 
     /// Starts, ends or restores the ramp of joint `i`.
-    pub fn set_ramp(&mut self, i: usize, ramp: Option<Ramp>) {
+    pub(crate) fn set_ramp(&mut self, i: usize, ramp: Option<Ramp>) {
         self.ramps[i] = ramp;
         self.has_ramps = self.ramps.iter().any(Option::is_some);
     }
 
     /// Sets parameters of joint `i`; `clearance`, m, is its current clearance.
-    pub fn set_parameters(&mut self, i: usize, parameters: &Parameters, clearance: f64) {
+    pub(crate) fn set_parameters(&mut self, i: usize, parameters: &Parameters, clearance: f64) {
         self.parameters[i] = *parameters;
         self.joints[i].law = Coefficients::new(parameters, clearance);
     }

@@ -44,7 +44,7 @@ pub struct CoupledRows {
     /// What a force at each row may accelerate.
     pub spans: Vec<Spans>,
     /// Bandwidth: rows further apart are not coupled.
-    pub bandwidth: usize,
+    pub(crate) bandwidth: usize,
 }
 
 impl CoupledRows {

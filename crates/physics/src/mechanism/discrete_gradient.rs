@@ -575,7 +575,7 @@ impl Mechanism {
     }
 
     /// Measures the end of such a step, at which the next one starts.
-    pub fn measure_step_end(&mut self, t: f64, y: &[f64]) {
+    pub(crate) fn measure_step_end(&mut self, t: f64, y: &[f64]) {
         self.measure(t, y);
         if let Some(discrete) = &mut self.discrete {
             discrete.result.copy_from_slice(y);
@@ -583,27 +583,27 @@ impl Mechanism {
     }
 
     /// Upper bound on the effect of a force at ball joint `j` on its opening, 1/kg.
-    pub fn max_contact_mobility(&self, j: usize) -> f64 {
+    pub(crate) fn max_contact_mobility(&self, j: usize) -> f64 {
         let joint = &self.model.joints[j];
         max_mobility(&self.model, &[joint.carried, joint.carrier])[0]
     }
 
     /// n . W M^-1 W^T n of ball joint `j` in the latest step, 1/kg; `None` if it did not touch.
-    pub fn contact_mobility(&self, j: usize) -> Option<f64> {
+    pub(crate) fn contact_mobility(&self, j: usize) -> Option<f64> {
         let rows = &self.discrete.as_ref()?.rows;
         let row = rows.binary_search_by_key(&j, |row| row.index).ok()?;
         Some(rows[row].mobility)
     }
 
     /// Derivative of the velocities without contact forces at the middle of the latest such step.
-    pub fn contact_free_acceleration(&self) -> &[f64] {
+    pub(crate) fn contact_free_acceleration(&self) -> &[f64] {
         let positions = self.positions();
         self.discrete.as_ref().map_or(&[], |discrete| &discrete.rate[positions..])
     }
 
     /// The ball joints that touched in the latest such step, with the means over it; directions are those of the latest
     /// evaluation.
-    pub fn discrete_contacts(&self) -> impl Iterator<Item = (usize, elements::WallContact)> {
+    pub(crate) fn discrete_contacts(&self) -> impl Iterator<Item = (usize, elements::WallContact)> {
         let rows = self.discrete.iter().flat_map(|discrete| &discrete.rows);
         let contacts = rows.filter_map(|row| Some((row.contact()?.0, row)));
         contacts.filter(|(_, row)| row.normal_force > 0.0).map(|(joint, row)| {
@@ -613,7 +613,7 @@ impl Mechanism {
     }
 
     /// Powers over the latest such step.
-    pub fn discrete_powers(&self) -> Powers {
+    pub(crate) fn discrete_powers(&self) -> Powers {
         self.discrete.as_ref().map_or_else(Powers::default, |discrete| discrete.powers)
     }
 }

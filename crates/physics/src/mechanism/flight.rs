@@ -177,12 +177,12 @@ impl Flight {
     }
 
     /// Whether the series are valid at `t`.
-    pub fn is_valid_at(&self, t: f64) -> bool {
+    pub(crate) fn is_valid_at(&self, t: f64) -> bool {
         t <= self.end
     }
 
     /// Writes the coordinates of `body` at `t` to the state `y`.
-    pub fn write_state(&self, body: &FreeFlightBody, t: f64, y: &mut [f64]) {
+    pub(crate) fn write_state(&self, body: &FreeFlightBody, t: f64, y: &mut [f64]) {
         let s = t - self.start;
         let mut turn = self.turn[ORDER];
         let mut spin = self.spin[ORDER];
@@ -205,12 +205,12 @@ impl Flight {
 
 impl Mechanism {
     /// Bodies capable of free flight.
-    pub fn free_flight_bodies(&self) -> &[FreeFlightBody] {
+    pub(crate) fn free_flight_bodies(&self) -> &[FreeFlightBody] {
         &self.free_flight_bodies
     }
 
     /// Ball and socket bodies of joint `j` that are capable of free flight.
-    pub fn free_flight_bodies_of(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
+    pub(crate) fn free_flight_bodies_of(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
         let joint = &self.model.joints[j];
         let of = |b: BodyIndex| self.free_flight_bodies.binary_search_by_key(&b, |body| body.body).ok();
         [of(joint.carried.body), of(joint.carrier.body)].into_iter().flatten()
@@ -243,7 +243,7 @@ impl Mechanism {
     }
 
     /// Completes an evaluation at (t, y), with `active_set`: adds the motion of the skipped bodies and all gaps.
-    pub fn complete_gaps(&mut self, active_set: ActiveSet<'_>, y: &[f64]) {
+    pub(crate) fn complete_gaps(&mut self, active_set: ActiveSet<'_>, y: &[f64]) {
         if self.contacts.skips_inactive_joints {
             self.equations.update_suspended(&self.model, y);
         }

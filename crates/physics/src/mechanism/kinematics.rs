@@ -46,7 +46,7 @@ impl Kinematics {
 
     /// Sets pose and velocity of a free body from its coordinates: centroid, quaternion (w, x, y, z); velocity, angular velocity.
     #[inline]
-    pub fn move_freely(&mut self, [x, y, z, turn @ ..]: &[f64; 7], &[vx, vy, vz, wx, wy, wz]: &[f64; 6]) {
+    pub(crate) fn move_freely(&mut self, [x, y, z, turn @ ..]: &[f64; 7], &[vx, vy, vz, wx, wy, wz]: &[f64; 6]) {
         self.rotation = rotation_of(turn);
         self.position = Vec3::new(*x, *y, *z);
         self.velocity = Vec3::new(vx, vy, vz);
@@ -55,7 +55,7 @@ impl Kinematics {
 
     /// Velocity of the body-fixed point at `arm` (world axes) from the centroid, m/s.
     #[inline]
-    pub fn point_velocity(&self, arm: &Vec3) -> Vec3 {
+    pub(crate) fn point_velocity(&self, arm: &Vec3) -> Vec3 {
         self.velocity + self.angular_velocity.cross(arm)
     }
 
@@ -110,12 +110,12 @@ impl LooseJoint {
     }
 
     /// de/dt, m/s.
-    pub fn opening_rate(&self, motion: &[Kinematics]) -> Vec3 {
+    pub(crate) fn opening_rate(&self, motion: &[Kinematics]) -> Vec3 {
         self.opening(motion, &self.arms(motion)).1
     }
 
     /// The joint without play.
-    pub fn closed(&self) -> Cut {
+    pub(crate) fn closed(&self) -> Cut {
         Cut::point(self.carried, self.carrier)
     }
 }

@@ -451,7 +451,7 @@ impl Mechanism {
     }
 
     /// Whether positions and velocities are projected onto the constraints after a step.
-    pub fn projects(&self) -> bool {
+    pub(crate) fn projects(&self) -> bool {
         self.equations.projects()
     }
 
@@ -461,13 +461,13 @@ impl Mechanism {
     }
 
     /// Maximum step if the motion is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
-    pub fn kinematic_step(&self) -> f64 {
+    pub(crate) fn kinematic_step(&self) -> f64 {
         let laws = self.elements.iter().filter_map(|element| element.law());
         laws.map(|law| law.shortest_period()).fold(self.model.shortest_period, f64::min) / 50.0
     }
 
     /// Whether derivatives of prescribed motions jump at ends of steps.
-    pub fn has_broken_drives(&self) -> bool {
+    pub(crate) fn has_broken_drives(&self) -> bool {
         !self.model.bounding.is_empty()
     }
 
@@ -479,19 +479,19 @@ impl Mechanism {
 
     /// If the motion is a function of time alone: whether the determinant of the loops' Jacobian is positive. Its sign changes
     /// across a singular pose. Otherwise true.
-    pub fn is_determinant_positive(&mut self) -> bool {
+    pub(crate) fn is_determinant_positive(&mut self) -> bool {
         !self.is_kinematic() || self.equations.is_determinant_positive(&self.model)
     }
 
     /// Distance of the probe's tip, or of the output body's origin if there is no probe, from its motion in closed form at the
     /// latest evaluation, m, if the motion is a function of time alone and known in closed form; otherwise 0.
-    pub fn distance_from_path(&self) -> f64 {
+    pub(crate) fn distance_from_path(&self) -> f64 {
         let ideal = self.closed_motion().filter(|_| self.is_kinematic());
         ideal.map_or(0.0, |ideal| kinematics::distance_from(&ideal, &self.model, self.motion()))
     }
 
     /// Predicts the state after a step `h`, s, to second order in positions, if the motion is a function of time alone.
-    pub fn predict(&self, h: f64, y: &[f64], k: &[f64], step: &mut [f64], out: &mut [f64]) {
+    pub(crate) fn predict(&self, h: f64, y: &[f64], k: &[f64], step: &mut [f64], out: &mut [f64]) {
         let nq = self.model.nq;
         out.copy_from_slice(y);
         for i in 0..self.model.nv {
@@ -559,7 +559,7 @@ impl Mechanism {
     }
 
     /// Position rates from the velocities in `y`, into the leading components of `dy`.
-    pub fn position_rate(&self, y: &[f64], dy: &mut [f64]) {
+    pub(crate) fn position_rate(&self, y: &[f64], dy: &mut [f64]) {
         let dq = &mut dy[..self.positions()];
         self.equations.position_rate(&self.model, y, dq);
     }
@@ -570,12 +570,12 @@ impl Mechanism {
     }
 
     /// Whether the path of the output body is known in closed form.
-    pub fn has_closed_form(&self) -> bool {
+    pub(crate) fn has_closed_form(&self) -> bool {
         self.model.path().is_some()
     }
 
     /// Motion of the output body in closed form at the latest instant, if known.
-    pub fn closed_motion(&self) -> Option<ClosedMotion> {
+    pub(crate) fn closed_motion(&self) -> Option<ClosedMotion> {
         Some(self.model.path()?.1.at(&self.equations.driven().functions.latest))
     }
 
@@ -596,19 +596,19 @@ impl Mechanism {
     /// Whether the reaction of cut joint `j` is unique at the latest evaluation; loose joints come first, then other loop-closing
     /// joints. If a direction is constrained redundantly, [`Self::reaction`] minimises the sum of squares over all such joints,
     /// in N and N m.
-    pub fn is_reaction_unique(&self, j: usize) -> bool {
+    pub(crate) fn is_reaction_unique(&self, j: usize) -> bool {
         self.closed_index(j).is_none_or(|k| self.equations.is_closing_load_unique(k))
     }
 
     /// Directions in which the force, and about which the torque, of cut joint `j` is not unique at the latest evaluation, counted
     /// as in [`Self::is_reaction_unique`]: orthogonal unit vectors, world axes.
-    pub fn undetermined_directions(&self, j: usize) -> [Vec<Vec3>; 2] {
+    pub(crate) fn undetermined_directions(&self, j: usize) -> [Vec<Vec3>; 2] {
         let loads = self.closed_index(j).map_or_else(Vec::new, |k| self.equations.null_closing_loads(k));
         [0, 1].map(|part| span(loads.iter().map(|load| load[part])))
     }
 
     /// Force, N, at the child's point and torque, N m, exerted on its child by each loop-closing joint at the latest evaluation.
-    pub fn closing_loads(&self) -> impl Iterator<Item = [Vec3; 2]> {
+    pub(crate) fn closing_loads(&self) -> impl Iterator<Item = [Vec3; 2]> {
         let first = self.model.ideal_joints.len();
         let all = first..first + self.model.closures.len();
         all.map(|k| self.equations.closing_load(k))
@@ -620,7 +620,7 @@ impl Mechanism {
     }
 
     /// Whether any ball joint is ideal, so that [`Self::reaction`] changes with every evaluation.
-    pub fn has_reactions(&self) -> bool {
+    pub(crate) fn has_reactions(&self) -> bool {
         !self.model.ideal_joints.is_empty()
     }
 
@@ -630,17 +630,17 @@ impl Mechanism {
     }
 
     /// Whether constraint rows were dependent, up to rounding, at the latest evaluation.
-    pub fn has_dependent_rows(&self) -> bool {
+    pub(crate) fn has_dependent_rows(&self) -> bool {
         self.equations.least_pivot() < LEAST_PIVOT
     }
 
     /// Whether the rows were so nearly dependent that steps cannot pass: the pose is singular.
-    pub fn is_nearly_singular(&self) -> bool {
+    pub(crate) fn is_nearly_singular(&self) -> bool {
         self.equations.least_pivot() < NEARLY_DEPENDENT
     }
 
     /// Whether the constraints no longer determine the motion at the latest evaluation.
-    pub fn is_undetermined(&self) -> bool {
+    pub(crate) fn is_undetermined(&self) -> bool {
         self.equations.is_undetermined()
     }
 
@@ -680,7 +680,7 @@ impl Mechanism {
     }
 
     /// Energy stored in contacts and springs at the gaps last measured, at `t`, J.
-    pub fn elastic_energy(&self, t: f64) -> f64 {
+    pub(crate) fn elastic_energy(&self, t: f64) -> f64 {
         let motion = self.equations.motion();
         let mut energy = 0.0;
         for contact in self.contacts.with_clearance() {
@@ -690,13 +690,13 @@ impl Mechanism {
     }
 
     /// Energy stored in springs at the latest evaluation, at `t`, J.
-    pub fn energy_in_elements(&self, t: f64) -> f64 {
+    pub(crate) fn energy_in_elements(&self, t: f64) -> f64 {
         let motion = self.equations.motion();
         self.elements.iter().map(|e| e.stored(t, motion)).sum()
     }
 
     /// Reports of the force elements in scene order; `t`, s, is the time of the latest evaluation.
-    pub fn element_reports(&self, t: f64) -> impl Iterator<Item = ElementReport> {
+    pub(crate) fn element_reports(&self, t: f64) -> impl Iterator<Item = ElementReport> {
         let motion = self.equations.motion();
         let scene_elements = self.elements[..self.scene_elements].iter();
         scene_elements.map(move |e| e.report(t, motion))
@@ -705,7 +705,7 @@ impl Mechanism {
     /// Two indicators per one-sided element: depth of contact, and the smaller of that and an indicator that falls to 0 when
     /// contact is lost while compressed. Then one per element whose force has kinks. `t`, s, is the time of the motion last
     /// measured.
-    pub fn edge_indicators(&self, t: f64) -> impl Iterator<Item = EdgeIndicator> {
+    pub(crate) fn edge_indicators(&self, t: f64) -> impl Iterator<Item = EdgeIndicator> {
         let motion = self.equations.motion();
         let of_contact = self.elements.iter().filter_map(move |e| e.contact_indicators(t, motion)).flatten();
         let segments = self.elements.iter().filter_map(move |e| e.segment(t, motion));
@@ -713,13 +713,13 @@ impl Mechanism {
     }
 
     /// Whether any element is one-sided or has a force with kinks.
-    pub fn has_edges(&self) -> bool {
+    pub(crate) fn has_edges(&self) -> bool {
         self.edge_indicators(0.0).next().is_some()
     }
 
     /// Whether the force of any element in contact, by `indicators` from [`Self::edge_indicators`], has a vertical slope at first
     /// contact.
-    pub fn has_vertical_onset(&self, indicators: &[EdgeIndicator]) -> bool {
+    pub(crate) fn has_vertical_onset(&self, indicators: &[EdgeIndicator]) -> bool {
         let motion = self.equations.motion();
         let one_sided = self.elements.iter().filter(|e| e.contact_indicators(0.0, motion).is_some());
         let in_contact = |own: &[EdgeIndicator]| own[1].side() > 0.0;
@@ -728,7 +728,7 @@ impl Mechanism {
 
     /// Freezes each element on its side of every edge according to `indicators` from [`Self::edge_indicators`], regardless of the
     /// motion; unfreezes it if `indicators` is empty.
-    pub fn freeze_elements(&mut self, indicators: &[EdgeIndicator]) {
+    pub(crate) fn freeze_elements(&mut self, indicators: &[EdgeIndicator]) {
         let motion = self.equations.motion();
         let mut remaining = indicators.iter().map(|indicator| indicator.side());
         for element in self.elements.iter_mut().filter(|e| e.contact_indicators(0.0, motion).is_some()) {
@@ -745,7 +745,7 @@ impl Mechanism {
     }
 
     /// Sets or removes the hand's pull on a body of `machine`, which these equations must belong to.
-    pub fn set_pull(&mut self, machine: &Machine, pull: Option<Pull>) {
+    pub(crate) fn set_pull(&mut self, machine: &Machine, pull: Option<Pull>) {
         self.elements.truncate(self.scene_elements);
         self.pull = pull;
         if let Some(pull) = pull {
@@ -757,18 +757,18 @@ impl Mechanism {
     }
 
     /// Whether the force of any element depends on motion in a possibly stiff way.
-    pub fn has_couplings(&self) -> bool {
+    pub(crate) fn has_couplings(&self) -> bool {
         let motion = self.equations.motion();
         self.elements.iter().any(|e| e.ends(motion).is_some())
     }
 
     /// Origin of the scene frame of body `b` from its centroid, body axes, m.
-    pub fn frame_origin(&self, b: usize) -> Vec3 {
+    pub(crate) fn frame_origin(&self, b: usize) -> Vec3 {
         self.model.bodies[b].origin
     }
 
     /// Allocates the workspace of [`linearise`](crate::integrate::StiffSystem::linearise), so that steps do not allocate.
-    pub fn prepare_linearisation(&mut self) {
+    pub(crate) fn prepare_linearisation(&mut self) {
         if self.stiff.is_none() {
             let (dimension, positions) = (self.dimension(), self.positions());
             self.stiff = Some(Box::new(stiff::Stiff::new(
@@ -781,19 +781,19 @@ impl Mechanism {
     }
 
     /// Approximate cost of linear algebra in the latest implicit step, in evaluations.
-    pub fn implicit_algebra(&self) -> f64 {
+    pub(crate) fn implicit_algebra(&self) -> f64 {
         self.implicit_time() / self.evaluation_time
     }
 
     /// The same, ns.
-    pub fn implicit_time(&self) -> f64 {
+    pub(crate) fn implicit_time(&self) -> f64 {
         let stiff = self.stiff.as_ref();
         let [coordinates, products] = stiff.map_or([0; 2], |stiff| stiff.size());
         bounds::implicit_time(coordinates, products)
     }
 
     /// Approximate time of one evaluation, ns: only its ratio to other such times matters.
-    pub fn evaluation_time(&self) -> f64 {
+    pub(crate) fn evaluation_time(&self) -> f64 {
         self.evaluation_time
     }
 

@@ -25,14 +25,14 @@ pub struct Body {
     pub mass: f64,
     /// Inertia about the centroid, body axes, kg m^2.
     pub inertia: Mat3,
-    pub inertia_inverse: Mat3,
+    pub(crate) inertia_inverse: Mat3,
     /// Parent body, or the world's index.
     pub parent: BodyIndex,
     pub motion: Motion,
     /// Joint point from the parent's centroid, parent axes (world: absolute), m.
-    pub from_parent: Vec3,
+    pub(crate) from_parent: Vec3,
     /// Centroid from the joint point, body axes, m.
-    pub to_centroid: Vec3,
+    pub(crate) to_centroid: Vec3,
     /// Joint axis, parent axes.
     pub axis: Vec3,
     /// Relative rotation = `fixed` + cos q `cosine` + sin q `sine` (`fixed` alone unless revolute).
@@ -42,9 +42,9 @@ pub struct Body {
     /// Origin of the scene's body frame from the centroid, body axes, m.
     pub origin: Vec3,
     /// Whether its motion depends on time alone.
-    pub driven_only: bool,
+    pub(crate) driven_only: bool,
     /// Whether it has a child whose motion does not depend on time alone.
-    pub has_moving_child: bool,
+    pub(crate) has_moving_child: bool,
     /// Whether the inertia is diagonal in body axes.
     pub diagonal: bool,
 }
@@ -85,7 +85,7 @@ pub struct TreeBlock {
     /// Which of its coordinates couple.
     pub pattern: Pattern,
     /// The free body of this block if it is the only one: the mass matrix is then block diagonal.
-    pub single_free_body: Option<BodyIndex>,
+    pub(crate) single_free_body: Option<BodyIndex>,
 }
 
 /// A point fixed to a body.
@@ -117,7 +117,7 @@ pub struct Pair {
     /// Joint axis and two directions perpendicular to it, in the parent's axes.
     pub axes: [Vec3; 3],
     /// The same directions at zero coordinates, in the child's axes.
-    pub child_axes: [Vec3; 3],
+    pub(crate) child_axes: [Vec3; 3],
     /// Second axis of a universal joint, child axes.
     pub second: Vec3,
 }
@@ -152,14 +152,14 @@ pub struct DriveLaw {
 pub struct Model {
     pub bodies: Vec<Body>,
     /// Number of bodies from the scene; the rest are massless links.
-    pub massive: usize,
+    pub(crate) massive: usize,
     /// All bodies, parents before children, and the position of each in that order.
     pub order: Vec<BodyIndex>,
-    pub order_index: Vec<usize>,
+    pub(crate) order_index: Vec<usize>,
     /// Joints of two degrees of freedom, by link.
-    pub two_degree_joints: Vec<Pair>,
+    pub(crate) two_degree_joints: Vec<Pair>,
     /// Joints that close loops.
-    pub closures: Vec<Pair>,
+    pub(crate) closures: Vec<Pair>,
     /// Number of position coordinates.
     pub nq: usize,
     /// Number of velocity coordinates.
@@ -174,19 +174,19 @@ pub struct Model {
     /// Functions of the closed form, for evaluation at every instant.
     pub functions: Tape,
     /// Indices of the closed form's values that the drives and the path of the output body use.
-    pub required_values: Vec<usize>,
+    pub(crate) required_values: Vec<usize>,
     pub start: StartRule,
     /// Position and velocity coordinates at t = 0 as specified in the scene.
-    pub start_state: Vec<f64>,
+    pub(crate) start_state: Vec<f64>,
     /// Factor on the tolerance for each coordinate of (q, v).
     pub scale: Vec<f64>,
     /// Length from which the position scales are derived, m.
     pub length_scale: f64,
     /// Scale of the rotation of each body of the scene as a free body, rad.
-    pub spin_scales: Vec<f64>,
+    pub(crate) spin_scales: Vec<f64>,
     /// Bound on the distance from the origin of every point of the machine with all coordinates at zero, m.
     pub extent: f64,
-    pub output_body: BodyIndex,
+    pub(crate) output_body: BodyIndex,
     /// Probe tip from the output body's centroid, body axes.
     pub probe: Option<Vec3>,
     /// Shortest period of oscillation of a drive, s; infinite if none oscillates.
@@ -384,7 +384,7 @@ impl Model {
     }
 
     /// The two-degree joint whose link or child is body `b`, and which of its coordinates moves `b`.
-    pub fn two_degree_joint_at(&self, b: BodyIndex) -> Option<(&Pair, usize)> {
+    pub(crate) fn two_degree_joint_at(&self, b: BodyIndex) -> Option<(&Pair, usize)> {
         let link = |b: BodyIndex| self.two_degree_joints.get(b.checked_sub(self.massive)?);
         let own = link(b).map(|pair| (pair, 0));
         own.or_else(|| Some((link(self.bodies[b].parent)?, 1)))
@@ -547,7 +547,7 @@ impl Model {
     }
 
     /// Scale of speeds, m/s.
-    pub fn speed_scale(&self) -> f64 {
+    pub(crate) fn speed_scale(&self) -> f64 {
         self.length_scale / SPEED_TIME
     }
 
@@ -580,7 +580,7 @@ impl Model {
     }
 
     /// Whether any joint closes a loop.
-    pub fn closes_loops(&self) -> bool {
+    pub(crate) fn closes_loops(&self) -> bool {
         !self.ideal_joints.is_empty() || !self.closures.is_empty()
     }
 

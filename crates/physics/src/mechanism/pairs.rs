@@ -22,7 +22,7 @@ pub enum Rows {
 
 /// J of one row for its two bodies: (velocity, angular velocity) of the child, then of the parent.
 #[derive(Clone, Copy, Default)]
-pub struct JacobianRow {
+pub(crate) struct JacobianRow {
     pub child: [Vec3; 2],
     pub parent: [Vec3; 2],
 }
@@ -41,7 +41,7 @@ impl Rows {
     /// Calls `visit` with each row's number, Jacobian, and violation with its first and second time derivatives, for the motion
     /// of child and parent and the driven coordinates.
     #[inline(always)]
-    pub fn linearise(
+    pub(crate) fn linearise(
         &self,
         c: &Kinematics,
         p: &Kinematics,
@@ -181,7 +181,7 @@ impl Pair {
     }
 
     /// The row that prescribes coordinate `part`.
-    pub fn driven_row(&self, part: usize, drive: usize) -> Rows {
+    pub(crate) fn driven_row(&self, part: usize, drive: usize) -> Rows {
         let about_axis =
             |child: Vec3, zero: Vec3| Rows::Angle { child, zero, axis: self.axes[0], in_child: false, drive };
         match (self.kind, part) {
@@ -284,7 +284,7 @@ impl Pair {
     }
 
     /// Rate of constraint violation, m/s and rad/s.
-    pub fn opening_rate(&self, motion: &[Kinematics]) -> Opening {
+    pub(crate) fn opening_rate(&self, motion: &[Kinematics]) -> Opening {
         let [c, p] = self.ends(motion);
         let rates = self.rows().map(|rows| {
             let mut sum = Vec3::zeros();

@@ -12,7 +12,7 @@ pub struct Path {
     /// Bodies whose motion depends on time alone.
     pub driven: Vec<BodyIndex>,
     /// All other bodies on the path.
-    pub dynamic: Vec<BodyIndex>,
+    pub(crate) dynamic: Vec<BodyIndex>,
     /// Driven coordinates of both.
     pub drives: Vec<usize>,
     /// Their components of the state.

@@ -12,7 +12,7 @@ pub(super) struct Sources {
     /// Whether there are neither drives nor contacts nor force elements: every power is zero.
     pub none: bool,
     /// Whether the loads alone suffice, because no drive force depends on an unknown acceleration.
-    pub forces_suffice: bool,
+    pub(crate) forces_suffice: bool,
 }
 
 impl Sources {
@@ -36,22 +36,22 @@ impl Sources {
 
 impl Mechanism {
     /// Whether anything other than gravity can supply or dissipate energy.
-    pub fn has_powers(&self) -> bool {
+    pub(crate) fn has_powers(&self) -> bool {
         !self.sources.none
     }
 
     /// Whether motion and forces of the latest evaluation are those at `t`.
-    pub fn is_evaluated_at(&self, t: f64) -> bool {
+    pub(crate) fn is_evaluated_at(&self, t: f64) -> bool {
         self.latest == Latest::Evaluated(t)
     }
 
     /// Whether motion and gaps, at least, are those of a measurement or evaluation at `t`.
-    pub fn is_measured_at(&self, t: f64) -> bool {
+    pub(crate) fn is_measured_at(&self, t: f64) -> bool {
         self.latest == Latest::Measured(t) || self.is_evaluated_at(t)
     }
 
     /// Marks the latest evaluation as stale.
-    pub fn forget_evaluation(&mut self) {
+    pub(crate) fn forget_evaluation(&mut self) {
         self.latest = Latest::Unknown;
     }
 
@@ -77,13 +77,13 @@ impl Mechanism {
     }
 
     /// Contact between the ball of joint `j` and its socket wall at the latest evaluation; `None` without contact force.
-    pub fn wall_contact(&self, j: usize) -> Option<WallContact> {
+    pub(crate) fn wall_contact(&self, j: usize) -> Option<WallContact> {
         self.contacts.joint(j).wall_contact(self.motion())
     }
 
     /// Unit vector from the socket centre of joint `j` to the ball centre at the latest evaluation, in the axes of the socket's
     /// body. It points to the point of the wall nearest to the ball; the two centres must differ.
-    pub fn wall_direction(&self, j: usize) -> Vec3 {
+    pub(crate) fn wall_direction(&self, j: usize) -> Vec3 {
         self.contacts.joint(j).wall_direction(self.motion())
     }
 }

@@ -254,7 +254,7 @@ impl Mechanism {
     }
 
     /// Whether the force of actuator `i` is unique at the latest evaluation.
-    pub fn is_actuator_unique(&mut self, i: usize) -> bool {
+    pub(crate) fn is_actuator_unique(&mut self, i: usize) -> bool {
         self.equations.is_actuator_unique(&self.model, &self.gravity, i)
     }
 }

@@ -24,7 +24,7 @@ impl Mechanism {
 
     /// The same; it sets the entry in `has_left_branch` of each ball joint whose contact leaves the frozen branches of its laws
     /// in an evaluation.
-    pub fn evaluator_with_branches<'a>(
+    pub(crate) fn evaluator_with_branches<'a>(
         &'a mut self,
         active_set: ActiveSet<'a>,
         has_left_branch: &'a mut [bool],

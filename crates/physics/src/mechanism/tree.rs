@@ -54,7 +54,7 @@ pub struct Tree {
     /// Bodies, then the world.
     pub motion: Vec<Kinematics>,
     /// External loads of the latest evaluation, same order.
-    pub wrench: Vec<Wrench>,
+    pub(crate) wrench: Vec<Wrench>,
     /// Motion prescribed by time.
     pub driven: Driven,
     composite: Vec<Composite>,

@@ -5,12 +5,9 @@ mod angles;
 mod channels;
 mod doubt;
 mod frame;
-#[expect(clippy::disallowed_types, reason = "the record for the plots; nothing is computed from it")]
-mod history;
 mod impacts;
 mod ledger;
 mod load_peaks;
-mod pace;
 mod peaks;
 mod report;
 mod simulation;
@@ -22,11 +19,9 @@ pub use angles::angles_of;
 pub use channels::*;
 pub use doubt::{AffectedJoints, Doubt, LedgerTerm};
 pub use frame::*;
-pub use history::{Bin, History, Mark};
 pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use load_peaks::{LoadPeak, LoadPeaks};
-pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE, SPELL};
 pub use simulation::{
     CLEARANCE_SPEED, ChangeError, Model, ProbeFault, Simulation, State, StateMismatch, Workspace, closed,
 };
@@ -101,7 +96,7 @@ pub struct JointStatistics {
     pub impacts: u64,
     /// Finished contacts that began slower than the scene's `impact_speed_floor` or existed at the start: they rebounded higher than
     /// requested.
-    pub floored: u64,
+    pub below_speed_floor: u64,
     /// Contacts that lasted fewer fixed steps than needed to resolve one; 0 with an adaptive method.
     pub coarse: u64,
     /// Deepest penetration at which a contact was found although its beginning should have been located, m; 0 if all were, or with

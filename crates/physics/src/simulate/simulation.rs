@@ -170,9 +170,9 @@ struct Control {
     chatter: u32,
     chatters: bool,
     /// Active scheme of the automatic method.
-    member: ActiveScheme,
+    scheme: ActiveScheme,
     /// Data for the automatic choice of scheme.
-    choice: SchemeSelector,
+    selector: SchemeSelector,
     controller: Controller,
     /// Fixed steps are counted from here, so that times do not accumulate rounding errors.
     grid_origin: f64,
@@ -234,7 +234,7 @@ pub struct Workspace {
 struct WorkspaceId(u64);
 
 /// A state of a model that is stepped in the workspace attached to it.
-struct Run<'a> {
+struct Stepping<'a> {
     model: &'a Model,
     machine: &'a Machine,
     state: &'a mut State,
@@ -353,8 +353,8 @@ impl Simulation {
         Self { model, state, workspace }
     }
 
-    fn run(&mut self) -> Run<'_> {
-        Run::new(&self.model, &mut self.state, &mut self.workspace)
+    fn run(&mut self) -> Stepping<'_> {
+        Stepping::new(&self.model, &mut self.state, &mut self.workspace)
     }
 
     /// The compiled machine.

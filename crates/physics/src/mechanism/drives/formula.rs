@@ -9,7 +9,7 @@ pub(super) struct Formula {
     pub program: Program,
     pub scale: f64,
     /// Longest step, s.
-    pub max_step: f64,
+    pub(crate) max_step: f64,
 }
 
 impl Law for Formula {

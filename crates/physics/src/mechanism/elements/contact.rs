@@ -14,7 +14,7 @@ pub struct Gap {
     /// e = Z_j - Z_i, m (5).
     pub eccentricity: Vec3,
     /// de/dt, m/s.
-    pub eccentricity_rate: Vec3,
+    pub(crate) eccentricity_rate: Vec3,
     /// Position of the ball in its socket. Every evaluation sets it for a ball beyond the wall, and `complete_separation`
     /// completes it for the others. An ideal joint has no penetration.
     pub separation: Separation,

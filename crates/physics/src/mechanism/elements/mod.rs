@@ -113,7 +113,7 @@ impl EdgeIndicator {
     }
 
     /// The value at the first edge on the way to `later`, if there is one.
-    pub fn edge_towards(self, later: Self) -> Option<f64> {
+    pub(crate) fn edge_towards(self, later: Self) -> Option<f64> {
         let [from, to] = [self.side(), later.side()];
         match self {
             _ if from == to => None,
@@ -127,10 +127,10 @@ impl EdgeIndicator {
 /// Accumulators of an evaluation.
 pub(super) struct Loads<'a> {
     /// Loads on the bodies about their centroids; the last is the world's.
-    pub wrench: &'a mut [Wrench],
+    pub(crate) wrench: &'a mut [Wrench],
     pub counts: &'a mut Counts,
     /// By ball joint: set where a contact leaves the frozen branches of its laws. Empty if that is not recorded.
-    pub has_left_branch: &'a mut [bool],
+    pub(crate) has_left_branch: &'a mut [bool],
 }
 
 /// Linearisation of the force between two points with respect to their relative motion.
@@ -145,18 +145,18 @@ pub(super) struct Coupling {
     /// Derivatives of the force.
     pub stiffness: Stiffness,
     /// Whether the slip-dependent part follows the surfaces rather than the points.
-    pub uses_surface_velocity: bool,
+    pub(crate) uses_surface_velocity: bool,
     /// For an element between coincident points of two bodies, in axes fixed to the bodies: the dependence of its torque on their
     /// relative rotation. A common rotation of both bodies leaves force and torque unchanged.
-    pub torque_derivatives: Option<TorqueDerivatives>,
+    pub(crate) torque_derivatives: Option<TorqueDerivatives>,
 }
 
 /// Linearisation of the torque on the first of two bodies (and its opposite on the second) with respect to their relative motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TorqueDerivatives {
     /// Derivatives with respect to relative rotation, N m/rad, and to relative angular velocity, N m s/rad.
-    pub by_rotation: Mat3,
-    pub by_angular_velocity: Mat3,
+    pub(crate) by_rotation: Mat3,
+    pub(crate) by_angular_velocity: Mat3,
 }
 
 impl Coupling {
@@ -196,7 +196,7 @@ pub struct ElementReport {
     /// Torque on the body, N m, if any; for an element on a hinge, on the child.
     pub torque: Option<Vec3>,
     /// Whether the load is a pure torque pair.
-    pub is_pure_torque: bool,
+    pub(crate) is_pure_torque: bool,
     /// For a stop in contact: its depth, and the depth at which it exerts the force given in the scene, m or rad.
     pub depth: Option<[f64; 2]>,
 }
@@ -233,7 +233,7 @@ pub struct WallContact {
     /// F_N, N.
     pub normal_force: f64,
     /// Power dissipated by friction, W.
-    pub friction_power: f64,
+    pub(crate) friction_power: f64,
 }
 
 impl Powers {

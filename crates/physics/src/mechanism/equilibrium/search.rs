@@ -128,7 +128,7 @@ pub(super) struct Search<'a> {
     largest_shift: f64,
     pub difference: f64,
     /// Bound of the rounding error of an energy, J.
-    pub energy_noise: f64,
+    pub(crate) energy_noise: f64,
     evaluations: usize,
 }
 

@@ -1,7 +1,7 @@
 //! Corners of the contact laws as events. During a step each touching joint stays on one branch of the friction law and one of
 //! the approach-speed rule; the step ends where its sliding speed or penetration rate leaves that branch.
 
-use super::{Run, State};
+use super::{State, Stepping};
 use crate::contact::{ApproachBranch, ContactState, FrictionBranch};
 use crate::integrate::find_root;
 
@@ -56,7 +56,7 @@ impl Corner {
     }
 }
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Assigns every touching joint its current branches of the laws; joints that already have branches retain them unless
     /// `reset`. If corners are not located, all joints use the full laws.
     pub(super) fn freeze_branches(&mut self, reset: bool) {
@@ -191,9 +191,9 @@ impl Run<'_> {
             stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, &state.polynomial, scratch_y);
         }
         let time = now.t + theta * h;
-        for flyer in mechanism.free_flight_bodies_of(j) {
-            if let Some(flight) = &state.flights[flyer] {
-                flight.write_state(&mechanism.free_flight_bodies()[flyer], time, scratch_y);
+        for free_body in mechanism.free_flight_bodies_of(j) {
+            if let Some(flight) = &state.flights[free_body] {
+                flight.write_state(&mechanism.free_flight_bodies()[free_body], time, scratch_y);
             }
         }
         mechanism.measure_one(j, time, scratch_y);

@@ -1,9 +1,9 @@
 //! Perturbations of the state, for a twin run and its renormalisation.
 
-use super::{Attempt, Control, Run};
+use super::{Attempt, Control, Stepping};
 use crate::contact::ContactState;
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// As [`Simulation::displace`](crate::simulate::Simulation::displace).
     pub(in crate::simulate) fn displace(&mut self, offset: &[f64]) {
         let Self { mechanism, state, .. } = self;
@@ -46,7 +46,7 @@ impl Run<'_> {
 
     /// Adopts the step control of another run in nearly the same state.
     pub(in crate::simulate) fn adopt_step_control(&mut self, control: &Control) {
-        let turns = self.state.control.member != control.member;
+        let turns = self.state.control.scheme != control.scheme;
         self.state.control.clone_from(control);
         if turns {
             self.freeze_branches(false);
