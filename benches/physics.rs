@@ -32,8 +32,8 @@ fn evaluation(watch: &Stopwatch, label: &str, scene: &Scene, time: f64) {
     let t = simulation.time();
     let y = simulation.state_vector().to_vec();
     let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
-    let joints = 0..mechanism.contacts.len();
-    let states: Vec<_> = joints.map(|j| simulation.contact_state(j)).collect();
+    let joints = 0..scene.machine.loose_joints.len();
+    let states: Vec<_> = joints.flat_map(|j| simulation.contact_states(j)).copied().collect();
     let mut mechanism = mechanism.evaluator(ActiveSet::Located(&states));
     let mut dy = vec![0.0; y.len()];
     let mut n = 0.0;

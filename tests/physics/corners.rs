@@ -14,7 +14,7 @@ fn settled_sliding_keeps_its_law_branch_and_corners_cost_few_rejections() {
             simulation.step().unwrap();
             let frame = frame_now(&mut simulation);
             for (j, joint) in frame.joints.iter().enumerate() {
-                let contact = simulation.contact_state(j);
+                let contact = simulation.contact_states(j)[0];
                 assert!(contact.active && contact.friction_branch != FrictionBranch::Unfrozen, "{method}");
                 let c = simulation.mechanism().contacts.coefficients(j);
                 let beyond = c.excess_over_branch(contact.friction_branch, joint.slip_speed);
@@ -43,7 +43,7 @@ fn a_maximum_rate_is_found_anywhere_within_a_step() {
         let (mut largest, mut speeds) = (0.0_f64, Vec::new());
         while simulation.time() < 0.015 {
             simulation.step().unwrap();
-            let contact = simulation.contact_state(0);
+            let contact = simulation.contact_states(0)[0];
             if contact.active {
                 largest = contact.approach_speed;
             } else if largest > 0.0 {

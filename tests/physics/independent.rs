@@ -51,7 +51,7 @@ fn own_run(name: &str, changes: &Changes, time: f64) -> (Simulation, Vec<Contact
         simulation.take_peaks(&mut peaks);
         for (j, peak) in peaks.iter().enumerate() {
             if peak.impacts > 0 {
-                let speed = simulation.contact_state(j).approach_speed;
+                let speed = simulation.contact_states(j)[0].approach_speed;
                 contacts.push((j, simulation.time(), speed, 0.0));
             } else if let Some(contact) = contacts.iter_mut().rev().find(|c| c.0 == j) {
                 contact.3 = contact.3.max(peak.normal);

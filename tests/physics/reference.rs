@@ -109,7 +109,7 @@ fn first_impacts_have_their_reference_speeds_and_peaks() {
             if let Some(at) = open[j] {
                 impacts[at].3 = impacts[at].3.max(peaks[j].normal);
             }
-            if !simulation.contact_state(j).active {
+            if !simulation.contact_states(j)[0].active {
                 open[j] = None;
             }
         }

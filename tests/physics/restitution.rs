@@ -143,7 +143,7 @@ fn methods_agree_about_the_first_impacts() {
 fn a_live_change_disturbs_an_impact_or_ends_it() {
     let in_contact = || {
         let mut simulation = live("pendulum", &[]);
-        while !simulation.contact_state(0).active {
+        while !simulation.contact_states(0)[0].active {
             simulation.step().unwrap();
         }
         for _ in 0..3 {
@@ -171,7 +171,7 @@ fn recent_impacts_are_kept_all_can_be_taken_and_snapshots_contain_them() {
     }
     let started: u64 = simulation.statistics().impacts();
     let joints = simulation.machine().loose_joints.len();
-    let touching = (0..joints).filter(|&j| simulation.contact_state(j).active);
+    let touching = (0..joints).flat_map(|j| simulation.contact_states(j)).filter(|contact| contact.active);
     assert_eq!(started as usize, taken.len() + touching.count());
     let latest: Vec<Impact> = simulation.impacts().copied().collect();
     assert_eq!(latest.len(), 64);
@@ -214,7 +214,7 @@ fn struck_contact(method: &str, approach_speed: &str) -> LiveScene {
         ("solver.steps_per_impact", "256"),
     ];
     let mut simulation = LiveScene::new(&parse(&text.replace(start, touching), &changes)).unwrap();
-    while !simulation.contact_state(0).active {
+    while !simulation.contact_states(0)[0].active {
         simulation.step().unwrap();
     }
     simulation.set("gravity.z", "-981 m/s^2").unwrap();

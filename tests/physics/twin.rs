@@ -37,7 +37,7 @@ fn a_displaced_state_continues_from_its_displacement() {
 fn contacts_follow_a_displacement_and_keep_their_state() {
     let mut simulation = simulation("spcmm", &[]);
     run_until(&mut simulation, 1.0);
-    let contacts = |simulation: &Simulation| [0, 1, 2].map(|j| simulation.contact_state(j));
+    let contacts = |simulation: &Simulation| [0, 1, 2].map(|j| simulation.contact_states(j)[0]);
     let (settled, hash) = (contacts(&simulation), simulation.state_hash());
     assert!(settled.iter().all(|m| m.active));
     let begun = |simulation: &Simulation| [0, 1, 2].map(|j| simulation.statistics().joints[j].impacts);

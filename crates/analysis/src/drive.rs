@@ -172,7 +172,12 @@ impl Orbit for Simulation {
     /// True only while the same balls are in contact. Otherwise one run is in an impact that the other has not reached or has
     /// left.
     fn is_comparable(&self, twin: &Self) -> bool {
-        (0..self.machine().loose_joints.len()).all(|j| self.contact_state(j).active == twin.contact_state(j).active)
+        (0..self.machine().loose_joints.len()).all(|j| {
+            self.contact_states(j)
+                .iter()
+                .map(|contact| contact.active)
+                .eq(twin.contact_states(j).iter().map(|contact| contact.active))
+        })
     }
 
     fn observables(&self) -> usize {

@@ -239,7 +239,10 @@ fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<Simul
     let loose: Vec<usize> = joints.filter(|(_, joint)| joint.contact.clearance > 0.0).map(|(j, _)| j).collect();
     advance_capped(&mut simulation, SETTLING_TIME_LIMIT, SEARCH_COST, context, |simulation| {
         simulation.take_peaks(&mut peaks);
-        if loose.iter().any(|&j| !simulation.contact_state(j).active || peaks[j].impacts > 0) {
+        if loose
+            .iter()
+            .any(|&j| simulation.contact_states(j).iter().all(|contact| !contact.active) || peaks[j].impacts > 0)
+        {
             since = simulation.time();
         }
         settled = simulation.time() - since >= QUIET_TIME;

@@ -1,7 +1,7 @@
 //! Jacobian columns of a contact, one per coordinate.
 
 use super::equations::Equations;
-use super::model::{Anchor, LooseJoint, Model};
+use super::model::{Anchor, Model, Site};
 use crate::contact::Coefficients;
 use crate::machine::Vec3;
 
@@ -19,8 +19,8 @@ pub struct Column {
 }
 
 /// Centres of ball and socket, in that order, each with the distance from it to the wall, m.
-pub fn contact_sides(joint: &LooseJoint, c: &Coefficients) -> [(Anchor, f64); 2] {
-    [(joint.carried, c.ball_radius), (joint.carrier, c.ball_radius + c.clearance)]
+pub fn contact_sides(site: &Site, c: &Coefficients) -> [(Anchor, f64); 2] {
+    [(site.carried, c.ball_radius), (site.carrier, c.ball_radius + c.clearance)]
 }
 
 /// Fills `columns` with the velocity of the first point relative to the second per unit rate of each coordinate, and likewise for

@@ -1,13 +1,14 @@
-//! Ball joints of a scene: active contacts, clearance ramps and gaps. Allocates nothing. The force of a single joint is in
-//! `elements/contact.rs`.
+//! Contacts of the loose joints of a scene: forces, clearance ramps and gaps. Allocates nothing. The force of a single contact is
+//! in `elements/contact.rs`.
 
 use serde::{Deserialize, Serialize};
 
 use super::elements::{ActiveSet, At, Contact, ForceElement, Gap, Loads};
 use super::kinematics::Kinematics;
-use super::model::{LooseJoint, Model};
+use super::model::{ContactId, Model, Site};
 use crate::contact::{Coefficients, Parameters};
 use crate::machine::{Machine, Vec3, root};
+use std::ops::Range;
 
 /// A clearance that ramps to a new value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,7 +23,7 @@ pub struct Ramp {
     pub to: f64,
 }
 
-/// Group of each ball joint of `machine`: a tree of bodies, with all trees that joints and force elements connect to it.
+/// Group of each contact of `machine`: a tree of bodies, with all trees that joints and force elements connect to it.
 fn groups(machine: &Machine, model: &Model) -> Vec<usize> {
     let block_of = |body: usize| {
         let moves = model.bodies.get(body).is_some_and(|body| !body.driven_only);
@@ -46,11 +47,11 @@ fn groups(machine: &Machine, model: &Model) -> Vec<usize> {
     for element in &machine.elements {
         connect(&mut element.points(machine).iter().filter_map(|point| point.body));
     }
-    let group = |joint: &LooseJoint| {
-        let block = block_of(joint.carried.body).or_else(|| block_of(joint.carrier.body));
+    let group = |site: &Site| {
+        let block = block_of(site.carried.body).or_else(|| block_of(site.carrier.body));
         block.map_or(usize::MAX, |block| root(&mut above, block))
     };
-    model.joints.iter().map(group).collect()
+    model.sites.iter().map(group).collect()
 }
 
 impl Ramp {
@@ -61,102 +62,124 @@ impl Ramp {
     }
 }
 
-/// All ball joints of a scene.
+/// The contacts of a scene's loose joints.
 pub struct Contacts {
-    joints: Vec<Contact>,
-    parameters: Vec<Parameters>,
-    ramps: Vec<Option<Ramp>>,
+    contacts: Vec<Contact>,
+    joints: Vec<JointContacts>,
     has_ramps: bool,
-    has_contacts: bool,
-    /// Joints of the same group act on one another.
+    /// Contacts of the same group act on one another.
     groups: Vec<usize>,
     /// Evaluations skip joints without contact, because some of their bodies are suspended.
     pub(super) skips_inactive_joints: bool,
 }
 
+/// A loose joint's play, and its contacts.
+struct JointContacts {
+    parameters: Parameters,
+    ramp: Option<Ramp>,
+    contacts: Range<ContactId>,
+}
+
 impl Contacts {
     /// Contacts of `machine`.
     pub fn new(machine: &Machine, model: &Model) -> Self {
-        let parameters: Vec<Parameters> = machine.loose_joints.iter().map(|j| j.contact).collect();
-        let joints: Vec<Contact> = model
-            .joints
-            .iter()
-            .zip(&parameters)
-            .enumerate()
-            .map(|(i, (&joint, p))| Contact::new(i, joint, Coefficients::new(p, p.clearance)))
-            .collect();
+        let joints = machine.loose_joints.iter().zip(&model.joints).map(|(joint, compiled)| JointContacts {
+            parameters: joint.contact,
+            ramp: None,
+            contacts: compiled.contacts.clone(),
+        });
+        let contacts = model.sites.iter().enumerate().map(|(id, &site)| {
+            let parameters = &machine.loose_joints[site.joint].contact;
+            Contact::new(id, site, Coefficients::new(parameters, parameters.clearance))
+        });
         Self {
-            has_contacts: joints.iter().any(Contact::has_clearance),
-            ramps: vec![None; joints.len()],
-            joints,
-            parameters,
+            contacts: contacts.collect(),
+            joints: joints.collect(),
             groups: groups(machine, model),
             has_ramps: false,
             skips_inactive_joints: false,
         }
     }
 
-    /// Number of ball joints, ideal ones included.
+    /// Number of contacts.
     pub fn len(&self) -> usize {
-        self.joints.len()
+        self.contacts.len()
     }
 
-    /// Whether there are no ball joints.
+    /// Whether there are no contacts.
     pub fn is_empty(&self) -> bool {
-        self.joints.is_empty()
+        self.contacts.is_empty()
     }
 
-    /// Whether joint `i` has a clearance.
-    pub(crate) fn has_clearance(&self, i: usize) -> bool {
-        self.joints[i].has_clearance()
+    /// Contacts of loose joint `j`; none if it is ideal.
+    pub fn of_joint(&self, j: usize) -> Range<ContactId> {
+        self.joints[j].contacts.clone()
     }
 
-    /// Whether the forces of joints `i` and `j` act on one another: their bodies are connected, however far, other than through
+    /// Loose joint to which contact `c` belongs.
+    pub fn joint_of(&self, c: ContactId) -> usize {
+        self.contacts[c].site.joint
+    }
+
+    /// Whether the forces of contacts `c` and `d` act on one another: their bodies are connected, however far, other than through
     /// the world and driven bodies.
-    pub fn interact(&self, i: usize, j: usize) -> bool {
-        self.groups[i] == self.groups[j]
+    pub fn interact(&self, c: ContactId, d: ContactId) -> bool {
+        self.groups[c] == self.groups[d]
     }
 
-    /// Joints with clearance.
-    pub(super) fn with_clearance(&self) -> impl Iterator<Item = &Contact> {
-        self.joints.iter().filter(|contact| contact.has_clearance())
+    /// All contacts.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Contact> {
+        self.contacts.iter()
     }
 
-    /// Gaps of all joints at the latest evaluation.
+    /// Contact `c`.
+    pub(super) fn contact(&self, c: ContactId) -> &Contact {
+        &self.contacts[c]
+    }
+
+    /// Gaps of all contacts at the latest evaluation.
     pub fn gaps(&self) -> impl Iterator<Item = &Gap> {
-        self.joints.iter().map(|contact| &contact.gap)
+        self.contacts.iter().map(|contact| &contact.gap)
     }
 
-    /// Ball joint `i`.
-    pub(super) fn joint(&self, i: usize) -> &Contact {
-        &self.joints[i]
+    /// Gap of contact `c` at the latest evaluation.
+    pub fn gap(&self, c: ContactId) -> &Gap {
+        &self.contacts[c].gap
     }
 
-    /// Gap of joint `i` at the latest evaluation.
-    pub fn gap(&self, i: usize) -> &Gap {
-        &self.joints[i].gap
+    /// Coefficients of contact `c`.
+    pub fn coefficients(&self, c: ContactId) -> &Coefficients {
+        &self.contacts[c].law
     }
 
-    /// Coefficients of joint `i`.
-    pub fn coefficients(&self, i: usize) -> &Coefficients {
-        &self.joints[i].law
+    /// Clearance of contact `c` at the latest evaluation, m.
+    pub fn clearance(&self, c: ContactId) -> f64 {
+        self.contacts[c].law.clearance
     }
 
-    /// Clearance of joint `i` at the latest evaluation, m.
-    pub fn clearance(&self, i: usize) -> f64 {
-        self.joints[i].law.clearance
+    /// Parameters of loose joint `j`.
+    pub fn parameters(&self, j: usize) -> &Parameters {
+        &self.joints[j].parameters
     }
 
-    /// Starts, ends or restores the ramp of joint `i`.
-    pub(crate) fn set_ramp(&mut self, i: usize, ramp: Option<Ramp>) {
-        self.ramps[i] = ramp;
-        self.has_ramps = self.ramps.iter().any(Option::is_some);
+    /// Clearance of loose joint `j` at the latest evaluation, m; 0 if it is ideal.
+    pub fn joint_clearance(&self, j: usize) -> f64 {
+        self.of_joint(j).next().map_or(0.0, |c| self.clearance(c))
     }
 
-    /// Sets parameters of joint `i`; `clearance`, m, is its current clearance.
-    pub(crate) fn set_parameters(&mut self, i: usize, parameters: &Parameters, clearance: f64) {
-        self.parameters[i] = *parameters;
-        self.joints[i].law = Coefficients::new(parameters, clearance);
+    /// Starts, ends or restores the ramp of joint `j`.
+    pub(crate) fn set_ramp(&mut self, j: usize, ramp: Option<Ramp>) {
+        self.joints[j].ramp = ramp;
+        self.has_ramps = self.joints.iter().any(|joint| joint.ramp.is_some());
+    }
+
+    /// Sets parameters of joint `j`; `clearance`, m, is its current clearance.
+    pub(crate) fn set_parameters(&mut self, j: usize, parameters: &Parameters, clearance: f64) {
+        let joint = &mut self.joints[j];
+        joint.parameters = *parameters;
+        for contact in &mut self.contacts[joint.contacts.clone()] {
+            contact.law = Coefficients::new(parameters, clearance);
+        }
     }
 
     /// Updates ramped clearances to `t`.
@@ -165,23 +188,24 @@ impl Contacts {
         if !self.has_ramps {
             return;
         }
-        for i in 0..self.joints.len() {
-            if let Some(ramp) = self.ramps[i] {
+        for joint in &self.joints {
+            if let Some(ramp) = joint.ramp {
                 let (clearance, rate) = ramp.at(t);
-                let law = &mut self.joints[i].law;
-                law.set_clearance(&self.parameters[i], clearance, rate);
+                for contact in &mut self.contacts[joint.contacts.clone()] {
+                    contact.law.set_clearance(&joint.parameters, clearance, rate);
+                }
             }
         }
     }
 
     /// Adds contact forces and updates gaps, if any contact may carry a force.
     pub(super) fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        if !self.has_contacts || matches!(at.active_set, ActiveSet::Nothing) {
+        if self.contacts.is_empty() || matches!(at.active_set, ActiveSet::Nothing) {
             return;
         }
         self.update_ramps(at.t);
         loads.counts.contacts += 1;
-        for contact in self.joints.iter_mut().filter(|contact| contact.has_clearance()) {
+        for contact in &mut self.contacts {
             if self.skips_inactive_joints && !contact.may_carry_force(at.active_set) {
                 contact.gap = Gap::default();
             } else {
@@ -192,7 +216,7 @@ impl Contacts {
 
     /// Completes the gaps of the latest evaluation, with `active_set`, and measures those it skipped.
     pub(super) fn complete_separations(&mut self, active_set: ActiveSet<'_>, motion: &[Kinematics]) {
-        for contact in &mut self.joints {
+        for contact in &mut self.contacts {
             if self.skips_inactive_joints && !contact.may_carry_force(active_set) {
                 contact.measure(motion);
             } else {
@@ -204,25 +228,25 @@ impl Contacts {
     /// Gap geometry at `t`, without forces.
     pub fn measure(&mut self, t: f64, motion: &[Kinematics]) {
         self.update_ramps(t);
-        for contact in &mut self.joints {
+        for contact in &mut self.contacts {
             contact.measure(motion);
         }
     }
 
-    /// The same for joint `i` alone.
-    pub fn measure_one(&mut self, i: usize, t: f64, motion: &[Kinematics]) {
+    /// The same for contact `c` alone.
+    pub fn measure_one(&mut self, c: ContactId, t: f64, motion: &[Kinematics]) {
         self.update_ramps(t);
-        self.joints[i].measure(motion);
+        self.contacts[c].measure(motion);
     }
 
-    /// Relative velocity used by friction at the contact of joint `i` for the normal `n`, m/s.
-    pub fn slip_velocity(&self, i: usize, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
-        self.joints[i].slip_velocity(n, motion)
+    /// Relative velocity used by friction at contact `c` for the normal `n`, m/s.
+    pub fn slip_velocity(&self, c: ContactId, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
+        self.contacts[c].slip_velocity(n, motion)
     }
 
-    /// Sliding speed of joint `i` in the motion last measured, m/s; the ball must be off centre.
-    pub fn slip_speed(&self, i: usize, motion: &[Kinematics]) -> f64 {
-        let contact = &self.joints[i];
+    /// Sliding speed of contact `c` in the motion last measured, m/s; the ball must be off centre.
+    pub fn slip_speed(&self, c: ContactId, motion: &[Kinematics]) -> f64 {
+        let contact = &self.contacts[c];
         let at = &contact.gap.separation;
         let slip_velocity = contact.slip_velocity(&at.normal, motion);
         at.sliding_velocity(&slip_velocity).norm()

@@ -16,7 +16,7 @@ use super::coupled::{CoupledRows, add_impulse, apply_inverse_mass, mobility_betw
 use super::elements::{ActiveSet, At, Counts, Powers, SceneElement};
 use super::equations::Equations;
 use super::kinematics::Kinematics;
-use super::model::{Anchor, Model};
+use super::model::{Anchor, ContactId, Model};
 use super::systems::Evaluator;
 use super::{Latest, Mechanism, MechanismError, elements};
 use crate::contact::{Coefficients, ContactState, ContactStep, StepForce};
@@ -124,7 +124,7 @@ impl SolvedRow {
 
 /// Workspace, allocated once.
 pub struct DiscreteGradient {
-    joints: usize,
+    contacts: usize,
     /// Upper bounds on the effect of a force and a torque of each element on its relative motion, 1/kg and 1/(kg m^2).
     max_mobility: Vec<[f64; 2]>,
     coupled: CoupledRows,
@@ -149,7 +149,7 @@ pub struct DiscreteGradient {
     mean: Vec<f64>,
     displacement: Vec<f64>,
     scratch: Vec<f64>,
-    starts: Vec<JointStart>,
+    starts: Vec<ContactStart>,
     /// State at the end of the latest step, as measured.
     result: Vec<f64>,
     /// Powers over the step.
@@ -158,7 +158,7 @@ pub struct DiscreteGradient {
 
 /// A ball joint at the start of the step.
 #[derive(Clone, Copy, Default)]
-struct JointStart {
+struct ContactStart {
     /// e, m.
     eccentricity: Vec3,
     /// Penetration rate and slip velocity, m/s.
@@ -201,13 +201,13 @@ impl DiscreteGradient {
         elements: &[[Anchor; 2]],
     ) -> Result<Self, MechanismError> {
         let n = dimension - positions;
-        let joints = model.joints.len();
-        let of_joints = model.joints.iter().map(|joint| [joint.carried.body, joint.carrier.body]);
+        let contacts = model.sites.len();
+        let of_contacts = model.sites.iter().map(|site| [site.carried.body, site.carrier.body]);
         let of_elements = elements.iter().flat_map(|ends| [ends.map(|end| end.body); 2]);
-        let coupled = CoupledRows::new(model, n, within, of_joints.chain(of_elements))?;
+        let coupled = CoupledRows::new(model, n, within, of_contacts.chain(of_elements))?;
         let (rows, bandwidth) = (coupled.spans.len(), coupled.bandwidth);
         Ok(Self {
-            joints,
+            contacts,
             max_mobility: elements.iter().map(|ends| max_mobility(model, ends)).collect(),
             band: Band::with_capacity(rows, bandwidth),
             rows: Vec::with_capacity(rows),
@@ -224,7 +224,7 @@ impl DiscreteGradient {
             mean: vec![0.0; n],
             displacement: vec![0.0; n],
             scratch: vec![0.0; n],
-            starts: vec![JointStart::default(); joints],
+            starts: vec![ContactStart::default(); contacts],
             result: vec![0.0; dimension],
             powers: Powers::default(),
             coupled,
@@ -235,7 +235,7 @@ impl DiscreteGradient {
     fn record_start(&mut self, contacts: &Contacts, motion: &[Kinematics]) {
         for (j, start) in self.starts.iter_mut().enumerate() {
             let gap = contacts.gap(j);
-            *start = JointStart {
+            *start = ContactStart {
                 eccentricity: gap.eccentricity,
                 rate: gap.separation.rate,
                 slip: contacts.slip_velocity(j, &gap.separation.normal, motion),
@@ -245,12 +245,9 @@ impl DiscreteGradient {
         }
     }
 
-    /// Collects the joints that touch or may, from the gaps just measured at the guessed end; all loose ones if `all`.
-    fn gather(&mut self, model: &Model, contacts: &Contacts, from: &StepStart<'_>, all: bool) {
-        for (j, joint) in model.joints.iter().enumerate() {
-            if joint.ideal.is_some() {
-                continue;
-            }
+    /// Collects the contacts that touch or may, from the gaps just measured at the guessed end; all of them if `all`.
+    fn gather(&mut self, contacts: &Contacts, from: &StepStart<'_>, all: bool) {
+        for j in 0..contacts.len() {
             let start = &mut self.starts[j];
             start.clearances[1] = contacts.clearance(j);
             let end = contacts.gap(j).eccentricity;
@@ -300,7 +297,7 @@ impl DiscreteGradient {
             if 0.5 * h * change < MIN_RELATIVE_CHANGE {
                 continue;
             }
-            let row = self.joints + 2 * i;
+            let row = self.contacts + 2 * i;
             let columns = &mut self.columns[row];
             match torque_gain {
                 Some(gain) => {
@@ -325,14 +322,14 @@ impl DiscreteGradient {
         for row in &mut self.rows {
             let columns = &mut self.columns[row.index];
             if let Law::Contact(law) = &row.law {
-                let (joint, n) = (&model.joints[row.index], row.normal);
+                let (site, n) = (&model.sites[row.index], row.normal);
                 let motion = equations.motion();
                 let spin = |body: usize| &motion[body].angular_velocity;
-                let (ball, socket) = (spin(joint.carried.body), spin(joint.carrier.body));
+                let (ball, socket) = (spin(site.carried.body), spin(site.carrier.body));
                 let mean = row.guessed[0];
                 row.guessed[1] = law.slip_velocity(&n, &mean, ball, socket);
                 row.guessed[2] = law.surface_velocity(&n, &mean, ball, socket);
-                collect_columns(columns, model, equations, &contact_sides(joint, law), &n);
+                collect_columns(columns, model, equations, &contact_sides(site, law), &n);
             }
             let [centres, slip] = row.of_motion(moved_by(columns, |i| self.mean[i] - self.guess[i]));
             row.free = [row.guessed[0] + centres, row.guessed[1] + slip];
@@ -582,16 +579,16 @@ impl Mechanism {
         }
     }
 
-    /// Upper bound on the effect of a force at ball joint `j` on its opening, 1/kg.
-    pub(crate) fn max_contact_mobility(&self, j: usize) -> f64 {
-        let joint = &self.model.joints[j];
-        max_mobility(&self.model, &[joint.carried, joint.carrier])[0]
+    /// Upper bound on the effect of a force at contact `c` on its opening, 1/kg.
+    pub(crate) fn max_contact_mobility(&self, c: ContactId) -> f64 {
+        let site = &self.model.sites[c];
+        max_mobility(&self.model, &[site.carried, site.carrier])[0]
     }
 
-    /// n . W M^-1 W^T n of ball joint `j` in the latest step, 1/kg; `None` if it did not touch.
-    pub(crate) fn contact_mobility(&self, j: usize) -> Option<f64> {
+    /// n . W M^-1 W^T n of contact `c` in the latest step, 1/kg; `None` if it did not touch.
+    pub(crate) fn contact_mobility(&self, c: ContactId) -> Option<f64> {
         let rows = &self.discrete.as_ref()?.rows;
-        let row = rows.binary_search_by_key(&j, |row| row.index).ok()?;
+        let row = rows.binary_search_by_key(&c, |row| row.index).ok()?;
         Some(rows[row].mobility)
     }
 
@@ -601,14 +598,14 @@ impl Mechanism {
         self.discrete.as_ref().map_or(&[], |discrete| &discrete.rate[positions..])
     }
 
-    /// The ball joints that touched in the latest such step, with the means over it; directions are those of the latest
+    /// The contacts that touched in the latest such step, with the means over it; directions are those of the latest
     /// evaluation.
-    pub(crate) fn discrete_contacts(&self) -> impl Iterator<Item = (usize, elements::WallContact)> {
+    pub(crate) fn discrete_contacts(&self) -> impl Iterator<Item = (ContactId, elements::WallContact)> {
         let rows = self.discrete.iter().flat_map(|discrete| &discrete.rows);
         let contacts = rows.filter_map(|row| Some((row.contact()?.0, row)));
-        contacts.filter(|(_, row)| row.normal_force > 0.0).map(|(joint, row)| {
+        contacts.filter(|(_, row)| row.normal_force > 0.0).map(|(contact, row)| {
             let (normal_force, friction_power) = (row.normal_force, row.friction_power);
-            (joint, elements::WallContact { direction: self.wall_direction(joint), normal_force, friction_power })
+            (contact, elements::WallContact { direction: self.wall_direction(contact), normal_force, friction_power })
         })
     }
 
@@ -619,7 +616,7 @@ impl Mechanism {
 }
 
 impl Evaluator<'_> {
-    /// Takes the step `from`, with the state at its end in `y_end`, ideal joints not yet closed. Considers all loose joints if
+    /// Takes the step `from`, with the state at its end in `y_end`, ideal joints not yet closed. Considers all contacts if
     /// `all`, otherwise those that the guessed motion brings near their walls. Returns whether the iteration converged.
     pub fn discrete_step(&mut self, from: &StepStart<'_>, all: bool, y_end: &mut [f64]) -> bool {
         let Some(mut discrete) = self.mechanism.discrete.take() else {
@@ -668,7 +665,7 @@ impl Evaluator<'_> {
             self.mechanism.measure(t + h, &discrete.end);
             discrete.rows.clear();
             if !matches!(self.active_set, ActiveSet::Nothing) {
-                discrete.gather(&self.mechanism.model, &self.mechanism.contacts, from, all);
+                discrete.gather(&self.mechanism.contacts, from, all);
             }
             // All forces except those of contacts, at the middle.
             let active_set = std::mem::replace(&mut self.active_set, ActiveSet::Nothing);
@@ -709,7 +706,7 @@ impl Evaluator<'_> {
         let positions = equations.positions(model);
         let mut powers = Powers::default();
         for row in &mut discrete.rows {
-            let Some((joint, _)) = row.contact() else {
+            let Some((contact, _)) = row.contact() else {
                 continue;
             };
             let [centres, surfaces] = moved_by(&discrete.columns[row.index], |i| discrete.mean[i] - discrete.guess[i]);
@@ -718,14 +715,14 @@ impl Evaluator<'_> {
             let normal = -row.force.dot(&n);
             let end = (row.step.start + u * h).norm() - row.step.clearances[1];
             let start = row.step.start.norm() - row.step.clearances[0];
-            let law = contacts.coefficients(joint);
+            let law = contacts.coefficients(contact);
             let stored = law.elastic.energy(end) - law.elastic.energy(start);
             row.normal_force = normal;
             row.friction_power = -(row.force + n * normal).dot(&s);
             powers.restitution += (normal * (end - start) - stored) / h;
             powers.friction += row.friction_power;
             // A clearance that shrinks also stiffens the contact.
-            let stiffened = law.elastic.energy(start) - discrete.starts[joint].stored;
+            let stiffened = law.elastic.energy(start) - discrete.starts[contact].stored;
             powers.clearance += (stiffened - normal * (row.step.clearances[1] - row.step.clearances[0])) / h;
         }
         if sources.none {
@@ -738,18 +735,18 @@ impl Evaluator<'_> {
         if !model.drives.is_empty() {
             let (motion, wrench) = equations.loads();
             for row in &discrete.rows {
-                let Some((joint, law)) = row.contact() else {
+                let Some((contact, law)) = row.contact() else {
                     continue;
                 };
-                let joint = &model.joints[joint];
-                let [arm_ball, arm_socket] = joint.arms(motion);
+                let site = &model.sites[contact];
+                let [arm_ball, arm_socket] = site.arms(motion);
                 // Only friction has a lever arm about the centres.
                 let n = row.law_force.normal;
                 let turning = row.normal.cross(&(row.force - n * row.force.dot(&n)));
-                let ball = &mut wrench[joint.carried.body];
+                let ball = &mut wrench[site.carried.body];
                 ball.force += row.force;
                 ball.torque += arm_ball.cross(&row.force) + turning * law.ball_radius;
-                let socket = &mut wrench[joint.carrier.body];
+                let socket = &mut wrench[site.carrier.body];
                 socket.force -= row.force;
                 socket.torque -= arm_socket.cross(&row.force) + turning * (law.ball_radius + law.clearance);
             }

@@ -1,7 +1,7 @@
 //! Interface of a formulation of the equations of motion; no other module depends on the details of one.
 
 use super::kinematics::{Driven, Kinematics, Wrench};
-use super::model::{BodyIndex, LooseJoint, Model};
+use super::model::{BodyIndex, Model, Site};
 use super::path::Path;
 use crate::machine::{Mat3, Vec3};
 
@@ -56,8 +56,8 @@ pub(super) trait Equations: Send + Sync {
     /// The same for the suspended bodies, after [`Self::update_active`] at this instant.
     fn update_suspended(&mut self, _model: &Model, _y: &[f64]) {}
 
-    /// Bodies that determine the gap of `joint`; `None` if they are nearly all that [`Self::update_kinematics`] moves.
-    fn path(&self, model: &Model, joint: &LooseJoint) -> Option<Path>;
+    /// Bodies that determine the gap at `site`; `None` if they are nearly all that [`Self::update_kinematics`] moves.
+    fn path(&self, model: &Model, site: &Site) -> Option<Path>;
 
     /// [`Self::update_kinematics`] for the bodies on `path` alone.
     fn update_along(&mut self, model: &Model, t: f64, y: &[f64], path: &Path);

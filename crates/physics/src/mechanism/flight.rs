@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::kinematics::{part, rotation_of};
-use super::model::{Body, BodyIndex, Motion};
+use super::model::{Body, BodyIndex, ContactId, Motion};
 use super::{ActiveSet, Mechanism};
 use std::ops::Range;
 
@@ -22,8 +22,8 @@ const LONGEST: f64 = 0.1;
 pub struct FreeFlightBody {
     /// Body index.
     pub body: BodyIndex,
-    /// Ball joints whose ball or socket is on the body.
-    pub joints: Vec<usize>,
+    /// Contacts on the body.
+    pub contacts: Vec<ContactId>,
     q: usize,
     v: usize,
 }
@@ -41,17 +41,19 @@ impl FreeFlightBody {
         for body in points.filter_map(|point| point.body) {
             loaded[body] = true;
         }
-        let mut joints = vec![Vec::new(); model.bodies.len() + 1];
-        for (j, joint) in model.joints.iter().enumerate() {
-            joints[joint.carried.body].push(j);
-            if joint.carrier.body != joint.carried.body {
-                joints[joint.carrier.body].push(j);
+        let mut contacts = vec![Vec::new(); model.bodies.len() + 1];
+        for (c, site) in model.sites.iter().enumerate() {
+            contacts[site.carried.body].push(c);
+            if site.carrier.body != site.carried.body {
+                contacts[site.carrier.body].push(c);
             }
         }
         // In order of body index, like the blocks.
         let single = model.blocks.iter().filter_map(|block| block.single_free_body);
         let free_flight_body = |body: BodyIndex| match model.bodies[body].motion {
-            Motion::Free { q, v } => Some(Self { body, joints: std::mem::take(&mut joints[body]), q, v: model.nq + v }),
+            Motion::Free { q, v } => {
+                Some(Self { body, contacts: std::mem::take(&mut contacts[body]), q, v: model.nq + v })
+            }
             _ => None,
         };
         single.filter(|&b| !loaded[b]).filter_map(free_flight_body).collect()
@@ -209,11 +211,11 @@ impl Mechanism {
         &self.free_flight_bodies
     }
 
-    /// Ball and socket bodies of joint `j` that are capable of free flight.
-    pub(crate) fn free_flight_bodies_of(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
-        let joint = &self.model.joints[j];
+    /// Bodies of contact `c` that are capable of free flight.
+    pub(crate) fn free_flight_bodies_of(&self, c: ContactId) -> impl Iterator<Item = usize> + use<> {
+        let site = &self.model.sites[c];
         let of = |b: BodyIndex| self.free_flight_bodies.binary_search_by_key(&b, |body| body.body).ok();
-        [of(joint.carried.body), of(joint.carrier.body)].into_iter().flatten()
+        [of(site.carried.body), of(site.carrier.body)].into_iter().flatten()
     }
 
     /// Free flight of `body` from the state `y` at `t`.

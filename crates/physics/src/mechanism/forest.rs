@@ -3,7 +3,7 @@
 use super::constraints::Constraints;
 use super::equations::Equations;
 use super::kinematics::{Driven, Kinematics, Wrench};
-use super::model::{BodyIndex, LooseJoint, Model, Motion};
+use super::model::{BodyIndex, Model, Motion, Site};
 use super::path::Path;
 use super::power::inverse_dynamics;
 use super::tree::{self, Tree};
@@ -108,8 +108,8 @@ impl Equations for Forest {
         self.tree.update_suspended(model, y);
     }
 
-    fn path(&self, model: &Model, joint: &LooseJoint) -> Option<Path> {
-        Path::of(model, joint)
+    fn path(&self, model: &Model, site: &Site) -> Option<Path> {
+        Path::of(model, site)
     }
 
     fn update_along(&mut self, model: &Model, t: f64, y: &[f64], path: &Path) {

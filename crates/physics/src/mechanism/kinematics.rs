@@ -1,8 +1,7 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
 use super::closed_form::{ClosedMotion, Values};
-use super::model::{Anchor, Body, BodyIndex, LooseJoint, Model, Motion};
-use super::pairs::Cut;
+use super::model::{Body, BodyIndex, Model, Motion, Site};
 use super::path::Path;
 use crate::jet::Jet;
 use crate::machine::{Mat3, Quat, Vec3};
@@ -87,36 +86,20 @@ pub fn angular_velocity_of(q: &[f64], d: &[f64]) -> [f64; 3] {
     ]
 }
 
-impl LooseJoint {
-    /// Centres of ball and socket from the centroids of their bodies, m.
+impl Site {
+    /// Points of the carried part and of the carrier from the centroids of their bodies, m.
     // Inlined: called three times per evaluation, and shorter than the call.
     #[inline(always)]
     pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
-        let arm = |anchor: &Anchor| motion[anchor.body].rotation * anchor.offset;
-        [arm(&self.carried), arm(&self.carrier)]
+        [&self.carried, &self.carrier].map(|anchor| motion[anchor.body].rotation * anchor.offset)
     }
 
-    /// e and de/dt, m and m/s, given the arms of both centres.
+    /// e and de/dt, m and m/s, given the arms of both points.
     // Inlined: every evaluation needs it for every contact, and a call would cost a few per cent.
     #[inline(always)]
-    pub fn opening(&self, motion: &[Kinematics], [ball, socket]: &[Vec3; 2]) -> (Vec3, Vec3) {
+    pub fn opening(&self, motion: &[Kinematics], [carried, carrier]: &[Vec3; 2]) -> (Vec3, Vec3) {
         let (b, s) = (&motion[self.carried.body], &motion[self.carrier.body]);
-        ((b.position + ball) - (s.position + socket), b.point_velocity(ball) - s.point_velocity(socket))
-    }
-
-    /// e = Z_j - Z_i, m (5).
-    pub fn eccentricity(&self, motion: &[Kinematics]) -> Vec3 {
-        self.opening(motion, &self.arms(motion)).0
-    }
-
-    /// de/dt, m/s.
-    pub(crate) fn opening_rate(&self, motion: &[Kinematics]) -> Vec3 {
-        self.opening(motion, &self.arms(motion)).1
-    }
-
-    /// The joint without play.
-    pub(crate) fn closed(&self) -> Cut {
-        Cut::point(self.carried, self.carrier)
+        ((b.position + carried) - (s.position + carrier), b.point_velocity(carried) - s.point_velocity(carrier))
     }
 }
 

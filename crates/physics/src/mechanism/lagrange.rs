@@ -5,7 +5,7 @@
 
 use super::equations::{Equations, LEAST_PIVOT};
 use super::kinematics::{self, Driven, Kinematics, Wrench, part};
-use super::model::{Anchor, BodyIndex, LooseJoint, Model, Motion, Pair};
+use super::model::{Anchor, BodyIndex, Model, Motion, Pair, Site};
 use super::pairs::{JacobianRow, Rows};
 use super::path::Path;
 use super::rows::RowSystem;
@@ -363,8 +363,8 @@ impl Equations for Lagrange {
         }
     }
 
-    fn path(&self, model: &Model, joint: &LooseJoint) -> Option<Path> {
-        Some(Path::of_bodies(model, joint))
+    fn path(&self, model: &Model, site: &Site) -> Option<Path> {
+        Some(Path::of_bodies(model, site))
     }
 
     fn update_along(&mut self, model: &Model, _: f64, y: &[f64], path: &Path) {

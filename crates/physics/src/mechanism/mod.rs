@@ -23,6 +23,7 @@ mod forest;
 mod held;
 mod kinematics;
 mod lagrange;
+mod loose;
 mod lu;
 mod massless;
 mod model;
@@ -68,6 +69,7 @@ use elements::{ForceElement, SceneElement, elements_of};
 use equations::{Equations, LEAST_PIVOT, NEARLY_DEPENDENT};
 use forest::Forest;
 use lagrange::Lagrange;
+pub use model::ContactId;
 pub(crate) use model::Model;
 use model::Motion;
 use path::Path;
@@ -328,9 +330,9 @@ fn unclosed(remaining: &[OpenJoint]) -> String {
 pub struct Mechanism {
     model: Arc<Model>,
     equations: Box<dyn Equations>,
-    /// Ball joints with clearance.
+    /// Contacts of the loose joints.
     pub contacts: Contacts,
-    /// Bodies that determine the gap of each ball joint; `None` if nearly all do.
+    /// Bodies that determine the gap of each contact; `None` if nearly all do.
     paths: Vec<Option<Path>>,
     /// The scene's elements in its order, then the pulling hand, if any.
     elements: Vec<Box<dyn SceneElement>>,
@@ -403,9 +405,9 @@ impl Mechanism {
             Formulation::Tree => Box::new(Forest::new(&model)),
             Formulation::Lagrange => Box::new(Lagrange::new(machine, &model)),
         };
-        let path = |joint| equations.path(&model, joint);
+        let path = |site| equations.path(&model, site);
         let mut mechanism = Self {
-            paths: model.joints.iter().map(path).collect(),
+            paths: model.sites.iter().map(path).collect(),
             evaluation_time: bounds::evaluation_time(machine, &model),
             sources: power::Sources::new(&model, &*equations, machine.elements.len()),
             elements: elements_of(machine, &model),
@@ -515,24 +517,24 @@ impl Mechanism {
         self.contacts.measure(t, self.equations.motion());
     }
 
-    /// Components of the state read by [`Self::measure_one`] for ball joint `j`; `None` if it reads all.
-    pub fn gap_components(&self, j: usize) -> Option<&[Range<usize>]> {
-        self.paths[j].as_ref().map(|path| &path.parts[..])
+    /// Components of the state read by [`Self::measure_one`] for contact `c`; `None` if it reads all.
+    pub fn gap_components(&self, c: ContactId) -> Option<&[Range<usize>]> {
+        self.paths[c].as_ref().map(|path| &path.parts[..])
     }
 
-    /// Measures the gap of ball joint `j` at (t, y), and the motion of the bodies that determine it.
-    pub fn measure_one(&mut self, j: usize, t: f64, y: &[f64]) {
+    /// Measures the gap of contact `c` at (t, y), and the motion of the bodies that determine it.
+    pub fn measure_one(&mut self, c: ContactId, t: f64, y: &[f64]) {
         self.latest = Latest::Unknown;
-        match &self.paths[j] {
+        match &self.paths[c] {
             Some(path) => self.equations.update_along(&self.model, t, y, path),
             None => self.equations.update_kinematics(&self.model, t, y),
         }
-        self.contacts.measure_one(j, t, self.equations.motion());
+        self.contacts.measure_one(c, t, self.equations.motion());
     }
 
-    /// Sliding speed of ball joint `j` in the motion last measured, m/s.
-    pub fn slip_speed(&self, j: usize) -> f64 {
-        self.contacts.slip_speed(j, self.motion())
+    /// Sliding speed of contact `c` in the motion last measured, m/s.
+    pub fn slip_speed(&self, c: ContactId) -> f64 {
+        self.contacts.slip_speed(c, self.motion())
     }
 
     /// Number of components of a state: positions, then velocities.
@@ -577,6 +579,12 @@ impl Mechanism {
     /// Motion of the output body in closed form at the latest instant, if known.
     pub(crate) fn closed_motion(&self) -> Option<ClosedMotion> {
         Some(self.model.path()?.1.at(&self.equations.driven().functions.latest))
+    }
+
+    /// Origin of the carried part's frame of loose joint `j` from that of the carrier's at the latest evaluation, m: e = Z_j - Z_i
+    /// (5).
+    pub fn separation(&self, j: usize) -> Vec3 {
+        self.model.joints[j].opening(self.motion(), 0)
     }
 
     /// Constraint force on the carried part of loose joint `j` at the latest evaluation, N; `None` for a joint with clearance.
@@ -683,7 +691,7 @@ impl Mechanism {
     pub(crate) fn elastic_energy(&self, t: f64) -> f64 {
         let motion = self.equations.motion();
         let mut energy = 0.0;
-        for contact in self.contacts.with_clearance() {
+        for contact in self.contacts.iter() {
             energy += contact.stored(t, motion);
         }
         energy + self.energy_in_elements(t)

@@ -1,5 +1,6 @@
 //! A scene compiled for the equations of motion: centroid frames, coordinate numbering, trees, drives.
 
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use super::assembly::{Assembled, Settled};
@@ -10,7 +11,8 @@ use super::pairs::{Cut, Opening};
 use crate::expression::Tape;
 use crate::jet::Jet;
 use crate::machine::{
-    Attachment, ClosedForm, Drive, Freedom, Joint, JointKind, JointStart, Machine, Mat3, Path, Quat, StartRule, Vec3,
+    Attachment, ClosedForm, Drive, Freedom, Joint, JointKind, JointStart, LooseKind, Machine, Mat3, Path, Quat,
+    StartRule, Vec3,
 };
 
 /// Index of a body: the scene's bodies, then massless links; one past the last is the world.
@@ -97,14 +99,28 @@ pub struct Anchor {
 }
 
 /// A cut joint that may have play.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct LooseJoint {
-    /// The centre of the socket.
+    pub kind: LooseKind,
+    /// Origins of the frames of the carrier and of the carried part.
     pub carrier: Anchor,
-    /// The centre of the ball.
     pub carried: Anchor,
     /// Index among the ideal joints; `None` with clearance.
     pub ideal: Option<usize>,
+    /// Its contacts; none if it is ideal.
+    pub contacts: Range<ContactId>,
+}
+
+/// Number of a contact among those of all joints.
+pub type ContactId = usize;
+
+/// Where the bodies of a loose joint can touch: a point of the carrier and one of the carried part.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    /// Index among the loose joints.
+    pub joint: usize,
+    pub carrier: Anchor,
+    pub carried: Anchor,
 }
 
 /// A joint between two bodies, in the tree or closing a loop.
@@ -169,6 +185,8 @@ pub struct Model {
     pub block_of: Vec<usize>,
     pub joints: Vec<LooseJoint>,
     pub ideal_joints: Vec<usize>,
+    /// Contacts of the loose joints, in their order.
+    pub sites: Vec<Site>,
     pub drives: Vec<DriveLaw>,
     pub closed_form: Option<ClosedForm>,
     /// Functions of the closed form, for evaluation at every instant.
@@ -329,6 +347,7 @@ impl Model {
             block_of: vec![0; world],
             joints: Vec::new(),
             ideal_joints: Vec::new(),
+            sites: Vec::new(),
             drives,
             closed_form: machine.closed_form.clone(),
             required_values,
@@ -352,11 +371,14 @@ impl Model {
                 model.ideal_joints.push(index);
                 model.ideal_joints.len() - 1
             });
-            model.joints.push(LooseJoint {
-                carrier: model.anchor(machine, &joint.carrier()),
-                carried: model.anchor(machine, &joint.carried()),
-                ideal,
-            });
+            let [carrier, carried] = [joint.carrier(), joint.carried()].map(|point| model.anchor(machine, &point));
+            let first = model.sites.len();
+            if ideal.is_none() {
+                let sites = joint.kind.sites([carrier, carried]);
+                model.sites.extend(sites.map(|[carrier, carried]| Site { joint: index, carrier, carried }));
+            }
+            let contacts = first..model.sites.len();
+            model.joints.push(LooseJoint { kind: joint.kind, carrier, carried, ideal, contacts });
         }
         for joint in &machine.closing_joints {
             let [parent, child] = joint.points().map(|point| model.anchor(machine, &point));
@@ -560,7 +582,7 @@ impl Model {
     /// Violation at `motion` of cut joint `k`, a loose joint or one that closes a loop, as if it had no play.
     pub fn opening(&self, k: usize, motion: &[Kinematics]) -> Opening {
         match self.joints.get(k) {
-            Some(joint) => Opening { apart: joint.eccentricity(motion), turned: 0.0 },
+            Some(joint) => Opening { apart: joint.opening(motion, 0), turned: 0.0 },
             None => self.closures[k - self.joints.len()].opening(motion),
         }
     }
@@ -568,7 +590,7 @@ impl Model {
     /// Its rate.
     pub fn opening_rate(&self, k: usize, motion: &[Kinematics]) -> Opening {
         match self.joints.get(k) {
-            Some(joint) => Opening { apart: joint.opening_rate(motion), turned: 0.0 },
+            Some(joint) => Opening { apart: joint.opening(motion, 1), turned: 0.0 },
             None => self.closures[k - self.joints.len()].opening_rate(motion),
         }
     }

@@ -138,16 +138,22 @@ impl Cut {
         [arm, if slides { c.position + arm - p.position } else { p.rotation * self.parent.offset }]
     }
 
-    /// Separation of two points that coincide, m, or its first or second derivative.
+    /// Separation of its points, m, or its first or second derivative.
     #[inline]
     pub fn separation(&self, motion: &[Kinematics], order: usize) -> Vec3 {
-        let (c, p) = (&motion[self.child.body], &motion[self.parent.body]);
-        let (child, parent) = (c.rotation * self.child.offset, p.rotation * self.parent.offset);
-        match order {
-            0 => (c.position + child) - (p.position + parent),
-            1 => c.point_velocity(&child) - p.point_velocity(&parent),
-            _ => c.point_acceleration(&child) - p.point_acceleration(&parent),
-        }
+        separation([&self.child, &self.parent], motion, order)
+    }
+}
+
+/// The first of two points from the second, m, or the first or second derivative of that.
+#[inline]
+pub fn separation([child, parent]: [&Anchor; 2], motion: &[Kinematics], order: usize) -> Vec3 {
+    let (c, p) = (&motion[child.body], &motion[parent.body]);
+    let (child, parent) = (c.rotation * child.offset, p.rotation * parent.offset);
+    match order {
+        0 => (c.position + child) - (p.position + parent),
+        1 => c.point_velocity(&child) - p.point_velocity(&parent),
+        _ => c.point_acceleration(&child) - p.point_acceleration(&parent),
     }
 }
 

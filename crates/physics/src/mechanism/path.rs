@@ -1,6 +1,6 @@
-//! The few bodies that determine the gap of one ball joint, so that event location need not evaluate the others.
+//! The few bodies that determine the gap of one contact, so that event location need not evaluate the others.
 
-use super::model::{BodyIndex, LooseJoint, Model, Motion};
+use super::model::{BodyIndex, Model, Motion, Site};
 use std::ops::Range;
 
 /// Maximum path length: longer paths save too little.
@@ -20,10 +20,10 @@ pub struct Path {
 }
 
 impl Path {
-    /// Path of `joint` in tree coordinates; `None` if it is too long.
-    pub fn of(model: &Model, joint: &LooseJoint) -> Option<Self> {
+    /// Path of `site` in tree coordinates; `None` if it is too long.
+    pub fn of(model: &Model, site: &Site) -> Option<Self> {
         let mut bodies = Vec::with_capacity(LONGEST);
-        for mut b in [joint.carried.body, joint.carrier.body] {
+        for mut b in [site.carried.body, site.carrier.body] {
             while b != model.world() {
                 if bodies.len() == LONGEST {
                     return None;
@@ -51,10 +51,10 @@ impl Path {
         Some(path)
     }
 
-    /// Path of `joint` if each body has its own seven positions and six velocities.
-    pub fn of_bodies(model: &Model, joint: &LooseJoint) -> Self {
+    /// Path of `site` if each body has its own seven positions and six velocities.
+    pub fn of_bodies(model: &Model, site: &Site) -> Self {
         let mut path = Self::default();
-        for b in [joint.carried.body, joint.carrier.body] {
+        for b in [site.carried.body, site.carrier.body] {
             if b != model.world() && !path.dynamic.contains(&b) {
                 path.dynamic.push(b);
                 path.add_parts(7 * b..7 * b + 7, 7 * model.massive + 6 * b, 6);

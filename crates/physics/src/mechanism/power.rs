@@ -3,7 +3,7 @@
 use super::elements::{ForceElement, Powers, WallContact};
 use super::equations::Equations;
 use super::kinematics::{Kinematics, Wrench};
-use super::model::{Model, Motion};
+use super::model::{ContactId, Model, Motion};
 use super::{Latest, Mechanism};
 use crate::machine::Vec3;
 
@@ -20,7 +20,7 @@ impl Sources {
     pub(super) fn new(model: &Model, equations: &dyn Equations, elements: usize) -> Self {
         let n = model.bodies.len();
         let drives = !model.drives.is_empty();
-        let contacts = model.joints.iter().any(|joint| joint.ideal.is_none());
+        let contacts = !model.sites.is_empty();
         // Parents come before children.
         let mut moved = vec![false; n + 1];
         let mut carries_free_body = false;
@@ -59,7 +59,7 @@ impl Mechanism {
     pub(super) fn powers_of_latest(&mut self, t: f64, y: &[f64], dy: &[f64]) -> Powers {
         let mut powers = Powers::default();
         let motion = self.equations.motion();
-        for contact in self.contacts.with_clearance() {
+        for contact in self.contacts.iter() {
             contact.add_powers(t, motion, &mut powers);
         }
         for element in &self.elements {
@@ -76,15 +76,15 @@ impl Mechanism {
         powers
     }
 
-    /// Contact between the ball of joint `j` and its socket wall at the latest evaluation; `None` without contact force.
-    pub(crate) fn wall_contact(&self, j: usize) -> Option<WallContact> {
-        self.contacts.joint(j).wall_contact(self.motion())
+    /// The ball and its socket wall at contact `c` at the latest evaluation; `None` without contact force.
+    pub(crate) fn wall_contact(&self, c: ContactId) -> Option<WallContact> {
+        self.contacts.contact(c).wall_contact(self.motion())
     }
 
-    /// Unit vector from the socket centre of joint `j` to the ball centre at the latest evaluation, in the axes of the socket's
+    /// Unit vector from the socket centre of contact `c` to the ball centre at the latest evaluation, in the axes of the socket's
     /// body. It points to the point of the wall nearest to the ball; the two centres must differ.
-    pub(crate) fn wall_direction(&self, j: usize) -> Vec3 {
-        self.contacts.joint(j).wall_direction(self.motion())
+    pub(crate) fn wall_direction(&self, c: ContactId) -> Vec3 {
+        self.contacts.contact(c).wall_direction(self.motion())
     }
 }
 

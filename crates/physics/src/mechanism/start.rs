@@ -73,18 +73,18 @@ impl Mechanism {
         }
         tree.update_kinematics(model, T, &y);
         let guess = tree.motion.clone();
-        let distance = |j: usize| model.joints[j].eccentricity(&guess).norm();
+        let distance = |j: usize| model.joints[j].opening(&guess, 0).norm();
         for j in 0..model.joints.len() {
             let d = distance(j);
             let joint = || self.joint_names[j].clone();
-            let clearance = self.contacts.clearance(j);
+            let clearance = self.contacts.joint_clearance(j);
             if all.contains(&j) {
                 // An assembled start needs only a rough guess, from which Newton's method closes the joints.
                 if d > MAX_GIVEN_GAP && !assembled {
                     let given = self.gap(j, model.opening(j, &guess));
                     return Err(MechanismError::Open { given });
                 }
-            } else if d > clearance + 0.01 * self.contacts.coefficients(j).ball_radius {
+            } else if d > clearance + 0.01 * self.contacts.parameters(j).ball_radius {
                 return Err(MechanismError::OutsideSocket { joint: joint(), distance: d, clearance });
             }
         }

@@ -115,7 +115,7 @@ impl Stiff {
         self.is_coupled_pair.fill(false);
         self.empty = true;
         let at = At { t, motion, active_set };
-        let of_contacts = contacts.with_clearance().map(|contact| contact.coupling(&at));
+        let of_contacts = contacts.iter().map(|contact| contact.coupling(&at));
         let of_elements = elements.iter().map(|element| element.coupling(&at));
         for coupling in of_contacts.chain(of_elements).flatten() {
             self.empty = false;

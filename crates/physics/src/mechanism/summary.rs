@@ -43,7 +43,6 @@ impl Summary {
         let equations = &mechanism.equations;
         let velocity_coordinates = equations.velocities(model);
         let (constraint_rows, rank) = (equations.rows(), equations.rank());
-        let contacts: Vec<usize> = (0..model.joints.len()).filter(|&j| mechanism.contacts.has_clearance(j)).collect();
         Self {
             bodies: model.massive,
             driven_bodies: model.bodies[..model.massive].iter().filter(|b| b.driven_only).count(),
@@ -55,11 +54,8 @@ impl Summary {
             degrees_of_freedom: velocity_coordinates.saturating_sub(rank),
             ideal_joints: model.ideal_joints.len(),
             closing_joints: model.closures.len(),
-            frictional_contacts: contacts
-                .iter()
-                .filter(|&&j| mechanism.contacts.coefficients(j).friction > 0.0)
-                .count(),
-            contacts: contacts.len(),
+            frictional_contacts: mechanism.contacts.iter().filter(|contact| contact.law.friction > 0.0).count(),
+            contacts: mechanism.contacts.len(),
             single_body_blocks: model.blocks.iter().filter(|b| b.single_free_body.is_some()).count(),
             largest_implicit: mechanism.largest_implicit(),
             solves_differential_equation: !mechanism.is_kinematic(),

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::peaks::PenetrationCubic;
 use crate::contact::{Coefficients, undisturbed_restitution};
+use crate::mechanism::ContactId;
 
 /// Number of latest impacts stored.
 const STORED_IMPACTS: usize = 64;
@@ -76,7 +77,7 @@ impl Impact {
     }
 }
 
-/// The impact of one joint under way, if any, and the law of its impacts.
+/// The impact of one contact under way, if any, and the law of its impacts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Contacting {
     impact: Option<Impact>,
@@ -87,8 +88,8 @@ struct Contacting {
 /// Impacts under way and the latest finished ones: part of a simulation's state. Allocates nothing after `new`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Impacts {
-    /// By joint.
-    joints: Vec<Contacting>,
+    /// By contact.
+    contacts: Vec<Contacting>,
     /// Finished ones, as a ring buffer: impact n is at index n modulo its length.
     finished: Vec<Impact>,
     /// Number of finished ones, and of those handed out.
@@ -102,31 +103,32 @@ impl Impacts {
         &self.finished
     }
 
-    /// A record for `joints` ball joints. A step finishes at most one impact per joint, so that all of them can be collected
+    /// A record for this number of contacts. A step finishes at most one impact at each, so that all of them can be collected
     /// between two steps.
-    pub(super) fn new(joints: usize) -> Self {
+    pub(super) fn new(contacts: usize) -> Self {
         Self {
-            joints: vec![Contacting { impact: None, law: (0.0, 1.0) }; joints],
-            finished: vec![Impact::default(); STORED_IMPACTS.max(joints)],
+            contacts: vec![Contacting { impact: None, law: (0.0, 1.0) }; contacts],
+            finished: vec![Impact::default(); STORED_IMPACTS.max(contacts)],
             count: 0,
             handed_out: 0,
         }
     }
 
-    /// Whether they fit a scene with `joints` ball joints.
-    pub(super) fn fits(&self, joints: usize) -> bool {
-        let own = Self::new(joints);
-        let mut known = self.joints.iter().filter_map(|joint| joint.impact.as_ref()).chain(&self.finished);
-        self.joints.len() == joints
+    /// Whether they fit a scene with this number of contacts and loose joints.
+    pub(super) fn fits(&self, contacts: usize, joints: usize) -> bool {
+        let own = Self::new(contacts);
+        let mut known = self.contacts.iter().filter_map(|contact| contact.impact.as_ref()).chain(&self.finished);
+        self.contacts.len() == contacts
             && self.finished.len() == own.finished.len()
             && self.handed_out <= self.count
             && known.all(|impact| impact.joint < joints.max(1))
     }
 
-    /// Records that a contact of `joint` begins at `time` with penetration rate `speed` (m/s), which was changing at `push`
-    /// (m/s^2); `in_contact` if another joint is in contact that `interacts` with it.
+    /// Records that contact `c`, of `joint`, begins at `time` with penetration rate `speed` (m/s), which was changing at `push`
+    /// (m/s^2); `in_contact` if another contact touches that `interacts` with it.
     pub(super) fn begin(
         &mut self,
+        c: ContactId,
         joint: usize,
         time: f64,
         speed: f64,
@@ -134,18 +136,18 @@ impl Impacts {
         push: f64,
         coefficients: &Coefficients,
         in_contact: bool,
-        interacts: impl Fn(usize) -> bool,
+        interacts: impl Fn(ContactId) -> bool,
     ) {
-        let under_way = self.joints.iter_mut().filter_map(|joint| joint.impact.as_mut());
-        for other in under_way.filter(|other| interacts(other.joint)) {
-            other.disturbed = true;
+        let others = self.contacts.iter_mut().enumerate().filter(|(other, _)| interacts(*other));
+        for impact in others.filter_map(|(_, other)| other.impact.as_mut()) {
+            impact.disturbed = true;
         }
-        let law = &mut self.joints[joint].law;
+        let law = &mut self.contacts[c].law;
         if law.0 != coefficients.damping {
             *law = (coefficients.damping, undisturbed_restitution(coefficients.damping));
         }
         let law = law.1;
-        self.joints[joint].impact = (speed > 0.0).then_some(Impact {
+        self.contacts[c].impact = (speed > 0.0).then_some(Impact {
             joint,
             start: time,
             approach_speed: speed,
@@ -158,10 +160,10 @@ impl Impacts {
         });
     }
 
-    /// Updates the contact of `joint` over a step in which it was, or became, active, from its penetration, its largest normal
+    /// Updates contact `c` over a step in which it was, or became, active, from its penetration, its largest normal
     /// force (N) and its largest ratio of damping to elastic force.
-    pub(super) fn update(&mut self, joint: usize, cubic: &PenetrationCubic, force: f64, damping: f64) {
-        if let Some(impact) = &mut self.joints[joint].impact {
+    pub(super) fn update(&mut self, c: ContactId, cubic: &PenetrationCubic, force: f64, damping: f64) {
+        if let Some(impact) = &mut self.contacts[c].impact {
             impact.steps += 1;
             impact.damping = impact.damping.max(damping);
             impact.deepest = impact.deepest.max(cubic.deepest());
@@ -169,25 +171,25 @@ impl Impacts {
         }
     }
 
-    /// Approach speed of the impact of `joint` under way, and the speed with which its law lets it separate, m/s, if neither other
+    /// Approach speed of the impact under way at `c`, and the speed with which its law lets it separate, m/s, if neither other
     /// contacts nor other forces determine its course. Below `floor` (m/s) the damping is less by the ratio of the speeds, and so
     /// is the loss, to first order.
-    pub(super) fn speeds_under_way(&self, joint: usize, floor: f64) -> Option<[f64; 2]> {
+    pub(super) fn speeds_under_way(&self, c: ContactId, floor: f64) -> Option<[f64; 2]> {
         let is_own = |impact: &&Impact| !impact.disturbed && impact.external_work() < MAX_WORK_IN_REBOUND;
-        let impact = self.joints[joint].impact.as_ref().filter(is_own)?;
+        let impact = self.contacts[c].impact.as_ref().filter(is_own)?;
         let (speed, law) = (impact.approach_speed, impact.law);
         Some([speed, speed * (1.0 - (1.0 - law) * (speed / floor).min(1.0))])
     }
 
-    /// Largest normal force so far in the current impact of `joint`, N; infinite without one.
-    pub(super) fn peak_under_way(&self, joint: usize) -> f64 {
-        let impact = &self.joints[joint].impact;
+    /// Largest normal force so far in the current impact at `c`, N; infinite without one.
+    pub(super) fn peak_under_way(&self, c: ContactId) -> f64 {
+        let impact = &self.contacts[c].impact;
         impact.as_ref().map_or(f64::INFINITY, |impact| impact.peak)
     }
 
-    /// Ends the contact of `joint` at `time` with the penetration rate `rate`. Returns the impact, if it was one.
-    pub(super) fn end(&mut self, joint: usize, time: f64, rate: f64) -> Option<Impact> {
-        let mut impact = self.joints[joint].impact.take()?;
+    /// Ends contact `c` at `time` with the penetration rate `rate`. Returns the impact, if it was one.
+    pub(super) fn end(&mut self, c: ContactId, time: f64, rate: f64) -> Option<Impact> {
+        let mut impact = self.contacts[c].impact.take()?;
         impact.end = time;
         impact.separation_speed = (-rate).max(0.0);
         let slot = (self.count % self.finished.len() as u64) as usize;
@@ -196,9 +198,9 @@ impl Impacts {
         Some(impact)
     }
 
-    /// Records that a live change altered the contact of `joint`, or ended it if `in_contact` is false.
-    pub(super) fn change(&mut self, joint: usize, in_contact: bool) {
-        let impact = &mut self.joints[joint].impact;
+    /// Records that a live change altered contact `c`, or ended it if `in_contact` is false.
+    pub(super) fn change(&mut self, c: ContactId, in_contact: bool) {
+        let impact = &mut self.contacts[c].impact;
         if in_contact {
             if let Some(impact) = impact {
                 impact.disturbed = true;

@@ -31,7 +31,7 @@ pub(super) fn fill(
     out.pose = pose_of(&out.bodies[machine.output.body]);
     out.joints.clear();
     for (j, joint) in machine.loose_joints.iter().enumerate() {
-        out.joints.push(joint_report(mechanism, joint, &contact_states[j], j));
+        out.joints.push(joint_report(mechanism, joint, contact_states, j));
     }
     out.closing.clear();
     out.closing.extend(mechanism.closing_loads());
@@ -52,7 +52,7 @@ pub(super) fn fill(
     }
 }
 
-fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_state: &ContactState, j: usize) -> JointReport {
+fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_states: &[ContactState], j: usize) -> JointReport {
     let motion = mechanism.motion();
     let centre = |a: &Attachment| match a.body {
         None => a.point,
@@ -61,37 +61,36 @@ fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_state: &Conta
             m.position + m.rotation * (a.point + mechanism.frame_origin(b))
         }
     };
-    let gap = mechanism.contacts.gap(j);
     let contacts = &mechanism.contacts;
-    let coefficients = contacts.coefficients(j);
     let ball_centre = centre(&joint.carried());
-    let mut report = JointReport {
+    let report = JointReport {
         socket_centre: centre(&joint.carrier()),
         ball_centre,
-        eccentricity: gap.eccentricity,
-        clearance: contacts.clearance(j),
+        eccentricity: mechanism.separation(j),
+        clearance: contacts.joint_clearance(j),
+        ..JointReport::default()
+    };
+    let Some(c) = contacts.of_joint(j).next() else {
+        let normal_force = mechanism.reaction(j).unwrap_or_default();
+        return JointReport { normal_force, contact_point: ball_centre, state: ContactMode::Ideal, ..report };
+    };
+    let (gap, coefficients) = (contacts.gap(c), contacts.coefficients(c));
+    JointReport {
         penetration: gap.separation.penetration,
         penetration_rate: gap.separation.rate,
         contact_point: ball_centre + gap.separation.normal * coefficients.ball_radius,
         slip_speed: gap.slip_speed,
-        ..JointReport::default()
-    };
-    if let Some(reaction) = mechanism.reaction(j) {
-        report.normal_force = reaction;
-        report.contact_point = ball_centre;
-        report.state = ContactMode::Ideal;
-        return report;
+        normal_force: gap.separation.normal * -gap.normal_force,
+        friction_force: gap.friction,
+        state: if !contact_states[c].active && gap.normal_force == 0.0 {
+            ContactMode::Free
+        } else if gap.slip_speed < coefficients.slip_high {
+            ContactMode::Creep
+        } else {
+            ContactMode::Slip
+        },
+        ..report
     }
-    report.normal_force = gap.separation.normal * -gap.normal_force;
-    report.friction_force = gap.friction;
-    report.state = if !contact_state.active && gap.normal_force == 0.0 {
-        ContactMode::Free
-    } else if gap.slip_speed < coefficients.slip_high {
-        ContactMode::Creep
-    } else {
-        ContactMode::Slip
-    };
-    report
 }
 
 /// Probe tip minus the tip of the ideal mechanism at the same time, m.

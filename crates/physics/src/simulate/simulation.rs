@@ -36,7 +36,7 @@ use super::{
 use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::{Controller, Polynomial};
 use crate::machine::{Conditions, Machine, Vec3};
-use crate::mechanism::{self, Counts, EdgeIndicator, ElementReport, Flight, Mechanism, Pull, Ramp};
+use crate::mechanism::{self, ContactId, Counts, EdgeIndicator, ElementReport, Flight, Mechanism, Pull, Ramp};
 use adaptive::FullStep;
 use automatic::SchemeSelector;
 use corners::LawBranch;
@@ -106,8 +106,9 @@ pub struct State {
     quarter_turns: Vec<i64>,
     /// Gravity, contacts and stepper with the live changes so far.
     conditions: Conditions,
-    /// What each ball joint remembers.
+    /// What each loose joint remembers, and each contact.
     joints: Vec<JointState>,
+    contacts: Vec<ContactMemory>,
     /// The hand's pull, if any.
     pull: Option<Pull>,
     /// Flights of the bodies excluded from the latest step, indexed like the mechanism's free-flight bodies.
@@ -126,22 +127,26 @@ pub struct State {
     workspace_id: WorkspaceId,
 }
 
-/// What one ball joint remembers from step to step, besides its gap and its contact.
+/// What one loose joint remembers from step to step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct JointState {
     /// Active ramp of the clearance, and the clearance without it, m.
     ramp: Option<Ramp>,
     clearance: f64,
-    /// Effect of a unit normal force on the opening at the latest contact, 1/kg, and the phase of the contact: for the
-    /// discrete-gradient method.
-    mobility: f64,
-    phase: ContactPhase,
-    /// Steps since the current contact began.
-    contact_steps: u64,
     /// Reaction at the latest two instants, if the joint is ideal, for its peak between steps.
     reaction: Recent,
     /// Peak since it was last taken.
     peak: Peak,
+}
+
+/// What one contact remembers from step to step, besides its gap and its [`ContactState`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct ContactMemory {
+    /// Effect of a unit normal force on the opening at its latest touch, 1/kg, and its phase: for the discrete-gradient method.
+    mobility: f64,
+    phase: ContactPhase,
+    /// Steps since it began or ended.
+    steps: u64,
 }
 
 /// State vector, derivative, gaps and contact state at one instant.
@@ -252,10 +257,10 @@ struct Stepping<'a> {
 /// The step being taken.
 struct Attempt {
     end: StepEnd,
-    /// Joint whose contact starts or ends at the step's end.
-    located_joint: Option<usize>,
-    /// Joint that switches to another branch of a law there, and that branch.
-    corner: Option<(usize, LawBranch)>,
+    /// Contact that starts or ends at the step's end.
+    located_contact: Option<ContactId>,
+    /// Contact that switches to another branch of a law there, and that branch.
+    corner: Option<(ContactId, LawBranch)>,
     /// Indicators that fix the side of each element during the step, as from [`Mechanism::edge_indicators`]; empty if steps do not
     /// end at edges of elements.
     element_sides: Vec<EdgeIndicator>,
@@ -265,14 +270,14 @@ struct Attempt {
     edge_indicators: [Vec<EdgeIndicator>; 2],
     /// Whether it has been restarted on another branch.
     has_switched_branch: bool,
-    /// Joints whose contact left the frozen branches of its laws in an evaluation.
+    /// Contacts that left the frozen branches of their laws in an evaluation.
     has_left_branch: Vec<bool>,
     /// The full step, if an event truncated it, and the full step of another run that the next step must reproduce.
     full_step: Option<FullStep>,
     step_to_reproduce: Option<FullStep>,
     /// Whether it may contain the largest force of a contact.
     may_contain_peak: bool,
-    /// Largest normal force of each joint in contact, N, and the fraction of the step at which it occurs.
+    /// Largest normal force of each contact, N, and the fraction of the step at which it occurs.
     peak_forces: Vec<(f64, f64)>,
     /// [`StepStart::rebounds`](crate::mechanism::StepStart::rebounds) of a discrete-gradient step.
     rebounds: Vec<Option<f64>>,
@@ -423,9 +428,9 @@ impl Simulation {
         self.state.hash()
     }
 
-    /// As [`State::contact_state`].
-    pub fn contact_state(&self, j: usize) -> ContactState {
-        self.state.contact_state(j)
+    /// States of the contacts of loose joint `j`, none if it is ideal: whether they touch, and their approach speeds.
+    pub fn contact_states(&self, j: usize) -> &[ContactState] {
+        &self.state.now.contact_states[self.mechanism().contacts.of_joint(j)]
     }
 
     /// As [`State::statistics`].

@@ -260,14 +260,14 @@ impl Wear {
 
     /// Records the forces of the latest evaluation of `mechanism` at node `instant` of the step.
     pub(super) fn record_forces(&mut self, instant: usize, mechanism: &Mechanism) {
-        for joint in 0..self.sockets.len() {
-            if let Some(contact) = mechanism.wall_contact(joint) {
-                self.record_contact(instant, joint, &contact);
+        for c in 0..mechanism.contacts.len() {
+            if let Some(contact) = mechanism.wall_contact(c) {
+                self.record_contact(instant, mechanism.contacts.joint_of(c), &contact);
             }
         }
     }
 
-    /// Records the forces of ball joint `joint` at node `instant` of the step.
+    /// Records the forces of a contact of loose joint `joint` at node `instant` of the step.
     pub(super) fn record_contact(&mut self, instant: usize, joint: usize, contact: &WallContact) {
         let cell = self.cell(joint, &contact.direction);
         let WallContact { normal_force, friction_power, .. } = *contact;

@@ -1,14 +1,14 @@
-//! Ball joint with clearance: contact between a ball and the wall of its socket, by the laws in `contact`.
+//! Contact of a loose joint, between a ball and the wall of its socket, by the laws in `contact`.
 
 use super::{ActiveSet, At, Coupling, ForceElement, Loads};
 use crate::contact::{Coefficients, Force, Separation};
 use crate::machine::Vec3;
 use crate::mechanism::columns::contact_sides;
 use crate::mechanism::kinematics::Kinematics;
-use crate::mechanism::model::{Anchor, LooseJoint};
+use crate::mechanism::model::{Anchor, ContactId, Site};
 use crate::mechanism::{Powers, WallContact};
 
-/// One ball joint at the latest evaluation.
+/// One contact at the latest evaluation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Gap {
     /// e = Z_j - Z_i, m (5).
@@ -16,7 +16,7 @@ pub struct Gap {
     /// de/dt, m/s.
     pub(crate) eccentricity_rate: Vec3,
     /// Position of the ball in its socket. Every evaluation sets it for a ball beyond the wall, and `complete_separation`
-    /// completes it for the others. An ideal joint has no penetration.
+    /// completes it for the others.
     pub separation: Separation,
     /// F_N, N (19).
     pub normal_force: f64,
@@ -26,30 +26,23 @@ pub struct Gap {
     pub slip_speed: f64,
 }
 
-/// A ball joint; a force element if it has clearance.
+/// A contact of a loose site.
 pub struct Contact {
-    /// Index among the ball joints, also that of its contact state.
-    index: usize,
-    pub joint: LooseJoint,
+    id: ContactId,
+    pub site: Site,
     pub law: Coefficients,
     pub gap: Gap,
 }
 
 impl Contact {
-    pub fn new(index: usize, joint: LooseJoint, law: Coefficients) -> Self {
-        Self { index, joint, law, gap: Gap::default() }
-    }
-
-    /// Whether it has clearance.
-    #[inline]
-    pub fn has_clearance(&self) -> bool {
-        self.joint.ideal.is_none()
+    pub fn new(id: ContactId, site: Site, law: Coefficients) -> Self {
+        Self { id, site, law, gap: Gap::default() }
     }
 
     /// Whether it may carry a force.
     #[inline]
     pub fn may_carry_force(&self, active_set: ActiveSet<'_>) -> bool {
-        active_set.contact_state(self.index).is_some()
+        active_set.contact_state(self.id).is_some()
     }
 
     /// Power dissipated by friction, W.
@@ -66,7 +59,7 @@ impl Contact {
 
     /// Contact between the ball and its socket wall at the latest evaluation; `None` without contact force.
     pub fn wall_contact(&self, motion: &[Kinematics]) -> Option<WallContact> {
-        if !self.has_clearance() || self.gap.normal_force <= 0.0 {
+        if self.gap.normal_force <= 0.0 {
             return None;
         }
         Some(WallContact {
@@ -79,7 +72,7 @@ impl Contact {
     /// Unit vector from the socket centre to the ball centre at the latest evaluation, in the axes of the socket's body. It
     /// points to the point of the wall nearest to the ball; the two centres must differ.
     pub fn wall_direction(&self, motion: &[Kinematics]) -> Vec3 {
-        let socket = &motion[self.joint.carrier.body];
+        let socket = &motion[self.site.carrier.body];
         socket.rotation.tr_mul(&self.direction())
     }
 
@@ -91,7 +84,7 @@ impl Contact {
     /// Angular velocities of ball and socket, rad/s.
     #[inline]
     fn spins<'a>(&self, motion: &'a [Kinematics]) -> [&'a Vec3; 2] {
-        [self.joint.carried.body, self.joint.carrier.body].map(|body| &motion[body].angular_velocity)
+        [self.site.carried.body, self.site.carrier.body].map(|body| &motion[body].angular_velocity)
     }
 
     /// Relative velocity used by friction for the normal `n`, m/s.
@@ -103,29 +96,25 @@ impl Contact {
 
     /// Measures the eccentricity and its rate; forces are left unchanged.
     pub fn measure(&mut self, motion: &[Kinematics]) {
-        let joint = &self.joint;
-        let (e, rate) = joint.opening(motion, &joint.arms(motion));
+        let site = &self.site;
+        let (e, rate) = site.opening(motion, &site.arms(motion));
         (self.gap.eccentricity, self.gap.eccentricity_rate) = (e, rate);
         self.complete_separation();
     }
 
     /// Completes the separation from the eccentricity of the latest evaluation.
     pub fn complete_separation(&mut self) {
-        let has_clearance = self.has_clearance();
         let Self { law, gap, .. } = self;
         gap.separation = law.separation(&gap.eccentricity, &gap.eccentricity_rate);
-        if !has_clearance {
-            (gap.separation.penetration, gap.separation.rate) = (0.0, 0.0);
-        }
     }
 }
 
 impl ForceElement for Contact {
     #[inline]
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        let (joint, law) = (&self.joint, &self.law);
-        let arms = joint.arms(at.motion);
-        let (e, velocity) = joint.opening(at.motion, &arms);
+        let (site, law) = (&self.site, &self.law);
+        let arms = site.arms(at.motion);
+        let (e, velocity) = site.opening(at.motion, &arms);
         let gap = &mut self.gap;
         *gap = Gap { eccentricity: e, eccentricity_rate: velocity, ..Gap::default() };
         let clearance = law.clearance;
@@ -134,17 +123,17 @@ impl ForceElement for Contact {
         }
         let separation = law.separation(&e, &velocity);
         gap.separation = separation;
-        let Some(contact_state) = at.active_set.contact_state(self.index) else {
+        let Some(contact_state) = at.active_set.contact_state(self.id) else {
             return;
         };
         let counts = &mut *loads.counts;
         let force = law.force(contact_state, &separation, || {
             counts.friction += 1;
             let spin = |anchor: &Anchor| &at.motion[anchor.body].angular_velocity;
-            let (ball, socket) = (spin(&joint.carried), spin(&joint.carrier));
+            let (ball, socket) = (spin(&site.carried), spin(&site.carrier));
             law.slip_velocity(&separation.normal, &velocity, ball, socket)
         });
-        if let Some(has_left_branch) = loads.has_left_branch.get_mut(self.index) {
+        if let Some(has_left_branch) = loads.has_left_branch.get_mut(self.id) {
             *has_left_branch |= law.leaves_branch(contact_state, &separation, &force);
         }
         gap.normal_force = force.normal;
@@ -157,21 +146,21 @@ impl ForceElement for Contact {
         let on_ball = n * -force.normal + force.friction;
         let radius = law.ball_radius;
         let [arm_ball, arm_socket] = arms;
-        let ball = &mut loads.wrench[joint.carried.body];
+        let ball = &mut loads.wrench[site.carried.body];
         ball.force += on_ball;
         ball.torque += (arm_ball + n * radius).cross(&on_ball);
-        let socket = &mut loads.wrench[joint.carrier.body];
+        let socket = &mut loads.wrench[site.carrier.body];
         socket.force -= on_ball;
         socket.torque -= (arm_socket + n * (radius + clearance)).cross(&on_ball);
     }
 
     fn ends(&self, _: &[Kinematics]) -> Option<[Anchor; 2]> {
-        Some([self.joint.carrier, self.joint.carried])
+        Some([self.site.carrier, self.site.carried])
     }
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let gap = &self.gap;
-        let contact_state = at.active_set.contact_state(self.index);
+        let contact_state = at.active_set.contact_state(self.id);
         let contact_state = contact_state.filter(|_| gap.normal_force > 0.0)?;
         let n = gap.separation.normal;
         let read = self.slip_velocity(&n, at.motion);
@@ -180,7 +169,7 @@ impl ForceElement for Contact {
         let [ball, socket] = self.spins(at.motion);
         stiffness.add_normal_rotation(&self.law.slip_velocity_by_normal(ball, socket));
         Some(Coupling {
-            sides: contact_sides(&self.joint, &self.law),
+            sides: contact_sides(&self.site, &self.law),
             normal: n,
             force: n * -gap.normal_force + gap.friction,
             stiffness,

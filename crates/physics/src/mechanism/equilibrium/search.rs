@@ -377,9 +377,9 @@ impl Search<'_> {
         // The gaps are those of the latest evaluation.
         self.pose(pose.state.clone());
         let mut differences = DVector::from_element(self.model.nv, self.difference);
-        for (joint, gap) in self.model.joints.iter().zip(self.mechanism.contacts.gaps()) {
+        for (site, gap) in self.model.sites.iter().zip(self.mechanism.contacts.gaps()) {
             let depth = gap.separation.penetration;
-            let ends = [joint.carried.body, joint.carrier.body].map(|body| jacobians.get(body));
+            let ends = [site.carried.body, site.carrier.body].map(|body| jacobians.get(body));
             for (j, ..) in ends.into_iter().flatten().flatten().filter(|_| depth > 0.0) {
                 differences[*j] = differences[*j].min((OF_DEPTH * depth).max(FINEST * self.difference));
             }
@@ -407,10 +407,10 @@ impl Search<'_> {
         self.pose(pose.state.clone());
         let mechanism = &mut *self.mechanism;
         let mut sums = vec![[0.0; 2]; pose.motion.len()];
-        let ends = |j: usize| [self.model.joints[j].carried.body, self.model.joints[j].carrier.body];
-        for (j, gap) in mechanism.contacts.gaps().enumerate() {
-            let force = mechanism.reaction(j).map_or(gap.normal_force, |reaction| reaction.norm());
-            for body in ends(j) {
+        for (j, joint) in self.model.joints.iter().enumerate() {
+            let contacts = joint.contacts.clone().map(|c| mechanism.contacts.gap(c).normal_force).sum();
+            let force: f64 = mechanism.reaction(j).map_or(contacts, |reaction| reaction.norm());
+            for body in [joint.carried.body, joint.carrier.body] {
                 sums[body][0] += force;
             }
         }

@@ -146,7 +146,7 @@ impl Stepping<'_> {
         {
             // Retry once on the other branch; if that leads back here, either branch will do.
             self.attempt.has_switched_branch = true;
-            corner.next.apply_to(&mut self.state.now.contact_states[corner.joint]);
+            corner.next.apply_to(&mut self.state.now.contact_states[corner.contact]);
             self.invalidate();
             self.state.control.h_next = requested_step;
             self.state.control.contact_began = contact_began;
@@ -163,7 +163,7 @@ impl Stepping<'_> {
         let edge = edge.filter(|theta| before_last(*theta));
         let first = event.into_iter().chain(corner.iter().map(|corner| corner.theta)).fold(f64::INFINITY, f64::min);
         if let Some(theta) = edge.filter(|theta| *theta < first) {
-            self.attempt.located_joint = None;
+            self.attempt.located_contact = None;
             self.attempt.edge = true;
             t_end = t + theta * h;
             self.truncate_at(theta, t_end, h);
@@ -174,8 +174,8 @@ impl Stepping<'_> {
             if contact_began && matches!(corner.next, LawBranch::Approach(_)) {
                 self.state.control.h_contact = next.max(MIN_FIRST_STEP);
             }
-            self.attempt.located_joint = None;
-            self.attempt.corner = Some((corner.joint, corner.next));
+            self.attempt.located_contact = None;
+            self.attempt.corner = Some((corner.contact, corner.next));
             t_end = t + corner.theta * h;
             self.truncate_at(corner.theta, t_end, h);
             self.attempt.full_step = Some(FullStep { size: h, repeated: false });
@@ -183,12 +183,12 @@ impl Stepping<'_> {
         } else if let Some((last, false)) = last
             && event.is_none()
         {
-            self.attempt.located_joint = None;
+            self.attempt.located_contact = None;
             self.truncate_at(last, limit, h);
             return Some((limit, limit - t));
         } else if let Some(theta) = event.or(last.map(|(last, _)| last)) {
             if event.is_none() {
-                self.attempt.located_joint = None;
+                self.attempt.located_contact = None;
             }
             t_end = t + theta * h;
             if tolerance >= END_ON_INTERPOLANT && self.stepper.ends_on_interpolant() {
@@ -215,35 +215,32 @@ impl Stepping<'_> {
         Some((t_end, h))
     }
 
-    /// Fraction of the step just attempted at which the first contact starts or ends, if any; its joint is stored in
-    /// `located_joint`.
+    /// Fraction of the step just attempted at which the first contact starts or ends, if any; that contact is stored in
+    /// `located_contact`.
     fn first_event(&mut self, h: f64) -> Option<f64> {
         let mut first: Option<f64> = None;
-        self.attempt.located_joint = None;
-        for j in 0..self.attempt.end.gaps.len() {
-            if !self.mechanism.contacts.has_clearance(j) {
-                continue;
-            }
-            let Some(theta) = self.event_of(j, h) else {
+        self.attempt.located_contact = None;
+        for c in 0..self.attempt.end.gaps.len() {
+            let Some(theta) = self.event_of(c, h) else {
                 continue;
             };
             if first.is_none_or(|earliest| theta < earliest) {
                 first = Some(theta);
-                self.attempt.located_joint = Some(j);
+                self.attempt.located_contact = Some(c);
             }
         }
         first
     }
 
-    /// Fraction of the step just attempted at which joint `j` leaves its recorded contact state.
-    fn event_of(&mut self, j: usize, h: f64) -> Option<f64> {
-        let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
+    /// Fraction of the step just attempted at which contact `c` leaves its recorded contact state.
+    fn event_of(&mut self, c: usize, h: f64) -> Option<f64> {
+        let (start, end) = (self.state.now.gaps[c], self.attempt.end.gaps[c]);
         // Positive where the gap contradicts the recorded contact state.
-        let sign = if self.state.now.contact_states[j].active { -1.0 } else { 1.0 };
+        let sign = if self.state.now.contact_states[c].active { -1.0 } else { 1.0 };
         // A ball may cross its play several times in one long step: search intervals in which it moves little compared with
         // the play.
         let travel = h * start.speed.max(end.speed);
-        let clearance = self.mechanism.contacts.clearance(j);
+        let clearance = self.mechanism.contacts.clearance(c);
         let intervals = (4.0 * travel / clearance).ceil().clamp(1.0, 64.0);
         let signed = |theta: f64, at: Approach| SignedGap { theta, gap: sign * at.penetration, rate: sign * at.rate };
         let mut left = signed(0.0, start);
@@ -251,11 +248,11 @@ impl Stepping<'_> {
             let right = if f64::from(n) == intervals {
                 signed(1.0, end)
             } else {
-                self.signed_gap(j, f64::from(n) / intervals, h, sign)
+                self.signed_gap(c, f64::from(n) / intervals, h, sign)
             };
-            if let Some((a, b)) = self.crossing_within(j, h, sign, left, right) {
+            if let Some((a, b)) = self.crossing_within(c, h, sign, left, right) {
                 let width = (1e-15 / h).max(1e-12);
-                let gap = |theta: f64| self.signed_gap(j, theta, h, sign).gap;
+                let gap = |theta: f64| self.signed_gap(c, theta, h, sign).gap;
                 return Some(find_root(a.theta, a.gap, b.theta, b.gap, width, 1e-16, gap));
             }
             left = right;
@@ -267,7 +264,7 @@ impl Stepping<'_> {
     /// Two points within an interval of the step between which the signed gap turns positive.
     fn crossing_within(
         &mut self,
-        j: usize,
+        c: usize,
         h: f64,
         sign: f64,
         left: SignedGap,
@@ -289,7 +286,7 @@ impl Stepping<'_> {
             if right.gap <= 0.0 && reach < 0.0 {
                 return None;
             }
-            let middle = self.signed_gap(j, 0.5 * (a.theta + b.theta), h, sign);
+            let middle = self.signed_gap(c, 0.5 * (a.theta + b.theta), h, sign);
             if right.gap > 0.0 && middle.gap <= 0.0 {
                 return Some((middle, right));
             }
@@ -305,10 +302,10 @@ impl Stepping<'_> {
         None
     }
 
-    /// Gap of joint `j` on the interpolant of the attempted step, times `sign`.
-    fn signed_gap(&mut self, j: usize, theta: f64, h: f64, sign: f64) -> SignedGap {
-        self.measure_at(j, theta, h);
-        let gap = self.mechanism.contacts.gap(j);
+    /// Gap of contact `c` on the interpolant of the attempted step, times `sign`.
+    fn signed_gap(&mut self, c: usize, theta: f64, h: f64, sign: f64) -> SignedGap {
+        self.measure_at(c, theta, h);
+        let gap = self.mechanism.contacts.gap(c);
         SignedGap { theta, gap: sign * gap.separation.penetration, rate: sign * gap.separation.rate }
     }
 }

@@ -94,13 +94,13 @@ impl Stepping<'_> {
     /// the ringing at a multiple of the tolerance, and implicit ones would then have to resolve it.
     pub(super) fn choose_first_scheme(&mut self) {
         let Self { mechanism, state, .. } = self;
-        let active_joints = || state.now.contact_states.iter().enumerate().filter(|(_, m)| m.active).map(|(j, _)| j);
-        let undamped = |j| mechanism.contacts.coefficients(j).damping == 0.0;
+        let touching = || state.now.contact_states.iter().enumerate().filter(|(_, m)| m.active).map(|(c, _)| c);
+        let undamped = |c| mechanism.contacts.coefficients(c).damping == 0.0;
         let velocities = state.now.y.len() - mechanism.positions();
         if state.conditions.solver.method == Method::Automatic
             && velocities <= mechanism.largest_implicit()
-            && active_joints().next().is_some()
-            && active_joints().all(undamped)
+            && touching().next().is_some()
+            && touching().all(undamped)
             && !mechanism.is_kinematic()
         {
             self.set_scheme(ActiveScheme::Implicit);

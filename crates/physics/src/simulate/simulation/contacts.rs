@@ -5,7 +5,7 @@ use super::{State, Stepping};
 use crate::contact::{Coefficients, ContactState, Separation};
 use crate::integrate::StepControl;
 use crate::machine::MIN_IMPACT_STEPS;
-use crate::mechanism::Contacts;
+use crate::mechanism::{ContactId, Contacts};
 use crate::simulate::peaks::PenetrationCubic;
 
 /// Largest penetration, as a fraction of the clearance, of a ball that is at its wall to within rounding.
@@ -26,15 +26,16 @@ pub(super) struct ContactChanges {
 }
 
 impl State {
-    /// Records that contact `j` begins at `time` with penetration rate `rate` (m/s), which was changing at `push` (m/s^2);
+    /// Records that contact `c` begins at `time` with penetration rate `rate` (m/s), which was changing at `push` (m/s^2);
     /// returns its contact state.
-    fn begin(&mut self, j: usize, time: f64, rate: f64, push: f64, contacts: &Contacts) -> ContactState {
+    fn begin(&mut self, c: ContactId, time: f64, rate: f64, push: f64, contacts: &Contacts) -> ContactState {
+        let j = contacts.joint_of(c);
         let requested = self.conditions.joints[j].restitution;
-        let coefficients = contacts.coefficients(j);
-        let interacts = |other: usize| contacts.interact(j, other);
+        let coefficients = contacts.coefficients(c);
+        let interacts = |other: ContactId| contacts.interact(c, other);
         let mut active = self.now.contact_states.iter().enumerate().filter(|(_, m)| m.active);
         let among_others = active.any(|(other, _)| interacts(other));
-        self.record.impacts.begin(j, time, rate, requested, push, coefficients, among_others, interacts);
+        self.record.impacts.begin(c, j, time, rate, requested, push, coefficients, among_others, interacts);
         let contact_state = ContactState::at_onset(coefficients, rate);
         self.record.statistics.joints[j].impacts += 1;
         let peak = &mut self.joints[j].peak;
@@ -45,20 +46,21 @@ impl State {
         contact_state
     }
 
-    /// Records a step of contact `j` that began at `start` (s), from fraction `from` on, with the largest normal force `force`
+    /// Records a step of contact `c`, of joint `j`, that began at `start` (s), from fraction `from` on, with the largest normal force `force`
     /// (N).
     fn record_contact_step(
         &mut self,
+        c: ContactId,
         j: usize,
         start: f64,
         cubic: &PenetrationCubic,
-        c: &Coefficients,
+        law: &Coefficients,
         force: f64,
         contact_state: &ContactState,
         from: f64,
     ) {
-        let (damping, theta) = cubic.most_damped(c, contact_state, from);
-        self.record.impacts.update(j, cubic, force, damping);
+        let (damping, theta) = cubic.most_damped(law, contact_state, from);
+        self.record.impacts.update(c, cubic, force, damping);
         if damping > self.record.statistics.joints[j].damping {
             self.record.statistics.joints[j].damping = damping;
             self.record.statistics.joints[j].damping_time = start + theta * (self.now.t - start);
@@ -72,20 +74,17 @@ impl Stepping<'_> {
     pub(super) fn begin_contacts_at_start(&mut self) {
         let Self { mechanism, state, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
-        for j in 0..state.conditions.joints.len() {
-            let contact = state.conditions.joints[j];
-            if !mechanism.contacts.has_clearance(j) {
-                continue;
-            }
-            let Separation { penetration, rate, .. } = mechanism.contacts.gap(j).separation;
-            let coefficients = mechanism.contacts.coefficients(j);
+        for c in 0..state.now.gaps.len() {
+            let j = mechanism.contacts.joint_of(c);
+            let Separation { penetration, rate, .. } = mechanism.contacts.gap(c).separation;
+            let coefficients = mechanism.contacts.coefficients(c);
             if !(penetration > 0.0) {
                 continue;
             }
-            if penetration <= AT_WALL * contact.clearance && rate > 0.0 {
-                state.now.contact_states[j] = state.begin(j, 0.0, rate, UNKNOWN_PUSH, &mechanism.contacts);
+            if penetration <= AT_WALL * mechanism.contacts.clearance(c) && rate > 0.0 {
+                state.now.contact_states[c] = state.begin(c, 0.0, rate, UNKNOWN_PUSH, &mechanism.contacts);
             } else {
-                state.now.contact_states[j] = ContactState::at_onset(coefficients, f64::NEG_INFINITY);
+                state.now.contact_states[c] = ContactState::at_onset(coefficients, f64::NEG_INFINITY);
                 state.record.statistics.joints[j].impacts += 1;
             }
         }
@@ -96,11 +95,11 @@ impl Stepping<'_> {
     pub(super) fn begin_contacts_at_walls(&mut self) {
         let Self { mechanism, state, .. } = self;
         let mut begins = false;
-        for j in 0..state.conditions.joints.len() {
-            let gap = state.now.gaps[j];
-            if mechanism.contacts.has_clearance(j) && gap.is_arriving() && !state.now.contact_states[j].active {
-                state.now.contact_states[j] = state.begin(j, state.now.t, gap.rate, UNKNOWN_PUSH, &mechanism.contacts);
-                state.joints[j].contact_steps = 0;
+        for c in 0..state.now.gaps.len() {
+            let gap = state.now.gaps[c];
+            if gap.is_arriving() && !state.now.contact_states[c].active {
+                state.now.contact_states[c] = state.begin(c, state.now.t, gap.rate, UNKNOWN_PUSH, &mechanism.contacts);
+                state.contacts[c].steps = 0;
                 begins = true;
             }
         }
@@ -111,7 +110,7 @@ impl Stepping<'_> {
 
     /// Starts and ends contacts whose penetration changed sign over the step just accepted.
     pub(super) fn switch_contacts(&mut self, h: f64) -> ContactChanges {
-        let located = self.attempt.located_joint.take();
+        let located = self.attempt.located_contact.take();
         let (fixed, rounding) = (!self.locates(), self.rounding());
         let Self { mechanism, state, before, attempt, .. } = self;
         let peak_forces = &attempt.peak_forces;
@@ -119,37 +118,35 @@ impl Stepping<'_> {
         let mut changes = ContactChanges { contacts: false, forces: false };
         // What is as close to its wall as the located ball, which is there but for the error of the step, switches in the same
         // instant.
-        let at_wall = located.map_or(0.0, |j| state.now.gaps[j].penetration.abs()) + rounding;
-        for j in 0..state.now.gaps.len() {
-            if !mechanism.contacts.has_clearance(j) {
-                continue;
-            }
-            let (start, end) = (before.gaps[j], state.now.gaps[j]);
-            let coefficients = mechanism.contacts.coefficients(j);
-            if state.now.contact_states[j].active {
+        let at_wall = located.map_or(0.0, |c| state.now.gaps[c].penetration.abs()) + rounding;
+        for c in 0..state.now.gaps.len() {
+            let j = mechanism.contacts.joint_of(c);
+            let (start, end) = (before.gaps[c], state.now.gaps[c]);
+            let coefficients = mechanism.contacts.coefficients(c);
+            if state.now.contact_states[c].active {
                 let cubic = PenetrationCubic::new(start, end, h, rounding);
-                let contact_state = state.now.contact_states[j].unfrozen();
-                state.record_contact_step(j, before.t, &cubic, coefficients, peak_forces[j].0, &contact_state, 0.0);
+                let contact_state = state.now.contact_states[c].unfrozen();
+                state.record_contact_step(c, j, before.t, &cubic, coefficients, peak_forces[c].0, &contact_state, 0.0);
             }
             // A located switch ends within rounding of the wall, on either side. The repeated step may still show that a ball
             // about to separate has turned back.
-            let active = state.now.contact_states[j].active;
+            let active = state.now.contact_states[c].active;
             let turned_back = active && end.penetration > 0.0 && end.rate > 0.0;
             let at_wall = end.penetration.abs() <= at_wall && end.rate != 0.0 && active == (end.rate < 0.0);
-            let switches = located.is_some_and(|located| located == j || at_wall);
+            let switches = located.is_some_and(|located| located == c || at_wall);
             let in_contact = if switches { !active || turned_back } else { end.penetration > 0.0 || end.is_arriving() };
-            state.joints[j].contact_steps += 1;
-            if in_contact == state.now.contact_states[j].active {
+            state.contacts[c].steps += 1;
+            if in_contact == state.now.contact_states[c].active {
                 if in_contact {
                     let fastest = || PenetrationCubic::new(start, end, h, rounding).fastest(0.0).0;
-                    let contact_state = &mut state.now.contact_states[j];
+                    let contact_state = &mut state.now.contact_states[c];
                     changes.forces |= contact_state.update_largest_rate(coefficients, end.rate, fastest);
                 }
                 continue;
             }
             changes.contacts = true;
             changes.forces |= fixed;
-            let steps = std::mem::replace(&mut state.joints[j].contact_steps, 0);
+            let steps = std::mem::replace(&mut state.contacts[c].steps, 0);
             if in_contact {
                 let cubic = PenetrationCubic::new(start, end, h, rounding);
                 let crosses = start.penetration <= 0.0 && end.penetration > 0.0;
@@ -159,8 +156,8 @@ impl Stepping<'_> {
                 let approach_time = theta * h;
                 let is_known = approach_time > TOO_SHORT_FOR_PUSH;
                 let push = if is_known { (rate - start.rate) / approach_time } else { UNKNOWN_PUSH };
-                let mut contact_state = state.begin(j, time, rate, push, &mechanism.contacts);
-                if !fixed && !switches && end.penetration > AT_WALL * mechanism.contacts.clearance(j) {
+                let mut contact_state = state.begin(c, time, rate, push, &mechanism.contacts);
+                if !fixed && !switches && end.penetration > AT_WALL * mechanism.contacts.clearance(c) {
                     let late = &mut state.record.statistics.joints[j].late;
                     *late = late.max(end.penetration);
                 }
@@ -168,9 +165,9 @@ impl Stepping<'_> {
                 if fixed {
                     contact_state.update_largest_rate(coefficients, end.rate, || cubic.fastest(theta).0);
                     let (force, _) = cubic.strongest(coefficients, &contact_state);
-                    state.record_contact_step(j, before.t, &cubic, coefficients, force, &contact_state, theta);
+                    state.record_contact_step(c, j, before.t, &cubic, coefficients, force, &contact_state, theta);
                 }
-                state.now.contact_states[j] = contact_state;
+                state.now.contact_states[c] = contact_state;
             } else {
                 let crosses = start.penetration > 0.0 && end.penetration < 0.0;
                 let (time, rate) = if crosses && !switches {
@@ -181,8 +178,8 @@ impl Stepping<'_> {
                     (state.now.t, end.rate)
                 };
                 let statistics = &mut state.record.statistics;
-                statistics.joints[j].below_speed_floor += u64::from(state.now.contact_states[j].below_speed_floor);
-                if let Some(impact) = state.record.impacts.end(j, time, rate) {
+                statistics.joints[j].below_speed_floor += u64::from(state.now.contact_states[c].below_speed_floor);
+                if let Some(impact) = state.record.impacts.end(c, time, rate) {
                     let farthest =
                         statistics.joints[j].excessive_rebound.map_or(0.0, |impact| impact.restitution_excess());
                     if impact.restitution_excess() > farthest {
@@ -191,7 +188,7 @@ impl Stepping<'_> {
                 }
                 let coarse = counts_steps && steps < MIN_IMPACT_STEPS;
                 state.record.statistics.joints[j].coarse += u64::from(coarse);
-                state.now.contact_states[j] = ContactState::default();
+                state.now.contact_states[c] = ContactState::default();
                 state.record.statistics.joints[j].last_separation = Some(state.now.t);
             }
         }
@@ -202,21 +199,19 @@ impl Stepping<'_> {
     pub(super) fn track_peaks(&mut self, h: f64) {
         let (immediate, rounding) = (!self.locates(), self.rounding());
         let Self { mechanism, state, before, attempt, .. } = self;
-        for j in 0..state.now.gaps.len() {
-            if !mechanism.contacts.has_clearance(j) {
-                continue;
-            }
-            let (start, end) = (before.gaps[j], state.now.gaps[j]);
+        for c in 0..state.now.gaps.len() {
+            let j = mechanism.contacts.joint_of(c);
+            let (start, end) = (before.gaps[c], state.now.gaps[c]);
             let grazes = immediate && start.rate > 0.0 && end.rate < 0.0;
             if start.penetration <= 0.0 && end.penetration <= 0.0 && !grazes {
                 continue;
             }
-            let coefficients = mechanism.contacts.coefficients(j);
+            let coefficients = mechanism.contacts.coefficients(c);
             let cubic = PenetrationCubic::new(start, end, h, rounding);
-            let (force, theta) = if before.contact_states[j].active {
-                attempt.peak_forces[j]
-            } else if state.now.contact_states[j].active {
-                cubic.strongest(coefficients, &state.now.contact_states[j].unfrozen())
+            let (force, theta) = if before.contact_states[c].active {
+                attempt.peak_forces[c]
+            } else if state.now.contact_states[c].active {
+                cubic.strongest(coefficients, &state.now.contact_states[c].unfrozen())
             } else {
                 cubic.strongest(coefficients, &ContactState::within_step(coefficients))
             };
@@ -227,7 +222,7 @@ impl Stepping<'_> {
                 state.record.statistics.joints[j].peak_time = time;
             }
             if force > state.joints[j].peak.normal {
-                let gap = mechanism.contacts.gap(j);
+                let gap = mechanism.contacts.gap(c);
                 let peak = &mut state.joints[j].peak;
                 peak.normal = force;
                 peak.time = time;

@@ -1,9 +1,10 @@
-//! Corners of the contact laws as events. During a step each touching joint stays on one branch of the friction law and one of
+//! Corners of the contact laws as events. During a step each touching contact stays on one branch of the friction law and one of
 //! the approach-speed rule; the step ends where its sliding speed or penetration rate leaves that branch.
 
 use super::{State, Stepping};
 use crate::contact::{ApproachBranch, ContactState, FrictionBranch};
 use crate::integrate::find_root;
+use crate::mechanism::ContactId;
 
 /// Parts of a step at whose ends sliding speed and penetration rate are checked.
 const PARTS: u32 = 4;
@@ -26,7 +27,7 @@ const MAX_CHATTER: u32 = 60;
 pub(super) struct Corner {
     /// Fraction of the step.
     pub theta: f64,
-    pub joint: usize,
+    pub contact: ContactId,
     pub next: LawBranch,
 }
 
@@ -50,15 +51,15 @@ impl LawBranch {
 }
 
 impl Corner {
-    /// Whether it lies so early that its joint should switch to the next branch before the step.
+    /// Whether it lies so early that its contact should switch to the next branch before the step.
     pub(super) fn is_at_start(&self) -> bool {
         self.theta <= AT_START
     }
 }
 
 impl Stepping<'_> {
-    /// Assigns every touching joint its current branches of the laws; joints that already have branches retain them unless
-    /// `reset`. If corners are not located, all joints use the full laws.
+    /// Assigns every touching contact its current branches of the laws; contacts that already have branches retain them unless
+    /// `reset`. If corners are not located, all contacts use the full laws.
     pub(super) fn freeze_branches(&mut self, reset: bool) {
         let freezes = self.locates() && !self.state.control.chatters;
         let Self { mechanism, state, .. } = self;
@@ -73,8 +74,8 @@ impl Stepping<'_> {
         }
         // With `reset`, the gaps may belong to another state until they are measured.
         if !reset {
-            for (j, contact_state) in now.contact_states.iter_mut().enumerate() {
-                contact_state.freeze_approach(mechanism.contacts.coefficients(j), now.gaps[j].rate);
+            for (c, contact_state) in now.contact_states.iter_mut().enumerate() {
+                contact_state.freeze_approach(mechanism.contacts.coefficients(c), now.gaps[c].rate);
             }
         }
         let is_unfrozen = |m: &ContactState| m.active && m.friction_branch == FrictionBranch::Unfrozen;
@@ -82,12 +83,12 @@ impl Stepping<'_> {
             return;
         }
         mechanism.measure(now.t, &now.y);
-        for (j, contact_state) in now.contact_states.iter_mut().enumerate() {
+        for (c, contact_state) in now.contact_states.iter_mut().enumerate() {
             if is_unfrozen(contact_state) {
-                let c = mechanism.contacts.coefficients(j);
-                contact_state.friction_branch = c.friction_branch_at(mechanism.slip_speed(j));
+                let law = mechanism.contacts.coefficients(c);
+                contact_state.friction_branch = law.friction_branch_at(mechanism.slip_speed(c));
                 if reset {
-                    contact_state.freeze_approach(c, mechanism.contacts.gap(j).separation.rate);
+                    contact_state.freeze_approach(law, mechanism.contacts.gap(c).separation.rate);
                 }
             }
         }
@@ -96,40 +97,40 @@ impl Stepping<'_> {
     /// First corner of the laws inside the step just attempted.
     pub(super) fn first_corner(&mut self, h: f64) -> Option<Corner> {
         let mut first: Option<Corner> = None;
-        for j in 0..self.state.now.contact_states.len() {
-            if !self.attempt.has_left_branch[j] {
+        for c in 0..self.state.now.contact_states.len() {
+            if !self.attempt.has_left_branch[c] {
                 continue;
             }
-            let contact_state = self.state.now.contact_states[j];
+            let contact_state = self.state.now.contact_states[c];
             let mut consider = |corner: Option<(f64, LawBranch)>| {
                 let earliest = first.as_ref().map_or(f64::INFINITY, |corner| corner.theta);
                 if let Some((theta, next)) = corner.filter(|(theta, _)| *theta < earliest) {
-                    first = Some(Corner { theta, joint: j, next });
+                    first = Some(Corner { theta, contact: c, next });
                 }
             };
             if contact_state.friction_branch != FrictionBranch::Unfrozen {
-                consider(self.friction_corner_of(j, h));
+                consider(self.friction_corner_of(c, h));
             }
             match contact_state.approach_branch {
                 ApproachBranch::Unfrozen => {}
-                ApproachBranch::Held => consider(self.rising_corner_of(j, h)),
-                ApproachBranch::Rising => consider(self.maximum_corner_of(j, h)),
+                ApproachBranch::Held => consider(self.rising_corner_of(c, h)),
+                ApproachBranch::Rising => consider(self.maximum_corner_of(c, h)),
             }
         }
         first
     }
 
-    /// Step fraction at which the penetration rate of joint `j` exceeds its largest value so far, and the next branch.
-    fn rising_corner_of(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
-        let most = self.state.now.contact_states[j].approach_speed * (1.0 + EQUAL_RATES);
-        let mut left = (0.0, self.state.now.gaps[j].rate - most);
+    /// Step fraction at which the penetration rate at contact `c` exceeds its largest value so far, and the next branch.
+    fn rising_corner_of(&mut self, c: usize, h: f64) -> Option<(f64, LawBranch)> {
+        let most = self.state.now.contact_states[c].approach_speed * (1.0 + EQUAL_RATES);
+        let mut left = (0.0, self.state.now.gaps[c].rate - most);
         for n in 1..=PARTS {
             let theta = f64::from(n) / f64::from(PARTS);
-            let right = (theta, self.rate_at(j, theta, h) - most);
+            let right = (theta, self.rate_at(c, theta, h) - most);
             if right.1 > 0.0 {
                 let at = if left.1 < 0.0 {
                     let (width, small) = ((1e-15 / h).max(1e-12), 1e-9 * most);
-                    let excess = |theta: f64| self.rate_at(j, theta, h) - most;
+                    let excess = |theta: f64| self.rate_at(c, theta, h) - most;
                     find_root(left.0, left.1, right.0, right.1, width, small, excess)
                 } else {
                     left.0
@@ -141,31 +142,31 @@ impl Stepping<'_> {
         None
     }
 
-    /// Step fraction at which the penetration rate of joint `j`, now at its largest, stops rising, and the next branch.
-    fn maximum_corner_of(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
+    /// Step fraction at which the penetration rate at contact `c`, now at its largest, stops rising, and the next branch.
+    fn maximum_corner_of(&mut self, c: usize, h: f64) -> Option<(f64, LawBranch)> {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
-        let mut before = self.state.now.gaps[j].rate;
+        let mut before = self.state.now.gaps[c].rate;
         for n in 1..=PARTS {
             let end = f64::from(n) / f64::from(PARTS);
-            let rate = self.rate_at(j, end, h);
+            let rate = self.rate_at(c, end, h);
             // Otherwise the next step would mistake the rate at its start for a maximum that this step has passed.
-            let passed = n == PARTS && self.rate_at(j, end - LAST_PART, h) > rate;
+            let passed = n == PARTS && self.rate_at(c, end - LAST_PART, h) > rate;
             if rate >= before && !passed {
                 before = rate;
                 continue;
             }
             let (mut a, mut b) = ((end - 2.0 / f64::from(PARTS)).max(0.0), end);
-            let (mut c, mut d) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
-            let (mut at_c, mut at_d) = (self.rate_at(j, c, h), self.rate_at(j, d, h));
+            let (mut x, mut z) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
+            let (mut at_x, mut at_z) = (self.rate_at(c, x, h), self.rate_at(c, z, h));
             for _ in 0..SECTIONS {
-                if at_c > at_d {
-                    (b, d, at_d) = (d, c, at_c);
-                    c = b - GOLDEN * (b - a);
-                    at_c = self.rate_at(j, c, h);
+                if at_x > at_z {
+                    (b, z, at_z) = (z, x, at_x);
+                    x = b - GOLDEN * (b - a);
+                    at_x = self.rate_at(c, x, h);
                 } else {
-                    (a, c, at_c) = (c, d, at_d);
-                    d = a + GOLDEN * (b - a);
-                    at_d = self.rate_at(j, d, h);
+                    (a, x, at_x) = (x, z, at_z);
+                    z = a + GOLDEN * (b - a);
+                    at_z = self.rate_at(c, z, h);
                 }
             }
             let at = 0.5 * (a + b);
@@ -175,49 +176,49 @@ impl Stepping<'_> {
         None
     }
 
-    /// Penetration rate of joint `j` on the interpolant of the attempted step, m/s.
-    fn rate_at(&mut self, j: usize, theta: f64, h: f64) -> f64 {
-        self.measure_at(j, theta, h);
-        self.mechanism.contacts.gap(j).separation.rate
+    /// Penetration rate at contact `c` on the interpolant of the attempted step, m/s.
+    fn rate_at(&mut self, c: usize, theta: f64, h: f64) -> f64 {
+        self.measure_at(c, theta, h);
+        self.mechanism.contacts.gap(c).separation.rate
     }
 
-    /// Measures the gap of joint `j` on the interpolant of the attempted step.
-    pub(super) fn measure_at(&mut self, j: usize, theta: f64, h: f64) {
+    /// Measures the gap of contact `c` on the interpolant of the attempted step.
+    pub(super) fn measure_at(&mut self, c: usize, theta: f64, h: f64) {
         let Self { mechanism, stepper, state, attempt, scratch_y, .. } = self;
         let (now, end) = (&state.now, &attempt.end);
         let all = 0..now.y.len();
-        for part in mechanism.gap_components(j).unwrap_or(std::slice::from_ref(&all)) {
+        for part in mechanism.gap_components(c).unwrap_or(std::slice::from_ref(&all)) {
             let part = part.clone();
             stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, &state.polynomial, scratch_y);
         }
         let time = now.t + theta * h;
-        for free_body in mechanism.free_flight_bodies_of(j) {
+        for free_body in mechanism.free_flight_bodies_of(c) {
             if let Some(flight) = &state.flights[free_body] {
                 flight.write_state(&mechanism.free_flight_bodies()[free_body], time, scratch_y);
             }
         }
-        mechanism.measure_one(j, time, scratch_y);
+        mechanism.measure_one(c, time, scratch_y);
     }
 
-    /// Step fraction at which the sliding speed of joint `j` leaves its branch, and the next branch.
-    fn friction_corner_of(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
-        let mut left = (0.0, self.slip_excess(j, 0.0, h).0);
+    /// Step fraction at which the sliding speed at contact `c` leaves its branch, and the next branch.
+    fn friction_corner_of(&mut self, c: usize, h: f64) -> Option<(f64, LawBranch)> {
+        let mut left = (0.0, self.slip_excess(c, 0.0, h).0);
         for n in 1..=PARTS {
             let theta = f64::from(n) / f64::from(PARTS);
-            let right = (theta, self.slip_excess(j, theta, h).0);
+            let right = (theta, self.slip_excess(c, theta, h).0);
             if right.1 > 0.0 {
                 let at = if left.1 < 0.0 {
-                    let small = 1e-9 * self.mechanism.contacts.coefficients(j).slip_high;
+                    let small = 1e-9 * self.mechanism.contacts.coefficients(c).slip_high;
                     let width = (1e-15 / h).max(1e-12);
-                    let excess = |theta: f64| self.slip_excess(j, theta, h).0;
+                    let excess = |theta: f64| self.slip_excess(c, theta, h).0;
                     find_root(left.0, left.1, right.0, right.1, width, small, excess)
                 } else {
                     left.0
                 };
-                let (_, speed) = self.slip_excess(j, at.max(AT_START), h);
-                let c = self.mechanism.contacts.coefficients(j);
-                let next = match self.state.now.contact_states[j].friction_branch {
-                    FrictionBranch::Ramp if speed > 0.5 * (c.slip_low + c.slip_high) => FrictionBranch::Full,
+                let (_, speed) = self.slip_excess(c, at.max(AT_START), h);
+                let law = self.mechanism.contacts.coefficients(c);
+                let next = match self.state.now.contact_states[c].friction_branch {
+                    FrictionBranch::Ramp if speed > 0.5 * (law.slip_low + law.slip_high) => FrictionBranch::Full,
                     FrictionBranch::Ramp => FrictionBranch::DeadBand,
                     _ => FrictionBranch::Ramp,
                 };
@@ -244,22 +245,22 @@ impl Stepping<'_> {
         self.evaluate_end(t_end);
     }
 
-    /// Excess of joint `j`'s sliding speed over its branch, and that speed, m/s, on the interpolant of the attempted step.
-    fn slip_excess(&mut self, j: usize, theta: f64, h: f64) -> (f64, f64) {
-        self.measure_at(j, theta, h);
-        let speed = self.mechanism.slip_speed(j);
-        let slip = self.state.now.contact_states[j].friction_branch;
-        let c = self.mechanism.contacts.coefficients(j);
-        (c.excess_over_branch(slip, speed), speed)
+    /// Excess at contact `c`'s sliding speed over its branch, and that speed, m/s, on the interpolant of the attempted step.
+    fn slip_excess(&mut self, c: usize, theta: f64, h: f64) -> (f64, f64) {
+        self.measure_at(c, theta, h);
+        let speed = self.mechanism.slip_speed(c);
+        let slip = self.state.now.contact_states[c].friction_branch;
+        let law = self.mechanism.contacts.coefficients(c);
+        (law.excess_over_branch(slip, speed), speed)
     }
 
     /// After an accepted step: switches to the branch beyond the corner at its end. Stops locating corners for a while if almost
     /// every step ends at one.
     pub(super) fn switch_at_corner(&mut self) {
         let state = &mut self.state;
-        if let Some((j, next)) = self.attempt.corner.take() {
-            if state.now.contact_states[j].active {
-                next.apply_to(&mut state.now.contact_states[j]);
+        if let Some((c, next)) = self.attempt.corner.take() {
+            if state.now.contact_states[c].active {
+                next.apply_to(&mut state.now.contact_states[c]);
             }
             state.record.statistics.corners += 1;
             state.control.chatter += CHATTER_PER_CORNER;

@@ -11,9 +11,9 @@
 //!
 //! Beyond [`COARSE`] steps per impact the last three shrink, too, so that the motion converges.
 
-use super::{DiscreteControl, JointState, NEARLY, State, StepEnd, Stepping, store_gaps};
+use super::{ContactMemory, DiscreteControl, NEARLY, State, StepEnd, Stepping, store_gaps};
 use crate::contact::{ContactPhase, ElasticLaw};
-use crate::mechanism::{ActiveSet, Counts, Mechanism, StepStart};
+use crate::mechanism::{ActiveSet, ContactId, Counts, Mechanism, StepStart};
 use crate::simulate::peaks::PenetrationCubic;
 use crate::simulate::{StopAdvice, StopFault, Stopped};
 
@@ -50,12 +50,12 @@ impl DiscreteControl {
     }
 
     /// Records the step just accepted, of size `h`, that ends at `now`; with `finer` times the steps of the coarse ones.
-    fn record(&mut self, mechanism: &Mechanism, h: f64, joints: &mut [JointState], now: &StepEnd, finer: f64) {
-        for (j, joint) in joints.iter_mut().enumerate() {
-            let touches = now.contact_states[j].active;
-            joint.phase = if touches { joint.phase.after(now.gaps[j].rate) } else { ContactPhase::default() };
-            if let Some(found) = mechanism.contact_mobility(j) {
-                joint.mobility = found;
+    fn record(&mut self, mechanism: &Mechanism, h: f64, contacts: &mut [ContactMemory], now: &StepEnd, finer: f64) {
+        for (c, contact) in contacts.iter_mut().enumerate() {
+            let touches = now.contact_states[c].active;
+            contact.phase = if touches { contact.phase.after(now.gaps[c].rate) } else { ContactPhase::default() };
+            if let Some(found) = mechanism.contact_mobility(c) {
+                contact.mobility = found;
             }
         }
         // The midpoint rule errs by h^3 / 12 times the rate at which the acceleration changes.
@@ -73,39 +73,40 @@ impl DiscreteControl {
     }
 }
 
-/// ElasticLaw law of ball joint `j`. Samples leave the mechanism at other instants, so that its own may be another.
-fn elastic(state: &State, j: usize) -> ElasticLaw {
+/// Elastic law of contact `c`. Samples leave the mechanism at other instants, so that its own may be another.
+fn elastic(state: &State, mechanism: &Mechanism, c: ContactId) -> ElasticLaw {
+    let j = mechanism.contacts.joint_of(c);
     ElasticLaw::of_ball(&state.conditions.joints[j], state.clearance(j))
 }
 
-/// Longest step in an impact of ball joint `j` at `speed`, m/s, in s: a part of the Hertz time.
-fn step_in_impact(state: &State, j: usize, speed: f64) -> f64 {
-    let mass = 1.0 / state.joints[j].mobility;
+/// Longest step in an impact of contact `c` at `speed`, m/s, in s: a part of the Hertz time.
+fn step_in_impact(state: &State, mechanism: &Mechanism, c: ContactId, speed: f64) -> f64 {
+    let mass = 1.0 / state.contacts[c].mobility;
     let steps = state.conditions.solver.steps_per_impact;
     let steps = if speed > SLOW { steps } else { steps.min(SLOW_STEPS) };
-    elastic(state, j).impact_duration(0.0, mass, speed) / f64::from(steps)
+    elastic(state, mechanism, c).impact_duration(0.0, mass, speed) / f64::from(steps)
 }
 
 /// Force over elastic force with which each ball rebounds in a step of `h` seconds, for those that need one.
 fn set_rebounds(state: &State, mechanism: &Mechanism, h: f64, rebounds: &mut [Option<f64>]) {
-    for (j, rebound) in rebounds.iter_mut().enumerate() {
-        let gap = state.now.gaps[j];
-        let rises = gap.penetration > 0.0 && state.joints[j].phase == ContactPhase::Restitution;
-        let law = mechanism.contacts.coefficients(j);
-        let speeds = state.record.impacts.speeds_under_way(j, law.speed_floor);
+    for (c, rebound) in rebounds.iter_mut().enumerate() {
+        let gap = state.now.gaps[c];
+        let rises = gap.penetration > 0.0 && state.contacts[c].phase == ContactPhase::Restitution;
+        let law = mechanism.contacts.coefficients(c);
+        let speeds = state.record.impacts.speeds_under_way(c, law.speed_floor);
         let Some([approach, separation]) = speeds.filter(|_| rises) else {
             *rebound = None;
             continue;
         };
-        let mass = 1.0 / state.joints[j].mobility;
-        let few = h * FEW_STEPS > elastic(state, j).impact_duration(0.0, mass, approach);
+        let mass = 1.0 / state.contacts[c].mobility;
+        let few = h * FEW_STEPS > elastic(state, mechanism, c).impact_duration(0.0, mass, approach);
         *rebound = few.then(|| law.rebound(mass, gap.penetration, gap.rate, separation));
     }
 }
 
-/// Half a period of the ringing of ball joint `j` about `penetration`, m, in s.
-fn half_period(state: &State, j: usize, penetration: f64) -> f64 {
-    elastic(state, j).half_period_at(penetration, state.joints[j].mobility)
+/// Half a period of the ringing of contact `c` about `penetration`, m, in s.
+fn half_period(state: &State, mechanism: &Mechanism, c: ContactId, penetration: f64) -> f64 {
+    elastic(state, mechanism, c).half_period_at(penetration, state.contacts[c].mobility)
 }
 
 /// Steps of a run over those of the coarse ones, at least 1.
@@ -118,23 +119,20 @@ pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
     let control = &state.control.discrete;
     let (longest, periods) = (LONGEST / finer(state), RINGING / finer(state));
     let mut h = longest.min(control.smooth);
-    let floor = |j: usize| mechanism.contacts.coefficients(j).speed_floor;
-    for (j, (gap, contact_state)) in state.now.gaps.iter().zip(&state.now.contact_states).enumerate() {
-        if !mechanism.contacts.has_clearance(j) {
-            continue;
-        }
+    let floor = |c: ContactId| mechanism.contacts.coefficients(c).speed_floor;
+    for (c, (gap, contact_state)) in state.now.gaps.iter().zip(&state.now.contact_states).enumerate() {
         if contact_state.active && gap.penetration > 0.0 {
-            let lasts = state.joints[j].phase == ContactPhase::Lasting;
+            let lasts = state.contacts[c].phase == ContactPhase::Lasting;
             // A ball at its wall may be struck again.
             let speed = if lasts { gap.rate.abs() } else { contact_state.approach_speed.max(gap.rate.abs()) };
-            if speed > SLOW || (speed > floor(j) && !lasts) {
-                h = h.min(step_in_impact(state, j, speed));
+            if speed > SLOW || (speed > floor(c) && !lasts) {
+                h = h.min(step_in_impact(state, mechanism, c, speed));
             }
-            h = h.min(periods * half_period(state, j, gap.penetration));
-        } else if gap.rate > floor(j) {
+            h = h.min(periods * half_period(state, mechanism, c, gap.penetration));
+        } else if gap.rate > floor(c) {
             let arrival = -gap.penetration / gap.rate;
             if arrival < h {
-                h = h.min(arrival.max(step_in_impact(state, j, gap.rate)));
+                h = h.min(arrival.max(step_in_impact(state, mechanism, c, gap.rate)));
             }
         }
     }
@@ -175,9 +173,9 @@ impl Stepping<'_> {
                 _ => {
                     self.accept_closed(t_end, size, open)?;
                     let finer = finer(self.state);
-                    let State { now, control, joints, .. } = &mut *self.state;
+                    let State { now, control, contacts, .. } = &mut *self.state;
                     control.h_next = if t_end == limit { h } else { size };
-                    control.discrete.record(self.mechanism, size, joints, now, finer);
+                    control.discrete.record(self.mechanism, size, contacts, now, finer);
                     return Ok(());
                 }
             }
@@ -186,7 +184,7 @@ impl Stepping<'_> {
     }
 
     /// The part of the step of size `h` just attempted that must be taken in its place, if any: an impact began in it that it
-    /// does not resolve. Sets `all` if the step left out a joint that touches.
+    /// does not resolve. Sets `all` if the step left out a contact that touches.
     fn part_to_repeat(&mut self, t_end: f64, h: f64, all: &mut bool) -> Option<f64> {
         let rounding = self.rounding();
         let Self { mechanism, state, attempt, .. } = self;
@@ -194,19 +192,19 @@ impl Stepping<'_> {
         mechanism.measure_step_end(t_end, &end.y);
         store_gaps(mechanism, &mut end.gaps);
         let mut part = 1.0_f64;
-        for (j, (start, end)) in state.now.gaps.iter().zip(&end.gaps).enumerate() {
-            if !mechanism.contacts.has_clearance(j) || start.penetration > 0.0 || end.penetration <= 0.0 {
+        for (c, (start, end)) in state.now.gaps.iter().zip(&end.gaps).enumerate() {
+            if start.penetration > 0.0 || end.penetration <= 0.0 {
                 continue;
             }
-            if mechanism.contact_mobility(j).is_none() {
+            if mechanism.contact_mobility(c).is_none() {
                 *all = true;
                 return Some(1.0);
             }
             let cubic = PenetrationCubic::new(*start, *end, h, rounding);
             let theta = cubic.crossing();
             let speed = cubic.at(theta).1;
-            if speed > mechanism.contacts.coefficients(j).speed_floor {
-                let longest = step_in_impact(state, j, speed);
+            if speed > mechanism.contacts.coefficients(c).speed_floor {
+                let longest = step_in_impact(state, mechanism, c, speed);
                 if h - theta * h > longest {
                     part = part.min((theta * h).max(longest) / h);
                 }

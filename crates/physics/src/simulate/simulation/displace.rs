@@ -15,21 +15,18 @@ impl Stepping<'_> {
             mechanism.project(state.now.t, &mut state.now.y);
         }
         mechanism.measure(state.now.t, &state.now.y);
-        for j in 0..state.now.contact_states.len() {
-            if !mechanism.contacts.has_clearance(j) {
-                continue;
-            }
+        for c in 0..state.now.contact_states.len() {
             // The offset may cross a corner of the laws.
-            state.now.contact_states[j] = state.now.contact_states[j].unfrozen();
-            let gap = *mechanism.contacts.gap(j);
+            state.now.contact_states[c] = state.now.contact_states[c].unfrozen();
+            let gap = *mechanism.contacts.gap(c);
             let in_contact = gap.separation.penetration > 0.0;
-            if in_contact == state.now.contact_states[j].active {
+            if in_contact == state.now.contact_states[c].active {
                 continue;
             }
-            state.now.contact_states[j] = if in_contact {
+            state.now.contact_states[c] = if in_contact {
                 state.control.contact_began = true;
                 state.control.h_next = state.control.h_next.min(state.control.h_contact);
-                ContactState::at_onset(mechanism.contacts.coefficients(j), gap.separation.rate)
+                ContactState::at_onset(mechanism.contacts.coefficients(c), gap.separation.rate)
             } else {
                 ContactState::default()
             };

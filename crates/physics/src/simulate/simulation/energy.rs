@@ -56,8 +56,8 @@ impl Stepping<'_> {
             account.powers = None;
             self.begin_wear_of_step(false);
             if let Some(wear) = &mut self.state.record.wear {
-                for (joint, contact) in self.mechanism.discrete_contacts() {
-                    wear.record_contact(0, joint, &contact);
+                for (c, contact) in self.mechanism.discrete_contacts() {
+                    wear.record_contact(0, self.mechanism.contacts.joint_of(c), &contact);
                 }
                 wear.integrate_step(h, &[1.0]);
             }
@@ -104,9 +104,9 @@ impl Stepping<'_> {
             return;
         };
         wear.begin_step(reuses_start);
-        for (j, (before, now)) in before.contact_states.iter().zip(&now.contact_states).enumerate() {
+        for (c, (before, now)) in before.contact_states.iter().zip(&now.contact_states).enumerate() {
             if now.active && !before.active {
-                wear.begin_contact(j, &mechanism.wall_direction(j));
+                wear.begin_contact(mechanism.contacts.joint_of(c), &mechanism.wall_direction(c));
             }
         }
     }
@@ -178,10 +178,8 @@ impl Stepping<'_> {
 fn energies(mechanism: &Mechanism, state: &State) -> Energies {
     let (kinetic, gravitational) = mechanism.energies();
     let contacts = &mechanism.contacts;
-    let in_contacts: f64 = (0..contacts.len())
-        .filter(|&j| contacts.has_clearance(j))
-        .map(|j| contacts.coefficients(j).elastic.energy(state.now.gaps[j].penetration))
-        .sum();
+    let gaps = state.now.gaps.iter().enumerate();
+    let in_contacts: f64 = gaps.map(|(c, gap)| contacts.coefficients(c).elastic.energy(gap.penetration)).sum();
     let elastic = in_contacts + mechanism.energy_in_elements(state.now.t);
     Energies { kinetic, gravitational, elastic, in_contacts }
 }

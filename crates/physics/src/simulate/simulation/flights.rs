@@ -23,7 +23,7 @@ impl Stepping<'_> {
         for (free_body, flight) in mechanism.free_flight_bodies().iter().zip(&mut state.flights) {
             let flew = flight.is_some();
             let held = state.pull.is_some_and(|pull| pull.body == free_body.body);
-            if held || free_body.joints.iter().any(|&j| now.contact_states[j].active) {
+            if held || free_body.contacts.iter().any(|&c| now.contact_states[c].active) {
                 *flight = None;
                 some_land |= flew;
                 continue;

@@ -2,6 +2,7 @@
 
 use super::{OPEN_LOOP, Stepping};
 use crate::integrate::StepControl;
+use crate::mechanism::ContactId;
 use crate::simulate::StopFault;
 
 /// Speed beyond which a state is absurd, m/s and rad/s.
@@ -26,17 +27,15 @@ impl Stepping<'_> {
         if self.mechanism.is_undetermined() {
             return Some(StopFault::SingularConstraints);
         }
-        for j in 0..self.attempt.end.gaps.len() {
-            if !self.mechanism.contacts.has_clearance(j) {
-                continue;
-            }
-            let penetration = self.attempt.end.gaps[j].penetration;
-            let radius = self.mechanism.contacts.coefficients(j).ball_radius;
+        for c in 0..self.attempt.end.gaps.len() {
+            let j = self.mechanism.contacts.joint_of(c);
+            let penetration = self.attempt.end.gaps[c].penetration;
+            let radius = self.mechanism.contacts.coefficients(c).ball_radius;
             if !(penetration <= LEFT_SOCKET * radius) {
                 return Some(StopFault::LeftSocket { joint: self.machine.loose_joints[j].name.clone(), penetration });
             }
             if self.state.conditions.solver.method.control() == StepControl::Fixed
-                && let Some(times) = self.overshoot_energy_ratio(j, h)
+                && let Some(times) = self.overshoot_energy_ratio(c, h)
             {
                 return Some(StopFault::Overshoot {
                     joint: self.machine.loose_joints[j].name.clone(),
@@ -64,12 +63,12 @@ impl Stepping<'_> {
 
     /// Ratio of stored to approach energy, if a fixed step carried a free ball so far into the wall that it stores more than any
     /// approach could bring.
-    fn overshoot_energy_ratio(&self, j: usize, h: f64) -> Option<f64> {
-        let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
+    fn overshoot_energy_ratio(&self, c: ContactId, h: f64) -> Option<f64> {
+        let (start, end) = (self.state.now.gaps[c], self.attempt.end.gaps[c]);
         if start.penetration > 0.0 || end.penetration <= 0.0 {
             return None;
         }
-        let coefficients = self.mechanism.contacts.coefficients(j);
+        let coefficients = self.mechanism.contacts.coefficients(c);
         let mass: f64 = self.machine.bodies.iter().map(|body| body.mass).sum();
         let least = self.machine.bodies.iter().map(|body| body.mass).filter(|mass| *mass > 0.0);
         let pushed = self.mechanism.element_reports(self.state.now.t + h);

@@ -6,7 +6,7 @@ use super::{CLEARANCE_SPEED, Stepping};
 use crate::contact::ContactState;
 use crate::integrate::Polynomial;
 use crate::machine::{Machine, Vec3};
-use crate::mechanism::{MechanismError, Pull, Ramp};
+use crate::mechanism::{ContactId, MechanismError, Pull, Ramp};
 use crate::simulate::Effect;
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
 
@@ -139,10 +139,11 @@ impl Stepping<'_> {
         }
         let Self { mechanism, state, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
-        let now = mechanism.contacts.clearance(j);
-        let gap = *mechanism.contacts.gap(j);
-        let distance = gap.separation.penetration + now;
-        let clearance = if contact.clearance < now && distance > contact.clearance {
+        let now = mechanism.contacts.joint_clearance(j);
+        let contacts = mechanism.contacts.of_joint(j);
+        let distance = |c: ContactId| mechanism.contacts.gap(c).separation.penetration + now;
+        let farthest = contacts.clone().map(distance).fold(0.0, f64::max);
+        let clearance = if contact.clearance < now && farthest > contact.clearance {
             let ramp = Ramp { start: state.now.t, from: now, rate: -CLEARANCE_SPEED, to: contact.clearance };
             state.joints[j].ramp = Some(ramp);
             now
@@ -152,10 +153,12 @@ impl Stepping<'_> {
         };
         state.joints[j].clearance = clearance;
         // The wall has moved away from the ball. The state of a ball just arriving or leaving does not change.
-        if clearance > now && state.now.contact_states[j].active && distance <= clearance {
-            state.now.contact_states[j] = ContactState::default();
+        for c in contacts {
+            if clearance > now && state.now.contact_states[c].active && distance(c) <= clearance {
+                state.now.contact_states[c] = ContactState::default();
+            }
+            state.record.impacts.change(c, state.now.contact_states[c].active);
         }
-        state.record.impacts.change(j, state.now.contact_states[j].active);
     }
 
     /// End of the active clearance ramp that finishes first, s.

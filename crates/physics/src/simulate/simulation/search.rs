@@ -15,9 +15,8 @@ impl Stepping<'_> {
     /// Records the reactions at the end of the step just accepted and fully evaluated. Without contacts they are smooth, and
     /// their peaks lie on the parabola through three step ends.
     pub(super) fn track_reactions(&mut self) {
-        let joints = self.state.now.gaps.len();
-        let smooth = !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j));
-        for j in 0..joints {
+        let smooth = self.mechanism.contacts.is_empty();
+        for j in 0..self.state.joints.len() {
             let Some(reaction) = self.mechanism.reaction(j) else {
                 continue;
             };
@@ -27,33 +26,34 @@ impl Stepping<'_> {
         }
     }
 
-    /// Finds the largest normal force of every joint in contact over the step just accepted, and its step fraction, from the
+    /// Finds the largest normal force of every contact over the step just accepted, and its step fraction, from the
     /// penetration cubic; no force where none can come near a peak so far. A peak inside a located step is re-evaluated there: the
     /// cubic's rate, which sets the damping, differs from that of the motion.
     pub(super) fn find_peak_forces(&mut self, h: f64) {
         let (located, rounding) = (self.locates(), self.rounding());
-        for j in 0..self.state.now.gaps.len() {
-            let contact_state = self.before.contact_states[j].unfrozen();
-            if !contact_state.active || !self.mechanism.contacts.has_clearance(j) {
+        for c in 0..self.state.now.gaps.len() {
+            let contact_state = self.before.contact_states[c].unfrozen();
+            if !contact_state.active {
                 continue;
             }
-            let cubic = PenetrationCubic::new(self.before.gaps[j], self.state.now.gaps[j], h, rounding);
-            let c = *self.mechanism.contacts.coefficients(j);
+            let cubic = PenetrationCubic::new(self.before.gaps[c], self.state.now.gaps[c], h, rounding);
+            let law = *self.mechanism.contacts.coefficients(c);
+            let j = self.mechanism.contacts.joint_of(c);
             let run_peak = self.state.record.statistics.joints[j].peak_normal;
-            let least = run_peak.min(self.state.joints[j].peak.normal).min(self.state.record.impacts.peak_under_way(j));
-            if cubic.force_bound(&c, &contact_state) <= least.min(NEAR_PEAK * run_peak) {
-                self.attempt.peak_forces[j] = (0.0, 1.0);
+            let least = run_peak.min(self.state.joints[j].peak.normal).min(self.state.record.impacts.peak_under_way(c));
+            if cubic.force_bound(&law, &contact_state) <= least.min(NEAR_PEAK * run_peak) {
+                self.attempt.peak_forces[c] = (0.0, 1.0);
                 continue;
             }
-            let (force, theta) = cubic.strongest(&c, &contact_state);
-            self.attempt.peak_forces[j] = (force, theta);
+            let (force, theta) = cubic.strongest(&law, &contact_state);
+            self.attempt.peak_forces[c] = (force, theta);
             if !located || theta <= 0.0 || theta >= 1.0 || force <= least {
                 continue;
             }
             self.evaluate_at(self.before.t + theta * h);
-            let inside = self.mechanism.contacts.gap(j).normal_force;
-            let ends = cubic.stronger_end(&c, &contact_state);
-            self.attempt.peak_forces[j] = if inside > ends.0 { (inside, theta) } else { ends };
+            let inside = self.mechanism.contacts.gap(c).normal_force;
+            let ends = cubic.stronger_end(&law, &contact_state);
+            self.attempt.peak_forces[c] = if inside > ends.0 { (inside, theta) } else { ends };
         }
     }
 
@@ -62,7 +62,7 @@ impl Stepping<'_> {
         let near = self.attempt.may_contain_peak;
         self.search_contacts();
         self.search_reactions();
-        let smooth = !(0..self.state.now.gaps.len()).any(|j| self.mechanism.contacts.has_clearance(j));
+        let smooth = self.mechanism.contacts.is_empty();
         let time = self.state.now.t;
         if self.state.loads.as_ref().is_some_and(|loads| near || smooth || loads.age(time) >= LOADS_EVERY) {
             self.record_loads();
@@ -95,16 +95,17 @@ impl Stepping<'_> {
         for part in PARTS {
             let time = t0 + part * (t - t0);
             self.evaluate_at(time);
-            for j in 0..self.state.now.gaps.len() {
+            for j in 0..self.state.joints.len() {
                 if let Some(reaction) = self.mechanism.reaction(j) {
                     self.take_reaction(j, reaction.norm(), time);
-                    continue;
                 }
-                let gap = self.mechanism.contacts.gap(j);
-                let (normal, size, friction) = (gap.separation.normal, gap.normal_force, gap.friction);
-                if self.is_peak(j, size, time) {
-                    self.state.joints[j].peak.normal_force = normal * -size;
-                    self.state.joints[j].peak.friction_force = friction;
+                for c in self.mechanism.contacts.of_joint(j) {
+                    let gap = self.mechanism.contacts.gap(c);
+                    let (normal, size, friction) = (gap.separation.normal, gap.normal_force, gap.friction);
+                    if self.is_peak(j, size, time) {
+                        self.state.joints[j].peak.normal_force = normal * -size;
+                        self.state.joints[j].peak.friction_force = friction;
+                    }
                 }
             }
         }
@@ -113,12 +114,11 @@ impl Stepping<'_> {
     /// Searches the step just accepted for peaks of reactions caused by impacts at other joints. Steps around an impact are
     /// too uneven for a parabola through their ends: it would have spurious peaks.
     fn search_reactions(&mut self) {
-        let joints = self.state.now.gaps.len();
-        if !self.mechanism.has_reactions() || !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j)) {
+        if !self.mechanism.has_reactions() || self.mechanism.contacts.is_empty() {
             return;
         }
         let (t0, t) = (self.before.t, self.state.now.t);
-        for j in 0..joints {
+        for j in 0..self.state.joints.len() {
             let Some((start, end)) = self.state.joints[j].reaction.ends(t0, t) else {
                 continue;
             };

@@ -2,13 +2,13 @@
 
 use super::automatic::{SchemeSelector, controller_of};
 use super::{
-    Control, DiscreteControl, FIRST_CONTACT_STEP, JointState, LONGEST_STEP, Model, Record, State, StateMismatch,
-    StepEnd, WorkspaceId,
+    ContactMemory, Control, DiscreteControl, FIRST_CONTACT_STEP, JointState, LONGEST_STEP, Model, Record, State,
+    StateMismatch, StepEnd, WorkspaceId,
 };
 use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::Polynomial;
 use crate::machine::Conditions;
-use crate::mechanism::{Flight, Mechanism, Pull};
+use crate::mechanism::{ContactId, Flight, Mechanism, Pull};
 use crate::simulate::impacts::{Impact, Impacts};
 use crate::simulate::ledger::{Account, Ledger};
 use crate::simulate::load_peaks::LoadPeaks;
@@ -21,23 +21,27 @@ impl JointState {
     fn new(mechanism: &Mechanism, j: usize) -> Self {
         Self {
             ramp: None,
-            clearance: mechanism.contacts.clearance(j),
-            mobility: mechanism.max_contact_mobility(j),
-            phase: ContactPhase::default(),
-            contact_steps: 0,
+            clearance: mechanism.contacts.joint_clearance(j),
             reaction: Recent::default(),
             peak: Peak::default(),
         }
     }
 }
 
+impl ContactMemory {
+    /// At the start.
+    fn new(mechanism: &Mechanism, c: ContactId) -> Self {
+        Self { mobility: mechanism.max_contact_mobility(c), phase: ContactPhase::default(), steps: 0 }
+    }
+}
+
 impl StepEnd {
-    pub(super) fn new(y: Vec<f64>, joints: usize) -> Self {
+    pub(super) fn new(y: Vec<f64>, contacts: usize) -> Self {
         Self {
             t: 0.0,
             k: vec![0.0; y.len()],
-            gaps: vec![Approach::default(); joints],
-            contact_states: vec![ContactState::default(); joints],
+            gaps: vec![Approach::default(); contacts],
+            contact_states: vec![ContactState::default(); contacts],
             y,
         }
     }
@@ -51,23 +55,24 @@ impl StepEnd {
         self.contact_states.copy_from_slice(&other.contact_states);
     }
 
-    fn fits(&self, dimension: usize, joints: usize) -> bool {
+    fn fits(&self, dimension: usize, contacts: usize) -> bool {
         self.y.len() == dimension
             && self.k.len() == dimension
-            && self.gaps.len() == joints
-            && self.contact_states.len() == joints
+            && self.gaps.len() == contacts
+            && self.contact_states.len() == contacts
     }
 }
 
 impl State {
     /// The state at t = 0 with coordinates and velocities `y`.
     pub(super) fn new(conditions: Conditions, mechanism: &Mechanism, y: Vec<f64>) -> Self {
-        let joints = mechanism.contacts.len();
+        let (joints, contacts) = (conditions.joints.len(), mechanism.contacts.len());
         let solver = &conditions.solver;
         let [quarter_turns, other_turns] = mechanism.quarter_turns();
         Self {
             quarter_turns,
             joints: (0..joints).map(|j| JointState::new(mechanism, j)).collect(),
+            contacts: (0..contacts).map(|c| ContactMemory::new(mechanism, c)).collect(),
             pull: None,
             flights: vec![None; mechanism.free_flight_bodies().len()],
             control: Control {
@@ -87,7 +92,7 @@ impl State {
             record: Record {
                 account: Account::default(),
                 wear: None,
-                impacts: Impacts::new(joints),
+                impacts: Impacts::new(contacts),
                 statistics: Statistics::new(joints),
                 starts_inside: None,
                 determinant_positive: true,
@@ -97,7 +102,7 @@ impl State {
             loads: None,
             ideal: None,
             workspace_id: WorkspaceId::default(),
-            now: StepEnd::new(y, joints),
+            now: StepEnd::new(y, contacts),
             conditions,
         }
     }
@@ -120,11 +125,6 @@ impl State {
     /// Gravity, contacts and stepper with the live changes so far.
     pub fn conditions(&self) -> &Conditions {
         &self.conditions
-    }
-
-    /// Contact state of ball joint `j`: whether it is in contact, and its approach speed.
-    pub fn contact_state(&self, j: usize) -> ContactState {
-        self.now.contact_states[j]
     }
 
     /// Clearance of ball joint `j`, m.
@@ -186,9 +186,12 @@ impl State {
         for y in &self.now.y {
             add(y.to_bits());
         }
-        for (j, m) in self.now.contact_states.iter().enumerate() {
-            add(u64::from(m.active));
-            add(m.approach_speed.to_bits());
+        let mut contacts = self.now.contact_states.iter();
+        for (j, parameters) in self.conditions.joints.iter().enumerate() {
+            let contact = if parameters.clearance > 0.0 { contacts.next() } else { None };
+            let contact = contact.copied().unwrap_or_default();
+            add(u64::from(contact.active));
+            add(contact.approach_speed.to_bits());
             add(self.clearance(j).to_bits());
         }
         // Closer to 0 the poses determine the angle.
@@ -205,7 +208,7 @@ impl State {
         const COPIES: usize = 10;
         const OF_JOINT: usize = 1024;
         const FIXED: usize = 4096;
-        let (coordinates, joints) = (self.now.y.len(), self.now.gaps.len());
+        let (coordinates, joints) = (self.now.y.len(), self.joints.len());
         let impacts = std::mem::size_of_val(self.record.impacts.stored());
         let wear = self.record.wear.as_ref().map_or(0, Wear::bytes);
         let flights = self.flights.len() * size_of::<Option<Flight>>();
@@ -217,25 +220,26 @@ impl State {
     /// Checks a state that was read: it has the dimensions of a state of `model`, which began as `own`, and all its indices are
     /// valid.
     pub(super) fn check(&self, model: &Model, own: &Self) -> Result<(), StateMismatch> {
-        let (dimension, joints) = (own.now.y.len(), own.now.gaps.len());
+        let (dimension, joints, contacts) = (own.now.y.len(), own.joints.len(), own.contacts.len());
         let record = &self.record;
         let worn = record.wear.as_ref();
         let conditions = &self.conditions;
         let loose =
             |contacts: &Conditions| contacts.joints.iter().map(|contact| contact.clearance > 0.0).collect::<Vec<_>>();
-        let fits = self.now.fits(dimension, joints)
+        let fits = self.now.fits(dimension, contacts)
             && self.quarter_turns.len() == own.quarter_turns.len()
             && record.quarter_turns.len() == own.record.quarter_turns.len()
             && loose(conditions) == loose(&own.conditions)
             && model.machine().with_conditions(conditions).check().is_ok()
             && self.joints.len() == joints
+            && self.contacts.len() == contacts
             && self.flights.len() == own.flights.len()
             // Only a window has a hand.
             && self.pull.is_none()
             && self.polynomial.fits(AnyStepper::polynomial_size(conditions.solver.method, dimension))
             && record.account.fits()
             && record.starts_inside.is_none_or(|(element, ..)| element < model.machine().elements.len())
-            && record.impacts.fits(joints)
+            && record.impacts.fits(contacts, joints)
             && record.statistics.joints.len() == joints
             && worn.is_none_or(|wear| wear.fits(model.machine()))
             && self.control.discrete.acceleration.len() == own.control.discrete.acceleration.len()

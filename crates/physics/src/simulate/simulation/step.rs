@@ -14,22 +14,22 @@ use crate::simulate::{Frame, Indeterminate, StartError, StopAdvice, StopFault, S
 
 impl Attempt {
     /// For the steps of a state of `dimension` components.
-    pub(super) fn new(machine: &Machine, dimension: usize, joints: usize) -> Self {
+    pub(super) fn new(machine: &Machine, dimension: usize, contacts: usize) -> Self {
         let edges = 3 * machine.elements.len();
         Self {
-            end: StepEnd::new(vec![0.0; dimension], joints),
-            located_joint: None,
+            end: StepEnd::new(vec![0.0; dimension], contacts),
+            located_contact: None,
             corner: None,
             element_sides: Vec::with_capacity(edges),
             edge: false,
             edge_indicators: std::array::from_fn(|_| Vec::with_capacity(edges)),
             has_switched_branch: false,
-            has_left_branch: vec![false; joints],
+            has_left_branch: vec![false; contacts],
             full_step: None,
             step_to_reproduce: None,
             may_contain_peak: false,
-            peak_forces: vec![(0.0, 0.0); joints],
-            rebounds: vec![None; joints],
+            peak_forces: vec![(0.0, 0.0); contacts],
+            rebounds: vec![None; contacts],
             stiffness: 0.0,
             counts: Counts::default(),
             factorisations: 0,
@@ -38,7 +38,7 @@ impl Attempt {
 
     /// Forgets how the latest step ended, which belongs to another state.
     pub(super) fn clear(&mut self) {
-        self.located_joint = None;
+        self.located_contact = None;
         self.corner = None;
         self.full_step = None;
         self.step_to_reproduce = None;

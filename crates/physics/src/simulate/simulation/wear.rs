@@ -8,9 +8,9 @@ impl Stepping<'_> {
     pub(in crate::simulate) fn track_wear(&mut self) {
         let mut wear = Wear::new(self.machine);
         self.evaluate_at(self.state.now.t);
-        for (j, contact_state) in self.state.now.contact_states.iter().enumerate() {
+        for (c, contact_state) in self.state.now.contact_states.iter().enumerate() {
             if contact_state.active {
-                wear.begin_contact(j, &self.mechanism.wall_direction(j));
+                wear.begin_contact(self.mechanism.contacts.joint_of(c), &self.mechanism.wall_direction(c));
             }
         }
         wear.commit_step();

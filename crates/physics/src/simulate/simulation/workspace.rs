@@ -40,14 +40,14 @@ impl Workspace {
     /// # Errors
     /// The method is too costly for the equations.
     pub(super) fn new(model: &Model, mechanism: Mechanism, method: Method) -> Result<Self, StartError> {
-        let (n, joints) = (mechanism.dimension(), mechanism.contacts.len());
+        let (n, contacts) = (mechanism.dimension(), mechanism.contacts.len());
         let mut workspace = Self {
             stepper: AnyStepper::new(method, n),
-            before: StepEnd::new(vec![0.0; n], joints),
-            attempt: Attempt::new(model.machine(), n, joints),
+            before: StepEnd::new(vec![0.0; n], contacts),
+            attempt: Attempt::new(model.machine(), n, contacts),
             scratch_y: vec![0.0; n],
             scratch_k: vec![0.0; n],
-            scratch_contacts: vec![ContactState::default(); joints],
+            scratch_contacts: vec![ContactState::default(); contacts],
             ideal: None,
             workspace_id: WorkspaceId::default(),
             mechanism,
