@@ -209,7 +209,7 @@ impl PyScene {
     fn channels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let mut live = self.start(py)?;
         let (rows, _) = detached(py, || channels_at_start(&mut live))?;
-        PyList::new(py, rows.into_iter().map(|c| (c.name, c.column, c.unit, c.help, c.unasked)))
+        PyList::new(py, rows.into_iter().map(|c| (c.name, c.column, c.unit, c.help, c.by_default)))
     }
 
     fn __eq__(&self, other: &Self) -> bool {

@@ -171,7 +171,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
     let what = impact
         .map_or_else(|| "none yet".to_owned(), |impact| format!("{}, {}", joint(player, impact.joint), kind(impact)));
     let ratio = |impact: &Impact| {
-        let [measured, requested] = [impact.achieved(), impact.asked].map(|ratio| value::number(ratio, 3));
+        let [measured, requested] = [impact.achieved(), impact.requested].map(|ratio| value::number(ratio, 3));
         // Only an undisturbed impact is comparable with the requested value.
         if impact.has_own_restitution() { format!("{measured}, asked {requested}") } else { measured }
     };
@@ -214,7 +214,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
 
 /// Kind of an impact; only an undisturbed one has its law's restitution.
 fn kind(impact: &Impact) -> &'static str {
-    match (impact.disturbed, impact.floored, impact.is_soft()) {
+    match (impact.disturbed, impact.below_speed_floor, impact.is_soft()) {
         (true, ..) => "disturbed",
         (_, true, _) => "slow",
         (_, _, true) => "soft",

@@ -63,7 +63,7 @@ fn millimetres(speed: f64) -> String {
 /// The law's coefficient of restitution, and why an impact's may differ.
 fn law(impact: &Impact) -> String {
     let law = value::number(impact.law, 3);
-    match (impact.disturbed, impact.floored) {
+    match (impact.disturbed, impact.below_speed_floor) {
         (true, _) => format!("{law}, disturbed"),
         (false, true) => format!("{law}, slow"),
         (false, false) => law,

@@ -282,7 +282,7 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
         ("Deepest", formatted(|impact| value::quantity(impact.deepest, "um", 3)), "Its largest indentation"),
         (
             "Restitution asked",
-            impact.map_or(NONE.to_owned(), |impact| ratio(impact.asked)),
+            impact.map_or(NONE.to_owned(), |impact| ratio(impact.requested)),
             "Coefficient of restitution set for the joint",
         ),
         (
@@ -305,7 +305,9 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
         }
     });
     let remark = match impact {
-        Some(impact) if impact.floored => "It began slower than impact_speed_floor: it rebounds higher than asked",
+        Some(impact) if impact.below_speed_floor => {
+            "It began slower than impact_speed_floor: it rebounds higher than asked"
+        }
         Some(impact) if impact.disturbed => {
             "Another joint was in contact meanwhile, or a parameter changed: the law alone does not set its restitution"
         }

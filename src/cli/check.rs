@@ -43,10 +43,10 @@ fn channels(all: &[ChannelInfo]) -> String {
     let name = width(|channel| channel.name.len());
     let column = width(|channel| channel.column.len());
     let mut out = String::new();
-    for (unasked, title) in [(true, "Written without --channels"), (false, "Written on request")] {
+    for (by_default, title) in [(true, "Written without --channels"), (false, "Written on request")] {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "{title}:");
-        for channel in all.iter().filter(|channel| channel.unasked == unasked) {
+        for channel in all.iter().filter(|channel| channel.by_default == by_default) {
             let ChannelInfo { unit, help, .. } = channel;
             let _ = writeln!(out, "  {:<name$}  {unit:<6}  {:<column$}  {help}", channel.name, channel.column);
         }

@@ -83,8 +83,8 @@ impl Restitution {
     /// Summary for ball joint `joint`.
     pub fn of(impacts: &[Impact], joint: usize) -> Self {
         let own = || impacts.iter().filter(|impact| impact.joint == joint);
-        let clean = own().filter(|impact| !impact.disturbed && !impact.floored);
-        let mut excess: Vec<f64> = clean.map(|impact| impact.achieved() - impact.asked).collect();
+        let clean = own().filter(|impact| !impact.disturbed && !impact.below_speed_floor);
+        let mut excess: Vec<f64> = clean.map(|impact| impact.achieved() - impact.requested).collect();
         excess.sort_by(f64::total_cmp);
         let n = excess.len();
         Self {
@@ -110,12 +110,12 @@ mod tests {
 
     #[test]
     fn the_median_leaves_disturbed_and_slow_impacts_out() {
-        let impact = |joint, restitution: f64, floored, disturbed| Impact {
+        let impact = |joint, restitution: f64, below_speed_floor, disturbed| Impact {
             joint,
             approach_speed: 0.1,
             separation_speed: 0.1 * restitution,
-            asked: 0.5,
-            floored,
+            requested: 0.5,
+            below_speed_floor,
             disturbed,
             ..Impact::default()
         };

@@ -67,7 +67,7 @@ pub fn json(
         "evaluations": statistics.evaluations,
         "rejected": statistics.rejected,
         "impacts": by_joint(&|i| json!(statistics.joints[i].impacts)),
-        "floored": by_joint(&|i| json!(statistics.joints[i].floored)),
+        "floored": by_joint(&|i| json!(statistics.joints[i].below_speed_floor)),
         "peak_normal_N": by_joint(&|i| json!(simulation.peak(i).0)),
         "peak_time_s": by_joint(&|i| json!(simulation.peak(i).1)),
         "constraint_drift_m": statistics.constraint_drift,
@@ -124,7 +124,7 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
             "no contact".to_owned()
         } else {
             let impacts = count(statistics.joints[i].impacts, "impact");
-            match statistics.joints[i].floored {
+            match statistics.joints[i].below_speed_floor {
                 0 => format!("{impacts}, {peak}"),
                 // Below the floor the damping term divides by the floor, so these rebound higher than requested.
                 slow => format!("{impacts} ({slow} slower than impact_speed_floor), {peak}"),

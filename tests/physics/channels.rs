@@ -51,9 +51,9 @@ fn channels_begin_with_the_default_columns_and_have_distinct_names() {
         let scene = scene(text);
         let first = first(&scene.machine);
         let list = channels_of(&scene.machine, &first);
-        let unasked: Vec<ChannelInfo> = list.iter().filter(|channel| channel.unasked).cloned().collect();
-        assert_eq!(columns(&chosen(&scene.machine, &first, &[]).expect("no pattern fails")), columns(&unasked));
-        assert!(list[..unasked.len()].iter().all(|channel| channel.unasked));
+        let by_default: Vec<ChannelInfo> = list.iter().filter(|channel| channel.by_default).cloned().collect();
+        assert_eq!(columns(&chosen(&scene.machine, &first, &[]).expect("no pattern fails")), columns(&by_default));
+        assert!(list[..by_default.len()].iter().all(|channel| channel.by_default));
         let names: BTreeSet<&str> = list.iter().map(|channel| &channel.name[..]).collect();
         assert_eq!(names.len(), list.len());
         for channel in &list {

@@ -286,7 +286,7 @@ fn a_joint_with_both_coordinates_driven_carries_an_attached_pendulum() {
         assert!(residual.abs() < 1e-7, "{residual:e}");
         assert_eq!(frame.actuators.len(), 2);
         let channels = jointplay_physics::simulate::channels_of(simulation.machine(), &frame);
-        let columns = channels.iter().filter(|channel| channel.unasked).map(|channel| &channel.column);
+        let columns = channels.iter().filter(|channel| channel.by_default).map(|channel| &channel.column);
         let own: &[&str] = match first.kind {
             "cylindrical" => &["j_actuator_N", "j_angle_actuator_Nm"],
             _ => &["j_angle_actuator_Nm", "j_child_angle_actuator_Nm"],

@@ -309,7 +309,7 @@ fn slow_impacts_of_separate_balls_return_no_more_than_their_law() {
                 simulation.step_until(0.5).unwrap();
                 simulation.take_impacts(&mut impacts);
             }
-            let resolved: Vec<_> = impacts.iter().filter(|impact| !impact.floored).collect();
+            let resolved: Vec<_> = impacts.iter().filter(|impact| !impact.below_speed_floor).collect();
             assert!(resolved.len() > 8, "{preset}, {gravity}");
             for impact in resolved {
                 assert!(!impact.disturbed, "{preset}, {gravity}: {impact:?}");

@@ -147,7 +147,7 @@ fn slow_impacts_use_the_speed_floor_and_rebound_higher() {
         simulation.step().unwrap();
     }
     let contact = simulation.contact_state(0);
-    assert!(contact.active && contact.floored);
+    assert!(contact.active && contact.below_speed_floor);
     assert_eq!(contact.approach_speed, 1e-3);
     let (slow, _) = rebound(4e-4, &[]);
     let (fast, _) = rebound(0.1, &[]);
@@ -157,7 +157,7 @@ fn slow_impacts_use_the_speed_floor_and_rebound_higher() {
         above.step().unwrap();
     }
     let contact = above.contact_state(0);
-    assert!(!contact.floored);
+    assert!(!contact.below_speed_floor);
     assert!((contact.approach_speed - 0.1).abs() < 1e-12, "{contact:?}");
 }
 
@@ -179,7 +179,7 @@ fn pressed(velocity: Vec3, spin: Vec3, changes: &[(&str, &str)]) -> (Simulation,
 fn contacts_at_the_start_have_the_floor_as_approach_speed() {
     let (simulation, frame) = pressed(Vec3::zeros(), Vec3::zeros(), &[]);
     let contact = simulation.contact_state(0);
-    assert!(contact.active && contact.floored);
+    assert!(contact.active && contact.below_speed_floor);
     assert_eq!(contact.approach_speed, 1e-3);
     assert_eq!(simulation.statistics().joints[0].impacts, 1);
     assert_eq!(frame.joints[0].state, ContactMode::Creep);

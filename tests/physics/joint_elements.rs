@@ -497,7 +497,7 @@ fn columns_follow_the_kind_of_joint() {
         let columns = jointplay_physics::simulate::channels_of(&scene.machine, &frame);
         columns
             .into_iter()
-            .filter(|channel| channel.unasked)
+            .filter(|channel| channel.by_default)
             .map(|channel| channel.column)
             .collect::<Vec<_>>()
             .join(",")

@@ -57,10 +57,10 @@ fn an_undisturbed_impact_has_the_restitution_of_its_law() {
             let first = impacts.first().unwrap();
             let case = format!("{word} {restitution}, {method}: {first:?}");
             println!("{case}: gave {:.5}, law {expected:.5}", first.achieved());
-            assert_eq!((first.asked, first.joint), (requested, 0), "{case}");
+            assert_eq!((first.requested, first.joint), (requested, 0), "{case}");
             assert!((first.law - expected).abs() < 1e-12, "{case}");
             assert!((first.achieved() - expected).abs() < bound, "{case}");
-            assert!(!first.disturbed && !first.floored, "{case}");
+            assert!(!first.disturbed && !first.below_speed_floor, "{case}");
             assert!(first.end > first.start && first.steps > 5, "{case}");
         }
     }
@@ -88,7 +88,7 @@ fn an_impact_reports_its_depth_force_and_time() {
 fn slow_impacts_are_flagged() {
     let changes = [("contact.impact_speed_floor", "0.5 m/s")];
     let impacts = impacts(&mut axial_impact(&changes), 0.01);
-    assert!(impacts[0].floored && impacts[0].achieved() > impacts[0].law + 0.01, "{:?}", impacts[0]);
+    assert!(impacts[0].below_speed_floor && impacts[0].achieved() > impacts[0].law + 0.01, "{:?}", impacts[0]);
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn impacts_among_other_contacts_are_flagged() {
         assert_eq!((impact.joint, impact.disturbed), (joint, disturbed), "{impact:?}");
         assert!((1e3 * impact.start - start).abs() < 1e-4, "{impact:?}");
         assert!((impact.approach_speed / speed - 1.0).abs() < 1e-3, "{impact:?}");
-        assert_eq!(impact.asked, 0.9);
+        assert_eq!(impact.requested, 0.9);
         assert!((impact.law - 0.913).abs() < 1e-3);
         assert!((0.8..0.92).contains(&impact.achieved()), "{impact:?}");
         assert!(impact.steps >= 10, "{impact:?}");

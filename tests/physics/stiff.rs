@@ -54,7 +54,8 @@ fn resting(changes: &[(&str, &str)], approach_speed: f64) -> (Mechanism, Vec<f64
     for (i, slip) in [2e-7, 3e-5, -4e-5].iter().enumerate() {
         y[v + i] += slip;
     }
-    let contact_state = ContactState { active: true, approach_speed, floored: true, ..ContactState::default() };
+    let contact_state =
+        ContactState { active: true, approach_speed, below_speed_floor: true, ..ContactState::default() };
     (mechanism, y, [contact_state; 3])
 }
 

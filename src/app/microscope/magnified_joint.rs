@@ -155,7 +155,7 @@ mod tests {
         assert!((ends[0].start - 7.801_422_908e-3).abs() < 1e-6);
         assert!((ends[0].approach_speed - 0.076_909).abs() < 1e-4);
         let expected = ends[0].separation_speed / ends[0].approach_speed;
-        assert!((ends[0].achieved() - expected).abs() < 1e-15 && ends[0].asked == 0.9);
+        assert!((ends[0].achieved() - expected).abs() < 1e-15 && ends[0].requested == 0.9);
         // Going back into an impact shows its recorded outcome.
         player.step_back();
         assert_eq!(MagnifiedJoint::of(&player, 0).expect("has a joint").impact, Some(ends[2]));

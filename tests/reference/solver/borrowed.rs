@@ -61,7 +61,7 @@ impl Equations for ProgramEquations {
             *state = ContactState {
                 active: speed.is_some(),
                 approach_speed: speed.unwrap_or(0.0),
-                floored: false,
+                below_speed_floor: false,
                 ..ContactState::default()
             };
         }

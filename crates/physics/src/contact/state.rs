@@ -13,7 +13,7 @@ pub struct ContactState {
     /// floor; 0 while free.
     pub approach_speed: f64,
     /// Whether the floor applied: this contact then rebounds higher than requested.
-    pub floored: bool,
+    pub below_speed_floor: bool,
     /// Active branch of the friction law.
     pub friction_branch: FrictionBranch,
     /// Active branch of the approach-speed rule.
@@ -46,7 +46,12 @@ impl ContactPhase {
 impl ContactState {
     /// State of a contact that begins at the penetration rate `rate` (m/s).
     pub(crate) fn at_onset(c: &Coefficients, rate: f64) -> Self {
-        Self { active: true, approach_speed: c.with_floor(rate), floored: rate < c.speed_floor, ..Self::default() }
+        Self {
+            active: true,
+            approach_speed: c.with_floor(rate),
+            below_speed_floor: rate < c.speed_floor,
+            ..Self::default()
+        }
     }
 
     /// State of a contact that begins and ends within a step: its approach speed is the current rate.

@@ -92,7 +92,7 @@ pub enum Doubt {
         "{joints}: {slow} of {contacts} contacts began slower than impact_speed_floor or existed at the start: they rebound \
          higher than asked."
     )]
-    Floored {
+    BelowSpeedFloor {
         /// Affected joints.
         joints: AffectedJoints,
         /// Number of such contacts of the worst joint.
@@ -227,7 +227,7 @@ impl Doubt {
             Self::Unresolved { .. } => 1,
             Self::Late { .. } => 2,
             Self::Rebound { .. } => 3,
-            Self::Floored { .. } => 4,
+            Self::BelowSpeedFloor { .. } => 4,
             Self::Patch { .. } => 5,
             Self::StartsInside { .. } => 6,
             Self::Damping { .. } => 7,

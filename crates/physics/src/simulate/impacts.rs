@@ -27,11 +27,11 @@ pub struct Impact {
     /// Minus the penetration rate when it ended, m/s.
     pub separation_speed: f64,
     /// The joint's restitution setting when it began.
-    pub asked: f64,
+    pub requested: f64,
     /// Restitution that its normal-force law predicts for an undisturbed impact not slower than the floor.
     pub law: f64,
     /// Whether it began slower than `impact_speed_floor`: it then rebounds higher than requested.
-    pub floored: bool,
+    pub below_speed_floor: bool,
     /// Whether another ball joint that acts on the same bodies was in contact meanwhile, or a live change altered the contact: the law alone then does not
     /// determine its restitution.
     pub disturbed: bool,
@@ -72,7 +72,7 @@ impl Impact {
 
     /// Whether its restitution can be compared with its law's prediction: it was neither disturbed nor slow nor soft.
     pub fn has_own_restitution(&self) -> bool {
-        !(self.disturbed || self.floored || self.is_soft())
+        !(self.disturbed || self.below_speed_floor || self.is_soft())
     }
 }
 
@@ -130,7 +130,7 @@ impl Impacts {
         joint: usize,
         time: f64,
         speed: f64,
-        asked: f64,
+        requested: f64,
         push: f64,
         coefficients: &Coefficients,
         in_contact: bool,
@@ -149,9 +149,9 @@ impl Impacts {
             joint,
             start: time,
             approach_speed: speed,
-            asked,
+            requested,
             law,
-            floored: speed < coefficients.speed_floor,
+            below_speed_floor: speed < coefficients.speed_floor,
             disturbed: in_contact,
             push,
             ..Impact::default()

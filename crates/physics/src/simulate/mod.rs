@@ -101,7 +101,7 @@ pub struct JointStatistics {
     pub impacts: u64,
     /// Finished contacts that began slower than the scene's `impact_speed_floor` or existed at the start: they rebounded higher than
     /// requested.
-    pub floored: u64,
+    pub below_speed_floor: u64,
     /// Contacts that lasted fewer fixed steps than needed to resolve one; 0 with an adaptive method.
     pub coarse: u64,
     /// Deepest penetration at which a contact was found although its beginning should have been located, m; 0 if all were, or with

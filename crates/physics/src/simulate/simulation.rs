@@ -170,9 +170,9 @@ struct Control {
     chatter: u32,
     chatters: bool,
     /// Active scheme of the automatic method.
-    member: ActiveScheme,
+    scheme: ActiveScheme,
     /// Data for the automatic choice of scheme.
-    choice: SchemeSelector,
+    selector: SchemeSelector,
     controller: Controller,
     /// Fixed steps are counted from here, so that times do not accumulate rounding errors.
     grid_origin: f64,

@@ -152,7 +152,7 @@ pub struct Wear {
     grid: Arc<Grid>,
     sockets: Vec<Socket>,
     /// Contacts at the nodes of the step being recorded; afterwards those at its end, reusable for the next step.
-    presses: Vec<ContactSample>,
+    contacts: Vec<ContactSample>,
     /// Contributions of the latest step, by joint and cell, not yet added to the cells.
     latest: Vec<(usize, usize, Cell)>,
 }
@@ -185,7 +185,7 @@ impl Wear {
     /// Approximate size in bytes, without the shared grid.
     pub(super) fn bytes(&self) -> usize {
         let cells: usize = self.sockets.iter().map(|socket| socket.cells.len()).sum();
-        cells * size_of::<Cell>() + size_of_val(self.presses.as_slice())
+        cells * size_of::<Cell>() + size_of_val(self.contacts.as_slice())
     }
 
     /// An empty map.
@@ -203,7 +203,7 @@ impl Wear {
         };
         let sockets: Vec<Socket> = machine.loose_joints.iter().map(socket).collect();
         let most = MAX_ENTRIES * sockets.len();
-        Self { presses: Vec::with_capacity(most), latest: Vec::with_capacity(most), sockets, grid }
+        Self { contacts: Vec::with_capacity(most), latest: Vec::with_capacity(most), sockets, grid }
     }
 
     /// Whether it fits `machine`: all its indices are valid.
@@ -215,7 +215,7 @@ impl Wear {
             socket.is_some_and(|socket| cell < socket.cells.len())
         };
         cells(self) == cells(&own)
-            && self.presses.iter().all(|p| p.instant == 0 && has(p.joint, p.cell))
+            && self.contacts.iter().all(|p| p.instant == 0 && has(p.joint, p.cell))
             && self.latest.iter().all(|&(joint, cell, _)| has(joint, cell))
     }
 
@@ -254,7 +254,7 @@ impl Wear {
     pub(super) fn begin_step(&mut self, reuses_start: bool) {
         self.commit_step();
         if !reuses_start {
-            self.presses.clear();
+            self.contacts.clear();
         }
     }
 
@@ -271,7 +271,7 @@ impl Wear {
     pub(super) fn record_contact(&mut self, instant: usize, joint: usize, contact: &WallContact) {
         let cell = self.cell(joint, &contact.direction);
         let WallContact { normal_force, friction_power, .. } = *contact;
-        self.presses.push(ContactSample { instant, joint, cell, normal_force, friction_power });
+        self.contacts.push(ContactSample { instant, joint, cell, normal_force, friction_power });
     }
 
     /// Records that a contact of `joint` begins in `direction`, in the axes of the socket's body.
@@ -282,7 +282,7 @@ impl Wear {
 
     /// Integrates the recorded forces over a step of size `h` with the quadrature weights `weights`.
     pub(super) fn integrate_step(&mut self, h: f64, weights: &[f64]) {
-        for sample in &self.presses {
+        for sample in &self.contacts {
             let weight = h * weights[sample.instant];
             let contribution = Cell {
                 contacts: 0,
@@ -292,8 +292,8 @@ impl Wear {
             self.latest.push((sample.joint, sample.cell, contribution));
         }
         let last = weights.len() - 1;
-        self.presses.retain(|sample| sample.instant == last);
-        self.presses.iter_mut().for_each(|sample| sample.instant = 0);
+        self.contacts.retain(|sample| sample.instant == last);
+        self.contacts.iter_mut().for_each(|sample| sample.instant = 0);
     }
 
     fn cell(&self, joint: usize, direction: &Vec3) -> usize {

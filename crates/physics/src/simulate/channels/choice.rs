@@ -23,7 +23,7 @@ pub struct ChannelInfo {
     /// Description.
     pub help: &'static str,
     /// Whether `run` writes it by default.
-    pub unasked: bool,
+    pub by_default: bool,
     pub(super) reading: Reading,
 }
 
@@ -103,7 +103,7 @@ pub fn channels_of(machine: &Machine, first: &Frame) -> Vec<ChannelInfo> {
                 unit: unit_of(found.signal.column),
                 column,
                 help: found.signal.help,
-                unasked: found.signal.run.is_some(),
+                by_default: found.signal.run.is_some(),
                 reading: found.reading,
             });
         }
@@ -121,8 +121,8 @@ pub fn chosen_channels(mut list: Vec<ChannelInfo>, patterns: &[String]) -> Resul
         matching(&list, pattern)?;
     }
     list.retain(|channel| {
-        let is_asked = patterns.iter().any(|pattern| channel.is_matched_by(pattern));
-        channel.name == TIME || is_asked || (patterns.is_empty() && channel.unasked)
+        let is_requested = patterns.iter().any(|pattern| channel.is_matched_by(pattern));
+        channel.name == TIME || is_requested || (patterns.is_empty() && channel.by_default)
     });
     Ok(list)
 }

@@ -17,7 +17,7 @@ const END_ON_INTERPOLANT: f64 = 1e-5;
 /// Loosest tolerance of the automatic method's explicit scheme. It takes the steps through impacts, which determine all later
 /// motion and are few compared with those in lasting contact.
 const IMPACT_TOLERANCE: f64 = 1e-5;
-/// Factor on the allowed error of an explicit step in which a stop presses: its force grows with d^1.5, whose slope begins with a
+/// Factor on the allowed error of an explicit step in which a stop vertical_onset: its force grows with d^1.5, whose slope begins with a
 /// vertical tangent. The sensitivity of the motion after an impact to the motion before it, which determines exponents, has a
 /// much larger error than the motion itself.
 const STOP_ERROR_FACTOR: f64 = 0.001;
@@ -48,7 +48,7 @@ impl Run<'_> {
     /// Takes a step whose size follows the error estimate, truncated at the first contact start or end inside it.
     pub(super) fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
         self.choose_flights(limit);
-        self.stepper.choose(self.state.control.member);
+        self.stepper.choose(self.state.control.scheme);
         self.attempt.has_switched_branch = false;
         self.attempt.counts = Counts::default();
         self.attempt.factorisations = 0;
@@ -85,12 +85,12 @@ impl Run<'_> {
     /// Largest scaled error of an acceptable step.
     fn allowed_error(&self) -> f64 {
         let solver = &self.state.conditions.solver;
-        let allowed = match (solver.method, self.state.control.member) {
+        let allowed = match (solver.method, self.state.control.scheme) {
             (Method::Automatic, ActiveScheme::Explicit) => solver.tolerance.min(IMPACT_TOLERANCE),
             _ => solver.tolerance,
         };
-        let presses = self.mechanism.has_vertical_onset(&self.attempt.element_sides);
-        if presses { STOP_ERROR_FACTOR * allowed } else { allowed }
+        let vertical_onset = self.mechanism.has_vertical_onset(&self.attempt.element_sides);
+        if vertical_onset { STOP_ERROR_FACTOR * allowed } else { allowed }
     }
 
     /// Attempts a step and locates its first event. Returns its end and size, s, or `None` if it must be repeated with the new

@@ -110,13 +110,13 @@ impl Run<'_> {
     /// Chooses the scheme of the next step, after one of size `h` that took `evaluations` evaluations.
     pub(super) fn choose_scheme(&mut self, h: f64, stiffness: f64, evaluations: f64) {
         let scheme = self.next_scheme(h, stiffness, evaluations);
-        if scheme != self.state.control.member {
+        if scheme != self.state.control.scheme {
             self.set_scheme(scheme);
         }
     }
 
     fn set_scheme(&mut self, scheme: ActiveScheme) {
-        self.state.control.member = scheme;
+        self.state.control.scheme = scheme;
         self.state.control.controller = controller_of(Method::Automatic, scheme);
         self.invalidate();
     }
@@ -125,57 +125,57 @@ impl Run<'_> {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
         let factorisations = f64::from(self.attempt.factorisations);
         let state = &mut self.state;
-        let scheme = state.control.member;
+        let scheme = state.control.scheme;
         let algebra = match scheme {
             ActiveScheme::Explicit => 0.0,
             ActiveScheme::Implicit => factorisations * self.mechanism.implicit_algebra(),
         };
         let cost = evaluations + algebra + STEP_COST;
-        let choice = &mut state.control.choice;
+        let selector = &mut state.control.selector;
         if scheme == ActiveScheme::Implicit {
-            choice.implicit.add(h, cost);
+            selector.implicit.add(h, cost);
         }
         if state.control.contact_began {
-            choice.since_contact = 0;
-            choice.limited = 0;
+            selector.since_contact = 0;
+            selector.limited = 0;
             // An impact is short and not stiff: the explicit method resolves it at less cost.
-            let strikes = state.now.contact_states.iter().any(|m| m.active && !m.floored);
+            let strikes = state.now.contact_states.iter().any(|m| m.active && !m.below_speed_floor);
             let leaves = scheme == ActiveScheme::Implicit && strikes;
             if leaves {
-                choice.implicit.conclude(choice.explicit());
+                selector.implicit.conclude(selector.explicit());
             }
-            (choice.explicit_progress, choice.explicit_cost) = (0.0, 0.0);
+            (selector.explicit_progress, selector.explicit_cost) = (0.0, 0.0);
             return if leaves { ActiveScheme::Explicit } else { scheme };
         }
         if scheme == ActiveScheme::Implicit {
-            let before = choice.explicit();
-            let trial = &mut choice.implicit;
+            let before = selector.explicit();
+            let trial = &mut selector.implicit;
             if trial.steps == GROWING_STEPS {
                 (trial.progress, trial.cost) = (0.0, 0.0);
             }
             if trial.steps >= TRIAL_STEPS && trial.conclude(before) {
                 // An event may have truncated that step to almost nothing.
-                state.control.h_next = choice.h_explicit.max(shortest_step(state.now.t));
+                state.control.h_next = selector.h_explicit.max(shortest_step(state.now.t));
                 return ActiveScheme::Explicit;
             }
             return scheme;
         }
-        choice.since_contact += 1;
-        choice.explicit_progress = DECAY * choice.explicit_progress + h;
-        choice.explicit_cost = DECAY * choice.explicit_cost + cost;
-        choice.limited =
-            if stiffness > STABILITY_LIMIT { choice.limited + 1 } else { choice.limited.saturating_sub(1) };
-        if choice.implicit.wait > 0 {
-            choice.implicit.wait -= 1;
+        selector.since_contact += 1;
+        selector.explicit_progress = DECAY * selector.explicit_progress + h;
+        selector.explicit_cost = DECAY * selector.explicit_cost + cost;
+        selector.limited =
+            if stiffness > STABILITY_LIMIT { selector.limited + 1 } else { selector.limited.saturating_sub(1) };
+        if selector.implicit.wait > 0 {
+            selector.implicit.wait -= 1;
             return scheme;
         }
         let touches = state.now.contact_states.iter().any(|m| m.active);
-        let limited = choice.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
-        let settled = limited || (touches && choice.since_contact >= SETTLED_STEPS);
+        let limited = selector.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
+        let settled = limited || (touches && selector.since_contact >= SETTLED_STEPS);
         if settled && velocities <= self.mechanism.largest_implicit() {
-            (choice.since_contact, choice.limited) = (0, 0);
-            choice.h_explicit = h;
-            choice.implicit.restart();
+            (selector.since_contact, selector.limited) = (0, 0);
+            selector.h_explicit = h;
+            selector.implicit.restart();
             return ActiveScheme::Implicit;
         }
         scheme
@@ -225,8 +225,8 @@ mod tests {
         simulation.advance_to(1.0).unwrap();
         let (model, mut state) = (simulation.model(), simulation.state().clone());
         let mut workspace = model.workspace(&state);
-        assert_eq!(state.control.member, ActiveScheme::Implicit);
-        state.control.choice = SchemeSelector {
+        assert_eq!(state.control.scheme, ActiveScheme::Implicit);
+        state.control.selector = SchemeSelector {
             h_explicit: 1e-16,
             explicit_progress: 1.0,
             explicit_cost: 1e-3,
@@ -235,7 +235,7 @@ mod tests {
         };
         Run::new(model, &mut state, &mut workspace).choose_scheme(1e-3, 0.0, 10.0);
         let (control, t) = (&state.control, state.now.t);
-        assert_eq!(control.member, ActiveScheme::Explicit);
+        assert_eq!(control.scheme, ActiveScheme::Explicit);
         assert!(t + control.h_next > t);
         assert!(control.h_next >= shortest_step(t));
         while state.time() < 1.1 {

@@ -26,14 +26,15 @@ pub(super) struct ContactChanges {
 }
 
 impl State {
-    /// Records that contact `j` begins at `time` with penetration rate `rate` (m/s), which was changing at `push` (m/s^2), and
-    /// restitution setting `asked`; returns its contact state.
-    fn begin(&mut self, j: usize, time: f64, rate: f64, push: f64, asked: f64, contacts: &Contacts) -> ContactState {
+    /// Records that contact `j` begins at `time` with penetration rate `rate` (m/s), which was changing at `push` (m/s^2);
+    /// returns its contact state.
+    fn begin(&mut self, j: usize, time: f64, rate: f64, push: f64, contacts: &Contacts) -> ContactState {
+        let requested = self.conditions.joints[j].restitution;
         let coefficients = contacts.coefficients(j);
         let interacts = |other: usize| contacts.interact(j, other);
         let mut active = self.now.contact_states.iter().enumerate().filter(|(_, m)| m.active);
         let among_others = active.any(|(other, _)| interacts(other));
-        self.record.impacts.begin(j, time, rate, asked, push, coefficients, among_others, interacts);
+        self.record.impacts.begin(j, time, rate, requested, push, coefficients, among_others, interacts);
         let contact_state = ContactState::at_onset(coefficients, rate);
         self.record.statistics.joints[j].impacts += 1;
         let peak = &mut self.joints[j].peak;
@@ -83,7 +84,7 @@ impl Run<'_> {
             }
             if penetration <= AT_WALL * contact.clearance && rate > 0.0 {
                 state.now.contact_states[j] =
-                    state.begin(j, 0.0, rate, UNKNOWN_PUSH, contact.restitution, &mechanism.contacts);
+                    state.begin(j, 0.0, rate, UNKNOWN_PUSH, &mechanism.contacts);
             } else {
                 state.now.contact_states[j] = ContactState::at_onset(coefficients, f64::NEG_INFINITY);
                 state.record.statistics.joints[j].impacts += 1;
@@ -99,9 +100,7 @@ impl Run<'_> {
         for j in 0..state.conditions.joints.len() {
             let gap = state.now.gaps[j];
             if mechanism.contacts.has_clearance(j) && gap.is_arriving() && !state.now.contact_states[j].active {
-                let asked = state.conditions.joints[j].restitution;
-                state.now.contact_states[j] =
-                    state.begin(j, state.now.t, gap.rate, UNKNOWN_PUSH, asked, &mechanism.contacts);
+                state.now.contact_states[j] = state.begin(j, state.now.t, gap.rate, UNKNOWN_PUSH, &mechanism.contacts);
                 state.joints[j].contact_steps = 0;
                 begins = true;
             }
@@ -158,11 +157,10 @@ impl Run<'_> {
                 let theta = if crosses { cubic.crossing() } else { 1.0 };
                 let rate = if crosses { cubic.at(theta).1 } else { end.rate };
                 let time = before.t + theta * h;
-                let asked = state.conditions.joints[j].restitution;
                 let approach_time = theta * h;
                 let is_known = approach_time > TOO_SHORT_FOR_PUSH;
                 let push = if is_known { (rate - start.rate) / approach_time } else { UNKNOWN_PUSH };
-                let mut contact_state = state.begin(j, time, rate, push, asked, &mechanism.contacts);
+                let mut contact_state = state.begin(j, time, rate, push, &mechanism.contacts);
                 if !fixed && !switches && end.penetration > AT_WALL * mechanism.contacts.clearance(j) {
                     let late = &mut state.record.statistics.joints[j].late;
                     *late = late.max(end.penetration);
@@ -184,7 +182,7 @@ impl Run<'_> {
                     (state.now.t, end.rate)
                 };
                 let statistics = &mut state.record.statistics;
-                statistics.joints[j].floored += u64::from(state.now.contact_states[j].floored);
+                statistics.joints[j].below_speed_floor += u64::from(state.now.contact_states[j].below_speed_floor);
                 if let Some(impact) = state.record.impacts.end(j, time, rate) {
                     let farthest =
                         statistics.joints[j].excessive_rebound.map_or(0.0, |impact| impact.restitution_excess());

@@ -191,9 +191,9 @@ impl Run<'_> {
             stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, &state.polynomial, scratch_y);
         }
         let time = now.t + theta * h;
-        for flyer in mechanism.free_flight_bodies_of(j) {
-            if let Some(flight) = &state.flights[flyer] {
-                flight.write_state(&mechanism.free_flight_bodies()[flyer], time, scratch_y);
+        for free_body in mechanism.free_flight_bodies_of(j) {
+            if let Some(flight) = &state.flights[free_body] {
+                flight.write_state(&mechanism.free_flight_bodies()[free_body], time, scratch_y);
             }
         }
         mechanism.measure_one(j, time, scratch_y);

@@ -46,7 +46,7 @@ impl Run<'_> {
 
     /// Adopts the step control of another run in nearly the same state.
     pub(in crate::simulate) fn adopt_step_control(&mut self, control: &Control) {
-        let turns = self.state.control.member != control.member;
+        let turns = self.state.control.scheme != control.scheme;
         self.state.control.clone_from(control);
         if turns {
             self.freeze_branches(false);

@@ -7,7 +7,7 @@ use crate::machine::{LooseJoint, MIN_IMPACT_STEPS, Machine};
 use crate::simulate::{AffectedJoints, Doubt, Ledger, LedgerTerm};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
-const MAX_FLOORED: f64 = 0.5;
+const MAX_BELOW_SPEED_FLOOR: f64 = 0.5;
 /// Contact patch over ball radius beyond which Hertz theory, which treats the ball as a half-space, is far off.
 const MAX_PATCH: f64 = 1.0 / 3.0;
 /// Constraint violations above this fraction of the smallest clearance blur the effect of the clearance.
@@ -60,10 +60,10 @@ impl DoubtContext<'_> {
             contacts: statistics.joints[j].impacts,
             steps: MIN_IMPACT_STEPS,
         }));
-        let floored = self.worst(MAX_FLOORED, |j| part(statistics.joints[j].floored, j));
-        doubts.extend(floored.map(|(joints, j)| Doubt::Floored {
+        let below_speed_floor = self.worst(MAX_BELOW_SPEED_FLOOR, |j| part(statistics.joints[j].below_speed_floor, j));
+        doubts.extend(below_speed_floor.map(|(joints, j)| Doubt::BelowSpeedFloor {
             joints,
-            slow: statistics.joints[j].floored,
+            slow: statistics.joints[j].below_speed_floor,
             contacts: statistics.joints[j].impacts,
         }));
         let late = self.worst(0.0, |j| statistics.joints[j].late);

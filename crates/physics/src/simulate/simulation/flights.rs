@@ -20,10 +20,10 @@ impl Run<'_> {
         let now = &mut state.now;
         let until = limit.min(now.t + state.control.h_next.min(LONGEST_STEP));
         let (mut some_land, mut some_start) = (false, false);
-        for (flyer, flight) in mechanism.free_flight_bodies().iter().zip(&mut state.flights) {
+        for (free_body, flight) in mechanism.free_flight_bodies().iter().zip(&mut state.flights) {
             let flew = flight.is_some();
-            let held = state.pull.is_some_and(|pull| pull.body == flyer.body);
-            if held || flyer.joints.iter().any(|&j| now.contact_states[j].active) {
+            let held = state.pull.is_some_and(|pull| pull.body == free_body.body);
+            if held || free_body.joints.iter().any(|&j| now.contact_states[j].active) {
                 *flight = None;
                 some_land |= flew;
                 continue;
@@ -31,7 +31,7 @@ impl Run<'_> {
             if flight.as_ref().is_some_and(|f| f.is_valid_at(until)) {
                 continue;
             }
-            let next = mechanism.flight(flyer, now.t, &now.y);
+            let next = mechanism.flight(free_body, now.t, &now.y);
             *flight = next.is_valid_at(until).then_some(next);
             let flies = flight.is_some();
             some_start |= flies && !flew;
@@ -58,7 +58,7 @@ impl Run<'_> {
     /// Excludes bodies in flight from evaluations.
     pub(super) fn exclude_flights(&mut self) {
         let flights = &self.state.flights;
-        self.mechanism.suspend(|flyer| flights[flyer].is_some());
+        self.mechanism.suspend(|free_body| flights[free_body].is_some());
     }
 
     /// Includes all bodies in evaluations until `exclude_flights`; returns whether any is in flight.
@@ -87,9 +87,9 @@ impl Run<'_> {
 
 /// Writes 0 to the components of bodies in flight.
 pub(super) fn clear_flights(mechanism: &Mechanism, flights: &[Option<Flight>], k: &mut [f64]) {
-    for (flyer, flight) in mechanism.free_flight_bodies().iter().zip(flights) {
+    for (free_body, flight) in mechanism.free_flight_bodies().iter().zip(flights) {
         if flight.is_some() {
-            for part in flyer.parts() {
+            for part in free_body.parts() {
                 k[part].fill(0.0);
             }
         }
@@ -98,9 +98,9 @@ pub(super) fn clear_flights(mechanism: &Mechanism, flights: &[Option<Flight>], k
 
 /// Writes the motion of bodies in flight at `t` to the state `y`.
 pub(super) fn write_flights(mechanism: &Mechanism, flights: &[Option<Flight>], t: f64, y: &mut [f64]) {
-    for (flyer, flight) in mechanism.free_flight_bodies().iter().zip(flights) {
+    for (free_body, flight) in mechanism.free_flight_bodies().iter().zip(flights) {
         if let Some(flight) = flight {
-            flight.write_state(flyer, t, y);
+            flight.write_state(free_body, t, y);
         }
     }
 }

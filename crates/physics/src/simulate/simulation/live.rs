@@ -76,9 +76,9 @@ impl Run<'_> {
                 let dimension = self.state.now.y.len();
                 *self.stepper = AnyStepper::new(solver.method, dimension);
                 let control = &mut self.state.control;
-                control.member = ActiveScheme::Explicit;
+                control.scheme = ActiveScheme::Explicit;
                 control.controller = controller_of(solver.method, ActiveScheme::Explicit);
-                control.choice = SchemeSelector::default();
+                control.selector = SchemeSelector::default();
                 let components = AnyStepper::polynomial_size(solver.method, dimension);
                 self.state.polynomial = Polynomial::new(components);
             }

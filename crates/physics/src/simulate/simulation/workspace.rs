@@ -76,7 +76,7 @@ impl Workspace {
             self.stepper = AnyStepper::new(method, state.now.y.len());
         }
         self.stepper.invalidate();
-        self.stepper.choose(state.control.member);
+        self.stepper.choose(state.control.scheme);
         // The interpolant of the latest step is not part of the state.
         self.before.copy_from(&state.now);
         self.attempt.clear();
