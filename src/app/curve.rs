@@ -9,7 +9,7 @@ use eframe::egui::{Color32, Mesh, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
 use egui_plot::{PlotBounds, PlotGeometry, PlotItem, PlotItemBase, PlotPoint, PlotTransform};
 
 use super::player::FINEST_BIN;
-use crate::simulate::Bin;
+use crate::session::history::Bin;
 
 /// Width of a curve, points.
 pub const WIDTH: f32 = 1.4;

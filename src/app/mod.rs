@@ -73,8 +73,9 @@ use crate::analysis::source::SceneSource;
 use crate::machine::Vec3;
 use crate::render;
 use crate::scene::{DEFAULT_SCENE, Scene};
+use crate::session::pace::{LONGEST_FRAME, LONGEST_STEPPING};
 use crate::session::{link, load, log, paths, player, twin, value, watch};
-use crate::simulate::{LONGEST_FRAME, SPELL, Simulation, StartError};
+use crate::simulate::{Simulation, StartError};
 use crate::view::{Preset, Quality, ViewOptions};
 
 pub use crate::session::embedded::Embedded;
@@ -824,7 +825,7 @@ impl App {
         let comparison = &mut self.plots.comparison;
         let waits = comparison.is_behind(&self.player);
         let behind = if waits { None } else { self.player.step_between(since) };
-        let lags = comparison.follow(&self.player, SPELL);
+        let lags = comparison.follow(&self.player, LONGEST_STEPPING);
         behind.or(lags.then_some(true)).map(|behind| behind || lags)
     }
 

@@ -2,7 +2,8 @@
 
 use crate::analysis::drive::{NoPeriod, drive_period};
 use crate::scene::{DEFAULT_SCENE, Scene};
-use crate::simulate::{Quantity, SCALE_RANGE};
+use crate::session::pace::SCALE_RANGE;
+use crate::simulate::Quantity;
 
 /// Viewing time of one drive period, s, if the scene has no time scale.
 const PERIOD_VIEWING_TIME: f64 = 4.0;
@@ -103,7 +104,7 @@ mod tests {
         let words = Quantity::ALL.map(|quantity| match quantity {
             Quantity::Penetration => "penetration".to_owned(),
             Quantity::ProbeError => "probe-error".to_owned(),
-            _ => quantity.label().to_lowercase().replace(' ', "-"),
+            _ => crate::app::plots::plot_of(quantity).label.to_lowercase().replace(' ', "-"),
         });
         assert_eq!(words.each_ref().map(String::as_str), Quantity::ALL.map(Quantity::word));
     }

@@ -1,6 +1,6 @@
 //! Picture quality while it moves: reduced when frames are slow, raised when there is headroom, full at rest.
 
-use crate::simulate::REST;
+use crate::session::pace::REST;
 use crate::view::Quality;
 
 /// A longer frame, s, counts as slow if drawing takes most of it.

@@ -15,10 +15,14 @@ use super::zoom::{self, Zoom};
 use super::{curve, layout, opening};
 use super::{spoken, theme, value};
 use crate::scene::Scene;
+use crate::session::history::Bin;
 use crate::session::link::settings::PlotWindow;
-use crate::simulate::{Bin, ChannelInfo, MAX_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
+use crate::simulate::{ChannelInfo, MAX_PICKED, Quantity, RECORDED_JOINTS, channels_of};
+pub(super) use quantity::plot_of;
+use quantity::{PlotKind, QuantityPlot};
 
 mod cut;
+mod quantity;
 #[cfg(not(target_arch = "wasm32"))]
 mod sheet;
 
@@ -109,14 +113,8 @@ impl<'a> Panel<'a> {
             .filter(|(_, channel)| channel.quantity == quantity)
             .map(|(index, channel)| (index, channel.member.as_str()))
             .collect();
-        (!members.is_empty()).then(|| Self {
-            quantity: Some(quantity),
-            label: quantity.label(),
-            help: quantity.help(),
-            unit: quantity.unit(),
-            kind: quantity.kind(),
-            members,
-        })
+        let QuantityPlot { label, unit, kind, help } = plot_of(quantity);
+        (!members.is_empty()).then_some(Self { quantity: Some(quantity), label, help, unit, kind, members })
     }
 
     /// Panels of the channels picked by `name`, one per unit.
@@ -271,8 +269,8 @@ impl Plots {
                 continue;
             }
             let mut on = self.chosen.contains(&quantity);
-            let label = format!("{}, {}", quantity.label(), quantity.unit().0);
-            if ui.checkbox(&mut on, label).on_hover_text(quantity.help()).changed() {
+            let QuantityPlot { label, unit, help, .. } = plot_of(quantity);
+            if ui.checkbox(&mut on, format!("{label}, {}", unit.0)).on_hover_text(help).changed() {
                 self.chosen.retain(|q| *q != quantity);
                 if on {
                     self.chosen.push(quantity);

@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn every_unit_on_show_has_a_name() {
         let parameters = crate::scene::table().iter().map(|parameter| parameter.display_unit());
-        let plots = crate::simulate::Quantity::ALL.iter().map(|quantity| quantity.unit().0);
+        let plots = crate::simulate::Quantity::ALL.map(|quantity| crate::app::plots::plot_of(quantity).unit.0);
         for shown in parameters.chain(plots).filter(|unit| !unit.is_empty()) {
             let shown = crate::app::value::typeset(shown);
             assert!(shown.split(' ').all(|symbol| unit(symbol, true).is_some()), "{shown}");

@@ -7,7 +7,7 @@ use eframe::egui::{
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::{keys, spoken, theme, value};
-use crate::simulate::{Limit, SCALE_RANGE};
+use crate::session::pace::{Limit, SCALE_RANGE};
 
 /// Time scales in the list.
 pub const SCALES: [f64; 8] = [1.0, 0.5, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4];

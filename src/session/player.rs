@@ -11,8 +11,10 @@ mod travel;
 
 use super::clock::{Clock, wall};
 use super::goal::Goal;
+use super::history::History;
 use super::ideal::{Gravity, Ideal};
 use super::log::{Entry, Event, Log, Script};
+use super::pace::{Limit, Pacer};
 use super::paths::Paths;
 use super::settled::Settling;
 use super::twin::Twin;
@@ -21,8 +23,7 @@ use crate::analysis::presets::too_slow;
 use crate::machine::Warning;
 use crate::scene::{LiveScene, Scene, SetError, Value};
 use crate::simulate::{
-    ChannelInfo, Channels, ContactMode, Effect, Frame, History, Limit, Pacer, Peak, Pull, Simulation, StartError,
-    Stopped, Wear,
+    ChannelInfo, Channels, ContactMode, Effect, Frame, Peak, Pull, Simulation, StartError, Stopped, Wear,
 };
 use before_change::BeforeChange;
 use keyframes::Keyframes;

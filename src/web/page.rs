@@ -16,7 +16,7 @@ use super::host::{Inbox, WebHost, are_graphics_lost, graphics_lost, schedule_ste
 use super::mirror::Mirror;
 use crate::app::{App, AppOptions};
 use crate::render::wgpu::Backends;
-use crate::simulate::SPELL;
+use crate::session::pace::LONGEST_STEPPING;
 
 /// Interval between snapshots of the session, s; a crash report and the reload after it use the latest.
 const SNAPSHOT_INTERVAL: f64 = 2.0;
@@ -252,7 +252,7 @@ impl Page {
             let since = (laboratory.app.player().clock)() - laboratory.frame_start;
             laboratory.app.step_between(since)
         })??;
-        Some(if behind { 0.0 } else { 1000.0 * SPELL })
+        Some(if behind { 0.0 } else { 1000.0 * LONGEST_STEPPING })
     }
 
     fn with<T>(&self, action: impl FnOnce(&mut Laboratory) -> T) -> Option<T> {

@@ -3,7 +3,8 @@
 use eframe::egui::{self, Rect, Theme, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, Player};
-use jointplay::simulate::{Bin, Frame, Quantity, Simulation};
+use jointplay::session::history::Bin;
+use jointplay::simulate::{Frame, Quantity, Simulation};
 
 use crate::hands::plain;
 use crate::hands::window::click;

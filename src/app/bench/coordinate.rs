@@ -4,6 +4,7 @@ use eframe::egui::Ui;
 
 use super::plane::AxisLabel;
 use crate::app::layout;
+use crate::app::plots::plot_of;
 use crate::app::watch::Observed;
 use crate::simulate::Quantity;
 
@@ -28,29 +29,35 @@ impl Coordinate {
         self.0
     }
 
-    fn quantities(self) -> [Quantity; 2] {
-        if self.0 < 3 { [Quantity::Position, Quantity::Velocity] } else { [Quantity::Angles, Quantity::AngleRates] }
+    /// Axis units of the coordinate and of its rate, and their values in SI units.
+    fn units(self) -> [(&'static str, f64); 2] {
+        let own = if self.0 < 3 {
+            [Quantity::Position, Quantity::Velocity]
+        } else {
+            [Quantity::Angles, Quantity::AngleRates]
+        };
+        own.map(|quantity| plot_of(quantity).unit)
     }
 
     /// The axis of the coordinate.
     pub fn axis(self) -> AxisLabel {
-        AxisLabel::new(NAMES[self.0], self.quantities()[0].unit().0)
+        AxisLabel::new(NAMES[self.0], self.units()[0].0)
     }
 
     /// The axis of its rate.
     pub fn rate_axis(self) -> AxisLabel {
         let name = format!("rate of {}", NAMES[self.0]);
-        AxisLabel::new(name, self.quantities()[1].unit().0)
+        AxisLabel::new(name, self.units()[1].0)
     }
 
     /// Converts an SI value to the unit of [`Self::axis`].
     pub fn shown(self, si: f64) -> f64 {
-        si / self.quantities()[0].unit().1
+        si / self.units()[0].1
     }
 
     /// Coordinate and rate in the units of their axes.
     pub fn of(self, state: &Observed) -> [f64; 2] {
-        let rate = self.quantities()[1].unit().1;
+        let rate = self.units()[1].1;
         [self.shown(state[self.0]), state[6 + self.0] / rate]
     }
 

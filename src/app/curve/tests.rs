@@ -9,7 +9,7 @@ use egui_plot::Plot;
 
 use super::*;
 use crate::app::theme;
-use crate::simulate::History;
+use crate::session::history::History;
 
 #[path = "../../../tests/common/pixels.rs"]
 mod pixels;

@@ -38,7 +38,7 @@ pub fn peaks<'a>(traces: impl Iterator<Item = &'a Trace> + Clone) -> Option<Peak
 /// Largest values of `traces` in the first `share` of their time and after it, SI, if the first is far above the second.
 fn within<'a>(traces: impl Iterator<Item = &'a Trace> + Clone, share: f64) -> Option<(f64, f64)> {
     let bins = traces.flat_map(|trace| &trace.bins).filter(|bin| !bin.greatest.is_nan());
-    let ends = |(from, to): (f64, f64), bin: &crate::simulate::Bin| (from.min(bin.from), to.max(bin.to));
+    let ends = |(from, to): (f64, f64), bin: &crate::session::history::Bin| (from.min(bin.from), to.max(bin.to));
     let (from, to) = bins.clone().fold((f64::INFINITY, f64::NEG_INFINITY), ends);
     let until = from + share * (to - from);
     let (mut early, mut later) = (0.0_f64, 0.0_f64);
@@ -96,7 +96,7 @@ pub fn switch(ui: &mut Ui, plot: &str, on: bool) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::Bin;
+    use crate::session::history::Bin;
 
     fn trace(values: &[f64]) -> Trace {
         let bin =

@@ -2,13 +2,13 @@
 
 use eframe::egui::Ui;
 
-use super::{Panel, Plots, earlier_traces, time_axis};
+use super::{Panel, PlotKind, Plots, earlier_traces, time_axis};
 use crate::app::curve;
 use crate::app::host::SaveFile;
 use crate::app::player::Player;
 use crate::app::{App, layout};
 use crate::chart::{Axis, Chart, Colour, PALETTE, Series, Sheet};
-use crate::simulate::{Bin, PlotKind};
+use crate::session::history::Bin;
 
 /// Size of a chart, pixels, and its maximum number of instants; more would not be visible.
 const CHART_SIZE: (u32, u32) = (520, 320);

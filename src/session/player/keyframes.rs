@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::scene::SceneSnapshot;
 use crate::session::companion::CompanionState;
-use crate::simulate::Mark;
+use crate::session::history::Mark;
 
 /// Steps between keyframes.
 const STRIDE: u64 = 256;
@@ -115,7 +115,7 @@ impl Keyframes {
         self.drop_fine();
     }
 
-    /// Adapts the positions after [`History::rearranged`](crate::simulate::History::rearranged) of a record of `channels`
+    /// Adapts the positions after [`History::rearranged`](crate::session::history::History::rearranged) of a record of `channels`
     /// channels.
     pub fn rearrange(&mut self, channels: usize, from: &[Option<usize>]) {
         for mark in self.regular.iter_mut().filter_map(|regular| regular.record.as_mut()) {

@@ -3,10 +3,11 @@
 use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
 use crate::scene::Scene;
+use crate::session::history::{Bin, History, Mark};
 use crate::session::paths::Paths;
 use crate::session::settled::Settling;
 use crate::session::watch::RunWatch;
-use crate::simulate::{Bin, Channels, Frame, History, Mark, Peak, RECORDED_JOINTS};
+use crate::simulate::{Channels, Frame, Peak, RECORDED_JOINTS};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
 pub const FINEST_BIN: f64 = 2e-6;

@@ -271,7 +271,7 @@ fn a_window_hidden_for_minutes_resumes_without_catching_up() {
     // Ten minutes at 1:50 would be 12 s of simulated time.
     player.advance(600.0);
     let leap = player.pacer.shown() - before;
-    assert!(leap <= 0.02 * crate::simulate::LONGEST_FRAME + 1e-12, "{leap}");
+    assert!(leap <= 0.02 * crate::session::pace::LONGEST_FRAME + 1e-12, "{leap}");
     assert!(player.steps() - steps < 20_000);
     let before = player.pacer.shown();
     for _ in 0..30 {

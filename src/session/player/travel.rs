@@ -7,8 +7,8 @@ use super::keyframes::Keyframe;
 use super::record::{FINEST_BIN, drop_before};
 use super::{Player, warnings_of};
 use crate::session::goal::{Goal, Obstacle};
+use crate::session::history::{Bin, History, Mark};
 use crate::session::log::Event;
-use crate::simulate::{Bin, History};
 
 /// Most steps retraced before a past instant, so that the plots show its history in detail.
 const MAX_RETRACED_STEPS: u64 = 512;
@@ -363,7 +363,7 @@ impl Player {
         }
     }
 
-    fn keyframe(&self, record: Option<crate::simulate::Mark>) -> Keyframe {
+    fn keyframe(&self, record: Option<Mark>) -> Keyframe {
         Keyframe {
             state: self.simulation.snapshot().into(),
             events: self.script.passed,

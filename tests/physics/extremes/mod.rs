@@ -1,6 +1,10 @@
 //! Every extreme of a scene's parameters, with every preset or method, ends in a named outcome.
 
 mod outcome;
+// The pacing of the window, from a crate that this one does not use.
+#[path = "../../../src/session/pace.rs"]
+#[expect(dead_code, reason = "the window needs more of it")]
+mod pace;
 mod rows;
 
 use std::fmt::Write;

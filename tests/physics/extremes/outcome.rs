@@ -1,7 +1,8 @@
 //! One cell of the table: a run and its outcome.
 
-use jointplay_physics::simulate::{Frame, Pacer, Simulation};
+use jointplay_physics::simulate::{Frame, Simulation};
 
+use super::pace::Pacer;
 use super::rows::Row;
 use crate::common::frame_now;
 use crate::common::invariants::{finite, violation};

@@ -4,8 +4,8 @@ mod choice;
 mod table;
 
 pub use choice::{ChannelInfo, UnknownChannel, channels_of, chosen_channels, matches_pattern, matching};
+pub use table::Quantity;
 use table::TIME;
-pub use table::{PlotKind, Quantity};
 
 use super::Frame;
 use crate::machine::{Freedom, Joint, JointKind, Machine};

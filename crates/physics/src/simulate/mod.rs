@@ -5,12 +5,9 @@ mod angles;
 mod channels;
 mod doubt;
 mod frame;
-#[expect(clippy::disallowed_types, reason = "the record for the plots; nothing is computed from it")]
-mod history;
 mod impacts;
 mod ledger;
 mod load_peaks;
-mod pace;
 mod peaks;
 mod report;
 mod simulation;
@@ -22,11 +19,9 @@ pub use angles::angles_of;
 pub use channels::*;
 pub use doubt::{AffectedJoints, Doubt, LedgerTerm};
 pub use frame::*;
-pub use history::{Bin, History, Mark};
 pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use load_peaks::{LoadPeak, LoadPeaks};
-pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE, SPELL};
 pub use simulation::{
     CLEARANCE_SPEED, ChangeError, Model, ProbeFault, Simulation, State, StateMismatch, Workspace, closed,
 };

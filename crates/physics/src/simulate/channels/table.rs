@@ -35,28 +35,6 @@ pub enum Quantity {
     TipError,
 }
 
-/// How a plot presents its quantity.
-struct Plot {
-    label: &'static str,
-    /// Axis unit, and its value in SI units.
-    unit: (&'static str, f64),
-    kind: PlotKind,
-    help: &'static str,
-}
-
-/// How a plot shows its channels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PlotKind {
-    /// One curve per channel, over their range.
-    Curves,
-    /// Curves over a range that begins at zero: no value is ever negative.
-    FromZero,
-    /// As `FromZero`, with the clearances of the joints.
-    FromZeroWithClearances,
-    /// Bands stacked on both sides of zero.
-    Bands,
-}
-
 words!(Quantity {
     NormalForce => "normal-force",
     FrictionForce => "friction-force",
@@ -77,107 +55,6 @@ words!(Quantity {
 });
 
 impl Quantity {
-    fn plot(self) -> Plot {
-        let row = |label, unit, kind, help| Plot { label, unit, kind, help };
-        match self {
-            Self::NormalForce => row(
-                "Normal force",
-                ("N", 1.0),
-                PlotKind::FromZero,
-                "Size of the normal force on each ball; of the whole reaction where a joint is ideal.",
-            ),
-            Self::FrictionForce => {
-                row("Friction force", ("N", 1.0), PlotKind::FromZero, "Size of the friction force on each ball.")
-            }
-            Self::Eccentricity => row(
-                "Eccentricity",
-                ("mm", 1e-3),
-                PlotKind::FromZeroWithClearances,
-                "Distance of each ball's centre from its socket's centre. Contact begins at the clearance.",
-            ),
-            Self::Penetration => row(
-                "Indentation",
-                ("µm", 1e-6),
-                PlotKind::Curves,
-                "How deep each ball presses into its socket; below zero there is a gap.",
-            ),
-            Self::Position => {
-                row("Position", ("mm", 1e-3), PlotKind::Curves, "Origin of the output body in world axes.")
-            }
-            Self::Angles => row("Angles", ("mrad", 1e-3), PlotKind::Curves, "Angles α, β, γ of the output body."),
-            Self::Velocity => row("Velocity", ("m/s", 1.0), PlotKind::Curves, "Velocity of the output body's origin."),
-            Self::AngleRates => row("Angle rates", ("rad/s", 1.0), PlotKind::Curves, "Rates of the angles α, β, γ."),
-            Self::Acceleration => {
-                row("Acceleration", ("m/s²", 1.0), PlotKind::Curves, "Acceleration of the output body's origin.")
-            }
-            Self::AngleAccelerations => row(
-                "Angle accelerations",
-                ("rad/s²", 1.0),
-                PlotKind::Curves,
-                "Second derivatives of the angles α, β, γ.",
-            ),
-            Self::ActuatorForce => row(
-                "Actuator force",
-                ("N", 1.0),
-                PlotKind::Curves,
-                "Force that each driven slide needs, positive along its axis.",
-            ),
-            Self::ActuatorTorque => row(
-                "Actuator torque",
-                ("N m", 1.0),
-                PlotKind::Curves,
-                "Torque that each driven hinge needs, positive about its axis.",
-            ),
-            Self::Energy => row(
-                "Energy",
-                ("mJ", 1e-3),
-                PlotKind::Curves,
-                "Kinetic, potential and elastic energy of the whole mechanism.",
-            ),
-            Self::EnergyBalance => row(
-                "Energy balance",
-                ("mJ", 1e-3),
-                PlotKind::Bands,
-                "Since the start: work of drives, gravity, moving clearances, changed parameters and loads from outside, loss \
-               by restitution, friction and dampers, change of kinetic and elastic energy, and the residual, which is the \
-               error of the integration.",
-            ),
-            Self::ProbeError => row(
-                "Tip error by axis",
-                ("mm", 1e-3),
-                PlotKind::Curves,
-                "Position of the probe tip less that of the ideal mechanism at the same time, by world axis.",
-            ),
-            Self::TipError => row(
-                "Tip error",
-                ("µm", 1e-6),
-                PlotKind::FromZero,
-                "Distance of the output point (the probe tip, or the output body's origin) from where ideal joints have it at the \
-               same time. Recorded while the ideal ghost is on (key G).",
-            ),
-        }
-    }
-
-    /// Sentence-case name.
-    pub fn label(self) -> &'static str {
-        self.plot().label
-    }
-
-    /// Axis unit, and its value in SI units.
-    pub fn unit(self) -> (&'static str, f64) {
-        self.plot().unit
-    }
-
-    /// How its plot shows the channels.
-    pub fn kind(self) -> PlotKind {
-        self.plot().kind
-    }
-
-    /// A one-sentence description.
-    pub fn help(self) -> &'static str {
-        self.plot().help
-    }
-
     /// Whether this member of [`Self::EnergyBalance`] takes or stores energy; the others supply it. All members sum to zero.
     pub fn takes(member: &str) -> bool {
         TABLE.iter().any(|signal| matches!(signal.source, Consumed(own, _) if own == member))

@@ -83,8 +83,7 @@ impl Run<'_> {
                 continue;
             }
             if penetration <= AT_WALL * contact.clearance && rate > 0.0 {
-                state.now.contact_states[j] =
-                    state.begin(j, 0.0, rate, UNKNOWN_PUSH, &mechanism.contacts);
+                state.now.contact_states[j] = state.begin(j, 0.0, rate, UNKNOWN_PUSH, &mechanism.contacts);
             } else {
                 state.now.contact_states[j] = ContactState::at_onset(coefficients, f64::NEG_INFINITY);
                 state.record.statistics.joints[j].impacts += 1;

@@ -14,8 +14,8 @@ pub const USUAL_BUDGET: f64 = 0.012;
 /// Largest stepping budget, s, however slow drawing is, so that the interface stays responsive.
 pub const MAX_BUDGET: f64 = 0.25;
 
-/// Longest spell of stepping between two frames, s: user input waits until it ends.
-pub const SPELL: f64 = 0.008;
+/// Longest period of stepping between two frames, s: user input waits until it ends.
+pub const LONGEST_STEPPING: f64 = 0.008;
 
 /// Averaging time of the achieved time scale, s.
 const AVERAGE: f64 = 0.5;
@@ -118,7 +118,7 @@ impl Pacer {
         let drawing = (frame - self.spent).max(0.0);
         // A single slow frame is a hitch: only two in a row raise the budget.
         self.budget = budget(dt, drawing.min(self.drawing));
-        self.within = if std::mem::take(&mut self.behind) { self.budget.min(SPELL) } else { self.budget };
+        self.within = if std::mem::take(&mut self.behind) { self.budget.min(LONGEST_STEPPING) } else { self.budget };
         let passed = dt.min(LONGEST_FRAME.max(self.frame));
         (self.frame, self.drawing) = (frame, drawing);
         self.target(passed)
@@ -129,15 +129,15 @@ impl Pacer {
         (self.base + passed * self.scale).max(self.shown)
     }
 
-    /// Starts a spell of stepping between two frames, `since` seconds after the first of them began. Returns the simulated time
+    /// Starts a period of stepping between two frames, `since` seconds after the first of them began. Returns the simulated time
     /// to reach, or `None` if that frame is already too long to catch up with.
     pub fn begin_between(&self, since: f64) -> Option<f64> {
         (since < LONGEST_FRAME.max(self.frame)).then(|| self.target(since))
     }
 
-    /// Whether another step may start after `spent` seconds of stepping in this spell.
+    /// Whether another step may start after `spent` seconds of stepping in this period.
     pub fn may_step_between(&self, spent: f64) -> bool {
-        spent < SPELL && self.has_budget(spent)
+        spent < LONGEST_STEPPING && self.has_budget(spent)
     }
 
     /// Whether the budget allows `more` seconds of stepping before the next frame.
@@ -145,7 +145,7 @@ impl Pacer {
         self.spent + more < self.budget
     }
 
-    /// Ends the spell, like [`Self::end`]. Returns whether another one may follow, and whether the simulation is still behind.
+    /// Ends the period, like [`Self::end`]. Returns whether another one may follow, and whether the simulation is still behind.
     pub fn end_between(&mut self, target: f64, reached: f64, spent: f64) -> (bool, bool) {
         self.spent += spent;
         self.shown = target.min(reached).max(self.shown);
@@ -350,7 +350,7 @@ mod tests {
     }
 
     /// Runs frames with `drawing` s of drawing on a machine that simulates `speed` seconds per second of stepping and also steps
-    /// between frames, while another processor waits `idle` s for the screen; returns the longest spell of stepping, s.
+    /// between frames, while another processor waits `idle` s for the screen; returns the longest period of stepping, s.
     fn stepped_between(pacer: &mut Pacer, frames: usize, drawing: f64, idle: f64, speed: f64) -> f64 {
         let (mut time, mut dt, mut longest) = (pacer.shown(), drawing + idle, 0.0_f64);
         let step = 1e-5;
@@ -374,7 +374,7 @@ mod tests {
                     "what is shown is within the latest step"
                 );
                 longest = longest.max(spent);
-                since += spent + if behind { 0.0 } else { SPELL };
+                since += spent + if behind { 0.0 } else { LONGEST_STEPPING };
                 if !another {
                     break;
                 }
@@ -385,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_between_slow_frames_come_in_short_spells_and_reach_the_requested_scale() {
+    fn steps_between_slow_frames_come_in_short_periods_and_reach_the_requested_scale() {
         // At speed 0.5 at most half a second per second is possible, less the time for drawing.
         for (speed, requested) in [(0.5, 0.1), (0.5, 1.0), (10.0, 1.0)] {
             let mut pacer = Pacer::default();
@@ -393,7 +393,7 @@ mod tests {
             // The first frames do not know yet that they cannot keep up.
             stepped_between(&mut pacer, 20, 0.03, 0.12, speed);
             let longest = stepped_between(&mut pacer, 100, 0.03, 0.12, speed);
-            assert!(longest <= SPELL + 1e-5 / speed + 1e-12, "{speed} {requested}: {longest}");
+            assert!(longest <= LONGEST_STEPPING + 1e-5 / speed + 1e-12, "{speed} {requested}: {longest}");
             let reached = pacer.reached_scale().expect("measured");
             // Stepping takes nearly as much time as everything else.
             let least = requested.min(0.45 * speed);
