@@ -25,7 +25,7 @@ use super::spoken;
 use crate::analysis::ready_sweeps::ReadySweep;
 use crate::scene::Scene;
 use crate::view::Cloud;
-use coordinate::Coordinate;
+use coordinate::BenchCoordinate;
 pub use cost_study::CostStudy;
 use costs::Costs;
 use portrait::Portrait;
@@ -37,7 +37,7 @@ use workspace::MapPanel;
 /// The panel.
 #[derive(Default)]
 pub struct Bench {
-    coordinate: Coordinate,
+    coordinate: BenchCoordinate,
     portrait: Portrait,
     sweep: SweepPanel,
     /// What play costs, while that is open in place of the chaos bench.
@@ -98,7 +98,7 @@ impl Bench {
     /// Starts a ready sweep over the displayed `scene`.
     pub(super) fn start(&mut self, ready: &'static ReadySweep, scene: &Scene) {
         // The diagram shows the coordinate along the machine's travel.
-        self.coordinate = Coordinate::default();
+        self.coordinate = BenchCoordinate::default();
         self.sweep.start(ready, scene);
     }
 

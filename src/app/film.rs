@@ -8,7 +8,7 @@ use super::canvas::{Canvas, Pending};
 use super::host::SaveFile;
 use super::picture::Contents;
 use super::{layout, transport, value};
-use crate::film::{Film, Format};
+use crate::film::{Film, FilmFormat};
 
 /// Sizes to choose from, pixels.
 const SIZES: [([u32; 2], &str); 4] = [
@@ -36,13 +36,13 @@ pub struct FilmSettings {
     /// Whether the plots appear below the view.
     pub plots: bool,
     /// File format.
-    pub format: Format,
+    pub format: FilmFormat,
 }
 
 impl FilmSettings {
     /// The run from 0 to `reached`, s, at time scale `scale`.
     pub fn all(reached: f64, scale: f64) -> Self {
-        Self { span: [0.0, reached], scale, rate: 30.0, size: SIZES[1].0, plots: false, format: Format::Mp4 }
+        Self { span: [0.0, reached], scale, rate: 30.0, size: SIZES[1].0, plots: false, format: FilmFormat::Mp4 }
     }
 
     /// Number of frames; both ends count, as in `render --duration`.
@@ -137,8 +137,8 @@ pub fn settings_ui(ui: &mut Ui, settings: &mut FilmSettings, reached: f64) -> bo
         ui.label("File");
         ui.horizontal(|ui| {
             let formats = [
-                (Format::Mp4, "MP4", "H.264: plays everywhere, small, exact times"),
-                (Format::Gif, "GIF", "Plays by itself in slides; 256 colours, at most 50 frames a second"),
+                (FilmFormat::Mp4, "MP4", "H.264: plays everywhere, small, exact times"),
+                (FilmFormat::Gif, "GIF", "Plays by itself in slides; 256 colours, at most 50 frames a second"),
             ];
             for (format, name, help) in formats {
                 ui.selectable_value(&mut settings.format, format, name).on_hover_text(help);

@@ -16,10 +16,8 @@ const ROW_HEIGHT: f32 = 20.0;
 /// Most visible rows at first.
 const MAX_VISIBLE_ROWS: f32 = 9.0;
 
-/// A column: heading, width in points, tooltip.
-type Column = (&'static str, f32, &'static str);
-
-const COLUMNS: [Column; 9] = [
+/// Columns: heading, width in points, tooltip.
+const COLUMNS: [(&str, f32, &str); 9] = [
     ("No.", 44.0, "Number of the impact in this run, in the order of their beginnings"),
     ("Joint", 58.0, "Ball joint"),
     ("Time", 82.0, "Instant at which it began"),

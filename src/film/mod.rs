@@ -12,7 +12,7 @@ const MAX_BYTES: usize = 1 << 30;
 
 /// Kind of file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Format {
+pub enum FilmFormat {
     /// H.264 in MP4: plays everywhere, with exact times.
     #[default]
     Mp4,
@@ -20,12 +20,12 @@ pub enum Format {
     Gif,
 }
 
-words!(Format {
+words!(FilmFormat {
     Mp4 => "mp4",
     Gif => "gif",
 });
 
-impl Format {
+impl FilmFormat {
     /// The format by the extension of a file name.
     pub fn of_name(name: &str) -> Option<Self> {
         let (_, ending) = name.rsplit_once('.')?;
@@ -110,10 +110,10 @@ impl Film {
     ///
     /// # Errors
     /// A size or rate that the format cannot hold.
-    pub fn new(format: Format, size: [u32; 2], rate: f64) -> Result<Self, FilmError> {
+    pub fn new(format: FilmFormat, size: [u32; 2], rate: f64) -> Result<Self, FilmError> {
         let encoder: Box<dyn Encode> = match format {
-            Format::Mp4 => Box::new(mp4::Mp4::new(size, rate)?),
-            Format::Gif => Box::new(gif::Gif::new(size, rate)?),
+            FilmFormat::Mp4 => Box::new(mp4::Mp4::new(size, rate)?),
+            FilmFormat::Gif => Box::new(gif::Gif::new(size, rate)?),
         };
         Ok(Self { encoder, frames: 0 })
     }

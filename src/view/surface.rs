@@ -86,7 +86,7 @@ pub(super) fn surface(mesh: &Mesh, unit: f64) -> MeshData {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::Format;
+    use crate::mesh::MeshFormat;
 
     /// A prism with `sides` sides about z, radius 10, open at its ends unless `closed`.
     fn prism(sides: usize, closed: bool) -> Mesh {
@@ -106,7 +106,7 @@ mod tests {
             text += &format!("f{}\n", ring(0).rev().collect::<String>());
         }
         let no_files = |_: &str| Err(String::new().into());
-        Format::Obj.read(text.as_bytes(), &no_files).unwrap()
+        MeshFormat::Obj.read(text.as_bytes(), &no_files).unwrap()
     }
 
     #[test]

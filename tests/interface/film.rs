@@ -10,7 +10,7 @@ use std::process::Command;
 
 use eframe::egui::accesskit::Role;
 use egui_kittest::kittest::Queryable as _;
-use jointplay::film::{Film, FilmError, Format};
+use jointplay::film::{Film, FilmError, FilmFormat};
 
 use crate::hands::give_graphics;
 use crate::hands::page::{click, decoded, label, next_file, window};
@@ -82,7 +82,7 @@ fn an_mp4_has_the_frames_at_their_times_in_their_colours() {
     // Not a multiple of 16: the decoder must crop the frame.
     let size = [200, 90];
     for (rate, colour) in [(30.0, [200, 40, 30]), (29.97, [20, 60, 190])] {
-        let mut film = Film::new(Format::Mp4, size, rate).unwrap();
+        let mut film = Film::new(FilmFormat::Mp4, size, rate).unwrap();
         let pictures: Vec<Vec<u8>> = (0..70).map(|k| picture(size, k, colour)).collect();
         for picture in &pictures {
             film.add(picture).unwrap();
@@ -116,7 +116,7 @@ fn an_mp4_has_the_frames_at_their_times_in_their_colours() {
 #[test]
 fn a_gif_keeps_its_frame_rate_and_draws_only_changes() {
     let size = [120, 64];
-    let mut film = Film::new(Format::Gif, size, 30.0).unwrap();
+    let mut film = Film::new(FilmFormat::Gif, size, 30.0).unwrap();
     let pictures: Vec<Vec<u8>> = (0..30).map(|k| picture(size, k, [200, 40, 30])).collect();
     for picture in &pictures {
         film.add(picture).unwrap();
@@ -151,12 +151,12 @@ fn a_gif_keeps_its_frame_rate_and_draws_only_changes() {
 #[test]
 fn films_beyond_the_limits_of_players_are_refused() {
     let error = |format, size, rate| Film::new(format, size, rate).err().unwrap().to_string();
-    assert!(error(Format::Mp4, [201, 90], 30.0).contains("must be even"));
-    assert!(error(Format::Mp4, [16_384, 16_384], 30.0).contains("8192x4320"));
-    assert!(error(Format::Mp4, [1280, 720], 0.0).contains("frames a second"));
-    assert!(error(Format::Gif, [200, 90], 60.0).contains("50 frames"));
-    assert!(error(Format::Gif, [70_000, 90], 20.0).contains("65535"));
-    let film = Film::new(Format::Mp4, [16, 16], 30.0).unwrap();
+    assert!(error(FilmFormat::Mp4, [201, 90], 30.0).contains("must be even"));
+    assert!(error(FilmFormat::Mp4, [16_384, 16_384], 30.0).contains("8192x4320"));
+    assert!(error(FilmFormat::Mp4, [1280, 720], 0.0).contains("frames a second"));
+    assert!(error(FilmFormat::Gif, [200, 90], 60.0).contains("50 frames"));
+    assert!(error(FilmFormat::Gif, [70_000, 90], 20.0).contains("65535"));
+    let film = Film::new(FilmFormat::Mp4, [16, 16], 30.0).unwrap();
     assert_eq!(film.finish(), Err(FilmError::Empty));
 }
 

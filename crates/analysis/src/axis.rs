@@ -148,7 +148,7 @@ fn coordinate_list(coordinates: &[String]) -> String {
 
 /// A driven coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coordinate {
+pub struct DrivenCoordinate {
     /// Index in the order of [`Machine::driven`](jointplay_physics::machine::Machine::driven).
     pub index: usize,
     /// Length or angle.
@@ -158,7 +158,7 @@ pub struct Coordinate {
 /// The quantity that an axis varies.
 enum Subject {
     Parameter(&'static Parameter),
-    Coordinate(Coordinate),
+    DrivenCoordinate(DrivenCoordinate),
 }
 
 impl Subject {
@@ -177,7 +177,7 @@ impl Subject {
         });
         let names: Vec<(String, Dimension)> = names.collect();
         match names.iter().position(|(name, _)| name == key) {
-            Some(index) => Ok(Self::Coordinate(Coordinate { index, dimension: names[index].1 })),
+            Some(index) => Ok(Self::DrivenCoordinate(DrivenCoordinate { index, dimension: names[index].1 })),
             None => {
                 let coordinates = names.into_iter().map(|(name, _)| name).collect();
                 Err(RangeFault::NoSubject { error: Box::new(error), coordinates })
@@ -185,17 +185,17 @@ impl Subject {
         }
     }
 
-    fn coordinate(&self) -> Option<Coordinate> {
+    fn coordinate(&self) -> Option<DrivenCoordinate> {
         match self {
             Self::Parameter(_) => None,
-            Self::Coordinate(coordinate) => Some(*coordinate),
+            Self::DrivenCoordinate(coordinate) => Some(*coordinate),
         }
     }
 
     fn read(&self, value: &str) -> Result<Value, ValueError> {
         match self {
             Self::Parameter(parameter) => parameter.read(value),
-            Self::Coordinate(coordinate) => {
+            Self::DrivenCoordinate(coordinate) => {
                 let number = parse_quantity(value.trim(), coordinate.dimension);
                 let refuse = |error: jointplay_physics::units::QuantityError| ValueError {
                     fault: error.into(),
@@ -260,7 +260,7 @@ pub struct Axis {
     key: String,
     /// Text as given, for error messages.
     text: String,
-    coordinate: Option<Coordinate>,
+    coordinate: Option<DrivenCoordinate>,
     values: Values,
 }
 
@@ -349,7 +349,7 @@ impl Axis {
     }
 
     /// The driven coordinate, if the axis varies one.
-    pub fn coordinate(&self) -> Option<Coordinate> {
+    pub fn coordinate(&self) -> Option<DrivenCoordinate> {
         self.coordinate
     }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::argument::Argument;
-use super::axis::{Axis, Coordinate, RangeError};
+use super::axis::{Axis, DrivenCoordinate, RangeError};
 use jointplay_physics::words::words;
 use jointplay_scene::{Scene, SceneError, Value};
 
@@ -227,7 +227,7 @@ impl Design {
     }
 
     /// Every varied driven coordinate at a point with its value, m or rad.
-    pub fn coordinates(&self, point: usize) -> impl Iterator<Item = (Coordinate, f64)> {
+    pub fn coordinates(&self, point: usize) -> impl Iterator<Item = (DrivenCoordinate, f64)> {
         let pairs = self.axes.iter().zip(self.indices(point));
         pairs.filter_map(|(axis, i)| Some((axis.coordinate()?, axis.number(i))))
     }

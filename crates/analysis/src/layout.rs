@@ -26,7 +26,7 @@ impl Status {
 
 /// One array of the result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Column {
+pub struct ResultArray {
     /// Name, with the unit.
     pub name: String,
     /// Whether the values are whole numbers.
@@ -38,7 +38,7 @@ pub struct Column {
 /// All arrays of a sweep's result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
-    columns: Vec<Column>,
+    columns: Vec<ResultArray>,
     /// Ball joints whose quantities are recorded.
     joints: Vec<String>,
     probe: bool,
@@ -102,7 +102,7 @@ impl Layout {
     pub fn new(scene: &Scene, protocol: &Protocol) -> Self {
         let mut columns = Vec::new();
         let mut add = |name: &str, whole: bool, per_section: bool| {
-            columns.push(Column { name: name.to_owned(), whole, per_section });
+            columns.push(ResultArray { name: name.to_owned(), whole, per_section });
         };
         let has_sections = protocol.sections().is_some();
         let at_crossings = has_sections && protocol.plan().is_none();
@@ -146,7 +146,7 @@ impl Layout {
     }
 
     /// Arrays in order.
-    pub fn columns(&self) -> &[Column] {
+    pub fn columns(&self) -> &[ResultArray] {
         &self.columns
     }
 
@@ -156,7 +156,7 @@ impl Layout {
     }
 
     /// Number of values per point in `column`.
-    pub fn values_in(&self, column: &Column) -> usize {
+    pub fn values_in(&self, column: &ResultArray) -> usize {
         if column.per_section { self.kept } else { 1 }
     }
 

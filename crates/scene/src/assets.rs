@@ -12,7 +12,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 
 use super::Texts;
 use super::file::{ReadError, read_regular};
-use super::mesh::{Fault, Format, Mesh};
+use super::mesh::{Fault, Mesh, MeshFormat};
 
 /// Size limit for scene and text files, bytes: a scene is a few kilobytes.
 pub const MAX_FILE_SIZE: u64 = 4 << 20;
@@ -21,7 +21,7 @@ pub const MAX_MESH_SIZE: u64 = 8 << 20;
 
 /// Size limit for the user-supplied file `name`, bytes.
 pub fn max_file_size(name: &str) -> u64 {
-    match Format::of(name) {
+    match MeshFormat::of(name) {
         Some(_) => MAX_MESH_SIZE,
         None => MAX_FILE_SIZE,
     }
@@ -75,7 +75,7 @@ pub(super) enum AssetFault {
     },
     #[error("not a text file: it is not valid UTF-8")]
     NotText,
-    #[error("is not a mesh file; allowed: names that end in {}", Format::ENDINGS)]
+    #[error("is not a mesh file; allowed: names that end in {}", MeshFormat::ENDINGS)]
     NotMesh,
 }
 
@@ -144,7 +144,7 @@ impl<'d> AssetResolver<'d> {
         if let Some(mesh) = self.meshes.borrow().get(name) {
             return Ok(mesh.clone());
         }
-        let format = Format::of(name).ok_or(MeshError::Unavailable(AssetFault::NotMesh))?;
+        let format = MeshFormat::of(name).ok_or(MeshError::Unavailable(AssetFault::NotMesh))?;
         let text = self.content(name, FileKind::Mesh).map_err(MeshError::Unavailable)?;
         // References are relative to the folder of the mesh file.
         let other = |other: &str| {

@@ -153,13 +153,13 @@ pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneE
         let Some((of_x, of_y)) = columns else {
             let column = |cell: &Range<usize>, axis| {
                 let header = text[cell.clone()].trim_start_matches('\u{feff}');
-                let column = Column::new(header, axis);
+                let column = FileColumn::new(header, axis);
                 column.map_err(|fault| file.error(cell.clone(), "", None, fault.to_string()))
             };
             columns = Some((column(x, first)?, column(y, second)?));
             continue;
         };
-        let value = |cell: &Range<usize>, column: Column<'_>| {
+        let value = |cell: &Range<usize>, column: FileColumn<'_>| {
             let number = &text[cell.clone()];
             let error = |fault: PointsFault| file.error(cell.clone(), column.header, Some(number), fault.to_string());
             column.read(number).map_err(error)
@@ -192,13 +192,13 @@ fn cells(text: &str, line: Range<usize>) -> Vec<Range<usize>> {
 
 /// A column of a file.
 #[derive(Clone, Copy)]
-struct Column<'t> {
+struct FileColumn<'t> {
     header: &'t str,
     unit: &'t str,
     axis: Axis,
 }
 
-impl<'t> Column<'t> {
+impl<'t> FileColumn<'t> {
     /// Takes the unit from the header: in brackets, or after the last underscore. A pure number has none.
     fn new(header: &'t str, axis: Axis) -> Result<Self, PointsFault> {
         let dimension = axis.dimension;

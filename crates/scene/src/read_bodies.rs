@@ -3,7 +3,7 @@
 use super::assets::MeshError;
 use super::document::{Document, Node, Section};
 use super::instance::Instance;
-use super::mesh::{Fault, Format};
+use super::mesh::{Fault, MeshFormat};
 use super::placement::read_rotation;
 use super::*;
 use jointplay_physics::machine::{Solid, triangulate};
@@ -204,7 +204,7 @@ fn read_mesh(section: &Section<'_>) -> Result<Geometry, SceneError> {
         MeshError::Unavailable(fault) => file.error(fault.to_string()),
         MeshError::Invalid { text, fault } => error_in(name, text.as_deref(), fault, document),
     })?;
-    let own = Format::of(name).and_then(Format::unit);
+    let own = MeshFormat::of(name).and_then(MeshFormat::unit);
     let unit = match own.filter(|_| section.get("unit").is_none()) {
         Some(unit) => unit,
         None => read_unit(&section.require("unit")?)?,

@@ -10,20 +10,20 @@ use crate::simulate::Quantity;
 
 /// One of x, y, z, alpha, beta, gamma, by its index in a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Coordinate(usize);
+pub struct BenchCoordinate(usize);
 
 /// Names of the coordinates.
 const NAMES: [&str; 6] = ["x", "y", "z", "α", "β", "γ"];
 /// Order in the list: the paper's coordinates first.
 const ORDER: [usize; 6] = [0, 4, 1, 2, 3, 5];
 
-impl Default for Coordinate {
+impl Default for BenchCoordinate {
     fn default() -> Self {
         Self(ORDER[0])
     }
 }
 
-impl Coordinate {
+impl BenchCoordinate {
     /// Its index in a section.
     pub fn index(self) -> usize {
         self.0

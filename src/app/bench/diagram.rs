@@ -3,7 +3,7 @@
 use eframe::egui::{Grid, Pos2, Rect, RichText, Sense, Ui};
 use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
 
-use super::coordinate::Coordinate;
+use super::coordinate::BenchCoordinate;
 use super::plane::{AxisLabel, plane, set_accessible_name};
 use super::portrait::title;
 use super::sweep_results::SweepResults;
@@ -39,7 +39,7 @@ impl Ordinate {
         }
     }
 
-    fn axis(self, coordinate: Coordinate) -> AxisLabel {
+    fn axis(self, coordinate: BenchCoordinate) -> AxisLabel {
         match self {
             Self::Sections => coordinate.axis(),
             Self::Exponent => AxisLabel::new("largest Lyapunov exponent", "1/s"),
@@ -66,7 +66,7 @@ type Mark = (PlotPoint, usize, usize);
 pub struct Diagram {
     ordinate: Ordinate,
     /// The settings of the current marks; `None` if they must be rebuilt.
-    mark_settings: Option<(Ordinate, Coordinate)>,
+    mark_settings: Option<(Ordinate, BenchCoordinate)>,
     marks: [Vec<PlotPoint>; REGIMES.len()],
     all: Vec<Mark>,
     /// Marks of unreliable points.
@@ -109,7 +109,7 @@ impl Diagram {
     }
 
     /// The diagram of `results`; returns the clicked point and its retained section.
-    pub fn ui(&mut self, ui: &mut Ui, results: &SweepResults, coordinate: Coordinate) -> Option<(usize, usize)> {
+    pub fn ui(&mut self, ui: &mut Ui, results: &SweepResults, coordinate: BenchCoordinate) -> Option<(usize, usize)> {
         let parameter = results.parameter();
         let unit = parameter.map_or("", |parameter| parameter.display_unit());
         let label = parameter.map_or(results.range.key.as_str(), |parameter| parameter.label);
@@ -226,7 +226,7 @@ impl Diagram {
         });
     }
 
-    fn rebuild_marks(&mut self, results: &SweepResults, coordinate: Coordinate, shown: &dyn Fn(f64) -> f64) {
+    fn rebuild_marks(&mut self, results: &SweepResults, coordinate: BenchCoordinate, shown: &dyn Fn(f64) -> f64) {
         self.marks.iter_mut().for_each(Vec::clear);
         self.all.clear();
         self.doubtful.clear();

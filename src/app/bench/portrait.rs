@@ -3,7 +3,7 @@
 use eframe::egui::{RichText, Slider, SliderClamping, Ui};
 use egui_plot::{PlotPoint, PlotPoints, Points};
 
-use super::coordinate::Coordinate;
+use super::coordinate::BenchCoordinate;
 use super::plane::{AxisLabel, plane, set_accessible_name};
 use crate::analysis::drive::observed;
 use crate::app::curve::Path;
@@ -24,7 +24,7 @@ pub struct Portrait {
 
 impl Portrait {
     /// Phase portrait (rate over coordinate): the orbit of the last periods and the sections.
-    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, coordinate: Coordinate) {
+    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, coordinate: BenchCoordinate) {
         self.update_points(player, coordinate);
         let (across, up) = (coordinate.axis(), coordinate.rate_axis());
         let dark = ui.visuals().dark_mode;
@@ -102,7 +102,7 @@ impl Portrait {
         );
     }
 
-    fn update_points(&mut self, player: &Player, coordinate: Coordinate) {
+    fn update_points(&mut self, player: &Player, coordinate: BenchCoordinate) {
         let watch = player.watch();
         let point = |(_, state): &(f64, Observed)| {
             let [across, up] = coordinate.of(state);

@@ -3,7 +3,7 @@
 use eframe::egui::{Align, ComboBox, DragValue, RichText, TextEdit, Ui};
 
 use super::computation::Computation;
-use super::coordinate::Coordinate;
+use super::coordinate::BenchCoordinate;
 use super::diagram::Diagram;
 use super::in_words;
 use super::request::BenchRequest;
@@ -95,13 +95,13 @@ impl SweepPanel {
     }
 
     /// Ready sweeps, settings, progress and diagram; returns the user's request to the run.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<BenchRequest> {
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: BenchCoordinate) -> Option<BenchRequest> {
         let ready = ready_ui(ui).map(BenchRequest::Ready);
         let load = self.sweep_ui(ui, player, coordinate);
         ready.or(load.map(BenchRequest::Section))
     }
 
-    fn sweep_ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Load> {
+    fn sweep_ui(&mut self, ui: &mut Ui, player: &Player, coordinate: BenchCoordinate) -> Option<Load> {
         let mut progress = ui.cursor().top();
         match player.watch().period() {
             Err(why) => {
@@ -136,7 +136,7 @@ impl SweepPanel {
     }
 
     /// The diagram; returns the clicked section.
-    fn diagram_ui(&mut self, ui: &mut Ui, coordinate: Coordinate) -> Option<Load> {
+    fn diagram_ui(&mut self, ui: &mut Ui, coordinate: BenchCoordinate) -> Option<Load> {
         let results = self.results.as_ref()?;
         reserve_lines(ui, "sweep of", 3, |ui| {
             ui.label(RichText::new(results.caption()).small()).on_hover_text("Scene and settings of the diagram below");

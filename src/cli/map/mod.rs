@@ -21,12 +21,12 @@ use crate::files::{OutputFile, PendingFile, publish};
 
 /// Format of an output, by its extension.
 #[derive(Clone, Copy)]
-enum Format {
+enum MapFormat {
     Npz,
     Vtk,
 }
 
-impl Format {
+impl MapFormat {
     fn of(path: &Path) -> Result<Self, Failure> {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         match &*extension.to_ascii_lowercase() {
@@ -55,7 +55,7 @@ pub fn map(arguments: &MapArguments) -> Result<(), Failure> {
         std::iter::once(("the scene".to_owned(), arguments.scene.name())).chain(outputs).collect();
     check_distinct(&names)?;
     let targets = arguments.out.iter().map(|path| {
-        let format = Format::of(path)?;
+        let format = MapFormat::of(path)?;
         Ok((format, OutputFile::claim(path, arguments.force)?))
     });
     let targets = targets.collect::<Result<Vec<_>, Failure>>()?;
@@ -67,8 +67,8 @@ pub fn map(arguments: &MapArguments) -> Result<(), Failure> {
         return Err(Failure::usage(format!("no point has a pose of the machine without play; at the first: {fault}")));
     }
     let files = targets.into_iter().map(|(format, target)| match format {
-        Format::Npz => archive::npz(&results, target),
-        Format::Vtk => archive::vtk(&results, target),
+        MapFormat::Npz => archive::npz(&results, target),
+        MapFormat::Vtk => archive::vtk(&results, target),
     });
     publish(files.collect::<Result<Vec<PendingFile>, _>>()?)?;
     print(&match arguments.summary {

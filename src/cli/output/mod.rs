@@ -26,7 +26,7 @@ const MAX_METADATA_SIZE: u64 = 64 << 20;
 
 /// File format of results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum RowFormat {
     /// Text, one row per line; a second file beside it holds the metadata.
     Csv,
     /// One object: `meta` and `columns`.
@@ -35,7 +35,7 @@ pub enum Format {
     Npz,
 }
 
-impl Format {
+impl RowFormat {
     /// The format of a file by its extension.
     ///
     /// # Errors
@@ -56,7 +56,7 @@ impl Format {
 
 /// Output file for the rows of a run, claimed and checked to be writable before the run starts.
 pub struct RowsFile {
-    format: Format,
+    format: RowFormat,
     rows: OutputFile,
     /// Metadata of a CSV file, kept apart because plain readers treat every line after the header as data.
     metadata: Option<OutputFile>,
@@ -68,12 +68,12 @@ impl RowsFile {
     /// # Errors
     /// Unknown extension (usage), existing file without `force`, unwritable folder (input/output).
     pub fn claim(path: &Path, force: bool) -> Result<Self, Failure> {
-        let format = Format::of(path)?;
+        let format = RowFormat::of(path)?;
         // The user's own name is claimed first, so that an error names it.
         let rows = OutputFile::claim(path, force)?;
         let metadata = match format {
-            Format::Csv => Some(claim_metadata(path, force)?),
-            Format::Json | Format::Npz => None,
+            RowFormat::Csv => Some(claim_metadata(path, force)?),
+            RowFormat::Json | RowFormat::Npz => None,
         };
         Ok(Self { format, rows, metadata })
     }
@@ -81,7 +81,7 @@ impl RowsFile {
     /// The files that `option` with `path` writes, for [`check_distinct`].
     pub fn names(option: &str, path: &Path) -> Vec<(String, PathBuf)> {
         let mut names = vec![(option.to_owned(), path.to_owned())];
-        if Format::of(path) == Ok(Format::Csv) {
+        if RowFormat::of(path) == Ok(RowFormat::Csv) {
             names.push((format!("the .meta.json of {option}"), metadata_path(path)));
         }
         names
@@ -104,14 +104,14 @@ impl RowsFile {
     pub fn fill(self, table: &Table, mut meta: Map<String, Json>) -> Result<Vec<PendingFile>, Failure> {
         let mut checksum = String::new();
         let rows = self.rows.fill(|file| match self.format {
-            Format::Csv => {
+            RowFormat::Csv => {
                 let mut file = csv::ChecksumWriter::new(file);
                 csv::write(&mut file, table)?;
                 checksum = file.checksum();
                 Ok(())
             }
-            Format::Json => json::write(file, table, &meta),
-            Format::Npz => npz::write(file, table.columns().iter().cloned(), &meta),
+            RowFormat::Json => json::write(file, table, &meta),
+            RowFormat::Npz => npz::write(file, table.columns().iter().cloned(), &meta),
         })?;
         let Some(metadata) = self.metadata else {
             return Ok(vec![rows]);

@@ -10,7 +10,7 @@ use crate::cli::args::RenderArguments;
 use crate::cli::output::{claim_metadata, write_meta};
 use crate::cli::{Failure, print};
 use crate::files::{Folder, MANIFEST, OutputFile, publish, spare_older};
-use crate::film::{Film, FilmError, Format};
+use crate::film::{Film, FilmError, FilmFormat};
 use crate::render::Image;
 
 /// Destination of the frames. Nothing has its final name before [`Destination::finish`].
@@ -39,10 +39,10 @@ impl Destination {
             return Ok(Self::Pictures(Folder::claim(folder, arguments.force)?));
         };
         let name = path.to_string_lossy();
-        let Some(format) = Format::of_name(&name) else {
+        let Some(format) = FilmFormat::of_name(&name) else {
             return Err(Failure::usage(format!(
                 "--film {name}: the name must end in {}",
-                Format::ALL.map(|format| format!(".{format}")).join(" or ")
+                FilmFormat::ALL.map(|format| format!(".{format}")).join(" or ")
             )));
         };
         let size = [arguments.size.0, arguments.size.1];

@@ -8,7 +8,7 @@ use crate::analysis::axis::Axis;
 use crate::analysis::sweep::Sweep;
 use crate::analysis::sweep_settings::unit_suffix;
 use crate::cli::Failure;
-use crate::cli::output::{Column, Format, RowsFile, axis_column, fill_archive};
+use crate::cli::output::{Column, RowFormat, RowsFile, axis_column, fill_archive};
 use crate::files::{OutputFile, publish};
 
 /// A computed sweep.
@@ -35,9 +35,9 @@ impl Target {
     /// # Errors
     /// An unknown extension, an existing file without `force`, or an unwritable folder.
     pub fn claim(path: &Path, force: bool) -> Result<Self, Failure> {
-        match Format::of(path) {
-            Ok(Format::Npz) => Ok(Self::Archive(OutputFile::claim(path, force)?)),
-            Ok(Format::Csv) => Ok(Self::Points(RowsFile::claim(path, force)?)),
+        match RowFormat::of(path) {
+            Ok(RowFormat::Npz) => Ok(Self::Archive(OutputFile::claim(path, force)?)),
+            Ok(RowFormat::Csv) => Ok(Self::Points(RowsFile::claim(path, force)?)),
             _ => Err(Failure::usage(format!(
                 "--out {}: a sweep is written as a NumPy archive or as a table of points; use the extension .npz or .csv",
                 path.display()

@@ -30,7 +30,7 @@ pub(super) struct Turns {
 
 /// An angle that follows from poses.
 struct Counted {
-    source: Source,
+    source: CoordinateLocation,
     /// Elements that act on it.
     elements: Vec<usize>,
     reference: AngleReference,
@@ -38,14 +38,14 @@ struct Counted {
 
 /// Location of a joint coordinate.
 #[derive(Clone, Copy)]
-enum Source {
+enum CoordinateLocation {
     /// The one-degree joint above this body.
     Above(BodyIndex),
     /// A loop-closing joint and which of its coordinates.
     Closing(usize, usize),
 }
 
-impl Source {
+impl CoordinateLocation {
     fn is_angle(self, model: &Model) -> bool {
         match self {
             Self::Above(body) => {
@@ -88,12 +88,12 @@ impl Counted {
 impl Turns {
     pub(super) fn new(machine: &Machine, model: &Model) -> Self {
         let is_coordinate = |&b: &BodyIndex| !matches!(model.bodies[b].motion, Motion::Fixed | Motion::Free { .. });
-        let above = model.order.iter().copied().filter(is_coordinate).map(Source::Above);
+        let above = model.order.iter().copied().filter(is_coordinate).map(CoordinateLocation::Above);
         let closing = model.closures.iter().enumerate();
         let closing = closing.flat_map(|(closure, pair)| {
-            (0..pair.kind.freedoms().len()).map(move |part| Source::Closing(closure, part))
+            (0..pair.kind.freedoms().len()).map(move |part| CoordinateLocation::Closing(closure, part))
         });
-        let sources: Vec<Source> = above.chain(closing).collect();
+        let sources: Vec<CoordinateLocation> = above.chain(closing).collect();
         let acting = elements_by_coordinate(machine, sources.len());
         let mut turns = Self {
             followed: Vec::new(),
@@ -111,7 +111,7 @@ impl Turns {
                     turns.index[i] = Some(turns.counted.len());
                     let reference = AngleReference::default();
                     turns.counted.push(Counted { source, elements: elements.clone(), reference });
-                } else if let Source::Above(body) = source
+                } else if let CoordinateLocation::Above(body) = source
                     && source.is_angle(model)
                 {
                     turns.followed.extend(elements.iter().map(|&element| (element, body)));
@@ -130,7 +130,7 @@ impl Turns {
     pub(super) fn start(&mut self, model: &Model, tree: &mut Tree, y: &[f64]) {
         for counted in &mut self.counted {
             counted.reference = AngleReference::default();
-            if let Source::Above(body) = counted.source
+            if let CoordinateLocation::Above(body) = counted.source
                 && let Motion::Revolute { q, .. } = model.bodies[body].motion
             {
                 counted.reference.angle = y[q];
@@ -156,7 +156,7 @@ impl Turns {
             }
             tree.update_kinematics(model, 0.0, &between);
             for counted in &mut self.counted {
-                if let Source::Closing(closure, part) = counted.source
+                if let CoordinateLocation::Closing(closure, part) = counted.source
                     && let Some([angle, _]) = model.closures[closure].coordinates(&tree.motion).nth(part)
                     && angle.is_finite()
                 {

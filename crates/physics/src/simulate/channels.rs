@@ -9,7 +9,7 @@ use table::TIME;
 
 use super::Frame;
 use crate::machine::{Freedom, Joint, JointKind, Machine};
-use table::{Repetition, Signal, Source, TABLE};
+use table::{Repetition, Signal, SignalSource, TABLE};
 
 /// Largest number of ball joints and drives that are recorded: in a longer chain the rest is not worth the memory.
 pub const RECORDED_JOINTS: usize = 12;
@@ -20,7 +20,7 @@ pub const MAX_PICKED: usize = 32;
 /// Where a value is found in a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
-    source: Source,
+    source: SignalSource,
     part: usize,
     component: usize,
 }
@@ -34,7 +34,7 @@ impl Reading {
 
     /// Requests the value from `frame`, if frames contain it only on request.
     pub fn request(&self, frame: &mut Frame) {
-        if matches!(self.source, Source::Reaction(_)) {
+        if matches!(self.source, SignalSource::Reaction(_)) {
             frame.reactions.get_or_insert_default();
         }
     }
@@ -231,21 +231,21 @@ fn has_signal(
     let source = signal.source;
     let known = |may_have: bool| first.map_or(may_have, |f| source.value(f, part, 0).is_some());
     match source {
-        Source::Slide | Source::SlideCoordinate(_) => freedom == Some(Freedom::Slide),
-        Source::HingeCoordinate(0) if freedom == Some(Freedom::TurnOfSlide) => true,
-        Source::Hinge | Source::HingeCoordinate(_) => freedom == Some(Freedom::Turn),
-        Source::TurnRate => freedom == Some(Freedom::TurnOfSlide),
-        Source::Turn => matches!(freedom, Some(Freedom::TurnOfSlide | Freedom::FirstTurn)),
-        Source::ChildTurn => freedom == Some(Freedom::SecondTurn),
-        Source::FirstTurn(_) => freedom == Some(Freedom::FirstTurn),
-        Source::SecondTurn(_) => freedom == Some(Freedom::SecondTurn),
-        Source::OtherAxes(_) | Source::OtherAngles(_) => part != machine.output.body,
-        Source::Supplied(..) | Source::Consumed(..) => {
+        SignalSource::Slide | SignalSource::SlideCoordinate(_) => freedom == Some(Freedom::Slide),
+        SignalSource::HingeCoordinate(0) if freedom == Some(Freedom::TurnOfSlide) => true,
+        SignalSource::Hinge | SignalSource::HingeCoordinate(_) => freedom == Some(Freedom::Turn),
+        SignalSource::TurnRate => freedom == Some(Freedom::TurnOfSlide),
+        SignalSource::Turn => matches!(freedom, Some(Freedom::TurnOfSlide | Freedom::FirstTurn)),
+        SignalSource::ChildTurn => freedom == Some(Freedom::SecondTurn),
+        SignalSource::FirstTurn(_) => freedom == Some(Freedom::FirstTurn),
+        SignalSource::SecondTurn(_) => freedom == Some(Freedom::SecondTurn),
+        SignalSource::OtherAxes(_) | SignalSource::OtherAngles(_) => part != machine.output.body,
+        SignalSource::Supplied(..) | SignalSource::Consumed(..) => {
             known(machine.solver.energy_ledger) && (!signal.of_elements || !machine.elements.is_empty())
         }
-        Source::ProbeError | Source::ProbeDistance => known(machine.output.probe.is_some()),
-        Source::Element(_) => known(true),
-        Source::ElementValue(_) => machine.elements[part].is_between_points(),
+        SignalSource::ProbeError | SignalSource::ProbeDistance => known(machine.output.probe.is_some()),
+        SignalSource::Element(_) => known(true),
+        SignalSource::ElementValue(_) => machine.elements[part].is_between_points(),
         _ => true,
     }
 }

@@ -22,7 +22,7 @@ type Other<'o> = &'o dyn Fn(&str) -> Result<Vec<u8>, NoFile>;
 
 /// Mesh file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum MeshFormat {
     /// STL, text or binary.
     Stl,
     /// OBJ, faces only.
@@ -31,7 +31,7 @@ pub enum Format {
     Gltf,
 }
 
-impl Format {
+impl MeshFormat {
     /// Supported file name extensions.
     pub(crate) const ENDINGS: &'static str = ".stl, .obj, .gltf, .glb";
 
@@ -93,7 +93,7 @@ mod tests {
         Err("there is no other file".into())
     }
 
-    fn read(format: Format, bytes: &[u8]) -> Result<Mesh, Fault> {
+    fn read(format: MeshFormat, bytes: &[u8]) -> Result<Mesh, Fault> {
         format.read(bytes, &alone)
     }
 
@@ -215,12 +215,12 @@ mod tests {
     fn every_format_gives_the_same_box() {
         let (corners, triangles) = box_of_triangles();
         let files = [
-            (Format::Stl, binary_stl()),
-            (Format::Stl, text_stl().into_bytes()),
-            (Format::Stl, text_stl().replace('\n', "\r\n").to_uppercase().into_bytes()),
-            (Format::Obj, obj().into_bytes()),
-            (Format::Gltf, glb()),
-            (Format::Gltf, gltf_alone()),
+            (MeshFormat::Stl, binary_stl()),
+            (MeshFormat::Stl, text_stl().into_bytes()),
+            (MeshFormat::Stl, text_stl().replace('\n', "\r\n").to_uppercase().into_bytes()),
+            (MeshFormat::Obj, obj().into_bytes()),
+            (MeshFormat::Gltf, glb()),
+            (MeshFormat::Gltf, gltf_alone()),
         ];
         for (format, bytes) in files {
             let mesh = read(format, &bytes).unwrap();
@@ -243,7 +243,7 @@ mod tests {
         let mut count = 0;
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
-            let format = Format::of(path.to_str().unwrap()).unwrap();
+            let format = MeshFormat::of(path.to_str().unwrap()).unwrap();
             let mesh = read(format, &std::fs::read(&path).unwrap()).unwrap();
             assert_eq!(mesh.open_edge(), None, "{}", path.display());
             count += 1;
@@ -257,8 +257,8 @@ mod tests {
             "box.bin" => Ok(gltf_parts().1),
             _ => Err("no such file".into()),
         };
-        assert!(Format::Gltf.read(&gltf_with("box.bin"), &other).is_ok());
-        let fault = Format::Gltf.read(&gltf_with("bin"), &other).unwrap_err();
+        assert!(MeshFormat::Gltf.read(&gltf_with("box.bin"), &other).is_ok());
+        let fault = MeshFormat::Gltf.read(&gltf_with("bin"), &other).unwrap_err();
         assert_eq!(fault.why.to_string(), "buffers[0].uri: no such file");
     }
 
@@ -272,7 +272,7 @@ mod tests {
             }
         }
         let back = lines.join("\n");
-        let [there, back] = [&text, &back].map(|text| read(Format::Stl, text.as_bytes()).unwrap());
+        let [there, back] = [&text, &back].map(|text| read(MeshFormat::Stl, text.as_bytes()).unwrap());
         let volume = there.volume_about([0.0; 3]);
         assert!((volume - 6.0).abs() < 1e-5, "{volume}");
         assert!((volume - back.volume_about([0.0; 3])).abs() < 1e-5);
@@ -282,7 +282,7 @@ mod tests {
     fn a_hole_is_found() {
         let whole = text_stl();
         let holed = whole.replacen("   vertex 10.5", "   vertex 10.6", 1);
-        let mesh = read(Format::Stl, holed.as_bytes()).unwrap();
+        let mesh = read(MeshFormat::Stl, holed.as_bytes()).unwrap();
         let [from, to] = mesh.open_edge().expect("an open edge");
         assert!(from != to);
     }
@@ -298,28 +298,28 @@ mod tests {
         };
         let good = text_stl();
         let bad = good.replacen("vertex 9.5", "vertex 9.5mm", 1);
-        check(Format::Stl, &bad, at(&bad, "9.5mm"), "not a number");
+        check(MeshFormat::Stl, &bad, at(&bad, "9.5mm"), "not a number");
         let bad = good.replacen("  endloop", "", 1);
-        check(Format::Stl, &bad, at(&bad, " endfacet").map(|i| i + 1), "endloop");
+        check(MeshFormat::Stl, &bad, at(&bad, " endfacet").map(|i| i + 1), "endloop");
         let bad = &good[..good.len() - 16];
-        check(Format::Stl, bad, Some(bad.len()), "ends within");
-        check(Format::Stl, "", Some(0), "empty");
-        check(Format::Stl, "PK", Some(0), "neither");
+        check(MeshFormat::Stl, bad, Some(bad.len()), "ends within");
+        check(MeshFormat::Stl, "", Some(0), "empty");
+        check(MeshFormat::Stl, "PK", Some(0), "neither");
         let mut short = binary_stl();
         short.truncate(200);
-        let fault = read(Format::Stl, &short).unwrap_err();
+        let fault = read(MeshFormat::Stl, &short).unwrap_err();
         assert_eq!(fault.at, Some(80));
         let why = fault.why.to_string();
         assert!(why.contains("12 triangles") && why.contains("684 bytes"));
         let good = obj();
         let bad = format!("{good}f 1 2 9\n");
-        check(Format::Obj, &bad, bad.rfind('9'), "8 vertices");
+        check(MeshFormat::Obj, &bad, bad.rfind('9'), "8 vertices");
         let bad = format!("{good}f 1 2\n");
-        check(Format::Obj, &bad, bad.rfind('f'), "at least 3");
-        check(Format::Obj, "v 1 2\n", Some(0), "three");
-        check(Format::Obj, "v 1 2 1e300\n", Some(0), "out of range");
-        check(Format::Obj, "hello\n", None, "no triangles");
-        let fault = read(Format::Gltf, b"{ \"asset\": ").unwrap_err();
+        check(MeshFormat::Obj, &bad, bad.rfind('f'), "at least 3");
+        check(MeshFormat::Obj, "v 1 2\n", Some(0), "three");
+        check(MeshFormat::Obj, "v 1 2 1e300\n", Some(0), "out of range");
+        check(MeshFormat::Obj, "hello\n", None, "no triangles");
+        let fault = read(MeshFormat::Gltf, b"{ \"asset\": ").unwrap_err();
         assert!(fault.why.to_string().contains("line 1"), "{fault:?}");
         let gltf = |change: fn(&mut serde_json::Value)| {
             use base64::Engine as _;
@@ -327,7 +327,7 @@ mod tests {
             let data = base64::engine::general_purpose::STANDARD.encode(buffer);
             json["buffers"][0]["uri"] = format!("data:;base64,{data}").into();
             change(&mut json);
-            let fault = read(Format::Gltf, json.to_string().as_bytes()).unwrap_err();
+            let fault = read(MeshFormat::Gltf, json.to_string().as_bytes()).unwrap_err();
             fault.why.to_string()
         };
         let why = gltf(|json| json["accessors"][0]["count"] = 9.into());
@@ -352,7 +352,7 @@ mod tests {
             }
         }
         bytes[80..84].copy_from_slice(&(MAX_TRIANGLES as u32 + 1).to_le_bytes());
-        let fault = read(Format::Stl, &bytes).unwrap_err();
+        let fault = read(MeshFormat::Stl, &bytes).unwrap_err();
         assert!(fault.why.to_string().contains("200000"), "{fault:?}");
     }
 
@@ -364,12 +364,12 @@ mod tests {
             changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0_u8..4), 1..12),
         ) {
             let (format, mut bytes) = match which {
-                0 => (Format::Stl, binary_stl()),
-                1 => (Format::Stl, text_stl().into_bytes()),
-                2 => (Format::Obj, obj().into_bytes()),
-                3 => (Format::Gltf, glb()),
-                4 => (Format::Gltf, gltf_alone()),
-                _ => (Format::Gltf, gltf_with("box.bin")),
+                0 => (MeshFormat::Stl, binary_stl()),
+                1 => (MeshFormat::Stl, text_stl().into_bytes()),
+                2 => (MeshFormat::Obj, obj().into_bytes()),
+                3 => (MeshFormat::Gltf, glb()),
+                4 => (MeshFormat::Gltf, gltf_alone()),
+                _ => (MeshFormat::Gltf, gltf_with("box.bin")),
             };
             for (place, byte, how) in changes {
                 if bytes.is_empty() {
@@ -403,7 +403,7 @@ mod tests {
     /// A shape from the OBJ file `text`, in millimetres, rotated and shifted.
     fn of_file(text: &str) -> Geometry {
         let alone = |_: &str| Err(String::new().into());
-        let mesh = Format::Obj.read(text.as_bytes(), &alone).unwrap();
+        let mesh = MeshFormat::Obj.read(text.as_bytes(), &alone).unwrap();
         assert_eq!(mesh.open_edge(), None);
         Geometry::Mesh {
             mesh: mesh.into(),

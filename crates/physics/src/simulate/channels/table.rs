@@ -2,7 +2,7 @@
 //! records and the rows of `run` are all derived from it.
 
 use Quantity as Q;
-use Source::{
+use SignalSource::{
     Angles, Axes, BodyAxes, ChildTurn, Closing, Consumed, Element, ElementValue, FirstTurn, Hinge, HingeCoordinate,
     Joint, JointAxes, OtherAngles, OtherAxes, ProbeDistance, ProbeError, Reaction, Scalar, SecondTurn, Slide,
     SlideCoordinate, Supplied, Turn, TurnRate,
@@ -63,7 +63,7 @@ impl Quantity {
 
 /// How a signal is read from a frame (SI units, world axes), and for which parts it is repeated.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Source {
+pub(super) enum SignalSource {
     /// A single value, with its member name in the plot.
     Scalar(&'static str, fn(&Frame) -> f64),
     /// Vector of the output body: x, y, z.
@@ -140,7 +140,7 @@ pub(super) enum Repetition {
 /// Names of a signal's components, in plots and in columns.
 pub(super) type Components = &'static [(&'static str, &'static str)];
 
-impl Source {
+impl SignalSource {
     pub(super) fn repetition(&self) -> Repetition {
         match self {
             Joint(_) | JointAxes(_) => Repetition::Joint,
@@ -221,13 +221,13 @@ pub(super) struct Signal {
     /// end.
     pub run: Option<u8>,
     /// How it is read.
-    pub source: Source,
+    pub source: SignalSource,
     /// Whether it is absent in a scene without force elements.
     pub of_elements: bool,
 }
 
 /// A signal in no plot, written by `run` only on request.
-const fn on_request(name: &'static str, column: &'static str, source: Source, help: &'static str) -> Signal {
+const fn on_request(name: &'static str, column: &'static str, source: SignalSource, help: &'static str) -> Signal {
     Signal { name, column, help, plot: None, run: None, source, of_elements: false }
 }
 
