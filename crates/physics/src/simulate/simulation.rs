@@ -234,7 +234,7 @@ pub struct Workspace {
 struct WorkspaceId(u64);
 
 /// A state of a model that is stepped in the workspace attached to it.
-struct Run<'a> {
+struct Stepping<'a> {
     model: &'a Model,
     machine: &'a Machine,
     state: &'a mut State,
@@ -353,8 +353,8 @@ impl Simulation {
         Self { model, state, workspace }
     }
 
-    fn run(&mut self) -> Run<'_> {
-        Run::new(&self.model, &mut self.state, &mut self.workspace)
+    fn run(&mut self) -> Stepping<'_> {
+        Stepping::new(&self.model, &mut self.state, &mut self.workspace)
     }
 
     /// The compiled machine.

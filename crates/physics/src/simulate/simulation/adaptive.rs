@@ -2,7 +2,7 @@
 
 use super::automatic::STABILITY_LIMIT;
 use super::corners::LawBranch;
-use super::{LONGEST_STEP, NEARLY, Run, edges, shortest_step};
+use super::{LONGEST_STEP, NEARLY, Stepping, edges, shortest_step};
 use crate::integrate::{Method, find_root};
 use crate::mechanism::Counts;
 use crate::simulate::peaks::Approach;
@@ -44,7 +44,7 @@ struct SignedGap {
     rate: f64,
 }
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Takes a step whose size follows the error estimate, truncated at the first contact start or end inside it.
     pub(super) fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
         self.choose_flights(limit);

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Run, shortest_step};
+use super::{Stepping, shortest_step};
 use crate::integrate::{Controller, Method};
 use crate::mechanism::{MAX_DENSE, Mechanism, MechanismError};
 use crate::simulate::stepper::ActiveScheme;
@@ -89,7 +89,7 @@ impl SchemeSelector {
     }
 }
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Starts with the implicit scheme if balls touch from the start and their laws have no damping: explicit steps would sustain
     /// the ringing at a multiple of the tolerance, and implicit ones would then have to resolve it.
     pub(super) fn choose_first_scheme(&mut self) {
@@ -233,7 +233,7 @@ mod tests {
             implicit: Trial { steps: TRIAL_STEPS - 1, ..Trial::default() },
             ..SchemeSelector::default()
         };
-        Run::new(model, &mut state, &mut workspace).choose_scheme(1e-3, 0.0, 10.0);
+        Stepping::new(model, &mut state, &mut workspace).choose_scheme(1e-3, 0.0, 10.0);
         let (control, t) = (&state.control, state.now.t);
         assert_eq!(control.scheme, ActiveScheme::Explicit);
         assert!(t + control.h_next > t);

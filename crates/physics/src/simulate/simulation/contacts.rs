@@ -1,7 +1,7 @@
 //! Contact states and continuous-time peaks of the step just accepted.
 
 use super::search::NEAR_PEAK;
-use super::{Run, State};
+use super::{State, Stepping};
 use crate::contact::{Coefficients, ContactState, Separation};
 use crate::integrate::StepControl;
 use crate::machine::MIN_IMPACT_STEPS;
@@ -66,7 +66,7 @@ impl State {
     }
 }
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Initialises the contacts that exist at the start. Their onset is unknown, so the floor serves as approach speed; a ball at
     /// its wall to within rounding begins its contact there, at its current rate.
     pub(super) fn begin_contacts_at_start(&mut self) {

@@ -1,7 +1,7 @@
 //! Corners of the contact laws as events. During a step each touching joint stays on one branch of the friction law and one of
 //! the approach-speed rule; the step ends where its sliding speed or penetration rate leaves that branch.
 
-use super::{Run, State};
+use super::{State, Stepping};
 use crate::contact::{ApproachBranch, ContactState, FrictionBranch};
 use crate::integrate::find_root;
 
@@ -56,7 +56,7 @@ impl Corner {
     }
 }
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Assigns every touching joint its current branches of the laws; joints that already have branches retain them unless
     /// `reset`. If corners are not located, all joints use the full laws.
     pub(super) fn freeze_branches(&mut self, reset: bool) {

@@ -11,7 +11,7 @@
 //!
 //! Beyond [`COARSE`] steps per impact the last three shrink, too, so that the motion converges.
 
-use super::{DiscreteControl, JointState, NEARLY, Run, State, StepEnd, store_gaps};
+use super::{DiscreteControl, JointState, NEARLY, State, StepEnd, Stepping, store_gaps};
 use crate::contact::{ContactPhase, ElasticLaw};
 use crate::mechanism::{ActiveSet, Counts, Mechanism, StepStart};
 use crate::simulate::peaks::PenetrationCubic;
@@ -141,7 +141,7 @@ pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
     h.min(GROWTH * state.control.h_next).max(SHORTEST)
 }
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Takes a step that ends no later than `limit`, s.
     pub(super) fn discrete_step(&mut self, limit: f64) -> Result<(), Stopped> {
         self.attempt.counts = Counts::default();

@@ -1,9 +1,9 @@
 //! Perturbations of the state, for a twin run and its renormalisation.
 
-use super::{Attempt, Control, Run};
+use super::{Attempt, Control, Stepping};
 use crate::contact::ContactState;
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// As [`Simulation::displace`](crate::simulate::Simulation::displace).
     pub(in crate::simulate) fn displace(&mut self, offset: &[f64]) {
         let Self { mechanism, state, .. } = self;

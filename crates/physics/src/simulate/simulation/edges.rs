@@ -2,7 +2,7 @@
 //! straight lines stays on one of them, and the step ends where that changes. The force has a kink or a jump there, and a step
 //! across it has an error that its estimate does not see.
 
-use super::Run;
+use super::Stepping;
 use super::flights::write_flights;
 use crate::integrate::find_root;
 use crate::mechanism::EdgeIndicator;
@@ -12,7 +12,7 @@ const PARTS: u32 = 4;
 /// An edge earlier than this fraction of the step was passed at its start.
 pub(super) const AT_START: f64 = 1e-9;
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Fixes the side of each element that has edges for the next step, if the method ends steps there, which takes an
     /// interpolant as accurate as its steps.
     pub(super) fn freeze_element_sides(&mut self) {

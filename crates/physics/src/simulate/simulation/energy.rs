@@ -1,6 +1,6 @@
 //! Energy ledger of a running simulation, from powers at a few instants of each accepted step.
 
-use super::{Record, Run, State};
+use super::{Record, State, Stepping};
 use crate::integrate::Method;
 use crate::mechanism::{ActiveSet, Mechanism, Powers};
 use crate::simulate::ledger::{Account, Energies, weights};
@@ -14,7 +14,7 @@ const SHORTEST_PAST: f64 = 0.1;
 /// Interior nodes of such a step while there are too few past ends.
 const MIDDLE: [f64; 1] = [0.5];
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Starts a new ledger at the current state, which has just been fully evaluated.
     pub(super) fn start_ledger(&mut self) {
         let Self { mechanism, state, .. } = self;

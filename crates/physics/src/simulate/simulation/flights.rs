@@ -1,14 +1,14 @@
 //! Bodies in free flight: while nothing touches a free body, its motion is known in advance, and the steps that resolve impacts
 //! elsewhere exclude it.
 
-use super::{LONGEST_STEP, Run, StepEnd};
+use super::{LONGEST_STEP, StepEnd, Stepping};
 use crate::integrate::{Method, System as _};
 use crate::mechanism::{ActiveSet, Flight, Mechanism};
 
 /// With fewer free bodies than this, excluding some saves less than it costs.
 const MIN_FREE_BODIES: usize = 3;
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Chooses the bodies to exclude from a step that ends by `limit`: those that touch nothing and whose motion is known until
     /// then.
     pub(super) fn choose_flights(&mut self, limit: f64) {

@@ -1,6 +1,6 @@
 //! The divergence guard: checks that every accepted step must pass.
 
-use super::{OPEN_LOOP, Run};
+use super::{OPEN_LOOP, Stepping};
 use crate::integrate::StepControl;
 use crate::simulate::StopFault;
 
@@ -13,7 +13,7 @@ const MAX_OVERSHOOT: f64 = 4.0;
 /// Violation beyond which stabilised constraints no longer hold the mechanism together, m.
 const MAX_DRIFT: f64 = 1e-3;
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Fault of the step of size `h` just attempted, if any.
     pub(super) fn divergence(&self, open: f64, h: f64) -> Option<StopFault> {
         if !(open <= OPEN_LOOP) {

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{IdealModel, IdealSource, IdealState, IdealWorkspace, Model, Run, StateMismatch};
+use super::{IdealModel, IdealSource, IdealState, IdealWorkspace, Model, StateMismatch, Stepping};
 use crate::integrate::Method;
 use crate::machine::{Formulation, Machine, StartRule, Vec3};
 use crate::simulate::{Frame, StartError, Stopped};
@@ -132,7 +132,7 @@ impl IdealModel {
     /// Sets gravity from `time` on, m/s^2.
     pub(super) fn set_gravity(&self, state: &mut IdealState, work: &mut IdealWorkspace, time: f64, gravity: Vec3) {
         self.tip(state, work, time);
-        let mut run = Run::new(&self.model, &mut state.state, &mut work.workspace);
+        let mut run = Stepping::new(&self.model, &mut state.state, &mut work.workspace);
         run.rewind_to(time);
         run.set_gravity(gravity);
         // Samples after `time` are no longer valid.

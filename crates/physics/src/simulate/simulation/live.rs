@@ -2,7 +2,7 @@
 
 use super::automatic::{SchemeSelector, controller_of, prepare_implicit};
 use super::workspace::sync_parameters;
-use super::{CLEARANCE_SPEED, Run};
+use super::{CLEARANCE_SPEED, Stepping};
 use crate::contact::ContactState;
 use crate::integrate::Polynomial;
 use crate::machine::{Machine, Vec3};
@@ -48,7 +48,7 @@ pub(in crate::simulate) fn check_pull(machine: &Machine, pull: &Pull) -> Result<
     }
 }
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// As [`Simulation::adopt`](crate::simulate::Simulation::adopt).
     pub(in crate::simulate) fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
         let pairs = self.machine.loose_joints.iter().zip(&next.loose_joints);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{IdealSource, Model, ProbeFault, Run, State, StateMismatch, Workspace, doubts};
+use super::{IdealSource, Model, ProbeFault, State, StateMismatch, Stepping, Workspace, doubts};
 use crate::machine::Machine;
 use crate::mechanism::{self, Mechanism};
 use crate::simulate::{Doubt, Frame, StartError, Stopped};
@@ -27,7 +27,7 @@ impl Model {
         let mut model = Self { machine: machine.clone(), compiled, ideal, start };
         let mut workspace = model.workspace_in(mechanism, &model.start)?;
         let mut start = model.start.clone();
-        Run::new(&model, &mut start, &mut workspace).begin()?;
+        Stepping::new(&model, &mut start, &mut workspace).begin()?;
         model.start = start;
         Ok((model, workspace))
     }
@@ -77,7 +77,7 @@ impl Model {
     /// # Panics
     /// A state or a workspace of another model.
     pub fn step(&self, state: &mut State, workspace: &mut Workspace) -> Result<(), Stopped> {
-        Run::new(self, state, workspace).advance(f64::INFINITY)
+        Stepping::new(self, state, workspace).advance(f64::INFINITY)
     }
 
     /// Takes one step that ends no later than `end`, s, and exactly there if it would overshoot.
@@ -91,7 +91,7 @@ impl Model {
         if state.now.t >= end {
             return Ok(());
         }
-        Run::new(self, state, workspace).advance(end)
+        Stepping::new(self, state, workspace).advance(end)
     }
 
     /// Samples the state at `time`, s, interpolated within the latest step; forces come from the interpolated state. Allocates
@@ -100,7 +100,7 @@ impl Model {
     /// # Panics
     /// As [`Self::step`].
     pub fn sample(&self, state: &mut State, workspace: &mut Workspace, time: f64, out: &mut Frame) {
-        Run::new(self, state, workspace).sample(time, out);
+        Stepping::new(self, state, workspace).sample(time, out);
     }
 
     /// Reasons not to trust the results since the start; empty if there are none. Begins with [`Machine::doubts`] of the machine

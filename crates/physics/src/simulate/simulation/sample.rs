@@ -1,13 +1,13 @@
 //! Sampling of an instant within the latest step.
 
 use super::flights::write_flights;
-use super::{IdealSource, Run};
+use super::{IdealSource, Stepping};
 use crate::integrate::hermite;
 use crate::machine::Vec3;
 use crate::mechanism::ActiveSet;
 use crate::simulate::{Frame, report};
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// As [`Model::sample`](crate::simulate::Model::sample).
     pub(in crate::simulate) fn sample(&mut self, time: f64, out: &mut Frame) {
         let time = time.clamp(self.before.t, self.state.now.t);

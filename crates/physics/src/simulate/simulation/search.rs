@@ -1,6 +1,6 @@
 //! Search for peaks inside a step, which is sampled as for an output row.
 
-use super::Run;
+use super::Stepping;
 use crate::simulate::LoadPeaks;
 use crate::simulate::peaks::PenetrationCubic;
 
@@ -11,7 +11,7 @@ const LOADS_EVERY: f64 = 1e-4;
 /// Fractions at which a fixed step is sampled.
 const PARTS: [f64; 3] = [0.25, 0.5, 0.75];
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Records the reactions at the end of the step just accepted and fully evaluated. Without contacts they are smooth, and
     /// their peaks lie on the parabola through three step ends.
     pub(super) fn track_reactions(&mut self) {

@@ -3,7 +3,7 @@
 use super::discrete::discrete_size;
 use super::flights::{clear_flights, write_flights};
 use super::{
-    Attempt, LONGEST_STEP, Model, NEARLY, OPEN_LOOP, Run, SHORTEST_KINEMATIC_STEP, State, StepEnd, Workspace,
+    Attempt, LONGEST_STEP, Model, NEARLY, OPEN_LOOP, SHORTEST_KINEMATIC_STEP, State, StepEnd, Stepping, Workspace,
     store_gaps,
 };
 use crate::integrate::{Method, StepControl, System as _};
@@ -46,7 +46,7 @@ impl Attempt {
     }
 }
 
-impl<'a> Run<'a> {
+impl<'a> Stepping<'a> {
     /// Attaches `workspace` to `state` first, if it is attached to another.
     pub(super) fn new(model: &'a Model, state: &'a mut State, workspace: &'a mut Workspace) -> Self {
         workspace.attach_to(model, state);
@@ -70,7 +70,7 @@ impl<'a> Run<'a> {
     }
 }
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// Completes the start: contacts, derivative, first peaks, ledger.
     pub(super) fn begin(&mut self) -> Result<(), StartError> {
         self.begin_contacts_at_start();

@@ -1,9 +1,9 @@
 //! The wear map of a running simulation.
 
-use super::Run;
+use super::Stepping;
 use crate::simulate::Wear;
 
-impl Run<'_> {
+impl Stepping<'_> {
     /// As [`Simulation::track_wear`](crate::simulate::Simulation::track_wear).
     pub(in crate::simulate) fn track_wear(&mut self) {
         let mut wear = Wear::new(self.machine);
