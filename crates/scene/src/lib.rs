@@ -26,7 +26,7 @@
 //!
 //! The rest of this page is the manual of the file format.
 //!
-#![doc = include_str!("../../../docs/scene-format.md")]
+#![cfg_attr(any(doc, doctest), doc = include_str!("../../../docs/scene-format.md"))]
 #![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_types))]
 
 mod access;
