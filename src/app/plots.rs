@@ -456,7 +456,7 @@ impl Plots {
         let (values, cut_off) = self.values(panel, &bands);
         let from_zero = matches!(panel.kind, PlotKind::FromZero | PlotKind::FromZeroWithClearances);
         let (least, greatest) = range(values, from_zero);
-        let scale = Scale { from, to, time_unit, least, greatest, unit: panel.unit };
+        let scale = Scale { panel, from, to, time_unit, least, greatest };
         self.readings.resize_with(panel.members.len(), Vec::new);
         for (trace, readings) in self.traces.iter().zip(&mut self.readings) {
             readings.clear();
@@ -468,21 +468,19 @@ impl Plots {
         }
         ui.vertical(|ui| {
             self.title(ui, player, panel, cut_off.is_some());
-            let PlotResponse { response, transform, .. } = self.curves(ui, panel, &scale, &bands, space);
+            let PlotResponse { response, transform, .. } = self.curves(ui, &scale, &bands, space);
             let cursor = self.cursor.and_then(|(plot, time)| (plot == response.id).then_some(time));
-            self.describe(ui, &response, panel, &scale, cursor);
-            let cursor =
-                cursor.map(|time| (time, scale.reading(&panel.members, &self.traces, time, scale.instant(time), "\n")));
+            self.describe(ui, &response, &scale, cursor);
             self.move_cursor(ui, &response, player);
             let clicked_time = self.pointer(ui, &response, &transform, time_unit.1, player);
-            let x = |time: f64| transform.position_from_point(&PlotPoint::new(time / time_unit.1, 0.0)).x;
             let frame = *transform.frame();
+            let x = |time: f64| transform.position_from_point(&PlotPoint::new(time / time_unit.1, 0.0)).x;
             if cut_off.is_some() {
                 for trace in self.earlier.iter().flatten().chain(&self.traces) {
                     cut::mark(ui, frame, trace, greatest * size, x);
                 }
             }
-            self.instants(ui, player, &scale, frame, cursor, x);
+            self.instants(ui, player, &scale, cursor, frame, x);
             if let Some(peaks) = cut_off {
                 cut::note(ui, frame, peaks.largest, panel.unit);
             }
@@ -554,20 +552,13 @@ impl Plots {
     }
 
     /// Draws axes and curves, or `bands`.
-    fn curves(
-        &self,
-        ui: &mut Ui,
-        panel: &Panel<'_>,
-        scale: &Scale,
-        bands: &[Band<'_>],
-        space: egui::Vec2,
-    ) -> PlotResponse<()> {
+    fn curves(&self, ui: &mut Ui, scale: &Scale<'_>, bands: &[Band<'_>], space: egui::Vec2) -> PlotResponse<()> {
         let Self { traces, levels, readings, hidden, comparison, earlier, .. } = self;
-        let (members, units) = (&panel.members, scale.units());
-        let plot = scale.plot(ui, panel.label, space).label_formatter(|position: &HoverPosition<'_>| {
+        let (panel, units) = (scale.panel, scale.units());
+        let plot = scale.plot(ui, space).label_formatter(|position: &HoverPosition<'_>| {
             let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) = position;
             let time = position.x * units[0];
-            Some(scale.reading(members, traces, time, scale.instant(time), "\n"))
+            Some(scale.reading(traces, time, scale.instant(time), "\n"))
         });
         let shown = plot.show(ui, |plot| {
             plot.set_plot_bounds_x(scale.from / units[0]..=scale.to / units[0]);
@@ -592,7 +583,7 @@ impl Plots {
                 });
             }
             plot.add(Curves::new(traces, units));
-            for ((channel, member), (trace, points)) in members.iter().zip(traces.iter().zip(readings)) {
+            for ((channel, member), (trace, points)) in panel.members.iter().zip(traces.iter().zip(readings)) {
                 if !hidden.contains(channel) {
                     plot.add(Path::readings(member, points, trace.colour));
                 }
@@ -604,29 +595,28 @@ impl Plots {
     }
 
     /// Describes the plot to screen readers: the values at `cursor`, s, or the range of all.
-    fn describe(&self, ui: &Ui, response: &egui::Response, panel: &Panel<'_>, scale: &Scale, cursor: Option<f64>) {
+    fn describe(&self, ui: &Ui, response: &egui::Response, scale: &Scale<'_>, cursor: Option<f64>) {
         ui.ctx().accesskit_node_builder(response.id, |node| {
             if let Some(time) = cursor {
                 // Read aloud as the cursor moves.
                 node.set_live(Live::Polite);
-                let values = scale.reading(&panel.members, &self.traces, time, String::new(), ", ");
+                let values = scale.reading(&self.traces, time, String::new(), ", ");
                 let values = values.trim_start_matches(", ");
                 node.set_label(spoken::words(&format!("{values} at {}", scale.instant(time))));
             } else {
-                node.set_value(spoken::words(&scale.summary(&panel.members, &self.traces)));
+                node.set_value(spoken::words(&scale.summary(&self.traces)));
             }
         });
     }
 
-    /// Draws over `frame` the present and the future, flags, and the `cursor` with the values there; `x` maps a time, s, to its
-    /// position.
+    /// Draws over `frame` the present and the future, flags, and the values at `cursor`, s; `x` maps a time, s, to its position.
     fn instants(
         &self,
         ui: &Ui,
         player: &Player,
-        scale: &Scale,
+        scale: &Scale<'_>,
+        cursor: Option<f64>,
         frame: egui::Rect,
-        cursor: Option<(f64, String)>,
         x: impl Fn(f64) -> f32,
     ) {
         let (painter, now) = (ui.painter_at(frame), player.pacer.shown());
@@ -643,8 +633,9 @@ impl Plots {
             let line = egui::Stroke::new(1.0, ui.visuals().warn_fg_color.gamma_multiply(0.7));
             painter.vline(x(flag.time), frame.y_range(), line);
         }
-        if let Some((time, words)) = cursor {
+        if let Some(time) = cursor {
             painter.vline(x(time), frame.y_range(), ui.visuals().selection.stroke);
+            let words = scale.reading(&self.traces, time, scale.instant(time), "\n");
             let font = egui::TextStyle::Small.resolve(ui.style());
             let words = painter.layout_no_wrap(words, font, ui.visuals().strong_text_color());
             let left = (x(time) + 4.0).min(frame.right() - words.size().x);

@@ -3,26 +3,25 @@
 use eframe::egui::{self, Rangef, Ui, Vec2b};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot};
 
-use super::{LETTER_WIDTH, MAX_MARKS, MIN_MARK_DISTANCE, Trace, largest, marks, short_tick, theme, tick, value};
+use super::{LETTER_WIDTH, MAX_MARKS, MIN_MARK_DISTANCE, Panel, Trace, largest, marks, short_tick, theme, tick, value};
 
 /// Ranges and units of the two axes of a plot.
-pub struct Scale {
+pub struct Scale<'a> {
+    pub panel: &'a Panel<'a>,
     /// Time range, s.
     pub from: f64,
     pub to: f64,
     /// Unit of the time axis, and its value in seconds.
     pub time_unit: (&'static str, f64),
-    /// Range of values, in their unit.
+    /// Range of values, in the unit of the panel.
     pub least: f64,
     pub greatest: f64,
-    /// Unit of the values, and its value in SI units.
-    pub unit: (&'static str, f64),
 }
 
-impl Scale {
+impl Scale<'_> {
     /// Values of both units in SI units.
     pub fn units(&self) -> [f64; 2] {
-        [self.time_unit.1, self.unit.1]
+        [self.time_unit.1, self.panel.unit.1]
     }
 
     fn time(&self, time: f64) -> String {
@@ -36,23 +35,16 @@ impl Scale {
 
     fn value(&self, si: f64) -> String {
         let digits = value::digits_within(self.greatest - self.least, self.least.abs().max(self.greatest.abs()));
-        value::number(si / self.unit.1, digits)
+        value::number(si / self.panel.unit.1, digits)
     }
 
-    /// The curves of `members` at `time`, s, each after `between`, appended to `words`.
-    pub fn reading(
-        &self,
-        members: &[(usize, &str)],
-        traces: &[Trace],
-        time: f64,
-        mut words: String,
-        between: &str,
-    ) -> String {
-        for ((_, member), trace) in members.iter().zip(traces) {
+    /// The `traces` at `time`, s, each after `between`, appended to `words`.
+    pub fn reading(&self, traces: &[Trace], time: f64, mut words: String, between: &str) -> String {
+        for ((_, member), trace) in self.panel.members.iter().zip(traces) {
             let Some((least, greatest)) = trace.at(time) else {
                 continue;
             };
-            let ([least, greatest], unit) = ([least, greatest].map(|v| self.value(v)), self.unit.0);
+            let ([least, greatest], unit) = ([least, greatest].map(|v| self.value(v)), self.panel.unit.0);
             words += &if least == greatest {
                 format!("{between}{member} {least} {unit}")
             } else {
@@ -62,18 +54,18 @@ impl Scale {
         words
     }
 
-    /// The time range, and the range of the curves of `members`.
-    pub fn summary(&self, members: &[(usize, &str)], traces: &[Trace]) -> String {
+    /// The time range, and the range of the `traces`.
+    pub fn summary(&self, traces: &[Trace]) -> String {
         let mut words = format!("{} to {}", self.time(self.from), self.instant(self.to));
-        if let Some((member, least, most, time)) = largest(members, traces) {
-            let ([least, most], unit) = ([least, most].map(|v| self.value(v)), self.unit.0);
+        if let Some((member, least, most, time)) = largest(&self.panel.members, traces) {
+            let ([least, most], unit) = ([least, most].map(|v| self.value(v)), self.panel.unit.0);
             words += &format!(", from {least} to {most} {unit}, largest in {member} at {}", self.instant(time));
         }
         words
     }
 
     /// A plot without curves in `space`, points, below its title.
-    pub fn plot<'a>(&self, ui: &Ui, label: &str, space: egui::Vec2) -> Plot<'a> {
+    pub fn plot<'a>(&self, ui: &Ui, space: egui::Vec2) -> Plot<'a> {
         let faint = ui.visuals().weak_text_color();
         let font = egui::TextStyle::Small.resolve(ui.style());
         let axis = |hints: AxisHints<'static>| hints.tick_label_color(faint).tick_label_font(font.clone());
@@ -105,7 +97,7 @@ impl Scale {
             let room = frame / (LETTER_WIDTH * longest as f64 + 8.0);
             if room < MAX_MARKS { super::marks(&input, room.max(1.0)) } else { marks }
         };
-        Plot::new(("plot", label, self.unit.0))
+        Plot::new(("plot", self.panel.label, self.panel.unit.0))
             .width(width)
             .height((space.y - 20.0 - theme::side(ui, 18.0)).max(60.0))
             .allow_drag(false)
