@@ -10,8 +10,7 @@ program `jointplay`: compare `Run.hash` with the state hash that `jointplay run`
 """
 
 from ._render import render
-from ._run import Run
-from ._scene import Check, Parameter, Scene
+from ._scene import Check, Parameter, Run, Scene
 from ._sensitivity import Changes, Effects, Ends, Indices, Sensitivity, Target, sensitivity
 from ._simulation import Frame, Simulation
 from ._study import Estimate, Runs, Study

@@ -28,7 +28,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "_tolerance_command",
         "Find what part of a manufactured lot meets its limits, what drives the rejects, and the cheapest fits that reach a yield.",
     ),
-    "import": ("_robots", "Print a robot description, MJCF or URDF, as a scene file."),
+    "import": ("_robots_command", "Print a robot description, MJCF or URDF, as a scene file."),
 }
 """Module within the package, and one line of help, of each command."""
 

@@ -6,24 +6,20 @@ import base64
 import html
 import os
 import zlib
-from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from . import _native
-
-if TYPE_CHECKING:
-    from ._scene import Scene
 
 MAX_LENGTH = 32_000
 """Length limit of a link that the page accepts, in characters."""
 
 
-def link_of(scene: Scene, time: float | None = None) -> str | None:
+def link_of(scene: _native.Scene, time: float | None = None) -> str | None:
     """Pairs of a link that opens `scene`, and runs it to `time`, s.
 
     None for a scene that needs further files or is too long for a link.
     """
-    text, _, files, changes = scene._native.origin()
+    text, _, files, changes = scene.origin()
     pairs: dict[str, str] = {}
     built_in = [name for names in _native.scenes() for name in names]
     if scene.name in built_in and text_of_built_in(scene.name) == text:
@@ -46,7 +42,7 @@ def text_of_built_in(name: str) -> str:
     return _native.Scene.load(name).origin()[0]
 
 
-def frame_of(scene: Scene, time: float | None = None) -> str | None:
+def frame_of(scene: _native.Scene, time: float | None = None) -> str | None:
     """HTML of a frame in which the page shows `scene` at `time`; None unless the environment variable JOINTPLAY_PAGE is set."""
     page = os.environ.get("JOINTPLAY_PAGE")
     link = link_of(scene, time) if page else None

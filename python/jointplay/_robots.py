@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import re
-import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
@@ -19,8 +17,8 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._scene import Scene
-from .errors import OmissionWarning, OptionError, SceneError
+from . import _native
+from .errors import OptionError, SceneError
 
 if TYPE_CHECKING:
     import mujoco  # type: ignore[import-untyped]
@@ -72,7 +70,7 @@ class Description:
         return SceneError(f"{place}: {message}", file=self.label, line=line, column=None, key=None, value=None, allowed=None)
 
 
-def scene_of(source: str | os.PathLike[str], kind: str | None, folder: str | None = "meshes") -> tuple[Scene, dict[str, bytes]]:
+def scene_of(source: str | os.PathLike[str], kind: str | None, folder: str | None = "meshes") -> tuple[_native.Scene, dict[str, bytes]]:
     """The scene of a description, a file or a text with `<`; and its meshes, as files of `folder`, without which there are none.
 
     `kind` is the first element that the description must have; None allows all.
@@ -96,20 +94,13 @@ def scene_of(source: str | os.PathLike[str], kind: str | None, folder: str | Non
     scene_text = writer.text()
     with tempfile.TemporaryDirectory() as scratch:
         for name, content in writer.meshes.items():
-            _write(Path(scratch, str(folder), name), content)
+            write(Path(scratch, str(folder), name), content)
         try:
-            return Scene.from_toml(scene_text, folder=scratch), writer.meshes
+            return _native.Scene.parse(scene_text, None, Path(scratch)), writer.meshes
         except SceneError as error:
             # The lines of the scene mean nothing to who has none.
             message = re.sub(r"^line \d+, column \d+: ", "", str(error).splitlines()[0])
             raise description.refused(f"a scene cannot hold this machine: {message}") from error
-
-
-def warned(scene: Scene) -> Scene:
-    """The scene, after a warning about what it does not have."""
-    if len(scene.notes) > 1:
-        warnings.warn("\n".join(scene.notes), OmissionWarning, stacklevel=3)
-    return scene
 
 
 @contextmanager
@@ -597,7 +588,7 @@ def _end(body: str, at: ArrayLike) -> _Keys:
     return {"body": body, "at": _metres(at)}
 
 
-def _write(path: Path, content: bytes) -> None:
+def write(path: Path, content: bytes) -> None:
     """Writes a file, which appears whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.name}.{os.getpid()}")
@@ -606,31 +597,3 @@ def _write(path: Path, content: bytes) -> None:
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of `import`."""
-    parser.add_argument("file", type=Path, help="the description; its first element is <robot> (URDF) or <mujoco> (MJCF)")
-    parser.add_argument("--out", type=Path, metavar="SCENE", help="file of the scene, by default standard output")
-    text = "folder of the meshes, beside the scene; by default that of --out with -meshes; without both there are no meshes"
-    parser.add_argument("--meshes", type=Path, metavar="FOLDER", help=text)
-    parser.add_argument("--force", action="store_true", help="replace existing files")
-
-
-def main(arguments: argparse.Namespace) -> None:
-    """Runs `import`."""
-    out: Path | None = arguments.out
-    folder: Path | None = arguments.meshes or (out.with_name(f"{out.stem}-meshes") if out else None)
-    if out and folder and folder.resolve().parent != out.resolve().parent:
-        raise OptionError(f"--meshes {folder}: a scene finds its meshes in a folder beside it, in {out.resolve().parent}")
-    scene, meshes = scene_of(arguments.file, None, folder.resolve().name if folder else None)
-    files = {folder / name: content for name, content in meshes.items()} if folder else {}
-    files |= {out: scene.toml.encode()} if out else {}
-    existing = next((path for path in files if path.exists()), None)
-    if existing and not arguments.force:
-        raise OptionError(f"{existing} exists already; --force replaces it")
-    for path, content in files.items():
-        _write(path, content)
-    if not out:
-        sys.stdout.write(scene.toml)
-    print(*scene.notes, sep="\n", file=sys.stderr)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from ._link import frame_of
-from ._run import impact_table
+from ._scene import impact_table
 
 if TYPE_CHECKING:
     from typing import Self
@@ -84,7 +84,7 @@ class Simulation(_native.Simulation):
 
     def _repr_html_(self) -> str:
         # The link does not contain changes during the run.
-        frame = frame_of(self.scene, self.time) if self._is_plain else None
+        frame = frame_of(self.scene._native, self.time) if self._is_plain else None
         return frame or html.escape(repr(self))
 
     def __repr__(self) -> str:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from ._run import Run
+from typing import Any
 
 
 class JointplayError(Exception):
@@ -53,13 +50,13 @@ class ChannelError(JointplayError, KeyError):
 class Stopped(JointplayError, RuntimeError):
     """A run that the divergence guard stopped.
 
-    Attributes: `time` of the last good state, s; `advice` about what to try, or None; `run` with the rows so far, if `Scene.run`
-    raised it.
+    Attributes: `time` of the last good state, s; `advice` about what to try, or None; `run`, the `Run` with the rows so far if
+    `Scene.run` raised it.
     """
 
     time: float
     advice: str | None
-    run: Run | None = None
+    run: Any = None
 
 
 class InternalError(JointplayError, RuntimeError):

@@ -98,3 +98,15 @@ def test_the_example_for_clusters_runs(monkeypatch, tmp_path):
         names = {"cluster": cluster}
         exec(compile(smaller.replace('"scheduler:8786"', "cluster"), "docs/cluster.md", "exec"), names)
     assert names["result"]["status"].tolist() == [0, 0, 0]
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    # Deferred imports and those for types, too.
+    imports = {}
+    for file in FOLDER.glob("*.py"):
+        nodes = [node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.ImportFrom) and node.level == 1]
+        imports[file.stem] = {node.module or alias.name for node in nodes for alias in node.names} - {"_native"}
+    while imports:
+        leaves = {name for name, used in imports.items() if not used & imports.keys()}
+        assert leaves, f"a circle among {sorted(imports)}"
+        imports = {name: used for name, used in imports.items() if name not in leaves}

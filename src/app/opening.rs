@@ -1,6 +1,6 @@
 //! Initial state of a window: time scale and plots of a scene, and the scene for first-time visitors.
 
-use crate::analysis::drive::{NoPeriod, drive_period};
+use crate::analysis::drive::common_period;
 use crate::scene::{DEFAULT_SCENE, Scene};
 use crate::session::pace::SCALE_RANGE;
 use crate::simulate::Quantity;
@@ -19,11 +19,7 @@ pub const RATTLING_SCALE: f64 = 0.05;
 /// Initial time scale of a window on `scene`, simulated seconds per second: the value in its file, or one at which a drive period
 /// takes about four seconds.
 pub fn time_scale(scene: &Scene) -> f64 {
-    let period = match drive_period(scene) {
-        Ok(period) => Some(period),
-        Err(NoPeriod::Different { first, second, .. }) => Some(first.max(second)),
-        Err(NoPeriod::None { .. }) => None,
-    };
+    let period = common_period(&scene.machine).unwrap_or_else(|[first, second]| Some(first.max(second)));
     let from_period = || period.map_or(UNDRIVEN_SCALE, |period| round(period / PERIOD_VIEWING_TIME));
     scene.view.time_scale.unwrap_or_else(from_period).clamp(SCALE_RANGE.0, SCALE_RANGE.1)
 }
@@ -63,6 +59,7 @@ pub fn is_rattling(scene: &Scene) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::drive::drive_period;
     use crate::scene::BUILT_IN;
     use crate::simulate::Simulation;
 

@@ -2,10 +2,10 @@
 //! channel name and unit.
 
 use eframe::egui::{
-    self, ComboBox, EventFilter, Id, Key, Pos2, Rangef, RichText, Role, ScrollArea, TextEdit, Ui, Vec2b, WidgetInfo,
-    accesskit::Live, vec2,
+    self, ComboBox, EventFilter, Id, Key, Pos2, RichText, Role, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit::Live,
+    vec2,
 };
-use egui_plot::{AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform};
+use egui_plot::{FilledArea, GridInput, GridMark, HoverPosition, PlotPoint, PlotResponse, PlotTransform};
 
 use super::compare::{Comparison, EarlierRun};
 use super::curve::{Curves, Path, Trace};
@@ -20,9 +20,11 @@ use crate::session::link::settings::PlotWindow;
 use crate::simulate::{ChannelInfo, MAX_PICKED, Quantity, RECORDED_JOINTS, channels_of};
 pub(super) use quantity::plot_of;
 use quantity::{PlotKind, QuantityPlot};
+use scale::Scale;
 
 mod cut;
 mod quantity;
+mod scale;
 #[cfg(not(target_arch = "wasm32"))]
 mod sheet;
 
@@ -444,24 +446,63 @@ impl Plots {
         clicked_time
     }
 
+    /// Shows `panel` in `space`, points; returns an instant, s, that was clicked.
     fn plot(&mut self, ui: &mut Ui, player: &Player, panel: &Panel<'_>, space: egui::Vec2) -> Option<f64> {
-        let (unit, size) = panel.unit;
         let (from, to) = self.range(player);
-        let (length, now) = (to - from, player.pacer.shown());
-        let (time_unit, time_size) = time_axis_until(length, to);
-        let units = [time_size, size];
+        self.collect(ui, player, panel, (from, to), space.x);
+        let (time_unit, size) = (time_axis_until(to - from, to), panel.unit.1);
+        let stacked = panel.kind == PlotKind::Bands;
+        let bands = if stacked { self.bands(&panel.members, [time_unit.1, size]) } else { Vec::new() };
+        let (values, cut_off) = self.values(panel, &bands);
+        let from_zero = matches!(panel.kind, PlotKind::FromZero | PlotKind::FromZeroWithClearances);
+        let (least, greatest) = range(values, from_zero);
+        let scale = Scale { panel, from, to, time_unit, least, greatest };
+        self.readings.resize_with(panel.members.len(), Vec::new);
+        for (trace, readings) in self.traces.iter().zip(&mut self.readings) {
+            readings.clear();
+            readings.extend(trace.bins.iter().flat_map(|bin| {
+                let time = 0.5 * (bin.from + bin.to) / time_unit.1;
+                let ends = [bin.least, bin.greatest].map(|v| PlotPoint::new(time, v / size));
+                ends.into_iter().take(1 + usize::from(bin.least != bin.greatest))
+            }));
+        }
+        ui.vertical(|ui| {
+            self.title(ui, player, panel, cut_off.is_some());
+            let PlotResponse { response, transform, .. } = self.curves(ui, &scale, &bands, space);
+            let cursor = self.cursor.and_then(|(plot, time)| (plot == response.id).then_some(time));
+            self.describe(ui, &response, &scale, cursor);
+            self.move_cursor(ui, &response, player);
+            let clicked_time = self.pointer(ui, &response, &transform, time_unit.1, player);
+            let frame = *transform.frame();
+            let x = |time: f64| transform.position_from_point(&PlotPoint::new(time / time_unit.1, 0.0)).x;
+            if cut_off.is_some() {
+                for trace in self.earlier.iter().flatten().chain(&self.traces) {
+                    cut::mark(ui, frame, trace, greatest * size, x);
+                }
+            }
+            self.instants(ui, player, &scale, cursor, frame, x);
+            if let Some(peaks) = cut_off {
+                cut::note(ui, frame, peaks.largest, panel.unit);
+            }
+            if let Some(quantity) = panel.quantity {
+                self.places.push((quantity, Place { transform, units: scale.units() }));
+            }
+            clicked_time
+        })
+        .inner
+    }
 
-        let members = &panel.members;
-        let dark = ui.visuals().dark_mode;
-        let faint = ui.visuals().weak_text_color();
+    /// Collects the curves of `panel` between the instants `from` and `to`, s, for a plot `width` points wide.
+    fn collect(&mut self, ui: &Ui, player: &Player, panel: &Panel<'_>, (from, to): (f64, f64), width: f32) {
         // No bin is wider than a pixel column, if the record's resolution permits.
-        let bins = (2.0 * space.x * ui.ctx().pixels_per_point()) as usize;
+        let bins = (2.0 * width * ui.ctx().pixels_per_point()) as usize;
+        let dark = ui.visuals().dark_mode;
         let query = |channel: usize, out: &mut Vec<Bin>| {
             out.clear();
             player.bins(channel, from, to, bins, out);
         };
-        self.traces.resize_with(members.len(), Trace::default);
-        for (index, (channel, _)) in members.iter().enumerate() {
+        self.traces.resize_with(panel.members.len(), Trace::default);
+        for (index, (channel, _)) in panel.members.iter().enumerate() {
             let trace = &mut self.traces[index];
             trace.colour = theme::series(index, dark);
             trace.bins.clear();
@@ -469,23 +510,21 @@ impl Plots {
                 query(*channel, &mut trace.bins);
             }
         }
-        let kind = panel.kind;
-        if kind == PlotKind::Bands {
-            // A stack of ranges would mean nothing.
-            let widest = f64::from(curve::MAX_BIN_WIDTH / space.x) * length;
-            self.traces.iter_mut().for_each(|trace| trace.bins.retain(|bin| curve::is_narrow(bin, widest)));
-        }
         self.earlier.clear();
-        if kind != PlotKind::Bands {
+        if panel.kind == PlotKind::Bands {
+            // A stack of ranges would mean nothing.
+            let widest = f64::from(curve::MAX_BIN_WIDTH / width) * (to - from);
+            self.traces.iter_mut().for_each(|trace| trace.bins.retain(|bin| curve::is_narrow(bin, widest)));
+        } else {
             let shown = self.comparison.shown();
             self.earlier
                 .extend(shown.map(|run| earlier_traces(run, player, panel, &self.hidden, dark, (from, to, bins))));
         }
         self.levels.clear();
-        if kind == PlotKind::FromZeroWithClearances {
+        if panel.kind == PlotKind::FromZeroWithClearances {
             // The recorded clearance: the present value may differ from the past one.
             for index in player.clearances() {
-                let mut trace = Trace { colour: faint, ..Trace::default() };
+                let mut trace = Trace { colour: ui.visuals().weak_text_color(), ..Trace::default() };
                 query(index, &mut trace.bins);
                 let closed = trace.bins.iter().all(|bin| bin.greatest <= 0.0);
                 if !closed && !self.levels.iter().any(|level| level.bins == trace.bins) {
@@ -493,196 +532,115 @@ impl Plots {
                 }
             }
         }
-        let bands = if kind == PlotKind::Bands { self.bands(members, units) } else { Vec::new() };
-        let from_zero = matches!(kind, PlotKind::FromZero | PlotKind::FromZeroWithClearances);
+    }
+
+    /// Least and greatest value shown, in the unit of `panel`, and the first peaks that are cut.
+    fn values(&self, panel: &Panel<'_>, bands: &[Band<'_>]) -> (Option<(f64, f64)>, Option<cut::Peaks>) {
+        let size = panel.unit.1;
         let values = if bands.is_empty() {
             extremes(self.traces.iter().chain(&self.levels).chain(self.earlier.iter().flatten()), size)
         } else {
             let edges = bands.iter().flat_map(|band| band.low.iter().chain(&band.high));
             edges.fold(None, |all, &edge| extended(all, edge, edge))
         };
-        let first_peaks = (kind == PlotKind::FromZero && self.zoomed.is_none())
+        let first_peaks = (panel.kind == PlotKind::FromZero && self.zoomed.is_none())
             .then(|| cut::peaks(self.traces.iter().chain(self.earlier.iter().flatten())))
             .flatten();
         let cut_off = first_peaks.filter(|peaks| self.cut.unwrap_or(peaks.brief));
         let values = values.map(|(least, most)| (least, cut_off.map_or(most, |peaks| peaks.most() / size)));
-        let (least, greatest) = range(values, from_zero);
-        self.readings.resize_with(members.len(), Vec::new);
-        for (trace, readings) in self.traces.iter().zip(&mut self.readings) {
-            readings.clear();
-            readings.extend(trace.bins.iter().flat_map(|bin| {
-                let time = 0.5 * (bin.from + bin.to) / time_size;
-                let ends = [bin.least, bin.greatest].map(|v| PlotPoint::new(time, v / size));
-                ends.into_iter().take(1 + usize::from(bin.least != bin.greatest))
-            }));
-        }
+        (values, cut_off)
+    }
 
-        ui.vertical(|ui| {
-            self.title(ui, player, panel, cut_off.is_some());
+    /// Draws axes and curves, or `bands`.
+    fn curves(&self, ui: &mut Ui, scale: &Scale<'_>, bands: &[Band<'_>], space: egui::Vec2) -> PlotResponse<()> {
+        let Self { traces, levels, readings, hidden, comparison, earlier, .. } = self;
+        let (panel, units) = (scale.panel, scale.units());
+        let plot = scale.plot(ui, space).label_formatter(|position: &HoverPosition<'_>| {
+            let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) = position;
+            let time = position.x * units[0];
+            Some(scale.reading(traces, time, scale.instant(time), "\n"))
+        });
+        let shown = plot.show(ui, |plot| {
+            plot.set_plot_bounds_x(scale.from / units[0]..=scale.to / units[0]);
+            plot.set_plot_bounds_y(scale.least..=scale.greatest);
+            if panel.kind == PlotKind::Bands {
+                for band in bands {
+                    plot.add(
+                        FilledArea::new(band.member, &band.times, &band.low, &band.high)
+                            .fill_color(band.colour.gamma_multiply(0.75))
+                            // Strokes would jump where a term changes sign.
+                            .stroke(egui::Stroke::NONE),
+                    );
+                }
+                return;
+            }
+            plot.add(Curves::new(levels, units).dashed(1.0, curve::DASH));
+            for (run, traces) in comparison.shown().zip(earlier) {
+                let curves = Curves::new(traces, units);
+                plot.add(match run.dashes() {
+                    Some(length) => curves.dashed(curve::WIDTH, length),
+                    None => curves,
+                });
+            }
+            plot.add(Curves::new(traces, units));
+            for ((channel, member), (trace, points)) in panel.members.iter().zip(traces.iter().zip(readings)) {
+                if !hidden.contains(channel) {
+                    plot.add(Path::readings(member, points, trace.colour));
+                }
+            }
+        });
+        let name = format!("Plot of {}", panel.name());
+        shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &name));
+        shown
+    }
+
+    /// Describes the plot to screen readers: the values at `cursor`, s, or the range of all.
+    fn describe(&self, ui: &Ui, response: &egui::Response, scale: &Scale<'_>, cursor: Option<f64>) {
+        ui.ctx().accesskit_node_builder(response.id, |node| {
+            if let Some(time) = cursor {
+                // Read aloud as the cursor moves.
+                node.set_live(Live::Polite);
+                let values = scale.reading(&self.traces, time, String::new(), ", ");
+                let values = values.trim_start_matches(", ");
+                node.set_label(spoken::words(&format!("{values} at {}", scale.instant(time))));
+            } else {
+                node.set_value(spoken::words(&scale.summary(&self.traces)));
+            }
+        });
+    }
+
+    /// Draws over `frame` the present and the future, flags, and the values at `cursor`, s; `x` maps a time, s, to its position.
+    fn instants(
+        &self,
+        ui: &Ui,
+        player: &Player,
+        scale: &Scale<'_>,
+        cursor: Option<f64>,
+        frame: egui::Rect,
+        x: impl Fn(f64) -> f32,
+    ) {
+        let (painter, now) = (ui.painter_at(frame), player.pacer.shown());
+        if (scale.from..scale.to).contains(&now)
+            && (player.has_future() || self.zoomed.is_some() || player.abandoned_future().is_some())
+        {
+            // Fades the future.
+            let veil = ui.visuals().panel_fill.gamma_multiply(0.65);
+            painter.rect_filled(frame.with_min_x(x(now)), 0.0, veil);
+            let line = egui::Stroke::new(1.0, ui.visuals().strong_text_color());
+            painter.vline(x(now), frame.y_range(), line);
+        }
+        for flag in player.flags().filter(|flag| (scale.from..=scale.to).contains(&flag.time)) {
+            let line = egui::Stroke::new(1.0, ui.visuals().warn_fg_color.gamma_multiply(0.7));
+            painter.vline(x(flag.time), frame.y_range(), line);
+        }
+        if let Some(time) = cursor {
+            painter.vline(x(time), frame.y_range(), ui.visuals().selection.stroke);
+            let words = scale.reading(&self.traces, time, scale.instant(time), "\n");
             let font = egui::TextStyle::Small.resolve(ui.style());
-            let axis = |hints: AxisHints<'static>| hints.tick_label_color(faint).tick_label_font(font.clone());
-            let width = space.x - 12.0;
-            let time_mark =
-                move |mark: &GridMark| format!("{} {time_unit}", tick(mark.value, mark.step_size, to / time_size));
-            let frame = f64::from(width - 52.0);
-            let x_axis = axis(AxisHints::new_x()).label_spacing(Rangef::new(0.0, 1.0)).formatter(move |mark, range| {
-                let words = time_mark(&mark);
-                let beyond = (range.end() - mark.value) / (range.end() - range.start()) * frame;
-                // Omits a mark that would extend into the next plot.
-                if 0.5 * LETTER_WIDTH * words.chars().count() as f64 > beyond + 28.0 {
-                    return String::new();
-                }
-                words
-            });
-            let y_axis = axis(AxisHints::new_y()).min_thickness(40.0).label_spacing(Rangef::new(0.0, 1.0)).formatter(
-                |mark, range| {
-                    let most = range.start().abs().max(range.end().abs());
-                    short_tick(mark.value, mark.step_size, most)
-                },
-            );
-            // Marks at late times have long labels, so fewer fit side by side.
-            let label_length = |mark: &GridMark| time_mark(mark).chars().count();
-            let marks_across = move |input: GridInput| {
-                let marks = marks(&input, MAX_MARKS);
-                let longest = marks.iter().map(label_length).max().unwrap_or(1);
-                let room = frame / (LETTER_WIDTH * longest as f64 + 8.0);
-                if room < MAX_MARKS { self::marks(&input, room.max(1.0)) } else { marks }
-            };
-            let value_digits = value::digits_within(greatest - least, least.abs().max(greatest.abs()));
-            let time_digits = value::digits_within(length, to);
-            let plot = Plot::new(("plot", panel.label, unit))
-                .width(width)
-                .height((space.y - 20.0 - theme::side(ui, 18.0)).max(60.0))
-                .allow_drag(false)
-                .allow_zoom(false)
-                .allow_scroll(false)
-                .allow_boxed_zoom(false)
-                .allow_axis_zoom_drag(false)
-                .allow_double_click_reset(false)
-                .auto_bounds(Vec2b::FALSE)
-                .custom_x_axes(vec![x_axis])
-                .custom_y_axes(vec![y_axis])
-                .x_grid_spacer(marks_across)
-                .y_grid_spacer(|input| marks(&input, MAX_MARKS))
-                .grid_spacing(Rangef::new(MIN_MARK_DISTANCE, 300.0))
-                .grid_color(faint.gamma_multiply(0.35))
-                .grid_fade(0.0);
-            let Self { traces, levels, readings, hidden, comparison, earlier, .. } = &*self;
-            let instant = |time: f64| format!("{} {time_unit}", value::number(time / time_size, time_digits));
-            // All curves at an instant, appended to `words`.
-            let reading = |time: f64, mut words: String, between: &str| {
-                for ((_, member), trace) in members.iter().zip(traces) {
-                    let Some((least, greatest)) = trace.at(time) else {
-                        continue;
-                    };
-                    let [least, greatest] = [least, greatest].map(|v| value::number(v / size, value_digits));
-                    words += &if least == greatest {
-                        format!("{between}{member} {least} {unit}")
-                    } else {
-                        format!("{between}{member} {least} to {greatest} {unit}")
-                    };
-                }
-                words
-            };
-            let plot = plot.label_formatter(|position: &HoverPosition<'_>| {
-                let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) = position;
-                let time = position.x * time_size;
-                Some(reading(time, instant(time), "\n"))
-            });
-            let shown = plot.show(ui, |plot| {
-                plot.set_plot_bounds_x(from / time_size..=to / time_size);
-                plot.set_plot_bounds_y(least..=greatest);
-                if kind == PlotKind::Bands {
-                    for band in &bands {
-                        plot.add(
-                            FilledArea::new(band.member, &band.times, &band.low, &band.high)
-                                .fill_color(band.colour.gamma_multiply(0.75))
-                                // Strokes would jump where a term changes sign.
-                                .stroke(egui::Stroke::NONE),
-                        );
-                    }
-                    return;
-                }
-                plot.add(Curves::new(levels, units).dashed(1.0, curve::DASH));
-                for (run, traces) in comparison.shown().zip(earlier) {
-                    let curves = Curves::new(traces, units);
-                    plot.add(match run.dashes() {
-                        Some(length) => curves.dashed(curve::WIDTH, length),
-                        None => curves,
-                    });
-                }
-                plot.add(Curves::new(traces, units));
-                for ((channel, member), (trace, points)) in members.iter().zip(traces.iter().zip(readings)) {
-                    if !hidden.contains(channel) {
-                        plot.add(Path::readings(member, points, trace.colour));
-                    }
-                }
-            });
-            let name = format!("Plot of {}", panel.name());
-            shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &name));
-            let transform = shown.transform;
-            let own = shown.response.id;
-            let cursor = self.cursor.and_then(|(plot, time)| (plot == own).then_some(time));
-            ui.ctx().accesskit_node_builder(own, |node| {
-                if let Some(time) = cursor {
-                    // Read aloud as the cursor moves.
-                    node.set_live(Live::Polite);
-                    let values = reading(time, String::new(), ", ");
-                    let values = values.trim_start_matches(", ");
-                    node.set_label(spoken::words(&format!("{values} at {}", instant(time))));
-                } else {
-                    let mut words = format!("{} to {}", value::number(from / time_size, time_digits), instant(to));
-                    if let Some((member, least, most, time)) = largest(members, traces) {
-                        let [least, most] = [least, most].map(|v| value::number(v / size, value_digits));
-                        words += &format!(", from {least} to {most} {unit}, largest in {member} at {}", instant(time));
-                    }
-                    node.set_value(spoken::words(&words));
-                }
-            });
-            let cursor = cursor.map(|time| (time, reading(time, instant(time), "\n")));
-            self.move_cursor(ui, &shown.response, player);
-            let clicked_time = self.pointer(ui, &shown.response, &transform, time_size, player);
-            if let Some(quantity) = panel.quantity {
-                self.places.push((quantity, Place { transform, units }));
-            }
-            let x = |time: f64| {
-                let point = PlotPoint::new(time / time_size, 0.0);
-                transform.position_from_point(&point).x
-            };
-            let frame = *transform.frame();
-            if cut_off.is_some() {
-                for trace in self.earlier.iter().flatten().chain(&self.traces) {
-                    cut::mark(ui, frame, trace, greatest * size, x);
-                }
-            }
-            if (from..to).contains(&now)
-                && (player.has_future() || self.zoomed.is_some() || player.abandoned_future().is_some())
-            {
-                // Fades the future.
-                let painter = ui.painter_at(frame);
-                let veil = ui.visuals().panel_fill.gamma_multiply(0.65);
-                painter.rect_filled(frame.with_min_x(x(now)), 0.0, veil);
-                let line = egui::Stroke::new(1.0, ui.visuals().strong_text_color());
-                painter.vline(x(now), frame.y_range(), line);
-            }
-            for flag in player.flags().filter(|flag| (from..=to).contains(&flag.time)) {
-                let line = egui::Stroke::new(1.0, ui.visuals().warn_fg_color.gamma_multiply(0.7));
-                ui.painter_at(frame).vline(x(flag.time), frame.y_range(), line);
-            }
-            if let Some((time, words)) = cursor {
-                let painter = ui.painter_at(frame);
-                painter.vline(x(time), frame.y_range(), ui.visuals().selection.stroke);
-                let colour = ui.visuals().strong_text_color();
-                let words = painter.layout_no_wrap(words, font, colour);
-                let left = (x(time) + 4.0).min(frame.right() - words.size().x);
-                painter.galley(egui::pos2(left, frame.top()), words, colour);
-            }
-            if let Some(peaks) = cut_off {
-                cut::note(ui, frame, peaks.largest, panel.unit);
-            }
-            clicked_time
-        })
-        .inner
+            let words = painter.layout_no_wrap(words, font, ui.visuals().strong_text_color());
+            let left = (x(time) + 4.0).min(frame.right() - words.size().x);
+            painter.galley(egui::pos2(left, frame.top()), words, ui.visuals().strong_text_color());
+        }
     }
 
     /// Arrow keys on a focused plot move the cursor to an instant.

@@ -1,10 +1,10 @@
 //! `run`: simulate without a window and write rows at equal intervals.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
-use serde_json::{Value as Json, json};
+use serde_json::{Map, Value as Json, json};
 
 use super::args::{RunArguments, SummaryForm};
 use super::impacts::ImpactsFile;
@@ -39,42 +39,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let Some(duration) = requested.or(replay.as_ref().and_then(LinkReplay::time)) else {
         return Err(Failure::usage("--link: the link names no instant; give the length of the run with --duration"));
     };
-    let times = match &arguments.every {
-        Some(every) => {
-            let every = quantity::duration("--every", every)?;
-            let zero = || Failure::usage("--every 0: the interval between rows must be greater than 0");
-            Some(RowTimes::new(duration, every).ok_or_else(zero)?)
-        }
-        None => None,
-    };
+    let times = row_times(arguments, duration)?;
     let scene = load(&arguments.scene)?;
     let mut simulation = start(&scene)?;
     // From here on there may be temporary files, which an interrupted run removes.
     interrupt::listen();
-    let mut names = vec![("the scene".to_owned(), arguments.scene.name())];
-    for (option, path) in [("--out", &arguments.out), ("--impacts", &arguments.impacts), ("--wear", &arguments.wear)] {
-        names.extend(path.iter().flat_map(|path| RowsFile::names(option, path)));
-    }
-    for (option, path) in [("--save-state", &arguments.save_state), ("--from-state", &arguments.from_state)] {
-        names.extend(path.iter().map(|path| (option.to_owned(), path.clone())));
-    }
-    check_distinct(&names)?;
-    let mut file = match &arguments.out {
-        Some(path) => Some(RowsFile::claim(path, arguments.force)?),
-        None => None,
-    };
-    let mut impacts = match &arguments.impacts {
-        Some(path) => Some(ImpactsFile::claim(path, arguments.force)?),
-        None => None,
-    };
-    let mut wear = match &arguments.wear {
-        Some(path) => Some(RowsFile::claim(path, arguments.force)?),
-        None => None,
-    };
-    let mut state = match &arguments.save_state {
-        Some(path) => Some(StateFile::claim(path, arguments.force)?),
-        None => None,
-    };
+    let mut outputs = Outputs::claim(arguments)?;
     let start_report = StartReport::of(&mut simulation);
     let mut frame = Frame::default();
     // Columns are determined at t = 0, also for a resumed run.
@@ -83,13 +53,13 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(path) => resume_from(&mut simulation, path, &scene, duration)?,
         None => 0.0,
     };
-    if let Some(impacts) = &mut impacts {
+    if let Some(impacts) = &mut outputs.impacts {
         impacts.begin_at(from);
     }
     if simulation.load_peaks().is_none() {
         simulation.track_load_peaks();
     }
-    let starts_wear = wear.is_some() && simulation.wear().is_none();
+    let starts_wear = outputs.wear.is_some() && simulation.wear().is_none();
     if starts_wear {
         simulation.track_wear();
     }
@@ -100,7 +70,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         ))
     })?;
     let mut table = Table::new(channels.iter().map(|channel| &channel.column));
-    if let (Some(times), Some(_)) = (&times, &file) {
+    if let (Some(times), Some(_)) = (&times, &outputs.rows) {
         reserve(&mut table, times.last().saturating_add(1))?;
     }
     if !arguments.quiet {
@@ -125,8 +95,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         rows,
         &mut table,
         &mut StepObservers {
-            impacts: impacts.as_mut(),
-            state: state.as_mut(),
+            impacts: outputs.impacts.as_mut(),
+            state: outputs.state.as_mut(),
             replay: replay.as_mut(),
             end: requested,
         },
@@ -135,17 +105,14 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     );
     progress.finish_and_clear();
     let End { status, failure } = end;
-    // A diverged run would diverge again when resumed.
-    let mut state = state.filter(|_| status != Status::Diverged);
-    let failure = failure.map(|failure| {
-        let rows = file.iter_mut().chain(&mut wear).chain(impacts.as_mut().map(ImpactsFile::file));
-        let targets = rows.flat_map(RowsFile::targets).chain(state.as_mut().map(StateFile::file));
-        failure.with_result_in(&spare_older(targets.collect()))
-    });
-    let wall = stopwatch.as_secs_f64();
-    let stepping = Stepping { from, wall };
+    if status == Status::Diverged {
+        // It would diverge again when resumed.
+        outputs.state = None;
+    }
+    let failure = failure.map(|failure| failure.with_result_in(&outputs.spare_older()));
 
-    let finished_impacts = impacts.as_ref().map(ImpactsFile::impacts);
+    let stepping = Stepping { from, wall: stopwatch.as_secs_f64() };
+    let finished_impacts = outputs.impacts.as_ref().map(ImpactsFile::impacts);
     let mut facts = summary::json(&simulation, status, stepping, finished_impacts);
     let mut text = summary::text(&simulation, status, stepping, finished_impacts);
     summary::start(&mut facts, &mut text, &start_report);
@@ -176,53 +143,113 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     meta.shift_remove("slower_than_asked");
     meta.insert("duration_s".into(), json!(duration));
     insert_texts(&mut meta, &scene);
-    let mut files = Vec::new();
-    if let (Some(file), Some(times)) = (file, times) {
-        let path = file.path().to_owned();
-        let mut meta = meta.clone();
-        meta.insert("every_s".into(), json!(times.every()));
-        if !arguments.channels.is_empty() {
-            meta.insert("channels".into(), json!(arguments.channels));
-        }
-        meta.insert("contact_states".into(), json!({"0": "free", "1": "creep", "2": "slip", "3": "ideal"}));
-        files.extend(file.fill(&table, meta)?);
-        facts.insert("out".into(), json!(path.display().to_string()));
-        summary::written(&mut text, table.rows(), "row", &path);
-    }
-    if let Some(mut impacts) = impacts {
-        let path = impacts.file().path().to_owned();
-        let (rows, filled) = impacts.fill(&scene, meta.clone())?;
-        files.extend(filled);
-        facts.insert("impacts_out".into(), json!(path.display().to_string()));
-        summary::written(&mut text, rows, "impact", &path);
-    }
-    simulation.commit_wear();
-    if let (Some(file), Some(map)) = (wear, simulation.wear()) {
-        let path = file.path().to_owned();
-        let (rows, filled) = wear::fill(file, map, &scene, meta)?;
-        files.extend(filled);
-        facts.insert("wear_out".into(), json!(path.display().to_string()));
-        summary::written(&mut text, rows, "cell", &path);
-    }
-    let mut failure = failure.or(verdict);
-    if let Some(mut state) = state {
-        match state.text(&simulation) {
-            Ok(content) => {
-                let path = state.file().path().display().to_string();
-                files.push(state.fill(&content)?);
-                facts.insert("state_out".into(), json!(path));
-                summary::line(&mut text, "State", &path);
-            }
-            // The rows are still useful without the saved state.
-            Err(error) => failure = failure.or(Some(error)),
-        }
-    }
-    publish(files)?;
+    let unsaved = outputs.write(arguments, &mut simulation, &scene, (&table, times), meta, &mut facts, &mut text)?;
     match arguments.summary {
         SummaryForm::Text => print(&text)?,
         SummaryForm::Json => print(&format!("{:#}\n", Json::Object(facts)))?,
     }
-    failure.map_or(Ok(()), Err)
+    failure.or(verdict).or(unsaved).map_or(Ok(()), Err)
+}
+
+/// The instants of the rows of a run of `duration`, s, if `--every` asks for rows.
+fn row_times(arguments: &RunArguments, duration: f64) -> Result<Option<RowTimes>, Failure> {
+    let Some(every) = &arguments.every else { return Ok(None) };
+    let every = quantity::duration("--every", every)?;
+    let zero = || Failure::usage("--every 0: the interval between rows must be greater than 0");
+    Ok(Some(RowTimes::new(duration, every).ok_or_else(zero)?))
+}
+
+/// The files that a run writes.
+struct Outputs {
+    rows: Option<RowsFile>,
+    impacts: Option<ImpactsFile>,
+    wear: Option<RowsFile>,
+    state: Option<StateFile>,
+}
+
+impl Outputs {
+    fn claim(arguments: &RunArguments) -> Result<Self, Failure> {
+        let RunArguments { out, impacts, wear, save_state, from_state, force, .. } = arguments;
+        let mut names = vec![("the scene".to_owned(), arguments.scene.name())];
+        for (option, path) in [("--out", out), ("--impacts", impacts), ("--wear", wear)] {
+            names.extend(path.iter().flat_map(|path| RowsFile::names(option, path)));
+        }
+        for (option, path) in [("--save-state", save_state), ("--from-state", from_state)] {
+            names.extend(path.iter().map(|path| (option.to_owned(), path.clone())));
+        }
+        check_distinct(&names)?;
+        let rows = |path: &Option<PathBuf>| path.as_ref().map(|path| RowsFile::claim(path, *force)).transpose();
+        Ok(Self {
+            rows: rows(out)?,
+            impacts: impacts.as_ref().map(|path| ImpactsFile::claim(path, *force)).transpose()?,
+            wear: rows(wear)?,
+            state: save_state.as_ref().map(|path| StateFile::claim(path, *force)).transpose()?,
+        })
+    }
+
+    /// After a failure: gives the files other names if they would replace older ones; returns these names.
+    fn spare_older(&mut self) -> Vec<PathBuf> {
+        let rows = self.rows.iter_mut().chain(&mut self.wear).chain(self.impacts.as_mut().map(ImpactsFile::file));
+        let targets = rows.flat_map(RowsFile::targets).chain(self.state.as_mut().map(StateFile::file));
+        spare_older(targets.collect())
+    }
+
+    /// Writes the files with `meta`, and their names into the summary: `facts` and `text`. Returns why there is no saved state
+    /// if the others were written without it.
+    fn write(
+        self,
+        arguments: &RunArguments,
+        simulation: &mut LiveScene,
+        scene: &Scene,
+        (table, times): (&Table, Option<RowTimes>),
+        meta: Map<String, Json>,
+        facts: &mut Map<String, Json>,
+        text: &mut String,
+    ) -> Result<Option<Failure>, Failure> {
+        let mut files = Vec::new();
+        if let (Some(file), Some(times)) = (self.rows, times) {
+            let path = file.path().to_owned();
+            let mut meta = meta.clone();
+            meta.insert("every_s".into(), json!(times.every()));
+            if !arguments.channels.is_empty() {
+                meta.insert("channels".into(), json!(arguments.channels));
+            }
+            meta.insert("contact_states".into(), json!({"0": "free", "1": "creep", "2": "slip", "3": "ideal"}));
+            files.extend(file.fill(table, meta)?);
+            facts.insert("out".into(), json!(path.display().to_string()));
+            summary::written(text, table.rows(), "row", &path);
+        }
+        if let Some(mut impacts) = self.impacts {
+            let path = impacts.file().path().to_owned();
+            let (rows, filled) = impacts.fill(scene, meta.clone())?;
+            files.extend(filled);
+            facts.insert("impacts_out".into(), json!(path.display().to_string()));
+            summary::written(text, rows, "impact", &path);
+        }
+        simulation.commit_wear();
+        if let (Some(file), Some(map)) = (self.wear, simulation.wear()) {
+            let path = file.path().to_owned();
+            let (rows, filled) = wear::fill(file, map, scene, meta)?;
+            files.extend(filled);
+            facts.insert("wear_out".into(), json!(path.display().to_string()));
+            summary::written(text, rows, "cell", &path);
+        }
+        let mut failure = None;
+        if let Some(mut state) = self.state {
+            match state.text(simulation) {
+                Ok(content) => {
+                    let path = state.file().path().display().to_string();
+                    files.push(state.fill(&content)?);
+                    facts.insert("state_out".into(), json!(path));
+                    summary::line(text, "State", &path);
+                }
+                // The rows are still useful without the saved state.
+                Err(error) => failure = Some(error),
+            }
+        }
+        publish(files)?;
+        Ok(failure)
+    }
 }
 
 /// The replay of the run that `--link` names, if given.

@@ -13,7 +13,7 @@
 
 use std::sync::Arc;
 
-use crate::analysis::drive::{NoPeriod, drive_period};
+use crate::analysis::drive::common_period;
 use crate::machine::Vec3;
 use crate::mechanism::{Law, laws_of};
 use crate::scene::Scene;
@@ -63,11 +63,7 @@ pub struct Settling {
 impl Settling {
     /// Observes a run of `scene` from now on.
     pub fn new(scene: &Scene) -> Self {
-        let period = match drive_period(scene) {
-            Ok(period) => Some(period),
-            Err(NoPeriod::Different { first, second, .. }) => Some(first.max(second)),
-            Err(NoPeriod::None { .. }) => None,
-        };
+        let period = common_period(&scene.machine).unwrap_or_else(|[first, second]| Some(first.max(second)));
         let play = |joint: &crate::machine::LooseJoint| {
             let clearance = joint.contact.clearance;
             (clearance > 0.0).then_some((joint.carrier().body, clearance))

@@ -115,21 +115,22 @@ fn impact_balance(chi: f64, ce: f64) -> f64 {
     chi * (1.0 + ce) - libm::log1p(chi) + libm::log1p(-ce * chi)
 }
 
+/// Where `balance`, positive above 0, becomes negative below `high`.
+fn sign_change(mut high: f64, balance: impl Fn(f64) -> f64) -> f64 {
+    let mut low = 0.0;
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        *if balance(middle) > 0.0 { &mut low } else { &mut high } = middle;
+    }
+    0.5 * (low + high)
+}
+
 fn exact_damping_factor(ce: f64) -> f64 {
     if ce >= 1.0 {
         return 0.0;
     }
     // The balance is positive for small chi > 0 and falls to minus infinity at chi = 1 / ce.
-    let (mut low, mut high) = (0.0, 1.0 / ce);
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if impact_balance(middle, ce) > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
+    sign_change(1.0 / ce, |chi| impact_balance(chi, ce))
 }
 
 /// Restitution that an undisturbed impact actually gives with damping factor `chi`, from the closed integral of the law.
@@ -137,16 +138,7 @@ pub fn undisturbed_restitution(chi: f64) -> f64 {
     if chi <= 0.0 {
         return 1.0;
     }
-    let (mut low, mut high) = (0.0, (1.0 / chi).min(1.0));
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if impact_balance(chi, middle) > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
+    sign_change((1.0 / chi).min(1.0), |ce| impact_balance(chi, ce))
 }
 
 /// Coefficients of the force kernel, computed once from [`Parameters`].

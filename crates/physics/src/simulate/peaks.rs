@@ -98,17 +98,9 @@ impl PenetrationCubic {
 
     /// Step fraction at which the penetration passes zero, given that it changes sign over the step.
     pub(super) fn crossing(&self) -> f64 {
-        let (mut low, mut high) = (0.0, 1.0);
         let end_sign = self.end.penetration > 0.0;
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if (self.at(middle).0 > 0.0) == end_sign {
-                high = middle;
-            } else {
-                low = middle;
-            }
-        }
-        high
+        let [_, after] = bisect(60, |theta| (self.at(theta).0 > 0.0) != end_sign);
+        after
     }
 
     /// Deepest penetration over the step, m.
@@ -117,16 +109,8 @@ impl PenetrationCubic {
         if !(self.start.rate > 0.0 && self.end.rate < 0.0) {
             return ends;
         }
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..30 {
-            let middle = 0.5 * (low + high);
-            if self.at(middle).1 > 0.0 {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        self.at(0.5 * (low + high)).0.max(ends)
+        let [before, after] = bisect(30, |theta| self.at(theta).1 > 0.0);
+        self.at(0.5 * (before + after)).0.max(ends)
     }
 
     /// Largest penetration rate from `from` to the end of the step, and where: (m/s, theta).
@@ -190,19 +174,21 @@ impl PenetrationCubic {
         if !(slope(0.0) > 0.0 && slope(1.0) < 0.0) {
             return ends;
         }
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..30 {
-            let middle = 0.5 * (low + high);
-            if slope(middle) > 0.0 {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        let theta = 0.5 * (low + high);
+        let [before, after] = bisect(30, |theta| slope(theta) > 0.0);
+        let theta = 0.5 * (before + after);
         let inside = force(theta);
         if inside > ends.0 { (inside, theta) } else { ends }
     }
+}
+
+/// Bounds of the step fraction up to which `is_before` holds, halved `rounds` times.
+fn bisect(rounds: u32, is_before: impl Fn(f64) -> bool) -> [f64; 2] {
+    let [mut low, mut high] = [0.0, 1.0];
+    for _ in 0..rounds {
+        let middle = 0.5 * (low + high);
+        *if is_before(middle) { &mut low } else { &mut high } = middle;
+    }
+    [low, high]
 }
 
 #[cfg(test)]
