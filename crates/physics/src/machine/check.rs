@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::{Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointKind, LooseJoint, Machine, Warning};
+use super::{Doubt, Drive, Elastic, JointCoordinate, JointKind, LooseJoint, Machine, Warning};
 use crate::contact::{self, FrictionLaw, NormalLaw};
 use crate::integrate::StepControl;
 use crate::interpolate::{Ends, Interpolant, Interpolation, Overshoot};
@@ -220,8 +220,9 @@ impl Machine {
             joint.drives().try_for_each(|(_, drive)| check(&joint.name, drive, functions))?;
         }
         for element in &self.elements {
-            element.law().map_or(Ok(()), |law| check(&element.name, law, 0))?;
-            if let Some(Elastic::Curve { points, .. }) = element.elastic() {
+            let description = element.describe();
+            description.law.map_or(Ok(()), |(_, law)| check(&element.name, law, 0))?;
+            if let Some(Elastic::Curve { points, .. }) = description.elastic {
                 rises(&element.name, points)?;
             }
         }
@@ -244,23 +245,20 @@ impl Machine {
             }),
             _ => None,
         };
+        let unit = |turns: bool| if turns { "deg" } else { "mm" };
         let drives = self.joints.iter().flat_map(move |joint| {
             let drives = joint.drives();
             drives.filter_map(move |(freedom, drive)| {
-                let unit = if freedom.turns() { "deg" } else { "mm" };
-                of_drive("drive", joint.name.as_str(), drive, unit, false)
+                of_drive("drive", joint.name.as_str(), drive, unit(freedom.turns()), false)
             })
         });
         let laws = self.elements.iter().filter_map(move |element| {
-            let (what, unit) = match &element.kind {
-                ElementKind::Load(_) => ("factor", ""),
-                ElementKind::Motor(_) if element.is_on_hinge() => ("target", "deg"),
-                ElementKind::Motor(_) => ("target", "mm"),
-                _ => ("ground", "mm"),
-            };
-            of_drive(what, element.name.as_str(), element.law()?, unit, what == "factor")
+            let (what, drive) = element.describe().law?;
+            let is_factor = what == "factor";
+            let unit = if is_factor { "" } else { unit(element.is_on_hinge()) };
+            of_drive(what, element.name.as_str(), drive, unit, is_factor)
         });
-        let characteristics = self.elements.iter().filter_map(|element| match element.elastic()? {
+        let characteristics = self.elements.iter().filter_map(|element| match element.describe().elastic? {
             Elastic::Line { .. } => None,
             &Elastic::Curve { ref points, interpolation } => Some(PointTable {
                 what: "characteristic",
@@ -296,16 +294,8 @@ impl Machine {
     pub fn length_scale(&self) -> f64 {
         let radii = self.loose_joints.iter().map(|joint| joint.contact.ball_radius);
         let closing = self.closing_joints.iter().map(|_| self.contact.ball_radius);
-        let depths = self.elements.iter().filter_map(|element| match &element.kind {
-            ElementKind::Stop(stop) if !element.is_on_hinge() => Some(DEPTH_FACTOR * stop.depth),
-            ElementKind::Stop(_)
-            | ElementKind::Spring(_)
-            | ElementKind::Load(_)
-            | ElementKind::JointSpring(_)
-            | ElementKind::Bushing(_)
-            | ElementKind::Motor(_)
-            | ElementKind::Tyre(_) => None,
-        });
+        let on_slides = self.elements.iter().filter(|element| !element.is_on_hinge());
+        let depths = on_slides.filter_map(|element| Some(DEPTH_FACTOR * element.describe().stop_depth?));
         let smallest = radii.chain(closing).chain(depths).reduce(f64::min);
         smallest.unwrap_or(self.contact.ball_radius).min(1.0)
     }
@@ -562,7 +552,7 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::{Attachment, Body, Element, Joint, Mat3, Spring, SpringSide, Vec3};
+    use crate::machine::{Attachment, Body, Element, ElementKind, Joint, Mat3, Spring, SpringSide, Vec3};
 
     /// Fault of a machine with a bob in a socket after `change`.
     fn fault(change: impl FnOnce(&mut Machine)) -> Option<MachineFault> {

@@ -14,7 +14,8 @@ pub struct Element {
     pub kind: ElementKind,
 }
 
-/// Kind of a force element. Adding one takes a variant here, a file in `mechanism/elements`, and its row in the scene format.
+/// Kind of a force element. Adding one takes a variant here with its [`Description`], a file in `mechanism/elements`, and its row
+/// in the scene format.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ElementKind {
     /// Spring-damper along the line between two points.
@@ -248,36 +249,107 @@ impl Elastic {
     }
 }
 
+/// Where an element acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// At a point of a body.
+    Point(Attachment),
+    /// Between points of two bodies.
+    Between([Attachment; 2]),
+    /// On a coordinate of a joint.
+    Coordinate(JointCoordinate),
+}
+
+/// What an element says of itself, whatever its kind.
+#[derive(Clone, Copy, Debug)]
+pub struct Description<'a> {
+    /// Name of the kind in a scene file.
+    pub word: &'static str,
+    /// Where it acts.
+    pub place: Place,
+    /// Elastic law of a spring.
+    pub elastic: Option<&'a Elastic>,
+    /// Time law that it follows, if any, with its key in a scene file.
+    pub law: Option<(&'static str, &'a Drive)>,
+    /// Magnitude of a force that depends on neither motion nor time, N or N m.
+    pub constant_force: f64,
+    /// Depth at which a stop exerts the force given for it, m or rad.
+    pub stop_depth: Option<f64>,
+    /// Whether it is a load from outside the machine.
+    pub is_external: bool,
+}
+
 impl Element {
+    /// What it says of itself.
+    pub fn describe(&self) -> Description<'_> {
+        let of = |word, place| Description {
+            word,
+            place,
+            elastic: None,
+            law: None,
+            constant_force: 0.0,
+            stop_depth: None,
+            is_external: false,
+        };
+        match &self.kind {
+            ElementKind::Spring(spring) => {
+                Description { elastic: Some(&spring.elastic), ..of("spring", Place::Between([spring.from, spring.to])) }
+            }
+            ElementKind::Load(load) => Description {
+                law: load.factor.as_ref().map(|factor| ("factor", factor)),
+                constant_force: load.force.norm(),
+                is_external: true,
+                ..of("load", Place::Point(load.on))
+            },
+            ElementKind::JointSpring(spring) => {
+                Description { elastic: Some(&spring.elastic), ..of("joint_spring", Place::Coordinate(spring.on)) }
+            }
+            ElementKind::Stop(stop) => {
+                Description { stop_depth: Some(stop.depth), ..of("stop", Place::Coordinate(stop.on)) }
+            }
+            ElementKind::Bushing(bushing) => of("bushing", Place::Between([bushing.from, bushing.to])),
+            ElementKind::Motor(motor) => Description {
+                law: motor.target.as_ref().map(|target| ("target", target)),
+                constant_force: motor.force.abs().min(motor.limit),
+                ..of("motor", Place::Coordinate(motor.on))
+            },
+            ElementKind::Tyre(tyre) => Description {
+                law: tyre.ground.as_ref().map(|ground| ("ground", ground)),
+                ..of("tyre", Place::Point(tyre.on))
+            },
+        }
+    }
+
+    /// The time law of its [`Description`].
+    pub fn law_mut(&mut self) -> Option<&mut Drive> {
+        match &mut self.kind {
+            ElementKind::Load(load) => load.factor.as_mut(),
+            ElementKind::Motor(motor) => motor.target.as_mut(),
+            ElementKind::Tyre(tyre) => tyre.ground.as_mut(),
+            ElementKind::Spring(_) | ElementKind::JointSpring(_) | ElementKind::Stop(_) | ElementKind::Bushing(_) => {
+                None
+            }
+        }
+    }
+
     /// Points of application in `machine`: one, or two for an element between points; of one on a joint coordinate, the parent and
     /// child points of that joint.
     pub fn points(&self, machine: &Machine) -> Vec<Attachment> {
-        match &self.kind {
-            ElementKind::Spring(Spring { from, to, .. }) | ElementKind::Bushing(Bushing { from, to, .. }) => {
-                vec![*from, *to]
-            }
-            ElementKind::Load(Load { on, .. }) | ElementKind::Tyre(Tyre { on, .. }) => vec![*on],
-            ElementKind::JointSpring(JointSpring { on, .. })
-            | ElementKind::Stop(Stop { on, .. })
-            | ElementKind::Motor(Motor { on, .. }) => {
+        match self.describe().place {
+            Place::Point(point) => vec![point],
+            Place::Between(points) => points.to_vec(),
+            Place::Coordinate(on) => {
                 let joint = machine.kinematic_joints().nth(on.joint);
                 joint.map_or_else(Vec::new, |joint| joint.points().to_vec())
             }
         }
     }
 
-    /// Whether it acts between two points of its own.
-    pub fn is_between_points(&self) -> bool {
-        matches!(self.kind, ElementKind::Spring(_) | ElementKind::Bushing(_))
-    }
-
     /// The joint coordinate on which it acts, if any.
     pub fn coordinate(&self) -> Option<JointCoordinate> {
-        match &self.kind {
-            ElementKind::JointSpring(spring) => Some(spring.on),
-            ElementKind::Stop(stop) => Some(stop.on),
-            ElementKind::Motor(motor) => Some(motor.on),
-            ElementKind::Spring(_) | ElementKind::Load(_) | ElementKind::Bushing(_) | ElementKind::Tyre(_) => None,
+        match self.describe().place {
+            Place::Coordinate(on) => Some(on),
+            Place::Point(_) | Place::Between(_) => None,
         }
     }
 
@@ -286,59 +358,13 @@ impl Element {
         self.coordinate().is_some_and(|on| on.freedom.turns())
     }
 
-    /// The elastic law of a spring.
-    pub fn elastic(&self) -> Option<&Elastic> {
-        match &self.kind {
-            ElementKind::Spring(spring) => Some(&spring.elastic),
-            ElementKind::JointSpring(spring) => Some(&spring.elastic),
-            ElementKind::Load(_)
-            | ElementKind::Stop(_)
-            | ElementKind::Bushing(_)
-            | ElementKind::Motor(_)
-            | ElementKind::Tyre(_) => None,
-        }
-    }
-
-    /// The time law that it follows, if any.
-    pub fn law(&self) -> Option<&Drive> {
-        match &self.kind {
-            ElementKind::Load(load) => load.factor.as_ref(),
-            ElementKind::Motor(motor) => motor.target.as_ref(),
-            ElementKind::Tyre(tyre) => tyre.ground.as_ref(),
-            ElementKind::Spring(_) | ElementKind::JointSpring(_) | ElementKind::Stop(_) | ElementKind::Bushing(_) => {
-                None
-            }
-        }
-    }
-
     /// Largest force at its points due to its own parameters, N; contributions of the motion are excluded.
     pub fn own_force(&self) -> f64 {
-        let on_hinge = self.is_on_hinge();
-        match &self.kind {
-            ElementKind::Spring(spring) => spring.elastic.unstretched().abs(),
-            ElementKind::Load(load) => load.force.norm(),
-            ElementKind::JointSpring(spring) if !on_hinge => spring.elastic.unstretched().abs(),
-            ElementKind::Motor(motor) if !on_hinge => motor.force.abs().min(motor.limit),
-            ElementKind::JointSpring(_)
-            | ElementKind::Motor(_)
-            | ElementKind::Stop(_)
-            | ElementKind::Bushing(_)
-            | ElementKind::Tyre(_) => 0.0,
-        }
-    }
-}
-
-impl ElementKind {
-    /// Name of the kind in a scene file.
-    pub fn word(&self) -> &'static str {
-        match self {
-            Self::Spring(_) => "spring",
-            Self::Load(_) => "load",
-            Self::JointSpring(_) => "joint_spring",
-            Self::Stop(_) => "stop",
-            Self::Bushing(_) => "bushing",
-            Self::Motor(_) => "motor",
-            Self::Tyre(_) => "tyre",
+        let Description { elastic, constant_force, .. } = self.describe();
+        match elastic {
+            _ if self.is_on_hinge() => 0.0,
+            Some(elastic) => elastic.unstretched().abs(),
+            None => constant_force,
         }
     }
 }

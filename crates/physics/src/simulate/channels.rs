@@ -8,7 +8,7 @@ use table::TIME;
 pub use table::{PlotKind, Quantity};
 
 use super::Frame;
-use crate::machine::{Freedom, Joint, JointKind, Machine};
+use crate::machine::{Freedom, Joint, JointKind, Machine, Place};
 use table::{Repetition, Signal, Source, TABLE};
 
 /// Largest number of ball joints and drives that are recorded: in a longer chain the rest is not worth the memory.
@@ -245,7 +245,7 @@ fn has_signal(
         }
         Source::ProbeError | Source::ProbeDistance => known(machine.output.probe.is_some()),
         Source::Element(_) => known(true),
-        Source::ElementValue(_) => machine.elements[part].is_between_points(),
+        Source::ElementValue(_) => matches!(machine.elements[part].describe().place, Place::Between(_)),
         _ => true,
     }
 }

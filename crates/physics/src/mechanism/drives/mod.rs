@@ -95,7 +95,8 @@ pub(super) fn law_of_factor(drive: &Drive) -> Option<Arc<dyn Law>> {
 /// Laws of joint drives and of the time laws of force elements, without the functions of the closed form.
 pub fn laws_of(machine: &Machine) -> impl Iterator<Item = Arc<dyn Law>> {
     let drives = machine.joints.iter().flat_map(Joint::drives).map(|(freedom, drive)| (drive, freedom.turns()));
-    let elements = machine.elements.iter().filter_map(|element| Some((element.law()?, element.is_on_hinge())));
+    let elements =
+        machine.elements.iter().filter_map(|element| Some((element.describe().law?.1, element.is_on_hinge())));
     drives.chain(elements).filter_map(|(drive, turns)| trajectory_of(drive, turns).law().cloned())
 }
 
@@ -107,7 +108,7 @@ pub fn periods_of(machine: &Machine) -> impl Iterator<Item = f64> {
         trajectory.law().map_or_else(|| closed_period(machine), |law| law.period())
     });
     let of_elements = machine.elements.iter().filter_map(|element| {
-        let trajectory = trajectory_of(element.law()?, element.is_on_hinge());
+        let trajectory = trajectory_of(element.describe().law?.1, element.is_on_hinge());
         Some(trajectory.law().map_or(f64::INFINITY, |law| law.period()))
     });
     of_drives.chain(of_elements)
