@@ -6,7 +6,7 @@ use crate::common::matrix::for_every;
 use crate::common::{THREE_VARIANTS, assert_refused, parse};
 use crate::elements::frame_at;
 use jointplay_physics::interpolate::Interpolation;
-use jointplay_physics::machine::{Elastic, ElementKind};
+use jointplay_physics::machine::{Characteristic, ElementKind};
 use jointplay_physics::simulate::{Frame, Simulation};
 use jointplay_scene::Scene;
 
@@ -294,7 +294,7 @@ fn a_characteristic_can_be_read_from_a_file() {
     let ElementKind::Spring(spring) = &scene.machine.elements[0].kind else {
         panic!("a spring");
     };
-    assert_eq!(spring.elastic, Elastic::Curve { points: POINTS.to_vec(), interpolation: Interpolation::Spline });
+    assert_eq!(spring.elastic, Characteristic::Curve { points: POINTS.to_vec(), interpolation: Interpolation::Spline });
     let mut simulation = Simulation::new(&scene.machine).unwrap();
     let (zero_crossing, _) = zero_crossing();
     assert!(Mounting::Body.state(&frame_at(&mut simulation, zero_crossing))[0].abs() < 1e-4);

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::{Doubt, Drive, Elastic, JointCoordinate, JointKind, LooseJoint, Machine, Warning};
+use super::{Characteristic, Doubt, Drive, JointCoordinate, JointKind, LooseJoint, Machine, Warning};
 use crate::contact::{self, FrictionLaw, NormalLaw};
 use crate::integrate::StepControl;
 use crate::interpolate::{Ends, Interpolant, Interpolation, Overshoot};
@@ -222,8 +222,10 @@ impl Machine {
         for element in &self.elements {
             let description = element.describe();
             description.law.map_or(Ok(()), |(_, law)| check(&element.name, law, 0))?;
-            if let Some(Elastic::Curve { points, .. }) = description.elastic {
-                rises(&element.name, points)?;
+            for characteristic in description.spring.into_iter().flatten() {
+                if let Characteristic::Curve { points, .. } = characteristic {
+                    rises(&element.name, points)?;
+                }
             }
         }
         let coordinates =
@@ -258,17 +260,22 @@ impl Machine {
             let unit = if is_factor { "" } else { unit(element.is_on_hinge()) };
             of_drive(what, element.name.as_str(), drive, unit, is_factor)
         });
-        let characteristics = self.elements.iter().filter_map(|element| match element.describe().elastic? {
-            Elastic::Line { .. } => None,
-            &Elastic::Curve { ref points, interpolation } => Some(PointTable {
-                what: "characteristic",
-                of: &element.name,
-                points,
-                interpolation,
-                ends: Ends::Natural,
-                units: if element.is_on_hinge() { ["deg", "N m"] } else { ["mm", "N"] },
-                may_have_kinks: true,
-            }),
+        let characteristics = self.elements.iter().flat_map(|element| {
+            let both = element.describe().spring.into_iter().flatten();
+            let units = if element.is_on_hinge() { ["deg", "deg/s", "N m"] } else { ["mm", "mm/s", "N"] };
+            let names = [("characteristic", units[0]), ("damping", units[1])];
+            both.zip(names).filter_map(move |(characteristic, (what, unit))| match *characteristic {
+                Characteristic::Line { .. } => None,
+                Characteristic::Curve { ref points, interpolation } => Some(PointTable {
+                    what,
+                    of: &element.name,
+                    points,
+                    interpolation,
+                    ends: Ends::Natural,
+                    units: [unit, units[2]],
+                    may_have_kinks: true,
+                }),
+            })
         });
         drives.chain(laws).chain(characteristics)
     }
@@ -596,9 +603,9 @@ mod tests {
         assert!(matches!(none, Some(MachineFault::NoFunction { function: 2, .. })), "{none:?}");
         let curve = fault(|machine| {
             let [from, to] = [Attachment::world(Vec3::zeros()), Attachment::on(0, Vec3::zeros())];
-            let elastic = Elastic::Curve { points: Vec::new(), interpolation: Interpolation::Monotone };
+            let elastic = Characteristic::Curve { points: Vec::new(), interpolation: Interpolation::Monotone };
             let side = SpringSide::Both;
-            let spring = Spring { from, to, length: 0.1, elastic, damping: 0.0, side };
+            let spring = Spring { from, to, length: 0.1, elastic, damping: Characteristic::linear(0.0), side };
             machine.elements.push(Element { name: "s".to_owned(), kind: ElementKind::Spring(spring) });
         });
         assert_eq!(curve, Some(MachineFault::Points { what: "s".to_owned() }));

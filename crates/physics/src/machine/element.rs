@@ -43,26 +43,27 @@ pub struct JointCoordinate {
     pub freedom: Freedom,
 }
 
-/// Elastic characteristic of a spring.
+/// Force of a spring by its stretch, m (rad on a hinge), or of a damper by the rate of that, m/s (rad/s).
 #[derive(Clone, Debug, PartialEq)]
-pub enum Elastic {
-    /// preload + stiffness s, with the stretch s.
+pub enum Characteristic {
+    /// offset + slope x, with the stretch or the rate x.
     Line {
-        /// Force at zero stretch, N (N m on a hinge).
-        preload: f64,
-        /// Stiffness, N/m (N m/rad on a hinge).
-        stiffness: f64,
+        /// Force at 0, N (N m on a hinge): the preload of a spring, 0 for a damper.
+        offset: f64,
+        /// Stiffness, N/m (N m/rad on a hinge), or damping, N s/m (N m s/rad).
+        slope: f64,
     },
     /// A curve through points.
     Curve {
-        /// Stretches, m (rad), and tensions, N (N m), in ascending stretch.
+        /// Stretches or rates, and forces, N (N m), with increasing first coordinates.
         points: Vec<[f64; 2]>,
         /// How it passes through them.
         interpolation: Interpolation,
     },
 }
 
-/// Tension `elastic` + `damping` dl/dt along the line between two points, restricted to one sign if the spring is one-sided.
+/// Tension `elastic`(l - `length`) + `damping`(dl/dt) along the line between two points at the distance l, restricted to one sign
+/// if the spring is one-sided.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spring {
     /// First point of application.
@@ -72,9 +73,9 @@ pub struct Spring {
     /// Distance of the points at zero stretch, m.
     pub length: f64,
     /// Tension as a function of the stretch.
-    pub elastic: Elastic,
-    /// Damping, N s/m.
-    pub damping: f64,
+    pub elastic: Characteristic,
+    /// Tension as a function of the rate of the distance.
+    pub damping: Characteristic,
     /// Direction in which it acts.
     pub side: SpringSide,
 }
@@ -94,17 +95,17 @@ pub struct Load {
     pub factor: Option<Drive>,
 }
 
-/// Force or torque on the child, towards lower coordinates: `elastic` + `damping` dq/dt.
+/// Force or torque on the child, towards lower coordinates q: `elastic`(q - `position`) + `damping`(dq/dt).
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointSpring {
     /// Coordinate on which it acts.
     pub on: JointCoordinate,
     /// Coordinate at zero stretch, m or rad.
     pub position: f64,
-    /// Tension as a function of the stretch.
-    pub elastic: Elastic,
-    /// Damping, N s/m or N m s/rad.
-    pub damping: f64,
+    /// Force or torque as a function of the stretch.
+    pub elastic: Characteristic,
+    /// Force or torque as a function of the rate of the coordinate.
+    pub damping: Characteristic,
 }
 
 /// Stop force F = K d^1.5 (1 + a dd/dt), never below 0, with the depth d beyond a limit.
@@ -227,19 +228,24 @@ impl SpringSide {
     }
 }
 
-impl Elastic {
-    /// Whether the tension is ever nonzero.
+impl Characteristic {
+    /// A line through 0 with this slope.
+    pub const fn linear(slope: f64) -> Self {
+        Self::Line { offset: 0.0, slope }
+    }
+
+    /// Whether the force is ever nonzero.
     pub fn has_effect(&self) -> bool {
         match self {
-            Self::Line { preload, stiffness } => *preload != 0.0 || *stiffness != 0.0,
+            Self::Line { offset, slope } => *offset != 0.0 || *slope != 0.0,
             Self::Curve { points, .. } => points.iter().any(|point| point[1] != 0.0),
         }
     }
 
-    /// Tension at zero stretch, N or N m; a curve is interpolated linearly.
-    fn unstretched(&self) -> f64 {
+    /// Force at 0, N or N m; a curve is interpolated linearly.
+    fn at_zero(&self) -> f64 {
         let points = match self {
-            Self::Line { preload, .. } => return *preload,
+            Self::Line { offset, .. } => return *offset,
             Self::Curve { points, .. } => points,
         };
         let next = points.partition_point(|point| point[0] < 0.0);
@@ -267,8 +273,8 @@ pub struct Description<'a> {
     pub word: &'static str,
     /// Where it acts.
     pub place: Place,
-    /// Elastic law of a spring.
-    pub elastic: Option<&'a Elastic>,
+    /// Elastic and damping force of a spring.
+    pub spring: Option<[&'a Characteristic; 2]>,
     /// Time law that it follows, if any, with its key in a scene file.
     pub law: Option<(&'static str, &'a Drive)>,
     /// Magnitude of a force that depends on neither motion nor time, N or N m.
@@ -285,25 +291,27 @@ impl Element {
         let of = |word, place| Description {
             word,
             place,
-            elastic: None,
+            spring: None,
             law: None,
             constant_force: 0.0,
             stop_depth: None,
             is_external: false,
         };
         match &self.kind {
-            ElementKind::Spring(spring) => {
-                Description { elastic: Some(&spring.elastic), ..of("spring", Place::Between([spring.from, spring.to])) }
-            }
+            ElementKind::Spring(spring) => Description {
+                spring: Some([&spring.elastic, &spring.damping]),
+                ..of("spring", Place::Between([spring.from, spring.to]))
+            },
             ElementKind::Load(load) => Description {
                 law: load.factor.as_ref().map(|factor| ("factor", factor)),
                 constant_force: load.force.norm(),
                 is_external: true,
                 ..of("load", Place::Point(load.on))
             },
-            ElementKind::JointSpring(spring) => {
-                Description { elastic: Some(&spring.elastic), ..of("joint_spring", Place::Coordinate(spring.on)) }
-            }
+            ElementKind::JointSpring(spring) => Description {
+                spring: Some([&spring.elastic, &spring.damping]),
+                ..of("joint_spring", Place::Coordinate(spring.on))
+            },
             ElementKind::Stop(stop) => {
                 Description { stop_depth: Some(stop.depth), ..of("stop", Place::Coordinate(stop.on)) }
             }
@@ -360,10 +368,10 @@ impl Element {
 
     /// Largest force at its points due to its own parameters, N; contributions of the motion are excluded.
     pub fn own_force(&self) -> f64 {
-        let Description { elastic, constant_force, .. } = self.describe();
-        match elastic {
+        let Description { spring, constant_force, .. } = self.describe();
+        match spring {
             _ if self.is_on_hinge() => 0.0,
-            Some(elastic) => elastic.unstretched().abs(),
+            Some([elastic, _]) => elastic.at_zero().abs(),
             None => constant_force,
         }
     }
