@@ -202,35 +202,29 @@ impl Machine {
 
     /// Checks curves and time laws.
     fn check_laws(&self) -> Result<(), MachineFault> {
-        let rises = |what: &str, points: &[[f64; 2]]| {
+        let functions = self.closed_form.as_ref().map_or(0, |form| form.functions.len());
+        let drives =
+            self.joints.iter().flat_map(|joint| joint.drives().map(|(_, drive)| (&joint.name, drive, functions)));
+        // Elements follow laws of their own.
+        let laws = self.elements.iter().filter_map(|element| Some((&element.name, element.describe().law?.1, 0)));
+        for (what, drive, functions) in drives.chain(laws) {
+            if let &Drive::Function(function) = drive
+                && function >= functions
+            {
+                return Err(MachineFault::NoFunction { what: what.clone(), function });
+            }
+        }
+        for PointTable { of, points, interpolation, may_have_kinks, .. } in self.tables() {
             let finite = points.iter().flatten().all(|number| number.is_finite());
             let rising = points.len() >= 2 && points.windows(2).all(|pair| pair[0][0] < pair[1][0]);
-            if finite && rising { Ok(()) } else { Err(MachineFault::Points { what: what.to_owned() }) }
-        };
-        // Elements follow laws of their own.
-        let check = |what: &str, drive: &Drive, functions: usize| match drive {
-            Drive::Table { points, .. } => rises(what, points),
-            Drive::Function(function) if *function >= functions => {
-                Err(MachineFault::NoFunction { what: what.to_owned(), function: *function })
+            if !(finite && rising) {
+                return Err(MachineFault::Points { what: of.to_owned() });
             }
-            _ => Ok(()),
-        };
-        let functions = self.closed_form.as_ref().map_or(0, |form| form.functions.len());
-        for joint in &self.joints {
-            joint.drives().try_for_each(|(_, drive)| check(&joint.name, drive, functions))?;
-        }
-        for element in &self.elements {
-            let description = element.describe();
-            description.law.map_or(Ok(()), |(_, law)| check(&element.name, law, 0))?;
-            for characteristic in description.spring.into_iter().flatten() {
-                if let Characteristic::Curve { points, .. } = characteristic {
-                    rises(&element.name, points)?;
-                }
+            if interpolation == Interpolation::Linear && !may_have_kinks {
+                return Err(MachineFault::Kinks { what: of.to_owned() });
             }
         }
-        let coordinates =
-            self.tables().find(|table| !table.may_have_kinks && table.interpolation == Interpolation::Linear);
-        coordinates.map_or(Ok(()), |table| Err(MachineFault::Kinks { what: table.of.to_owned() }))
+        Ok(())
     }
 
     /// Every table of a drive, a time law or a characteristic.
