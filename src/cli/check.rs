@@ -222,7 +222,7 @@ fn force_element(element: &Element, report: &ElementReport) -> String {
     let force = report.own_force().map(|force| format!("{} N", significant(force.norm(), 6)));
     let torque = report.torque.map(|torque| format!("{} N m", significant(torque.norm(), 6)));
     let exerts: Vec<String> = force.into_iter().chain(torque).collect();
-    format!("{}: {}", element.kind.word(), exerts.join(" and "))
+    format!("{}: {}", element.describe().word, exerts.join(" and "))
 }
 
 /// Processor time for each part of the check that steps, s.

@@ -41,7 +41,7 @@ impl Part<'_> {
 /// All parts whose peaks `simulation` records.
 pub fn parts(simulation: &Simulation) -> Vec<Part<'_>> {
     let machine = simulation.machine();
-    let elements = machine.elements.iter().map(|element| ("Element", &element.name, element.kind.word()));
+    let elements = machine.elements.iter().map(|element| ("Element", &element.name, element.describe().word));
     let constraining = machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
     let joints = constraining.chain(&machine.closing_joints).map(|joint| ("Joint", &joint.name, joint.kind.word()));
     let peaks = simulation.load_peaks().map_or(&[][..], |peaks| peaks.parts());

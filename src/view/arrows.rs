@@ -8,7 +8,6 @@ use super::theme::Material;
 use super::{
     Camera, Colour, DrawList, LabelKind, Layer, Legend, Line, Mark, Mesh, Palette, Scaling, Shot, Tick, to_f32,
 };
-use crate::machine::ElementKind;
 use crate::units::format_quantity_digits;
 
 /// Reference length of arrows, as a fraction of the picture height.
@@ -136,7 +135,7 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
     let options = &shot.options.arrows;
     let draws_joint_forces = (options.normal || options.friction) && !joints.is_empty();
     let elements = shot.scene.machine.elements.iter().zip(&shot.frame.elements);
-    let loads = elements.filter(|(element, _)| options.normal && matches!(element.kind, ElementKind::Load(_)));
+    let loads = elements.filter(|(element, _)| options.normal && element.describe().is_external);
     let loads = loads.map(|(_, report)| report);
     let mut external = loads.chain(&shot.frame.pull).peekable();
     if !draws_joint_forces && external.peek().is_none() {

@@ -1,4 +1,4 @@
-//! Springs with a characteristic through points against closed-form solutions, in every method and both formulations.
+//! Springs and dampers with a characteristic through points against closed-form solutions, in every method and both formulations.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -6,7 +6,7 @@ use crate::common::matrix::for_every;
 use crate::common::{THREE_VARIANTS, assert_refused, parse};
 use crate::elements::frame_at;
 use jointplay_physics::interpolate::Interpolation;
-use jointplay_physics::machine::{Elastic, ElementKind};
+use jointplay_physics::machine::{Characteristic, ElementKind};
 use jointplay_physics::simulate::{Frame, Simulation};
 use jointplay_scene::Scene;
 
@@ -218,6 +218,70 @@ fn steps_end_at_the_kinks_of_straight_lines() {
     }
 }
 
+/// A damper that is harder up to this speed, m/s, with its damping below and above, N s/m, and a constant force that pulls, N.
+const SLOW: f64 = 0.1;
+const DAMPINGS: [f64; 2] = [20.0, 5.0];
+const PULL: f64 = 4.0;
+
+/// Distance moved and speed a time after release, where `force` pulls against `damping` from rest.
+fn relaxed(force: f64, damping: f64, time: f64) -> [f64; 2] {
+    let lag = MASS / damping;
+    let fraction = -libm::expm1(-time / lag);
+    let last = force / damping;
+    [last * (time - lag * fraction), last * fraction]
+}
+
+#[test]
+fn a_damper_along_straight_lines_lets_a_mass_approach_one_speed_and_then_another() {
+    let [slow, fast] = DAMPINGS;
+    let hold = slow * SLOW;
+    let change = -MASS / slow * libm::log1p(-hold / PULL);
+    let expected = |time: f64| {
+        if time <= change {
+            return relaxed(PULL, slow, time);
+        }
+        let [before, _] = relaxed(PULL, slow, change);
+        let [moved, speed] = relaxed(PULL - hold, fast, time - change);
+        [before + SLOW * (time - change) + moved, SLOW + speed]
+    };
+    for_every([Mounting::Body, Mounting::Slide, Mounting::Hinge], |mounting, variant| {
+        let mut machine = parse(&mounting.text(&LINES, LINEAR), &variant.close()).machine;
+        let scale = mounting.scale();
+        let force = |speed: f64| scale * (hold + fast * (speed - SLOW));
+        let points = [[-1.0, -force(1.0)], [-SLOW, -scale * hold], [SLOW, scale * hold], [1.0, force(1.0)]];
+        let curve = Characteristic::Curve { points: points.to_vec(), interpolation: Interpolation::Linear };
+        let constant = Characteristic::Line { offset: scale * PULL, slope: 0.0 };
+        match &mut machine.elements[0].kind {
+            ElementKind::Spring(spring) => (spring.elastic, spring.damping) = (constant, curve),
+            ElementKind::JointSpring(spring) => (spring.elastic, spring.damping) = (constant, curve),
+            _ => panic!("a spring"),
+        }
+        let mut simulation = Simulation::new(&machine).unwrap();
+        // A step that is not cut at a kink has an error of the third order in its size.
+        let bound = if variant.method == "rk4" { 1e-7 } else { variant.bound() };
+        if variant.method == "dopri5" {
+            let mut speeds = std::iter::from_fn(|| {
+                simulation.step().unwrap();
+                Some(-mounting.state(&crate::common::frame_now(&mut simulation))[1])
+            });
+            let first = speeds.find(|speed| *speed > SLOW - 1e-6).unwrap();
+            assert!((first - SLOW).abs() < 1e-9, "a step passed the kink: {first}");
+            simulation = Simulation::new(&machine).unwrap();
+        }
+        for time in [0.5 * change, change, 2.0 * change, 0.1, 0.3] {
+            let [x, v] = mounting.state(&frame_at(&mut simulation, time));
+            let [moved, speed] = expected(time);
+            let off = [0.1 - x - moved, -v - speed];
+            assert!(off[0].abs() < bound && off[1].abs() < 20.0 * bound, "{mounting:?} {variant} {time}: {off:?}");
+        }
+        let ledger = simulation.ledger().unwrap();
+        let [moved, speed] = expected(simulation.time());
+        let lost = scale * (PULL * moved - 0.5 * MASS * speed * speed);
+        assert!((ledger.damping_loss / lost - 1.0).abs() < 1e-4, "{mounting:?} {variant}: {ledger:?} {lost}");
+        assert!(ledger.relative_residual().abs() < 1e-4, "{mounting:?} {variant}: {ledger:?}");
+    });
+}
+
 #[test]
 fn points_on_a_line_are_the_spring_of_that_line() {
     let line = [[-0.05, -1.0], [0.0, 3.0], [0.1, 11.0], [0.15, 15.0]];
@@ -294,7 +358,7 @@ fn a_characteristic_can_be_read_from_a_file() {
     let ElementKind::Spring(spring) = &scene.machine.elements[0].kind else {
         panic!("a spring");
     };
-    assert_eq!(spring.elastic, Elastic::Curve { points: POINTS.to_vec(), interpolation: Interpolation::Spline });
+    assert_eq!(spring.elastic, Characteristic::Curve { points: POINTS.to_vec(), interpolation: Interpolation::Spline });
     let mut simulation = Simulation::new(&scene.machine).unwrap();
     let (zero_crossing, _) = zero_crossing();
     assert!(Mounting::Body.state(&frame_at(&mut simulation, zero_crossing))[0].abs() < 1e-4);

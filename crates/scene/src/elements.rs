@@ -13,8 +13,8 @@ use super::read_joints::read_coordinate;
 use super::*;
 use jointplay_physics::interpolate::Interpolation;
 use jointplay_physics::machine::{
-    Bushing, Drive, Elastic, Element, ElementKind, Harmonic, JointCoordinate, JointSpring, Load, LoadAxes, Motor, Quat,
-    Spring, SpringSide, Stop, Tyre, Vec3,
+    Bushing, Characteristic, Drive, Element, ElementKind, Harmonic, JointCoordinate, JointSpring, Load, LoadAxes,
+    Motor, Quat, Spring, SpringSide, Stop, Tyre, Vec3,
 };
 use jointplay_physics::units::Dimension as D;
 use jointplay_physics::words::Words;
@@ -378,8 +378,8 @@ impl ElementReader<'_, '_> {
     }
 
     /// Elastic law of a spring: a line, or a curve whose `axes` have these names and dimensions.
-    fn elastic(&self, axes: [(&'static str, D); 2]) -> Result<Elastic, SceneError> {
-        let line = Elastic::Line { stiffness: self.number("stiffness")?, preload: self.number("preload")? };
+    fn elastic(&self, axes: [(&'static str, D); 2]) -> Result<Characteristic, SceneError> {
+        let line = Characteristic::Line { slope: self.number("stiffness")?, offset: self.number("preload")? };
         let most = [MAX_SI, MAX_FORCE];
         let axis = |i: usize| Axis { name: axes[i].0, dimension: axes[i].1, most: most[i] };
         let rise = (1e-9, if self.on_hinge() { "1e-9 rad" } else { "1 nm" });
@@ -399,7 +399,7 @@ impl ElementReader<'_, '_> {
             self.section.refuse(key, "`characteristic`, or its `file`, says what the spring exerts")?;
         }
         let given = self.section.get("interpolation").map(|node| node.word()).transpose()?;
-        Ok(Elastic::Curve { points, interpolation: given.unwrap_or(Interpolation::Monotone) })
+        Ok(Characteristic::Curve { points, interpolation: given.unwrap_or(Interpolation::Monotone) })
     }
 
     /// Rejects an element without effect; `keys` lists the values of which one must not be 0.
@@ -437,11 +437,11 @@ fn read_spring(reader: &ElementReader<'_, '_>) -> Result<ElementKind, SceneError
         from,
         to,
         length: reader.number("length")?,
-        damping: reader.number("damping")?,
+        damping: Characteristic::linear(reader.number("damping")?),
         elastic: reader.elastic([("length", D::Length), ("tension", D::Force)])?,
         side: reader.word("side")?,
     };
-    reader.check_effect(spring.damping != 0.0 || spring.elastic.has_effect(), "stiffness, damping, preload")?;
+    reader.check_effect(spring.damping.has_effect() || spring.elastic.has_effect(), "stiffness, damping, preload")?;
     Ok(ElementKind::Spring(spring))
 }
 
@@ -481,10 +481,10 @@ fn read_joint_spring(reader: &ElementReader<'_, '_>) -> Result<ElementKind, Scen
     let spring = JointSpring {
         on: reader.on(),
         position: reader.number("position")?,
-        damping: reader.number("damping")?,
+        damping: Characteristic::linear(reader.number("damping")?),
         elastic: reader.elastic(axes)?,
     };
-    reader.check_effect(spring.damping != 0.0 || spring.elastic.has_effect(), "stiffness, damping, preload")?;
+    reader.check_effect(spring.damping.has_effect() || spring.elastic.has_effect(), "stiffness, damping, preload")?;
     Ok(ElementKind::JointSpring(spring))
 }
 

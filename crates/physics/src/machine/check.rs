@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::{Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointKind, LooseJoint, Machine, Warning};
+use super::{Characteristic, Doubt, Drive, JointCoordinate, JointKind, LooseJoint, Machine, Warning};
 use crate::contact::{self, FrictionLaw, NormalLaw};
 use crate::integrate::StepControl;
 use crate::interpolate::{Ends, Interpolant, Interpolation, Overshoot};
@@ -202,32 +202,29 @@ impl Machine {
 
     /// Checks curves and time laws.
     fn check_laws(&self) -> Result<(), MachineFault> {
-        let rises = |what: &str, points: &[[f64; 2]]| {
+        let functions = self.closed_form.as_ref().map_or(0, |form| form.functions.len());
+        let drives =
+            self.joints.iter().flat_map(|joint| joint.drives().map(|(_, drive)| (&joint.name, drive, functions)));
+        // Elements follow laws of their own.
+        let laws = self.elements.iter().filter_map(|element| Some((&element.name, element.describe().law?.1, 0)));
+        for (what, drive, functions) in drives.chain(laws) {
+            if let &Drive::Function(function) = drive
+                && function >= functions
+            {
+                return Err(MachineFault::NoFunction { what: what.clone(), function });
+            }
+        }
+        for PointTable { of, points, interpolation, may_have_kinks, .. } in self.tables() {
             let finite = points.iter().flatten().all(|number| number.is_finite());
             let rising = points.len() >= 2 && points.windows(2).all(|pair| pair[0][0] < pair[1][0]);
-            if finite && rising { Ok(()) } else { Err(MachineFault::Points { what: what.to_owned() }) }
-        };
-        // Elements follow laws of their own.
-        let check = |what: &str, drive: &Drive, functions: usize| match drive {
-            Drive::Table { points, .. } => rises(what, points),
-            Drive::Function(function) if *function >= functions => {
-                Err(MachineFault::NoFunction { what: what.to_owned(), function: *function })
+            if !(finite && rising) {
+                return Err(MachineFault::Points { what: of.to_owned() });
             }
-            _ => Ok(()),
-        };
-        let functions = self.closed_form.as_ref().map_or(0, |form| form.functions.len());
-        for joint in &self.joints {
-            joint.drives().try_for_each(|(_, drive)| check(&joint.name, drive, functions))?;
-        }
-        for element in &self.elements {
-            element.law().map_or(Ok(()), |law| check(&element.name, law, 0))?;
-            if let Some(Elastic::Curve { points, .. }) = element.elastic() {
-                rises(&element.name, points)?;
+            if interpolation == Interpolation::Linear && !may_have_kinks {
+                return Err(MachineFault::Kinks { what: of.to_owned() });
             }
         }
-        let coordinates =
-            self.tables().find(|table| !table.may_have_kinks && table.interpolation == Interpolation::Linear);
-        coordinates.map_or(Ok(()), |table| Err(MachineFault::Kinks { what: table.of.to_owned() }))
+        Ok(())
     }
 
     /// Every table of a drive, a time law or a characteristic.
@@ -244,33 +241,35 @@ impl Machine {
             }),
             _ => None,
         };
+        let unit = |turns: bool| if turns { "deg" } else { "mm" };
         let drives = self.joints.iter().flat_map(move |joint| {
             let drives = joint.drives();
             drives.filter_map(move |(freedom, drive)| {
-                let unit = if freedom.turns() { "deg" } else { "mm" };
-                of_drive("drive", joint.name.as_str(), drive, unit, false)
+                of_drive("drive", joint.name.as_str(), drive, unit(freedom.turns()), false)
             })
         });
         let laws = self.elements.iter().filter_map(move |element| {
-            let (what, unit) = match &element.kind {
-                ElementKind::Load(_) => ("factor", ""),
-                ElementKind::Motor(_) if element.is_on_hinge() => ("target", "deg"),
-                ElementKind::Motor(_) => ("target", "mm"),
-                _ => ("ground", "mm"),
-            };
-            of_drive(what, element.name.as_str(), element.law()?, unit, what == "factor")
+            let (what, drive) = element.describe().law?;
+            let is_factor = what == "factor";
+            let unit = if is_factor { "" } else { unit(element.is_on_hinge()) };
+            of_drive(what, element.name.as_str(), drive, unit, is_factor)
         });
-        let characteristics = self.elements.iter().filter_map(|element| match element.elastic()? {
-            Elastic::Line { .. } => None,
-            &Elastic::Curve { ref points, interpolation } => Some(PointTable {
-                what: "characteristic",
-                of: &element.name,
-                points,
-                interpolation,
-                ends: Ends::Natural,
-                units: if element.is_on_hinge() { ["deg", "N m"] } else { ["mm", "N"] },
-                may_have_kinks: true,
-            }),
+        let characteristics = self.elements.iter().flat_map(|element| {
+            let both = element.describe().spring.into_iter().flatten();
+            let units = if element.is_on_hinge() { ["deg", "deg/s", "N m"] } else { ["mm", "mm/s", "N"] };
+            let names = [("characteristic", units[0]), ("damping", units[1])];
+            both.zip(names).filter_map(move |(characteristic, (what, unit))| match *characteristic {
+                Characteristic::Line { .. } => None,
+                Characteristic::Curve { ref points, interpolation } => Some(PointTable {
+                    what,
+                    of: &element.name,
+                    points,
+                    interpolation,
+                    ends: Ends::Natural,
+                    units: [unit, units[2]],
+                    may_have_kinks: true,
+                }),
+            })
         });
         drives.chain(laws).chain(characteristics)
     }
@@ -296,16 +295,8 @@ impl Machine {
     pub fn length_scale(&self) -> f64 {
         let radii = self.loose_joints.iter().map(|joint| joint.contact.ball_radius);
         let closing = self.closing_joints.iter().map(|_| self.contact.ball_radius);
-        let depths = self.elements.iter().filter_map(|element| match &element.kind {
-            ElementKind::Stop(stop) if !element.is_on_hinge() => Some(DEPTH_FACTOR * stop.depth),
-            ElementKind::Stop(_)
-            | ElementKind::Spring(_)
-            | ElementKind::Load(_)
-            | ElementKind::JointSpring(_)
-            | ElementKind::Bushing(_)
-            | ElementKind::Motor(_)
-            | ElementKind::Tyre(_) => None,
-        });
+        let on_slides = self.elements.iter().filter(|element| !element.is_on_hinge());
+        let depths = on_slides.filter_map(|element| Some(DEPTH_FACTOR * element.describe().stop_depth?));
         let smallest = radii.chain(closing).chain(depths).reduce(f64::min);
         smallest.unwrap_or(self.contact.ball_radius).min(1.0)
     }
@@ -562,7 +553,7 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::{Attachment, Body, Element, Joint, Mat3, Spring, SpringSide, Vec3};
+    use crate::machine::{Attachment, Body, Element, ElementKind, Joint, Mat3, Spring, SpringSide, Vec3};
 
     /// Fault of a machine with a bob in a socket after `change`.
     fn fault(change: impl FnOnce(&mut Machine)) -> Option<MachineFault> {
@@ -606,9 +597,9 @@ mod tests {
         assert!(matches!(none, Some(MachineFault::NoFunction { function: 2, .. })), "{none:?}");
         let curve = fault(|machine| {
             let [from, to] = [Attachment::world(Vec3::zeros()), Attachment::on(0, Vec3::zeros())];
-            let elastic = Elastic::Curve { points: Vec::new(), interpolation: Interpolation::Monotone };
+            let elastic = Characteristic::Curve { points: Vec::new(), interpolation: Interpolation::Monotone };
             let side = SpringSide::Both;
-            let spring = Spring { from, to, length: 0.1, elastic, damping: 0.0, side };
+            let spring = Spring { from, to, length: 0.1, elastic, damping: Characteristic::linear(0.0), side };
             machine.elements.push(Element { name: "s".to_owned(), kind: ElementKind::Spring(spring) });
         });
         assert_eq!(curve, Some(MachineFault::Points { what: "s".to_owned() }));

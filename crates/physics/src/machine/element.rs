@@ -14,7 +14,8 @@ pub struct Element {
     pub kind: ElementKind,
 }
 
-/// Kind of a force element. Adding one takes a variant here, a file in `mechanism/elements`, and its row in the scene format.
+/// Kind of a force element. Adding one takes a variant here with its [`Description`], a file in `mechanism/elements`, and its row
+/// in the scene format.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ElementKind {
     /// Spring-damper along the line between two points.
@@ -42,26 +43,27 @@ pub struct JointCoordinate {
     pub freedom: Freedom,
 }
 
-/// Elastic characteristic of a spring.
+/// Force of a spring by its stretch, m (rad on a hinge), or of a damper by the rate of that, m/s (rad/s).
 #[derive(Clone, Debug, PartialEq)]
-pub enum Elastic {
-    /// preload + stiffness s, with the stretch s.
+pub enum Characteristic {
+    /// offset + slope x, with the stretch or the rate x.
     Line {
-        /// Force at zero stretch, N (N m on a hinge).
-        preload: f64,
-        /// Stiffness, N/m (N m/rad on a hinge).
-        stiffness: f64,
+        /// Force at 0, N (N m on a hinge): the preload of a spring, 0 for a damper.
+        offset: f64,
+        /// Stiffness, N/m (N m/rad on a hinge), or damping, N s/m (N m s/rad).
+        slope: f64,
     },
     /// A curve through points.
     Curve {
-        /// Stretches, m (rad), and tensions, N (N m), in ascending stretch.
+        /// Stretches or rates, and forces, N (N m), with increasing first coordinates.
         points: Vec<[f64; 2]>,
         /// How it passes through them.
         interpolation: Interpolation,
     },
 }
 
-/// Tension `elastic` + `damping` dl/dt along the line between two points, restricted to one sign if the spring is one-sided.
+/// Tension `elastic`(l - `length`) + `damping`(dl/dt) along the line between two points at the distance l, restricted to one sign
+/// if the spring is one-sided.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spring {
     /// First point of application.
@@ -71,9 +73,9 @@ pub struct Spring {
     /// Distance of the points at zero stretch, m.
     pub length: f64,
     /// Tension as a function of the stretch.
-    pub elastic: Elastic,
-    /// Damping, N s/m.
-    pub damping: f64,
+    pub elastic: Characteristic,
+    /// Tension as a function of the rate of the distance.
+    pub damping: Characteristic,
     /// Direction in which it acts.
     pub side: SpringSide,
 }
@@ -93,17 +95,17 @@ pub struct Load {
     pub factor: Option<Drive>,
 }
 
-/// Force or torque on the child, towards lower coordinates: `elastic` + `damping` dq/dt.
+/// Force or torque on the child, towards lower coordinates q: `elastic`(q - `position`) + `damping`(dq/dt).
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointSpring {
     /// Coordinate on which it acts.
     pub on: JointCoordinate,
     /// Coordinate at zero stretch, m or rad.
     pub position: f64,
-    /// Tension as a function of the stretch.
-    pub elastic: Elastic,
-    /// Damping, N s/m or N m s/rad.
-    pub damping: f64,
+    /// Force or torque as a function of the stretch.
+    pub elastic: Characteristic,
+    /// Force or torque as a function of the rate of the coordinate.
+    pub damping: Characteristic,
 }
 
 /// Stop force F = K d^1.5 (1 + a dd/dt), never below 0, with the depth d beyond a limit.
@@ -226,19 +228,24 @@ impl SpringSide {
     }
 }
 
-impl Elastic {
-    /// Whether the tension is ever nonzero.
+impl Characteristic {
+    /// A line through 0 with this slope.
+    pub const fn linear(slope: f64) -> Self {
+        Self::Line { offset: 0.0, slope }
+    }
+
+    /// Whether the force is ever nonzero.
     pub fn has_effect(&self) -> bool {
         match self {
-            Self::Line { preload, stiffness } => *preload != 0.0 || *stiffness != 0.0,
+            Self::Line { offset, slope } => *offset != 0.0 || *slope != 0.0,
             Self::Curve { points, .. } => points.iter().any(|point| point[1] != 0.0),
         }
     }
 
-    /// Tension at zero stretch, N or N m; a curve is interpolated linearly.
-    fn unstretched(&self) -> f64 {
+    /// Force at 0, N or N m; a curve is interpolated linearly.
+    fn at_zero(&self) -> f64 {
         let points = match self {
-            Self::Line { preload, .. } => return *preload,
+            Self::Line { offset, .. } => return *offset,
             Self::Curve { points, .. } => points,
         };
         let next = points.partition_point(|point| point[0] < 0.0);
@@ -248,36 +255,109 @@ impl Elastic {
     }
 }
 
+/// Where an element acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// At a point of a body.
+    Point(Attachment),
+    /// Between points of two bodies.
+    Between([Attachment; 2]),
+    /// On a coordinate of a joint.
+    Coordinate(JointCoordinate),
+}
+
+/// What an element says of itself, whatever its kind.
+#[derive(Clone, Copy, Debug)]
+pub struct Description<'a> {
+    /// Name of the kind in a scene file.
+    pub word: &'static str,
+    /// Where it acts.
+    pub place: Place,
+    /// Elastic and damping force of a spring.
+    pub spring: Option<[&'a Characteristic; 2]>,
+    /// Time law that it follows, if any, with its key in a scene file.
+    pub law: Option<(&'static str, &'a Drive)>,
+    /// Magnitude of a force that depends on neither motion nor time, N or N m.
+    pub constant_force: f64,
+    /// Depth at which a stop exerts the force given for it, m or rad.
+    pub stop_depth: Option<f64>,
+    /// Whether it is a load from outside the machine.
+    pub is_external: bool,
+}
+
 impl Element {
+    /// What it says of itself.
+    pub fn describe(&self) -> Description<'_> {
+        let of = |word, place| Description {
+            word,
+            place,
+            spring: None,
+            law: None,
+            constant_force: 0.0,
+            stop_depth: None,
+            is_external: false,
+        };
+        match &self.kind {
+            ElementKind::Spring(spring) => Description {
+                spring: Some([&spring.elastic, &spring.damping]),
+                ..of("spring", Place::Between([spring.from, spring.to]))
+            },
+            ElementKind::Load(load) => Description {
+                law: load.factor.as_ref().map(|factor| ("factor", factor)),
+                constant_force: load.force.norm(),
+                is_external: true,
+                ..of("load", Place::Point(load.on))
+            },
+            ElementKind::JointSpring(spring) => Description {
+                spring: Some([&spring.elastic, &spring.damping]),
+                ..of("joint_spring", Place::Coordinate(spring.on))
+            },
+            ElementKind::Stop(stop) => {
+                Description { stop_depth: Some(stop.depth), ..of("stop", Place::Coordinate(stop.on)) }
+            }
+            ElementKind::Bushing(bushing) => of("bushing", Place::Between([bushing.from, bushing.to])),
+            ElementKind::Motor(motor) => Description {
+                law: motor.target.as_ref().map(|target| ("target", target)),
+                constant_force: motor.force.abs().min(motor.limit),
+                ..of("motor", Place::Coordinate(motor.on))
+            },
+            ElementKind::Tyre(tyre) => Description {
+                law: tyre.ground.as_ref().map(|ground| ("ground", ground)),
+                ..of("tyre", Place::Point(tyre.on))
+            },
+        }
+    }
+
+    /// The time law of its [`Description`].
+    pub fn law_mut(&mut self) -> Option<&mut Drive> {
+        match &mut self.kind {
+            ElementKind::Load(load) => load.factor.as_mut(),
+            ElementKind::Motor(motor) => motor.target.as_mut(),
+            ElementKind::Tyre(tyre) => tyre.ground.as_mut(),
+            ElementKind::Spring(_) | ElementKind::JointSpring(_) | ElementKind::Stop(_) | ElementKind::Bushing(_) => {
+                None
+            }
+        }
+    }
+
     /// Points of application in `machine`: one, or two for an element between points; of one on a joint coordinate, the parent and
     /// child points of that joint.
     pub fn points(&self, machine: &Machine) -> Vec<Attachment> {
-        match &self.kind {
-            ElementKind::Spring(Spring { from, to, .. }) | ElementKind::Bushing(Bushing { from, to, .. }) => {
-                vec![*from, *to]
-            }
-            ElementKind::Load(Load { on, .. }) | ElementKind::Tyre(Tyre { on, .. }) => vec![*on],
-            ElementKind::JointSpring(JointSpring { on, .. })
-            | ElementKind::Stop(Stop { on, .. })
-            | ElementKind::Motor(Motor { on, .. }) => {
+        match self.describe().place {
+            Place::Point(point) => vec![point],
+            Place::Between(points) => points.to_vec(),
+            Place::Coordinate(on) => {
                 let joint = machine.kinematic_joints().nth(on.joint);
                 joint.map_or_else(Vec::new, |joint| joint.points().to_vec())
             }
         }
     }
 
-    /// Whether it acts between two points of its own.
-    pub(crate) fn is_between_points(&self) -> bool {
-        matches!(self.kind, ElementKind::Spring(_) | ElementKind::Bushing(_))
-    }
-
     /// The joint coordinate on which it acts, if any.
     pub fn coordinate(&self) -> Option<JointCoordinate> {
-        match &self.kind {
-            ElementKind::JointSpring(spring) => Some(spring.on),
-            ElementKind::Stop(stop) => Some(stop.on),
-            ElementKind::Motor(motor) => Some(motor.on),
-            ElementKind::Spring(_) | ElementKind::Load(_) | ElementKind::Bushing(_) | ElementKind::Tyre(_) => None,
+        match self.describe().place {
+            Place::Coordinate(on) => Some(on),
+            Place::Point(_) | Place::Between(_) => None,
         }
     }
 
@@ -286,59 +366,13 @@ impl Element {
         self.coordinate().is_some_and(|on| on.freedom.turns())
     }
 
-    /// The elastic law of a spring.
-    pub fn elastic(&self) -> Option<&Elastic> {
-        match &self.kind {
-            ElementKind::Spring(spring) => Some(&spring.elastic),
-            ElementKind::JointSpring(spring) => Some(&spring.elastic),
-            ElementKind::Load(_)
-            | ElementKind::Stop(_)
-            | ElementKind::Bushing(_)
-            | ElementKind::Motor(_)
-            | ElementKind::Tyre(_) => None,
-        }
-    }
-
-    /// The time law that it follows, if any.
-    pub fn law(&self) -> Option<&Drive> {
-        match &self.kind {
-            ElementKind::Load(load) => load.factor.as_ref(),
-            ElementKind::Motor(motor) => motor.target.as_ref(),
-            ElementKind::Tyre(tyre) => tyre.ground.as_ref(),
-            ElementKind::Spring(_) | ElementKind::JointSpring(_) | ElementKind::Stop(_) | ElementKind::Bushing(_) => {
-                None
-            }
-        }
-    }
-
     /// Largest force at its points due to its own parameters, N; contributions of the motion are excluded.
     pub fn own_force(&self) -> f64 {
-        let on_hinge = self.is_on_hinge();
-        match &self.kind {
-            ElementKind::Spring(spring) => spring.elastic.unstretched().abs(),
-            ElementKind::Load(load) => load.force.norm(),
-            ElementKind::JointSpring(spring) if !on_hinge => spring.elastic.unstretched().abs(),
-            ElementKind::Motor(motor) if !on_hinge => motor.force.abs().min(motor.limit),
-            ElementKind::JointSpring(_)
-            | ElementKind::Motor(_)
-            | ElementKind::Stop(_)
-            | ElementKind::Bushing(_)
-            | ElementKind::Tyre(_) => 0.0,
-        }
-    }
-}
-
-impl ElementKind {
-    /// Name of the kind in a scene file.
-    pub fn word(&self) -> &'static str {
-        match self {
-            Self::Spring(_) => "spring",
-            Self::Load(_) => "load",
-            Self::JointSpring(_) => "joint_spring",
-            Self::Stop(_) => "stop",
-            Self::Bushing(_) => "bushing",
-            Self::Motor(_) => "motor",
-            Self::Tyre(_) => "tyre",
+        let Description { spring, constant_force, .. } = self.describe();
+        match spring {
+            _ if self.is_on_hinge() => 0.0,
+            Some([elastic, _]) => elastic.at_zero().abs(),
+            None => constant_force,
         }
     }
 }

@@ -13,7 +13,7 @@ use super::bounds;
 use super::columns::{Column, collect_columns, collect_relative_columns, contact_sides};
 use super::contacts::Contacts;
 use super::coupled::{CoupledRows, add_impulse, apply_inverse_mass, mobility_between};
-use super::elements::{ActiveSet, At, Counts, Powers, SceneElement};
+use super::elements::{ActiveSet, At, Counts, ForceElement, Powers};
 use super::equations::Equations;
 use super::kinematics::Kinematics;
 use super::model::{Anchor, ContactId, Model};
@@ -279,7 +279,7 @@ impl DiscreteGradient {
     fn gather_elements(
         &mut self,
         model: &Model,
-        elements: &[Box<dyn SceneElement>],
+        elements: &[Box<dyn ForceElement>],
         equations: &dyn Equations,
         at: &At<'_>,
         h: f64,
@@ -563,7 +563,7 @@ impl Mechanism {
             let motion = self.equations.motion();
             let world = self.model.bodies.len();
             let fixed = Anchor { body: world, offset: Vec3::zeros() };
-            let ends = |element: &dyn SceneElement| element.ends(motion).unwrap_or([fixed; 2]);
+            let ends = |element: &dyn ForceElement| element.ends(motion).unwrap_or([fixed; 2]);
             let elements: Vec<[Anchor; 2]> = self.elements.iter().map(|element| ends(&**element)).collect();
             let discrete = DiscreteGradient::new(&self.model, dimension, positions, within, &elements)?;
             self.discrete = Some(Box::new(discrete));

@@ -13,7 +13,7 @@ use super::model::Model;
 use super::settled::{settle, without_play};
 use super::{ActiveSet, Mechanism, MechanismError};
 use crate::contact::ContactState;
-use crate::machine::{Drive, ElementKind, Formulation, LooseJoint, Machine, Mat3, StartRule, Vec3};
+use crate::machine::{Drive, Formulation, LooseJoint, Machine, Mat3, StartRule, Vec3};
 use search::Search;
 
 /// Maximum number of velocity coordinates: the derivative of the forces is taken by differences and is dense.
@@ -151,15 +151,7 @@ pub(super) fn with_constant_laws(machine: &Machine) -> Machine {
     }
     for element in &mut constant.elements {
         let turns = element.is_on_hinge();
-        let law = match &mut element.kind {
-            ElementKind::Load(load) => &mut load.factor,
-            ElementKind::Motor(motor) => &mut motor.target,
-            ElementKind::Tyre(tyre) => &mut tyre.ground,
-            ElementKind::Spring(_) | ElementKind::JointSpring(_) | ElementKind::Stop(_) | ElementKind::Bushing(_) => {
-                continue;
-            }
-        };
-        law.iter_mut().for_each(|law| hold(law, turns));
+        element.law_mut().into_iter().for_each(|law| hold(law, turns));
     }
     constant
 }

@@ -65,7 +65,7 @@ use std::sync::Arc;
 
 use crate::machine::{Formulation, Machine, MachineFault, Mat3, StartRule, Vec3};
 use crate::units::format_quantity_digits;
-use elements::{ForceElement, SceneElement, elements_of};
+use elements::{ForceElement, elements_of};
 use equations::{Equations, LEAST_PIVOT, NEARLY_DEPENDENT};
 use forest::Forest;
 use lagrange::Lagrange;
@@ -335,7 +335,9 @@ pub struct Mechanism {
     /// Bodies that determine the gap of each contact; `None` if nearly all do.
     paths: Vec<Option<Path>>,
     /// The scene's elements in its order, then the pulling hand, if any.
-    elements: Vec<Box<dyn SceneElement>>,
+    elements: Vec<Box<dyn ForceElement>>,
+    /// Time laws of the elements.
+    element_laws: Vec<Arc<dyn Law>>,
     /// Number of the scene's elements.
     scene_elements: usize,
     pull: Option<Pull>,
@@ -411,6 +413,7 @@ impl Mechanism {
             evaluation_time: bounds::evaluation_time(machine, &model),
             sources: power::Sources::new(&model, &*equations, machine.elements.len()),
             elements: elements_of(machine, &model),
+            element_laws: machine.elements.iter().filter_map(drives::law_of).collect(),
             scene_elements: machine.elements.len(),
             pull: None,
             turns: Turns::new(machine, &model),
@@ -464,7 +467,7 @@ impl Mechanism {
 
     /// Maximum step if the motion is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
     pub(crate) fn kinematic_step(&self) -> f64 {
-        let laws = self.elements.iter().filter_map(|element| element.law());
+        let laws = self.element_laws.iter();
         laws.map(|law| law.shortest_period()).fold(self.model.shortest_period, f64::min) / 50.0
     }
 
@@ -475,7 +478,7 @@ impl Mechanism {
 
     /// Latest end of an adaptive step that starts at `t`, s.
     pub fn step_end(&self, t: f64) -> f64 {
-        let laws = self.elements.iter().filter_map(|element| element.law());
+        let laws = self.element_laws.iter();
         laws.map(|law| law.step_end(t)).fold(self.model.step_end(t), f64::min)
     }
 
@@ -710,14 +713,10 @@ impl Mechanism {
         scene_elements.map(move |e| e.report(t, motion))
     }
 
-    /// Two indicators per one-sided element: depth of contact, and the smaller of that and an indicator that falls to 0 when
-    /// contact is lost while compressed. Then one per element whose force has kinks. `t`, s, is the time of the motion last
-    /// measured.
+    /// Indicators of all edges of the elements' forces. `t`, s, is the time of the motion last measured.
     pub(crate) fn edge_indicators(&self, t: f64) -> impl Iterator<Item = EdgeIndicator> {
         let motion = self.equations.motion();
-        let of_contact = self.elements.iter().filter_map(move |e| e.contact_indicators(t, motion)).flatten();
-        let segments = self.elements.iter().filter_map(move |e| e.segment(t, motion));
-        of_contact.map(EdgeIndicator::Contact).chain(segments.map(EdgeIndicator::Segment))
+        self.elements.iter().flat_map(move |element| element.edges(t, motion)).flatten()
     }
 
     /// Whether any element is one-sided or has a force with kinks.
@@ -725,25 +724,14 @@ impl Mechanism {
         self.edge_indicators(0.0).next().is_some()
     }
 
-    /// Whether the force of any element in contact, by `indicators` from [`Self::edge_indicators`], has a vertical slope at first
-    /// contact.
-    pub(crate) fn has_vertical_onset(&self, indicators: &[EdgeIndicator]) -> bool {
-        let motion = self.equations.motion();
-        let one_sided = self.elements.iter().filter(|e| e.contact_indicators(0.0, motion).is_some());
-        let in_contact = |own: &[EdgeIndicator]| own[1].side() > 0.0;
-        indicators.chunks_exact(2).zip(one_sided).any(|(own, element)| in_contact(own) && element.has_vertical_onset())
-    }
-
     /// Freezes each element on its side of every edge according to `indicators` from [`Self::edge_indicators`], regardless of the
     /// motion; unfreezes it if `indicators` is empty.
     pub(crate) fn freeze_elements(&mut self, indicators: &[EdgeIndicator]) {
         let motion = self.equations.motion();
-        let mut remaining = indicators.iter().map(|indicator| indicator.side());
-        for element in self.elements.iter_mut().filter(|e| e.contact_indicators(0.0, motion).is_some()) {
-            element.freeze_contact(remaining.nth(1).map(|side| side > 0.0));
-        }
-        for element in self.elements.iter_mut().filter(|e| e.segment(0.0, motion).is_some()) {
-            element.freeze_segment(remaining.next().map(|side| side as usize));
+        let mut indicators = indicators.iter().copied();
+        for element in &mut self.elements {
+            let sides = element.edges(0.0, motion).map(|edge| edge.and_then(|_| indicators.next()));
+            element.freeze(sides);
         }
     }
 

@@ -8,7 +8,7 @@
 
 use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
-use super::elements::{ActiveSet, At, Coupling, ForceElement, SceneElement, TorqueDerivatives};
+use super::elements::{ActiveSet, At, Coupling, ForceElement, TorqueDerivatives};
 use super::equations::Equations;
 use super::flight::ActiveRanges;
 use super::lu::Lu;
@@ -102,7 +102,7 @@ impl Stiff {
         &mut self,
         model: &Model,
         contacts: &Contacts,
-        elements: &[Box<dyn SceneElement>],
+        elements: &[Box<dyn ForceElement>],
         active_set: ActiveSet<'_>,
         equations: &dyn Equations,
         (t, y): (f64, &[f64]),

@@ -5,7 +5,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::Mechanism;
-use super::elements::{AngleReference, SceneElement};
+use super::elements::{AngleReference, ForceElement};
 use super::equations::Equations;
 use super::model::{Body, BodyIndex, Model, Motion};
 use super::tree::Tree;
@@ -77,7 +77,7 @@ impl CoordinateLocation {
 
 impl Counted {
     /// Sets the reference, also of its elements.
-    fn set_reference(&mut self, time: f64, angle: f64, elements: &mut [Box<dyn SceneElement>]) {
+    fn set_reference(&mut self, time: f64, angle: f64, elements: &mut [Box<dyn ForceElement>]) {
         self.reference = AngleReference { time, angle };
         for &element in &self.elements {
             elements[element].set_angle_reference(self.reference);
@@ -171,7 +171,7 @@ impl Turns {
     /// those of the others.
     pub(super) fn follow(
         &mut self,
-        elements: &mut [Box<dyn SceneElement>],
+        elements: &mut [Box<dyn ForceElement>],
         equations: &dyn Equations,
         model: &Model,
         (t, y): (f64, &[f64]),

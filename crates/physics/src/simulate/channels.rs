@@ -8,7 +8,7 @@ pub use table::Quantity;
 use table::TIME;
 
 use super::Frame;
-use crate::machine::{Freedom, Joint, JointKind, Machine};
+use crate::machine::{Freedom, Joint, JointKind, Machine, Place};
 use table::{Repetition, Signal, SignalSource, TABLE};
 
 /// Largest number of ball joints and drives that are recorded: in a longer chain the rest is not worth the memory.
@@ -245,7 +245,7 @@ fn has_signal(
         }
         SignalSource::ProbeError | SignalSource::ProbeDistance => known(machine.output.probe.is_some()),
         SignalSource::Element(_) => known(true),
-        SignalSource::ElementValue(_) => machine.elements[part].is_between_points(),
+        SignalSource::ElementValue(_) => matches!(machine.elements[part].describe().place, Place::Between(_)),
         _ => true,
     }
 }

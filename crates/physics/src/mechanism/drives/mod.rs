@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 use crate::interpolate::{Ends, Interpolation};
 use crate::jet::Jet;
-use crate::machine::{Drive, Joint, Machine};
+use crate::machine::{Description, Drive, Element, Joint, Machine};
 
 /// A coordinate, m or rad, or a factor as a function of time, s. Allocates nothing.
 pub trait Law: Debug + Send + Sync {
@@ -81,22 +81,24 @@ pub(super) fn trajectory_of(drive: &Drive, turns: bool) -> Trajectory {
     })
 }
 
-/// Law of the factor of a load, whose rate may jump; `None` for a function of the closed form.
-pub(super) fn law_of_factor(drive: &Drive) -> Option<Arc<dyn Law>> {
+/// Time law that an element follows, if any. The rate of a load's factor may jump.
+pub(super) fn law_of(element: &Element) -> Option<Arc<dyn Law>> {
+    let Description { law, is_external, .. } = element.describe();
+    let (_, drive) = law?;
     match drive {
         // It follows the data up to its ends.
-        Drive::Table { points, interpolation: Interpolation::Monotone, repeats: false } => {
+        Drive::Table { points, interpolation: Interpolation::Monotone, repeats: false } if is_external => {
             Some(Arc::new(Table::new(points, Interpolation::Monotone, Ends::Natural)))
         }
-        _ => trajectory_of(drive, false).law().cloned(),
+        _ => trajectory_of(drive, element.is_on_hinge()).law().cloned(),
     }
 }
 
 /// Laws of joint drives and of the time laws of force elements, without the functions of the closed form.
 pub fn laws_of(machine: &Machine) -> impl Iterator<Item = Arc<dyn Law>> {
-    let drives = machine.joints.iter().flat_map(Joint::drives).map(|(freedom, drive)| (drive, freedom.turns()));
-    let elements = machine.elements.iter().filter_map(|element| Some((element.law()?, element.is_on_hinge())));
-    drives.chain(elements).filter_map(|(drive, turns)| trajectory_of(drive, turns).law().cloned())
+    let drives = machine.joints.iter().flat_map(Joint::drives);
+    let of_drives = drives.filter_map(|(freedom, drive)| trajectory_of(drive, freedom.turns()).law().cloned());
+    of_drives.chain(machine.elements.iter().filter_map(law_of))
 }
 
 /// Periods of joint drives and of the time laws of force elements, s; infinite if one does not repeat or nothing moves.
@@ -106,11 +108,7 @@ pub fn periods_of(machine: &Machine) -> impl Iterator<Item = f64> {
         let trajectory = trajectory_of(drive, freedom.turns());
         trajectory.law().map_or_else(|| closed_period(machine), |law| law.period())
     });
-    let of_elements = machine.elements.iter().filter_map(|element| {
-        let trajectory = trajectory_of(element.law()?, element.is_on_hinge());
-        Some(trajectory.law().map_or(f64::INFINITY, |law| law.period()))
-    });
-    of_drives.chain(of_elements)
+    of_drives.chain(machine.elements.iter().filter_map(law_of).map(|law| law.period()))
 }
 
 impl Trajectory {

@@ -5,23 +5,18 @@
 //! rotations up to half a turn. Both forces act at the second point, and the torque is -J^-T L theta, where J maps the rate of
 //! theta to the relative angular velocity. About one axis that is -L theta.
 
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, TorqueDerivatives, push};
-use crate::machine::{self, Mat3, Quat, Vec3};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, TorqueDerivatives, push};
+use crate::machine::{self, Mat3, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::{Kinematics, quaternion_of};
 use crate::mechanism::model::Anchor;
 
-struct Bushing {
-    from: Anchor,
-    to: Anchor,
+pub(super) struct Bushing {
+    bushing: machine::Bushing,
+    ends: [Anchor; 2],
     /// Bushing axes as columns, and rest orientation of the second body, both in the axes of the first.
     axes: Mat3,
     rest: Mat3,
-    /// Diagonals of K and its damping, of L and its damping.
-    stiffness: Vec3,
-    damping: Vec3,
-    turning_stiffness: Vec3,
-    turning_damping: Vec3,
 }
 
 /// State at one instant, along the bushing axes unless stated otherwise.
@@ -37,20 +32,6 @@ struct State {
     /// theta, rad, and relative angular velocity.
     turn: Vec3,
     spin: Vec3,
-}
-
-pub(super) fn make(bushing: &machine::Bushing, [from, to]: [Anchor; 2]) -> Box<dyn SceneElement> {
-    let matrix = |rotation: Quat| rotation.to_rotation_matrix().into_inner();
-    Box::new(Bushing {
-        from,
-        to,
-        axes: matrix(bushing.axes),
-        rest: matrix(bushing.rotation),
-        stiffness: bushing.stiffness,
-        damping: bushing.damping,
-        turning_stiffness: bushing.turning_stiffness,
-        turning_damping: bushing.turning_damping,
-    })
 }
 
 /// Rotation vector of a rotation matrix.
@@ -77,11 +58,17 @@ fn torque_matrix(turn: &Vec3) -> Mat3 {
 }
 
 impl Bushing {
+    pub fn new(bushing: &machine::Bushing, ends: [Anchor; 2]) -> Self {
+        let [axes, rest] = [bushing.axes, bushing.rotation].map(|rotation| rotation.to_rotation_matrix().into_inner());
+        Self { bushing: *bushing, ends, axes, rest }
+    }
+
     fn state(&self, motion: &[Kinematics]) -> State {
-        let (first, second) = (&motion[self.from.body], &motion[self.to.body]);
+        let [from, to] = &self.ends;
+        let (first, second) = (&motion[from.body], &motion[to.body]);
         let axes = first.rotation * self.axes;
-        let from = first.position + first.rotation * self.from.offset;
-        let arm = second.rotation * self.to.offset;
+        let from = first.position + first.rotation * from.offset;
+        let arm = second.rotation * to.offset;
         let to = second.position + arm;
         let arms = [to - first.position, arm];
         let relative = first.rotation.tr_mul(&second.rotation) * self.rest.transpose();
@@ -98,15 +85,15 @@ impl Bushing {
 
     /// Force on the second point and torque on its body, world axes.
     fn loads(&self, s: &State) -> [Vec3; 2] {
-        let force = self.stiffness.component_mul(&s.offset) + self.damping.component_mul(&s.rate);
-        let torque = torque_matrix(&s.turn) * self.turning_stiffness.component_mul(&s.turn)
-            + self.turning_damping.component_mul(&s.spin);
+        let force = self.bushing.stiffness.component_mul(&s.offset) + self.bushing.damping.component_mul(&s.rate);
+        let torque = torque_matrix(&s.turn) * self.bushing.turning_stiffness.component_mul(&s.turn)
+            + self.bushing.turning_damping.component_mul(&s.spin);
         [force, torque].map(|along| s.axes * -along)
     }
 
     fn ends_in(&self, s: &State, motion: &[Kinematics]) -> [Anchor; 2] {
-        let from = Anchor { body: self.from.body, offset: motion[self.from.body].rotation.tr_mul(&s.arms[0]) };
-        [from, self.to]
+        let [Anchor { body, .. }, to] = self.ends;
+        [Anchor { body, offset: motion[body].rotation.tr_mul(&s.arms[0]) }, to]
     }
 }
 
@@ -114,10 +101,10 @@ impl ForceElement for Bushing {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
         let s = self.state(at.motion);
         let [force, torque] = self.loads(&s);
-        let first = &mut loads.wrench[self.from.body];
+        let first = &mut loads.wrench[self.ends[0].body];
         push(first, &s.arms[0], &-force);
         first.torque -= torque;
-        let second = &mut loads.wrench[self.to.body];
+        let second = &mut loads.wrench[self.ends[1].body];
         push(second, &s.arms[1], &force);
         second.torque += torque;
     }
@@ -132,10 +119,12 @@ impl ForceElement for Bushing {
         let across = |diagonal: &Vec3| world(Mat3::from_diagonal(diagonal));
         let to_torque = torque_matrix(&s.turn);
         let torque_derivatives = TorqueDerivatives {
-            by_rotation: world(to_torque * Mat3::from_diagonal(&self.turning_stiffness) * to_torque.transpose()),
-            by_angular_velocity: across(&self.turning_damping),
+            by_rotation: world(
+                to_torque * Mat3::from_diagonal(&self.bushing.turning_stiffness) * to_torque.transpose(),
+            ),
+            by_angular_velocity: across(&self.bushing.turning_damping),
         };
-        let along = [across(&self.stiffness), across(&self.damping)];
+        let along = [across(&self.bushing.stiffness), across(&self.bushing.damping)];
         let ends = self.ends_in(&s, at.motion);
         Some(Coupling::at_one_point(ends, along, torque_derivatives))
     }
@@ -143,17 +132,15 @@ impl ForceElement for Bushing {
     fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
         let s = self.state(motion);
         let twice = |stiffness: &Vec3, x: &Vec3| stiffness.component_mul(x).dot(x);
-        0.5 * (twice(&self.stiffness, &s.offset) + twice(&self.turning_stiffness, &s.turn))
+        0.5 * (twice(&self.bushing.stiffness, &s.offset) + twice(&self.bushing.turning_stiffness, &s.turn))
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
         let s = self.state(motion);
-        powers.damping +=
-            self.damping.component_mul(&s.rate).dot(&s.rate) + self.turning_damping.component_mul(&s.spin).dot(&s.spin);
+        powers.damping += self.bushing.damping.component_mul(&s.rate).dot(&s.rate)
+            + self.bushing.turning_damping.component_mul(&s.spin).dot(&s.spin);
     }
-}
 
-impl SceneElement for Bushing {
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
         let s = self.state(motion);
         let [force, torque] = self.loads(&s);

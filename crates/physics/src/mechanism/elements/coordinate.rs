@@ -4,10 +4,60 @@
 
 use std::f64::consts::TAU;
 
-use super::{Coupling, ElementReport, TorqueDerivatives, push};
+use super::{At, Coupling, Edges, ElementReport, ForceElement, Loads, Powers, TorqueDerivatives, push};
+use crate::jet::Jet;
 use crate::machine::{Freedom, JointCoordinate, Machine, Mat3, Vec3};
 use crate::mechanism::kinematics::{Kinematics, Wrench};
 use crate::mechanism::model::{Anchor, Model};
+
+/// A force or torque on the child along a coordinate, by the deviation of the coordinate from a target, m or rad, and its rate.
+pub(super) trait CoordinateLaw: Send + Sync {
+    /// The target at `t`, s.
+    fn target(&self, t: f64) -> Jet;
+
+    /// The force, N or N m.
+    fn force(&self, deviation: [f64; 2]) -> f64;
+
+    /// Its derivatives; `None` where it is constant.
+    fn slopes(&self, deviation: [f64; 2]) -> Option<Slopes>;
+
+    /// Whether it ever depends on the deviation.
+    fn is_stiff(&self) -> bool {
+        true
+    }
+
+    /// Stored energy, J.
+    fn stored(&self, _deviation: f64) -> f64 {
+        0.0
+    }
+
+    /// As [`ForceElement::work`].
+    fn work(&self, _from: [f64; 2], _to: [f64; 2]) -> f64 {
+        0.0
+    }
+
+    /// Adds its powers; `rate` is that of the coordinate itself.
+    fn add_powers(&self, deviation: [f64; 2], rate: f64, powers: &mut Powers);
+
+    /// As [`ForceElement::edges`].
+    fn edges(&self, _deviation: impl FnOnce() -> [f64; 2]) -> Edges {
+        Edges::default()
+    }
+
+    /// As [`ForceElement::freeze`].
+    fn freeze(&mut self, _sides: Edges) {}
+
+    /// As [`ElementReport::depth`].
+    fn depth(&self, _deviation: f64) -> Option<[f64; 2]> {
+        None
+    }
+}
+
+/// The element with a law on a coordinate.
+pub(super) struct OnCoordinate<L> {
+    pub on: Coordinate,
+    pub law: L,
+}
 
 /// A displacement along an axis or an angle about it.
 #[derive(Clone, Copy)]
@@ -44,12 +94,11 @@ impl AngleReference {
 }
 
 /// A coordinate at one instant.
-#[derive(Clone, Copy)]
-pub(super) struct CoordinateState {
-    /// Coordinate relative to the given position, m or rad.
-    pub deviation: f64,
-    /// Rate, m/s or rad/s.
-    pub rate: f64,
+struct State {
+    /// Coordinate relative to the target, m or rad, and the rate of that.
+    deviation: [f64; 2],
+    /// Rate of the coordinate, m/s or rad/s.
+    rate: f64,
     /// Axis, world.
     along: Vec3,
     /// Joint point of the child, world, m, and its arms from the centroids of parent and child.
@@ -92,13 +141,8 @@ impl Coordinate {
         }
     }
 
-    /// Sets the reference that determines the turns of an angle from now on.
-    pub fn set_reference(&mut self, reference: AngleReference) {
-        self.reference = reference;
-    }
-
-    /// The coordinate relative to `position`, and its rate, at `t`, s.
-    pub fn measure(&self, position: f64, t: f64, motion: &[Kinematics]) -> CoordinateState {
+    /// The coordinate at `t`, s, relative to `target`.
+    fn measure(&self, target: &Jet, t: f64, motion: &[Kinematics]) -> State {
         let (parent, child) = (&motion[self.parent.body], &motion[self.child.body]);
         let of_axis = if self.in_child { child } else { parent };
         let along = of_axis.rotation * self.axis;
@@ -109,17 +153,17 @@ impl Coordinate {
             let (zero, now) = (parent.rotation * self.across, child.rotation * self.child_across);
             let angle = libm::atan2(zero.cross(&now).dot(&along), zero.dot(&now));
             let rate = along.dot(&(child.angular_velocity - parent.angular_velocity));
-            (angle - position + self.reference.whole_turns(angle, rate, t), rate)
+            (angle - target.value + self.reference.whole_turns(angle, rate, t), rate)
         } else {
             let slid = from_parent - parent.rotation * self.parent.offset;
             let velocity = child.point_velocity(&arm) - parent.point_velocity(&from_parent);
-            (along.dot(&slid) - position, along.dot(&velocity))
+            (along.dot(&slid) - target.value, along.dot(&velocity))
         };
-        CoordinateState { deviation, rate, along, point, arms: [from_parent, arm] }
+        State { deviation: [deviation, rate - target.rate], rate, along, point, arms: [from_parent, arm] }
     }
 
     /// Adds `force` (N or N m) along the axis to the child, and its opposite to the parent.
-    pub fn apply_force(&self, state: &CoordinateState, force: f64, wrench: &mut [Wrench]) {
+    fn apply_force(&self, state: &State, force: f64, wrench: &mut [Wrench]) {
         let force = state.along * force;
         let [from_parent, arm] = &state.arms;
         if self.turns {
@@ -132,7 +176,7 @@ impl Coordinate {
     }
 
     /// The child's joint point as a point of the parent and as a point of the child: their relative motion is the joint's.
-    pub fn ends(&self, motion: &[Kinematics]) -> [Anchor; 2] {
+    fn ends(&self, motion: &[Kinematics]) -> [Anchor; 2] {
         let (parent, child) = (&motion[self.parent.body], &motion[self.child.body]);
         let point = child.position + child.rotation * self.child.offset;
         let parent = Anchor { body: self.parent.body, offset: parent.rotation.tr_mul(&(point - parent.position)) };
@@ -140,7 +184,7 @@ impl Coordinate {
     }
 
     /// Linearisation of a force along the axis.
-    pub fn coupling(&self, state: &CoordinateState, slopes: &Slopes, motion: &[Kinematics]) -> Coupling {
+    fn coupling(&self, state: &State, slopes: &Slopes, motion: &[Kinematics]) -> Coupling {
         let along = state.along * state.along.transpose();
         let (stiffness, damping) = (along * slopes.by_position, along * slopes.by_rate);
         let ends = self.ends(motion);
@@ -152,7 +196,7 @@ impl Coordinate {
     }
 
     /// Report of a force along the axis.
-    pub fn report(&self, state: &CoordinateState, force: f64, motion: &[Kinematics]) -> ElementReport {
+    fn report(&self, state: &State, force: f64, motion: &[Kinematics]) -> ElementReport {
         let force = state.along * force;
         if self.turns {
             return ElementReport {
@@ -169,5 +213,62 @@ impl Coordinate {
             force,
             ..ElementReport::default()
         }
+    }
+}
+
+impl<L: CoordinateLaw> OnCoordinate<L> {
+    fn state(&self, t: f64, motion: &[Kinematics]) -> State {
+        self.on.measure(&self.law.target(t), t, motion)
+    }
+}
+
+impl<L: CoordinateLaw> ForceElement for OnCoordinate<L> {
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        let state = self.state(at.t, at.motion);
+        let force = self.law.force(state.deviation);
+        if force != 0.0 {
+            self.on.apply_force(&state, force, loads.wrench);
+        }
+    }
+
+    fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
+        self.law.is_stiff().then(|| self.on.ends(motion))
+    }
+
+    fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
+        let state = self.state(at.t, at.motion);
+        Some(self.on.coupling(&state, &self.law.slopes(state.deviation)?, at.motion))
+    }
+
+    fn stored(&self, t: f64, motion: &[Kinematics]) -> f64 {
+        self.law.stored(self.state(t, motion).deviation[0])
+    }
+
+    fn work(&self, t: f64, poses: [&[Kinematics]; 2]) -> f64 {
+        let [from, to] = poses.map(|motion| self.state(t, motion).deviation);
+        self.law.work(from, to)
+    }
+
+    fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
+        let state = self.state(t, motion);
+        self.law.add_powers(state.deviation, state.rate, powers);
+    }
+
+    fn edges(&self, t: f64, motion: &[Kinematics]) -> Edges {
+        self.law.edges(|| self.state(t, motion).deviation)
+    }
+
+    fn freeze(&mut self, sides: Edges) {
+        self.law.freeze(sides);
+    }
+
+    fn set_angle_reference(&mut self, reference: AngleReference) {
+        self.on.reference = reference;
+    }
+
+    fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
+        let state = self.state(t, motion);
+        let depth = self.law.depth(state.deviation[0]);
+        ElementReport { depth, ..self.on.report(&state, self.law.force(state.deviation), motion) }
     }
 }

@@ -3,37 +3,25 @@
 use std::sync::Arc;
 
 use super::bushing::rotation_vector;
-use super::{At, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
+use super::{At, ElementReport, ForceElement, Loads, point_of, push};
 use crate::machine::{self, LoadAxes, Vec3};
 use crate::mechanism::Powers;
-use crate::mechanism::drives::{Law, law_of_factor};
+use crate::mechanism::drives::Law;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 
-struct Load {
-    on: Anchor,
-    force: Vec3,
-    torque: Vec3,
-    turns: bool,
-    factor: Option<Arc<dyn Law>>,
-}
-
-pub(super) fn make(load: &machine::Load, on: Anchor) -> Box<dyn SceneElement> {
-    Box::new(Load {
-        on,
-        force: load.force,
-        torque: load.torque,
-        turns: load.axes == LoadAxes::Body,
-        factor: load.factor.as_ref().and_then(law_of_factor),
-    })
+pub(super) struct Load {
+    pub load: machine::Load,
+    pub on: Anchor,
+    pub factor: Option<Arc<dyn Law>>,
 }
 
 impl Load {
     /// Force and torque at `t`, world axes.
     fn at(&self, t: f64, motion: &[Kinematics]) -> (Vec3, Vec3) {
         let factor = self.factor.as_ref().map_or(1.0, |law| law.at(t).value);
-        let (force, torque) = (self.force * factor, self.torque * factor);
-        if self.turns {
+        let (force, torque) = (self.load.force * factor, self.load.torque * factor);
+        if self.load.axes == LoadAxes::Body {
             let rotation = &motion[self.on.body].rotation;
             (rotation * force, rotation * torque)
         } else {
@@ -63,12 +51,6 @@ impl ForceElement for Load {
         let (_, velocity, _) = point_of(&self.on, motion);
         let spin = &motion[self.on.body].angular_velocity;
         powers.external += force.dot(&velocity) + torque.dot(spin);
-    }
-}
-
-impl SceneElement for Load {
-    fn law(&self) -> Option<&Arc<dyn Law>> {
-        self.factor.as_ref()
     }
 
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {

@@ -2,9 +2,9 @@
 //! them; the others come from the scene's list, each kind with an entry below.
 
 mod bushing;
+mod characteristic;
 mod contact;
 mod coordinate;
-mod elastic;
 mod joint_spring;
 mod load;
 mod motor;
@@ -16,18 +16,23 @@ mod tyre;
 pub(super) use contact::Contact;
 pub use contact::Gap;
 
-use std::sync::Arc;
-
 use serde::{Deserialize, Serialize};
 
-use super::drives::{Law, trajectory_of};
+use super::drives::law_of;
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
 use crate::contact::{ContactState, Stiffness};
-use crate::machine::{self, Attachment, Drive, Element, ElementKind, JointCoordinate, LoadAxes, Machine, Mat3, Vec3};
+use crate::machine::{self, Attachment, Element, ElementKind, JointCoordinate, LoadAxes, Machine, Mat3, Vec3};
+use bushing::Bushing;
 pub(super) use coordinate::AngleReference;
-use coordinate::Coordinate;
+use coordinate::{Coordinate, OnCoordinate};
+use joint_spring::JointSpring;
+use load::Load;
+use motor::Motor;
 pub use pull::Pull;
+use spring::Spring;
+use stop::Stop;
+use tyre::Tyre;
 
 /// Determines which contacts carry a force.
 #[derive(Clone, Copy, Debug)]
@@ -92,24 +97,40 @@ pub(super) struct At<'a> {
 pub enum EdgeIndicator {
     /// In any unit; above 0 where the element presses.
     Contact(f64),
-    /// Number of kinks passed, plus a fraction.
+    /// The same of a force whose slope has a vertical tangent at first contact.
+    VerticalOnset(f64),
+    /// Number of kinks passed, plus a fraction that grows from 0 to 1 up to the next.
     Segment(f64),
 }
+
+/// Edges of one element: depth of contact, and the smaller of that and an indicator that falls to 0 when contact is lost while still
+/// compressed; then the segments of its elastic and of its damping force. All are `None` where it has no such edge.
+pub(super) type Edges = [Option<EdgeIndicator>; 4];
 
 impl EdgeIndicator {
     /// The number, which is continuous.
     pub fn value(self) -> f64 {
         match self {
-            Self::Contact(value) | Self::Segment(value) => value,
+            Self::Contact(value) | Self::VerticalOnset(value) | Self::Segment(value) => value,
         }
     }
 
     /// The largest whole number, kinks passed or 1 for an element that presses, not above the indicator.
     pub fn side(self) -> f64 {
         match self {
-            Self::Contact(value) => f64::from(value > 0.0),
+            Self::Contact(value) | Self::VerticalOnset(value) => f64::from(value > 0.0),
             Self::Segment(value) => value.floor(),
         }
+    }
+
+    /// Whether the element presses.
+    fn presses(self) -> bool {
+        self.side() > 0.0
+    }
+
+    /// Whether it presses with a force whose slope was vertical at first contact.
+    pub fn has_vertical_onset(&self) -> bool {
+        matches!(self, Self::VerticalOnset(value) if *value > 0.0)
     }
 
     /// The value at the first edge on the way to `later`, if there is one.
@@ -117,9 +138,9 @@ impl EdgeIndicator {
         let [from, to] = [self.side(), later.side()];
         match self {
             _ if from == to => None,
-            Self::Contact(_) => Some(0.0),
             Self::Segment(_) if from < to => Some(from + 1.0),
             Self::Segment(_) => Some(from),
+            Self::Contact(_) | Self::VerticalOnset(_) => Some(0.0),
         }
     }
 }
@@ -248,21 +269,11 @@ impl Powers {
     }
 }
 
-/// A load on bodies that depends on their motion and on time. Allocates nothing.
+/// A load on bodies that depends on their motion and on time: its force, the energy stored in it and its power, and what steppers
+/// need of it. Allocates nothing.
 pub(super) trait ForceElement: Send + Sync {
     /// Adds its loads.
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>);
-
-    /// The two points in `motion` on whose relative motion, and that of their bodies, the force depends; `None` if it is not
-    /// stiff.
-    fn ends(&self, _motion: &[Kinematics]) -> Option<[Anchor; 2]> {
-        None
-    }
-
-    /// Linearisation after an evaluation; `None` if there is none.
-    fn coupling(&self, _at: &At<'_>) -> Option<Coupling> {
-        None
-    }
 
     /// Stored energy at `t`, J; for a contact, at the gap last measured.
     fn stored(&self, _t: f64, _motion: &[Kinematics]) -> f64 {
@@ -276,82 +287,72 @@ pub(super) trait ForceElement: Send + Sync {
 
     /// Adds its powers at `t`, after an evaluation.
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers);
-}
 
-/// An element of the scene's own list. Ball joints are reported as joints instead, with or without clearance.
-pub(super) trait SceneElement: ForceElement {
-    /// Its explicit dependence on time, if any.
-    fn law(&self) -> Option<&Arc<dyn Law>> {
+    /// The two points in `motion` on whose relative motion, and that of their bodies, the force depends; `None` if it is not
+    /// stiff.
+    fn ends(&self, _motion: &[Kinematics]) -> Option<[Anchor; 2]> {
         None
     }
 
-    /// Depth of contact, and the smaller of that and an indicator that falls to 0 when contact is lost while still compressed; in
-    /// any unit. Explicit steps end where a sign changes. `None` if the element always exerts a force.
-    fn contact_indicators(&self, _t: f64, _motion: &[Kinematics]) -> Option<[f64; 2]> {
+    /// Linearisation after an evaluation; `None` if there is none.
+    fn coupling(&self, _at: &At<'_>) -> Option<Coupling> {
         None
     }
 
-    /// Whether the slope of the force has a vertical tangent at first contact.
-    fn has_vertical_onset(&self) -> bool {
-        false
+    /// Where it is among the edges of its force. Explicit steps end where a side changes.
+    fn edges(&self, _t: f64, _motion: &[Kinematics]) -> Edges {
+        Edges::default()
     }
+
+    /// Freezes the force on its smooth continuation from these sides of its [`Self::edges`], regardless of the motion; unfreezes it
+    /// where they are `None`.
+    fn freeze(&mut self, _sides: Edges) {}
 
     /// Sets the reference that determines the turns of the angle on which it acts, if any. The element reads its joint's
     /// coordinate, which counts turns, although it measures poses.
     fn set_angle_reference(&mut self, _reference: AngleReference) {}
 
-    /// Position among the kinks of the force: the number of those passed, plus a fraction that grows from 0 to 1 up to the next.
-    /// `None` if the force has no kinks.
-    fn segment(&self, _t: f64, _motion: &[Kinematics]) -> Option<f64> {
-        None
+    /// Its report at `t`; empty for a ball joint, which is reported as a joint.
+    fn report(&self, _t: f64, _motion: &[Kinematics]) -> ElementReport {
+        ElementReport::default()
     }
-
-    /// Freezes the force on its smooth continuation from this number of kinks; `None` unfreezes it.
-    fn freeze_segment(&mut self, _segment: Option<usize>) {}
-
-    /// Freezes the contact state: the element follows its law as if it pressed, or as if it did not, regardless of the motion.
-    /// `None` unfreezes it.
-    fn freeze_contact(&mut self, _in_contact: Option<bool>) {}
-
-    /// Its report at `t`.
-    fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport;
 }
 
 /// The force elements of `machine`, in the order of the scene.
-pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn SceneElement>> {
-    let make = |element: &Element| {
+pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn ForceElement>> {
+    let make = |element: &Element| -> Box<dyn ForceElement> {
         let anchor = |point: &Attachment| model.anchor(machine, point);
         let coordinate = |on: JointCoordinate| Coordinate::of(machine, model, on);
+        let law = law_of(element);
         match &element.kind {
-            ElementKind::Spring(spring) => spring::make(spring, [&spring.from, &spring.to].map(anchor)),
-            ElementKind::Load(load) => load::make(load, anchor(&load.on)),
-            ElementKind::JointSpring(spring) => joint_spring::make(spring, coordinate(spring.on)),
-            ElementKind::Stop(stop) => stop::make(stop, coordinate(stop.on)),
-            ElementKind::Bushing(bushing) => bushing::make(bushing, [&bushing.from, &bushing.to].map(anchor)),
-            ElementKind::Motor(motor) => motor::make(motor, coordinate(motor.on)),
-            ElementKind::Tyre(tyre) => tyre::make(tyre, anchor(&tyre.on)),
+            ElementKind::Spring(spring) => Box::new(Spring::new(spring, [&spring.from, &spring.to].map(anchor))),
+            ElementKind::Load(load) => Box::new(Load { load: load.clone(), on: anchor(&load.on), factor: law }),
+            ElementKind::JointSpring(spring) => {
+                Box::new(OnCoordinate { on: coordinate(spring.on), law: JointSpring::new(spring) })
+            }
+            ElementKind::Stop(stop) => Box::new(OnCoordinate { on: coordinate(stop.on), law: Stop::new(stop) }),
+            ElementKind::Bushing(bushing) => Box::new(Bushing::new(bushing, [&bushing.from, &bushing.to].map(anchor))),
+            ElementKind::Motor(motor) => {
+                Box::new(OnCoordinate { on: coordinate(motor.on), law: Motor { motor: motor.clone(), target: law } })
+            }
+            ElementKind::Tyre(tyre) => Box::new(Tyre::new(tyre, anchor(&tyre.on), law)),
         }
     };
     machine.elements.iter().map(make).collect()
 }
 
 /// The element for the `force`, N, of gravity on body `body`.
-pub(super) fn weight(body: usize, force: Vec3) -> Box<dyn SceneElement> {
+pub(super) fn weight(body: usize, force: Vec3) -> Box<dyn ForceElement> {
     let centroid = Attachment { body: Some(body), point: Vec3::zeros() };
     let load = machine::Load { on: centroid, force, torque: Vec3::zeros(), axes: LoadAxes::World, factor: None };
-    load::make(&load, Anchor { body, offset: Vec3::zeros() })
+    Box::new(Load { load, on: Anchor { body, offset: Vec3::zeros() }, factor: None })
 }
 
 /// The element for a pulling hand.
-pub(super) fn hand(machine: &Machine, model: &Model, pull: Pull) -> Box<dyn SceneElement> {
+pub(super) fn hand(machine: &Machine, model: &Model, pull: Pull) -> Box<dyn ForceElement> {
     let point = Attachment { body: Some(pull.body), point: pull.point };
     let on = model.anchor(machine, &point);
     Box::new(pull::Hand { on, pull })
-}
-
-/// Time law that an element follows; an angle if it `turns`.
-fn law_of(drive: Option<&Drive>, turns: bool) -> Option<Arc<dyn Law>> {
-    trajectory_of(drive?, turns).law().cloned()
 }
 
 /// Position and velocity of a point, m and m/s, and its arm from the centroid.

@@ -1,100 +1,50 @@
 //! Motor on a slide or hinge. Its force or torque is F + k (target - q) + d (target' - q'), clamped to a limit, where q is the
 //! joint's coordinate. Its work counts as drive work.
 
-use super::coordinate::{AngleReference, Coordinate, CoordinateState, Slopes};
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, law_of};
+use std::sync::Arc;
+
+use super::coordinate::{CoordinateLaw, Slopes};
 use crate::jet::Jet;
 use crate::machine;
 use crate::mechanism::Powers;
 use crate::mechanism::drives::Law;
-use crate::mechanism::kinematics::Kinematics;
-use crate::mechanism::model::Anchor;
-use std::sync::Arc;
 
-struct Motor {
-    on: Coordinate,
-    force: f64,
-    stiffness: f64,
-    damping: f64,
-    limit: f64,
-    target: Option<Arc<dyn Law>>,
-}
-
-pub(super) fn make(motor: &machine::Motor, on: Coordinate) -> Box<dyn SceneElement> {
-    Box::new(Motor {
-        on,
-        force: motor.force,
-        stiffness: motor.stiffness,
-        damping: motor.damping,
-        limit: motor.limit,
-        target: law_of(motor.target.as_ref(), motor.on.freedom.turns()),
-    })
+pub(super) struct Motor {
+    pub motor: machine::Motor,
+    pub target: Option<Arc<dyn Law>>,
 }
 
 impl Motor {
-    /// Reference motion at `t`.
+    /// The force or torque on the child without its limit.
+    fn unclamped(&self, [x, v]: [f64; 2]) -> f64 {
+        self.motor.force - (self.motor.stiffness * x + self.motor.damping * v)
+    }
+}
+
+impl CoordinateLaw for Motor {
     fn target(&self, t: f64) -> Jet {
-        let value = |law: &Arc<dyn Law>| law.at(t);
-        self.target.as_ref().map_or_else(Jet::default, value)
+        self.target.as_ref().map_or_else(Jet::default, |law| law.at(t))
     }
 
-    /// The coordinate relative to the target, and the unclamped force or torque on the child.
-    fn at(&self, t: f64, motion: &[Kinematics]) -> (CoordinateState, f64) {
-        let target = self.target(t);
-        let state = self.on.measure(target.value, t, motion);
-        let ahead = self.stiffness * state.deviation + self.damping * (state.rate - target.rate);
-        (state, self.force - ahead)
+    fn force(&self, deviation: [f64; 2]) -> f64 {
+        self.unclamped(deviation).clamp(-self.motor.limit, self.motor.limit)
     }
 
-    /// The same with the force or torque clamped.
-    fn clamped(&self, t: f64, motion: &[Kinematics]) -> (CoordinateState, f64) {
-        let (state, force) = self.at(t, motion);
-        (state, force.clamp(-self.limit, self.limit))
-    }
-}
-
-impl ForceElement for Motor {
-    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        let (state, force) = self.clamped(at.t, at.motion);
-        self.on.apply_force(&state, force, loads.wrench);
+    fn is_stiff(&self) -> bool {
+        self.motor.stiffness > 0.0 || self.motor.damping > 0.0
     }
 
-    fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
-        let is_stiff = self.stiffness > 0.0 || self.damping > 0.0;
-        is_stiff.then(|| self.on.ends(motion))
+    fn slopes(&self, deviation: [f64; 2]) -> Option<Slopes> {
+        let machine::Motor { stiffness, damping, limit, .. } = self.motor;
+        let is_constant = self.unclamped(deviation).abs() > limit || (stiffness == 0.0 && damping == 0.0);
+        (!is_constant).then_some(Slopes { by_position: -stiffness, by_rate: -damping })
     }
 
-    fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
-        let (state, force) = self.at(at.t, at.motion);
-        if force.abs() > self.limit || (self.stiffness == 0.0 && self.damping == 0.0) {
-            return None;
-        }
-        let slopes = Slopes { by_position: -self.stiffness, by_rate: -self.damping };
-        Some(self.on.coupling(&state, &slopes, at.motion))
+    fn work(&self, from: [f64; 2], to: [f64; 2]) -> f64 {
+        0.5 * (self.force(from) + self.force(to)) * (to[0] - from[0])
     }
 
-    fn work(&self, t: f64, poses: [&[Kinematics]; 2]) -> f64 {
-        let [(from, force), (to, force_at_end)] = poses.map(|motion| self.clamped(t, motion));
-        0.5 * (force + force_at_end) * (to.deviation - from.deviation)
-    }
-
-    fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
-        let (state, force) = self.clamped(t, motion);
-        powers.drive += force * state.rate;
-    }
-}
-
-impl SceneElement for Motor {
-    fn law(&self) -> Option<&Arc<dyn Law>> {
-        self.target.as_ref()
-    }
-
-    fn set_angle_reference(&mut self, reference: AngleReference) {
-        self.on.set_reference(reference);
-    }
-
-    fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
-        let (state, force) = self.clamped(t, motion);
-        self.on.report(&state, force, motion)
+    fn add_powers(&self, deviation: [f64; 2], rate: f64, powers: &mut Powers) {
+        powers.drive += self.force(deviation) * rate;
     }
 }

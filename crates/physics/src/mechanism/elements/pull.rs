@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{At, ElementReport, ForceElement, Loads, Powers, SceneElement, point_of, push};
+use super::{At, ElementReport, ForceElement, Loads, Powers, point_of, push};
 use crate::machine::{Machine, Vec3};
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
@@ -72,9 +72,7 @@ impl ForceElement for Hand {
         let (report, velocity, _) = self.at(motion);
         powers.external += report.force.dot(&velocity);
     }
-}
 
-impl SceneElement for Hand {
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
         self.at(motion).0
     }

@@ -1,19 +1,18 @@
-//! Spring and damper along the line between two points: tension T = preload + stiffness (l - length) + damping dl/dt. A curve
-//! over l - length may replace the first two terms, and the spring may act only in compression or only in tension.
+//! Spring and damper along the line between two points: tension T = elastic(l - length) + damping(dl/dt), each a line or a curve. The
+//! spring may act only in compression or only in tension.
 
-use super::elastic::Elastic;
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
+use super::characteristic::SpringDamper;
+use super::{At, Coupling, EdgeIndicator, Edges, ElementReport, ForceElement, Loads, point_of, push};
+use crate::jet::Jet;
 use crate::machine::{self, Mat3, SpringSide, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 
-struct Spring {
-    from: Anchor,
-    to: Anchor,
+pub(super) struct Spring {
+    ends: [Anchor; 2],
     length: f64,
-    elastic: Elastic,
-    damping: f64,
+    law: SpringDamper,
     side: SpringSide,
     /// State of a one-sided spring frozen over a step, if any.
     frozen: Option<bool>,
@@ -23,47 +22,41 @@ struct Spring {
 struct State {
     arms: [Vec3; 2],
     points: [Vec3; 2],
-    /// Velocity of `to` relative to `from`, m/s.
+    /// Velocity of the second point relative to the first, m/s.
     velocity: Vec3,
-    /// Distance between the points, m, and unit vector from `from` to `to`; zero if they coincide.
+    /// Distance between the points, m, and unit vector from the first to the second; zero if they coincide.
     length: f64,
     along: Vec3,
     rate: f64,
-    /// Elastic tension, N, ignoring one-sidedness.
-    elastic: f64,
+    /// Elastic and damping tension with their slopes, ignoring one-sidedness.
+    elastic: Jet,
+    damping: Jet,
     /// Total tension, N.
     tension: f64,
     /// Whether a one-sided spring is slack.
     slack: bool,
 }
 
-pub(super) fn make(spring: &machine::Spring, [from, to]: [Anchor; 2]) -> Box<dyn SceneElement> {
-    Box::new(Spring {
-        from,
-        to,
-        length: spring.length,
-        elastic: Elastic::new(&spring.elastic, spring.side),
-        damping: spring.damping,
-        side: spring.side,
-        frozen: None,
-    })
-}
-
 impl Spring {
+    pub fn new(spring: &machine::Spring, ends: [Anchor; 2]) -> Self {
+        let law = SpringDamper::new(&spring.elastic, &spring.damping, spring.side);
+        Self { ends, length: spring.length, law, side: spring.side, frozen: None }
+    }
+
     fn state(&self, motion: &[Kinematics]) -> State {
-        let (start, start_velocity, start_arm) = point_of(&self.from, motion);
-        let (end, end_velocity, end_arm) = point_of(&self.to, motion);
+        let [(start, start_velocity, start_arm), (end, end_velocity, end_arm)] =
+            self.ends.each_ref().map(|anchor| point_of(anchor, motion));
         let distance = end - start;
         let length = distance.norm();
         let along = if length > 0.0 { distance / length } else { Vec3::zeros() };
         let velocity = end_velocity - start_velocity;
         let rate = along.dot(&velocity);
-        let elastic = self.elastic.tension(length - self.length);
-        let total = elastic + self.damping * rate;
+        let [elastic, damping] = self.law.at([length - self.length, rate]);
+        let total = elastic.value + damping.value;
         let tension = match self.frozen {
             Some(true) => total,
             // A slack spring has no damping force either.
-            None if self.side.of(elastic) == elastic => self.side.of(total),
+            None if self.side.of(elastic.value) == elastic.value => self.side.of(total),
             _ => 0.0,
         };
         State {
@@ -74,6 +67,7 @@ impl Spring {
             along,
             rate,
             elastic,
+            damping,
             tension,
             slack: tension != total,
         }
@@ -84,71 +78,64 @@ impl ForceElement for Spring {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
         let s = self.state(at.motion);
         let pull = s.along * s.tension;
-        push(&mut loads.wrench[self.from.body], &s.arms[0], &pull);
-        push(&mut loads.wrench[self.to.body], &s.arms[1], &-pull);
+        let [from, to] = self.ends.map(|end| end.body);
+        push(&mut loads.wrench[from], &s.arms[0], &pull);
+        push(&mut loads.wrench[to], &s.arms[1], &-pull);
     }
 
     fn ends(&self, _: &[Kinematics]) -> Option<[Anchor; 2]> {
-        Some([self.from, self.to])
+        Some(self.ends)
     }
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
-        let (s, ends) = (self.state(at.motion), [self.from, self.to]);
+        let s = self.state(at.motion);
         if s.slack {
             return None;
         }
-        let stiffness = self.elastic.stiffness(s.length - self.length);
+        let [stiffness, damping] = [s.elastic, s.damping].map(|force| force.rate);
         if s.length == 0.0 {
             // A bushing resists separation in any direction; otherwise the direction, and hence the force, is discontinuous here.
-            let is_bushing = self.length == 0.0 && s.elastic == 0.0;
+            let is_bushing = self.length == 0.0 && s.elastic.value == 0.0;
             let by_displacement = Mat3::identity() * -stiffness;
-            return is_bushing.then(|| Coupling::between_points(ends, by_displacement, Mat3::zeros()));
+            return is_bushing.then(|| Coupling::between_points(self.ends, by_displacement, Mat3::zeros()));
         }
         // F = -T u with u = e / |e|: dT = (k u + c P e_dot / l) . de + c u . de_dot, du = P de / l, P = 1 - u u'.
         let u = s.along;
         let turning = (Mat3::identity() - u * u.transpose()) / s.length;
-        let gradient = u * stiffness + turning * s.velocity * self.damping;
+        let gradient = u * stiffness + turning * s.velocity * damping;
         let by_displacement = -u * gradient.transpose() - turning * s.tension;
-        let by_rate = -u * (u * self.damping).transpose();
-        Some(Coupling::between_points(ends, by_displacement, by_rate))
+        let by_rate = -u * (u * damping).transpose();
+        Some(Coupling::between_points(self.ends, by_displacement, by_rate))
     }
 
     fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
-        self.elastic.stored(self.state(motion).length - self.length)
+        self.law.stored(self.state(motion).length - self.length)
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
         let s = self.state(motion);
         powers.damping += match self.side {
-            SpringSide::Both => self.damping * s.rate * s.rate,
-            _ => (s.tension - self.side.of(s.elastic)) * s.rate,
+            SpringSide::Both => s.damping.value * s.rate,
+            _ => (s.tension - self.side.of(s.elastic.value)) * s.rate,
         };
     }
-}
 
-impl SceneElement for Spring {
     /// For a one-sided spring: its elastic force, and the smaller of that and the total force with the damper.
-    fn contact_indicators(&self, _: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
-        let sign = match self.side {
-            SpringSide::Both => return None,
-            SpringSide::Pull => 1.0,
-            SpringSide::Push => -1.0,
-        };
+    fn edges(&self, _: f64, motion: &[Kinematics]) -> Edges {
+        if self.side == SpringSide::Both && !self.law.has_kinks() {
+            return Edges::default();
+        }
         let s = self.state(motion);
-        let [elastic, both] = [s.elastic, s.elastic + self.damping * s.rate].map(|tension| sign * tension);
-        Some([elastic, elastic.min(both)])
+        let [elastic, both] = [s.elastic.value, s.elastic.value + s.damping.value]
+            .map(|tension| if self.side == SpringSide::Pull { tension } else { -tension });
+        let contact = |value| (self.side != SpringSide::Both).then_some(EdgeIndicator::Contact(value));
+        let [of_elastic, of_damping] = self.law.edges([s.length - self.length, s.rate]);
+        [contact(elastic), contact(elastic.min(both)), of_elastic, of_damping]
     }
 
-    fn freeze_contact(&mut self, in_contact: Option<bool>) {
-        self.frozen = in_contact;
-    }
-
-    fn segment(&self, _: f64, motion: &[Kinematics]) -> Option<f64> {
-        self.elastic.has_kinks().then(|| self.elastic.segment(self.state(motion).length - self.length))
-    }
-
-    fn freeze_segment(&mut self, segment: Option<usize>) {
-        self.elastic.freeze(segment);
+    fn freeze(&mut self, [_, contact, of_elastic, of_damping]: Edges) {
+        self.frozen = contact.map(EdgeIndicator::presses);
+        self.law.freeze([of_elastic, of_damping]);
     }
 
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {

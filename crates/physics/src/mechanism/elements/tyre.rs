@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, law_of, point_of, push};
+use super::{At, Coupling, EdgeIndicator, Edges, ElementReport, ForceElement, Loads, point_of, push};
 use crate::jet::Jet;
 use crate::machine::{self, Mat3, Vec3};
 use crate::mechanism::Powers;
@@ -11,16 +11,11 @@ use crate::mechanism::drives::Law;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 
-struct Tyre {
+pub(super) struct Tyre {
+    tyre: machine::Tyre,
     /// Wheel centre.
     on: Anchor,
-    up: Vec3,
-    radius: f64,
-    stiffness: f64,
-    damping: f64,
     ground: Option<Arc<dyn Law>>,
-    /// Coordinate along `up` at which `ground` is 0, m.
-    height: f64,
     /// Contact state frozen over a step, if any.
     frozen: Option<bool>,
 }
@@ -38,28 +33,18 @@ struct State {
     force: f64,
 }
 
-pub(super) fn make(tyre: &machine::Tyre, on: Anchor) -> Box<dyn SceneElement> {
-    Box::new(Tyre {
-        on,
-        up: tyre.up,
-        radius: tyre.radius,
-        stiffness: tyre.stiffness,
-        damping: tyre.damping,
-        ground: law_of(tyre.ground.as_ref(), false),
-        height: tyre.height,
-        frozen: None,
-    })
-}
-
 impl Tyre {
+    pub fn new(tyre: &machine::Tyre, on: Anchor, ground: Option<Arc<dyn Law>>) -> Self {
+        Self { tyre: tyre.clone(), on, ground, frozen: None }
+    }
+
     fn at(&self, t: f64, motion: &[Kinematics]) -> State {
         let (centre, velocity, arm) = point_of(&self.on, motion);
-        let height = |law: &Arc<dyn Law>| law.at(t);
-        let ground = self.ground.as_ref().map_or_else(Jet::default, height) + Jet::constant(self.height);
-        let depth = ground.value + self.radius - self.up.dot(&centre);
-        let rate = ground.rate - self.up.dot(&velocity);
+        let ground = self.ground.as_ref().map_or_else(Jet::default, |law| law.at(t)) + Jet::constant(self.tyre.height);
+        let depth = ground.value + self.tyre.radius - self.tyre.up.dot(&centre);
+        let rate = ground.rate - self.tyre.up.dot(&velocity);
         // A tyre off the ground has no damping force either.
-        let force = self.stiffness * depth + self.damping * rate;
+        let force = self.tyre.stiffness * depth + self.tyre.damping * rate;
         let force = match self.frozen {
             Some(true) => force,
             None if depth > 0.0 => force.max(0.0),
@@ -72,7 +57,7 @@ impl Tyre {
 impl ForceElement for Tyre {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
         let s = self.at(at.t, at.motion);
-        let force = self.up * s.force;
+        let force = self.tyre.up * s.force;
         push(&mut loads.wrench[self.on.body], &s.arm, &force);
     }
 
@@ -87,46 +72,41 @@ impl ForceElement for Tyre {
         if !self.frozen.unwrap_or(s.force > 0.0) {
             return None;
         }
-        let along = self.up * self.up.transpose();
+        let along = self.tyre.up * self.tyre.up.transpose();
         let ends = self.ends(at.motion)?;
-        let by_height: [Mat3; 2] = [along * -self.stiffness, along * -self.damping];
+        let by_height: [Mat3; 2] = [along * -self.tyre.stiffness, along * -self.tyre.damping];
         Some(Coupling::between_points(ends, by_height[0], by_height[1]))
     }
 
     fn stored(&self, t: f64, motion: &[Kinematics]) -> f64 {
         let depth = self.at(t, motion).depth.max(0.0);
-        0.5 * self.stiffness * depth * depth
+        0.5 * self.tyre.stiffness * depth * depth
     }
 
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
         let s = self.at(t, motion);
         powers.drive += s.force * s.ground.rate;
-        powers.damping += (s.force - self.stiffness * s.depth.max(0.0)) * s.rate;
-    }
-}
-
-impl SceneElement for Tyre {
-    fn law(&self) -> Option<&Arc<dyn Law>> {
-        self.ground.as_ref()
+        powers.damping += (s.force - self.tyre.stiffness * s.depth.max(0.0)) * s.rate;
     }
 
     /// Contact is lost where k d + c dd/dt falls to 0.
-    fn contact_indicators(&self, t: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
+    fn edges(&self, t: f64, motion: &[Kinematics]) -> Edges {
         let s = self.at(t, motion);
-        Some([s.depth, s.depth.min(self.stiffness * s.depth + self.damping * s.rate)])
+        let pressing = s.depth.min(self.tyre.stiffness * s.depth + self.tyre.damping * s.rate);
+        [Some(EdgeIndicator::Contact(s.depth)), Some(EdgeIndicator::Contact(pressing)), None, None]
     }
 
-    fn freeze_contact(&mut self, in_contact: Option<bool>) {
-        self.frozen = in_contact;
+    fn freeze(&mut self, sides: Edges) {
+        self.frozen = sides[1].map(EdgeIndicator::presses);
     }
 
     /// From the ground below the wheel centre to the centre.
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
         let s = self.at(t, motion);
-        let above = self.up.dot(&s.centre) - s.ground.value;
+        let above = self.tyre.up.dot(&s.centre) - s.ground.value;
         ElementReport {
-            points: [s.centre - self.up * above, s.centre],
-            force: self.up * s.force,
+            points: [s.centre - self.tyre.up * above, s.centre],
+            force: self.tyre.up * s.force,
             ..ElementReport::default()
         }
     }

@@ -4,7 +4,7 @@ use super::automatic::STABILITY_LIMIT;
 use super::corners::LawBranch;
 use super::{LONGEST_STEP, NEARLY, Stepping, edges, shortest_step};
 use crate::integrate::{Method, find_root};
-use crate::mechanism::Counts;
+use crate::mechanism::{Counts, EdgeIndicator};
 use crate::simulate::peaks::Approach;
 use crate::simulate::stepper::ActiveScheme;
 use crate::simulate::{StopAdvice, StopFault, Stopped};
@@ -89,7 +89,7 @@ impl Stepping<'_> {
             (Method::Automatic, ActiveScheme::Explicit) => solver.tolerance.min(IMPACT_TOLERANCE),
             _ => solver.tolerance,
         };
-        let vertical_onset = self.mechanism.has_vertical_onset(&self.attempt.element_sides);
+        let vertical_onset = self.attempt.element_sides.iter().any(EdgeIndicator::has_vertical_onset);
         if vertical_onset { STOP_ERROR_FACTOR * allowed } else { allowed }
     }
 

@@ -1,7 +1,7 @@
-//! Elastic force of a spring, without its damper: preload + stiffness s, where s is the change of length or of a joint's
-//! coordinate, or a curve through points, straight beyond them. On a curve of straight lines, the slope jumps at the inner points,
-//! its kinks. A one-sided spring exerts only the part of one sign.
+//! Force of a spring by its stretch, or of a damper by its rate: a straight line, or a curve through points, straight beyond them. On
+//! a curve of straight lines, the slope jumps at the inner points, its kinks. A one-sided spring exerts only the part of one sign.
 
+use super::EdgeIndicator;
 use crate::interpolate::{Ends, Interpolant, Interpolation};
 use crate::jet::Jet;
 use crate::machine::{self, SpringSide};
@@ -9,89 +9,126 @@ use crate::machine::{self, SpringSide};
 /// Upper bound on the magnitude of a stretch, m or rad.
 const MAX_STRETCH: f64 = 1e7;
 
-pub(super) enum Elastic {
+/// Elastic and damping force of a spring.
+pub(super) struct SpringDamper {
+    elastic: Characteristic,
+    damping: Characteristic,
+    /// Number of kinks that each has passed, frozen over a step, if it is.
+    segments: [Option<usize>; 2],
+}
+
+impl SpringDamper {
+    /// For a spring that acts on `side`.
+    pub fn new(elastic: &machine::Characteristic, damping: &machine::Characteristic, side: SpringSide) -> Self {
+        let [elastic, damping] =
+            [(elastic, side), (damping, SpringSide::Both)].map(|(given, side)| Characteristic::new(given, side));
+        Self { elastic, damping, segments: [None; 2] }
+    }
+
+    /// Elastic and damping force at a stretch, m or rad, and its rate, each with its slope; ignoring one-sidedness.
+    #[inline]
+    pub fn at(&self, [stretch, rate]: [f64; 2]) -> [Jet; 2] {
+        let [elastic, damping] = self.segments;
+        [self.elastic.at(stretch, elastic), self.damping.at(rate, damping)]
+    }
+
+    /// Energy stored at a stretch, J.
+    pub fn stored(&self, stretch: f64) -> f64 {
+        self.elastic.stored(stretch)
+    }
+
+    /// Whether the slope of either jumps anywhere.
+    pub fn has_kinks(&self) -> bool {
+        [&self.elastic, &self.damping].iter().any(|part| !part.kinks().is_empty())
+    }
+
+    /// Position of each part among its kinks, if it has any.
+    pub fn edges(&self, [stretch, rate]: [f64; 2]) -> [Option<EdgeIndicator>; 2] {
+        [(&self.elastic, stretch), (&self.damping, rate)].map(|(part, at)| part.segment(at).map(EdgeIndicator::Segment))
+    }
+
+    /// Freezes each part on its smooth continuation from its side of its kinks.
+    pub fn freeze(&mut self, sides: [Option<EdgeIndicator>; 2]) {
+        self.segments = sides.map(|side| side.map(|side| side.side() as usize));
+    }
+}
+
+enum Characteristic {
     Line {
-        /// Tension at zero stretch, N or N m.
-        preload: f64,
-        /// N/m or N m/rad.
-        stiffness: f64,
+        /// At 0, N or N m.
+        offset: f64,
+        /// N/m or N m/rad, N s/m or N m s/rad.
+        slope: f64,
         side: SpringSide,
     },
     Curve(Curve),
 }
 
-impl Elastic {
-    /// Elastic law of a spring that acts on `side`.
-    pub fn new(elastic: &machine::Elastic, side: SpringSide) -> Self {
-        match elastic {
-            machine::Elastic::Curve { points, interpolation } => Self::Curve(Curve::new(points, *interpolation, side)),
-            machine::Elastic::Line { preload, stiffness } => {
-                Self::Line { preload: *preload, stiffness: *stiffness, side }
+impl Characteristic {
+    /// For a spring that acts on `side`.
+    fn new(given: &machine::Characteristic, side: SpringSide) -> Self {
+        match *given {
+            machine::Characteristic::Line { offset, slope } => Self::Line { offset, slope, side },
+            machine::Characteristic::Curve { ref points, interpolation } => {
+                Self::Curve(Curve::new(points, interpolation, side))
             }
         }
     }
 
-    /// Tension at `stretch`, N or N m, ignoring one-sidedness.
-    pub fn tension(&self, stretch: f64) -> f64 {
+    /// Force at `x`, N or N m, and its slope, ignoring one-sidedness; on the line that follows the `segment`th kink, even beyond
+    /// its ends, if that is given.
+    #[inline]
+    fn at(&self, x: f64, segment: Option<usize>) -> Jet {
         match self {
-            Self::Line { preload, stiffness, .. } => preload + stiffness * stretch,
-            Self::Curve(curve) => curve.on_segment(stretch).value,
+            Self::Line { offset, slope, .. } => Jet::new(offset + slope * x, *slope, 0.0),
+            Self::Curve(curve) => segment.map_or_else(|| curve.at(x), |segment| curve.on_segment(segment, x)),
         }
     }
 
-    /// Derivative of the tension, N/m or N m/rad.
-    pub fn stiffness(&self, stretch: f64) -> f64 {
+    /// Values of x at which the slope jumps.
+    fn kinks(&self) -> &[f64] {
         match self {
-            Self::Line { stiffness, .. } => *stiffness,
-            Self::Curve(curve) => curve.on_segment(stretch).rate,
+            Self::Line { .. } => &[],
+            Self::Curve(curve) => curve.kinks(),
         }
     }
 
-    /// Whether its slope jumps at any stretch.
-    pub fn has_kinks(&self) -> bool {
-        matches!(self, Self::Curve(curve) if !curve.kinks().is_empty())
-    }
-
-    /// Number of kinks below `stretch`, plus a fraction that grows from 0 to 1 up to the next kink.
-    pub fn segment(&self, stretch: f64) -> f64 {
-        match self {
-            Self::Line { .. } => 0.0,
-            Self::Curve(curve) => curve.segment(stretch),
-        }
-    }
-
-    /// Freezes the tension of a curve with kinks on the line that follows this number of them, even beyond its ends; `None`
-    /// unfreezes it. The stored energy does not change.
-    pub fn freeze(&mut self, segment: Option<usize>) {
-        if let Self::Curve(curve) = self {
-            curve.frozen = segment.map(|segment| segment.min(curve.kinks().len()));
-        }
+    /// Number of kinks below `x`, plus a fraction that grows from 0 to 1 up to the next kink; `None` without kinks.
+    fn segment(&self, x: f64) -> Option<f64> {
+        let kinks = self.kinks();
+        let below = kinks.partition_point(|kink| *kink <= x);
+        let fraction = match (kinks[..below].last(), kinks.get(below)) {
+            (Some(left), Some(right)) => (x - left) / (right - left),
+            // Towards 1 at the kink, and towards 1 at infinity.
+            (None, Some(right)) => 1.0 / (1.0 + (right - x)),
+            (Some(left), None) => 1.0 - 1.0 / (1.0 + (x - left)),
+            (None, None) => return None,
+        };
+        Some(below as f64 + fraction)
     }
 
     /// Stored energy, J: the work done from zero stretch.
-    pub fn stored(&self, stretch: f64) -> f64 {
+    fn stored(&self, stretch: f64) -> f64 {
         match self {
-            Self::Line { preload, stiffness, side } => {
-                let elastic = preload + stiffness * stretch;
+            Self::Line { offset, slope, side } => {
+                let elastic = offset + slope * stretch;
                 // A slack spring stores the energy that it had where it went slack.
-                let stretch = match side.of(elastic) == elastic || *stiffness == 0.0 {
+                let stretch = match side.of(elastic) == elastic || *slope == 0.0 {
                     true => stretch,
-                    false => -preload / stiffness,
+                    false => -offset / slope,
                 };
-                stretch * (preload + 0.5 * stiffness * stretch)
+                stretch * (offset + 0.5 * slope * stretch)
             }
             Self::Curve(curve) => curve.stored(stretch),
         }
     }
 }
 
-/// Tension given as a curve over the stretch.
-pub(super) struct Curve {
+/// Force given as a curve.
+struct Curve {
     interpolant: Interpolant,
     /// Whether the slope jumps at the inner points.
     has_kinks: bool,
-    /// Interval on whose line the tension is frozen over a step, if any.
-    frozen: Option<usize>,
     /// Stretches at which the cubic changes or a one-sided spring starts or ceases to act, in ascending order, each with the
     /// energy stored there, J.
     breakpoints: Vec<[f64; 2]>,
@@ -104,7 +141,6 @@ impl Curve {
         let mut curve = Self {
             interpolant: Interpolant::new(points, interpolation, Ends::Natural),
             has_kinks: interpolation == Interpolation::Linear,
-            frozen: None,
             breakpoints: Vec::new(),
             is_active: Vec::new(),
         };
@@ -145,29 +181,15 @@ impl Curve {
         Jet::new(at.value + at.rate * (stretch - within), at.rate, 0.0)
     }
 
-    /// The same on the line on which the tension is frozen, if it is.
-    fn on_segment(&self, stretch: f64) -> Jet {
-        self.frozen.map_or_else(|| self.at(stretch), |interval| self.interpolant.on_cubic(interval, stretch))
+    /// The same on the line that follows this number of kinks, even beyond its ends.
+    fn on_segment(&self, segment: usize, stretch: f64) -> Jet {
+        self.interpolant.on_cubic(segment.min(self.kinks().len()), stretch)
     }
 
     /// Stretches at which the slope jumps. The lines beyond the first and the last point continue those between points.
     fn kinks(&self) -> &[f64] {
         let knots = &self.interpolant.knots;
         if self.has_kinks { &knots[1..knots.len() - 1] } else { &[] }
-    }
-
-    /// As [`Elastic::segment`].
-    fn segment(&self, stretch: f64) -> f64 {
-        let kinks = self.kinks();
-        let below = kinks.partition_point(|kink| *kink <= stretch);
-        let fraction = match (kinks[..below].last(), kinks.get(below)) {
-            (Some(left), Some(right)) => (stretch - left) / (right - left),
-            // Towards 1 at the kink, and towards 1 at infinity.
-            (None, Some(right)) => 1.0 / (1.0 + (right - stretch)),
-            (Some(left), None) => 1.0 - 1.0 / (1.0 + (stretch - left)),
-            (None, None) => 0.0,
-        };
-        below as f64 + fraction
     }
 
     fn stored(&self, stretch: f64) -> f64 {
@@ -282,23 +304,18 @@ mod tests {
 
     #[test]
     fn segments_of_straight_lines_are_numbered_and_frozen_lines_go_on() {
-        let mut elastic = Elastic::Curve(Curve::new(&POINTS, Interpolation::Linear, SpringSide::Both));
-        assert!(elastic.has_kinks());
+        let elastic = Characteristic::Curve(Curve::new(&POINTS, Interpolation::Linear, SpringSide::Both));
         for (stretch, segment) in
             [(-1e6, 0), (-0.03, 0), (-0.02, 1), (-0.011, 1), (-0.01, 2), (0.0, 2), (0.02, 3), (1e6, 3)]
         {
-            assert_eq!(elastic.segment(stretch).floor(), f64::from(segment), "{stretch}");
+            assert_eq!(elastic.segment(stretch).unwrap().floor(), f64::from(segment), "{stretch}");
         }
-        let [energy, tension] = [elastic.stored(0.03), elastic.tension(0.03)];
-        elastic.freeze(Some(2));
         // The line from (-0.01, -8) to (0.01, 6).
-        assert!((elastic.tension(0.03) - 20.0).abs() < 1e-12 && (elastic.stiffness(0.03) - 700.0).abs() < 1e-9);
-        assert_eq!(elastic.stored(0.03), energy);
-        elastic.freeze(None);
-        assert_eq!(elastic.tension(0.03), tension);
+        let frozen = elastic.at(0.03, Some(2));
+        assert!((frozen.value - 20.0).abs() < 1e-12 && (frozen.rate - 700.0).abs() < 1e-9);
         for (points, interpolation) in [(&POINTS[..], Interpolation::Monotone), (&POINTS[..2], Interpolation::Linear)] {
-            let smooth = Elastic::Curve(Curve::new(points, interpolation, SpringSide::Both));
-            assert!(!smooth.has_kinks() && smooth.segment(0.0) == 0.0);
+            let smooth = Characteristic::Curve(Curve::new(points, interpolation, SpringSide::Both));
+            assert!(smooth.kinks().is_empty() && smooth.segment(0.0).is_none());
         }
     }
 }
