@@ -143,7 +143,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     meta.shift_remove("slower_than_asked");
     meta.insert("duration_s".into(), json!(duration));
     insert_texts(&mut meta, &scene);
-    let unsaved = outputs.write(arguments, &mut simulation, &scene, (&table, times), meta, &mut facts, &mut text)?;
+    let unsaved = outputs.write(arguments, &mut simulation, &scene, (&table, times), meta, (&mut facts, &mut text))?;
     match arguments.summary {
         SummaryForm::Text => print(&text)?,
         SummaryForm::Json => print(&format!("{:#}\n", Json::Object(facts)))?,
@@ -203,8 +203,7 @@ impl Outputs {
         scene: &Scene,
         (table, times): (&Table, Option<RowTimes>),
         meta: Map<String, Json>,
-        facts: &mut Map<String, Json>,
-        text: &mut String,
+        (facts, text): (&mut Map<String, Json>, &mut String),
     ) -> Result<Option<Failure>, Failure> {
         let mut files = Vec::new();
         if let (Some(file), Some(times)) = (self.rows, times) {

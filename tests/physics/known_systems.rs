@@ -4,7 +4,7 @@ use jointplay_analysis::exponent::Exponent;
 use jointplay_analysis::orbit::Orbit;
 use jointplay_analysis::regime::{Evidence, Regime, classify};
 use jointplay_analysis::section::{Schedule, SectionRun};
-use jointplay_physics::integrate::{Controller, DormandPrince, RungeKutta4, Stepper, System};
+use jointplay_physics::integrate::{Controller, DormandPrince, RungeKutta4, Step, Stepper, System};
 use std::ops::Range;
 
 /// A map of the line or the circle, x' = f(x).
@@ -103,7 +103,9 @@ impl<F: Fn(f64, f64, f64) -> f64 + Clone> Orbit for Oscillator<F> {
         loop {
             let cut = self.t + self.h >= end;
             let h = if cut { end - self.t } else { self.h };
-            let error = self.stepper.attempt(&mut self.force, self.t, h, &self.y, &k, &mut y, &mut k_end) / TOLERANCE;
+            let error =
+                self.stepper.attempt(&mut self.force, Step { t: self.t, h, y: &self.y, k: &k }, &mut y, &mut k_end)
+                    / TOLERANCE;
             if error > 1.0 {
                 self.h = h * self.controller.after_reject(error);
                 continue;
@@ -435,7 +437,7 @@ fn another_stepper_reaches_the_same_section() {
     for i in 0..n {
         let t = f64::from(i) * h;
         system.derivative(t, &y, &mut k);
-        stepper.attempt(&mut system, t, h, &y, &k, &mut end, &mut k_end);
+        stepper.attempt(&mut system, Step { t, h, y: &y, k: &k }, &mut end, &mut k_end);
         y = end;
     }
     for (a, b) in adaptive.state().iter().zip(&y) {

@@ -2,7 +2,7 @@
 
 use crate::common::{run_until, scene, simulation, slope};
 use jointplay_physics::contact::ContactState;
-use jointplay_physics::integrate::{DormandPrince, RungeKutta4, Stepper, System};
+use jointplay_physics::integrate::{DormandPrince, RungeKutta4, Step, Stepper, System};
 use jointplay_physics::mechanism::{ActiveSet, Mechanism, StepStart};
 
 /// Largest difference of two states relative to the scales of their components.
@@ -27,7 +27,7 @@ fn equal_steps<S: Stepper>(
     for i in 0..steps {
         let t = f64::from(i) * h;
         mechanism.derivative(t, &y, &mut k);
-        stepper.attempt(mechanism, t, h, &y, &k, &mut end, &mut k_end);
+        stepper.attempt(mechanism, Step { t, h, y: &y, k: &k }, &mut end, &mut k_end);
         std::mem::swap(&mut y, &mut end);
     }
     y

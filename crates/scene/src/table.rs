@@ -15,6 +15,7 @@ pub fn table() -> &'static [Parameter] {
 }
 
 /// A row that takes effect at once; the functions below modify that where needed.
+#[expect(clippy::too_many_arguments, reason = "the columns of the table")]
 const fn row(
     key: &'static str,
     access: Access,

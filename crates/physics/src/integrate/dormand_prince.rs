@@ -1,7 +1,7 @@
 //! Dormand-Prince 5(4) with its continuous extension of order 4
 //! (Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., Table II.5.2 and II.6).
 
-use super::{Stepper, System, combine, copy};
+use super::{Step, Stepper, System, combine, copy};
 use std::ops::Range;
 
 const C: [f64; 5] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0];
@@ -65,8 +65,9 @@ impl DormandPrince {
 
     /// Interpolates components `part` of the state at `t + theta h` of the latest attempt, 0 <= theta <= 1, from the state and
     /// derivative at its start.
-    pub fn interpolate(&self, part: Range<usize>, theta: f64, h: f64, y: &[f64], k: &[f64], out: &mut [f64]) {
-        let (theta, h) = (theta * self.remaining_fraction, h / self.remaining_fraction);
+    pub fn interpolate(&self, part: Range<usize>, theta: f64, step: Step<'_>, out: &mut [f64]) {
+        let (y, k) = (step.y, step.k);
+        let (theta, h) = (theta * self.remaining_fraction, step.h / self.remaining_fraction);
         let s = 1.0 - theta;
         let Self { k3, k4, k5, k6, raw_end: y_end, raw_k_end: k_end, .. } = self;
         let [y, k, k3, k4, k5, k6, y_end, k_end] = [y, k, k3, k4, k5, k6, y_end, k_end].map(|x| &x[part.clone()]);
@@ -94,16 +95,8 @@ impl DormandPrince {
 }
 
 impl Stepper for DormandPrince {
-    fn attempt<S: System>(
-        &mut self,
-        system: &mut S,
-        t: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        y_end: &mut [f64],
-        k_end: &mut [f64],
-    ) -> f64 {
+    fn attempt<S: System>(&mut self, system: &mut S, step: Step<'_>, y_end: &mut [f64], k_end: &mut [f64]) -> f64 {
+        let Step { t, h, y, k } = step;
         let Self { k2, k3, k4, k5, k6, stage, raw_end, raw_k_end, remaining_fraction } = self;
         *remaining_fraction = 1.0;
         system.prepare_times(&C.map(|c| t + c * h));

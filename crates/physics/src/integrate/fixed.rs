@@ -1,6 +1,6 @@
 //! A fixed-step method.
 
-use super::{Stepper, System, combine};
+use super::{Step, Stepper, System, combine};
 
 /// Kutta's classical method of order 4 (1901).
 pub struct RungeKutta4 {
@@ -19,16 +19,8 @@ impl RungeKutta4 {
 }
 
 impl Stepper for RungeKutta4 {
-    fn attempt<S: System>(
-        &mut self,
-        system: &mut S,
-        t: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        y_end: &mut [f64],
-        _k_end: &mut [f64],
-    ) -> f64 {
+    fn attempt<S: System>(&mut self, system: &mut S, step: Step<'_>, y_end: &mut [f64], _k_end: &mut [f64]) -> f64 {
+        let Step { t, h, y, k } = step;
         let n = y.len();
         let Self { k2, k3, k4, stage } = self;
         combine(system.active_ranges(), stage, y, 0.5 * h, [(1.0, k)]);

@@ -103,28 +103,34 @@ pub trait StiffSystem: System {
     fn solve_shifted_pair(&mut self, b_real: &mut [f64], b_imaginary: &mut [f64]);
 }
 
+/// A step of size `h`, s, from the state `y` at `t`, s, where `k` = f(t, y).
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
+    /// Start, s.
+    pub t: f64,
+    /// Size, s.
+    pub h: f64,
+    /// State at the start.
+    pub y: &'a [f64],
+    /// Its derivative.
+    pub k: &'a [f64],
+}
+
 /// One-step method.
 pub trait Stepper {
-    /// Attempts a step of size `h` from (`t`, `y`), where `k` = f(t, y), and writes the end state to `y_end`.
+    /// Attempts `step` and writes the end state to `y_end`.
     ///
     /// An adaptive method also writes f(t + h, y_end) to `k_end`. Returns the error estimate relative to the system's scales
     /// (largest component; 0 for a fixed-step method), not yet divided by the tolerance.
-    fn attempt<S: System>(
-        &mut self,
-        system: &mut S,
-        t: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        y_end: &mut [f64],
-        k_end: &mut [f64],
-    ) -> f64;
+    fn attempt<S: System>(&mut self, system: &mut S, step: Step<'_>, y_end: &mut [f64], k_end: &mut [f64]) -> f64;
 }
 
-/// Cubic Hermite interpolation between two states with their derivatives; error O(h^4).
-pub fn hermite(theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]) {
-    let s = 1.0 - theta;
-    let [y, k, y_end, k_end] = [y, k, y_end, k_end].map(|x| &x[..out.len()]);
+/// Cubic Hermite interpolation at fraction `theta` of `step`, which ends at `y_end` with the derivative `k_end`, of the components
+/// `part` of `out`; error O(h^4).
+pub fn hermite(part: Range<usize>, theta: f64, step: Step<'_>, y_end: &[f64], k_end: &[f64], out: &mut [f64]) {
+    let (s, h) = (1.0 - theta, step.h);
+    let [y, k, y_end, k_end] = [step.y, step.k, y_end, k_end].map(|x| &x[part.clone()]);
+    let out = &mut out[part];
     for i in 0..out.len() {
         let d = y_end[i] - y[i];
         out[i] = s * y[i]
@@ -213,7 +219,7 @@ mod tests {
         for n in 0..steps {
             let t = f64::from(n) * h;
             Oscillator.derivative(t, &y, &mut k);
-            stepper.attempt(&mut Oscillator, t, h, &y, &k, &mut y1, &mut k1);
+            stepper.attempt(&mut Oscillator, Step { t, h, y: &y, k: &k }, &mut y1, &mut k1);
             y = y1;
         }
         (y[0] - libm::cos(2.0)).abs().max((y[1] + libm::sin(2.0)).abs())
@@ -235,7 +241,7 @@ mod tests {
     fn frozen_components_are_not_read() {
         let step = |y: &[f64], k: &mut [f64], end: &mut [f64], k_end: &mut [f64]| {
             Oscillator.derivative(0.0, y, k);
-            DormandPrince::new(y.len()).attempt(&mut Oscillator, 0.0, 0.3, y, k, end, k_end)
+            DormandPrince::new(y.len()).attempt(&mut Oscillator, Step { t: 0.0, h: 0.3, y, k }, end, k_end)
         };
         let (mut alone, mut with_frozen) = ([0.0; 2], [0.0; 3]);
         let error = step(&[1.0, 0.2], &mut [0.0; 2], &mut alone, &mut [0.0; 2]);
@@ -250,8 +256,9 @@ mod tests {
         let y = [1.0, 0.0];
         let mut stepper = DormandPrince::new(2);
         Oscillator.derivative(0.0, &y, &mut k);
-        stepper.attempt(&mut Oscillator, 0.0, h, &y, &k, &mut y1, &mut k1);
-        stepper.interpolate(0..2, 0.37, h, &y, &k, &mut out);
+        let step = Step { t: 0.0, h, y: &y, k: &k };
+        stepper.attempt(&mut Oscillator, step, &mut y1, &mut k1);
+        stepper.interpolate(0..2, 0.37, step, &mut out);
         (out[0] - libm::cos(0.37 * h)).abs().max((out[1] + libm::sin(0.37 * h)).abs())
     }
 

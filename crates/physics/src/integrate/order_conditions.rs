@@ -158,7 +158,7 @@ fn explicit(stepper: &mut impl Stepper, stages: usize) -> (Tableau, Vec<f64>) {
     let mut probe = Probe::units(stages, stages);
     let k = probe.slopes[0].clone();
     let (y, mut end, mut k_end) = (vec![0.0; stages], vec![0.0; stages], vec![0.0; stages]);
-    stepper.attempt(&mut probe, 0.0, 1.0, &y, &k, &mut end, &mut k_end);
+    stepper.attempt(&mut probe, Step { t: 0.0, h: 1.0, y: &y, k: &k }, &mut end, &mut k_end);
     let mut rows = probe.rows(stages);
     if rows.len() < stages {
         rows.push(end.clone());
@@ -191,7 +191,7 @@ fn the_classical_runge_kutta_method_has_order_four_and_its_hermite_cubic_three()
     let unit = |i: usize| (0..5).map(|j| f64::from(u8::from(i == j))).collect::<Vec<f64>>();
     for theta in PARTS {
         let mut at = vec![0.0; 5];
-        hermite(theta, 1.0, &[0.0; 5], &unit(0), &weights, &unit(4), &mut at);
+        hermite(0..5, theta, Step { t: 0.0, h: 1.0, y: &[0.0; 5], k: &unit(0) }, &weights, &unit(4), &mut at);
         let defects = tableau.defects(&at, theta, 3);
         assert!(defects.iter().all(|d| *d < ROUNDING), "{theta}: {defects:?}");
     }
@@ -205,7 +205,7 @@ fn dormand_prince_has_order_five_and_its_interpolant_and_embedded_method_four() 
     let k = Probe::units(7, 7).slopes[0].clone();
     for theta in PARTS {
         let mut at = vec![0.0; 7];
-        stepper.interpolate(0..7, theta, 1.0, &[0.0; 7], &k, &mut at);
+        stepper.interpolate(0..7, theta, Step { t: 0.0, h: 1.0, y: &[0.0; 7], k: &k }, &mut at);
         let defects = tableau.defects(&at, theta, 4);
         assert!(defects.iter().all(|d| *d < ROUNDING), "{theta}: {defects:?}");
     }
@@ -213,7 +213,7 @@ fn dormand_prince_has_order_five_and_its_interpolant_and_embedded_method_four() 
     for tree in trees(5) {
         let error = estimate(&tree, &tableau, |probe, k| {
             let mut stepper = DormandPrince::new(1);
-            stepper.attempt(probe, 0.0, 1.0, &[0.0], k, &mut [0.0], &mut [0.0])
+            stepper.attempt(probe, Step { t: 0.0, h: 1.0, y: &[0.0], k }, &mut [0.0], &mut [0.0])
         });
         let order = tree.order() - 1;
         largest[order] = largest[order].max(error);

@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{StiffSystem, copy, largest};
+use super::{Step, StiffSystem, copy, largest};
 use std::ops::Range;
 
 const SQRT6: f64 = 2.449_489_742_783_178;
@@ -154,15 +154,13 @@ impl Radau {
     pub fn attempt<S: StiffSystem>(
         &mut self,
         system: &mut S,
-        t: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
+        step: Step<'_>,
         y_end: &mut [f64],
         k_end: &mut [f64],
         tolerance: f64,
         previous: &mut Polynomial,
     ) -> f64 {
+        let Step { t, h, y, k } = step;
         self.factorisations = 0;
         if self.set_initial_guess(system.active_ranges(), t, h, previous) {
             self.linearise_within(system, t, h, y);
@@ -522,7 +520,8 @@ mod tests {
         for n in 0..steps {
             let t = f64::from(n) * h;
             system.derivative(t, &y, &mut k);
-            let error = method.attempt(&mut system, t, h, &y, &k, &mut y1, &mut k1, 1e-13, &mut polynomial);
+            let error =
+                method.attempt(&mut system, Step { t, h, y: &y, k: &k }, &mut y1, &mut k1, 1e-13, &mut polynomial);
             assert!(error.is_finite(), "the iteration failed at {t}");
             y = y1;
         }
@@ -553,7 +552,14 @@ mod tests {
             let mut error = 0.0;
             for n in 0..2 {
                 let t = 0.02 * f64::from(n);
-                error = method.attempt(&mut system, t, 0.02, &y, &k, &mut y1, &mut k1, 1e-9, &mut polynomial);
+                error = method.attempt(
+                    &mut system,
+                    Step { t, h: 0.02, y: &y, k: &k },
+                    &mut y1,
+                    &mut k1,
+                    1e-9,
+                    &mut polynomial,
+                );
                 std::mem::swap(&mut y, &mut y1);
                 std::mem::swap(&mut k, &mut k1);
             }

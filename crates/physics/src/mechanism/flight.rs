@@ -256,7 +256,7 @@ impl Mechanism {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrate::{DormandPrince, Stepper, System};
+    use crate::integrate::{DormandPrince, Step, Stepper, System};
     use crate::machine::{Attachment, Body, Drive, Joint, JointStart, LooseJoint, Machine, Mat3, Quat};
 
     /// A slender body tumbling about all its axes.
@@ -296,7 +296,7 @@ mod tests {
         let mut equations = mechanism.evaluator(ActiveSet::Nothing);
         equations.derivative(t, &y, &mut k);
         for _ in 0..n {
-            stepper.attempt(&mut equations, t, h, &y, &k, &mut end, &mut k_end);
+            stepper.attempt(&mut equations, Step { t, h, y: &y, k: &k }, &mut end, &mut k_end);
             std::mem::swap(&mut y, &mut end);
             std::mem::swap(&mut k, &mut k_end);
             t += h;

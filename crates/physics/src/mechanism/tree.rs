@@ -194,7 +194,7 @@ impl Tree {
                     let row = v - block.v;
                     let h = &mut mass[mass_offset[block_index]..][..n * n];
                     h[row * n + row] = momentum.dot(&centre) + angular.dot(&a);
-                    fill_row(model, motion, h, n, block.v, row, b, momentum, angular);
+                    fill_row(model, motion, &mut h[row * n..][..n], block.v, b, momentum, angular);
                 }
                 Motion::Prismatic { v, .. } => {
                     let a = m.axis;
@@ -204,7 +204,7 @@ impl Tree {
                     let row = v - block.v;
                     let h = &mut mass[mass_offset[block_index]..][..n * n];
                     h[row * n + row] = c.mass;
-                    fill_row(model, motion, h, n, block.v, row, b, momentum, angular);
+                    fill_row(model, motion, &mut h[row * n..][..n], block.v, b, momentum, angular);
                 }
                 Motion::Free { v, .. } => {
                     out[v..v + 6].copy_from_slice(&six_of(&c.force, &c.torque));
@@ -458,15 +458,13 @@ fn fill_free(h: &mut [f64], n: usize, c: &Composite) {
     }
 }
 
-/// Couples coordinate `row` with its ancestors, given the momentum and angular momentum about body `b`'s centroid for unit rate.
+/// Couples a coordinate with its ancestors in its `row` of the block that begins with coordinate `first`, given the momentum and angular momentum about body `b`'s centroid for unit rate.
 #[inline]
 fn fill_row(
     model: &Model,
     motion: &[Kinematics],
-    h: &mut [f64],
-    n: usize,
+    row: &mut [f64],
     first: usize,
-    row: usize,
     b: usize,
     momentum: Vec3,
     mut angular: Vec3,
@@ -481,13 +479,13 @@ fn fill_row(
         match model.bodies[a].motion {
             Motion::Revolute { v, .. } => {
                 let axis = motion[a].axis;
-                h[row * n + v - first] = axis.dot(&(angular + motion[a].arm.cross(&momentum)));
+                row[v - first] = axis.dot(&(angular + motion[a].arm.cross(&momentum)));
             }
-            Motion::Prismatic { v, .. } => h[row * n + v - first] = motion[a].axis.dot(&momentum),
+            Motion::Prismatic { v, .. } => row[v - first] = motion[a].axis.dot(&momentum),
             Motion::Free { v, .. } => {
-                let at = row * n + v - first;
-                h[at..at + 3].copy_from_slice(momentum.as_slice());
-                h[at + 3..at + 6].copy_from_slice(angular.as_slice());
+                let at = v - first;
+                row[at..at + 3].copy_from_slice(momentum.as_slice());
+                row[at + 3..at + 6].copy_from_slice(angular.as_slice());
             }
             Motion::Fixed | Motion::Driven { .. } => {}
         }

@@ -85,6 +85,21 @@ struct Contacting {
     law: (f64, f64),
 }
 
+/// The beginning of a contact.
+pub(super) struct Onset {
+    pub contact: ContactId,
+    pub joint: usize,
+    /// s.
+    pub time: f64,
+    /// Penetration rate, m/s, and its rate of change before, m/s^2.
+    pub speed: f64,
+    pub push: f64,
+    /// Requested restitution.
+    pub requested: f64,
+    /// Whether another contact touches that acts on the same bodies.
+    pub among_others: bool,
+}
+
 /// Impacts under way and the latest finished ones: part of a simulation's state. Allocates nothing after `new`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Impacts {
@@ -124,38 +139,25 @@ impl Impacts {
             && known.all(|impact| impact.joint < joints.max(1))
     }
 
-    /// Records that contact `c`, of `joint`, begins at `time` with penetration rate `speed` (m/s), which was changing at `push`
-    /// (m/s^2); `in_contact` if another contact touches that `interacts` with it.
-    pub(super) fn begin(
-        &mut self,
-        c: ContactId,
-        joint: usize,
-        time: f64,
-        speed: f64,
-        requested: f64,
-        push: f64,
-        coefficients: &Coefficients,
-        in_contact: bool,
-        interacts: impl Fn(ContactId) -> bool,
-    ) {
+    /// Records that a contact begins as `onset` says, under `coefficients`.
+    pub(super) fn begin(&mut self, onset: &Onset, coefficients: &Coefficients, interacts: impl Fn(ContactId) -> bool) {
         let others = self.contacts.iter_mut().enumerate().filter(|(other, _)| interacts(*other));
         for impact in others.filter_map(|(_, other)| other.impact.as_mut()) {
             impact.disturbed = true;
         }
-        let law = &mut self.contacts[c].law;
-        if law.0 != coefficients.damping {
-            *law = (coefficients.damping, undisturbed_restitution(coefficients.damping));
+        let contact = &mut self.contacts[onset.contact];
+        if contact.law.0 != coefficients.damping {
+            contact.law = (coefficients.damping, undisturbed_restitution(coefficients.damping));
         }
-        let law = law.1;
-        self.contacts[c].impact = (speed > 0.0).then_some(Impact {
-            joint,
-            start: time,
-            approach_speed: speed,
-            requested,
-            law,
-            below_speed_floor: speed < coefficients.speed_floor,
-            disturbed: in_contact,
-            push,
+        contact.impact = (onset.speed > 0.0).then_some(Impact {
+            joint: onset.joint,
+            start: onset.time,
+            approach_speed: onset.speed,
+            requested: onset.requested,
+            law: contact.law.1,
+            below_speed_floor: onset.speed < coefficients.speed_floor,
+            disturbed: onset.among_others,
+            push: onset.push,
             ..Impact::default()
         });
     }

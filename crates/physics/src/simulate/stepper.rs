@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::integrate::{DormandPrince, Method, Polynomial, Radau, RungeKutta4, Stepper, StiffSystem, System, hermite};
+use crate::integrate::{
+    DormandPrince, Method, Polynomial, Radau, RungeKutta4, Step, Stepper, StiffSystem, System, hermite,
+};
 use std::ops::Range;
 
 pub(super) enum AnyStepper {
@@ -106,10 +108,7 @@ impl AnyStepper {
     pub(super) fn attempt<S: StiffSystem>(
         &mut self,
         system: &mut S,
-        t: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
+        step: Step<'_>,
         y_end: &mut [f64],
         k_end: &mut [f64],
         tolerance: f64,
@@ -117,12 +116,12 @@ impl AnyStepper {
     ) -> f64 {
         match self {
             Self::DiscreteGradient => unreachable!("the equations take this step"),
-            Self::RungeKutta4(s) => s.attempt(system, t, h, y, k, y_end, k_end),
+            Self::RungeKutta4(s) => s.attempt(system, step, y_end, k_end),
             Self::DormandPrince(s) | Self::Automatic { explicit: s, scheme: ActiveScheme::Explicit, .. } => {
-                s.attempt(system, t, h, y, k, y_end, k_end)
+                s.attempt(system, step, y_end, k_end)
             }
             Self::Radau(s) | Self::Automatic { stiff: s, .. } => {
-                s.attempt(system, t, h, y, k, y_end, k_end, tolerance, polynomial)
+                s.attempt(system, step, y_end, k_end, tolerance, polynomial)
             }
         }
     }
@@ -171,28 +170,22 @@ impl AnyStepper {
         matches!(self, Self::DiscreteGradient)
     }
 
-    /// Interpolates the components `part` of the state at fraction `theta` of the latest attempt into those of `out`.
+    /// Interpolates the components `part` of the state at fraction `theta` of the latest attempt, `step`, into those of `out`.
     pub(super) fn interpolate(
         &self,
         part: Range<usize>,
         theta: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        y_end: &[f64],
-        k_end: &[f64],
+        step: Step<'_>,
+        [y_end, k_end]: [&[f64]; 2],
         polynomial: &Polynomial,
         out: &mut [f64],
     ) {
         match self {
-            Self::DiscreteGradient | Self::RungeKutta4(_) => {
-                let [y, k, y_end, k_end] = [y, k, y_end, k_end].map(|x| &x[part.clone()]);
-                hermite(theta, h, y, k, y_end, k_end, &mut out[part]);
-            }
+            Self::DiscreteGradient | Self::RungeKutta4(_) => hermite(part, theta, step, y_end, k_end, out),
             Self::DormandPrince(s) | Self::Automatic { explicit: s, scheme: ActiveScheme::Explicit, .. } => {
-                s.interpolate(part, theta, h, y, k, out)
+                s.interpolate(part, theta, step, out)
             }
-            Self::Radau(_) | Self::Automatic { .. } => polynomial.interpolate(part, theta, y, out),
+            Self::Radau(_) | Self::Automatic { .. } => polynomial.interpolate(part, theta, step.y, out),
         }
     }
 }

@@ -4,7 +4,7 @@ use super::automatic::STABILITY_LIMIT;
 use super::corners::LawBranch;
 use super::{LONGEST_STEP, NEARLY, Stepping, edges, shortest_step};
 use crate::integrate::{Method, find_root};
-use crate::mechanism::{Counts, EdgeIndicator};
+use crate::mechanism::{ContactId, Counts, EdgeIndicator};
 use crate::simulate::peaks::Approach;
 use crate::simulate::stepper::ActiveScheme;
 use crate::simulate::{StopAdvice, StopFault, Stopped};
@@ -42,6 +42,26 @@ struct SignedGap {
     gap: f64,
     /// m/s.
     rate: f64,
+}
+
+/// What can end a step before its full size.
+#[derive(Clone, Copy)]
+enum End {
+    /// The end of the step to reproduce, and whether that was repeated to end there.
+    Limit(bool),
+    /// A contact starts or ends.
+    Contact(ContactId),
+    /// A contact leaves its branch of a law, for this one.
+    Corner(ContactId, LawBranch),
+    /// An edge of an element's force.
+    Edge,
+}
+
+/// An end, at a fraction of the step just attempted.
+#[derive(Clone, Copy)]
+struct Ending {
+    theta: f64,
+    at: End,
 }
 
 impl Stepping<'_> {
@@ -134,99 +154,87 @@ impl Stepping<'_> {
         let event = self.first_event(h);
         let corner = self.first_corner(h);
         // A step that follows another run ends where and how that run's step did, unless an event of its own comes first.
-        let last = to_reproduce.map(|full_step| ((limit - t) / h, full_step.repeated));
-        let before_last = |theta: f64| last.is_none_or(|(last, _)| theta < last);
-        let event = event.filter(|theta| before_last(*theta));
-        let corner = corner.filter(|corner| before_last(corner.theta));
+        let last = to_reproduce.map(|full_step| Ending { theta: (limit - t) / h, at: End::Limit(full_step.repeated) });
+        let contact = event.map(|(theta, contact)| Ending { theta, at: End::Contact(contact) });
+        let comes_first = |theta: f64| last.iter().chain(&contact).all(|ending| theta < ending.theta);
         self.attempt.corner = None;
-        let corner = corner.filter(|corner| event.is_none_or(|theta| corner.theta < theta));
-        if let Some(corner) = &corner
-            && corner.is_at_start()
+        self.attempt.located_contact = None;
+        let mut corner = corner.filter(|corner| comes_first(corner.theta));
+        if let Some(corner) = corner.take_if(|corner| corner.is_at_start())
             && !self.attempt.has_switched_branch
         {
             // Retry once on the other branch; if that leads back here, either branch will do.
             self.attempt.has_switched_branch = true;
             corner.next.apply_to(&mut self.state.now.contact_states[corner.contact]);
             self.invalidate();
-            self.state.control.h_next = requested_step;
-            self.state.control.contact_began = contact_began;
-            return None;
+            return self.retry(requested_step, contact_began);
         }
-        let corner = corner.filter(|corner| !corner.is_at_start());
         let edge = self.first_edge(h);
         if edge.is_some_and(|theta| theta < edges::AT_START) {
             // The edge was passed at the start: repeat the step on the other side.
-            self.state.control.h_next = requested_step;
-            self.state.control.contact_began = contact_began;
-            return None;
+            return self.retry(requested_step, contact_began);
         }
-        let edge = edge.filter(|theta| before_last(*theta));
-        let first = event.into_iter().chain(corner.iter().map(|corner| corner.theta)).fold(f64::INFINITY, f64::min);
-        if let Some(theta) = edge.filter(|theta| *theta < first) {
-            self.attempt.located_contact = None;
-            self.attempt.edge = true;
-            t_end = t + theta * h;
-            self.truncate_at(theta, t_end, h);
-            self.attempt.full_step = Some(FullStep { size: h, repeated: false });
-            h *= theta;
-        } else if let Some(corner) = corner {
-            // The full step worked; a rate that stops rising soon after contact onset is no evidence against its size.
-            if contact_began && matches!(corner.next, LawBranch::Approach(_)) {
-                self.state.control.h_contact = next.max(MIN_FIRST_STEP);
-            }
-            self.attempt.located_contact = None;
-            self.attempt.corner = Some((corner.contact, corner.next));
-            t_end = t + corner.theta * h;
-            self.truncate_at(corner.theta, t_end, h);
-            self.attempt.full_step = Some(FullStep { size: h, repeated: false });
-            h *= corner.theta;
-        } else if let Some((last, false)) = last
-            && event.is_none()
-        {
-            self.attempt.located_contact = None;
-            self.truncate_at(last, limit, h);
-            return Some((limit, limit - t));
-        } else if let Some(theta) = event.or(last.map(|(last, _)| last)) {
-            if event.is_none() {
-                self.attempt.located_contact = None;
-            }
-            t_end = t + theta * h;
-            if tolerance >= END_ON_INTERPOLANT && self.stepper.ends_on_interpolant() {
-                self.truncate_at(theta, t_end, h);
-                self.attempt.full_step = Some(FullStep { size: h, repeated: false });
-                return Some((t_end, h * theta));
-            }
-            // Repeat the step, shortened, so that its end has the error of the method and not that of the interpolant.
-            self.attempt.full_step = Some(FullStep { size: h, repeated: true });
-            if event.is_some() {
-                h *= theta;
-            } else {
-                (t_end, h) = (limit, limit - t);
-            }
-            if !self.try_step(h).is_finite() {
-                self.state.control.h_next = 0.5 * h;
-                self.state.control.contact_began = contact_began;
-                return None;
-            }
-            self.finish_gaps(t_end);
-        } else if contact_began {
+        let corner = corner.map(|corner| Ending { theta: corner.theta, at: End::Corner(corner.contact, corner.next) });
+        let edge = edge.map(|theta| Ending { theta, at: End::Edge });
+        // Of several at one instant, the first in this order.
+        let endings = [last, contact, corner, edge].into_iter().flatten();
+        let first = endings.reduce(|first, next| if next.theta < first.theta { next } else { first });
+        // The full step worked; a rate that stops rising soon after contact onset is no evidence against its size.
+        let worked = match first {
+            None => true,
+            Some(Ending { at, .. }) => matches!(at, End::Corner(_, LawBranch::Approach(_))),
+        };
+        if contact_began && worked {
             self.state.control.h_contact = next.max(MIN_FIRST_STEP);
         }
-        Some((t_end, h))
+        let Some(Ending { theta, at }) = first else {
+            return Some((t_end, h));
+        };
+        let (t_end, part) = match at {
+            End::Limit(_) => (limit, limit - t),
+            _ => (t + theta * h, h * theta),
+        };
+        match at {
+            End::Limit(false) => {
+                self.truncate_at(theta, limit, h);
+                return Some((t_end, part));
+            }
+            End::Corner(contact, branch) => self.attempt.corner = Some((contact, branch)),
+            End::Edge => self.attempt.edge = true,
+            End::Contact(contact) => self.attempt.located_contact = Some(contact),
+            End::Limit(true) => {}
+        }
+        let repeats = matches!(at, End::Contact(_) | End::Limit(_))
+            && !(tolerance >= END_ON_INTERPOLANT && self.stepper.ends_on_interpolant());
+        self.attempt.full_step = Some(FullStep { size: h, repeated: repeats });
+        if !repeats {
+            let t_end = t + theta * h;
+            self.truncate_at(theta, t_end, h);
+            return Some((t_end, h * theta));
+        }
+        // Repeat the step, shortened, so that its end has the error of the method and not that of the interpolant.
+        if !self.try_step(part).is_finite() {
+            return self.retry(0.5 * part, contact_began);
+        }
+        self.finish_gaps(t_end);
+        Some((t_end, part))
     }
 
-    /// Fraction of the step just attempted at which the first contact starts or ends, if any; that contact is stored in
-    /// `located_contact`.
-    fn first_event(&mut self, h: f64) -> Option<f64> {
-        let mut first: Option<f64> = None;
-        self.attempt.located_contact = None;
+    /// Lets the step be repeated with the size `h_next`, s.
+    fn retry(&mut self, h_next: f64, contact_began: bool) -> Option<(f64, f64)> {
+        self.state.control.h_next = h_next;
+        self.state.control.contact_began = contact_began;
+        None
+    }
+
+    /// Fraction of the step just attempted at which the first contact starts or ends, if any, and that contact.
+    fn first_event(&mut self, h: f64) -> Option<(f64, ContactId)> {
+        let mut first: Option<(f64, ContactId)> = None;
         for c in 0..self.attempt.end.gaps.len() {
-            let Some(theta) = self.event_of(c, h) else {
-                continue;
-            };
-            if first.is_none_or(|earliest| theta < earliest) {
-                first = Some(theta);
-                self.attempt.located_contact = Some(c);
+            if let Some(theta) = self.event_of(c, h)
+                && first.is_none_or(|(earliest, _)| theta < earliest)
+            {
+                first = Some((theta, c));
             }
         }
         first

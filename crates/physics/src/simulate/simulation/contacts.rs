@@ -2,10 +2,11 @@
 
 use super::search::NEAR_PEAK;
 use super::{State, Stepping};
-use crate::contact::{Coefficients, ContactState, Separation};
+use crate::contact::{ContactState, Separation};
 use crate::integrate::StepControl;
 use crate::machine::MIN_IMPACT_STEPS;
 use crate::mechanism::{ContactId, Contacts};
+use crate::simulate::impacts::Onset;
 use crate::simulate::peaks::PenetrationCubic;
 
 /// Largest penetration, as a fraction of the clearance, of a ball that is at its wall to within rounding.
@@ -35,7 +36,8 @@ impl State {
         let interacts = |other: ContactId| contacts.interact(c, other);
         let mut active = self.now.contact_states.iter().enumerate().filter(|(_, m)| m.active);
         let among_others = active.any(|(other, _)| interacts(other));
-        self.record.impacts.begin(c, j, time, rate, requested, push, coefficients, among_others, interacts);
+        let onset = Onset { contact: c, joint: j, time, speed: rate, push, requested, among_others };
+        self.record.impacts.begin(&onset, coefficients, interacts);
         let contact_state = ContactState::at_onset(coefficients, rate);
         self.record.statistics.joints[j].impacts += 1;
         let peak = &mut self.joints[j].peak;
@@ -46,19 +48,17 @@ impl State {
         contact_state
     }
 
-    /// Records a step of contact `c`, of joint `j`, that began at `start` (s), from fraction `from` on, with the largest normal force `force`
-    /// (N).
+    /// Records a step of contact `c` that began at `start` (s), from fraction `from` on, with the largest normal force `force` (N).
     fn record_contact_step(
         &mut self,
-        c: ContactId,
-        j: usize,
+        (c, contacts): (ContactId, &Contacts),
         start: f64,
         cubic: &PenetrationCubic,
-        law: &Coefficients,
         force: f64,
         contact_state: &ContactState,
         from: f64,
     ) {
+        let (j, law) = (contacts.joint_of(c), contacts.coefficients(c));
         let (damping, theta) = cubic.most_damped(law, contact_state, from);
         self.record.impacts.update(c, cubic, force, damping);
         if damping > self.record.statistics.joints[j].damping {
@@ -126,7 +126,14 @@ impl Stepping<'_> {
             if state.now.contact_states[c].active {
                 let cubic = PenetrationCubic::new(start, end, h, rounding);
                 let contact_state = state.now.contact_states[c].unfrozen();
-                state.record_contact_step(c, j, before.t, &cubic, coefficients, peak_forces[c].0, &contact_state, 0.0);
+                state.record_contact_step(
+                    (c, &mechanism.contacts),
+                    before.t,
+                    &cubic,
+                    peak_forces[c].0,
+                    &contact_state,
+                    0.0,
+                );
             }
             // A located switch ends within rounding of the wall, on either side. The repeated step may still show that a ball
             // about to separate has turned back.
@@ -165,7 +172,7 @@ impl Stepping<'_> {
                 if fixed {
                     contact_state.update_largest_rate(coefficients, end.rate, || cubic.fastest(theta).0);
                     let (force, _) = cubic.strongest(coefficients, &contact_state);
-                    state.record_contact_step(c, j, before.t, &cubic, coefficients, force, &contact_state, theta);
+                    state.record_contact_step((c, &mechanism.contacts), before.t, &cubic, force, &contact_state, theta);
                 }
                 state.now.contact_states[c] = contact_state;
             } else {

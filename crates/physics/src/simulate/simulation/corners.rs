@@ -189,7 +189,7 @@ impl Stepping<'_> {
         let all = 0..now.y.len();
         for part in mechanism.gap_components(c).unwrap_or(std::slice::from_ref(&all)) {
             let part = part.clone();
-            stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, &state.polynomial, scratch_y);
+            stepper.interpolate(part, theta, now.step(h), [&end.y, &end.k], &state.polynomial, scratch_y);
         }
         let time = now.t + theta * h;
         for free_body in mechanism.free_flight_bodies_of(c) {
@@ -235,7 +235,7 @@ impl Stepping<'_> {
         let (now, end, scratch) = (&self.state.now, &mut self.attempt.end, &mut self.scratch_y);
         for part in self.mechanism.active_ranges() {
             let part = part.clone();
-            self.stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, &self.state.polynomial, scratch);
+            self.stepper.interpolate(part, theta, now.step(h), [&end.y, &end.k], &self.state.polynomial, scratch);
         }
         for part in self.mechanism.active_ranges() {
             end.y[part.clone()].copy_from_slice(&scratch[part.clone()]);

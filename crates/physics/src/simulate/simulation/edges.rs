@@ -85,7 +85,7 @@ impl Stepping<'_> {
         let Self { mechanism, stepper, state, attempt, scratch_y, .. } = self;
         let (now, end) = (&state.now, &attempt.end);
         let all = 0..now.y.len();
-        stepper.interpolate(all, theta, h, &now.y, &now.k, &end.y, &end.k, &state.polynomial, scratch_y);
+        stepper.interpolate(all, theta, now.step(h), [&end.y, &end.k], &state.polynomial, scratch_y);
         let time = now.t + theta * h;
         write_flights(mechanism, &state.flights, time, scratch_y);
         mechanism.measure(time, scratch_y);

@@ -76,12 +76,12 @@ impl Stepping<'_> {
     pub(super) fn interpolate_stepped(&mut self, theta: f64, h: f64) {
         let Self { mechanism, stepper, state, before, scratch_y, .. } = self;
         let now = &state.now;
-        let (y0, k0, y, k) = (&before.y, &before.k, &now.y, &now.k);
+        let (step, end) = (before.step(h), [&*now.y, &now.k]);
         if mechanism.is_kinematic() {
-            hermite(theta, h, y0, k0, y, k, scratch_y);
+            hermite(0..now.y.len(), theta, step, &now.y, &now.k, scratch_y);
         } else {
             for part in mechanism.active_ranges() {
-                stepper.interpolate(part.clone(), theta, h, y0, k0, y, k, &state.polynomial, scratch_y);
+                stepper.interpolate(part.clone(), theta, step, end, &state.polynomial, scratch_y);
             }
         }
     }

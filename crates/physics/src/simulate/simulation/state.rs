@@ -6,7 +6,7 @@ use super::{
     StateMismatch, StepEnd, WorkspaceId,
 };
 use crate::contact::{ContactPhase, ContactState};
-use crate::integrate::Polynomial;
+use crate::integrate::{Polynomial, Step};
 use crate::machine::Conditions;
 use crate::mechanism::{ContactId, Flight, Mechanism, Pull};
 use crate::simulate::impacts::{Impact, Impacts};
@@ -44,6 +44,11 @@ impl StepEnd {
             contact_states: vec![ContactState::default(); contacts],
             y,
         }
+    }
+
+    /// The step of size `h` that begins here.
+    pub(super) fn step(&self, h: f64) -> Step<'_> {
+        Step { t: self.t, h, y: &self.y, k: &self.k }
     }
 
     /// Copies `other`, of the same model, without allocating.

@@ -189,14 +189,14 @@ impl Stepping<'_> {
         let located = self.locates();
         let Self { mechanism, stepper, state, attempt, .. } = self;
         let State { now, conditions, polynomial, .. } = &mut **state;
-        let StepEnd { t, y, k, contact_states, .. } = &*now;
+        let contact_states = &now.contact_states;
         mechanism.freeze_elements(&attempt.element_sides);
         attempt.has_left_branch.fill(false);
         let mut evaluator =
             mechanism.evaluator_with_branches(ActiveSet::by(located, contact_states), &mut attempt.has_left_branch);
         let end = &mut attempt.end;
         let tolerance = conditions.solver.tolerance;
-        let error = stepper.attempt(&mut evaluator, *t, h, y, k, &mut end.y, &mut end.k, tolerance, polynomial);
+        let error = stepper.attempt(&mut evaluator, now.step(h), &mut end.y, &mut end.k, tolerance, polynomial);
         attempt.counts += evaluator.counts;
         let factorisations = stepper.factorisations();
         attempt.factorisations += factorisations;
