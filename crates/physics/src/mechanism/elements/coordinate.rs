@@ -201,10 +201,9 @@ impl Coordinate {
         if self.turns {
             return ElementReport {
                 points: [state.point; 2],
-                force: Vec3::zeros(),
                 torque: Some(force),
                 is_pure_torque: true,
-                depth: None,
+                ..ElementReport::default()
             };
         }
         let parent = &motion[self.parent.body];

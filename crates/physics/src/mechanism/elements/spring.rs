@@ -3,7 +3,6 @@
 
 use super::characteristic::SpringDamper;
 use super::{At, Coupling, EdgeIndicator, Edges, ElementReport, ForceElement, Loads, point_of, push};
-use crate::jet::Jet;
 use crate::machine::{self, Mat3, SpringSide, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
@@ -28,9 +27,9 @@ struct State {
     length: f64,
     along: Vec3,
     rate: f64,
-    /// Elastic and damping tension with their slopes, ignoring one-sidedness.
-    elastic: Jet,
-    damping: Jet,
+    /// Elastic and damping tension, N, ignoring one-sidedness.
+    elastic: f64,
+    damping: f64,
     /// Total tension, N.
     tension: f64,
     /// Whether a one-sided spring is slack.
@@ -44,19 +43,20 @@ impl Spring {
     }
 
     fn state(&self, motion: &[Kinematics]) -> State {
-        let [(start, start_velocity, start_arm), (end, end_velocity, end_arm)] =
-            self.ends.each_ref().map(|anchor| point_of(anchor, motion));
+        let [from, to] = &self.ends;
+        let (start, start_velocity, start_arm) = point_of(from, motion);
+        let (end, end_velocity, end_arm) = point_of(to, motion);
         let distance = end - start;
         let length = distance.norm();
         let along = if length > 0.0 { distance / length } else { Vec3::zeros() };
         let velocity = end_velocity - start_velocity;
         let rate = along.dot(&velocity);
-        let [elastic, damping] = self.law.at([length - self.length, rate]);
-        let total = elastic.value + damping.value;
+        let [elastic, damping] = self.law.at([length - self.length, rate]).map(|force| force.value);
+        let total = elastic + damping;
         let tension = match self.frozen {
             Some(true) => total,
             // A slack spring has no damping force either.
-            None if self.side.of(elastic.value) == elastic.value => self.side.of(total),
+            None if self.side.of(elastic) == elastic => self.side.of(total),
             _ => 0.0,
         };
         State {
@@ -92,10 +92,10 @@ impl ForceElement for Spring {
         if s.slack {
             return None;
         }
-        let [stiffness, damping] = [s.elastic, s.damping].map(|force| force.rate);
+        let [stiffness, damping] = self.law.at([s.length - self.length, s.rate]).map(|force| force.rate);
         if s.length == 0.0 {
             // A bushing resists separation in any direction; otherwise the direction, and hence the force, is discontinuous here.
-            let is_bushing = self.length == 0.0 && s.elastic.value == 0.0;
+            let is_bushing = self.length == 0.0 && s.elastic == 0.0;
             let by_displacement = Mat3::identity() * -stiffness;
             return is_bushing.then(|| Coupling::between_points(self.ends, by_displacement, Mat3::zeros()));
         }
@@ -115,8 +115,8 @@ impl ForceElement for Spring {
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
         let s = self.state(motion);
         powers.damping += match self.side {
-            SpringSide::Both => s.damping.value * s.rate,
-            _ => (s.tension - self.side.of(s.elastic.value)) * s.rate,
+            SpringSide::Both => s.damping * s.rate,
+            _ => (s.tension - self.side.of(s.elastic)) * s.rate,
         };
     }
 
@@ -126,8 +126,8 @@ impl ForceElement for Spring {
             return Edges::default();
         }
         let s = self.state(motion);
-        let [elastic, both] = [s.elastic.value, s.elastic.value + s.damping.value]
-            .map(|tension| if self.side == SpringSide::Pull { tension } else { -tension });
+        let sign = if self.side == SpringSide::Pull { 1.0 } else { -1.0 };
+        let [elastic, both] = [s.elastic, s.elastic + s.damping].map(|tension| sign * tension);
         let contact = |value| (self.side != SpringSide::Both).then_some(EdgeIndicator::Contact(value));
         let [of_elastic, of_damping] = self.law.edges([s.length - self.length, s.rate]);
         [contact(elastic), contact(elastic.min(both)), of_elastic, of_damping]

@@ -71,7 +71,8 @@ impl Stepping<'_> {
     fn measure_edge_indicators(&mut self, theta: f64, h: f64, out: &mut Vec<EdgeIndicator>) {
         let time = self.measure_all_at(theta, h);
         out.clear();
-        out.extend(self.mechanism.edge_indicators(time));
+        // A nested iterator runs faster from inside than through `extend`.
+        self.mechanism.edge_indicators(time).for_each(|indicator| out.push(indicator));
     }
 
     /// The value of one of these indicators.
