@@ -11,7 +11,7 @@ use jointplay_physics::machine::{Preset, Solver};
 use jointplay_scene::Scene;
 
 /// Results of `jointplay tradeoff SCENE… --presets assets/presets.json`.
-const RECORD: &str = include_str!("../../../assets/presets.json");
+const RECORD: &str = include_str!("../assets/presets.json");
 
 /// Word of the settings of a solver about which nothing is given, beside those of the presets.
 pub const DEFAULT: &str = "default";

@@ -16,7 +16,7 @@ macro_rules! embedded {
         /// TOML text of a built-in scene or of a benchmark.
         pub fn built_in_text(name: &str) -> Option<&'static str> {
             Some(match name {
-                $($($name => include_str!(concat!("../../../assets/", $folder, "/", $name, ".toml")),)+)+
+                $($($name => include_str!(concat!("../assets/", $folder, "/", $name, ".toml")),)+)+
                 _ => return None,
             })
         }
