@@ -94,7 +94,7 @@ impl PyScene {
     fn origin(&self) -> Origin {
         let source = &self.scene.source;
         let references = source.beside.iter().map(|(name, text)| (name.clone(), text.to_string())).collect();
-        (source.text.clone(), source.file.clone(), references, self.scene.changes.clone())
+        (source.text.to_string(), source.file.clone(), references, self.scene.changes.clone())
     }
 
     /// Short name.

@@ -117,7 +117,7 @@ impl App {
         let pending = self.player.pending();
         let source = &pending.source;
         let has_same_files = |scene: Scene| scene.source.beside == source.beside;
-        let same = text == source.text;
+        let same = *text == *source.text;
         let companions = self.scene_file.companions.clone();
         if same && (self.parse_file(&name, &text, &companions, &pending.changes)).is_ok_and(has_same_files) {
             // Saved without changes, or reverted after an error.

@@ -543,11 +543,11 @@ impl SceneText {
     /// Source of `scene`.
     pub fn of(scene: &Scene) -> Self {
         let text = &scene.source.text;
-        if built_in_text(&scene.name) == Some(text) {
+        if built_in_text(&scene.name) == Some(&**text) {
             return Self::BuiltIn(scene.name.clone());
         }
         let path = scene.source.file.as_deref().unwrap_or("scene.toml");
-        Self::File { name: path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(), text: text.clone() }
+        Self::File { name: path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(), text: text.to_string() }
     }
 }
 

@@ -117,9 +117,8 @@ impl Player {
     /// # Errors
     /// As [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
-        // The text has been parsed before. Should it fail now, the default of a control is its current value.
-        let original = Scene::parse_with(&scene.source.text, scene.source.file.as_deref(), &scene.source.beside, &[])
-            .unwrap_or_else(|_| scene.clone());
+        // The text alone has been valid before. Should it fail now, the default of a control is its current value.
+        let original = scene.without(|_| true).unwrap_or_else(|_| scene.clone());
         let mut player = Self::with_simulation(LiveScene::new(scene)?, original);
         player.start();
         Ok(player)
