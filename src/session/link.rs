@@ -15,9 +15,8 @@ use super::log::Log;
 use crate::scene::{DEFAULT_SCENE, MAX_FILE_SIZE, Scene, SceneError, Texts, built_in_text, visible, visible_line};
 use crate::simulate::{Quantity, SCALE_RANGE};
 use crate::units::{Dimension, parse_quantity};
-use crate::view::ScenePart;
 use crate::words::{Words as _, words};
-use settings::{Instruments, PlotWindow};
+use settings::{Instruments, PlotWindow, ScenePart};
 
 /// Length limit of links, characters: e-mail, chats and every browser accept this length.
 pub const MAX_LINK_LENGTH: usize = 32_000;

@@ -157,7 +157,7 @@ impl Player {
     }
 
     /// Name patterns of the picked channels.
-    pub(crate) fn picks(&self) -> &[String] {
+    pub fn picks(&self) -> &[String] {
         &self.record.picks
     }
 
@@ -263,7 +263,7 @@ impl Player {
     }
 
     /// Moves the ghosts to the displayed instant.
-    pub(crate) fn update_ghosts(&mut self) {
+    pub fn update_ghosts(&mut self) {
         if let Some(twin) = &mut self.twin {
             twin.move_to(self.pacer.shown());
         }
@@ -306,7 +306,7 @@ impl Player {
     }
 
     /// Drops the queued events that were not reached.
-    pub(crate) fn drop_queued(&mut self) {
+    pub fn drop_queued(&mut self) {
         self.script.drop_ahead();
     }
 
@@ -511,7 +511,7 @@ impl Player {
     }
 
     /// Changes of parameters by the user since the last call.
-    pub(crate) fn take_edits(&mut self) -> Vec<Edit> {
+    pub fn take_edits(&mut self) -> Vec<Edit> {
         std::mem::take(&mut self.edits)
     }
 
@@ -519,7 +519,7 @@ impl Player {
     ///
     /// # Errors
     /// As [`Self::set`].
-    pub(crate) fn restore_parameter(&mut self, key: &str, text: Option<&str>) -> Result<(), SetError> {
+    pub fn restore_parameter(&mut self, key: &str, text: Option<&str>) -> Result<(), SetError> {
         if changed_value(&self.pending().changes, key).as_deref() == text {
             return Ok(());
         }
@@ -617,8 +617,7 @@ impl Player {
     pub(crate) fn step(&mut self) -> bool {
         self.record_until(self.simulation.time());
         self.store_keyframe();
-        let end = self.script.step_end(self.simulation.time());
-        match self.simulation.step_until(end) {
+        match self.script.step(&mut self.simulation, f64::INFINITY) {
             Ok(()) => {
                 self.unchanged = None;
                 self.simulation.take_peaks(&mut self.record.upcoming_peaks);
@@ -637,11 +636,6 @@ impl Player {
             Err(stopped) => {
                 self.playing = false;
                 self.stopped = Some(stopped);
-                match self.script.due(self.steps()) {
-                    // Repeated: the stop is already in the log.
-                    Some(Event::Stop) => self.script.pass(self.simulation.time()),
-                    _ => self.log_event(Event::Stop),
-                }
                 false
             }
         }
