@@ -125,7 +125,7 @@ impl App {
             self.scene_file.faulty = None;
             return Ok(());
         }
-        let before = Scene::parse_with(&source.text, Some(&name), &source.beside, &[]);
+        let before = pending.without(|_| true);
         let after = match self.parse_file(&name, &text, &companions, &[]) {
             Ok(after) => after,
             Err(error) => {

@@ -490,7 +490,7 @@ impl Player {
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SetError> {
         if self.has_future() {
             // A refused change must not abandon the future.
-            self.pending().clone().set(key, value)?;
+            self.pending().with(key, value)?;
         }
         self.change(key, Event::set(key, value))
     }
