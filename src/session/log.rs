@@ -5,7 +5,7 @@
 
 use crate::analysis::section::Schedule;
 use crate::machine::Vec3;
-use crate::scene::{LiveScene, SetError, Value};
+use crate::scene::{LiveScene, SetError};
 use crate::simulate::{Effect, MAX_RUN_DURATION, Pull, Simulation, Stopped};
 
 /// Largest stiffness, N/m, and damping, N s/m, of a logged pull.
@@ -63,7 +63,7 @@ impl Event {
         match self {
             Self::Set { key, value } => run.set(key, value),
             // A ball joint without a value of its own in the file follows the common one again, whatever that is now.
-            Self::Original { key } => run.set_value(key, &Value::Unset),
+            Self::Original { key } => run.undo_change(key),
             Self::Pull(pulled) => Ok(run.pull(pulled.map(Pull::from)).map(|()| Effect::Now)?),
             Self::Sections { .. } | Self::Stop => Ok(Effect::Now),
         }

@@ -547,7 +547,7 @@ impl Player {
     /// Reverts the change of a parameter: it has its value in the scene file again, or follows what it follows there.
     ///
     /// # Errors
-    /// As [`LiveScene::set_value`]; the run is left unchanged.
+    /// As [`LiveScene::undo_change`]; the run is left unchanged.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SetError> {
         self.pending().parameter(key)?;
         self.change(key, Event::Original { key: key.to_owned() })

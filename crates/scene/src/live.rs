@@ -3,7 +3,7 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
-use super::{Scene, SceneError, Value};
+use super::{Scene, SceneError};
 use jointplay_physics::simulate::{ChangeError, Effect, Model, Simulation, StartError, State, StateMismatch};
 
 /// Why a parameter of a running scene was not changed.
@@ -103,15 +103,14 @@ impl LiveScene {
         self.change(key, |scene| scene.with(key, value))
     }
 
-    /// Like [`Self::set`], with a value in SI units.
+    /// Reverts the change of a parameter, like [`Scene::undo_change`].
     ///
     /// # Errors
     /// Same as [`Self::set`].
-    pub fn set_value(&mut self, key: &str, value: &Value) -> Result<Effect, SetError> {
+    pub fn undo_change(&mut self, key: &str) -> Result<Effect, SetError> {
         self.change(key, |scene| {
-            let mut scene = scene.clone();
-            scene.set_value(key, value)?;
-            Ok(scene)
+            scene.parameter(key)?;
+            scene.without(|changed| changed == key)
         })
     }
 
