@@ -125,7 +125,7 @@ impl App {
             self.scene_file.faulty = None;
             return Ok(());
         }
-        let before = pending.without(|_| true);
+        let before = pending.with_changes(&[]);
         let after = match self.parse_file(&name, &text, &companions, &[]) {
             Ok(after) => after,
             Err(error) => {

@@ -118,7 +118,7 @@ impl Player {
     /// As [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
         // The text alone has been valid before. Should it fail now, the default of a control is its current value.
-        let original = scene.without(|_| true).unwrap_or_else(|_| scene.clone());
+        let original = scene.with_changes(&[]).unwrap_or_else(|_| scene.clone());
         let mut player = Self::with_simulation(LiveScene::new(scene)?, original);
         player.start();
         Ok(player)

@@ -176,7 +176,7 @@ impl Scene {
         }
         next.change(key, value)?;
         if leaves_preset || replaces_text(key) {
-            next = next.rebuilt()?;
+            next = next.rebuilt(&next.changes)?;
         }
         next.apply_preset();
         next.machine.check_contacts().map_err(|conflict| next.blame_change(&conflict, key))?;
@@ -204,18 +204,27 @@ impl Scene {
     /// A key this scene does not have, or an inconsistent scene; `self` is then unchanged.
     pub fn undo_change(&mut self, key: &str) -> Result<&'static Parameter, SceneError> {
         let parameter = self.parameter(key)?;
-        *self = self.without(|changed| changed == key)?;
+        *self = self.without(key)?;
         Ok(parameter)
     }
 
-    /// This scene without the changes of the keys that are `undone`.
+    /// This scene after [`Self::undo_change`].
     ///
     /// # Errors
-    /// An inconsistent scene.
-    pub fn without(&self, undone: impl Fn(&str) -> bool) -> Result<Self, SceneError> {
-        let mut next = self.clone();
-        next.changes.retain(|(key, _)| !undone(key));
-        next.rebuilt()
+    /// Same as [`Self::undo_change`].
+    pub fn without(&self, key: &str) -> Result<Self, SceneError> {
+        self.parameter(key)?;
+        let mut changes = self.changes.clone();
+        changes.retain(|(changed, _)| changed != key);
+        self.rebuilt(&changes)
+    }
+
+    /// The scene of the same text with these `changes` alone, made at once.
+    ///
+    /// # Errors
+    /// Same as [`Self::load`].
+    pub fn with_changes(&self, changes: &[(String, String)]) -> Result<Self, SceneError> {
+        self.read_again(changes, |_, _| true)
     }
 
     /// The value that `key` has once its change is reverted; `text` is the scene as read from the same text without changes. A ball
@@ -244,23 +253,28 @@ impl Scene {
         text.get(key).ok()
     }
 
-    /// The scene of the text with all changes, except those of keys that it no longer has, such as those of a joint beyond the
-    /// end of a shortened chain. The text is read again only for other numbers in it, and for the places that errors name.
-    fn rebuilt(&self) -> Result<Self, SceneError> {
-        let has = |scene: &Self, key: &str| scene.lookup(key).is_some();
-        if let Some(as_read) = self.as_read.as_ref().filter(|read| changes_of_text(&self.changes).eq(&read.changes))
-            && let Ok(scene) = as_read.with_changes(&self.changes, has)
+    /// As [`Self::with_changes`], except the changes of keys that the scene no longer has, such as those of a joint beyond the
+    /// end of a shortened chain.
+    fn rebuilt(&self, changes: &[(String, String)]) -> Result<Self, SceneError> {
+        self.read_again(changes, |scene, key| scene.lookup(key).is_some())
+    }
+
+    /// As [`Self::read`], from this scene's text. That is read again only for other numbers in it, and for the places that errors
+    /// name.
+    fn read_again(&self, changes: &[(String, String)], retains: fn(&Self, &str) -> bool) -> Result<Self, SceneError> {
+        if let Some(as_read) = self.as_read.as_ref().filter(|as_read| changes_of_text(changes).eq(&as_read.changes))
+            && let Ok(scene) = as_read.changed(changes, retains)
             && scene.machine.check_contacts().is_ok()
         {
             return Ok(scene);
         }
         let source = &self.source;
         let beside = AssetResolver::known(&source.beside);
-        Self::read(&source.text, source.file.as_deref(), beside, &self.changes, has)
+        Self::read(&source.text, source.file.as_deref(), beside, changes, retains)
     }
 
     /// This scene, as read from its text, with the `changes` of keys that it `retains`; without the checks of contacts.
-    pub(super) fn with_changes(
+    pub(super) fn changed(
         self: &Arc<Self>,
         changes: &[(String, String)],
         retains: fn(&Self, &str) -> bool,

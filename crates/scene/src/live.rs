@@ -108,10 +108,7 @@ impl LiveScene {
     /// # Errors
     /// Same as [`Self::set`].
     pub fn undo_change(&mut self, key: &str) -> Result<Effect, SetError> {
-        self.change(key, |scene| {
-            scene.parameter(key)?;
-            scene.without(|changed| changed == key)
-        })
+        self.change(key, |scene| scene.without(key))
     }
 
     fn change(&mut self, key: &str, change: impl Fn(&Scene) -> Result<Scene, SceneError>) -> Result<Effect, SetError> {

@@ -138,8 +138,8 @@ impl Scene {
         source.numbers = document.reading.numbers();
         source.own = own;
         source.beside = document.assets.texts();
-        scene.changes = changes_of_text(changes).cloned().collect();
-        let scene = Arc::new(scene).with_changes(changes, retains)?;
+        scene.changes = changes_of_text(changes).filter(|(key, _)| retains(&scene, key)).cloned().collect();
+        let scene = Arc::new(scene).changed(changes, retains)?;
         scene.machine.check_contacts().map_err(|conflict| {
             let message = conflict.fault.to_string();
             let keys = scene.keys_of(&conflict);
