@@ -1,8 +1,8 @@
 //! Jointplay: a 3D laboratory that shows what play in a ball joint does to a machine.
 //!
 //! Physics, scene files and analysis are separate crates, re-exported here. Above them are the following modules, each using
-//! only those before it (`ARCHITECTURE.md`): [`files`], [`chart`], [`film`] and [`view`], [`render`] and [`session`], [`app`],
-//! and the entries [`cli`], `main.rs` and [`web`].
+//! only those before it (`ARCHITECTURE.md`): [`files`], [`session`], [`chart`], [`film`] and [`view`], [`render`], [`app`], and the
+//! entries [`cli`], `main.rs` and [`web`].
 #![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_types))]
 
 /// The version that every output file names.
@@ -29,7 +29,6 @@ pub mod files;
 pub mod film;
 #[cfg(feature = "gui")]
 pub mod render;
-#[cfg(feature = "gui")]
 pub mod session;
 #[cfg(feature = "gui")]
 pub mod view;

@@ -1,4 +1,4 @@
-//! Nothing is allocated in the stepping loop.
+//! Nothing is allocated in the stepping loop, and little for a change of a parameter.
 #![allow(unsafe_code, reason = "a global allocator that counts can only be written with it")]
 
 mod common;
@@ -7,6 +7,7 @@ mod large;
 
 use common::{MACHINES, METHODS, SCENES, simulation};
 use jointplay::scene::Scene;
+use jointplay::session::player::Player;
 use jointplay::simulate::{Frame, Simulation};
 use large::scene_text;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -209,4 +210,32 @@ fn setup_allocations_grow_linearly_with_the_scene() {
         let growth = double as f64 / single as f64;
         assert!(growth < 2.6, "{kind}, {form}: {single}, then {double} bytes");
     }
+}
+
+/// Bytes allocated by `work`.
+fn bytes(work: impl FnOnce()) -> u64 {
+    let before = BYTES.get();
+    work();
+    BYTES.get() - before
+}
+
+#[test]
+fn a_change_copies_neither_text_nor_record_and_reads_the_text_only_for_its_numbers() {
+    let load = || Scene::load("spcmm", &[]).unwrap();
+    let reading = bytes(|| drop(load()));
+    let mut player = Player::new(&load()).unwrap();
+    player.run_to(0.1);
+    player.set("contact.friction", "0.2").unwrap();
+    let moved = bytes(|| drop(player.set("contact.friction", "0.21")));
+    assert!(moved < 32 << 10, "{moved}");
+    let solver = bytes(|| {
+        player.set("solver.preset", "preview").unwrap();
+        player.set("solver.method", "radau5").unwrap();
+        player.set_original("solver.method").unwrap();
+    });
+    assert!(solver < reading / 4, "{solver} of {reading}");
+    let number = bytes(|| drop(player.set("spcmm.frequency", "0.3 Hz")));
+    assert!(number < reading + reading / 4, "{number} of {reading}");
+    let copied = bytes(|| drop(player.clone()));
+    assert!(copied < 1 << 20, "{copied}");
 }

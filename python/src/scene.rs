@@ -94,7 +94,7 @@ impl PyScene {
     fn origin(&self) -> Origin {
         let source = &self.scene.source;
         let references = source.beside.iter().map(|(name, text)| (name.clone(), text.to_string())).collect();
-        (source.text.clone(), source.file.clone(), references, self.scene.changes.clone())
+        (source.text.to_string(), source.file.clone(), references, self.scene.changes.clone())
     }
 
     /// Short name.
@@ -237,8 +237,7 @@ fn with_changes(scene: &Scene, changes: &[(String, Option<String>)]) -> Result<S
         let is_changed = |key: &String| changes.iter().any(|(changed, _)| changed == key);
         let earlier = scene.changes.iter().filter(|(key, _)| !is_changed(key)).cloned();
         let all: Vec<(String, String)> = earlier.chain(own).collect();
-        let source = &scene.source;
-        Scene::parse_with(&source.text, source.file.as_deref(), &source.beside, &all).map_err(|_| error)
+        scene.with_changes(&all).map_err(|_| error)
     };
     one_by_one().or_else(together)
 }

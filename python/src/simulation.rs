@@ -65,10 +65,7 @@ impl PyState {
         let saved = saved.map_err(|why| refused(why.to_string()))?;
         let read = || {
             let pending = saved.scene()?;
-            let source = &pending.source;
-            let with = |changes: &Changes| -> Result<Scene, SceneError> {
-                Scene::parse_with(&source.text, source.file.as_deref(), &source.beside, changes)
-            };
+            let with = |changes: &Changes| pending.with_changes(changes);
             let [scene, initial, running] = [with(&changes[0])?, with(&changes[1])?, with(&changes[2])?];
             let live = LiveScene::new(&initial).map_err(|error| initial.locate(&error))?;
             Ok((scene, live, running, pending))

@@ -449,7 +449,7 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
         // A link can carry only one text.
         let texts = pending.source.beside.iter();
         let texts = texts.map(|(name, text)| (name.clone(), json!(**text)));
-        meta["scene_text"] = json!(pending.source.text);
+        meta["scene_text"] = json!(&*pending.source.text);
         meta["scene_files"] = texts.collect();
     }
     for (key, value) in more {

@@ -68,8 +68,9 @@ mod tests {
     use super::*;
     use crate::machine::Machine;
     use crate::scene::Scene;
+    use crate::session::ideal::output_point;
     use crate::simulate::{Frame, Simulation, closed};
-    use crate::view::{LabelKind, PeakMarks, ViewOptions, output_point, to_f32};
+    use crate::view::{LabelKind, PeakMarks, ViewOptions, to_f32};
 
     #[test]
     fn the_arrow_and_its_note_are_the_distance_of_two_separate_runs() {

@@ -32,7 +32,7 @@ static ABOUT_SCENES: LazyLock<Vec<SceneEntry>> = LazyLock::new(|| {
         let scene = Scene::load(name, &[]).ok()?;
         let description = scene.description.trim();
         let end = description.find(". ").map_or(description.len(), |end| end + 1);
-        Some(SceneEntry { name, sentence: description[..end].to_owned(), title: scene.title })
+        Some(SceneEntry { name, sentence: description[..end].to_owned(), title: scene.title.clone() })
     };
     BUILT_IN.into_iter().filter_map(about).collect()
 });

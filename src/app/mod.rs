@@ -664,7 +664,7 @@ impl App {
     pub fn open(&mut self, argument: &str) -> Result<(), String> {
         let scene = Scene::load(argument, &[]).map_err(|error| error.to_string())?;
         self.show_scene(&scene)?;
-        self.scene_file = SceneFile::named(scene.source.file);
+        self.scene_file = SceneFile::named(scene.source.file.clone());
         Ok(())
     }
 

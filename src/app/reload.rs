@@ -117,7 +117,7 @@ impl App {
         let pending = self.player.pending();
         let source = &pending.source;
         let has_same_files = |scene: Scene| scene.source.beside == source.beside;
-        let same = text == source.text;
+        let same = *text == *source.text;
         let companions = self.scene_file.companions.clone();
         if same && (self.parse_file(&name, &text, &companions, &pending.changes)).is_ok_and(has_same_files) {
             // Saved without changes, or reverted after an error.
@@ -125,7 +125,7 @@ impl App {
             self.scene_file.faulty = None;
             return Ok(());
         }
-        let before = Scene::parse_with(&source.text, Some(&name), &source.beside, &[]);
+        let before = pending.with_changes(&[]);
         let after = match self.parse_file(&name, &text, &companions, &[]) {
             Ok(after) => after,
             Err(error) => {

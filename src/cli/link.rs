@@ -1,14 +1,15 @@
 //! Runs of a share link. Live changes are replayed after the same steps, so that page and program can compare state hashes.
 
 use super::Failure;
-use crate::app::{Event, Link};
 use crate::scene::LiveScene;
 use crate::session::goal::Obstacle;
-use crate::session::log::Script;
+use crate::session::link::Link;
+use crate::session::log::{Event, Script};
 use crate::session::replay::Verdict;
 
-/// The remaining replay of a link's run.
-pub struct LinkReplay {
+/// The run of a link, and its position in the link's log. No player shows it: its samples would count among the largest sampled
+/// forces of the run.
+pub struct LinkedRun {
     link: Link,
     script: Script,
 }
@@ -21,8 +22,8 @@ pub fn parse(text: &str) -> Result<Link, Failure> {
     Link::parse(text).map_err(|error| Failure::usage(error.to_string()))
 }
 
-impl LinkReplay {
-    /// The replay up to the instant of `link`.
+impl LinkedRun {
+    /// The run up to the instant of `link`.
     pub fn new(mut link: Link) -> Self {
         Self { script: Script::new(std::mem::take(&mut link.log)), link }
     }
@@ -48,31 +49,18 @@ impl LinkReplay {
     /// # Errors
     /// A message about a rejected change, or about a step that was rejected only here or only in the link's run.
     pub fn step(&mut self, simulation: &mut LiveScene, end: Option<f64>) -> Result<(), String> {
-        self.apply_due(simulation)?;
+        let steps = simulation.statistics().steps;
+        let applied = self.script.apply_due(simulation);
+        applied.map_err(|error| format!("the change that the link made after {steps} steps: {error}"))?;
         if end.is_none() && self.is_reached(simulation) {
             return Ok(());
         }
-        let must_stop = self.script.due(simulation.statistics().steps) == Some(&Event::Stop);
-        let latest = self.script.step_end(simulation.time()).min(end.unwrap_or(f64::INFINITY));
-        match simulation.step_until(latest) {
+        let must_stop = self.script.due(steps) == Some(&Event::Stop);
+        match self.script.step(simulation, end.unwrap_or(f64::INFINITY)) {
             Ok(()) if must_stop && end.is_none() => Err(Obstacle::MissedStop.to_string()),
             Err(stopped) if !must_stop => Err(stopped.to_string()),
-            Err(_) => {
-                self.script.pass(simulation.time());
-                Ok(())
-            }
-            Ok(()) => Ok(()),
+            _ => Ok(()),
         }
-    }
-
-    fn apply_due(&mut self, simulation: &mut LiveScene) -> Result<(), String> {
-        let steps = simulation.statistics().steps;
-        while let Some(event) = self.script.due(steps).filter(|event| **event != Event::Stop) {
-            let applied = event.apply(simulation);
-            applied.map_err(|error| format!("the change that the link made after {steps} steps: {error}"))?;
-            self.script.pass(simulation.time());
-        }
-        Ok(())
     }
 
     /// Compares the state with the link's. Returns the verdict as text, as an error if the states differ.
@@ -92,7 +80,7 @@ mod tests {
         let mut link = Link::parse("?scene=pendulum&steps=9").expect("a link");
         link.log.push(3, Event::Stop);
         let mut simulation = crate::cli::start(&link.load().expect("built in")).expect("starts");
-        let mut replay = LinkReplay::new(link);
+        let mut replay = LinkedRun::new(link);
         let outcomes: Vec<_> = (0..9).map(|_| replay.step(&mut simulation, None)).collect();
         assert_eq!(outcomes.iter().position(Result::is_err), Some(3), "{outcomes:?}");
     }

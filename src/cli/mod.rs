@@ -8,7 +8,6 @@ mod failure;
 mod gone;
 mod impacts;
 mod interrupt;
-#[cfg_attr(not(feature = "gui"), path = "no_link.rs")]
 mod link;
 mod machine;
 mod map;
@@ -191,10 +190,7 @@ fn lessons(_arguments: &LessonArguments) -> Result<String, Failure> {
 
 fn load(arguments: &SceneArguments) -> Result<Scene, Failure> {
     match (&arguments.link, &arguments.scene) {
-        #[cfg(feature = "gui")]
         (Some(text), _) => Ok(link::parse(text)?.load()?),
-        #[cfg(not(feature = "gui"))]
-        (Some(_), _) => Err(no_graphics()),
         (None, scene) => Ok(Scene::load(scene.as_deref().unwrap_or_default(), &arguments.changes)?),
     }
 }

@@ -8,7 +8,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::args::{RunArguments, SummaryForm};
 use super::impacts::ImpactsFile;
-use super::link::LinkReplay;
+use super::link::{self, LinkedRun};
 use super::output::{RowsFile, Table, check_distinct, reserve};
 use super::state::{self, StateFile};
 use super::summary::{self, Status, Stepping};
@@ -36,7 +36,7 @@ struct End {
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let mut replay = link_replay(arguments)?;
     let requested = arguments.duration.as_deref().map(|text| quantity::duration("--duration", text)).transpose()?;
-    let Some(duration) = requested.or(replay.as_ref().and_then(LinkReplay::time)) else {
+    let Some(duration) = requested.or(replay.as_ref().and_then(LinkedRun::time)) else {
         return Err(Failure::usage("--link: the link names no instant; give the length of the run with --duration"));
     };
     let times = row_times(arguments, duration)?;
@@ -252,15 +252,9 @@ impl Outputs {
 }
 
 /// The replay of the run that `--link` names, if given.
-#[cfg(feature = "gui")]
-fn link_replay(arguments: &RunArguments) -> Result<Option<LinkReplay>, Failure> {
+fn link_replay(arguments: &RunArguments) -> Result<Option<LinkedRun>, Failure> {
     let text = arguments.scene.link.as_deref();
-    text.map(|text| super::link::parse(text).map(LinkReplay::new)).transpose()
-}
-
-#[cfg(not(feature = "gui"))]
-fn link_replay(_arguments: &RunArguments) -> Result<Option<LinkReplay>, Failure> {
-    Ok(None)
+    text.map(|text| link::parse(text).map(LinkedRun::new)).transpose()
 }
 
 /// Loads the state file `path` into the freshly started `simulation`; returns the time at which the run resumes, s.
@@ -286,7 +280,7 @@ struct StepObservers<'a> {
     impacts: Option<&'a mut ImpactsFile>,
     state: Option<&'a mut StateFile>,
     /// Replay of a link. It ends at `end`, s, or by default at the link's instant.
-    replay: Option<&'a mut LinkReplay>,
+    replay: Option<&'a mut LinkedRun>,
     end: Option<f64>,
 }
 

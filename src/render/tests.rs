@@ -223,25 +223,26 @@ fn in_a_row(order: [usize; 3], behind: bool) -> (Scene, Frame, Camera) {
     let double = |v: Vec3| Vec3d::new(v.x.into(), v.y.into(), v.z.into());
     let (joint, report) = (scene.machine.loose_joints[0].clone(), frame.joints[0]);
     let (body, motion) = (scene.machine.bodies[0].clone(), frame.bodies[0]);
-    (scene.machine.loose_joints, frame.joints) = Default::default();
-    (scene.machine.bodies, frame.bodies) = Default::default();
+    let machine = scene.machine_mut();
+    (machine.loose_joints, frame.joints) = Default::default();
+    (machine.bodies, frame.bodies) = Default::default();
     for k in order {
         let by = double(back * (0.05 * (k as f32 - 1.0)));
         let mut joint = joint.clone();
         joint.opening = double(openings[k].normalize());
-        joint.frames[1].origin.body = Some(scene.machine.bodies.len());
-        scene.machine.loose_joints.push(joint);
+        joint.frames[1].origin.body = Some(machine.bodies.len());
+        machine.loose_joints.push(joint);
         let mut report = report;
         report.socket_centre += by;
         report.ball_centre += by;
         report.contact_point += by;
         frame.joints.push(report);
-        scene.machine.bodies.push(body.clone());
+        machine.bodies.push(body.clone());
         let mut motion = motion;
         motion.position += by;
         frame.bodies.push(motion);
     }
-    scene.machine.fixed_shapes.clear();
+    machine.fixed_shapes.clear();
     if behind {
         camera.yaw += std::f32::consts::PI;
     }
@@ -597,7 +598,7 @@ fn every_standard_view_shows_the_moving_parts() {
                 view.fit(&mut camera, &scene, &frame, &options, size);
                 let whole = picture_of(size, &scene, &frame, &options, &camera, false);
                 let mut free = scene.clone();
-                free.machine.fixed_shapes.clear();
+                free.machine_mut().fixed_shapes.clear();
                 let mut moving = picture_of(size, &free, &frame, &options, &camera, false);
                 moving.light = whole.light;
                 let (mut fixed, mut nothing) = (whole.clone(), moving.clone());
@@ -956,7 +957,7 @@ fn the_longest_chain_needs_few_triangles_from_afar_and_from_within() {
 fn moved(scene: &Scene, frame: &Frame, by: Vec3d) -> (Scene, Frame) {
     use crate::machine::Geometry::{Box, Capsule, Cylinder};
     let (mut scene, mut frame) = (scene.clone(), frame.clone());
-    for shape in &mut scene.machine.fixed_shapes {
+    for shape in &mut scene.machine_mut().fixed_shapes {
         match &mut shape.geometry {
             Capsule { from, to, .. } | Cylinder { from, to, .. } => {
                 *from += by;
@@ -966,7 +967,7 @@ fn moved(scene: &Scene, frame: &Frame, by: Vec3d) -> (Scene, Frame) {
             other => panic!("{other:?}"),
         }
     }
-    for joint in &mut scene.machine.loose_joints {
+    for joint in &mut scene.machine_mut().loose_joints {
         for end in joint.frames.iter_mut().map(|frame| &mut frame.origin) {
             if end.body.is_none() {
                 end.point += by;

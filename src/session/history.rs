@@ -1,21 +1,24 @@
 //! Record of channels over time, decimated without losing extremes: bins of doubling width with their least and greatest values.
 
+use std::sync::Arc;
+
 /// Bins per level: more than a wide plot has columns of pixels.
 const BINS: usize = 2048;
 /// Number of levels: the widest bin is `finest * 2^(LEVELS - 1)`.
 const LEVELS: usize = 23;
+/// Slots that copies of a record share until one of them changes them; a divisor of [`BINS`].
+const CHUNK: usize = 64;
 /// Empty slot.
 const EMPTY: i64 = i64::MIN;
 /// Range of a channel without values.
 const NO_VALUE: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
 
-/// Fixed-size record of `channels` quantities over time. Nothing is allocated after [`History::new`].
+/// Record of `channels` quantities over time, of limited size. A copy shares the past with its original.
 #[derive(Clone, Debug)]
 pub struct History {
     channels: usize,
     finest: f64,
-    /// Bin index (time / width) of each slot, level by level.
-    indices: Vec<i64>,
+    slots: Slots,
     /// Newest index per level.
     newest: [i64; LEVELS],
     /// Greatest index per level whose bin has been overwritten, and with it all earlier ones.
@@ -23,10 +26,60 @@ pub struct History {
     /// First value per channel; NaN until a channel added later has one. Values are stored as differences from it, so that a
     /// small motion far from zero keeps its digits.
     base: Vec<f64>,
-    /// (least, greatest) per channel relative to its base, slot by slot, level by level.
-    ranges: Vec<(f32, f32)>,
     start: Option<f64>,
     end: f64,
+}
+
+/// The slots of the bins, level by level.
+#[derive(Clone, Debug)]
+struct Slots {
+    channels: usize,
+    chunks: Vec<Arc<Chunk>>,
+}
+
+#[derive(Clone, Debug)]
+struct Chunk {
+    /// Bin index (time / width) of each slot.
+    indices: [i64; CHUNK],
+    /// (least, greatest) per channel relative to its base, slot by slot.
+    ranges: Vec<(f32, f32)>,
+}
+
+impl Slots {
+    fn new(channels: usize) -> Self {
+        let empty = Chunk { indices: [EMPTY; CHUNK], ranges: vec![(0.0, 0.0); CHUNK * channels] };
+        Self { channels, chunks: vec![empty.into(); LEVELS * BINS / CHUNK] }
+    }
+
+    fn rearranged(&self, from: &[Option<usize>]) -> Self {
+        let mut new = Self::new(from.len());
+        for (new, old) in new.chunks.iter_mut().zip(&self.chunks) {
+            if old.indices != [EMPTY; CHUNK] {
+                let ranges = rearranged(&old.ranges, self.channels, from);
+                *new = Arc::new(Chunk { indices: old.indices, ranges });
+            }
+        }
+        new
+    }
+
+    /// Index of the bin in the slot of bin `index` of `level`, and its ranges.
+    fn get(&self, level: usize, index: i64) -> (i64, &[(f32, f32)]) {
+        let (chunk, at) = place(level, index);
+        let chunk = &self.chunks[chunk];
+        (chunk.indices[at], &chunk.ranges[at * self.channels..][..self.channels])
+    }
+
+    fn get_mut(&mut self, level: usize, index: i64) -> (&mut i64, &mut [(f32, f32)]) {
+        let (chunk, at) = place(level, index);
+        let chunk = Arc::make_mut(&mut self.chunks[chunk]);
+        (&mut chunk.indices[at], &mut chunk.ranges[at * self.channels..][..self.channels])
+    }
+}
+
+/// Chunk of the slot of bin `index` of `level`, and the slot's place in it.
+fn place(level: usize, index: i64) -> (usize, usize) {
+    let slot = level * BINS + index.rem_euclid(BINS as i64) as usize;
+    (slot / CHUNK, slot % CHUNK)
 }
 
 /// Least and greatest value of a channel between the times `from` and `to`, s.
@@ -76,11 +129,10 @@ impl History {
         Self {
             channels,
             finest: if finest > 0.0 && finest.is_finite() { finest } else { 1e-6 },
-            indices: vec![EMPTY; LEVELS * BINS],
+            slots: Slots::new(channels),
             newest: [EMPTY; LEVELS],
             lost: [EMPTY; LEVELS],
             base: vec![0.0; channels],
-            ranges: vec![(0.0, 0.0); LEVELS * BINS * channels],
             start: None,
             end: 0.0,
         }
@@ -91,9 +143,8 @@ impl History {
         let base = |channel: &Option<usize>| channel.map_or(f64::NAN, |at| self.base[at]);
         Self {
             channels: from.len(),
-            indices: self.indices.clone(),
+            slots: self.slots.rearranged(from),
             base: from.iter().map(base).collect(),
-            ranges: rearranged(&self.ranges, self.channels, from),
             ..*self
         }
     }
@@ -110,7 +161,7 @@ impl History {
 
     /// Clears the record.
     pub fn clear(&mut self) {
-        self.indices.fill(EMPTY);
+        self.slots = Slots::new(self.channels);
         self.newest = [EMPTY; LEVELS];
         self.lost = [EMPTY; LEVELS];
         self.start = None;
@@ -122,7 +173,7 @@ impl History {
         let mut ranges = Vec::with_capacity(LEVELS * self.channels);
         for (level, &index) in self.newest.iter().enumerate() {
             if index != EMPTY {
-                ranges.extend_from_slice(&self.ranges[self.at(level, index)]);
+                ranges.extend_from_slice(self.slots.get(level, index).1);
             }
         }
         Mark { newest: self.newest, ranges, span: self.span() }
@@ -137,9 +188,10 @@ impl History {
         self.newest = mark.newest;
         let mut stored = mark.ranges.chunks_exact(self.channels.max(1));
         for (level, &newest) in mark.newest.iter().enumerate() {
-            for index in &mut self.indices[level * BINS..(level + 1) * BINS] {
-                if *index > newest {
-                    *index = EMPTY;
+            for chunk in &mut self.slots.chunks[level * BINS / CHUNK..(level + 1) * BINS / CHUNK] {
+                if chunk.indices.iter().any(|index| *index > newest) {
+                    let later = Arc::make_mut(chunk).indices.iter_mut().filter(|index| **index > newest);
+                    later.for_each(|index| *index = EMPTY);
                 }
             }
             // The mark restores its newest bin; of later ones none is lost any more.
@@ -147,8 +199,9 @@ impl History {
             if newest != EMPTY
                 && let Some(ranges) = stored.next()
             {
-                self.indices[level * BINS + slot_of(newest)] = newest;
-                self.slot_mut(level, newest).copy_from_slice(ranges);
+                let (index, slot) = self.slots.get_mut(level, newest);
+                *index = newest;
+                slot.copy_from_slice(ranges);
             }
         }
     }
@@ -173,8 +226,8 @@ impl History {
             self.close(0);
             self.open(0, index);
         }
-        let at = self.at(0, index);
-        let slot = self.ranges[at].iter_mut().zip(values).zip(&mut self.base);
+        let (_, slot) = self.slots.get_mut(0, index);
+        let slot = slot.iter_mut().zip(values).zip(&mut self.base);
         for ((range, &value), base) in slot {
             if base.is_nan() && value.is_finite() {
                 *base = value;
@@ -193,8 +246,8 @@ impl History {
         let stored = (value - self.base[channel]) as f32;
         for level in 0..LEVELS {
             let index = self.index(level, time);
-            if self.indices[level * BINS + slot_of(index)] == index {
-                let range = &mut self.slot_mut(level, index)[channel];
+            if self.slots.get(level, index).0 == index {
+                let range = &mut self.slots.get_mut(level, index).1[channel];
                 *range = join(*range, (stored, stored));
             }
         }
@@ -275,17 +328,6 @@ impl History {
         ((time / self.finest).floor() as i64) >> level
     }
 
-    /// Index range of a bin's values in `ranges`.
-    fn at(&self, level: usize, index: i64) -> std::ops::Range<usize> {
-        let at = (level * BINS + slot_of(index)) * self.channels;
-        at..at + self.channels
-    }
-
-    fn slot_mut(&mut self, level: usize, index: i64) -> &mut [(f32, f32)] {
-        let at = self.at(level, index);
-        &mut self.ranges[at]
-    }
-
     /// First bin of `level` into which finer levels have yet to be merged.
     fn complete(&self, level: usize) -> i64 {
         let newest = self.newest[..level].iter().enumerate();
@@ -302,9 +344,9 @@ impl History {
             if at == EMPTY || at >> (level - below) != index {
                 continue;
             }
-            let slot = below * BINS + slot_of(at);
-            if self.indices[slot] == at {
-                let range = self.ranges[slot * self.channels + channel];
+            let (stored, ranges) = self.slots.get(below, at);
+            if stored == at {
+                let range = ranges[channel];
                 merged = Some(merged.map_or(range, |other| join(other, range)));
             }
         }
@@ -329,11 +371,10 @@ impl History {
             self.close(level + 1);
             self.open(level + 1, above);
         }
-        let from = (level * BINS + slot_of(index)) * self.channels;
-        let to = ((level + 1) * BINS + slot_of(above)) * self.channels;
-        for channel in 0..self.channels {
-            let range = self.ranges[from + channel];
-            let target = &mut self.ranges[to + channel];
+        let (chunk, at) = place(level, index);
+        let chunk = self.slots.chunks[chunk].clone();
+        let (_, targets) = self.slots.get_mut(level + 1, above);
+        for (target, &range) in targets.iter_mut().zip(&chunk.ranges[at * self.channels..]) {
             *target = if is_new { range } else { join(*target, range) };
         }
     }
@@ -341,12 +382,8 @@ impl History {
     fn open(&mut self, level: usize, index: i64) {
         self.newest[level] = index;
         self.lost[level] = self.lost[level].max(index - BINS as i64);
-        self.indices[level * BINS + slot_of(index)] = index;
+        *self.slots.get_mut(level, index).0 = index;
     }
-}
-
-fn slot_of(index: i64) -> usize {
-    index.rem_euclid(BINS as i64) as usize
 }
 
 fn join(a: (f32, f32), b: (f32, f32)) -> (f32, f32) {

@@ -5,13 +5,19 @@ use super::clock::Clock;
 use super::companion::Companion;
 use crate::machine::{Machine, Output, Vec3};
 use crate::simulate::{Frame, Simulation, StartError, closed};
-use crate::view::output_point;
 
 /// The ideal motion follows the recording if it is less than this behind, s, in at most this many steps.
 const FOLLOW_LAG: f64 = 0.02;
 const FOLLOW_STEPS: u32 = 512;
 /// Stepping budget per frame on the way to the displayed instant, s.
 const FRAME_BUDGET: f64 = 4e-3;
+
+/// The output point of a scene in `frame`, m: its probe tip, or its output body's origin.
+pub fn output_point(output: &Output, frame: &Frame) -> Option<Vec3> {
+    let body = frame.bodies.get(output.body)?;
+    let arm = output.probe.map_or_else(Vec3::zeros, |probe| body.rotation * probe);
+    Some(body.position + arm)
+}
 
 /// Gravity of a run over time. The ideal motion applies the same changes.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,7 +78,7 @@ impl Ideal {
     }
 
     /// Advances to `time`, s, up to which the run is recorded, if the motion lags by less than [`FOLLOW_LAG`].
-    pub(crate) fn follow(&mut self, time: f64, gravity: &Gravity) {
+    pub fn follow(&mut self, time: f64, gravity: &Gravity) {
         if self.motion.as_ref().is_ok_and(|motion| time - motion.simulation.time() < FOLLOW_LAG) {
             let mut left = FOLLOW_STEPS;
             self.move_to(time, gravity, || {
@@ -83,7 +89,7 @@ impl Ideal {
     }
 
     /// Advances to `time`, s, within the budget of a frame.
-    pub(crate) fn catch_up(&mut self, time: f64, gravity: &Gravity, clock: Clock) {
+    pub fn catch_up(&mut self, time: f64, gravity: &Gravity, clock: Clock) {
         if self.frame(time).is_none() {
             let start = clock();
             self.move_to(time, gravity, || clock() - start < FRAME_BUDGET);

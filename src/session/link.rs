@@ -16,9 +16,8 @@ use crate::scene::{DEFAULT_SCENE, MAX_FILE_SIZE, Scene, SceneError, Texts, built
 use crate::session::pace::SCALE_RANGE;
 use crate::simulate::Quantity;
 use crate::units::{Dimension, parse_quantity};
-use crate::view::ScenePart;
 use crate::words::{Words as _, words};
-use settings::{Instruments, PlotWindow};
+use settings::{Instruments, PlotWindow, ScenePart};
 
 /// Length limit of links, characters: e-mail, chats and every browser accept this length.
 pub const MAX_LINK_LENGTH: usize = 32_000;
@@ -544,11 +543,11 @@ impl SceneText {
     /// Source of `scene`.
     pub fn of(scene: &Scene) -> Self {
         let text = &scene.source.text;
-        if built_in_text(&scene.name) == Some(text) {
+        if built_in_text(&scene.name) == Some(&**text) {
             return Self::BuiltIn(scene.name.clone());
         }
         let path = scene.source.file.as_deref().unwrap_or("scene.toml");
-        Self::File { name: path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(), text: text.clone() }
+        Self::File { name: path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(), text: text.to_string() }
     }
 }
 

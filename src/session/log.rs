@@ -5,8 +5,8 @@
 
 use crate::analysis::section::Schedule;
 use crate::machine::Vec3;
-use crate::scene::{LiveScene, SetError, Value};
-use crate::simulate::{Effect, MAX_RUN_DURATION, Pull};
+use crate::scene::{LiveScene, SetError};
+use crate::simulate::{Effect, MAX_RUN_DURATION, Pull, Simulation, Stopped};
 
 /// Largest stiffness, N/m, and damping, N s/m, of a logged pull.
 const MAX_STIFFNESS: f64 = 1e9;
@@ -63,7 +63,7 @@ impl Event {
         match self {
             Self::Set { key, value } => run.set(key, value),
             // A ball joint without a value of its own in the file follows the common one again, whatever that is now.
-            Self::Original { key } => run.set_value(key, &Value::Unset),
+            Self::Original { key } => run.undo_change(key),
             Self::Pull(pulled) => Ok(run.pull(pulled.map(Pull::from)).map(|()| Effect::Now)?),
             Self::Sections { .. } | Self::Stop => Ok(Effect::Now),
         }
@@ -275,6 +275,33 @@ impl Script {
         }
         self.passed += 1;
         self.sections = self.log.entries[self.passed - 1].event.schedule().or(self.sections);
+    }
+
+    /// Applies to `run` the events due before its next step, except a refused step.
+    ///
+    /// # Errors
+    /// As [`Event::apply`], for the next entry.
+    pub fn apply_due(&mut self, run: &mut LiveScene) -> Result<(), SetError> {
+        while let Some(event) = self.due(run.statistics().steps).filter(|event| **event != Event::Stop) {
+            event.apply(run)?;
+            self.pass(run.time());
+        }
+        Ok(())
+    }
+
+    /// Takes a step of `run` that ends at `end`, s, at the latest, or where the log prescribes. A refused step passes the entry
+    /// that says so, or is recorded by one.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn step(&mut self, run: &mut Simulation, end: f64) -> Result<(), Stopped> {
+        run.step_until(self.step_end(run.time()).min(end)).inspect_err(|_| {
+            let steps = run.statistics().steps;
+            match self.due(steps) {
+                Some(Event::Stop) => self.pass(run.time()),
+                _ => self.record(steps, Event::Stop, run.time()),
+            }
+        })
     }
 
     /// Adds entries ahead.

@@ -118,9 +118,8 @@ impl Player {
     /// # Errors
     /// As [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
-        // The text has been parsed before. Should it fail now, the default of a control is its current value.
-        let original = Scene::parse_with(&scene.source.text, scene.source.file.as_deref(), &scene.source.beside, &[])
-            .unwrap_or_else(|_| scene.clone());
+        // The text alone has been valid before. Should it fail now, the default of a control is its current value.
+        let original = scene.with_changes(&[]).unwrap_or_else(|_| scene.clone());
         let mut player = Self::with_simulation(LiveScene::new(scene)?, original);
         player.start();
         Ok(player)
@@ -159,7 +158,7 @@ impl Player {
     }
 
     /// Name patterns of the picked channels.
-    pub(crate) fn picks(&self) -> &[String] {
+    pub fn picks(&self) -> &[String] {
         &self.record.picks
     }
 
@@ -265,7 +264,7 @@ impl Player {
     }
 
     /// Moves the ghosts to the displayed instant.
-    pub(crate) fn update_ghosts(&mut self) {
+    pub fn update_ghosts(&mut self) {
         if let Some(twin) = &mut self.twin {
             twin.move_to(self.pacer.shown());
         }
@@ -308,7 +307,7 @@ impl Player {
     }
 
     /// Drops the queued events that were not reached.
-    pub(crate) fn drop_queued(&mut self) {
+    pub fn drop_queued(&mut self) {
         self.script.drop_ahead();
     }
 
@@ -492,7 +491,7 @@ impl Player {
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SetError> {
         if self.has_future() {
             // A refused change must not abandon the future.
-            self.pending().clone().set(key, value)?;
+            self.pending().with(key, value)?;
         }
         self.change(key, Event::set(key, value))
     }
@@ -513,7 +512,7 @@ impl Player {
     }
 
     /// Changes of parameters by the user since the last call.
-    pub(crate) fn take_edits(&mut self) -> Vec<Edit> {
+    pub fn take_edits(&mut self) -> Vec<Edit> {
         std::mem::take(&mut self.edits)
     }
 
@@ -521,7 +520,7 @@ impl Player {
     ///
     /// # Errors
     /// As [`Self::set`].
-    pub(crate) fn restore_parameter(&mut self, key: &str, text: Option<&str>) -> Result<(), SetError> {
+    pub fn restore_parameter(&mut self, key: &str, text: Option<&str>) -> Result<(), SetError> {
         if changed_value(&self.pending().changes, key).as_deref() == text {
             return Ok(());
         }
@@ -549,7 +548,7 @@ impl Player {
     /// Reverts the change of a parameter: it has its value in the scene file again, or follows what it follows there.
     ///
     /// # Errors
-    /// As [`LiveScene::set_value`]; the run is left unchanged.
+    /// As [`LiveScene::undo_change`]; the run is left unchanged.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SetError> {
         self.pending().parameter(key)?;
         self.change(key, Event::Original { key: key.to_owned() })
@@ -619,8 +618,7 @@ impl Player {
     pub(crate) fn step(&mut self) -> bool {
         self.record_until(self.simulation.time());
         self.store_keyframe();
-        let end = self.script.step_end(self.simulation.time());
-        match self.simulation.step_until(end) {
+        match self.script.step(&mut self.simulation, f64::INFINITY) {
             Ok(()) => {
                 self.unchanged = None;
                 self.simulation.take_peaks(&mut self.record.upcoming_peaks);
@@ -639,11 +637,6 @@ impl Player {
             Err(stopped) => {
                 self.playing = false;
                 self.stopped = Some(stopped);
-                match self.script.due(self.steps()) {
-                    // Repeated: the stop is already in the log.
-                    Some(Event::Stop) => self.script.pass(self.simulation.time()),
-                    _ => self.log_event(Event::Stop),
-                }
                 false
             }
         }

@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_rod_that_hangs_straight_down_comes_to_rest() {
-        let text = scene("pendulum", &[]).source.text.clone();
+        let text = scene("pendulum", &[]).source.text.to_string();
         let hanging = text.replace("-30 deg", "0 deg");
         assert_ne!(hanging, text);
         let hanging = Scene::parse(&hanging, None, &[]).expect("a scene");

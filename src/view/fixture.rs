@@ -1,5 +1,7 @@
 //! Hand-built scenes and frames for tests of view and render: nothing here is simulated.
 
+use std::sync::Arc;
+
 use crate::machine::{Attachment, Body, Geometry, LooseJoint, Machine, Mat3, Output, Quat, Role, Shape, Vec3};
 use crate::scene::{MAX_PLOTS, Scene, SignedAxis, ViewSettings};
 use crate::simulate::{BodyMotion, ContactMode, Frame, JointReport, Peak};
@@ -34,16 +36,16 @@ fn scene(
     fixed_shapes: Vec<Shape>,
 ) -> Scene {
     let mut scene = Scene::load("pendulum", &[]).expect("a built-in scene");
-    scene.name = name.to_owned();
+    Arc::make_mut(&mut scene.source).name = name.to_owned();
     scene.view = ViewSettings { down, floor: None, isometric: None, time_scale: None, plots: [None; MAX_PLOTS] };
-    scene.machine = Machine {
+    *scene.machine_mut() = Machine {
         gravity: down.unit() * 9.81,
         output: Output { body: 0, probe: None },
         bodies,
         joints: Vec::new(),
         loose_joints,
         fixed_shapes,
-        ..scene.machine
+        ..Machine::clone(&scene.machine)
     };
     scene
 }
@@ -168,7 +170,7 @@ pub(crate) fn three_legs() -> (Scene, Frame) {
     bodies.push(body("platform", shapes));
     motions.push(at(o7, platform_turn));
     let mut scene = scene("three legs", SignedAxis::PlusX, bodies, joints, rails);
-    scene.machine.output = Output { body: 6, probe: Some(x(0.060)) };
+    scene.machine_mut().output = Output { body: 6, probe: Some(x(0.060)) };
     (scene, Frame { bodies: motions, joints: reports, ..Default::default() })
 }
 

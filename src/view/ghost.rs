@@ -9,7 +9,7 @@ use super::relative::RelativeShot;
 use super::solids::push_solid;
 use super::theme::{Ghost, GhostLook, Material};
 use super::{Colour, DrawList, Mesh, Palette, SceneView, Shot, drawn, to_f32};
-use crate::machine::Output;
+use crate::session::ideal::output_point;
 use crate::simulate::Frame;
 use crate::units::format_quantity_digits;
 
@@ -24,13 +24,6 @@ impl GhostLook {
         };
         [material(self.fill), material(self.edge)]
     }
-}
-
-/// The output point of a scene in `frame`, m: its probe tip, or its output body's origin.
-pub fn output_point(output: &Output, frame: &Frame) -> Option<crate::machine::Vec3> {
-    let body = frame.bodies.get(output.body)?;
-    let arm = output.probe.map_or_else(crate::machine::Vec3::zeros, |probe| body.rotation * probe);
-    Some(body.position + arm)
 }
 
 impl SceneView {

@@ -39,6 +39,7 @@ mod theme;
 mod wear;
 mod zones;
 
+pub use crate::session::link::settings::{ScenePart, WearMap};
 pub use arrows::ARROW_LENGTH;
 pub use build::SceneView;
 pub use camera::{Camera, Preset};
@@ -48,10 +49,9 @@ pub use draw_list::{
     Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh, MeshData, Tick,
     WearScale,
 };
-pub use ghost::output_point;
-pub use options::{ArrowOptions, Quality, Scaling, ViewOptions, WearMap};
+pub use options::{ArrowOptions, Quality, Scaling, ViewOptions};
 pub use peaks::{MARK_DURATION, Mark, PeakMarks};
-pub use pick::{Hit, ScenePart};
+pub use pick::Hit;
 pub use shot::Shot;
 pub use theme::{Colour, Ghost, GhostLook, Palette, Theme};
 

@@ -1,6 +1,7 @@
 //! The user's settings for the picture.
 
 use super::Theme;
+use super::WearMap;
 
 /// All user settings for the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,18 +82,6 @@ impl Quality {
     const fn row(occlusion: bool, samples: u32, fine_shadows: bool, sharpness: f32) -> Self {
         Self { occlusion, samples, fine_shadows, sharpness }
     }
-}
-
-/// Quantity shown on the sockets' inner faces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum WearMap {
-    /// Nothing.
-    #[default]
-    Off,
-    /// Time integral of the normal force.
-    Impulse,
-    /// Work done by friction.
-    FrictionWork,
 }
 
 /// How contact forces are drawn.

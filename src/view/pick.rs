@@ -5,19 +5,8 @@ use parry3d::query::Ray;
 
 use super::cast::{cast, cast_ball};
 use super::drawn;
-use super::{SceneView, Shot};
+use super::{ScenePart, SceneView, Shot};
 use crate::simulate::Frame;
-
-/// A part of the scene that can be hovered or followed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ScenePart {
-    /// A body, by index.
-    Body(usize),
-    /// A ball joint, by index.
-    Joint(usize),
-    /// A fixed shape, by index.
-    Fixed(usize),
-}
 
 /// Where the cursor's ray first meets the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -664,7 +664,7 @@ fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
         assert!(label(&harness, words), "{words}");
         assert_eq!(harness.state().player().running().name, "spcmm");
     }
-    let text = Scene::load("pendulum", &[]).expect("built in").source.text;
+    let text = &Scene::load("pendulum", &[]).expect("built in").source.text;
     let renamed = text.replace("name = \"pendulum\"", "name = \"mine\"");
     calls.borrow_mut().to_open.push_back(file("mine.toml", Ok(renamed.into_bytes())));
     harness.run_steps(3);

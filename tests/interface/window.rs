@@ -245,9 +245,9 @@ fn the_list_of_scenes_describes_each_scene() {
     harness.get_by_role_and_label(Role::ComboBox, "Scene").click();
     harness.run();
     for name in BUILT_IN {
-        let title = Scene::load(name, &[]).expect("built in").title;
+        let scene = Scene::load(name, &[]).expect("built in");
         let entry = harness.get_by_role_and_label(Role::Button, name);
-        assert_eq!(entry.accesskit_node().description().as_deref(), Some(&*title));
+        assert_eq!(entry.accesskit_node().description().as_deref(), Some(&*scene.title));
     }
     harness.get_by_role_and_label(Role::Button, "chain").click();
     harness.run();

@@ -74,7 +74,7 @@ fn a_closed_form_that_contradicts_the_machine_is_reported() {
     );
     let mut settled = with_path_error("5 mm", "100 mm");
     settled.set("contact.clearance", "0.1 mm").expect("a clearance in range");
-    settled.machine.start = StartRule::Settled;
+    settled.machine_mut().start = StartRule::Settled;
     assert_eq!(Simulation::new(&settled.machine).expect_err("the path is still wrong").to_string(), message);
     // Correct at the start, wrong later.
     for with_play in [false, true] {
@@ -113,7 +113,7 @@ fn a_run_without_play_stops_where_it_leaves_its_closed_form() {
 
 /// The default scene with these keys changed.
 fn paper(changes: &[(&str, &str)]) -> Machine {
-    crate::common::scene("spcmm", changes).machine
+    Machine::clone(&crate::common::scene("spcmm", changes).machine)
 }
 
 /// Position, rate and acceleration of the three sliders, which follow functions of the closed form.

@@ -230,7 +230,7 @@ fn a_bush_that_starts_concentric_is_stiff_from_the_first_step() {
 #[test]
 fn a_fast_load_is_resolved_even_without_degrees_of_freedom() {
     // With ideal joints the motion is prescribed by drives of half a hertz.
-    let text = crate::common::scene("spcmm", &[]).source.text.clone()
+    let text = crate::common::scene("spcmm", &[]).source.text.to_string()
         + "\n[[load]]\nname = \"shake\"\non = { body = \"platform\" }\nforce = \"0 20 0 N\"\nfrequency = \"200 Hz\"\n";
     let scene = crate::common::parse(&text, &[("contact.clearance", "0")]);
     let mut simulation = Simulation::new(&scene.machine).unwrap();

@@ -16,7 +16,7 @@ fn ideal_tip(simulation: &mut Simulation, time: f64) -> Vec3 {
 
 #[test]
 fn the_simulated_ideal_motion_agrees_with_the_closed_form_of_the_paper() {
-    let machine = scene("spcmm", &[]).machine;
+    let machine = Machine::clone(&scene("spcmm", &[]).machine);
     let mut alongside = machine.clone();
     alongside.closed_form.as_mut().expect("has one").path = None;
     let mut simulations = [machine, alongside].map(|machine| Simulation::new(&machine).expect("starts"));
@@ -31,7 +31,7 @@ fn the_simulated_ideal_motion_agrees_with_the_closed_form_of_the_paper() {
 
 #[test]
 fn a_change_of_gravity_takes_effect_at_its_instant() {
-    let mut machine = scene("pendulum", &[]).machine;
+    let mut machine = Machine::clone(&scene("pendulum", &[]).machine);
     machine.output.probe = Some(Vec3::new(0.0, 0.0, -0.1));
     let mut simulation = Simulation::new(&machine).expect("starts");
     let before = ideal_tip(&mut simulation, 0.045);

@@ -2,7 +2,7 @@
 
 use crate::common::{assert_refused, replaced};
 use crate::elements::frame_at;
-use jointplay_physics::machine::Vec3;
+use jointplay_physics::machine::{Machine, Vec3};
 use jointplay_physics::simulate::Simulation;
 use jointplay_scene::{Scene, SceneError, Texts};
 
@@ -157,7 +157,7 @@ fn including_a_file_twice_equals_writing_it_twice() {
     assert_eq!(dots, names(&direct).iter().map(|name| name.replace("toe-", "toe")).collect::<Vec<_>>());
     assert!(names(&included).contains(&"left.toe2".to_owned()));
     let mut both = [included, direct].map(|scene| {
-        let mut machine = scene.machine;
+        let mut machine = Machine::clone(&scene.machine);
         machine.solver.tolerance = 1e-10;
         Simulation::new(&machine).unwrap()
     });

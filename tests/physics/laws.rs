@@ -19,7 +19,7 @@ fn machine(drive: &str) -> Machine {
         "[[body]]\nname = \"a\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n[[joint]]\nname = \"a\"\nkind = \"prismatic\"\n\
          child = \"a\"\naxis = [1, 0, 0]\ndrive = {{ {drive} }}\n"
     );
-    parse(&text, &[]).machine
+    Machine::clone(&parse(&text, &[]).machine)
 }
 
 fn law(drive: &str) -> Arc<dyn Law> {

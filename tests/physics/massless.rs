@@ -5,7 +5,7 @@ use crate::common::{assert_refused, frame_now, replaced};
 use crate::elements::frame_at;
 use crate::joint_elements::start_simulation;
 use crate::two_degrees::{G, train};
-use jointplay_physics::machine::{MachineFault, Vec3};
+use jointplay_physics::machine::{Machine, MachineFault, Vec3};
 use jointplay_physics::mechanism::MechanismError;
 use jointplay_physics::simulate::{Frame, Simulation};
 use jointplay_scene::Scene;
@@ -190,7 +190,7 @@ fn a_body_that_needs_its_mass_is_refused_with_its_line() {
     let scene = Scene::parse(&good, Some("top.toml"), &[change]).unwrap();
     let error = scene.locate(&Simulation::new(&scene.machine).expect_err("refused")).to_string();
     assert!(error.contains("formulation = lagrange: body outer has mass 0 kg"), "{error}");
-    let mut machine = scene.machine;
+    let mut machine = Machine::clone(&scene.machine);
     machine.bodies[0].inertia.m11 = 1.0;
     let fault = MechanismError::Machine(MachineFault::Inertia { body: "outer".to_owned() });
     assert_eq!(Simulation::new(&machine).expect_err("refused").0, fault);

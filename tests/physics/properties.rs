@@ -138,8 +138,8 @@ fn mixed() -> impl Strategy<Value = Mixed> {
             if scene == "chain" {
                 changes.push(("chain.links".to_owned(), "3".to_owned()));
             }
-            let names = Scene::load(scene, &changes).unwrap().machine.loose_joints;
-            for (joint, clearance) in names.iter().zip(&joints) {
+            let machine = Scene::load(scene, &changes).unwrap().machine;
+            for (joint, clearance) in machine.loose_joints.iter().zip(&joints) {
                 let key = format!("joint.{}.clearance", joint.name);
                 let value = clearance.map_or("0".to_owned(), |c| format!("{c:.4} mm"));
                 changes.push((key, value));

@@ -37,7 +37,7 @@ fn two_rods_hold_the_tip_within_their_parallelogram() {
     for guide in [Guide::Plane, Guide::None] {
         let scene = parse(&truss(&TWO_RODS, TIP, guide, "friction_law = \"none\""), &[]);
         // If the tip is free, the rods can rotate about the line of their fixed points; without weight they do not.
-        let mut machine = scene.machine.clone();
+        let mut machine = Machine::clone(&scene.machine);
         machine.gravity = Vec3::zeros();
         let mut held_machine = HeldMachine::new(&machine, &[]).unwrap();
         assert!((held_machine.ideal_tip() - Vec3::new(TIP[0], 0.0, TIP[1])).norm() < 1e-12);

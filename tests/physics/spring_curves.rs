@@ -6,7 +6,7 @@ use crate::common::matrix::for_every;
 use crate::common::{THREE_VARIANTS, assert_refused, parse};
 use crate::elements::frame_at;
 use jointplay_physics::interpolate::Interpolation;
-use jointplay_physics::machine::{Characteristic, ElementKind};
+use jointplay_physics::machine::{Characteristic, ElementKind, Machine};
 use jointplay_physics::simulate::{Frame, Simulation};
 use jointplay_scene::Scene;
 
@@ -245,7 +245,7 @@ fn a_damper_along_straight_lines_lets_a_mass_approach_one_speed_and_then_another
         [before + SLOW * (time - change) + moved, SLOW + speed]
     };
     for_every([Mounting::Body, Mounting::Slide, Mounting::Hinge], |mounting, variant| {
-        let mut machine = parse(&mounting.text(&LINES, LINEAR), &variant.close()).machine;
+        let mut machine = Machine::clone(&parse(&mounting.text(&LINES, LINEAR), &variant.close()).machine);
         let scale = mounting.scale();
         let force = |speed: f64| scale * (hold + fast * (speed - SLOW));
         let points = [[-1.0, -force(1.0)], [-SLOW, -scale * hold], [SLOW, scale * hold], [1.0, force(1.0)]];

@@ -2,7 +2,7 @@
 
 use crate::common::{THREE_VARIANTS, parse};
 use crate::elements::frame_at;
-use jointplay_physics::machine::Doubt as MachineDoubt;
+use jointplay_physics::machine::{Doubt as MachineDoubt, Machine};
 use jointplay_physics::simulate::{Doubt, Simulation};
 use jointplay_scene::Scene;
 
@@ -36,7 +36,7 @@ fn a_measured_pulse_has_the_impulse_of_its_points() {
         let scene = interpolated(SQUARE, given);
         assert_eq!(overshoot(&scene), None);
         for (method, formulation) in THREE_VARIANTS {
-            let mut machine = scene.machine.clone();
+            let mut machine = Machine::clone(&scene.machine);
             let changes = [("solver.method", method), ("solver.tolerance", "1e-8"), ("formulation", formulation)];
             machine.solver = parse(SQUARE, &changes).machine.solver;
             machine.formulation = parse(SQUARE, &changes).machine.formulation;

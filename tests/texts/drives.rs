@@ -56,7 +56,7 @@ fn every_law_is_read_on_slides_and_hinges() {
                 Drive::Formula { .. } => "formula",
             };
             assert!(drive.contains(&format!("\"{law}")), "{drive}");
-            assert_eq!(scene.to_toml().as_ref(), Ok(&scene.source.text));
+            assert_eq!(scene.to_toml().as_deref(), Ok(&*scene.source.text));
         }
     }
     // All but the law that needs functions.

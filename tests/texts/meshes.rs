@@ -126,7 +126,7 @@ fn a_mesh_is_read_once() {
     let source = &first.source;
     let reread = Scene::parse_with(&source.text, Some("scene.toml"), &source.beside, &[]).unwrap();
     assert_eq!(reread.machine.bodies, first.machine.bodies);
-    assert_eq!(first.to_toml().unwrap(), source.text);
+    assert_eq!(first.to_toml().unwrap(), *source.text);
     let Geometry::Mesh { mesh, unit, .. } = &reread.machine.bodies[0].shapes[0].geometry else {
         panic!("a mesh");
     };

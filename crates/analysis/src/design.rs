@@ -250,9 +250,7 @@ impl Design {
             let write = |key: &str, value| base.parameter(key).map(|parameter| parameter.write(value));
             let written = settings.iter().map(|(key, value)| Ok(((*key).to_owned(), write(key, value)?)));
             let changes: Result<Vec<_>, SceneError> = base.changes.iter().cloned().map(Ok).chain(written).collect();
-            let source = &base.source;
-            let scene = Scene::parse_with(&source.text, source.file.as_deref(), &source.beside, &changes?);
-            scene.map_err(|_| error)
+            base.with_changes(&changes?).map_err(|_| error)
         };
         one_by_one().or_else(together)
     }

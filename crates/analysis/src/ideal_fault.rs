@@ -56,20 +56,20 @@ pub enum IdealFault {
 /// Checks the motion without play of a scene whose drives prescribe it: whether it follows its path in closed form, and whether
 /// it comes near a singular pose. `may_continue` is asked between steps: small fixed steps, for example, can take for ever.
 pub fn ideal_fault(scene: &Scene, mut may_continue: impl FnMut() -> bool) -> Option<IdealFault> {
-    let mut rigid = scene.clone();
-    rigid.machine.formulation = Formulation::Tree;
-    rigid.machine.elements.clear();
-    let form = rigid.machine.closed_form.as_mut()?;
+    let mut rigid = Machine::clone(&scene.machine);
+    rigid.formulation = Formulation::Tree;
+    rigid.elements.clear();
+    let form = rigid.closed_form.as_mut()?;
     // Drives at rest have a single pose.
     let instants = if form.frequency > 0.0 { INSTANTS } else { 0 };
     // At a low frequency only weight loads the joints; the poses do not depend on the frequency.
     form.pace = if form.frequency > 0.0 { SLOW / form.frequency } else { 1.0 };
     let (pace, period) = (form.pace, 1.0 / SLOW);
-    for joint in &mut rigid.machine.loose_joints {
+    for joint in &mut rigid.loose_joints {
         joint.contact.clearance = 0.0;
     }
-    let limit = MAX_WEIGHTS * 9.81 * rigid.machine.bodies.iter().map(|body| body.mass).sum::<f64>();
-    let mut simulation = Simulation::new(&rigid.machine).ok()?;
+    let limit = MAX_WEIGHTS * 9.81 * rigid.bodies.iter().map(|body| body.mass).sum::<f64>();
+    let mut simulation = Simulation::new(&rigid).ok()?;
     // Reactions in any other motion would need a simulation of arbitrary length.
     if !simulation.mechanism().is_kinematic() {
         return off_path(&scene.machine, may_continue);

@@ -28,7 +28,7 @@ impl SceneSource {
     pub fn of(scene: &Scene) -> Self {
         let texts = scene.source.beside.iter();
         Self {
-            text: scene.source.text.clone(),
+            text: scene.source.text.to_string(),
             file: scene.source.file.clone(),
             changes: scene.changes.clone(),
             beside: texts.map(|(name, text)| (name.clone(), text.to_string())).collect(),

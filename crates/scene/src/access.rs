@@ -4,12 +4,13 @@ use super::assets::AssetResolver;
 use super::error::{nearest_parameter, no_ball_joint};
 use super::field::Access;
 use super::numbers::row_of_number;
-use super::read::{is_fixed_in_file, replaces_text};
+use super::read::{changes_of_text, is_fixed_in_file, replaces_text};
 use super::table::{contact_part, contact_rows, find, joint_part};
 use super::*;
 use jointplay_physics::integrate::StepControl;
 use jointplay_physics::machine::Solver;
 use jointplay_physics::suggest::{did_you_mean, nearest, nearest_name};
+use std::sync::Arc;
 
 /// Keys of changes that set the solver by its method and numbers.
 pub(super) fn sets_solver(changes: &[(String, String)]) -> impl Iterator<Item = &str> {
@@ -133,7 +134,8 @@ impl Scene {
                 let own = joint.map(|joint| &self.machine.loose_joints[joint].contact);
                 (field.get)(own.unwrap_or(&self.machine.contact))
             }
-            Access::Scene(field) => (field.get)(self),
+            Access::Machine(field) => (field.get)(&self.machine),
+            Access::View(field) => (field.get)(&self.view),
             Access::Number => {
                 let number = self.source.numbers.get(key);
                 number.map_or(Value::Unset, |number| parameter.kind.value_of(number.value))
@@ -156,6 +158,15 @@ impl Scene {
     /// # Errors
     /// Unknown key, wrong unit, out of range, or an inconsistent scene; `self` is then unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<&'static Parameter, SceneError> {
+        *self = self.with(key, value)?;
+        self.parameter(key)
+    }
+
+    /// This scene after [`Self::set`].
+    ///
+    /// # Errors
+    /// Same as [`Self::set`].
+    pub fn with(&self, key: &str, value: &str) -> Result<Self, SceneError> {
         let mut next = self.clone();
         let leaves_preset = SOLVER_KEYS.contains(&key) && self.machine.solver.preset.is_some();
         if key == PRESET {
@@ -163,14 +174,13 @@ impl Scene {
         } else if leaves_preset {
             next.leave_preset()?;
         }
-        let parameter = next.change(key, value)?;
+        next.change(key, value)?;
         if leaves_preset || replaces_text(key) {
-            next = next.rebuilt()?;
+            next = next.rebuilt(&next.changes)?;
         }
         next.apply_preset();
         next.machine.check_contacts().map_err(|conflict| next.blame_change(&conflict, key))?;
-        *self = next;
-        Ok(parameter)
+        Ok(next)
     }
 
     /// Like [`Self::set`], with a value in SI units, for sliders: the recorded text reads back to the same bits.
@@ -178,10 +188,10 @@ impl Scene {
     /// # Errors
     /// Same as [`Self::set`]. [`Value::Unset`] reverts the change, like [`Self::undo_change`].
     pub fn set_value(&mut self, key: &str, value: &Value) -> Result<&'static Parameter, SceneError> {
-        let parameter = self.parameter(key)?;
         if *value == Value::Unset {
             return self.undo_change(key);
         }
+        let parameter = self.parameter(key)?;
         if matches!(value, Value::Number(number) if !number.is_finite()) {
             return Err(SceneError::about(key, None, format!("must be a finite number; {}", parameter.allowed())));
         }
@@ -194,10 +204,27 @@ impl Scene {
     /// A key this scene does not have, or an inconsistent scene; `self` is then unchanged.
     pub fn undo_change(&mut self, key: &str) -> Result<&'static Parameter, SceneError> {
         let parameter = self.parameter(key)?;
-        let mut next = self.clone();
-        next.changes.retain(|(changed, _)| changed != key);
-        *self = next.rebuilt()?;
+        *self = self.without(key)?;
         Ok(parameter)
+    }
+
+    /// This scene after [`Self::undo_change`].
+    ///
+    /// # Errors
+    /// Same as [`Self::undo_change`].
+    pub fn without(&self, key: &str) -> Result<Self, SceneError> {
+        self.parameter(key)?;
+        let mut changes = self.changes.clone();
+        changes.retain(|(changed, _)| changed != key);
+        self.rebuilt(&changes)
+    }
+
+    /// The scene of the same text with these `changes` alone, made at once.
+    ///
+    /// # Errors
+    /// Same as [`Self::load`].
+    pub fn with_changes(&self, changes: &[(String, String)]) -> Result<Self, SceneError> {
+        self.read_again(changes, |_, _| true)
     }
 
     /// The value that `key` has once its change is reverted; `text` is the scene as read from the same text without changes. A ball
@@ -220,19 +247,58 @@ impl Scene {
                 return Some(parameter.default.clone());
             }
             let mut next = text.clone();
-            next.machine.solver = preset.solver(&self.machine);
+            next.machine_mut().solver = preset.solver(&self.machine);
             return next.get(key).ok();
         }
         text.get(key).ok()
     }
 
-    /// The scene read again from its text with its changes, except those of keys that it no longer has, such as those of a
-    /// joint beyond the end of a shortened chain.
-    fn rebuilt(&self) -> Result<Self, SceneError> {
+    /// As [`Self::with_changes`], except the changes of keys that the scene no longer has, such as those of a joint beyond the
+    /// end of a shortened chain.
+    fn rebuilt(&self, changes: &[(String, String)]) -> Result<Self, SceneError> {
+        self.read_again(changes, |scene, key| scene.lookup(key).is_some())
+    }
+
+    /// As [`Self::read`], from this scene's text. That is read again only for other numbers in it, and for the places that errors
+    /// name.
+    fn read_again(&self, changes: &[(String, String)], retains: fn(&Self, &str) -> bool) -> Result<Self, SceneError> {
+        if let Some(as_read) = self.as_read.as_ref().filter(|as_read| changes_of_text(changes).eq(&as_read.changes))
+            && let Ok(scene) = as_read.changed(changes, retains)
+            && scene.machine.check_contacts().is_ok()
+        {
+            return Ok(scene);
+        }
         let source = &self.source;
         let beside = AssetResolver::known(&source.beside);
-        let has = |scene: &Self, key: &str| scene.lookup(key).is_some();
-        Self::read(&source.text, source.file.as_deref(), beside, &self.changes, has)
+        Self::read(&source.text, source.file.as_deref(), beside, changes, retains)
+    }
+
+    /// This scene, as read from its text, with the `changes` of keys that it `retains`; without the checks of contacts.
+    pub(super) fn changed(
+        self: &Arc<Self>,
+        changes: &[(String, String)],
+        retains: fn(&Self, &str) -> bool,
+    ) -> Result<Self, SceneError> {
+        let mut scene = Self { changes: Vec::new(), as_read: Some(self.clone()), ..Self::clone(self) };
+        check_solver_changes(changes)?;
+        if sets_solver(changes).next().is_some() {
+            // They take the place of the text's preset.
+            scene.machine_mut().solver.preset = None;
+        }
+        for (key, value) in changes {
+            if retains(&scene, key) {
+                scene.change(key, value)?;
+            }
+        }
+        scene.apply_preset();
+        Ok(scene)
+    }
+
+    /// Records that ball joint `joint` has its own value of the contact parameter `part`.
+    pub(super) fn add_override(&mut self, joint: usize, part: &'static str) {
+        if !self.overrides[joint].contains(&part) {
+            Arc::make_mut(&mut self.overrides)[joint].push(part);
+        }
     }
 
     /// Applies and records one change, without the checks across parameters.
@@ -245,11 +311,8 @@ impl Scene {
         let value = parameter.read(text).map_err(|error| SceneError::about(key, Some(text), error.to_string()))?;
         match (parameter.access, joint) {
             (Access::Contact(field), Some(joint)) => {
-                (field.set)(&mut self.machine.loose_joints[joint].contact, &value);
-                let part = contact_part(parameter).unwrap_or_default();
-                if !self.overrides[joint].contains(&part) {
-                    self.overrides[joint].push(part);
-                }
+                (field.set)(&mut self.machine_mut().loose_joints[joint].contact, &value);
+                self.add_override(joint, contact_part(parameter).unwrap_or_default());
             }
             // Applied when the text is read.
             _ if replaces_text(key) => {}
@@ -268,7 +331,10 @@ impl Scene {
     pub(super) fn apply_preset(&mut self) {
         if let Some(preset) = self.machine.solver.preset {
             let energy_ledger = self.machine.solver.energy_ledger;
-            self.machine.solver = Solver { energy_ledger, ..preset.solver(&self.machine) };
+            let solver = Solver { energy_ledger, ..preset.solver(&self.machine) };
+            if solver != self.machine.solver {
+                self.machine_mut().solver = solver;
+            }
         }
     }
 
@@ -291,14 +357,16 @@ impl Scene {
     pub(super) fn write(&mut self, parameter: &'static Parameter, value: &Value) {
         match parameter.access {
             Access::Contact(field) => {
-                (field.set)(&mut self.machine.contact, value);
+                let machine = Arc::make_mut(&mut self.machine);
+                (field.set)(&mut machine.contact, value);
                 let part = contact_part(parameter).unwrap_or_default();
-                let joints = self.machine.loose_joints.iter_mut().zip(&self.overrides);
+                let joints = machine.loose_joints.iter_mut().zip(&*self.overrides);
                 for (joint, _) in joints.filter(|(_, overrides)| !overrides.contains(&part)) {
                     (field.set)(&mut joint.contact, value);
                 }
             }
-            Access::Scene(field) => (field.set)(self, value),
+            Access::Machine(field) => (field.set)(self.machine_mut(), value),
+            Access::View(field) => (field.set)(&mut self.view, value),
             Access::Number => {}
         }
     }

@@ -177,8 +177,8 @@ impl<'d> AssetResolver<'d> {
     }
 
     /// Contents of all files requested.
-    pub fn into_texts(self) -> Texts {
-        self.requested.into_inner()
+    pub fn texts(&self) -> Texts {
+        self.requested.borrow().clone()
     }
 
     fn read(&self, name: &str, kind: FileKind) -> Result<Arc<str>, AssetFault> {

@@ -1,8 +1,9 @@
 //! Accessors that read and write parameters of a scene.
 
-use super::Scene;
+use super::ViewSettings;
 use super::value::Value;
 use jointplay_physics::contact;
+use jointplay_physics::machine::Machine;
 use jointplay_physics::words::Words;
 
 /// Reads and writes one field of a `T`. Values written have already passed the row's range check.
@@ -26,8 +27,10 @@ impl<T> Copy for Field<T> {}
 pub enum Access {
     /// In the contact parameters of the scene and of each ball joint.
     Contact(Field<contact::Parameters>),
-    /// In the scene itself.
-    Scene(Field<Scene>),
+    /// In the machine.
+    Machine(Field<Machine>),
+    /// In the view settings.
+    View(Field<ViewSettings>),
     /// In the scene's text; a change reads the scene again.
     Number,
 }
@@ -85,7 +88,7 @@ pub(super) fn word_of<T: Words>(value: &Value) -> T {
     }
 }
 
-/// A field by its path: `field!(solver.step)` of a scene.
+/// A field by its path: `field!(solver.step)` of a machine.
 macro_rules! field {
     ($($path:ident).+) => {
         Field {

@@ -3,7 +3,7 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
-use super::{Scene, SceneError, Value};
+use super::{Scene, SceneError};
 use jointplay_physics::simulate::{ChangeError, Effect, Model, Simulation, StartError, State, StateMismatch};
 
 /// Why a parameter of a running scene was not changed.
@@ -15,6 +15,11 @@ pub enum SetError {
     /// The running simulation rejects the change.
     #[error(transparent)]
     Change(#[from] ChangeError),
+}
+
+/// Changes of `scene` except those of `key`.
+fn other_changes<'s>(scene: &'s Scene, key: &'s str) -> impl Iterator<Item = &'s (String, String)> {
+    scene.changes.iter().filter(move |(other, _)| other != key)
 }
 
 /// A running simulation with its scene in effect, and a pending scene with the changes that wait for a reset.
@@ -95,30 +100,34 @@ impl LiveScene {
     /// # Errors
     /// Unknown key, wrong unit or value out of range; the running simulation is then unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SetError> {
-        self.change(|scene| scene.set(key, value).map(|_| ()))
+        self.change(key, |scene| scene.with(key, value))
     }
 
-    /// Like [`Self::set`], with a value in SI units.
+    /// Reverts the change of a parameter, like [`Scene::undo_change`].
     ///
     /// # Errors
     /// Same as [`Self::set`].
-    pub fn set_value(&mut self, key: &str, value: &Value) -> Result<Effect, SetError> {
-        self.change(|scene| scene.set_value(key, value).map(|_| ()))
+    pub fn undo_change(&mut self, key: &str) -> Result<Effect, SetError> {
+        self.change(key, |scene| scene.without(key))
     }
 
-    fn change(&mut self, change: impl Fn(&mut Scene) -> Result<(), SceneError>) -> Result<Effect, SetError> {
-        let mut pending = Scene::clone(&self.pending);
-        change(&mut pending)?;
-        let mut running = Scene::clone(&self.running);
+    fn change(&mut self, key: &str, change: impl Fn(&Scene) -> Result<Scene, SceneError>) -> Result<Effect, SetError> {
+        let pending = Arc::new(change(&self.pending)?);
+        // The scene follows from its changes: nothing else waits, or only an earlier value of this key.
+        let running = if other_changes(&self.running, key).eq(other_changes(&self.pending, key)) {
+            Ok(pending.clone())
+        } else {
+            change(&self.running).map(Arc::new)
+        };
         // A change may be valid only for the pending scene, e.g. for a joint of a longer chain.
-        let effect = match change(&mut running) {
-            Ok(()) => self.simulation.adopt(&running.machine)?,
+        let effect = match &running {
+            Ok(running) => self.simulation.adopt(&running.machine)?,
             Err(_) => Effect::AtReset,
         };
-        if effect == Effect::Now {
-            self.running = Arc::new(running);
+        if let (Effect::Now, Ok(running)) = (effect, running) {
+            self.running = running;
         }
-        self.pending = Arc::new(pending);
+        self.pending = pending;
         Ok(effect)
     }
 

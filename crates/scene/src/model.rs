@@ -2,6 +2,7 @@
 //! `access.rs` changes it by key.
 
 use std::collections::BTreeMap;
+use std::ops::Deref;
 use std::sync::Arc;
 
 use super::Parameter;
@@ -9,25 +10,37 @@ use super::file_number::FileNumber;
 use jointplay_physics::machine::{Machine, Vec3};
 use jointplay_physics::words::words;
 
-/// A scene file and the machine it describes.
+/// A scene file and the machine it describes. A copy shares both until one of the two is changed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// Short name: `name` in the file, or else the file name without its extension.
-    pub name: String,
-    /// A one-line title, for lists.
-    pub title: String,
-    /// A paragraph for the user.
-    pub description: String,
+    /// Source text and its origin, and what it says that no change affects: also read as fields of the scene.
+    pub source: Arc<Source>,
     /// The machine to simulate.
-    pub machine: Machine,
+    pub machine: Arc<Machine>,
     /// View settings.
     pub view: ViewSettings,
     /// Keys (without prefix) in which each ball joint differs from the scene's `contact.*`.
-    pub(super) overrides: Vec<Vec<&'static str>>,
-    /// Source text and its origin; a rebuild reads it again with the changes.
-    pub source: Source,
+    pub(super) overrides: Arc<Vec<Vec<&'static str>>>,
     /// Parameters changed since the file was read, in order: key and value as a user would write them.
     pub changes: Vec<(String, String)>,
+    /// The scene as read from its text, with only those changes that replace numbers of the text: where other changes start from
+    /// again without another reading. `None`: this scene.
+    pub(super) as_read: Option<Arc<Scene>>,
+}
+
+impl Deref for Scene {
+    type Target = Source;
+
+    fn deref(&self) -> &Source {
+        &self.source
+    }
+}
+
+impl Scene {
+    /// The machine, to be changed: no longer that of copies of this scene.
+    pub fn machine_mut(&mut self) -> &mut Machine {
+        Arc::make_mut(&mut self.machine)
+    }
 }
 
 /// Texts of files, by the names used in the scene.
@@ -36,15 +49,21 @@ pub type Texts = BTreeMap<String, Arc<str>>;
 /// Where a scene's text came from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Source {
+    /// Short name: `name` in the file, or else the file name without its extension.
+    pub name: String,
+    /// A one-line title, for lists.
+    pub title: String,
+    /// A paragraph for the user.
+    pub description: String,
     /// The file as the user named it; `None` for a built-in scene.
     pub file: Option<String>,
     /// The TOML text.
-    pub text: String,
+    pub text: Arc<str>,
     /// Byte offsets in the text for errors found after reading: each parameter in the text, by key; `closed_form` for its
     /// section; `joint.<name>` for each ball joint.
     pub places: BTreeMap<String, usize>,
     /// Numbers parsed from the text, by key.
-    pub numbers: Arc<BTreeMap<String, FileNumber>>,
+    pub numbers: BTreeMap<String, FileNumber>,
     /// Rows of the user-defined parameters, in file order.
     pub own: Vec<&'static Parameter>,
     /// Contents of the files named by the scene, as of loading.

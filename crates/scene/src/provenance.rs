@@ -34,7 +34,7 @@ pub fn provenance([program, version]: [&str; 2], scene: &Scene) -> Map<String, J
 
 /// Adds the texts of `scene`, which reproduce it with the changed parameters even if its files are gone.
 pub fn insert_texts(meta: &mut Map<String, Json>, scene: &Scene) {
-    meta.insert("scene_text".into(), json!(scene.source.text));
+    meta.insert("scene_text".into(), json!(&*scene.source.text));
     insert_files(meta, "scene_files", scene, |text| json!(text));
 }
 

@@ -1,6 +1,6 @@
 //! Reads a scene from TOML: settings first, then bodies, joints and ball joints.
 
-use super::access::{beside_preset, check_solver_changes, sets_solver};
+use super::access::beside_preset;
 use super::assets::AssetResolver;
 use super::closed_form::read_closed_form;
 use super::document::{Document, Node, Section, lists};
@@ -79,13 +79,10 @@ impl Scene {
         changes: &[(String, String)],
         retains: fn(&Self, &str) -> bool,
     ) -> Result<Self, SceneError> {
-        let of_text = changes.iter().filter(|(key, _)| replaces_text(key));
-        let reading = Reading::new(of_text);
+        let reading = Reading::new(changes_of_text(changes));
         let document =
             Document { file, text, reading: &reading, assets: &assets, include: None, instance: None, on_hinge: false };
-        let mut scene = Self::read_document(document, changes, retains)?;
-        scene.source.beside = assets.into_texts();
-        Ok(scene)
+        Self::read_document(document, changes, retains)
     }
 
     fn read_document(
@@ -122,7 +119,7 @@ impl Scene {
         let files: Vec<Section<'_>> = files.collect();
         let patterns = read_patterns(&files)?;
         let mut scene = read_settings(&top)?;
-        if let (Some(scene_instance), Some(form)) = (&scene_instance, &mut scene.machine.closed_form)
+        if let (Some(scene_instance), Some(form)) = (&scene_instance, &mut scene.machine_mut().closed_form)
             && let Some(path) = &mut form.path
         {
             let origin = scene_instance.point(None, Vec3::zeros());
@@ -130,25 +127,19 @@ impl Scene {
                 Some((scene_instance.rotation(None, Quat::identity()).to_rotation_matrix().into_inner(), origin));
         }
         let mut places = read_parameters(&top, &mut scene)?;
-        scene.source.places = places
+        let source = Arc::make_mut(&mut scene.source);
+        source.places = places
             .iter()
             .map(|(key, node)| (key.clone(), node.offset()))
             .chain(top.get("closed_form").map(|node| ("closed_form".to_owned(), node.offset())))
             .collect();
         read_mechanism(&files, &patterns, &mut scene, &mut places)?;
-        scene.source.numbers = Arc::new(document.reading.numbers());
-        scene.source.own = own;
-        check_solver_changes(changes)?;
-        if sets_solver(changes).next().is_some() {
-            // They take the place of the text's preset.
-            scene.machine.solver.preset = None;
-        }
-        for (key, value) in changes {
-            if retains(&scene, key) {
-                scene.change(key, value)?;
-            }
-        }
-        scene.apply_preset();
+        let source = Arc::make_mut(&mut scene.source);
+        source.numbers = document.reading.numbers();
+        source.own = own;
+        source.beside = document.assets.texts();
+        scene.changes = changes_of_text(changes).filter(|(key, _)| retains(&scene, key)).cloned().collect();
+        let scene = Arc::new(scene).changed(changes, retains)?;
         scene.machine.check_contacts().map_err(|conflict| {
             let message = conflict.fault.to_string();
             let keys = scene.keys_of(&conflict);
@@ -159,6 +150,11 @@ impl Scene {
         })?;
         Ok(scene)
     }
+}
+
+/// Those of `changes` that replace values of the text.
+pub(super) fn changes_of_text(changes: &[(String, String)]) -> impl Iterator<Item = &(String, String)> {
+    changes.iter().filter(|(key, _)| replaces_text(key))
 }
 
 /// The scene as a group with its own placement, if the file gives one.
@@ -223,15 +219,21 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
             _ => return Err(section.error("", "yaw and pitch belong together: give both or none")),
         };
     }
-    Ok(Scene {
+    let source = Source {
         title: visible_line(text("title")?.unwrap_or(&name)).into_owned(),
         description: visible(text("description")?.unwrap_or("").trim()).into_owned(),
         name,
-        machine: Machine { closed_form, ..Machine::default() },
+        file: document.file.map(str::to_owned),
+        text: document.text.into(),
+        ..Source::default()
+    };
+    Ok(Scene {
+        source: source.into(),
+        machine: Machine { closed_form, ..Machine::default() }.into(),
         view,
-        overrides: Vec::new(),
-        source: Source { file: document.file.map(str::to_owned), text: document.text.to_owned(), ..Source::default() },
+        overrides: Arc::default(),
         changes: Vec::new(),
+        as_read: None,
     })
 }
 
@@ -312,16 +314,18 @@ fn read_mechanism<'d>(
         let joint = read_joint(&node, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
         if joint.section.document.include.is_none() {
-            scene.source.places.insert(format!("joint.{}", joint.name), joint.section.offset());
+            let title = format!("joint.{}", joint.name);
+            Arc::make_mut(&mut scene.source).places.insert(title, joint.section.offset());
         }
         joints.push(joint);
     }
     let (closing, joints): (Vec<_>, Vec<_>) = joints.into_iter().partition(|text| text.closes_loop);
-    (scene.machine.bodies, scene.machine.joints) = sort_forest(bodies, joints, &body_sections)?;
+    let machine = scene.machine_mut();
+    (machine.bodies, machine.joints) = sort_forest(bodies, joints, &body_sections)?;
     let by_name = indices_by_name(&scene.machine.bodies);
     for JointText { joint, .. } in closing {
         let sorted = |body: usize| by_name[&file_order[body]];
-        scene.machine.closing_joints.push(Joint {
+        scene.machine_mut().closing_joints.push(Joint {
             parent: joint.parent.map(sorted),
             child: sorted(joint.child),
             ..joint
@@ -332,15 +336,15 @@ fn read_mechanism<'d>(
         joint_names.add(&section, "joint", &joint.name)?;
         let title = format!("joint.{}", joint.name);
         if section.document.include.is_none() {
-            scene.source.places.insert(title, section.offset());
+            Arc::make_mut(&mut scene.source).places.insert(title, section.offset());
         }
-        scene.overrides.push(own.keys().copied().collect());
+        Arc::make_mut(&mut scene.overrides).push(own.keys().copied().collect());
         places.extend(own.into_iter().map(|(part, node)| (format!("joint.{}.{part}", joint.name), node)));
-        scene.machine.loose_joints.push(joint);
+        scene.machine_mut().loose_joints.push(joint);
     }
     for node in list("fixed_shape")? {
         let shape = read_shape(&node, true)?;
-        scene.machine.fixed_shapes.push(shape);
+        scene.machine_mut().fixed_shapes.push(shape);
     }
     scene.machine.check_massless().map_err(|(index, why)| {
         let node = body_sections[file_places[scene.machine.bodies[index].name.as_str()]].require("mass");
@@ -356,7 +360,7 @@ fn read_mechanism<'d>(
             let (element, section) = read_element(&node, kind, scene, &by_name, &joints)?;
             // Joints and elements share one table of column names.
             joint_names.add(&section, "joint or force element", &element.name)?;
-            scene.machine.elements.push(element);
+            scene.machine_mut().elements.push(element);
         }
     }
     let of_bodies = scene.machine.bodies.iter().map(|body| body.shapes.len());
@@ -379,14 +383,12 @@ fn read_joint_contacts<'d>(top: &Section<'d>, scene: &mut Scene, places: &mut Pl
         let node = section.require("name")?;
         let name = node.text()?;
         names.add(&section, "[[joint_contact]]", name)?;
-        let joints = &mut scene.machine.loose_joints;
+        let joints = &mut Arc::make_mut(&mut scene.machine).loose_joints;
         let Some(index) = joints.iter().position(|joint| joint.name == name) else {
             return Err(node.error(no_ball_joint(name, joints)));
         };
         for (part, node) in read_own_contact(&section, &mut joints[index])? {
-            if !scene.overrides[index].contains(&part) {
-                scene.overrides[index].push(part);
-            }
+            scene.add_override(index, part);
             places.insert(format!("joint.{name}.{part}"), node);
         }
     }
@@ -413,7 +415,7 @@ fn read_output(top: &Section<'_>, scene: &mut Scene, file_order: &[String]) -> R
         (None, None) => 0,
     };
     let probe = section.and_then(|section| section.get("probe")).map(|node| node.vector()).transpose()?;
-    scene.machine.output = Output { body, probe };
+    scene.machine_mut().output = Output { body, probe };
     Ok(())
 }
 

@@ -1,7 +1,7 @@
 //! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
 
 use super::field::{Access, Field, FieldValue, SWITCH, field, word_field, word_of};
-use super::{Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, StartRule, Value};
+use super::{Formulation, Kind, Machine, Parameter, Preset, Scope, SignedAxis, StartRule, Value};
 use jointplay_physics::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
 use jointplay_physics::integrate::Method;
 use jointplay_physics::units::Dimension as D;
@@ -73,7 +73,7 @@ const fn logarithmic(dimension: D, min: f64, max: f64, display: &'static str, sl
 
 const fn gravity(
     key: &'static str,
-    field: Field<Scene>,
+    field: Field<Machine>,
     label: &'static str,
     default: f64,
     help: &'static str,
@@ -81,7 +81,7 @@ const fn gravity(
     let kind = number(D::Acceleration, -1000.0, 1000.0, "m/s^2", (-20.0, 20.0));
     row(
         key,
-        Access::Scene(field),
+        Access::Machine(field),
         label,
         "Gravity",
         kind,
@@ -206,28 +206,28 @@ static TABLE: [Parameter; 25] = [
     ),
     gravity(
         "gravity.x",
-        field!(machine.gravity.x),
+        field!(gravity.x),
         "Gravity along X",
         0.0,
         "World X component of gravity. In the paper's machine X points down: +9.81 m/s^2. A file that gives any component has 0 for the others.",
     ),
     gravity(
         "gravity.y",
-        field!(machine.gravity.y),
+        field!(gravity.y),
         "Gravity along Y",
         0.0,
         "World Y component of gravity. A file that gives any component has 0 for the others.",
     ),
     gravity(
         "gravity.z",
-        field!(machine.gravity.z),
+        field!(gravity.z),
         "Gravity along Z",
         -9.81,
         "World Z component of gravity: -9.81 m/s^2 where Z points up. A file that gives any component has 0 for the others.",
     ),
     at_reset(row(
         "formulation",
-        Access::Scene(word_field!(machine.formulation)),
+        Access::Machine(word_field!(formulation)),
         "Formulation",
         "Solver",
         Kind::Choice(Formulation::WORDS),
@@ -241,7 +241,7 @@ static TABLE: [Parameter; 25] = [
     )),
     at_reset(row(
         "start",
-        Access::Scene(word_field!(machine.start)),
+        Access::Machine(word_field!(start)),
         "Start",
         "Solver",
         Kind::Choice(StartRule::WORDS),
@@ -255,7 +255,7 @@ static TABLE: [Parameter; 25] = [
     )),
     row(
         "solver.method",
-        Access::Scene(word_field!(machine.solver.method)),
+        Access::Machine(word_field!(solver.method)),
         "Method",
         "Solver",
         Kind::Choice(Method::WORDS),
@@ -270,7 +270,7 @@ static TABLE: [Parameter; 25] = [
     ),
     row(
         "solver.step",
-        Access::Scene(field!(machine.solver.step)),
+        Access::Machine(field!(solver.step)),
         "Step",
         "Solver",
         logarithmic(D::Time, 1e-7, 1e-2, "us", (1e-6, 1e-3)),
@@ -282,7 +282,7 @@ static TABLE: [Parameter; 25] = [
     ),
     row(
         "solver.tolerance",
-        Access::Scene(field!(machine.solver.tolerance)),
+        Access::Machine(field!(solver.tolerance)),
         "Tolerance",
         "Solver",
         logarithmic(D::None, 1e-13, 1e-2, "", (1e-12, 1e-3)),
@@ -296,7 +296,7 @@ static TABLE: [Parameter; 25] = [
     ),
     row(
         "solver.steps_per_impact",
-        Access::Scene(field!(machine.solver.steps_per_impact)),
+        Access::Machine(field!(solver.steps_per_impact)),
         "Steps per impact",
         "Solver",
         Kind::Count { min: 2, max: 256 },
@@ -308,10 +308,10 @@ static TABLE: [Parameter; 25] = [
     ),
     row(
         "solver.preset",
-        Access::Scene(Field {
-            get: |scene| scene.machine.solver.preset.map_or(Value::Unset, |preset| Value::Choice(preset.word())),
+        Access::Machine(Field {
+            get: |machine| machine.solver.preset.map_or(Value::Unset, |preset| Value::Choice(preset.word())),
             // The settings that it stands for depend on the machine: `Scene::apply_preset`.
-            set: |scene, value| scene.machine.solver.preset = Some(word_of(value)),
+            set: |machine, value| machine.solver.preset = Some(word_of(value)),
         }),
         "Preset",
         "Solver",
@@ -325,7 +325,7 @@ static TABLE: [Parameter; 25] = [
     ),
     at_reset(row(
         "solver.energy_ledger",
-        Access::Scene(field!(machine.solver.energy_ledger)),
+        Access::Machine(field!(solver.energy_ledger)),
         "Energy ledger",
         "Solver",
         Kind::Choice(&SWITCH),
@@ -337,7 +337,7 @@ static TABLE: [Parameter; 25] = [
     )),
     row(
         "view.down",
-        Access::Scene(word_field!(view.down)),
+        Access::View(word_field!(down)),
         "Down on screen",
         "View",
         Kind::Choice(SignedAxis::WORDS),
@@ -388,7 +388,7 @@ pub(super) fn joint_part(key: &str) -> Option<(&str, &str)> {
 pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str> {
     match parameter.access {
         Access::Contact(_) => parameter.key.strip_prefix("contact."),
-        Access::Scene(_) | Access::Number => None,
+        _ => None,
     }
 }
 
@@ -396,6 +396,6 @@ pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str
 pub(super) fn contact_rows() -> impl Iterator<Item = (&'static str, Field<contact::Parameters>)> {
     TABLE.iter().filter_map(|parameter| match parameter.access {
         Access::Contact(field) => Some((parameter.key.strip_prefix("contact.")?, field)),
-        Access::Scene(_) | Access::Number => None,
+        _ => None,
     })
 }

@@ -619,12 +619,12 @@ role = \"frame\"
     }
     // A rotated box becomes a plate of the same shape.
     let boxes = text.replace("form = \"sphere\"", "form = \"box\"").replace("radius = \"1 mm\"", "size = \"2 4 6 mm\"");
-    let boxes = Scene::parse(&boxes, None, &[]).expect("reads").machine.fixed_shapes;
-    let Geometry::Box { centre, .. } = boxes[0].geometry else {
+    let boxes = Scene::parse(&boxes, None, &[]).expect("reads");
+    let Geometry::Box { centre, .. } = boxes.machine.fixed_shapes[0].geometry else {
         panic!("the first copy is not rotated");
     };
     near(centre, Vec3::new(0.02, 0.0, 0.0));
-    let Geometry::Plate { corners, triangles, thickness } = &boxes[1].geometry else {
+    let Geometry::Plate { corners, triangles, thickness } = &boxes.machine.fixed_shapes[1].geometry else {
         panic!("the second copy is rotated");
     };
     let angle = std::f64::consts::TAU / 3.0;

@@ -1,5 +1,7 @@
 //! What play costs: how far an output moves with the play of each joint alone, as a tornado that fills while it is computed.
 
+use std::sync::Arc;
+
 use eframe::egui::{Align, ComboBox, DragValue, RichText, Ui};
 
 use super::computation::Computation;
@@ -29,7 +31,7 @@ pub struct Costs {
     /// Whether another panel takes its place while the results are retained.
     is_set_aside: bool,
     /// Text of the scene that the settings belong to.
-    scene: String,
+    scene: Arc<str>,
     settings: Option<CostSettings>,
     pub(super) computation: Computation<OneAtATimeTask>,
     study: Option<CostStudy>,

@@ -3,7 +3,6 @@
 use crate::scene::Scene;
 use crate::simulate::{MAX_PICKED, Quantity};
 use crate::units::{Dimension, parse_quantity};
-use crate::view::{ScenePart, WearMap};
 
 /// Longest window of the plots that a link may request, s.
 const MAX_PLOT_WINDOW: f64 = 1e4;
@@ -15,6 +14,29 @@ const MAX_NAME_LENGTH: usize = 120;
 const IDEAL: &str = "ideal";
 const MICROSCOPE: &str = "microscope.";
 const WEAR: [(&str, WearMap); 2] = [("wear-impulse", WearMap::Impulse), ("wear-friction-work", WearMap::FrictionWork)];
+
+/// A part of the scene that can be hovered or followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ScenePart {
+    /// A body, by index.
+    Body(usize),
+    /// A ball joint, by index.
+    Joint(usize),
+    /// A fixed shape, by index.
+    Fixed(usize),
+}
+
+/// Quantity shown on the sockets' inner faces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WearMap {
+    /// Nothing.
+    #[default]
+    Off,
+    /// Time integral of the normal force.
+    Impulse,
+    /// Work done by friction.
+    FrictionWork,
+}
 
 /// How much of the past the plots show.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,8 +1,8 @@
 //! Round trips, hand-written links and damaged links.
 
 use super::*;
+use crate::session::link::settings::WearMap;
 use crate::session::log::Event;
-use crate::view::WearMap;
 
 /// Deterministic pseudo-random numbers (splitmix64).
 struct Random(u64);

@@ -25,7 +25,7 @@ impl Player {
     /// Takes the copy made before the latest parameter change, with the key; `None` if none was made since the last call. `enabled`:
     /// whether the run is copied before the next change. `is_over`: the gesture has ended, so that the next change counts as a
     /// new one, even of the same parameter.
-    pub(crate) fn take_copy_before_change(&mut self, enabled: bool, is_over: bool) -> Option<(Box<Self>, String)> {
+    pub fn take_copy_before_change(&mut self, enabled: bool, is_over: bool) -> Option<(Box<Self>, String)> {
         self.before_change.enabled = enabled;
         self.before_change.gesture.take_if(|_| is_over);
         self.before_change.copy.take()
@@ -50,12 +50,12 @@ impl Player {
     }
 
     /// Whether the whole record used the current parameters and no pull acted.
-    pub(crate) fn is_unchanged_since_start(&self) -> bool {
+    pub fn is_unchanged_since_start(&self) -> bool {
         self.script.log.entries.iter().all(|entry| entry.event == Event::Stop) && !self.has_pending_changes()
     }
 
     /// Displays `time`, s, stepping while `may_step`. Returns true once it is reached or the run cannot continue.
-    pub(crate) fn follow(&mut self, time: f64, may_step: impl FnMut() -> bool) -> bool {
+    pub fn follow(&mut self, time: f64, may_step: impl FnMut() -> bool) -> bool {
         if time > self.reached {
             if self.has_future() {
                 self.go_to(self.reached);

@@ -22,7 +22,7 @@ pub(super) struct Keyframe {
     /// Number of log entries before it.
     pub events: usize,
     /// Position in the record; only `regular` keyframes have one.
-    pub record: Option<Mark>,
+    pub record: Option<Arc<Mark>>,
     /// State of the twin run.
     pub twin: Option<Arc<CompanionState>>,
 }
@@ -30,7 +30,7 @@ pub(super) struct Keyframe {
 impl Keyframe {
     fn bytes(&self) -> usize {
         let twin = self.twin.as_ref().map_or(0, |twin| twin.state.bytes());
-        self.state.bytes() + twin + self.record.as_ref().map_or(0, Mark::bytes)
+        self.state.bytes() + twin + self.record.as_ref().map_or(0, |mark| mark.bytes())
     }
 }
 
@@ -119,7 +119,7 @@ impl Keyframes {
     /// channels.
     pub fn rearrange(&mut self, channels: usize, from: &[Option<usize>]) {
         for mark in self.regular.iter_mut().filter_map(|regular| regular.record.as_mut()) {
-            *mark = mark.rearranged(channels, from);
+            *mark = mark.rearranged(channels, from).into();
         }
         self.bytes = self.regular.iter().map(Keyframe::bytes).sum();
     }

@@ -1,6 +1,8 @@
 //! Going to an instant. [`Player::display`] shows a known instant: from the latest step, or by restoring the nearest earlier
 //! keyframe and repeating the same steps and logged events, with the same bits. [`Player::continue_to`] steps to a later one.
 
+use std::sync::Arc;
+
 use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
 use super::keyframes::Keyframe;
@@ -335,7 +337,7 @@ impl Player {
             return;
         };
         let (start, start_steps) = (keyframe.state.time(), keyframe.state.steps());
-        self.record.truncate(start, start_steps, keyframe.record.as_ref());
+        self.record.truncate(start, start_steps, keyframe.record.as_deref());
         self.keyframes.truncate(start_steps);
         if let Some(twin) = &mut self.twin {
             twin.truncate(start);
@@ -355,7 +357,7 @@ impl Player {
         let new = steps >= self.most_steps;
         self.most_steps = self.most_steps.max(steps);
         if new && self.keyframes.is_due(steps) {
-            let record = Some(self.record.history.mark());
+            let record = Some(self.record.history.mark().into());
             self.keyframes.store(self.keyframe(record));
         } else if !new && self.keyframes.is_fine(steps) {
             let keyframe = self.keyframe(None);
@@ -363,7 +365,7 @@ impl Player {
         }
     }
 
-    fn keyframe(&self, record: Option<Mark>) -> Keyframe {
+    fn keyframe(&self, record: Option<Arc<Mark>>) -> Keyframe {
         Keyframe {
             state: self.simulation.snapshot().into(),
             events: self.script.passed,

@@ -77,7 +77,7 @@ impl Row {
 }
 
 fn scale_masses(scene: &mut Scene, factor: f64) {
-    for body in &mut scene.machine.bodies {
+    for body in &mut scene.machine_mut().bodies {
         body.mass *= factor;
         body.inertia *= factor;
     }
@@ -85,7 +85,7 @@ fn scale_masses(scene: &mut Scene, factor: f64) {
 
 /// Sets the rods' moments of inertia about their own axes to nearly zero.
 fn thin_rods(scene: &mut Scene) {
-    for body in &mut scene.machine.bodies {
+    for body in &mut scene.machine_mut().bodies {
         let i = &mut body.inertia;
         let axis = (0..3).min_by(|&a, &b| i[(a, a)].total_cmp(&i[(b, b)]));
         if body.name.starts_with("rod") || body.name.starts_with("link") {
@@ -97,7 +97,9 @@ fn thin_rods(scene: &mut Scene) {
 
 /// Offsets the start of the pendulum's ball from the centre of its socket.
 fn start_at(scene: &mut Scene, offset: Vec3) {
-    let JointStart::Pose { position, .. } = &mut scene.machine.joints[0].start else { panic!("the pendulum is free") };
+    let JointStart::Pose { position, .. } = &mut scene.machine_mut().joints[0].start else {
+        panic!("the pendulum is free")
+    };
     *position += offset;
 }
 
