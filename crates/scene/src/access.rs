@@ -3,6 +3,7 @@
 use super::assets::AssetResolver;
 use super::error::{nearest_parameter, no_ball_joint};
 use super::field::Access;
+use super::model::AsRead;
 use super::numbers::row_of_number;
 use super::read::{changes_of_text, is_fixed_in_file, replaces_text};
 use super::table::{contact_part, contact_rows, find, joint_part};
@@ -262,36 +263,38 @@ impl Scene {
     /// As [`Self::read`], from this scene's text. That is read again only for other numbers in it, and for the places that errors
     /// name.
     fn read_again(&self, changes: &[(String, String)], retains: fn(&Self, &str) -> bool) -> Result<Self, SceneError> {
-        if let Some(as_read) = self.as_read.as_ref().filter(|as_read| changes_of_text(changes).eq(&as_read.changes))
-            && let Ok(scene) = as_read.changed(changes, retains)
-            && scene.machine.check_contacts().is_ok()
+        if let Some(as_read) = &self.source.as_read
+            && changes_of_text(changes).eq(&as_read.changes)
         {
-            return Ok(scene);
+            let AsRead { machine, view, overrides, .. } = as_read.clone();
+            let mut scene = Self { source: self.source.clone(), machine, view, overrides, changes: Vec::new() };
+            if scene.apply(changes, retains).is_ok() && scene.machine.check_contacts().is_ok() {
+                return Ok(scene);
+            }
         }
         let source = &self.source;
         let beside = AssetResolver::known(&source.beside);
         Self::read(&source.text, source.file.as_deref(), beside, changes, retains)
     }
 
-    /// This scene, as read from its text, with the `changes` of keys that it `retains`; without the checks of contacts.
-    pub(super) fn changed(
-        self: &Arc<Self>,
+    /// Makes the `changes` of keys that this scene, as read from its text, `retains`; without the checks of contacts.
+    pub(super) fn apply(
+        &mut self,
         changes: &[(String, String)],
         retains: fn(&Self, &str) -> bool,
-    ) -> Result<Self, SceneError> {
-        let mut scene = Self { changes: Vec::new(), as_read: Some(self.clone()), ..Self::clone(self) };
+    ) -> Result<(), SceneError> {
         check_solver_changes(changes)?;
         if sets_solver(changes).next().is_some() {
             // They take the place of the text's preset.
-            scene.machine_mut().solver.preset = None;
+            self.machine_mut().solver.preset = None;
         }
         for (key, value) in changes {
-            if retains(&scene, key) {
-                scene.change(key, value)?;
+            if retains(self, key) {
+                self.change(key, value)?;
             }
         }
-        scene.apply_preset();
-        Ok(scene)
+        self.apply_preset();
+        Ok(())
     }
 
     /// Records that ball joint `joint` has its own value of the contact parameter `part`.

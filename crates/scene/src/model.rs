@@ -23,9 +23,6 @@ pub struct Scene {
     pub(super) overrides: Arc<Vec<Vec<&'static str>>>,
     /// Parameters changed since the file was read, in order: key and value as a user would write them.
     pub changes: Vec<(String, String)>,
-    /// The scene as read from its text, with only those changes that replace numbers of the text: where other changes start from
-    /// again without another reading. `None`: this scene.
-    pub(super) as_read: Option<Arc<Scene>>,
 }
 
 impl Deref for Scene {
@@ -68,6 +65,17 @@ pub struct Source {
     pub own: Vec<&'static Parameter>,
     /// Contents of the files named by the scene, as of loading.
     pub beside: Texts,
+    pub(super) as_read: Option<AsRead>,
+}
+
+/// What a text says where changes do not replace its numbers: other changes start from here again without another reading.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct AsRead {
+    pub machine: Arc<Machine>,
+    pub view: ViewSettings,
+    pub overrides: Arc<Vec<Vec<&'static str>>>,
+    /// Changes of numbers of the text.
+    pub changes: Vec<(String, String)>,
 }
 
 /// A world axis with its sign.

@@ -9,6 +9,7 @@ use super::error::{no_ball_joint, no_body};
 use super::format::FILE;
 use super::include::{self, read_includes};
 use super::instance::{Group, Instance};
+use super::model::AsRead;
 use super::pattern::{Pattern, read_patterns};
 use super::placement::read_placement;
 use super::read_bodies::{read_body, read_shape};
@@ -138,8 +139,15 @@ impl Scene {
         source.numbers = document.reading.numbers();
         source.own = own;
         source.beside = document.assets.texts();
-        scene.changes = changes_of_text(changes).filter(|(key, _)| retains(&scene, key)).cloned().collect();
-        let scene = Arc::new(scene).changed(changes, retains)?;
+        let of_text = changes_of_text(changes).filter(|(key, _)| retains(&scene, key)).cloned().collect();
+        let as_read = AsRead {
+            machine: scene.machine.clone(),
+            view: scene.view,
+            overrides: scene.overrides.clone(),
+            changes: of_text,
+        };
+        Arc::make_mut(&mut scene.source).as_read = Some(as_read);
+        scene.apply(changes, retains)?;
         scene.machine.check_contacts().map_err(|conflict| {
             let message = conflict.fault.to_string();
             let keys = scene.keys_of(&conflict);
@@ -233,7 +241,6 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         view,
         overrides: Arc::default(),
         changes: Vec::new(),
-        as_read: None,
     })
 }
 

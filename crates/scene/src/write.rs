@@ -193,7 +193,6 @@ mod tests {
         let mut plain = scene.clone();
         plain.changes.clear();
         plain.source = Default::default();
-        plain.as_read = None;
         for overrides in Arc::make_mut(&mut plain.overrides) {
             overrides.sort_unstable();
         }
