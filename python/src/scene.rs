@@ -117,7 +117,7 @@ impl PyScene {
 
     /// Names of the ball joints, in scene order.
     #[getter]
-    fn loose_joints(&self) -> Vec<&str> {
+    fn ball_joints(&self) -> Vec<&str> {
         self.scene.machine.loose_joints.iter().map(|joint| &joint.name[..]).collect()
     }
 
