@@ -154,10 +154,6 @@ impl ForceElement for Contact {
         socket.torque -= (arm_socket + n * (radius + clearance)).cross(&on_ball);
     }
 
-    fn ends(&self, _: &[Kinematics]) -> Option<[Anchor; 2]> {
-        Some([self.site.carrier, self.site.carried])
-    }
-
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let gap = &self.gap;
         let contact_state = at.active_set.contact_state(self.id);
