@@ -77,7 +77,7 @@ impl Ideal {
         Self { output: machine.output.clone(), motion: Simulation::new(&closed(machine)).map(Companion::new) }
     }
 
-    /// Advances to `time`, s, up to which the run is recorded, if the motion lags by less than [`FOLLOW_LAG`].
+    /// Advances to `time`, s, up to which the run is recorded, if the motion lags by less than `FOLLOW_LAG`.
     pub fn follow(&mut self, time: f64, gravity: &Gravity) {
         if self.motion.as_ref().is_ok_and(|motion| time - motion.simulation.time() < FOLLOW_LAG) {
             let mut left = FOLLOW_STEPS;
