@@ -12,6 +12,7 @@ use jointplay::simulate::{Frame, Simulation};
 use large::scene_text;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::thread::LocalKey;
 
 thread_local! {
     /// Allocations of this thread and their bytes; other tests run in parallel.
@@ -51,9 +52,18 @@ static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// Number of allocations made by `work`.
 fn allocations(work: impl FnOnce()) -> u64 {
-    let before = COUNT.get();
+    counted(&COUNT, work)
+}
+
+/// Bytes allocated by `work`.
+fn bytes(work: impl FnOnce()) -> u64 {
+    counted(&BYTES, work)
+}
+
+fn counted(counter: &'static LocalKey<Cell<u64>>, work: impl FnOnce()) -> u64 {
+    let before = counter.get();
     work();
-    COUNT.get() - before
+    counter.get() - before
 }
 
 #[test]
@@ -196,27 +206,20 @@ fn setup_allocations_grow_linearly_with_the_scene() {
         ("a chain", "lagrange", "0 m"),
         ("hinges in a row", "lagrange", "0 m"),
     ] {
-        let bytes = |n: usize| {
+        let needed = |n: usize| {
             let text = scene_text(kind, n, clearance);
-            let before = BYTES.get();
-            let changes = [("formulation".to_owned(), form.to_owned())];
-            let scene = Scene::parse(&text, Some("big.toml"), &changes).unwrap();
-            std::hint::black_box(scene.machine.warnings());
-            std::hint::black_box(Simulation::new(&scene.machine).unwrap().time());
-            BYTES.get() - before
+            bytes(|| {
+                let changes = [("formulation".to_owned(), form.to_owned())];
+                let scene = Scene::parse(&text, Some("big.toml"), &changes).unwrap();
+                std::hint::black_box(scene.machine.warnings());
+                std::hint::black_box(Simulation::new(&scene.machine).unwrap().time());
+            })
         };
-        let (single, double) = (bytes(400), bytes(800));
+        let (single, double) = (needed(400), needed(800));
         // Vectors double their capacity as they grow, so that the waste varies between sizes.
         let growth = double as f64 / single as f64;
         assert!(growth < 2.6, "{kind}, {form}: {single}, then {double} bytes");
     }
-}
-
-/// Bytes allocated by `work`.
-fn bytes(work: impl FnOnce()) -> u64 {
-    let before = BYTES.get();
-    work();
-    BYTES.get() - before
 }
 
 #[test]

@@ -2,10 +2,10 @@
 //! channel name and unit.
 
 use eframe::egui::{
-    self, ComboBox, EventFilter, Id, Key, Pos2, RichText, Role, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit::Live,
-    vec2,
+    self, AsIdSalt, ComboBox, EventFilter, Id, Key, Pos2, RichText, Role, ScrollArea, TextEdit, Ui, WidgetInfo,
+    accesskit::Live, vec2,
 };
-use egui_plot::{FilledArea, GridInput, GridMark, HoverPosition, PlotPoint, PlotResponse, PlotTransform};
+use egui_plot::{FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotResponse, PlotTransform};
 
 use super::compare::{Comparison, EarlierRun};
 use super::curve::{Curves, Path, Trace};
@@ -852,6 +852,17 @@ fn range(values: Option<(f64, f64)>, from_zero: bool) -> (f64, f64) {
     }
     let margin = 0.05 * (greatest - least);
     (least - margin, greatest + margin)
+}
+
+/// A plot that no gesture moves.
+pub(super) fn still_plot<'a>(id: impl AsIdSalt) -> Plot<'a> {
+    Plot::new(id)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .allow_axis_zoom_drag(false)
+        .allow_double_click_reset(false)
 }
 
 /// About `count` marks at 1, 2 or 5 times a power of ten, no closer than the axis allows; at least two if there is room.

@@ -3,7 +3,7 @@
 use eframe::egui::{self, Rangef, Role, Sense, Ui, Vec2b, WidgetInfo};
 use egui_plot::{AxisHints, GridMark, HoverPosition, Plot, PlotResponse};
 
-use crate::app::plots::{marks, tick};
+use crate::app::plots::{marks, still_plot, tick};
 use crate::app::{spoken, value};
 
 /// Name and unit of an axis.
@@ -62,17 +62,11 @@ pub fn plane<'a>(ui: &Ui, id: &'static str, across: &AxisLabel, up: &AxisLabel, 
     let beside =
         hints(AxisHints::new_y()).min_thickness(46.0).label_spacing(Rangef::new(14.0, 18.0)).formatter(tick_label);
     let (across, up) = (across.clone(), up.clone());
-    Plot::new(id)
+    still_plot(id)
         .width(ui.available_width() - 12.0)
         .height(height)
         // Dragging a finger over the plot scrolls the panel.
         .sense(Sense::hover())
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_scroll(false)
-        .allow_boxed_zoom(false)
-        .allow_axis_zoom_drag(false)
-        .allow_double_click_reset(false)
         .auto_bounds(Vec2b::new(true, true))
         .custom_x_axes(vec![below])
         .custom_y_axes(vec![beside])

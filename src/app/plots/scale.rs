@@ -3,7 +3,10 @@
 use eframe::egui::{self, Rangef, Ui, Vec2b};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot};
 
-use super::{LETTER_WIDTH, MAX_MARKS, MIN_MARK_DISTANCE, Panel, Trace, largest, marks, short_tick, theme, tick, value};
+use super::{
+    LETTER_WIDTH, MAX_MARKS, MIN_MARK_DISTANCE, Panel, Trace, largest, marks, short_tick, still_plot, theme, tick,
+    value,
+};
 
 /// Ranges and units of the two axes of a plot.
 pub struct Scale<'a> {
@@ -97,15 +100,9 @@ impl Scale<'_> {
             let room = frame / (LETTER_WIDTH * longest as f64 + 8.0);
             if room < MAX_MARKS { super::marks(&input, room.max(1.0)) } else { marks }
         };
-        Plot::new(("plot", self.panel.label, self.panel.unit.0))
+        still_plot(("plot", self.panel.label, self.panel.unit.0))
             .width(width)
             .height((space.y - 20.0 - theme::side(ui, 18.0)).max(60.0))
-            .allow_drag(false)
-            .allow_zoom(false)
-            .allow_scroll(false)
-            .allow_boxed_zoom(false)
-            .allow_axis_zoom_drag(false)
-            .allow_double_click_reset(false)
             .auto_bounds(Vec2b::FALSE)
             .custom_x_axes(vec![x_axis])
             .custom_y_axes(vec![y_axis])

@@ -32,7 +32,7 @@ pub enum LooseKind {
 pub struct JointFrame {
     /// Origin.
     pub origin: Attachment,
-    /// Orientation in the axes of the body, or of the world.
+    /// Orientation in the axes of the body, or of the world. A ball has no use for it.
     pub rotation: Quat,
 }
 

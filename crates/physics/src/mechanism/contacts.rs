@@ -69,8 +69,8 @@ pub struct Contacts {
     has_ramps: bool,
     /// Contacts of the same group act on one another.
     groups: Vec<usize>,
-    /// Evaluations skip joints without contact, because some of their bodies are suspended.
-    pub(super) skips_inactive_joints: bool,
+    /// Evaluations skip contacts that do not touch, because some of their bodies are suspended.
+    pub(super) skips_inactive: bool,
 }
 
 /// A loose joint's play, and its contacts.
@@ -97,7 +97,7 @@ impl Contacts {
             joints: joints.collect(),
             groups: groups(machine, model),
             has_ramps: false,
-            skips_inactive_joints: false,
+            skips_inactive: false,
         }
     }
 
@@ -206,7 +206,7 @@ impl Contacts {
         self.update_ramps(at.t);
         loads.counts.contacts += 1;
         for contact in &mut self.contacts {
-            if self.skips_inactive_joints && !contact.may_carry_force(at.active_set) {
+            if self.skips_inactive && !contact.may_carry_force(at.active_set) {
                 contact.gap = Gap::default();
             } else {
                 contact.load(at, loads);
@@ -217,7 +217,7 @@ impl Contacts {
     /// Completes the gaps of the latest evaluation, with `active_set`, and measures those it skipped.
     pub(super) fn complete_separations(&mut self, active_set: ActiveSet<'_>, motion: &[Kinematics]) {
         for contact in &mut self.contacts {
-            if self.skips_inactive_joints && !contact.may_carry_force(active_set) {
+            if self.skips_inactive && !contact.may_carry_force(active_set) {
                 contact.measure(motion);
             } else {
                 contact.complete_separation();

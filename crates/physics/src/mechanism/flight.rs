@@ -232,7 +232,7 @@ impl Mechanism {
             index.is_ok_and(&suspended)
         };
         self.equations.suspend(&is_suspended);
-        self.contacts.skips_inactive_joints = (0..free_flight_bodies.len()).any(&suspended);
+        self.contacts.skips_inactive = (0..free_flight_bodies.len()).any(&suspended);
         let excluded = free_flight_bodies.iter().enumerate().filter(|(i, _)| suspended(*i));
         let (positions, dimension) = (self.positions(), self.dimension());
         let excluded = excluded.map(|(_, body)| body);
@@ -246,7 +246,7 @@ impl Mechanism {
 
     /// Completes an evaluation at (t, y), with `active_set`: adds the motion of the skipped bodies and all gaps.
     pub(crate) fn complete_gaps(&mut self, active_set: ActiveSet<'_>, y: &[f64]) {
-        if self.contacts.skips_inactive_joints {
+        if self.contacts.skips_inactive {
             self.equations.update_suspended(&self.model, y);
         }
         self.contacts.complete_separations(active_set, self.equations.motion());

@@ -191,6 +191,7 @@ impl State {
         for y in &self.now.y {
             add(y.to_bits());
         }
+        // A ball has one contact, unless it is ideal.
         let mut contacts = self.now.contact_states.iter();
         for (j, parameters) in self.conditions.joints.iter().enumerate() {
             let contact = if parameters.clearance > 0.0 { contacts.next() } else { None };
