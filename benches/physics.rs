@@ -59,7 +59,7 @@ fn real_time(watch: &Stopwatch) {
         let scene = load("spcmm", &changes);
         let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
         simulation.advance_to(7e-3).expect("a built-in scene runs");
-        let start = simulation.state().clone();
+        let start = simulation.snapshot();
         watch.time(&format!("10 ms simulated (spcmm, over the first impacts)/{label}"), || {
             simulation.restore(&start);
             simulation.advance_to(17e-3).expect("a built-in scene runs");

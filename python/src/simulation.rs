@@ -73,7 +73,7 @@ impl PyState {
         let read = detached(py, read)?.map_err(|error: SceneError| scene_error(py, None, &error))?;
         let (scene, mut live, running, pending) = read;
         let layout = detached(py, || Layout::of(&mut live))?;
-        let resumed = detached(py, || live.resume_changed(&saved.state, running, pending))?;
+        let resumed = detached(py, || live.resume_changed(&saved.snapshot, running, pending))?;
         resumed.map_err(|mismatch| refused(mismatch.to_string()))?;
         Ok(Self { scene: Arc::new(scene), snapshot: live.snapshot(), layout: Arc::new(layout) })
     }

@@ -262,7 +262,7 @@ fn link_replay(arguments: &RunArguments) -> Result<Option<LinkedRun>, Failure> {
 /// # Errors
 /// As [`state::read`]; a `duration`, s, before the saved time; a state that does not fit the simulation.
 fn resume_from(simulation: &mut LiveScene, path: &Path, scene: &Scene, duration: f64) -> Result<f64, Failure> {
-    let SavedState { state, time, .. } = state::read(path, scene)?;
+    let SavedState { snapshot, time, .. } = state::read(path, scene)?;
     if duration < time {
         return Err(Failure::usage(format!(
             "--duration {duration} s lies before the {time} s of --from-state {}: it counts from the start of the run",
@@ -270,7 +270,7 @@ fn resume_from(simulation: &mut LiveScene, path: &Path, scene: &Scene, duration:
         )));
     }
     simulation
-        .resume(&state)
+        .resume(&snapshot)
         .map_err(|mismatch| Failure::usage(format!("--from-state {}: {mismatch}", path.display())))?;
     Ok(time)
 }

@@ -9,8 +9,7 @@ use serde_json::{Map, Value as Json};
 use super::Failure;
 use super::provenance::{WRITER, meta};
 use crate::files::{FileError, OutputFile, PendingFile};
-use crate::scene::{LiveScene, ReadError, SavedState, Scene, read_regular, visible_line};
-use crate::simulate::State;
+use crate::scene::{LiveScene, ReadError, SavedState, Scene, SceneSnapshot, read_regular, visible_line};
 
 /// Size limit of a state file, bytes.
 const MAX_SIZE: u64 = 1 << 30;
@@ -18,7 +17,7 @@ const MAX_SIZE: u64 = 1 << 30;
 /// Output file for the state of a run, claimed and checked to be writable before the run starts.
 pub struct StateFile {
     file: OutputFile,
-    saved: Option<State>,
+    saved: Option<SceneSnapshot>,
 }
 
 impl StateFile {
@@ -40,7 +39,7 @@ impl StateFile {
     /// truncates, because a longer run would not truncate it.
     pub fn watch(&mut self, simulation: &LiveScene, end: f64) {
         if self.saved.is_none() && simulation.is_truncated_by(end) {
-            self.saved = Some(simulation.state().clone());
+            self.saved = Some(simulation.snapshot());
         }
     }
 
@@ -49,11 +48,8 @@ impl StateFile {
     /// # Errors
     /// A value that is not finite, which JSON cannot represent.
     pub fn text(&self, simulation: &LiveScene) -> Result<String, Failure> {
-        let saved = match &self.saved {
-            Some(saved) => saved,
-            None => simulation.state(),
-        };
-        SavedState::write(WRITER, simulation.pending(), saved, simulation.time())
+        let saved = self.saved.clone().unwrap_or_else(|| simulation.snapshot());
+        SavedState::write(WRITER, simulation.pending(), &saved, simulation.time())
             .map_err(|why| FileError::cannot(self.file.path(), why).into())
     }
 

@@ -2,7 +2,7 @@
 //! with the run. It never affects the run. The twin and the ideal motion are companions. The run from before a change has its own record,
 //! so it is a copy of the player (`player/before_change.rs`).
 
-use crate::simulate::{Frame, Simulation, State, Stopped};
+use crate::simulate::{Frame, Simulation, Snapshot, Stopped};
 
 /// Largest number of saved states; at this number every second one is dropped.
 pub(super) const MAX_STATES: usize = 32;
@@ -14,7 +14,7 @@ pub struct CompanionState {
     /// Start of the companion, s.
     start_time: f64,
     /// The state.
-    pub state: State,
+    pub state: Snapshot,
 }
 
 /// Drops the second, fourth, sixth entry and so on.
@@ -34,7 +34,7 @@ pub struct Companion {
     /// The latest displayed instant.
     pub(super) frame: Frame,
     /// Saved states in order of time; the first is the start.
-    pub(super) states: Vec<State>,
+    pub(super) states: Vec<Snapshot>,
     interval: f64,
     /// Why it ended before the run.
     pub(super) stopped: Option<Stopped>,
@@ -45,7 +45,7 @@ impl Companion {
     pub fn new(mut simulation: Simulation) -> Self {
         let mut frame = Frame::default();
         simulation.sample(simulation.time(), &mut frame);
-        Self { states: vec![simulation.state().clone()], simulation, frame, interval: INITIAL_INTERVAL, stopped: None }
+        Self { states: vec![simulation.snapshot()], simulation, frame, interval: INITIAL_INTERVAL, stopped: None }
     }
 
     /// Start time, s.
@@ -72,7 +72,7 @@ impl Companion {
 
     /// The current state.
     pub fn state(&self) -> CompanionState {
-        CompanionState { start_time: self.start_time(), state: self.simulation.state().clone() }
+        CompanionState { start_time: self.start_time(), state: self.simulation.snapshot() }
     }
 
     /// Restores a state, or the start if there is none. Returns false if the state belongs to another companion.
@@ -85,7 +85,7 @@ impl Companion {
 
     /// Saves the current state if at least one interval has passed since the last saved state.
     pub fn save_state(&mut self) {
-        let newest = self.states.last().map_or(f64::NEG_INFINITY, State::time);
+        let newest = self.states.last().map_or(f64::NEG_INFINITY, |state| state.time());
         if self.simulation.time() < newest + self.interval {
             return;
         }
@@ -93,7 +93,7 @@ impl Companion {
             drop_every_second(&mut self.states);
             self.interval *= 2.0;
         }
-        self.states.push(self.simulation.state().clone());
+        self.states.push(self.simulation.snapshot());
     }
 
     /// Restores the latest saved state at or before `time`, s.

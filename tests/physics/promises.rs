@@ -86,7 +86,7 @@ fn check_promises(scene: &Scene, variant: Variant) -> u64 {
     let start = plain.state_hash();
     let steps = step_into_contact(&mut plain);
     let at_snapshot = observe(&mut plain);
-    let saved = serde_json::to_string(&plain.state()).unwrap();
+    let saved = serde_json::to_string(&**plain.snapshot()).unwrap();
     change_parameters(&mut plain);
     let (mut peaks, mut later_peaks) = (Vec::new(), Vec::new());
     let snapshot = plain.snapshot();

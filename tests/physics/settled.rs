@@ -28,7 +28,7 @@ fn a_resumed_implicit_run_gives_the_same_bits() {
         let mut simulation = simulation("spcmm", &[("solver.method", method), ("solver.tolerance", "1e-5")]);
         // Settled: the automatic pair has changed to its implicit method.
         simulation.advance_to(0.3).unwrap();
-        let snapshot = simulation.state().clone();
+        let snapshot = simulation.snapshot();
         simulation.advance_to(0.4).unwrap();
         let expected = simulation.state_hash();
         simulation.restore(&snapshot);

@@ -4,7 +4,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 use super::{Scene, SceneError};
-use jointplay_physics::simulate::{ChangeError, Effect, Model, Simulation, StartError, State, StateMismatch};
+use jointplay_physics::simulate::{ChangeError, Effect, Model, Simulation, Snapshot, StartError, StateMismatch};
 
 /// Why a parameter of a running scene was not changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -37,7 +37,7 @@ pub struct SceneSnapshot {
     pending: Arc<Scene>,
     running: Arc<Scene>,
     model: Arc<Model>,
-    state: State,
+    snapshot: Snapshot,
 }
 
 impl SceneSnapshot {
@@ -53,10 +53,10 @@ impl SceneSnapshot {
 }
 
 impl Deref for SceneSnapshot {
-    type Target = State;
+    type Target = Snapshot;
 
-    fn deref(&self) -> &State {
-        &self.state
+    fn deref(&self) -> &Snapshot {
+        &self.snapshot
     }
 }
 
@@ -146,13 +146,13 @@ impl LiveScene {
     ///
     /// # Errors
     /// A state that cannot belong to this scene, or that has other conditions than `running`; `self` is then unchanged.
-    pub fn resume_changed(&mut self, state: &State, running: Scene, pending: Scene) -> Result<(), StateMismatch> {
+    pub fn resume_changed(&mut self, snapshot: &Snapshot, running: Scene, pending: Scene) -> Result<(), StateMismatch> {
         let machine = self.simulation.machine();
-        if !machine.differs_only_in_conditions(&running.machine) || *state.conditions() != running.machine.conditions()
+        if !machine.differs_only_in_conditions(&running.machine) || *snapshot.conditions() != running.machine.conditions()
         {
             return Err(StateMismatch);
         }
-        self.simulation.resume(state)?;
+        self.simulation.resume(snapshot)?;
         self.running = Arc::new(running);
         self.pending = Arc::new(pending);
         Ok(())
@@ -164,16 +164,16 @@ impl LiveScene {
             pending: self.pending.clone(),
             running: self.running.clone(),
             model: self.simulation.model().clone(),
-            state: self.simulation.state().clone(),
+            snapshot: self.simulation.snapshot(),
         }
     }
 
     /// Restores a state of this scene, at the cost of a copy, or of any other scene.
     pub fn restore(&mut self, snapshot: &SceneSnapshot) {
         if Arc::ptr_eq(self.simulation.model(), &snapshot.model) {
-            self.simulation.restore(&snapshot.state);
+            self.simulation.restore(&snapshot.snapshot);
         } else {
-            self.simulation = Simulation::from_state(snapshot.model.clone(), snapshot.state.clone());
+            self.simulation = Simulation::from_snapshot(snapshot.model.clone(), snapshot.snapshot.clone());
         }
         self.pending = snapshot.pending.clone();
         self.running = snapshot.running.clone();

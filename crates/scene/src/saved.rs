@@ -1,7 +1,7 @@
 //! States of runs as text, which `run --save-state` writes to a file and Python to a pickle.
 
 use super::{Scene, SceneError, Texts, insert_texts, provenance};
-use jointplay_physics::simulate::State;
+use jointplay_physics::simulate::Snapshot;
 use serde::Deserialize as _;
 use serde_json::{Map, Value as Json, json};
 
@@ -13,8 +13,8 @@ const FORMAT: u64 = 7;
 pub struct SavedState {
     /// Provenance of the run and texts of its scene; an object.
     pub meta: Json,
-    /// The state.
-    pub state: State,
+    /// The state, and what looking at the run had found.
+    pub snapshot: Snapshot,
     /// Time at which the run that saved it ended, s.
     pub time: f64,
 }
@@ -61,24 +61,26 @@ pub enum SavedStateError {
 }
 
 impl SavedState {
-    /// The text of `state`, of a run of `scene` that ended at `time`, s, written by a program with this name and version.
+    /// The text of `snapshot`, of a run of `scene` that ended at `time`, s, written by a program with this name and version.
     ///
     /// # Errors
     /// A value that is not finite, which JSON cannot represent.
-    pub fn write(program: [&str; 2], scene: &Scene, state: &State, time: f64) -> Result<String, SavedStateError> {
+    pub fn write(program: [&str; 2], scene: &Scene, snapshot: &Snapshot, time: f64) -> Result<String, SavedStateError> {
         let mut meta = provenance(program, scene);
         meta.insert("state_format".into(), json!(FORMAT));
         // Rows of a resumed run begin here.
         meta.insert("time_s".into(), json!(time));
-        meta.insert("step_end_s".into(), json!(state.time()));
+        meta.insert("step_end_s".into(), json!(snapshot.time()));
         insert_texts(&mut meta, scene);
-        let values = serde_json::to_value(state).unwrap_or_default();
-        if State::deserialize(&values).ok().as_ref() != Some(state) {
+        let values = serde_json::to_value(snapshot).unwrap_or_default();
+        if Snapshot::deserialize(&values).ok().as_ref() != Some(snapshot) {
             return Err(SavedStateError::NotFinite);
         }
         let mut content = Map::new();
         content.insert("meta".into(), Json::Object(meta));
-        content.insert("state".into(), values);
+        if let Json::Object(parts) = values {
+            content.extend(parts);
+        }
         content.insert("crc32".into(), json!(checksum(&content)));
         Ok(Json::Object(content).to_string())
     }
@@ -103,12 +105,12 @@ impl SavedState {
             return Err(SavedStateError::Checksum { found, stated: plain(&stated.unwrap_or_default()) });
         }
         let time = meta("time_s").as_f64();
-        let state = content.get("state").map(State::deserialize);
-        let (Some(time), Some(state)) = (time, state) else {
+        let meta = content.shift_remove("meta").unwrap_or_default();
+        let Some(time) = time.filter(|_| content.contains_key("state")) else {
             return Err(SavedStateError::Incomplete);
         };
-        let state = state.map_err(SavedStateError::State)?;
-        Ok(Self { meta: content.shift_remove("meta").unwrap_or_default(), state, time })
+        let snapshot = Snapshot::deserialize(Json::Object(content)).map_err(SavedStateError::State)?;
+        Ok(Self { meta, snapshot, time })
     }
 
     /// The scene of the run, with its changes, from the texts beside the state.

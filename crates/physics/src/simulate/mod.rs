@@ -23,7 +23,7 @@ pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use load_peaks::{LoadPeak, LoadPeaks};
 pub use simulation::{
-    CLEARANCE_SPEED, ChangeError, Model, ProbeFault, Simulation, State, StateMismatch, Workspace, closed,
+    CLEARANCE_SPEED, ChangeError, Model, ProbeFault, Simulation, Snapshot, State, StateMismatch, Workspace, closed,
 };
 pub use stopped::{StopAdvice, StopFault, Stopped};
 pub use wear::{Cell, Edges, Grid, Wear};

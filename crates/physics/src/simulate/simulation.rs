@@ -15,6 +15,7 @@ mod guard;
 mod ideal;
 mod live;
 mod model;
+mod observations;
 mod sample;
 mod search;
 mod state;
@@ -43,6 +44,8 @@ use corners::LawBranch;
 use ideal::TipHistory;
 pub use ideal::{ProbeFault, closed};
 pub use live::ChangeError;
+use observations::Observations;
+pub use observations::Snapshot;
 
 /// Rate at which a clearance shrinks when a jump would place the ball inside its socket wall, m/s: an impact at this speed gives
 /// a force of the order of the static ones.
@@ -94,8 +97,8 @@ pub struct Model {
     start: State,
 }
 
-/// The state of a run of a [`Model`]: everything that changes, each fact once. A clone is a snapshot, and a serialised state is a
-/// saved run; both continue with the same bits.
+/// The state of a run of a [`Model`]: everything that changes in a step, each fact once. A clone continues with the same bits.
+/// Looking at it changes nothing of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct State {
@@ -117,12 +120,6 @@ pub struct State {
     /// Latest collocation polynomial; empty unless the method has one.
     polynomial: Polynomial,
     record: Record,
-    /// Largest sampled force, N, and its time, s, by joint: separate from the record, which sampling does not change.
-    sampled: Vec<(f64, f64)>,
-    /// Load peaks, if tracked; sampling changes them.
-    loads: Option<LoadPeaks>,
-    /// The ideal motion, if it is simulated alongside; sampling advances it.
-    ideal: Option<Box<IdealState>>,
     #[serde(skip)]
     workspace_id: WorkspaceId,
 }
@@ -228,8 +225,6 @@ pub struct Workspace {
     scratch_y: Vec<f64>,
     scratch_k: Vec<f64>,
     scratch_contacts: Vec<ContactState>,
-    /// For the ideal motion alongside.
-    ideal: Option<Box<IdealWorkspace>>,
     workspace_id: WorkspaceId,
 }
 
@@ -251,7 +246,6 @@ struct Stepping<'a> {
     scratch_y: &'a mut [f64],
     scratch_k: &'a mut [f64],
     scratch_contacts: &'a mut [ContactState],
-    ideal: Option<&'a mut IdealWorkspace>,
 }
 
 /// The step being taken.
@@ -277,6 +271,8 @@ struct Attempt {
     step_to_reproduce: Option<FullStep>,
     /// Whether it may contain the largest force of a contact.
     may_contain_peak: bool,
+    /// The same of the step just accepted.
+    is_near_peak: bool,
     /// Largest normal force of each contact, N, and the fraction of the step at which it occurs.
     peak_forces: Vec<(f64, f64)>,
     /// [`StepStart::rebounds`](crate::mechanism::StepStart::rebounds) of a discrete-gradient step.
@@ -326,12 +322,15 @@ struct IdealWorkspace {
 pub struct Simulation {
     model: Arc<Model>,
     state: State,
+    observations: Observations,
     workspace: Workspace,
+    /// For the ideal motion alongside.
+    ideal: Option<Box<IdealWorkspace>>,
 }
 
 impl Clone for Simulation {
     fn clone(&self) -> Self {
-        Self::from_state(self.model.clone(), self.state.clone())
+        Self::from_snapshot(self.model.clone(), self.snapshot())
     }
 }
 
@@ -348,14 +347,18 @@ impl Simulation {
     /// If ball joints do not close, or the rods cannot follow the prescribed trajectory.
     pub fn new(machine: &Machine) -> Result<Self, StartError> {
         let (model, workspace) = Model::with_workspace(machine)?;
-        Ok(Self { state: model.start(), model: Arc::new(model), workspace })
+        let observations = Observations::new(&model);
+        let ideal = observations.workspace(&model);
+        Ok(Self { state: model.start(), observations, model: Arc::new(model), workspace, ideal })
     }
 
-    /// Continues from `state`, a state of `model`.
-    pub fn from_state(model: Arc<Model>, mut state: State) -> Self {
+    /// Continues from `snapshot`, of a run of `model`.
+    pub fn from_snapshot(model: Arc<Model>, snapshot: Snapshot) -> Self {
+        let Snapshot { mut state, observations } = snapshot;
         let mut workspace = model.workspace(&state);
         workspace.attach_to(&model, &mut state);
-        Self { model, state, workspace }
+        let ideal = observations.workspace(&model);
+        Self { model, state, observations, workspace, ideal }
     }
 
     fn run(&mut self) -> Stepping<'_> {
@@ -367,24 +370,30 @@ impl Simulation {
         &self.model
     }
 
-    /// The whole state: a clone of it is a snapshot.
+    /// The whole state.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// Continues from another state of the same model, which costs a copy and evaluates nothing.
-    pub fn restore(&mut self, state: &State) {
-        self.state.clone_from(state);
+    /// The state, and what looking at the run has found.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot { state: self.state.clone(), observations: self.observations.clone() }
+    }
+
+    /// Continues from a snapshot of another run of the same model, which costs a copy and evaluates nothing.
+    pub fn restore(&mut self, snapshot: &Snapshot) {
+        self.state.clone_from(&snapshot.state);
+        self.observations.clone_from(&snapshot.observations);
         self.workspace.attach_to(&self.model, &mut self.state);
     }
 
-    /// Continues from a state read from a file.
+    /// Continues from a snapshot read from a file.
     ///
     /// # Errors
-    /// If the state cannot belong to this model; the simulation is then unchanged.
-    pub fn resume(&mut self, state: &State) -> Result<(), StateMismatch> {
-        self.model.check(state)?;
-        self.restore(state);
+    /// If it cannot belong to this model; the simulation is then unchanged.
+    pub fn resume(&mut self, snapshot: &Snapshot) -> Result<(), StateMismatch> {
+        snapshot.check(&self.model)?;
+        self.restore(snapshot);
         Ok(())
     }
 
@@ -463,14 +472,16 @@ impl Simulation {
         self.state.wear()
     }
 
-    /// As [`State::load_peaks`].
+    /// Load peaks at the ends of steps and in samples, if tracked.
     pub fn load_peaks(&self) -> Option<&LoadPeaks> {
-        self.state.load_peaks()
+        self.observations.loads()
     }
 
-    /// As [`State::peak`].
+    /// Largest normal force of loose joint `j` (reaction, if ideal) since the start, and its time, (N, s): the value in
+    /// [`Statistics`], found from the ends of steps, or a larger one from a sample.
     pub fn peak(&self, j: usize) -> (f64, f64) {
-        self.state.peak(j)
+        let own = &self.statistics().joints[j];
+        self.observations.peak(j, (own.peak_normal, own.peak_time))
     }
 
     /// As [`State::pull`].
@@ -483,9 +494,9 @@ impl Simulation {
         self.model.doubts(&self.state)
     }
 
-    /// As [`Model::probe_fault`].
+    /// Why the probe has no ideal motion to be compared with: the ideal mechanism cannot start, or could not continue.
     pub fn probe_fault(&self) -> Option<ProbeFault> {
-        self.model.probe_fault(&self.state)
+        self.model.ideal().fault(self.observations.ideal())
     }
 
     /// As [`Model::step`].
@@ -493,7 +504,13 @@ impl Simulation {
     /// # Errors
     /// If the divergence guard stops the run; the state is then the last good one.
     pub fn step(&mut self) -> Result<(), Stopped> {
-        self.run().advance(f64::INFINITY)
+        self.advance(f64::INFINITY)
+    }
+
+    fn advance(&mut self, end: f64) -> Result<(), Stopped> {
+        self.run().advance(end)?;
+        self.observations.observe_step(Stepping::new(&self.model, &mut self.state, &mut self.workspace));
+        Ok(())
     }
 
     /// As [`Model::step_until`].
@@ -504,7 +521,7 @@ impl Simulation {
         if self.time() >= end {
             return Ok(());
         }
-        self.run().advance(end)
+        self.advance(end)
     }
 
     /// Steps until [`Self::time`] is at least `time`, without shortening a step.
@@ -528,9 +545,10 @@ impl Simulation {
         self.sample(self.time(), out);
     }
 
-    /// As [`Model::sample`].
+    /// As [`Model::sample`], with the error of a probe in any case; the largest forces sampled are remembered.
     pub fn sample(&mut self, time: f64, out: &mut Frame) {
         self.run().sample(time, out);
+        self.observations.observe_sample(&self.model, &mut self.workspace, self.ideal.as_deref_mut(), out);
     }
 
     /// Forces at the latest state that the motion does not determine uniquely.
@@ -556,7 +574,13 @@ impl Simulation {
     /// # Errors
     /// If the method is too costly for the equations; nothing has changed then.
     pub fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
-        self.run().adopt(next)
+        let before = self.conditions().gravity;
+        let effect = self.run().adopt(next)?;
+        let now = (self.time(), self.conditions().gravity);
+        if now.1 != before {
+            self.observations.set_gravity(&self.model, self.ideal.as_deref_mut(), now);
+        }
+        Ok(effect)
     }
 
     /// Sets gravity from now on, m/s^2, and changes nothing else.
@@ -649,7 +673,7 @@ impl Simulation {
 
     /// Tracks load peaks from now on. This does not affect the steps.
     pub fn track_load_peaks(&mut self) {
-        self.run().track_load_peaks();
+        self.observations.track_loads(Stepping::new(&self.model, &mut self.state, &mut self.workspace));
     }
 }
 

@@ -147,12 +147,12 @@ impl IdealState {
         self.state.bytes() + std::mem::size_of_val(&self.tips.ring[..])
     }
 
-    /// Checks a state that was read against `own`, a state of `model`.
-    pub(super) fn check(&self, model: &Model, own: &Self) -> Result<(), StateMismatch> {
+    /// Checks a state that was read against its model.
+    pub(super) fn check(&self, own: &IdealModel) -> Result<(), StateMismatch> {
         if self.tips.ring.len() != STORED_TIPS {
             return Err(StateMismatch);
         }
-        self.state.check(model, &own.state)
+        own.model.check(&self.state)
     }
 }
 

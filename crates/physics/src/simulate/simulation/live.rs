@@ -63,9 +63,6 @@ impl Stepping<'_> {
             prepare_implicit(self.mechanism, solver.method)?;
         }
         let before = std::mem::replace(&mut self.state.conditions, next.conditions());
-        if next.gravity != before.gravity {
-            self.set_ideal_gravity();
-        }
         for (j, old) in before.joints.iter().enumerate() {
             if self.state.conditions.joints[j] != *old {
                 self.change_contact(j);
@@ -103,15 +100,6 @@ impl Stepping<'_> {
         self.state.conditions.gravity = gravity;
         self.sync_parameters();
         self.refresh();
-    }
-
-    /// The same for the ideal motion alongside.
-    fn set_ideal_gravity(&mut self) {
-        let (time, gravity) = (self.state.now.t, self.state.conditions.gravity);
-        let both = self.state.ideal.as_deref_mut().zip(self.ideal.as_deref_mut());
-        if let (Some(ideal), Some((state, work))) = (self.model.ideal().simulated(), both) {
-            ideal.set_gravity(state, work, time, gravity);
-        }
     }
 
     fn sync_parameters(&mut self) {

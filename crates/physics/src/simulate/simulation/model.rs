@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{IdealSource, Model, ProbeFault, State, StateMismatch, Stepping, Workspace, doubts};
+use super::{IdealSource, Model, State, StateMismatch, Stepping, Workspace, doubts};
 use crate::machine::Machine;
 use crate::mechanism::{self, Mechanism};
 use crate::simulate::{Doubt, Frame, StartError, Stopped};
@@ -20,9 +20,8 @@ impl Model {
     pub(super) fn with_workspace(machine: &Machine) -> Result<(Self, Workspace), StartError> {
         let mut mechanism = Mechanism::new(machine)?;
         let y = mechanism.start()?;
-        let mut start = State::new(machine.conditions(), &mechanism, y);
+        let start = State::new(machine.conditions(), &mechanism, y);
         let ideal = IdealSource::of(machine, mechanism.has_closed_form());
-        start.ideal = ideal.start();
         let compiled = mechanism.model().clone();
         let mut model = Self { machine: machine.clone(), compiled, ideal, start };
         let mut workspace = model.workspace_in(mechanism, &model.start)?;
@@ -33,9 +32,7 @@ impl Model {
     }
 
     fn workspace_in(&self, mechanism: Mechanism, state: &State) -> Result<Workspace, StartError> {
-        let mut workspace = Workspace::new(self, mechanism, state.conditions.solver.method)?;
-        workspace.ideal = self.ideal.simulated().zip(state.ideal.as_ref()).map(|(ideal, state)| ideal.workspace(state));
-        Ok(workspace)
+        Workspace::new(self, mechanism, state.conditions.solver.method)
     }
 
     /// A workspace attached to `state`, a state of this model.
@@ -64,11 +61,6 @@ impl Model {
         &self.ideal
     }
 
-    /// Model of the ideal motion, if it is simulated alongside.
-    pub(super) fn ideal_model(&self) -> Option<&Self> {
-        self.ideal.simulated().map(|ideal| &ideal.model)
-    }
-
     /// Takes one accepted step.
     ///
     /// # Errors
@@ -95,7 +87,8 @@ impl Model {
     }
 
     /// Samples the state at `time`, s, interpolated within the latest step; forces come from the interpolated state. Allocates
-    /// only while `out` is too small. Of the state, this changes the largest sampled forces and loads alone.
+    /// only while `out` is too small. The state does not change; `&mut` lets the workspace be attached to it. The error of a probe
+    /// is missing if the ideal motion is simulated alongside, as a [`Simulation`](super::Simulation) does.
     ///
     /// # Panics
     /// As [`Self::step`].
@@ -107,11 +100,6 @@ impl Model {
     /// under the state's conditions.
     pub fn doubts(&self, state: &State) -> Vec<Doubt> {
         doubts::doubts(self, state)
-    }
-
-    /// Why the probe has no ideal motion to be compared with: the ideal mechanism cannot start, or could not continue.
-    pub fn probe_fault(&self, state: &State) -> Option<ProbeFault> {
-        self.ideal.fault(state.ideal.as_deref())
     }
 
     /// Checks a state that was read from a file.

@@ -14,24 +14,11 @@ impl Stepping<'_> {
         self.evaluate_at(time);
         let (contact_state, at) = (&*self.scratch_contacts, (time, &*self.scratch_y));
         report::fill(self.mechanism, self.machine, contact_state, at, out);
-        for (sampled, report) in self.state.sampled.iter_mut().zip(&out.joints) {
-            let force = report.normal_force.norm();
-            if force > sampled.0 {
-                *sampled = (force, time);
-            }
-        }
-        if let Some(loads) = &mut self.state.loads {
-            loads.record(self.mechanism, time);
-        }
         out.ledger = self.ledger_of(out);
         match self.model.ideal() {
             IdealSource::ClosedForm => {}
             IdealSource::SelfReference => out.probe_error = Some(Vec3::zeros()),
-            IdealSource::None(_) => out.probe_error = None,
-            IdealSource::Simulated(ideal) => {
-                let both = self.state.ideal.as_deref_mut().zip(self.ideal.as_deref_mut());
-                out.probe_error = both.and_then(|(state, work)| ideal.error(state, work, out));
-            }
+            IdealSource::Simulated(_) | IdealSource::None(_) => out.probe_error = None,
         }
     }
 

@@ -1,13 +1,10 @@
 //! Search for peaks inside a step, which is sampled as for an output row.
 
 use super::Stepping;
-use crate::simulate::LoadPeaks;
 use crate::simulate::peaks::PenetrationCubic;
 
 /// A step whose forces stay below this fraction of their peaks so far is not searched.
 pub(super) const NEAR_PEAK: f64 = 0.5;
-/// Interval at which non-contact loads are recorded, s, if steps are shorter and no contact is near its peak.
-const LOADS_EVERY: f64 = 1e-4;
 /// Fractions at which a fixed step is sampled.
 const PARTS: [f64; 3] = [0.25, 0.5, 0.75];
 
@@ -59,36 +56,15 @@ impl Stepping<'_> {
 
     /// Searches the step just accepted for peaks.
     pub(super) fn search_peaks(&mut self) {
-        let near = self.attempt.may_contain_peak;
+        self.attempt.is_near_peak = std::mem::take(&mut self.attempt.may_contain_peak);
         self.search_contacts();
         self.search_reactions();
-        let smooth = self.mechanism.contacts.is_empty();
-        let time = self.state.now.t;
-        if self.state.loads.as_ref().is_some_and(|loads| near || smooth || loads.age(time) >= LOADS_EVERY) {
-            self.record_loads();
-        }
-    }
-
-    /// As [`Simulation::track_load_peaks`](crate::simulate::Simulation::track_load_peaks).
-    pub(in crate::simulate) fn track_load_peaks(&mut self) {
-        self.state.loads = Some(LoadPeaks::new(self.machine));
-        self.record_loads();
-    }
-
-    /// Records the loads at the latest state.
-    fn record_loads(&mut self) {
-        let time = self.state.now.t;
-        self.evaluate_at(time);
-        if let Some(loads) = &mut self.state.loads {
-            loads.evaluate(self.mechanism, time);
-        }
     }
 
     /// Samples a fixed step near a contact peak: if the step is long compared with an impact, an output row inside it sees other
     /// rates than the penetration cubic.
     fn search_contacts(&mut self) {
-        let near = std::mem::take(&mut self.attempt.may_contain_peak);
-        if !near || self.locates() {
+        if !self.attempt.is_near_peak || self.locates() {
             return;
         }
         let (t0, t) = (self.before.t, self.state.now.t);

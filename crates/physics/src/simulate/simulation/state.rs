@@ -11,7 +11,6 @@ use crate::machine::Conditions;
 use crate::mechanism::{ContactId, Flight, Mechanism, Pull};
 use crate::simulate::impacts::{Impact, Impacts};
 use crate::simulate::ledger::{Account, Ledger};
-use crate::simulate::load_peaks::LoadPeaks;
 use crate::simulate::peaks::{Approach, Recent};
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
 use crate::simulate::{Peak, Statistics, Wear};
@@ -103,9 +102,6 @@ impl State {
                 determinant_positive: true,
                 quarter_turns: other_turns,
             },
-            sampled: vec![(0.0, 0.0); joints],
-            loads: None,
-            ideal: None,
             workspace_id: WorkspaceId::default(),
             now: StepEnd::new(y, contacts),
             conditions,
@@ -163,19 +159,6 @@ impl State {
         self.record.wear.as_ref()
     }
 
-    /// Load peaks at the ends of steps and in samples, if tracked.
-    pub fn load_peaks(&self) -> Option<&LoadPeaks> {
-        self.loads.as_ref()
-    }
-
-    /// Largest normal force of ball joint `j` (reaction, if ideal) since the start, and its time, (N, s): the value in
-    /// [`Statistics`], found from the ends of steps, or a larger one from a sample.
-    pub fn peak(&self, j: usize) -> (f64, f64) {
-        let statistics = self.statistics();
-        let found = (statistics.joints[j].peak_normal, statistics.joints[j].peak_time);
-        if self.sampled[j].0 > found.0 { self.sampled[j] } else { found }
-    }
-
     /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, then for each ball joint
     /// whether it is in contact, its approach speed, and its current clearance; then, of the angles that elements act on and
     /// coordinates do not count, the number and the quarter turns of each that has at least two. The current branch of the friction law is excluded: like the step size, it belongs to
@@ -218,9 +201,8 @@ impl State {
         let impacts = std::mem::size_of_val(self.record.impacts.stored());
         let wear = self.record.wear.as_ref().map_or(0, Wear::bytes);
         let flights = self.flights.len() * size_of::<Option<Flight>>();
-        let ideal = self.ideal.as_ref().map_or(0, |ideal| ideal.bytes());
         let turns = (self.quarter_turns.len() + self.record.quarter_turns.len()) * size_of::<i64>();
-        FIXED + turns + wear + flights + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts + ideal
+        FIXED + turns + wear + flights + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts
     }
 
     /// Checks a state that was read: it has the dimensions of a state of `model`, which began as `own`, and all its indices are
@@ -248,16 +230,7 @@ impl State {
             && record.impacts.fits(contacts, joints)
             && record.statistics.joints.len() == joints
             && worn.is_none_or(|wear| wear.fits(model.machine()))
-            && self.control.discrete.acceleration.len() == own.control.discrete.acceleration.len()
-            && self.sampled.len() == joints
-            && self.loads.as_ref().is_none_or(|loads| loads.fits(&LoadPeaks::new(model.machine())));
-        if !fits {
-            return Err(StateMismatch);
-        }
-        match (&self.ideal, &own.ideal, model.ideal_model()) {
-            (None, None, _) => Ok(()),
-            (Some(ideal), Some(own), Some(model)) => ideal.check(model, own),
-            _ => Err(StateMismatch),
-        }
+            && self.control.discrete.acceleration.len() == own.control.discrete.acceleration.len();
+        if fits { Ok(()) } else { Err(StateMismatch) }
     }
 }

@@ -28,6 +28,7 @@ impl Attempt {
             full_step: None,
             step_to_reproduce: None,
             may_contain_peak: false,
+            is_near_peak: false,
             peak_forces: vec![(0.0, 0.0); contacts],
             rebounds: vec![None; contacts],
             stiffness: 0.0,
@@ -50,10 +51,8 @@ impl<'a> Stepping<'a> {
     /// Attaches `workspace` to `state` first, if it is attached to another.
     pub(super) fn new(model: &'a Model, state: &'a mut State, workspace: &'a mut Workspace) -> Self {
         workspace.attach_to(model, state);
-        let Workspace { mechanism, stepper, before, attempt, scratch_y, scratch_k, scratch_contacts, ideal, .. } =
-            workspace;
+        let Workspace { mechanism, stepper, before, attempt, scratch_y, scratch_k, scratch_contacts, .. } = workspace;
         let machine = model.machine();
-        let ideal = ideal.as_deref_mut();
         Self {
             model,
             machine,
@@ -65,7 +64,6 @@ impl<'a> Stepping<'a> {
             scratch_y,
             scratch_k,
             scratch_contacts,
-            ideal,
         }
     }
 }

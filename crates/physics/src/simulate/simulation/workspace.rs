@@ -48,7 +48,6 @@ impl Workspace {
             scratch_y: vec![0.0; n],
             scratch_k: vec![0.0; n],
             scratch_contacts: vec![ContactState::default(); contacts],
-            ideal: None,
             workspace_id: WorkspaceId::default(),
             mechanism,
         };
