@@ -73,8 +73,8 @@ fn snapshots(watch: &Stopwatch) {
         let scene = load(name, &[]);
         let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
         simulation.advance_to(0.02).expect("a built-in scene runs");
-        let snapshot = simulation.state().clone();
-        watch.time(&format!("snapshot/{name}: take"), || simulation.state().clone());
+        let snapshot = simulation.snapshot();
+        watch.time(&format!("snapshot/{name}: take"), || simulation.snapshot());
         watch.time(&format!("snapshot/{name}: restore"), || simulation.restore(black_box(&snapshot)));
     }
 }
@@ -91,7 +91,7 @@ fn spans(watch: &Stopwatch) {
             let scene = load("spcmm", &all);
             let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
             simulation.advance_to(from).expect("a built-in scene runs");
-            let start = simulation.state().clone();
+            let start = simulation.snapshot();
             watch.time_part(&format!("{name}/{label}"), || {
                 let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
                 simulation.restore(&start);

@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     while impacts.len() < 8 {
         let first_new = impacts.len();
         simulation.step()?;
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
         for impact in &impacts[first_new..] {
             let (start, speed, peak) = (impact.start * 1e3, impact.approach_speed * 1e3, impact.peak);
             let (achieved, law) = (impact.achieved(), impact.law);

@@ -51,7 +51,7 @@ impl Recorder {
             }
             let stepped = self.live.step_until(self.duration);
             stepped.map_err(|stopped| (stopped.to_string(), Some(stopped.advice.to_string())))?;
-            self.live.take_impacts(&mut self.impacts);
+            self.impacts.extend(self.live.take_impacts());
         }
         Ok(false)
     }

@@ -297,7 +297,7 @@ impl PySimulation {
     #[pyo3(name = "_take_impacts")]
     fn take_impacts<'py>(&mut self, py: Python<'py>) -> PyResult<report::Impacts<'py>> {
         let mut impacts = Vec::new();
-        self.live.take_impacts(&mut impacts);
+        impacts.extend(self.live.take_impacts());
         report::impacts(py, &self.live, &impacts)
     }
 

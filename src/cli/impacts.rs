@@ -17,8 +17,6 @@ pub struct ImpactsFile {
     impacts: Vec<Impact>,
     /// Impacts that ended before this time, s, belong to an earlier run.
     since: f64,
-    /// Impacts of the latest step.
-    latest: Vec<Impact>,
 }
 
 impl ImpactsFile {
@@ -27,7 +25,7 @@ impl ImpactsFile {
     /// # Errors
     /// As [`RowsFile::claim`].
     pub fn claim(path: &Path, force: bool) -> Result<Self, Failure> {
-        Ok(Self { file: RowsFile::claim(path, force)?, impacts: Vec::new(), since: 0.0, latest: Vec::new() })
+        Ok(Self { file: RowsFile::claim(path, force)?, impacts: Vec::new(), since: 0.0 })
     }
 
     /// The file.
@@ -42,10 +40,8 @@ impl ImpactsFile {
 
     /// Collects the impacts finished since the last call; to be called after every step.
     pub fn collect(&mut self, simulation: &mut Simulation) {
-        self.latest.clear();
-        simulation.take_impacts(&mut self.latest);
-        let own = self.latest.iter().filter(|impact| impact.end >= self.since);
-        self.impacts.extend(own);
+        let since = self.since;
+        self.impacts.extend(simulation.take_impacts().filter(|impact| impact.end >= since));
     }
 
     /// All impacts so far, in the order in which they finished.

@@ -622,7 +622,7 @@ impl Player {
             Ok(()) => {
                 self.unchanged = None;
                 self.simulation.take_peaks(&mut self.record.upcoming_peaks);
-                self.record.impact_record.record(&mut self.simulation, &self.record.upcoming_peaks);
+                self.record.impact_record.record(&mut self.simulation);
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
@@ -781,7 +781,7 @@ impl Player {
         self.record.contact_history.begin(0.0);
         // Forces at the start belong to the first frame: there has been no impact yet.
         self.simulation.take_peaks(&mut self.record.upcoming_peaks);
-        self.record.impact_record.begin(&self.record.upcoming_peaks);
+        self.record.impact_record.begin(self.simulation.state());
         self.record.drop_peaks();
         self.record_at(self.simulation.time());
         self.store_keyframe();

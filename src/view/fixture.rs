@@ -179,7 +179,6 @@ pub(crate) fn hits(frame: &Frame) -> Vec<Peak> {
     let peak = |report: &JointReport| Peak {
         normal: 10.0 * report.normal_force.norm(),
         normal_force: report.normal_force * 10.0,
-        friction_force: report.friction_force * 10.0,
         impacts: 1,
         ..Default::default()
     };

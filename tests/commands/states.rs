@@ -199,9 +199,9 @@ fn a_state_of_another_scene_is_refused_with_the_reason() {
     for (pointer, value, words) in [
         ("/state/now/y", serde_json::json!([1.0]), "these values do not describe a state of this scene"),
         ("/state/flights", serde_json::json!([null, null]), "these values do not describe a state of this scene"),
-        ("/state/sampled", serde_json::json!([]), "these values do not describe a state of this scene"),
+        ("/observations/sampled", serde_json::json!([]), "these values do not describe a state of this scene"),
         (
-            "/state/loads",
+            "/observations/loads",
             serde_json::json!({"parts": [[[1.0, 0.0], null]], "seen": 0.0, "actuators": []}),
             "these values do not describe a state of this scene",
         ),

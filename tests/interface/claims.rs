@@ -295,7 +295,7 @@ const CLAIMS: &[Claim] = &[
             run.step().expect("runs");
             run.sample(run.time(), &mut frame);
             seen.push((run.time(), frame.joints[1].normal_force.norm()));
-            run.take_impacts(&mut impacts);
+            impacts.extend(run.take_impacts());
         }
         impacts.retain(|impact| impact.joint == 1);
         // Leaves out the impact in progress at the end.

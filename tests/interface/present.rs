@@ -48,7 +48,7 @@ fn f5_shows_the_picture_with_large_type_and_does_not_affect_the_run() {
         let mut impacts = Vec::new();
         while simulation.time() < 30e-3 {
             simulation.step().expect("runs");
-            simulation.take_impacts(&mut impacts);
+            impacts.extend(simulation.take_impacts());
         }
         let last = impacts.iter().rfind(|impact| impact.end <= before.0);
         let last = last.expect("an impact");

@@ -65,7 +65,7 @@ fn impacts(harness: &Harness<'_, App>, time: f64) -> Vec<Impact> {
     let mut impacts = Vec::new();
     while simulation.time() < time {
         simulation.step().expect("runs");
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
     }
     impacts.retain(|impact| impact.end <= time);
     impacts

@@ -21,7 +21,7 @@ fn rebound(word: &str, law: NormalLaw, parts: &str) -> f64 {
     let mut impacts = Vec::new();
     while impacts.is_empty() {
         simulation.step().unwrap();
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
     }
     let speed = -frame_now(&mut simulation).bodies[0].velocity.z;
     speed / (0.08 * undisturbed_restitution(law.damping_factor(0.9)))
@@ -43,7 +43,7 @@ fn hard_impacts(name: &str, changes: &Changes, span: f64) -> Vec<Impact> {
     let mut impacts = Vec::new();
     while simulation.time() < span {
         simulation.step().unwrap();
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
     }
     impacts.retain(|impact| impact.approach_speed > 0.02);
     impacts.sort_by(|a, b| a.start.total_cmp(&b.start));
@@ -307,7 +307,7 @@ fn slow_impacts_of_separate_balls_return_no_more_than_their_law() {
             let mut impacts = Vec::new();
             while simulation.time() < 0.5 {
                 simulation.step_until(0.5).unwrap();
-                simulation.take_impacts(&mut impacts);
+                impacts.extend(simulation.take_impacts());
             }
             let resolved: Vec<_> = impacts.iter().filter(|impact| !impact.below_speed_floor).collect();
             assert!(resolved.len() > 8, "{preset}, {gravity}");

@@ -151,7 +151,7 @@ fn contact_laws_and_patch_radii_have_the_documented_values() {
     let mut impacts = Vec::new();
     while simulation.time() < 0.02 {
         simulation.step().unwrap();
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
     }
     let contact = &simulation.machine().loose_joints[0].contact;
     let (r, c) = (contact.ball_radius, contact.clearance);

@@ -14,7 +14,7 @@ fn run(name: &str, changes: &Changes, method: &str, accuracy: (&str, &str), end:
     let (mut impacts, mut rows): (Vec<Impact>, Vec<ImpactRow>) = (Vec::new(), Vec::new());
     while simulation.time() < end {
         simulation.step().unwrap();
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
     }
     impacts.sort_by(|a, b| a.start.total_cmp(&b.start));
     for impact in impacts {

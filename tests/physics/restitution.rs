@@ -10,7 +10,7 @@ fn impacts(simulation: &mut Simulation, end: f64) -> Vec<Impact> {
     let mut impacts = Vec::new();
     while simulation.time() < end {
         simulation.step().unwrap();
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
     }
     impacts
 }
@@ -167,7 +167,7 @@ fn recent_impacts_are_kept_all_can_be_taken_and_snapshots_contain_them() {
     let mut taken = Vec::new();
     while taken.len() < 150 {
         simulation.step().unwrap();
-        simulation.take_impacts(&mut taken);
+        taken.extend(simulation.take_impacts());
     }
     let started: u64 = simulation.statistics().impacts();
     let joints = simulation.machine().loose_joints.len();
@@ -184,7 +184,7 @@ fn recent_impacts_are_kept_all_can_be_taken_and_snapshots_contain_them() {
         let mut more = Vec::new();
         while simulation.time() < end {
             simulation.step().unwrap();
-            simulation.take_impacts(&mut more);
+            more.extend(simulation.take_impacts());
         }
         more
     };

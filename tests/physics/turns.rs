@@ -255,7 +255,7 @@ fn turns_survive_snapshots_saved_states_going_back_and_live_changes() {
         run_until(&mut simulation, 0.8);
         let [angle, _] = coordinate(&mut simulation);
         assert!(angle < -500_f64.to_radians(), "{known:?}: {angle}");
-        let saved = serde_json::to_string(&simulation.state()).unwrap();
+        let saved = serde_json::to_string(&simulation.snapshot()).unwrap();
         let mut copy = simulation.clone();
         run_until(&mut simulation, 1.2);
         let (hash, end) = (simulation.state().hash(), coordinate(&mut simulation));

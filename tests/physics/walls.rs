@@ -9,7 +9,7 @@ fn impacts_of(text: &str, changes: &[(&str, &str)], duration: f64) -> (Simulatio
     let mut impacts = Vec::new();
     while simulation.time() < duration {
         simulation.step_until(duration).expect("runs");
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
     }
     (simulation, impacts)
 }
@@ -78,7 +78,7 @@ fn a_contact_begins_where_a_step_or_a_change_ends_on_the_wall() {
     let mut impacts = Vec::new();
     while impacts.is_empty() {
         simulation.step().expect("runs");
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
     }
     assert!((impacts[0].achieved() - impacts[0].law).abs() < 1e-4, "{:?}", impacts[0]);
     assert!((impacts[0].start - 2f64.powi(-12)).abs() < 1e-15);

@@ -148,7 +148,8 @@ impl LiveScene {
     /// A state that cannot belong to this scene, or that has other conditions than `running`; `self` is then unchanged.
     pub fn resume_changed(&mut self, snapshot: &Snapshot, running: Scene, pending: Scene) -> Result<(), StateMismatch> {
         let machine = self.simulation.machine();
-        if !machine.differs_only_in_conditions(&running.machine) || *snapshot.conditions() != running.machine.conditions()
+        if !machine.differs_only_in_conditions(&running.machine)
+            || *snapshot.conditions() != running.machine.conditions()
         {
             return Err(StateMismatch);
         }

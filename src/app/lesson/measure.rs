@@ -252,7 +252,7 @@ impl MeasuringRun {
         if let Some(twin) = &mut self.twin {
             twin.follow(&self.simulation);
         }
-        self.simulation.take_impacts(&mut self.impacts);
+        self.impacts.extend(self.simulation.take_impacts());
         self.simulation.take_peaks(&mut self.peaks);
         let Self { simulation, gauges, frame, impacts, peaks, twin, .. } = self;
         for (_, gauge) in gauges.iter_mut().filter(|(_, gauge)| gauge.value.is_none()) {

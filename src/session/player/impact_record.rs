@@ -2,8 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::machine::Vec3;
-use crate::simulate::{Impact, Peak, Simulation};
+use crate::simulate::{ForcePeak, Impact, ImpactEvent, Simulation, State};
 
 /// Most impacts stored; beyond that the oldest are dropped.
 const MAX_IMPACTS: usize = 20_000;
@@ -18,28 +17,21 @@ const MAX_SEARCHED: usize = 64;
 /// Relative rounding difference between the times of a record and of an impact.
 const ROUNDING: f64 = 1e-12;
 
-/// The largest normal force of an impact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ForcePeak {
-    /// Time, s.
-    pub time: f64,
-    /// Force on the ball, N, world axes.
-    pub force: Vec3,
-}
-
 /// An impact.
 #[derive(Clone, Debug)]
 pub struct RecordedImpact {
+    /// Its number in [`ImpactEvent`].
+    id: u64,
     /// Ball joint.
     pub joint: usize,
-    /// Start, s; accurate to within a step until the impact is over.
+    /// Start, s.
     pub start: f64,
-    /// Time at which the ball left its wall, s; infinite in contact, and until the next impact if a change removed the wall.
+    /// Time at which the ball left its wall, or at which a change removed the wall, s; infinite in contact.
     pub end: f64,
-    /// Its largest force.
+    /// Its largest force; while it lasts, that of its first 10 ms.
     pub force_peak: ForcePeak,
-    /// Numbers of the steps in which it began and in which its end became known.
-    steps: [u64; 2],
+    /// Its largest force so far.
+    largest: ForcePeak,
     impact: Option<Impact>,
 }
 
@@ -47,6 +39,13 @@ impl RecordedImpact {
     /// Complete data once it is over; `None` before that, and if a change of the contact ended it.
     pub fn finished(&self) -> Option<&Impact> {
         self.impact.as_ref()
+    }
+
+    fn raise(&mut self, peak: ForcePeak) {
+        self.largest = peak;
+        if peak.time <= self.start + MAX_IMPACT_DURATION {
+            self.force_peak = peak;
+        }
     }
 
     /// Whether it had begun by `time`, s.
@@ -60,126 +59,84 @@ impl RecordedImpact {
 pub struct ImpactRecord {
     all: VecDeque<RecordedImpact>,
     dropped: u64,
-    /// Largest force so far of the impact in progress, by joint.
-    in_progress: Vec<Option<ForcePeak>>,
-    /// Number of accepted steps recorded, and start and end of the latest, s.
-    steps: u64,
+    /// Number of the next impact to begin.
+    next: u64,
+    /// Start and end of the latest step, s.
     latest_step: [f64; 2],
-    /// Impacts that ended in the latest step.
-    ended: Vec<Impact>,
 }
 
 impl ImpactRecord {
-    /// Begins a new run; `peaks` contain the impacts that begin with it.
-    pub(super) fn begin(&mut self, peaks: &[Peak]) {
-        *self = Self { in_progress: vec![None; peaks.len()], ..Self::default() };
-        for (joint, peak) in peaks.iter().enumerate().filter(|(_, peak)| begins_impact(peak)) {
-            self.add(joint, peak);
+    /// Begins a new run, with the impacts that begin with it.
+    pub(super) fn begin(&mut self, state: &State) {
+        *self = Self::default();
+        for (id, impact, _) in state.impacts_under_way() {
+            self.apply(ImpactEvent::Began { id, joint: impact.joint, start: impact.start });
         }
     }
 
-    /// Records the latest step with its `peaks`; to be called after every step.
-    pub(super) fn record(&mut self, simulation: &mut Simulation, peaks: &[Peak]) {
-        let mut ended = std::mem::take(&mut self.ended);
-        ended.clear();
-        simulation.take_impacts(&mut ended);
-        let steps = simulation.statistics().steps;
-        if steps > self.steps {
-            self.steps = steps;
+    /// Records the latest step; to be called after every step.
+    pub(super) fn record(&mut self, simulation: &mut Simulation) {
+        if simulation.time() > self.latest_step[1] {
             self.latest_step = [simulation.step_start(), simulation.time()];
-            for (joint, peak) in peaks.iter().enumerate() {
-                self.record_joint(joint, peak, ended.iter().find(|impact| impact.joint == joint));
-            }
         }
-        self.ended = ended;
+        simulation.take_events().for_each(|event| self.apply(event));
     }
 
-    fn record_joint(&mut self, joint: usize, peak: &Peak, ended: Option<&Impact>) {
-        let begins = begins_impact(peak);
-        // An impact that ends began in an earlier step or in this one.
-        let (before, now) = match ended {
-            Some(impact) if begins && impact.start >= self.latest_step[0] => (None, ended),
-            _ => (ended, None),
-        };
-        if let Some(impact) = before {
-            self.raise_peak(joint, peak);
-            self.end_contact(joint, impact.end, Some(impact));
-        }
-        if begins {
-            self.add(joint, peak);
-        }
-        self.raise_peak(joint, peak);
-        if let Some(impact) = now {
-            self.end_contact(joint, impact.end, Some(impact));
-        }
-    }
-
-    fn add(&mut self, joint: usize, peak: &Peak) {
-        // Without a force yet, it begins at the end of the step.
-        let start = self.latest_step[usize::from(peak.normal <= 0.0)];
-        // A change has removed the wall of the previous impact.
-        self.end_contact(joint, start, None);
-        if self.all.len() == MAX_IMPACTS {
-            self.all.pop_front();
-            self.dropped += 1;
-        }
-        let force_peak = ForcePeak { time: start, force: Vec3::zeros() };
-        self.in_progress[joint] = Some(force_peak);
-        let steps = [self.steps, u64::MAX];
-        self.all.push_back(RecordedImpact { joint, start, end: f64::INFINITY, force_peak, steps, impact: None });
-    }
-
-    /// Updates the peak of the impact in progress at `joint` with the latest step.
-    fn raise_peak(&mut self, joint: usize, peak: &Peak) {
-        let Some(force_peak) = &mut self.in_progress[joint] else {
-            return;
-        };
-        if peak.normal <= force_peak.force.norm() || peak.time < force_peak.time {
-            return;
-        }
-        *force_peak = ForcePeak { time: peak.time, force: peak.normal_force };
-        let force_peak = *force_peak;
-        let own = self.all.iter_mut().rev().find(|impact| impact.joint == joint);
-        if let Some(own) = own.filter(|own| force_peak.time <= own.start + MAX_IMPACT_DURATION) {
-            own.force_peak = force_peak;
-        }
-    }
-
-    /// Ends the contact of `joint` at `time`, s; `impact` is `None` if a change ended it.
-    fn end_contact(&mut self, joint: usize, time: f64, impact: Option<&Impact>) {
-        let Some(force_peak) = self.in_progress[joint].take() else {
-            return;
-        };
-        let Some(at) = self.all.iter().rposition(|own| own.joint == joint && own.end.is_infinite()) else {
-            return;
-        };
-        let Some(mut own) = self.all.remove(at) else {
-            return;
-        };
-        (own.end, own.steps[1], own.impact) = (time, self.steps, impact.copied());
-        if let Some(impact) = impact {
-            (own.start, own.force_peak) = (impact.start, force_peak);
-        }
-        // Another may have begun earlier in the same step.
-        let at = self.all.partition_point(|other| other.start <= own.start);
-        self.all.insert(at, own);
-    }
-
-    /// Drops everything after `time`, s, and step number `steps`.
-    pub(super) fn truncate(&mut self, time: f64, steps: u64) {
-        self.all.retain(|impact| impact.steps[0] <= steps);
-        self.in_progress.fill(None);
-        for impact in &mut self.all {
-            if impact.steps[1] > steps {
-                (impact.end, impact.steps[1], impact.impact) = (f64::INFINITY, u64::MAX, None);
-                if impact.force_peak.time > time {
-                    impact.force_peak = ForcePeak { time: impact.start, force: Vec3::zeros() };
+    /// Records what happened; what is known already changes nothing.
+    fn apply(&mut self, event: ImpactEvent) {
+        match event {
+            ImpactEvent::Began { id, joint, start } if id >= self.next => {
+                self.next = id + 1;
+                if self.all.len() == MAX_IMPACTS {
+                    self.all.pop_front();
+                    self.dropped += 1;
                 }
-                self.in_progress[impact.joint] = Some(impact.force_peak);
+                let force_peak = ForcePeak { time: start, ..ForcePeak::default() };
+                let (end, largest) = (f64::INFINITY, force_peak);
+                let own = RecordedImpact { id, joint, start, end, force_peak, largest, impact: None };
+                // Another may have begun later in the same step.
+                let at = self.all.partition_point(|other| other.start <= start);
+                self.all.insert(at, own);
+            }
+            ImpactEvent::Began { .. } => {}
+            ImpactEvent::Peaked { id, peak } => {
+                let rises = |own: &&mut RecordedImpact| {
+                    own.end.is_infinite() && peak.force.norm_squared() > own.largest.force.norm_squared()
+                };
+                if let Some(own) = self.find(id).filter(rises) {
+                    own.raise(peak);
+                }
+            }
+            ImpactEvent::Ended { id, end, impact } => {
+                if let Some(own) = self.find(id) {
+                    (own.end, own.impact) = (end, impact);
+                    if impact.is_some() {
+                        own.force_peak = own.largest;
+                    }
+                }
             }
         }
-        self.steps = self.steps.min(steps);
-        self.latest_step = self.latest_step.map(|end| end.min(time));
+    }
+
+    fn find(&mut self, id: u64) -> Option<&mut RecordedImpact> {
+        self.all.iter_mut().rev().find(|own| own.id == id)
+    }
+
+    /// Drops everything after `state`, of the same run.
+    pub(super) fn truncate(&mut self, state: &State) {
+        self.next = self.next.min(state.impacts_begun());
+        let next = self.next;
+        self.all.retain(|own| own.id < next);
+        for (id, _, peak) in state.impacts_under_way() {
+            if let Some(own) = self.find(id) {
+                (own.end, own.impact) = (f64::INFINITY, None);
+                if own.force_peak.time > state.time() {
+                    own.force_peak = ForcePeak { time: own.start, ..ForcePeak::default() };
+                }
+                own.raise(peak);
+            }
+        }
+        self.latest_step = self.latest_step.map(|end| end.min(state.time()));
     }
 
     /// All recorded impacts, in order, with their numbers in the run, from 1.
@@ -247,7 +204,7 @@ impl ImpactRecord {
     /// The peaks after `from` and up to `to`, s, with the ball joint of each.
     pub fn peaks(&self, from: f64, to: f64) -> impl Iterator<Item = (usize, ForcePeak)> {
         let within = move |force_peak: &ForcePeak| {
-            force_peak.time > from && force_peak.time <= to && force_peak.force != Vec3::zeros()
+            force_peak.time > from && force_peak.time <= to && force_peak.force.norm_squared() > 0.0
         };
         self.all
             .iter()
@@ -261,11 +218,6 @@ impl ImpactRecord {
     }
 }
 
-/// Whether an impact begins in the step of `peak`. A ball that reaches its wall at zero speed is no impact.
-fn begins_impact(peak: &Peak) -> bool {
-    peak.impacts > 0 && peak.approach_speed > 0.0
-}
-
 fn is_of(joint: Option<usize>, impact: &RecordedImpact) -> bool {
     joint.is_none_or(|joint| joint == impact.joint)
 }
@@ -273,50 +225,69 @@ fn is_of(joint: Option<usize>, impact: &RecordedImpact) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::Vec3;
 
     /// Step, s.
     const STEP: f64 = 1e-3;
 
-    /// Peak of `force`, N, at the end of step `k`; `speed`: an impact begins with it.
-    fn peak(k: u64, force: f64, speed: Option<f64>) -> Peak {
-        Peak {
-            normal: force,
-            time: if force > 0.0 { k as f64 * STEP } else { 0.0 },
-            normal_force: Vec3::new(force, 0.0, 0.0),
-            impacts: u32::from(speed.is_some()),
-            approach_speed: speed.unwrap_or(0.0),
-            ..Peak::default()
-        }
+    /// The end of step `k`, s.
+    fn end(k: u64) -> f64 {
+        k as f64 * STEP
     }
 
-    /// Records the steps of one joint with its forces, N, from step `k` on. The first begins an impact; the last ends it if
-    /// `ends`.
-    fn contact(record: &mut ImpactRecord, joint: usize, k: u64, forces: &[f64], ends: bool) {
-        let last = k + forces.len() as u64 - 1;
-        for (now, force) in (k..).zip(forces) {
-            (record.steps, record.latest_step) = (now, [(now - 1) as f64 * STEP, now as f64 * STEP]);
-            let [start, end] = [k as f64 * STEP, last as f64 * STEP];
-            let impact = Impact { joint, start, end, ..Impact::default() };
-            let ended = Some(&impact).filter(|_| ends && now == last);
-            record.record_joint(joint, &peak(now, *force, (now == k).then_some(0.1)), ended);
+    impl ImpactRecord {
+        /// Passes to step `k`.
+        fn step(&mut self, k: u64) {
+            self.latest_step = [end(k.max(1) - 1), end(k)];
+        }
+
+        /// An impact of `joint` begins at the end of step `k`; returns its number.
+        fn begins(&mut self, joint: usize, k: u64) -> u64 {
+            self.step(k);
+            let id = self.next;
+            self.apply(ImpactEvent::Began { id, joint, start: end(k) });
+            id
+        }
+
+        /// Impact `id` is pressed with `force`, N, at the end of step `k`.
+        fn pressed(&mut self, id: u64, k: u64, force: f64) {
+            self.step(k);
+            let peak = ForcePeak { time: end(k), force: Vec3::new(force, 0.0, 0.0) };
+            self.apply(ImpactEvent::Peaked { id, peak });
+        }
+
+        /// Impact `id` ends with step `k`.
+        fn ends(&mut self, id: u64, k: u64) {
+            self.step(k);
+            let own = self.find(id).expect("recorded");
+            let impact = Impact { joint: own.joint, start: own.start, end: end(k), ..Impact::default() };
+            self.apply(ImpactEvent::Ended { id, end: end(k), impact: Some(impact) });
+        }
+
+        /// An impact of `joint` in the steps from `k` on, with these forces, N, at their ends.
+        fn contact(&mut self, joint: usize, k: u64, forces: &[f64]) {
+            let id = self.begins(joint, k);
+            for (now, force) in (k..).zip(forces) {
+                self.pressed(id, now, *force);
+            }
+            self.ends(id, k + forces.len() as u64 - 1);
         }
     }
 
     fn record() -> ImpactRecord {
         let mut record = ImpactRecord::default();
-        record.begin(&[Peak::default(); 2]);
-        contact(&mut record, 0, 2, &[0.0, 5.0, 9.0, 4.0], true);
-        contact(&mut record, 1, 7, &[0.0, 3.0, 1.0, 6.0, 2.0], true);
+        record.contact(0, 2, &[0.0, 5.0, 9.0, 4.0]);
+        record.contact(1, 7, &[0.0, 3.0, 1.0, 6.0, 2.0]);
         record
     }
 
     #[test]
     fn impacts_are_numbered_and_their_peaks_are_found_forwards_and_backwards() {
-        let mut record = record();
-        let numbers = |record: &ImpactRecord, time| record.until(time).map(|(number, ..)| number).collect::<Vec<_>>();
-        assert_eq!(numbers(&record, 4e-3), [0; 0]);
-        assert_eq!(numbers(&record, 5e-3), [1]);
-        assert_eq!(numbers(&record, 1.0), [1, 2]);
+        let record = record();
+        let numbers = |time| record.until(time).map(|(number, ..)| number).collect::<Vec<_>>();
+        assert_eq!(numbers(4e-3), [0; 0]);
+        assert_eq!(numbers(5e-3), [1]);
+        assert_eq!(numbers(1.0), [1, 2]);
         // Joint 1 has two maxima; the larger is its peak.
         assert_eq!(
             [record.next_peak(None, 0.0, false), record.next_peak(None, 4e-3, false)],
@@ -333,33 +304,31 @@ mod tests {
         assert_eq!(peaks, [(0, 9.0)]);
         assert_eq!(record.latest(None, 8e-3).next().map(|impact| impact.joint), Some(1));
         assert_eq!(record.latest(Some(0), 8e-3).count(), 1);
-        // Retraced steps would add nothing; those of a new branch do.
-        record.truncate(8e-3, 8);
-        assert_eq!(numbers(&record, 1.0), [1]);
-        assert_eq!(record.next_peak(None, 4e-3, false), None, "the impact is in progress again");
-        contact(&mut record, 0, 9, &[0.0, 1.0, 0.5], true);
-        record.record_joint(
-            1,
-            &peak(12, 8.0, None),
-            Some(&Impact { joint: 1, start: 7e-3, end: 12e-3, ..Impact::default() }),
-        );
-        assert_eq!(numbers(&record, 1.0), [1, 2, 3]);
-        assert_eq!(record.previous_peak(None, 1.0), Some(12e-3));
+    }
+
+    #[test]
+    fn events_of_retraced_steps_change_nothing() {
+        let mut retraced = record();
+        let again = record();
+        for own in &again.all {
+            retraced.apply(ImpactEvent::Began { id: own.id, joint: own.joint, start: own.start });
+            let peak = ForcePeak { force: own.largest.force * 0.5, ..own.largest };
+            retraced.apply(ImpactEvent::Peaked { id: own.id, peak });
+            retraced.apply(ImpactEvent::Ended { id: own.id, end: own.end, impact: own.impact });
+        }
+        let all = |record: &ImpactRecord| format!("{:?}", record.all);
+        assert_eq!(all(&retraced), all(&again));
     }
 
     #[test]
     fn among_simultaneous_impacts_the_one_at_its_peak_is_chosen_otherwise_the_latest() {
         let mut record = ImpactRecord::default();
-        record.begin(&[Peak::default(); 2]);
         // Both in the steps 1 to 5.
-        for k in 1..=5_u64 {
-            (record.steps, record.latest_step) = (k, [(k - 1) as f64 * STEP, k as f64 * STEP]);
-            for (joint, force_peak) in [(0, 2), (1, 4)] {
-                let impact = Impact { joint, start: STEP, end: 5e-3, ..Impact::default() };
-                let force = if k == 1 { 0.0 } else { 9.0 - k.abs_diff(force_peak) as f64 };
-                record.record_joint(joint, &peak(k, force, (k == 1).then_some(0.1)), Some(&impact).filter(|_| k == 5));
-            }
+        let both = [(0, 2_u64), (1, 4)].map(|(joint, peak)| (record.begins(joint, 1), peak));
+        for k in 2..=5_u64 {
+            both.iter().for_each(|(id, peak)| record.pressed(*id, k, 9.0 - k.abs_diff(*peak) as f64));
         }
+        both.iter().for_each(|(id, _)| record.ends(*id, 5));
         let at = |time| record.in_progress(None, time).map(|(_, impact)| impact.joint);
         assert_eq!([at(2e-3), at(3e-3), at(4e-3)], [Some(0), Some(1), Some(1)]);
     }
@@ -367,54 +336,42 @@ mod tests {
     #[test]
     fn a_resting_contact_has_the_peak_of_its_first_10_ms_and_a_finished_one_that_of_its_whole_duration() {
         let mut record = ImpactRecord::default();
-        record.begin(&[Peak::default()]);
-        let mut forces = vec![0.0, 5.0, 8.0];
-        forces.resize(8, 3.0);
-        contact(&mut record, 0, 1, &forces, false);
+        let id = record.begins(0, 1);
+        [5.0, 8.0, 3.0, 3.0, 3.0].iter().zip(2..).for_each(|(force, k)| record.pressed(id, k, *force));
         // The impact may still end in time.
         assert_eq!((record.next_peak(None, 0.0, false), record.next_peak(None, 0.0, true)), (None, Some(3e-3)));
         assert_eq!((record.previous_peak(None, 1.0), record.previous_peak(None, 3e-3)), (Some(3e-3), None));
         assert!(record.in_progress(None, 2e-3).is_none());
-        for k in 9..40 {
-            (record.steps, record.latest_step) = (k, [(k - 1) as f64 * STEP, k as f64 * STEP]);
-            record.record_joint(0, &peak(k, if k == 30 { 9.0 } else { 4.0 }, None), None);
-        }
+        (9..40).for_each(|k| record.pressed(id, k, if k == 30 { 9.0 } else { 4.0 }));
         assert_eq!(record.next_peak(None, 0.0, false), Some(3e-3));
         assert!(record.in_progress(None, 35e-3).is_none(), "a resting contact");
         let (_, lasting) = record.in_progress(None, 9e-3).expect("in contact");
         assert!(lasting.finished().is_none() && lasting.force_peak.force.x == 8.0);
-        (record.steps, record.latest_step) = (40, [39e-3, 40e-3]);
-        let impact = Impact { start: 1e-3, end: 40e-3, peak: 9.0, ..Impact::default() };
-        record.record_joint(0, &peak(40, 1.0, None), Some(&impact));
+        record.ends(id, 40);
         assert_eq!(record.next_peak(None, 0.0, false), Some(30e-3));
     }
 
     #[test]
-    fn a_rising_force_has_no_peak_yet_and_an_impact_without_an_end_ends_when_the_next_begins() {
+    fn a_rising_force_has_no_peak_yet_and_an_impact_without_its_wall_is_not_finished() {
         let mut record = ImpactRecord::default();
-        // An impact begins with the run.
-        record.begin(&[peak(0, 0.0, Some(0.1))]);
+        let id = record.begins(0, 0);
         assert_eq!((record.next_peak(None, 0.0, false), record.previous_peak(None, 1.0)), (None, None));
         for k in 1..=3 {
-            (record.steps, record.latest_step) = (k, [(k - 1) as f64 * STEP, k as f64 * STEP]);
-            record.record_joint(0, &peak(k, k as f64, None), None);
+            record.pressed(id, k, k as f64);
             assert_eq!((record.next_peak(None, 0.0, false), record.previous_peak(None, 1.0)), (None, None));
         }
-        contact(&mut record, 0, 6, &[0.0, 2.0, 1.0], true);
+        record.apply(ImpactEvent::Ended { id, end: 4e-3, impact: None });
+        record.contact(0, 6, &[0.0, 2.0, 1.0]);
         assert_eq!(record.next_peak(None, 0.0, false), Some(3e-3));
         assert_eq!(record.until(1.0).count(), 1);
         assert!(record.in_progress(None, 7e-3).is_some_and(|(number, _)| number == 2));
-        // A contact at zero speed is no impact.
-        record.record_joint(0, &peak(20, 1.0, Some(0.0)), None);
-        assert_eq!(record.next_peak(None, 8e-3, true), None);
     }
 
     #[test]
     fn the_number_of_stored_impacts_is_bounded_and_the_oldest_are_dropped() {
         let mut record = ImpactRecord::default();
-        record.begin(&[Peak::default()]);
         for k in 0..MAX_IMPACTS as u64 + 7 {
-            contact(&mut record, 0, 3 * k + 1, &[0.0, 2.0, 1.0], true);
+            record.contact(0, 3 * k + 1, &[0.0, 2.0, 1.0]);
         }
         assert_eq!((record.all.len(), record.dropped()), (MAX_IMPACTS, 7));
         assert_eq!(record.until(f64::INFINITY).map(|(number, ..)| number).next(), Some(8));

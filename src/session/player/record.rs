@@ -7,7 +7,7 @@ use crate::session::history::{Bin, History, Mark};
 use crate::session::paths::Paths;
 use crate::session::settled::Settling;
 use crate::session::watch::RunWatch;
-use crate::simulate::{Channels, Frame, Peak, RECORDED_JOINTS};
+use crate::simulate::{Channels, Frame, Peak, RECORDED_JOINTS, State};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
 pub const FINEST_BIN: f64 = 2e-6;
@@ -114,15 +114,15 @@ impl Record {
         }
     }
 
-    /// Drops everything after `time`, s, and `steps` steps, for a new branch; `mark` is the position of the history there.
-    pub fn truncate(&mut self, time: f64, steps: u64, mark: Option<&Mark>) {
+    /// Drops everything after `state`, for a new branch; `mark` is the position of the history there.
+    pub fn truncate(&mut self, state: &State, mark: Option<&Mark>) {
         if let Some(mark) = mark {
             self.history.rewind(mark);
         }
         self.detailed = None;
-        self.contact_history.truncate(time);
-        self.impact_record.truncate(time, steps);
-        self.watch.truncate(time);
+        self.contact_history.truncate(state.time());
+        self.impact_record.truncate(state);
+        self.watch.truncate(state.time());
     }
 
     /// Continues from `time`, s, in a run of `scene`. Known data stay.

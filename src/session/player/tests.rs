@@ -658,7 +658,7 @@ fn peaks_of_run(player: &Player, to: f64) -> Vec<(usize, f64, f64)> {
         simulation.step().expect("runs");
         simulation.take_peaks(&mut peaks);
         steps.extend(peaks.iter().copied().enumerate());
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
     }
     let top = |impact: &crate::simulate::Impact| {
         let within =

@@ -337,7 +337,7 @@ impl Player {
             return;
         };
         let (start, start_steps) = (keyframe.state.time(), keyframe.state.steps());
-        self.record.truncate(start, start_steps, keyframe.record.as_deref());
+        self.record.truncate(&keyframe.state, keyframe.record.as_deref());
         self.keyframes.truncate(start_steps);
         if let Some(twin) = &mut self.twin {
             twin.truncate(start);

@@ -217,7 +217,7 @@ pub fn peaks_of_run(app: &App, time: f64) -> Vec<(Impact, f64)> {
     let (mut impacts, mut latest, mut peaks) = (Vec::new(), Vec::new(), Vec::<(usize, Peak)>::new());
     while simulation.time() < time {
         simulation.step().expect("runs");
-        simulation.take_impacts(&mut impacts);
+        impacts.extend(simulation.take_impacts());
         simulation.take_peaks(&mut latest);
         peaks.extend(latest.iter().copied().enumerate());
     }

@@ -190,7 +190,7 @@ impl Case {
         let mut impacts = Vec::new();
         while run.simulation.time() < self.duration {
             run.simulation.step_until(self.duration).unwrap();
-            run.simulation.take_impacts(&mut impacts);
+            impacts.extend(run.simulation.take_impacts());
             for watch in &mut watches {
                 watch.update(&mut run);
             }

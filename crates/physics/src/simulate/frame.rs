@@ -131,8 +131,6 @@ pub struct Peak {
     pub time: f64,
     /// Normal force on the ball at that instant, N, world axes.
     pub normal_force: Vec3,
-    /// Friction force on the ball at that instant, N, world axes.
-    pub friction_force: Vec3,
     /// Number of contacts begun.
     pub impacts: u32,
     /// Largest approach speed of those impacts, m/s.

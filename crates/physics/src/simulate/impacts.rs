@@ -1,9 +1,13 @@
-//! Restitution check: for each impact, the requested restitution, the one that its law predicts, and the one achieved.
+//! Impacts: when each began, peaked and ended, and its restitution check: the requested restitution, the one that its law predicts,
+//! and the one achieved.
+
+use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
 use super::peaks::PenetrationCubic;
 use crate::contact::{Coefficients, undisturbed_restitution};
+use crate::machine::Vec3;
 use crate::mechanism::ContactId;
 
 /// Number of latest impacts stored.
@@ -77,10 +81,95 @@ impl Impact {
     }
 }
 
+/// The largest normal force of an impact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ForcePeak {
+    /// Time, s.
+    pub time: f64,
+    /// Force on the ball, N, world axes.
+    pub force: Vec3,
+}
+
+/// What happened to an impact. Its number counts the impacts of the run in the order in which they were found to begin, from 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ImpactEvent {
+    /// It began.
+    Began {
+        /// Number of the impact.
+        id: u64,
+        /// Loose joint, by its index in the scene.
+        joint: usize,
+        /// When, s.
+        start: f64,
+    },
+    /// Its normal force exceeded what it was before the step. The last of these events is its peak.
+    Peaked {
+        /// Number of the impact.
+        id: u64,
+        /// The largest force of the step.
+        peak: ForcePeak,
+    },
+    /// It ended, after the peak of its last step.
+    Ended {
+        /// Number of the impact.
+        id: u64,
+        /// When, s.
+        end: f64,
+        /// All about it; `None` if a live change removed its wall.
+        impact: Option<Impact>,
+    },
+}
+
+impl ImpactEvent {
+    /// The impact, if it ended and no live change removed its wall.
+    pub fn finished(self) -> Option<Impact> {
+        if let Self::Ended { impact, .. } = self { impact } else { None }
+    }
+}
+
+/// The latest events, oldest first. Allocates nothing after `new`.
+#[derive(Debug)]
+pub(super) struct ImpactEvents {
+    latest: VecDeque<ImpactEvent>,
+}
+
+impl ImpactEvents {
+    /// For a machine with this number of contacts: a step adds at most three events of each.
+    pub(super) fn new(contacts: usize) -> Self {
+        Self { latest: VecDeque::with_capacity(3 * STORED_IMPACTS.max(2 * contacts)) }
+    }
+
+    pub(super) fn push(&mut self, event: ImpactEvent) {
+        if self.latest.len() == self.latest.capacity() {
+            self.latest.pop_front();
+        }
+        self.latest.push_back(event);
+    }
+
+    pub(super) fn take(&mut self) -> impl Iterator<Item = ImpactEvent> + '_ {
+        self.latest.drain(..)
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.latest.clear();
+    }
+}
+
+/// An impact under way.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct UnderWay {
+    pub(super) id: u64,
+    pub(super) impact: Impact,
+    pub(super) peak: ForcePeak,
+    /// Whether its peak lies in the step that is being recorded, and whether it ends there.
+    rises: bool,
+    ends: bool,
+}
+
 /// The impact of one contact under way, if any, and the law of its impacts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Contacting {
-    impact: Option<Impact>,
+    under_way: Option<UnderWay>,
     /// Damping factor, and the restitution that results: kept, because computing it takes an iteration.
     law: (f64, f64),
 }
@@ -107,9 +196,9 @@ pub(super) struct Impacts {
     contacts: Vec<Contacting>,
     /// Finished ones, as a ring buffer: impact n is at index n modulo its length.
     finished: Vec<Impact>,
-    /// Number of finished ones, and of those handed out.
+    /// Number of finished ones, and of all begun.
     count: u64,
-    handed_out: u64,
+    begun: u64,
 }
 
 impl Impacts {
@@ -118,38 +207,56 @@ impl Impacts {
         &self.finished
     }
 
-    /// A record for this number of contacts. A step finishes at most one impact at each, so that all of them can be collected
-    /// between two steps.
+    /// A record for this number of contacts.
     pub(super) fn new(contacts: usize) -> Self {
         Self {
-            contacts: vec![Contacting { impact: None, law: (0.0, 1.0) }; contacts],
-            finished: vec![Impact::default(); STORED_IMPACTS.max(contacts)],
+            contacts: vec![Contacting { under_way: None, law: (0.0, 1.0) }; contacts],
+            finished: vec![Impact::default(); STORED_IMPACTS],
             count: 0,
-            handed_out: 0,
+            begun: 0,
         }
     }
 
     /// Whether they fit a scene with this number of contacts and loose joints.
     pub(super) fn fits(&self, contacts: usize, joints: usize) -> bool {
-        let own = Self::new(contacts);
-        let mut known = self.contacts.iter().filter_map(|contact| contact.impact.as_ref()).chain(&self.finished);
+        let mut known = self.under_way().map(|own| &own.impact).chain(&self.finished);
         self.contacts.len() == contacts
-            && self.finished.len() == own.finished.len()
-            && self.handed_out <= self.count
+            && self.finished.len() == STORED_IMPACTS
+            && self.count <= self.begun
             && known.all(|impact| impact.joint < joints.max(1))
     }
 
-    /// Records that a contact begins as `onset` says, under `coefficients`.
-    pub(super) fn begin(&mut self, onset: &Onset, coefficients: &Coefficients, interacts: impl Fn(ContactId) -> bool) {
+    /// Number of impacts begun.
+    pub(super) fn begun(&self) -> u64 {
+        self.begun
+    }
+
+    /// The impacts under way.
+    pub(super) fn under_way(&self) -> impl Iterator<Item = &UnderWay> {
+        self.contacts.iter().filter_map(|contact| contact.under_way.as_ref())
+    }
+
+    /// Records that a contact begins as `onset` says, under `coefficients`. A ball that reaches its wall at zero speed is no impact.
+    pub(super) fn begin(
+        &mut self,
+        onset: &Onset,
+        coefficients: &Coefficients,
+        interacts: impl Fn(ContactId) -> bool,
+        events: &mut ImpactEvents,
+    ) {
         let others = self.contacts.iter_mut().enumerate().filter(|(other, _)| interacts(*other));
-        for impact in others.filter_map(|(_, other)| other.impact.as_mut()) {
-            impact.disturbed = true;
+        for own in others.filter_map(|(_, other)| other.under_way.as_mut()).filter(|own| !own.ends) {
+            own.impact.disturbed = true;
         }
+        self.change(onset.contact, false, onset.time, events);
         let contact = &mut self.contacts[onset.contact];
         if contact.law.0 != coefficients.damping {
             contact.law = (coefficients.damping, undisturbed_restitution(coefficients.damping));
         }
-        contact.impact = (onset.speed > 0.0).then_some(Impact {
+        if !(onset.speed > 0.0) {
+            return;
+        }
+        let impact = Impact {
             joint: onset.joint,
             start: onset.time,
             approach_speed: onset.speed,
@@ -159,17 +266,51 @@ impl Impacts {
             disturbed: onset.among_others,
             push: onset.push,
             ..Impact::default()
-        });
+        };
+        let (id, peak) = (self.begun, ForcePeak { time: onset.time, force: Vec3::zeros() });
+        contact.under_way = Some(UnderWay { id, impact, peak, rises: false, ends: false });
+        self.begun += 1;
+        events.push(ImpactEvent::Began { id, joint: onset.joint, start: onset.time });
     }
 
-    /// Updates contact `c` over a step in which it was, or became, active, from its penetration, its largest normal
-    /// force (N) and its largest ratio of damping to elastic force.
-    pub(super) fn update(&mut self, c: ContactId, cubic: &PenetrationCubic, force: f64, damping: f64) {
-        if let Some(impact) = &mut self.contacts[c].impact {
+    /// Updates contact `c` over a step in which it was, or became, active, from its penetration and its largest ratio of damping to
+    /// elastic force.
+    pub(super) fn update(&mut self, c: ContactId, cubic: &PenetrationCubic, damping: f64) {
+        if let Some(UnderWay { impact, .. }) = &mut self.contacts[c].under_way {
             impact.steps += 1;
             impact.damping = impact.damping.max(damping);
             impact.deepest = impact.deepest.max(cubic.deepest());
-            impact.peak = impact.peak.max(force);
+        }
+    }
+
+    /// Takes into account that the normal force at contact `c` is `force`, N, along `direction`, at `time`, s.
+    pub(super) fn raise_peak(&mut self, c: ContactId, force: f64, direction: Vec3, time: f64) {
+        if let Some(own) = &mut self.contacts[c].under_way
+            && force > own.impact.peak
+        {
+            own.impact.peak = force;
+            own.peak = ForcePeak { time, force: direction * force };
+            own.rises = true;
+        }
+    }
+
+    /// Reports what the step just recorded brought.
+    pub(super) fn end_step(&mut self, events: &mut ImpactEvents) {
+        for contact in &mut self.contacts {
+            let Some(UnderWay { id, impact, peak, rises, ends }) = &mut contact.under_way else {
+                continue;
+            };
+            let id = *id;
+            if std::mem::take(rises) {
+                events.push(ImpactEvent::Peaked { id, peak: *peak });
+            }
+            if *ends {
+                let impact = *impact;
+                self.finished[(self.count % STORED_IMPACTS as u64) as usize] = impact;
+                self.count += 1;
+                contact.under_way = None;
+                events.push(ImpactEvent::Ended { id, end: impact.end, impact: Some(impact) });
+            }
         }
     }
 
@@ -178,56 +319,43 @@ impl Impacts {
     /// is the loss, to first order.
     pub(super) fn speeds_under_way(&self, c: ContactId, floor: f64) -> Option<[f64; 2]> {
         let is_own = |impact: &&Impact| !impact.disturbed && impact.external_work() < MAX_WORK_IN_REBOUND;
-        let impact = self.contacts[c].impact.as_ref().filter(is_own)?;
+        let impact = self.contacts[c].under_way.as_ref().map(|own| &own.impact).filter(is_own)?;
         let (speed, law) = (impact.approach_speed, impact.law);
         Some([speed, speed * (1.0 - (1.0 - law) * (speed / floor).min(1.0))])
     }
 
     /// Largest normal force so far in the current impact at `c`, N; infinite without one.
     pub(super) fn peak_under_way(&self, c: ContactId) -> f64 {
-        let impact = &self.contacts[c].impact;
-        impact.as_ref().map_or(f64::INFINITY, |impact| impact.peak)
+        let own = &self.contacts[c].under_way;
+        own.as_ref().map_or(f64::INFINITY, |own| own.impact.peak)
     }
 
-    /// Ends contact `c` at `time` with the penetration rate `rate`. Returns the impact, if it was one.
-    pub(super) fn end(&mut self, c: ContactId, time: f64, rate: f64) -> Option<Impact> {
-        let mut impact = self.contacts[c].impact.take()?;
+    /// Ends contact `c` at `time`, s, in the step being recorded, with the penetration rate `rate`. Returns the impact, if it was one.
+    pub(super) fn end(&mut self, c: ContactId, time: f64, rate: f64) -> Option<&Impact> {
+        let UnderWay { impact, ends, .. } = self.contacts[c].under_way.as_mut()?;
         impact.end = time;
         impact.separation_speed = (-rate).max(0.0);
-        let slot = (self.count % self.finished.len() as u64) as usize;
-        self.finished[slot] = impact;
-        self.count += 1;
+        *ends = true;
         Some(impact)
     }
 
-    /// Records that a live change altered contact `c`, or ended it if `in_contact` is false.
-    pub(super) fn change(&mut self, c: ContactId, in_contact: bool) {
-        let impact = &mut self.contacts[c].impact;
+    /// Records that a live change altered contact `c`, or ended it at `time`, s, if `in_contact` is false.
+    pub(super) fn change(&mut self, c: ContactId, in_contact: bool, time: f64, events: &mut ImpactEvents) {
+        let under_way = &mut self.contacts[c].under_way;
         if in_contact {
-            if let Some(impact) = impact {
-                impact.disturbed = true;
+            if let Some(own) = under_way {
+                own.impact.disturbed = true;
             }
-        } else {
-            *impact = None;
+        } else if let Some(own) = under_way.take() {
+            events.push(ImpactEvent::Ended { id: own.id, end: time, impact: None });
         }
     }
 
     /// The latest finished ones, at most 64, oldest first.
     pub(super) fn latest(&self) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
-        let first = self.count.saturating_sub(STORED_IMPACTS as u64);
-        self.since(first)
-    }
-
-    fn since(&self, first: u64) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
-        let length = self.finished.len() as u64;
+        let length = STORED_IMPACTS as u64;
+        let first = self.count.saturating_sub(length);
         let count = (self.count - first) as usize;
         (0..count).map(move |n| &self.finished[((first + n as u64) % length) as usize])
-    }
-
-    /// Appends the impacts not yet handed out.
-    pub(super) fn take_new(&mut self, out: &mut Vec<Impact>) {
-        let oldest = self.count.saturating_sub(self.finished.len() as u64);
-        out.extend(self.since(self.handed_out.max(oldest)));
-        self.handed_out = self.count;
     }
 }

@@ -19,7 +19,7 @@ pub use angles::angles_of;
 pub use channels::*;
 pub use doubt::{AffectedJoints, Doubt, LedgerTerm};
 pub use frame::*;
-pub use impacts::Impact;
+pub use impacts::{ForcePeak, Impact, ImpactEvent};
 pub use ledger::Ledger;
 pub use load_peaks::{LoadPeak, LoadPeaks};
 pub use simulation::{

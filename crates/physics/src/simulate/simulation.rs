@@ -27,12 +27,13 @@ use serde::{Deserialize, Serialize};
 
 use std::sync::Arc;
 
-use super::impacts::Impacts;
+use super::impacts::{ImpactEvents, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::{ActiveScheme, AnyStepper};
 use super::{
-    Doubt, Effect, Frame, Impact, Indeterminate, Ledger, LoadPeaks, Peak, StartError, Statistics, Stopped, Wear,
+    Doubt, Effect, Frame, Impact, ImpactEvent, Indeterminate, Ledger, LoadPeaks, Peak, StartError, Statistics, Stopped,
+    Wear,
 };
 use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::{Controller, Polynomial};
@@ -269,6 +270,8 @@ struct Attempt {
     /// The full step, if an event truncated it, and the full step of another run that the next step must reproduce.
     full_step: Option<FullStep>,
     step_to_reproduce: Option<FullStep>,
+    /// What happened to impacts since it was last asked.
+    events: ImpactEvents,
     /// Whether it may contain the largest force of a contact.
     may_contain_peak: bool,
     /// The same of the step just accepted.
@@ -562,10 +565,15 @@ impl Simulation {
         out.extend(self.state.joints.iter_mut().map(|joint| std::mem::take(&mut joint.peak)));
     }
 
-    /// Appends to `out` the impacts that finished since the last call. None is lost if it is called after every step;
-    /// otherwise only the latest 64 (more with more ball joints) are guaranteed.
-    pub fn take_impacts(&mut self, out: &mut Vec<Impact>) {
-        self.state.record.impacts.take_new(out);
+    /// What happened to impacts since the last call, in order. None is lost if it is called after every step; otherwise only the
+    /// latest of 64 impacts are guaranteed.
+    pub fn take_events(&mut self) -> impl Iterator<Item = ImpactEvent> + '_ {
+        self.workspace.attempt.events.take()
+    }
+
+    /// The impacts that finished since the last call, among these events; the others are dropped.
+    pub fn take_impacts(&mut self) -> impl Iterator<Item = Impact> + '_ {
+        self.take_events().filter_map(ImpactEvent::finished)
     }
 
     /// Adopts the gravity, contacts and stepper of `next`. Returns [`Effect::AtReset`] and changes nothing if `next` differs in

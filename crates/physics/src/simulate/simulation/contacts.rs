@@ -6,7 +6,7 @@ use crate::contact::{ContactState, Separation};
 use crate::integrate::StepControl;
 use crate::machine::MIN_IMPACT_STEPS;
 use crate::mechanism::{ContactId, Contacts};
-use crate::simulate::impacts::Onset;
+use crate::simulate::impacts::{ImpactEvents, Onset};
 use crate::simulate::peaks::PenetrationCubic;
 
 /// Largest penetration, as a fraction of the clearance, of a ball that is at its wall to within rounding.
@@ -29,7 +29,13 @@ pub(super) struct ContactChanges {
 impl State {
     /// Records that contact `c` begins at `time` with penetration rate `rate` (m/s), which was changing at `push` (m/s^2);
     /// returns its contact state.
-    fn begin(&mut self, c: ContactId, time: f64, rate: f64, push: f64, contacts: &Contacts) -> ContactState {
+    fn begin(
+        &mut self,
+        c: ContactId,
+        (time, rate, push): (f64, f64, f64),
+        contacts: &Contacts,
+        events: &mut ImpactEvents,
+    ) -> ContactState {
         let j = contacts.joint_of(c);
         let requested = self.conditions.joints[j].restitution;
         let coefficients = contacts.coefficients(c);
@@ -37,7 +43,7 @@ impl State {
         let mut active = self.now.contact_states.iter().enumerate().filter(|(_, m)| m.active);
         let among_others = active.any(|(other, _)| interacts(other));
         let onset = Onset { contact: c, joint: j, time, speed: rate, push, requested, among_others };
-        self.record.impacts.begin(&onset, coefficients, interacts);
+        self.record.impacts.begin(&onset, coefficients, interacts, events);
         let contact_state = ContactState::at_onset(coefficients, rate);
         self.record.statistics.joints[j].impacts += 1;
         let peak = &mut self.joints[j].peak;
@@ -48,19 +54,18 @@ impl State {
         contact_state
     }
 
-    /// Records a step of contact `c` that began at `start` (s), from fraction `from` on, with the largest normal force `force` (N).
+    /// Records a step of contact `c` that began at `start` (s), from fraction `from` on.
     fn record_contact_step(
         &mut self,
         (c, contacts): (ContactId, &Contacts),
         start: f64,
         cubic: &PenetrationCubic,
-        force: f64,
         contact_state: &ContactState,
         from: f64,
     ) {
         let (j, law) = (contacts.joint_of(c), contacts.coefficients(c));
         let (damping, theta) = cubic.most_damped(law, contact_state, from);
-        self.record.impacts.update(c, cubic, force, damping);
+        self.record.impacts.update(c, cubic, damping);
         if damping > self.record.statistics.joints[j].damping {
             self.record.statistics.joints[j].damping = damping;
             self.record.statistics.joints[j].damping_time = start + theta * (self.now.t - start);
@@ -72,7 +77,7 @@ impl Stepping<'_> {
     /// Initialises the contacts that exist at the start. Their onset is unknown, so the floor serves as approach speed; a ball at
     /// its wall to within rounding begins its contact there, at its current rate.
     pub(super) fn begin_contacts_at_start(&mut self) {
-        let Self { mechanism, state, .. } = self;
+        let Self { mechanism, state, attempt, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
         for c in 0..state.now.gaps.len() {
             let j = mechanism.contacts.joint_of(c);
@@ -82,7 +87,8 @@ impl Stepping<'_> {
                 continue;
             }
             if penetration <= AT_WALL * mechanism.contacts.clearance(c) && rate > 0.0 {
-                state.now.contact_states[c] = state.begin(c, 0.0, rate, UNKNOWN_PUSH, &mechanism.contacts);
+                state.now.contact_states[c] =
+                    state.begin(c, (0.0, rate, UNKNOWN_PUSH), &mechanism.contacts, &mut attempt.events);
             } else {
                 state.now.contact_states[c] = ContactState::at_onset(coefficients, f64::NEG_INFINITY);
                 state.record.statistics.joints[j].impacts += 1;
@@ -93,12 +99,13 @@ impl Stepping<'_> {
     /// Begins the contacts of balls that are exactly at their walls and move into them: the next step would show no sign change.
     /// The force is still 0.
     pub(super) fn begin_contacts_at_walls(&mut self) {
-        let Self { mechanism, state, .. } = self;
+        let Self { mechanism, state, attempt, .. } = self;
         let mut begins = false;
         for c in 0..state.now.gaps.len() {
             let gap = state.now.gaps[c];
             if gap.is_arriving() && !state.now.contact_states[c].active {
-                state.now.contact_states[c] = state.begin(c, state.now.t, gap.rate, UNKNOWN_PUSH, &mechanism.contacts);
+                let onset = (state.now.t, gap.rate, UNKNOWN_PUSH);
+                state.now.contact_states[c] = state.begin(c, onset, &mechanism.contacts, &mut attempt.events);
                 state.contacts[c].steps = 0;
                 begins = true;
             }
@@ -113,7 +120,6 @@ impl Stepping<'_> {
         let located = self.attempt.located_contact.take();
         let (fixed, rounding) = (!self.locates(), self.rounding());
         let Self { mechanism, state, before, attempt, .. } = self;
-        let peak_forces = &attempt.peak_forces;
         let counts_steps = state.conditions.solver.method.control() == StepControl::Fixed;
         let mut changes = ContactChanges { contacts: false, forces: false };
         // What is as close to its wall as the located ball, which is there but for the error of the step, switches in the same
@@ -126,14 +132,10 @@ impl Stepping<'_> {
             if state.now.contact_states[c].active {
                 let cubic = PenetrationCubic::new(start, end, h, rounding);
                 let contact_state = state.now.contact_states[c].unfrozen();
-                state.record_contact_step(
-                    (c, &mechanism.contacts),
-                    before.t,
-                    &cubic,
-                    peak_forces[c].0,
-                    &contact_state,
-                    0.0,
-                );
+                state.record_contact_step((c, &mechanism.contacts), before.t, &cubic, &contact_state, 0.0);
+                let (force, theta) = attempt.peak_forces[c];
+                let direction = -mechanism.contacts.gap(c).separation.normal;
+                state.record.impacts.raise_peak(c, force, direction, before.t + theta * h);
             }
             // A located switch ends within rounding of the wall, on either side. The repeated step may still show that a ball
             // about to separate has turned back.
@@ -163,7 +165,7 @@ impl Stepping<'_> {
                 let approach_time = theta * h;
                 let is_known = approach_time > TOO_SHORT_FOR_PUSH;
                 let push = if is_known { (rate - start.rate) / approach_time } else { UNKNOWN_PUSH };
-                let mut contact_state = state.begin(c, time, rate, push, &mechanism.contacts);
+                let mut contact_state = state.begin(c, (time, rate, push), &mechanism.contacts, &mut attempt.events);
                 if !fixed && !switches && end.penetration > AT_WALL * mechanism.contacts.clearance(c) {
                     let late = &mut state.record.statistics.joints[j].late;
                     *late = late.max(end.penetration);
@@ -171,8 +173,10 @@ impl Stepping<'_> {
                 // A located contact begins where the step ends.
                 if fixed {
                     contact_state.update_largest_rate(coefficients, end.rate, || cubic.fastest(theta).0);
-                    let (force, _) = cubic.strongest(coefficients, &contact_state);
-                    state.record_contact_step((c, &mechanism.contacts), before.t, &cubic, force, &contact_state, theta);
+                    let (force, at) = cubic.strongest(coefficients, &contact_state);
+                    let direction = -mechanism.contacts.gap(c).separation.normal;
+                    state.record_contact_step((c, &mechanism.contacts), before.t, &cubic, &contact_state, theta);
+                    state.record.impacts.raise_peak(c, force, direction, before.t + at * h);
                 }
                 state.now.contact_states[c] = contact_state;
             } else {
@@ -190,7 +194,7 @@ impl Stepping<'_> {
                     let farthest =
                         statistics.joints[j].excessive_rebound.map_or(0.0, |impact| impact.restitution_excess());
                     if impact.restitution_excess() > farthest {
-                        statistics.joints[j].excessive_rebound = Some(impact);
+                        statistics.joints[j].excessive_rebound = Some(*impact);
                     }
                 }
                 let coarse = counts_steps && steps < MIN_IMPACT_STEPS;
@@ -234,9 +238,6 @@ impl Stepping<'_> {
                 peak.normal = force;
                 peak.time = time;
                 peak.normal_force = gap.separation.normal * -force;
-                // Friction is taken as proportional to the normal force within a step, with the ratio at the step's end.
-                peak.friction_force =
-                    if gap.normal_force > 0.0 { gap.friction * (force / gap.normal_force) } else { gap.friction };
             }
         }
     }

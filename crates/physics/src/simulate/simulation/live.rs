@@ -125,7 +125,7 @@ impl Stepping<'_> {
         if contact.clearance == 0.0 {
             return;
         }
-        let Self { mechanism, state, .. } = self;
+        let Self { mechanism, state, attempt, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
         let now = mechanism.contacts.joint_clearance(j);
         let contacts = mechanism.contacts.of_joint(j);
@@ -145,7 +145,8 @@ impl Stepping<'_> {
             if clearance > now && state.now.contact_states[c].active && distance(c) <= clearance {
                 state.now.contact_states[c] = ContactState::default();
             }
-            state.record.impacts.change(c, state.now.contact_states[c].active);
+            let in_contact = state.now.contact_states[c].active;
+            state.record.impacts.change(c, in_contact, state.now.t, &mut attempt.events);
         }
     }
 

@@ -59,6 +59,7 @@ impl Stepping<'_> {
         self.attempt.is_near_peak = std::mem::take(&mut self.attempt.may_contain_peak);
         self.search_contacts();
         self.search_reactions();
+        self.state.record.impacts.end_step(&mut self.attempt.events);
     }
 
     /// Samples a fixed step near a contact peak: if the step is long compared with an impact, an output row inside it sees other
@@ -77,10 +78,10 @@ impl Stepping<'_> {
                 }
                 for c in self.mechanism.contacts.of_joint(j) {
                     let gap = self.mechanism.contacts.gap(c);
-                    let (normal, size, friction) = (gap.separation.normal, gap.normal_force, gap.friction);
+                    let (normal, size) = (gap.separation.normal, gap.normal_force);
+                    self.state.record.impacts.raise_peak(c, size, -normal, time);
                     if self.is_peak(j, size, time) {
                         self.state.joints[j].peak.normal_force = normal * -size;
-                        self.state.joints[j].peak.friction_force = friction;
                     }
                 }
             }

@@ -9,7 +9,7 @@ use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::{Polynomial, Step};
 use crate::machine::Conditions;
 use crate::mechanism::{ContactId, Flight, Mechanism, Pull};
-use crate::simulate::impacts::{Impact, Impacts};
+use crate::simulate::impacts::{ForcePeak, Impact, Impacts};
 use crate::simulate::ledger::{Account, Ledger};
 use crate::simulate::peaks::{Approach, Recent};
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
@@ -146,6 +146,16 @@ impl State {
     /// The latest finished impacts, at most 64, oldest first.
     pub fn impacts(&self) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
         self.record.impacts.latest()
+    }
+
+    /// Number of impacts begun since the start; the next one has this number.
+    pub fn impacts_begun(&self) -> u64 {
+        self.record.impacts.begun()
+    }
+
+    /// The impacts under way: the number of each, what is known of it, and its largest force so far.
+    pub fn impacts_under_way(&self) -> impl Iterator<Item = (u64, &Impact, ForcePeak)> {
+        self.record.impacts.under_way().map(|own| (own.id, &own.impact, own.peak))
     }
 
     /// Energy exchanged since the start; `None` where `solver.energy_ledger` is off.

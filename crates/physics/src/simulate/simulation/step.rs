@@ -9,6 +9,7 @@ use super::{
 use crate::integrate::{Method, StepControl, System as _};
 use crate::machine::Machine;
 use crate::mechanism::{ActiveSet, Counts, Mechanism, OFF_PATH};
+use crate::simulate::impacts::ImpactEvents;
 use crate::simulate::peaks::Recent;
 use crate::simulate::{Frame, Indeterminate, StartError, StopAdvice, StopFault, Stopped};
 
@@ -27,6 +28,7 @@ impl Attempt {
             has_left_branch: vec![false; contacts],
             full_step: None,
             step_to_reproduce: None,
+            events: ImpactEvents::new(contacts),
             may_contain_peak: false,
             is_near_peak: false,
             peak_forces: vec![(0.0, 0.0); contacts],
@@ -44,6 +46,7 @@ impl Attempt {
         self.full_step = None;
         self.step_to_reproduce = None;
         self.may_contain_peak = false;
+        self.events.clear();
     }
 }
 
@@ -53,18 +56,7 @@ impl<'a> Stepping<'a> {
         workspace.attach_to(model, state);
         let Workspace { mechanism, stepper, before, attempt, scratch_y, scratch_k, scratch_contacts, .. } = workspace;
         let machine = model.machine();
-        Self {
-            model,
-            machine,
-            state,
-            mechanism,
-            stepper,
-            before,
-            attempt,
-            scratch_y,
-            scratch_k,
-            scratch_contacts,
-        }
+        Self { model, machine, state, mechanism, stepper, before, attempt, scratch_y, scratch_k, scratch_contacts }
     }
 }
 
