@@ -1,19 +1,21 @@
 //! A scene compiled for the equations of motion: centroid frames, coordinate numbering, trees, drives.
 
+mod bodies;
+
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use super::assembly::{Assembled, Settled};
-use super::drives::{Law, Trajectory, trajectory_of};
+use super::drives::{Law, Trajectory};
 use super::factor::{NONE, Pattern};
 use super::kinematics::Kinematics;
 use super::pairs::{Cut, Opening};
 use crate::expression::Tape;
 use crate::jet::Jet;
 use crate::machine::{
-    Attachment, ClosedForm, Drive, Freedom, Joint, JointKind, JointStart, LooseKind, Machine, Mat3, Path, Quat,
-    StartRule, Vec3,
+    Attachment, ClosedForm, Joint, JointKind, JointStart, LooseKind, Machine, Mat3, Path, Quat, StartRule, Vec3,
 };
+use bodies::BodyTrees;
 
 /// Index of a body: the scene's bodies, then massless links; one past the last is the world.
 pub type BodyIndex = usize;
@@ -220,102 +222,8 @@ pub struct Model {
 impl Model {
     /// Compiles `machine`.
     pub fn new(machine: &Machine) -> Self {
-        let massive = machine.bodies.len();
-        let has_two_degrees = |joint: &&Joint| joint.kind.freedoms().len() == 2;
-        let world = massive + machine.joints.iter().filter(has_two_degrees).count();
-        let mut drives = Vec::new();
-        let mut bodies: Vec<Body> = Vec::new();
-        let mut links: Vec<Body> = Vec::new();
-        let mut two_degree_joints = Vec::new();
-        let mut order = Vec::with_capacity(world);
-        let mut root = vec![usize::MAX; world];
-        for (index, (body, joint)) in machine.bodies.iter().zip(&machine.joints).enumerate() {
-            let parent = joint.parent.unwrap_or(world);
-            let parent_centre = joint.parent.map_or(Vec3::zeros(), |p| machine.bodies[p].centre);
-            let mut motion_of = |freedom: Freedom, drive: &Option<Drive>, body| {
-                let revolute = freedom.turns();
-                match drive {
-                    Some(drive) => {
-                        let trajectory = trajectory_of(drive, revolute);
-                        drives.push(DriveLaw { trajectory, body });
-                        let drive = drives.len() - 1;
-                        Motion::Driven { drive, revolute }
-                    }
-                    // Numbered below, tree by tree.
-                    None if revolute => Motion::Revolute { q: 0, v: 0 },
-                    None => Motion::Prismatic { q: 0, v: 0 },
-                }
-            };
-            let (mut link_motion, link) = (None, massive + links.len());
-            let motion = match *joint.kind.freedoms() {
-                [only] => motion_of(only, &joint.drive, index),
-                [first, second] => {
-                    link_motion = Some(motion_of(first, &joint.drive, link));
-                    motion_of(second, &joint.second_drive, index)
-                }
-                _ if joint.kind == JointKind::Fixed => Motion::Fixed,
-                _ => Motion::Free { q: 0, v: 0 },
-            };
-            let root_below = |above: usize, body: BodyIndex, motion: &Motion| match motion {
-                _ if above != usize::MAX => above,
-                Motion::Fixed | Motion::Driven { .. } => usize::MAX,
-                _ => body,
-            };
-            let mut above = if parent == world { usize::MAX } else { root[parent] };
-            if let Some(motion) = &link_motion {
-                above = root_below(above, link, motion);
-                root[link] = above;
-            }
-            root[index] = root_below(above, index, &motion);
-            let moves_freely = root[index] != usize::MAX;
-            if parent != world && moves_freely {
-                bodies[parent].has_moving_child = true;
-            }
-            let rest = joint.rotation.to_rotation_matrix().into_inner();
-            let from_parent = joint.parent_point - parent_centre;
-            let to_centroid = body.centre - joint.child_point;
-            let (mut parent_or_link, mut from, mut axis) = (parent, from_parent, joint.axis);
-            if let Some(motion) = link_motion {
-                let child = Anchor { body: index, offset: -to_centroid };
-                let of_parent = Anchor { body: parent, offset: from_parent };
-                two_degree_joints.push(Pair::new(joint, child, of_parent));
-                links.push(Body {
-                    driven_only: root[link] == usize::MAX,
-                    has_moving_child: moves_freely,
-                    ..link_of(joint, motion, parent, from_parent)
-                });
-                order.push(link);
-                (parent_or_link, from) = (link, Vec3::zeros());
-                if joint.kind == JointKind::Universal {
-                    axis = joint.rotation * joint.child_axis;
-                }
-            }
-            order.push(index);
-            let turns = match motion {
-                Motion::Driven { revolute, .. } => revolute,
-                _ => matches!(motion, Motion::Revolute { .. }),
-            };
-            let [fixed, cosine, sine] = rotation_parts(&axis, rest, turns);
-            let inertia = body.inertia;
-            bodies.push(Body {
-                mass: body.mass,
-                inertia,
-                inertia_inverse: inertia.try_inverse().unwrap_or_else(Mat3::zeros),
-                parent: parent_or_link,
-                motion,
-                from_parent: from,
-                to_centroid,
-                axis,
-                fixed,
-                cosine,
-                sine,
-                origin: -body.centre,
-                driven_only: root[index] == usize::MAX,
-                has_moving_child: false,
-                diagonal: inertia == Mat3::from_diagonal(&inertia.diagonal()),
-            });
-        }
-        bodies.append(&mut links);
+        let BodyTrees { bodies, drives, two_degree_joints, order, root, .. } = BodyTrees::of(machine);
+        let (massive, world) = (machine.bodies.len(), bodies.len());
         let mut order_index = vec![0; world];
         for (at, &body) in order.iter().enumerate() {
             order_index[body] = at;
@@ -366,28 +274,33 @@ impl Model {
             bounding,
         };
         model.number_coordinates(machine, &root);
-        for (index, joint) in machine.loose_joints.iter().enumerate() {
-            let ideal = (joint.contact.clearance == 0.0).then(|| {
-                model.ideal_joints.push(index);
-                model.ideal_joints.len() - 1
-            });
-            let [carrier, carried] = [joint.carrier(), joint.carried()].map(|point| model.anchor(machine, &point));
-            let first = model.sites.len();
-            if ideal.is_none() {
-                let sites = joint.kind.sites([carrier, carried]);
-                model.sites.extend(sites.map(|[carrier, carried]| Site { joint: index, carrier, carried }));
-            }
-            let contacts = first..model.sites.len();
-            model.joints.push(LooseJoint { kind: joint.kind, carrier, carried, ideal, contacts });
-        }
-        for joint in &machine.closing_joints {
-            let [parent, child] = joint.points().map(|point| model.anchor(machine, &point));
-            model.closures.push(Pair::new(joint, child, parent));
-        }
+        model.cut_joints(machine);
         let own_reaches = model.own_reaches(machine, |_| Vec3::zeros());
         model.spin_scales = own_reaches[..massive].iter().map(|reach| model.angle_scale(*reach)).collect();
         model.extent = model.distances().fold(0.0, f64::max);
         model
+    }
+
+    /// Compiles the joints that are cut: loose joints with their contacts, and joints that close loops.
+    fn cut_joints(&mut self, machine: &Machine) {
+        for (index, joint) in machine.loose_joints.iter().enumerate() {
+            let ideal = (joint.contact.clearance == 0.0).then(|| {
+                self.ideal_joints.push(index);
+                self.ideal_joints.len() - 1
+            });
+            let [carrier, carried] = [joint.carrier(), joint.carried()].map(|point| self.anchor(machine, &point));
+            let first = self.sites.len();
+            if ideal.is_none() {
+                let sites = joint.kind.sites([carrier, carried]);
+                self.sites.extend(sites.map(|[carrier, carried]| Site { joint: index, carrier, carried }));
+            }
+            let contacts = first..self.sites.len();
+            self.joints.push(LooseJoint { kind: joint.kind, carrier, carried, ideal, contacts });
+        }
+        for joint in &machine.closing_joints {
+            let [parent, child] = joint.points().map(|point| self.anchor(machine, &point));
+            self.closures.push(Pair::new(joint, child, parent));
+        }
     }
 
     /// Bounds on the distances of the anchors of cut joints, and of all centroids, from the origin with all coordinates at zero,
@@ -629,40 +542,6 @@ impl Model {
     pub fn step_end(&self, t: f64) -> f64 {
         let ends = self.bounding.iter().map(|law| law.step_end(t));
         ends.fold(f64::INFINITY, f64::min)
-    }
-}
-
-/// Relative rotation of a joint for coordinate q in constant, cosine and sine parts: Rot(axis, q) R0 =
-/// (a a^T + cos q (1 - a a^T) + sin q [a]x) R0 if it `turns`, else R0.
-fn rotation_parts(axis: &Vec3, rest: Mat3, turns: bool) -> [Mat3; 3] {
-    if !turns {
-        return [rest, Mat3::zeros(), Mat3::zeros()];
-    }
-    let along = axis * axis.transpose();
-    [along * rest, (Mat3::identity() - along) * rest, axis.cross_matrix() * rest]
-}
-
-/// The massless link of a two-degree joint: on the slide of a cylindrical joint or the first hinge of a universal joint, whose
-/// motion is `motion`.
-fn link_of(joint: &Joint, motion: Motion, parent: BodyIndex, from_parent: Vec3) -> Body {
-    let slides = joint.kind == JointKind::Cylindrical;
-    let [fixed, cosine, sine] = rotation_parts(&joint.axis, Mat3::identity(), !slides);
-    Body {
-        mass: 0.0,
-        inertia: Mat3::zeros(),
-        inertia_inverse: Mat3::zeros(),
-        parent,
-        motion,
-        from_parent,
-        to_centroid: Vec3::zeros(),
-        axis: joint.axis,
-        fixed,
-        cosine,
-        sine,
-        origin: Vec3::zeros(),
-        driven_only: false,
-        has_moving_child: true,
-        diagonal: true,
     }
 }
 

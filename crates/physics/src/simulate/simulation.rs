@@ -128,6 +128,8 @@ pub struct State {
 /// What one loose joint remembers from step to step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct JointState {
+    /// Number of its contacts: none if it is ideal.
+    contacts: usize,
     /// Active ramp of the clearance, and the clearance without it, m.
     ramp: Option<Ramp>,
     clearance: f64,

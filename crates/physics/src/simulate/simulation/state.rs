@@ -19,6 +19,7 @@ impl JointState {
     /// At the start, where any joint may touch for the first time.
     fn new(mechanism: &Mechanism, j: usize) -> Self {
         Self {
+            contacts: mechanism.contacts.of_joint(j).len(),
             ramp: None,
             clearance: mechanism.contacts.joint_clearance(j),
             reaction: Recent::default(),
@@ -169,8 +170,8 @@ impl State {
         self.record.wear.as_ref()
     }
 
-    /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, then for each ball joint
-    /// whether it is in contact, its approach speed, and its current clearance; then, of the angles that elements act on and
+    /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, then for each loose joint
+    /// whether each of its contacts touches and its approach speed (0 and 0 if it is ideal), and its current clearance; then, of the angles that elements act on and
     /// coordinates do not count, the number and the quarter turns of each that has at least two. The current branch of the friction law is excluded: like the step size, it belongs to
     /// the stepper.
     pub fn hash(&self) -> u64 {
@@ -184,13 +185,15 @@ impl State {
         for y in &self.now.y {
             add(y.to_bits());
         }
-        // A ball has one contact, unless it is ideal.
-        let mut contacts = self.now.contact_states.iter();
-        for (j, parameters) in self.conditions.joints.iter().enumerate() {
-            let contact = if parameters.clearance > 0.0 { contacts.next() } else { None };
-            let contact = contact.copied().unwrap_or_default();
-            add(u64::from(contact.active));
-            add(contact.approach_speed.to_bits());
+        let mut contacts = &self.now.contact_states[..];
+        let free = [ContactState::default()];
+        for (j, joint) in self.joints.iter().enumerate() {
+            let (own, others) = contacts.split_at(joint.contacts);
+            contacts = others;
+            for contact in if own.is_empty() { &free } else { own } {
+                add(u64::from(contact.active));
+                add(contact.approach_speed.to_bits());
+            }
             add(self.clearance(j).to_bits());
         }
         // Closer to 0 the poses determine the angle.
@@ -229,7 +232,7 @@ impl State {
             && record.quarter_turns.len() == own.record.quarter_turns.len()
             && loose(conditions) == loose(&own.conditions)
             && model.machine().with_conditions(conditions).check().is_ok()
-            && self.joints.len() == joints
+            && self.joints.iter().map(|joint| joint.contacts).eq(own.joints.iter().map(|joint| joint.contacts))
             && self.contacts.len() == contacts
             && self.flights.len() == own.flights.len()
             // Only a window has a hand.
