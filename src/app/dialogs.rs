@@ -9,7 +9,7 @@ use super::load::Load;
 use super::player::Player;
 use super::spoken;
 use crate::analysis::ready_sweeps::ReadySweep;
-use code::SharedLink;
+pub use code::SharedLink;
 
 mod code;
 
@@ -69,6 +69,11 @@ pub enum Dialog {
 }
 
 impl Dialog {
+    /// Asks for a link, a file or a built-in scene.
+    pub fn open() -> Self {
+        Self::Open { path: String::new(), error: None }
+    }
+
     fn title(&self) -> &'static str {
         match self {
             Self::Help => "Keys",

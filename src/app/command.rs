@@ -1,0 +1,230 @@
+//! Commands of keys, menus, messages, dialogs and the bench, and their execution.
+
+use eframe::egui::{self, ThemePreference};
+
+use super::App;
+use super::bench::BenchRequest;
+use super::dialogs::{self, Answer, Dialog};
+use super::keys::Action;
+use super::panels::Sheet;
+#[cfg(not(target_arch = "wasm32"))]
+use super::plots::PlotFormat;
+use super::undo::Undo;
+use super::{impact_list, opening};
+use crate::scene::{DEFAULT_SCENE, Scene};
+
+/// What a widget asks of the application.
+pub enum Command {
+    /// Opens a built-in scene or a file.
+    Open(String),
+    /// Opens a recent file, which may be gone.
+    #[cfg(not(target_arch = "wasm32"))]
+    OpenRecent(String),
+    /// Lets the user choose a scene file.
+    ChooseFile,
+    /// Shows a dialog.
+    Ask(Dialog),
+    /// Shows the settings of a film.
+    AskFilm,
+    CopyLink,
+    /// Shows the link with its QR code.
+    ShowLink,
+    CopyEmbedding,
+    SavePicture,
+    #[cfg(not(target_arch = "wasm32"))]
+    SavePlots(PlotFormat),
+    SaveRecord,
+    SaveImpacts,
+    SaveScene,
+    Undo {
+        redo: bool,
+    },
+    /// Starts a built-in lesson.
+    Lesson(&'static str),
+    /// Opens or closes the audience window.
+    #[cfg(not(target_arch = "wasm32"))]
+    Audience(bool),
+    /// Reverts the changes of the first-time scene.
+    PaperSettings,
+    /// Stops or cancels the task under way.
+    StopTasks,
+}
+
+impl App {
+    /// Carries out `command`.
+    pub(super) fn perform(&mut self, ctx: &egui::Context, command: Command) {
+        match command {
+            Command::Open(name) => {
+                let opened = self.open(&name);
+                self.messages.report(opened);
+            }
+            #[cfg(not(target_arch = "wasm32"))]
+            Command::OpenRecent(file) => {
+                let opened = super::remembered::check_exists(&file).and_then(|()| self.open(&file));
+                self.messages.report(opened);
+            }
+            Command::ChooseFile => self.choose_file(),
+            Command::Ask(dialog) => self.dialog = Some(dialog),
+            Command::AskFilm => {
+                let settings = self.tasks.film_to_make(&self.run.player);
+                self.dialog = Some(Dialog::Film { settings });
+            }
+            Command::CopyLink => self.copy_link(ctx),
+            Command::ShowLink => self.show_link_dialog(),
+            Command::CopyEmbedding => self.copy_embedding(ctx),
+            Command::SavePicture => self.picture.request(ctx),
+            #[cfg(not(target_arch = "wasm32"))]
+            Command::SavePlots(format) => match self.run.plots.file(&self.run.player, format) {
+                Ok(file) => self.save(vec![file]),
+                Err(reason) => self.messages.fail(reason),
+            },
+            Command::SaveRecord => self.save_record(),
+            Command::SaveImpacts => self.save(impact_list::files(&self.run.player)),
+            Command::SaveScene => self.save_scene(),
+            Command::Undo { redo } => {
+                if !self.tasks.are_under_way() {
+                    self.messages.warn(self.run.undo(redo));
+                }
+            }
+            Command::Lesson(name) => self.open_lesson(name),
+            #[cfg(not(target_arch = "wasm32"))]
+            Command::Audience(on) => self.show_audience(on),
+            Command::PaperSettings => {
+                let opened = Scene::load(DEFAULT_SCENE, &[]).map_err(|error| error.to_string());
+                let opened = opened.and_then(|scene| {
+                    self.show_scene(&scene)?;
+                    self.run.player.pacer.set_scale(opening::time_scale(&scene));
+                    Ok(())
+                });
+                self.messages.report(opened);
+            }
+            Command::StopTasks => self.tasks.cancel(&mut self.run, &mut self.messages),
+        }
+    }
+
+    /// Performs the action of a key.
+    pub(super) fn perform_action(&mut self, ctx: &egui::Context, action: Action) {
+        // An open dialog blocks the machine's controls.
+        if self.dialog.is_some() && !matches!(action, Action::Help | Action::Close) {
+            return;
+        }
+        let moves = matches!(
+            action,
+            Action::PlayPause
+                | Action::Step
+                | Action::StepBack
+                | Action::Backwards
+                | Action::Impact { .. }
+                | Action::Home
+                | Action::End
+                | Action::Reset
+        );
+        if self.tasks.are_under_way() && moves {
+            return;
+        }
+        match action {
+            Action::Reset => self.reset(),
+            Action::IdealGhost => {
+                let on = self.run.player.ideal().is_none();
+                self.messages.warn(self.run.show_ideal(on));
+            }
+            Action::Sound => self.set_sound(!self.is_sounding()),
+            Action::TurnPage { forward } => self.change_step(forward),
+            Action::Present => self.present(ctx, !self.is_presenting()),
+            Action::Costs => self.show_costs(!self.shows_costs()),
+            Action::Plots if self.is_presenting() => self.show_next_plot(),
+            Action::Panel => self.panels.toggle(Sheet::Controls),
+            Action::Plots => self.panels.toggle(Sheet::Plots),
+            Action::Bench => self.panels.toggle(Sheet::Bench),
+            Action::Theme => ctx.set_theme(match ctx.theme() {
+                egui::Theme::Dark => ThemePreference::Light,
+                egui::Theme::Light => ThemePreference::Dark,
+            }),
+            Action::Help => {
+                self.dialog = if self.dialog == Some(Dialog::Help) { None } else { Some(Dialog::Help) };
+            }
+            Action::Close => self.close_innermost(ctx),
+            other => self.run.perform(other),
+        }
+    }
+
+    /// Closes the innermost element: menu, dialog, operation in progress, message, presentation or microscope.
+    fn close_innermost(&mut self, ctx: &egui::Context) {
+        // A menu and a list close themselves.
+        if egui::Popup::is_any_open(ctx) || self.dialog.take().is_some() {
+            return;
+        }
+        if self.tasks.are_under_way() {
+            self.tasks.cancel(&mut self.run, &mut self.messages);
+        } else if self.messages.dismiss_problem() {
+            // Only the message closes.
+        } else if self.is_presenting() {
+            self.present(ctx, false);
+        } else {
+            self.run.microscope.set_open(false);
+        }
+    }
+
+    /// Handles the keys of undo and redo.
+    pub(super) fn receive_undo(&mut self, ctx: &egui::Context) {
+        if self.dialog.is_none()
+            && !self.tasks.are_under_way()
+            && !ctx.text_edit_focused()
+            && let Some(redo) = Undo::pressed(ctx)
+        {
+            self.perform(ctx, Command::Undo { redo });
+        }
+    }
+
+    /// Shows the open dialog and handles its answer.
+    pub(super) fn dialog_ui(&mut self, ctx: &egui::Context) {
+        let Some(mut dialog) = self.dialog.take() else {
+            return;
+        };
+        let answer = dialogs::ui(ctx, &mut dialog, &self.run.player, &self.graphics.renderer);
+        match (answer, dialog) {
+            (Some(Answer::Save(path)), Dialog::Save { files, .. }) => self.save_as(path, files),
+            (Some(Answer::Copy), Dialog::Link(shared)) => {
+                self.copy(ctx, shared.link());
+                if shared.is_editable() {
+                    self.files.page = shared.page().to_owned();
+                }
+            }
+            (Some(Answer::Film), Dialog::Film { settings }) => {
+                let started = self.tasks.start_film(&mut self.run, &self.graphics, settings);
+                self.messages.report(started);
+            }
+            (Some(Answer::Sweep), Dialog::Ready { sweep, .. }) => self.start_ready_sweep(sweep),
+            #[cfg(not(target_arch = "wasm32"))]
+            (Some(Answer::StartAsNew), _) => self.reset_to_first_start(ctx),
+            (Some(Answer::Load), Dialog::Load { load, .. }) => self.go_to_section(*load),
+            (Some(Answer::Open(argument)), _) => {
+                if let Err(reason) = self.open_any(ctx, &argument) {
+                    // The dialog shows the error instead.
+                    self.messages.dismiss_problem();
+                    self.dialog = Some(Dialog::Open { path: argument, error: Some(reason) });
+                }
+            }
+            (Some(_), _) => {}
+            (None, dialog) => self.dialog = Some(dialog),
+        }
+    }
+
+    /// Handles a request of the bench.
+    pub(super) fn apply_bench_request(&mut self, request: BenchRequest) {
+        match request {
+            BenchRequest::Section(load) => self.start_load(load),
+            BenchRequest::Value { key, text } => match self.run.player.set(&key, &text) {
+                Err(error) => self.messages.fail(error),
+                Ok(_) => {
+                    self.run.controls.reveal(&key);
+                    if self.panels.is_compact() {
+                        self.bench.set_aside();
+                    }
+                    self.panels.show(Sheet::Controls, true);
+                }
+            },
+            BenchRequest::Ready(sweep) => self.ask_ready_sweep(sweep),
+        }
+    }
+}
