@@ -5,7 +5,7 @@ use eframe::egui::{self, CentralPanel, Panel, PointerButton, Ui, ViewportBuilder
 
 use super::keys::Action;
 use super::run::Run;
-use super::{App, keys, layout, present, theme};
+use super::{keys, layout, present, theme};
 
 /// Initial size, points at zoom 1.
 const INITIAL_SIZE: egui::Vec2 = vec2(1280.0, 720.0);
@@ -46,23 +46,21 @@ pub fn entry(ui: &mut Ui, on: bool) -> bool {
     ui.add(egui::Button::selectable(on, "Window for the class")).on_hover_text(help).clicked()
 }
 
-impl App {
-    /// Opens or closes the audience window.
-    pub fn show_audience(&mut self, on: bool) {
-        self.presentation.audience = on.then_some(Audience { height: INITIAL_SIZE.y, fills_screen: false });
+impl Audience {
+    /// The window when it opens.
+    pub fn open() -> Self {
+        Self { height: INITIAL_SIZE.y, fills_screen: false }
     }
 
-    /// Whether it is open.
-    pub fn has_audience(&self) -> bool {
-        self.presentation.audience.is_some()
-    }
-
-    /// Shows the window if it is open.
-    pub(super) fn audience_ui(&mut self, ctx: &egui::Context) {
-        let Some(audience) = &self.presentation.audience else {
-            return;
-        };
-        let zoom = present::legible_zoom(audience.height);
+    /// Shows the window with the plot of index `plot`. Returns the actions of its keys, and whether it was closed.
+    pub fn ui(
+        &mut self,
+        ctx: &egui::Context,
+        run: &mut Run,
+        plot: Option<usize>,
+        is_filmed: bool,
+    ) -> (Vec<Action>, bool) {
+        let zoom = present::legible_zoom(self.height);
         // In points at the initial zoom; a changed size would resize the window.
         let size = INITIAL_SIZE / present::legible_zoom(INITIAL_SIZE.y);
         let builder = ViewportBuilder::default()
@@ -73,42 +71,29 @@ impl App {
         // egui has one zoom for all windows. This window is drawn immediately with its own zoom, which keys do not change.
         let own = ctx.options(|options| (options.zoom_factor, options.zoom_with_keyboard));
         ctx.options_mut(|options| (options.zoom_factor, options.zoom_with_keyboard) = (zoom, false));
-        let (plot, is_filmed) = (self.presentation.single_plot(&self.run), self.tasks.filming().is_some());
-        let run = &mut self.run;
         let results = ctx.show_viewport_immediate(id(), builder, |ui, _| contents(ui, run, plot, is_filmed));
         ctx.options_mut(|options| (options.zoom_factor, options.zoom_with_keyboard) = own);
-        let Some(audience) = &mut self.presentation.audience else {
-            return;
-        };
-        if audience.height != results.height {
-            audience.height = results.height;
+        if self.height != results.height {
+            self.height = results.height;
             ctx.request_repaint();
         }
-        for key in results.keys {
-            match key {
-                Action::Present => self.fill_class_screen(ctx),
-                Action::Plots => self.show_next_plot(),
-                // Leaves full screen, as in the first window.
-                Action::Close if self.presentation.audience.as_ref().is_some_and(|audience| audience.fills_screen) => {
-                    self.fill_class_screen(ctx);
-                }
-                Action::Close => {}
-                other => self.perform_action(ctx, other),
+        let mut actions = results.keys;
+        actions.retain(|key| {
+            // Close leaves full screen, as in the first window.
+            if *key == Action::Present || (*key == Action::Close && self.fills_screen) {
+                self.switch_full_screen(ctx);
             }
-        }
+            !matches!(key, Action::Present | Action::Close)
+        });
         if results.tapped {
-            self.fill_class_screen(ctx);
+            self.switch_full_screen(ctx);
         }
-        if results.closed {
-            self.show_audience(false);
-        }
+        (actions, results.closed)
     }
 
-    fn fill_class_screen(&mut self, ctx: &egui::Context) {
-        if let Some(audience) = &mut self.presentation.audience {
-            audience.fills_screen = !audience.fills_screen;
-            ctx.send_viewport_cmd_to(id(), ViewportCommand::Fullscreen(audience.fills_screen));
-        }
+    fn switch_full_screen(&mut self, ctx: &egui::Context) {
+        self.fills_screen = !self.fills_screen;
+        ctx.send_viewport_cmd_to(id(), ViewportCommand::Fullscreen(self.fills_screen));
     }
 }
 

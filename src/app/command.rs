@@ -3,14 +3,17 @@
 use eframe::egui::{self, ThemePreference};
 
 use super::App;
-use super::bench::BenchRequest;
-use super::dialogs::{self, Answer, Dialog};
+use super::dialogs::{self, Dialog, SharedLink};
+use super::film::FilmSettings;
+use super::host::SaveFile;
 use super::keys::Action;
+use super::load::Load;
 use super::panels::Sheet;
 #[cfg(not(target_arch = "wasm32"))]
 use super::plots::PlotFormat;
 use super::undo::Undo;
 use super::{impact_list, opening};
+use crate::analysis::ready_sweeps::ReadySweep;
 use crate::scene::{DEFAULT_SCENE, Scene};
 
 /// What a widget asks of the application.
@@ -20,13 +23,18 @@ pub enum Command {
     /// Opens a recent file, which may be gone.
     #[cfg(not(target_arch = "wasm32"))]
     OpenRecent(String),
+    /// Opens a link, a built-in scene or a file as typed in the dialog.
+    OpenAny(String),
     /// Lets the user choose a scene file.
     ChooseFile,
     /// Shows a dialog.
     Ask(Dialog),
     /// Shows the settings of a film.
     AskFilm,
+    MakeFilm(FilmSettings),
     CopyLink,
+    /// Copies a shown link and keeps the typed address.
+    CopyShared(SharedLink),
     /// Shows the link with its QR code.
     ShowLink,
     CopyEmbedding,
@@ -36,11 +44,31 @@ pub enum Command {
     SaveRecord,
     SaveImpacts,
     SaveScene,
+    /// Saves files under a path.
+    SaveAs(String, Vec<SaveFile>),
+    /// Sets a parameter to a value, as a user writes it, and shows its slider.
+    SetValue {
+        key: String,
+        text: String,
+    },
+    /// Runs to a section of a sweep, or asks first if more than the varied parameter would change.
+    AskSection(Box<Load>),
+    GoToSection(Box<Load>),
+    /// Starts a ready sweep with its scene, or asks first if changes would be lost.
+    AskSweep(&'static ReadySweep),
+    StartSweep(&'static ReadySweep),
     Undo {
         redo: bool,
     },
     /// Starts a built-in lesson.
     Lesson(&'static str),
+    /// Goes to the next or the previous step of the lesson.
+    TurnPage {
+        forward: bool,
+    },
+    /// Sets the machine for the step again.
+    SetStep,
+    LeaveLesson,
     /// Opens or closes the audience window.
     #[cfg(not(target_arch = "wasm32"))]
     Audience(bool),
@@ -48,6 +76,9 @@ pub enum Command {
     PaperSettings,
     /// Stops or cancels the task under way.
     StopTasks,
+    /// Forgets all settings and opens the first-time scene.
+    #[cfg(not(target_arch = "wasm32"))]
+    StartAsNew,
 }
 
 impl App {
@@ -63,13 +94,30 @@ impl App {
                 let opened = super::remembered::check_exists(&file).and_then(|()| self.open(&file));
                 self.messages.report(opened);
             }
+            Command::OpenAny(argument) => {
+                if let Err(reason) = self.open_any(ctx, &argument) {
+                    // The dialog shows the error instead.
+                    self.messages.dismiss_problem();
+                    self.dialog = Some(Dialog::Open { path: argument, error: Some(reason) });
+                }
+            }
             Command::ChooseFile => self.choose_file(),
             Command::Ask(dialog) => self.dialog = Some(dialog),
             Command::AskFilm => {
                 let settings = self.tasks.film_to_make(&self.run.player);
                 self.dialog = Some(Dialog::Film { settings });
             }
+            Command::MakeFilm(settings) => {
+                let started = self.tasks.start_film(&mut self.run, &self.graphics, settings);
+                self.messages.report(started);
+            }
             Command::CopyLink => self.copy_link(ctx),
+            Command::CopyShared(shared) => {
+                self.copy(ctx, shared.link());
+                if shared.is_editable() {
+                    self.files.page = shared.page().to_owned();
+                }
+            }
             Command::ShowLink => self.show_link_dialog(),
             Command::CopyEmbedding => self.copy_embedding(ctx),
             Command::SavePicture => self.picture.request(ctx),
@@ -81,12 +129,30 @@ impl App {
             Command::SaveRecord => self.save_record(),
             Command::SaveImpacts => self.save(impact_list::files(&self.run.player)),
             Command::SaveScene => self.save_scene(),
+            Command::SaveAs(path, files) => self.save_as(path, files),
+            Command::SetValue { key, text } => match self.run.player.set(&key, &text) {
+                Err(error) => self.messages.fail(error),
+                Ok(_) => {
+                    self.run.controls.reveal(&key);
+                    if self.panels.is_compact() {
+                        self.bench.set_aside();
+                    }
+                    self.panels.show(Sheet::Controls, true);
+                }
+            },
+            Command::AskSection(load) => self.start_load(load),
+            Command::GoToSection(load) => self.go_to_section(*load),
+            Command::AskSweep(sweep) => self.ask_ready_sweep(sweep),
+            Command::StartSweep(sweep) => self.start_ready_sweep(sweep),
             Command::Undo { redo } => {
                 if !self.tasks.are_under_way() {
                     self.messages.warn(self.run.undo(redo));
                 }
             }
             Command::Lesson(name) => self.open_lesson(name),
+            Command::TurnPage { forward } => self.change_step(forward),
+            Command::SetStep => self.set_step(),
+            Command::LeaveLesson => self.leave_lesson(),
             #[cfg(not(target_arch = "wasm32"))]
             Command::Audience(on) => self.show_audience(on),
             Command::PaperSettings => {
@@ -99,7 +165,14 @@ impl App {
                 self.messages.report(opened);
             }
             Command::StopTasks => self.tasks.cancel(&mut self.run, &mut self.messages),
+            #[cfg(not(target_arch = "wasm32"))]
+            Command::StartAsNew => self.reset_to_first_start(ctx),
         }
+    }
+
+    /// Carries out `commands` one after the other.
+    pub(super) fn perform_all(&mut self, ctx: &egui::Context, commands: impl IntoIterator<Item = Command>) {
+        commands.into_iter().for_each(|command| self.perform(ctx, command));
     }
 
     /// Performs the action of a key.
@@ -176,55 +249,14 @@ impl App {
         }
     }
 
-    /// Shows the open dialog and handles its answer.
+    /// Shows the open dialog and carries out its answer.
     pub(super) fn dialog_ui(&mut self, ctx: &egui::Context) {
         let Some(mut dialog) = self.dialog.take() else {
             return;
         };
-        let answer = dialogs::ui(ctx, &mut dialog, &self.run.player, &self.graphics.renderer);
-        match (answer, dialog) {
-            (Some(Answer::Save(path)), Dialog::Save { files, .. }) => self.save_as(path, files),
-            (Some(Answer::Copy), Dialog::Link(shared)) => {
-                self.copy(ctx, shared.link());
-                if shared.is_editable() {
-                    self.files.page = shared.page().to_owned();
-                }
-            }
-            (Some(Answer::Film), Dialog::Film { settings }) => {
-                let started = self.tasks.start_film(&mut self.run, &self.graphics, settings);
-                self.messages.report(started);
-            }
-            (Some(Answer::Sweep), Dialog::Ready { sweep, .. }) => self.start_ready_sweep(sweep),
-            #[cfg(not(target_arch = "wasm32"))]
-            (Some(Answer::StartAsNew), _) => self.reset_to_first_start(ctx),
-            (Some(Answer::Load), Dialog::Load { load, .. }) => self.go_to_section(*load),
-            (Some(Answer::Open(argument)), _) => {
-                if let Err(reason) = self.open_any(ctx, &argument) {
-                    // The dialog shows the error instead.
-                    self.messages.dismiss_problem();
-                    self.dialog = Some(Dialog::Open { path: argument, error: Some(reason) });
-                }
-            }
-            (Some(_), _) => {}
-            (None, dialog) => self.dialog = Some(dialog),
-        }
-    }
-
-    /// Handles a request of the bench.
-    pub(super) fn apply_bench_request(&mut self, request: BenchRequest) {
-        match request {
-            BenchRequest::Section(load) => self.start_load(load),
-            BenchRequest::Value { key, text } => match self.run.player.set(&key, &text) {
-                Err(error) => self.messages.fail(error),
-                Ok(_) => {
-                    self.run.controls.reveal(&key);
-                    if self.panels.is_compact() {
-                        self.bench.set_aside();
-                    }
-                    self.panels.show(Sheet::Controls, true);
-                }
-            },
-            BenchRequest::Ready(sweep) => self.ask_ready_sweep(sweep),
+        match dialogs::ui(ctx, &mut dialog, &self.run.player, &self.graphics.renderer) {
+            None => self.dialog = Some(dialog),
+            Some(accepted) => self.perform_all(ctx, dialog.command().filter(|_| accepted)),
         }
     }
 }

@@ -47,7 +47,7 @@ impl App {
         }
         if panels.contains(Part::Bench) {
             let panel = Panel::right("bench").exact_size(0.45 * ui.available_width());
-            let request = panel.frame(bar).resizable(false).show(ui, |ui| {
+            let command = panel.frame(bar).resizable(false).show(ui, |ui| {
                 ScrollArea::vertical()
                     .id_salt("bench")
                     .auto_shrink(false)
@@ -58,9 +58,7 @@ impl App {
                     })
                     .inner
             });
-            if let Some(request) = request.inner {
-                self.apply_bench_request(request);
-            }
+            self.perform_all(ui.ctx(), command.inner);
         }
         if panels.contains(Part::Plots) {
             let panel = Panel::bottom("plots").exact_size(PLOTS_FRACTION * ui.available_height());

@@ -210,9 +210,8 @@ impl App {
             commands: Vec::new(),
         };
         header.ui(ui);
-        for command in header.commands {
-            self.perform(ui.ctx(), command);
-        }
+        let commands = header.commands;
+        self.perform_all(ui.ctx(), commands);
     }
 
     /// Elements above all panels.
@@ -264,7 +263,7 @@ impl App {
                 });
             },
         );
-        let bench_request = Panel::right("bench")
+        let command = Panel::right("bench")
             .frame(bar)
             .resizable(true)
             .default_size(400.0)
@@ -298,9 +297,7 @@ impl App {
                         audience::choose_plot(ui, &run.plots.titles(&run.player), &mut presentation.plot);
                     }
                 });
-                if let Some(time) = run.plots.ui(ui, &run.player).filter(|_| free) {
-                    run.show_instant(time);
-                }
+                run.plots_ui(ui, None, free);
             });
         for (panel, name) in
             [("controls", "Width of the controls"), ("bench", "Width of the bench"), ("plots", "Height of the plots")]
@@ -322,9 +319,7 @@ impl App {
         if present {
             self.present(ui.ctx(), true);
         }
-        if let Some(request) = bench_request.and_then(|shown| shown.inner) {
-            self.apply_bench_request(request);
-        }
+        self.perform_all(ui.ctx(), command.and_then(|shown| shown.inner));
     }
 
     fn portrait(&mut self, ui: &mut Ui, bar: Frame) {
@@ -413,7 +408,7 @@ impl App {
         }
         let free = !self.tasks.are_under_way();
         let Self { run, bench, panels, .. } = self;
-        let mut bench_request = None;
+        let mut command = None;
         ScrollArea::vertical().id_salt("sheet").auto_shrink(false).show(ui, |ui| {
             // Space for the scroll bar.
             ui.set_max_width(ui.available_width() - 14.0);
@@ -425,20 +420,15 @@ impl App {
                     spoken::landmark(ui, "Plots");
                     run.plots.header(ui, &run.player);
                     let size = egui::vec2(ui.available_width(), 340.0);
-                    let clicked_time = ui.allocate_ui(size, |ui| run.plots.ui(ui, &run.player)).inner;
-                    if let Some(time) = clicked_time.filter(|_| free) {
-                        run.show_instant(time);
-                    }
+                    ui.allocate_ui(size, |ui| run.plots_ui(ui, None, free));
                 }
                 Some(Sheet::Bench) => {
-                    bench_request = ui.add_enabled_ui(free, |ui| bench.ui(ui, &mut run.player)).inner;
+                    command = ui.add_enabled_ui(free, |ui| bench.ui(ui, &mut run.player)).inner;
                 }
                 Some(Sheet::Lesson) | None => {}
             }
         });
-        if let Some(request) = bench_request {
-            self.apply_bench_request(request);
-        }
+        self.perform_all(ui.ctx(), command);
     }
 
     /// The 3D view with its buttons and, after a stop, the reason. Returns whether the user asked for a reset.
@@ -534,9 +524,8 @@ impl App {
         }
         drop_hint(ui, whole);
         let inside = whole.shrink(10.0);
-        if let Some(command) = self.messages.ui(ui, inside, &self.run.player, &self.tasks, around) {
-            self.perform(ui.ctx(), command);
-        }
+        let command = self.messages.ui(ui, inside, &self.run.player, &self.tasks, around);
+        self.perform_all(ui.ctx(), command);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
         ui.scope_builder(middle, |ui| transport::banner(ui, &self.run.player)).inner
     }

@@ -29,7 +29,6 @@ pub use format::Lesson;
 use format::{CameraTarget, PanelName, Step};
 use measure::LessonMeasures;
 use names::{Names, comparisons};
-use panel::Request;
 pub use panel::menu;
 
 /// Latest time of a live change after its nominal instant, s: the longest solver step.
@@ -251,7 +250,7 @@ impl App {
     }
 
     /// Ends the lesson and restores the window.
-    fn leave_lesson(&mut self) {
+    pub(super) fn leave_lesson(&mut self) {
         if let Some((lesson, Some(before))) = self.course.end() {
             let Self { run, panels, bench, tasks, messages, .. } = self;
             if let Some(file) = before.restore(&lesson, run, panels, bench, tasks, messages) {
@@ -267,12 +266,8 @@ impl App {
     pub(super) fn lesson_ui(&mut self, ui: &mut Ui) {
         let presented = self.presentation.is_running();
         let low = presented && !self.panels.is_touched();
-        match self.course.ui(ui, &self.run.player, presented, low) {
-            Request::Nothing | Request::More => {}
-            Request::Turn(forward) => self.change_step(forward),
-            Request::Set => self.set_step(),
-            Request::Leave => self.leave_lesson(),
-        }
+        let command = self.course.ui(ui, &self.run.player, presented, low);
+        self.perform_all(ui.ctx(), command);
     }
 
     /// Goes to the next or the previous step of the lesson.

@@ -135,14 +135,15 @@ impl Messages {
     }
 
     /// The current message in one sentence; "" for none.
-    fn current(&self, tasks: &Tasks) -> String {
-        match (&self.problem, tasks.words(), &self.notice, &self.verdict) {
+    fn current(&self, player: &Player, tasks: &Tasks) -> String {
+        if let Some(problem) = &self.problem {
             // The other lines show the position in the file.
-            (Some(problem), ..) => problem.lines().next().unwrap_or("").to_owned(),
-            (None, "", Some(notice), _) => notice.text.clone(),
-            (None, "", None, Some(verdict)) => verdict.to_string(),
-            (None, words, ..) => words.to_owned(),
+            return problem.lines().next().unwrap_or("").to_owned();
         }
+        let task = tasks.progress(player).last().map(|(words, _)| words.to_owned());
+        let notice = || self.notice.as_ref().map(|notice| notice.text.clone());
+        let verdict = || self.verdict.as_ref().map(Verdict::to_string);
+        task.or_else(notice).or_else(verdict).unwrap_or_default()
     }
 
     /// The latest report for screen readers.
@@ -158,7 +159,7 @@ impl Messages {
     /// Makes an announcement if one is due.
     pub fn announce(&mut self, ctx: &egui::Context, host: &mut dyn Host, player: &Player, tasks: &Tasks) {
         let now = ctx.input(|input| input.time);
-        let news = self.current(tasks);
+        let news = self.current(player, tasks);
         let (announced, wait) = self.announcer.update(now, player, &news);
         if announced {
             host.announce(self.announcer.text(), self.announcer.is_event());
@@ -259,19 +260,12 @@ impl Messages {
         if self.problem.as_ref().is_some_and(|problem| strip(ui, problem, colour)) {
             self.problem = None;
         }
-        let tasks = [
-            ("Reproducing the state of the link…", tasks.replaying(player)),
-            ("Running to the chosen section…", tasks.loading(player)),
-            ("Making the film…", tasks.filming()),
-        ];
-        let is_filming = tasks[2].1.is_some();
-        for (words, fraction) in tasks {
-            let stop = if is_filming {
-                ("Cancel", "Cancels the film; the run returns to where it was (Esc)")
-            } else {
-                ("Stop here", "Stay at the time that the run has reached (Esc)")
-            };
-            if fraction.is_some_and(|fraction| progress_row(ui, words, fraction, stop)) {
+        let stop = match tasks.filming() {
+            Some(_) => ("Cancel", "Cancels the film; the run returns to where it was (Esc)"),
+            None => ("Stop here", "Stay at the time that the run has reached (Esc)"),
+        };
+        for (words, fraction) in tasks.progress(player) {
+            if progress_row(ui, words, fraction, stop) {
                 chosen = Some(Command::StopTasks);
             }
         }
@@ -350,7 +344,7 @@ fn progress_row(ui: &mut Ui, words: &str, fraction: f32, (stop, help): (&str, &s
     let row = plate.show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
             let percent = (fraction * 100.0).floor();
-            ui.label(format!("{words} {percent} %"));
+            ui.label(format!("{words}… {percent} %"));
             ui.add(egui::ProgressBar::new(fraction).desired_width(120.0)).accessible_name("Run so far");
             ui.button(stop).on_hover_text(help).clicked()
         })

@@ -214,6 +214,25 @@ impl App {
         self.host = host;
     }
 
+    /// Applies the settings in `store`, and records the window's settings in it from now on.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn store_settings_in(&mut self, ctx: &egui::Context, store: Store) {
+        store.apply(ctx);
+        self.store = Some(store);
+    }
+
+    /// Opens or closes the audience window.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn show_audience(&mut self, on: bool) {
+        self.presentation.audience = on.then(audience::Audience::open);
+    }
+
+    /// Whether the audience window is open.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn has_audience(&self) -> bool {
+        self.presentation.audience.is_some()
+    }
+
     /// The player.
     pub fn player(&self) -> &Player {
         &self.run.player

@@ -6,6 +6,8 @@ use super::dialogs::Dialog;
 use super::load::Load;
 use super::player::Player;
 use super::reload::SceneFile;
+#[cfg(not(target_arch = "wasm32"))]
+use super::remembered::INITIAL_SIZE;
 use super::{App, AppOptions, Link, link, theme, value};
 use crate::analysis::ready_sweeps::{READY_SWEEPS, ReadySweep};
 use crate::analysis::source::SceneSource;
@@ -59,15 +61,14 @@ impl App {
     }
 
     /// Runs to a section of a sweep; asks first if more than the varied parameter would change.
-    pub(super) fn start_load(&mut self, load: Load) {
+    pub(super) fn start_load(&mut self, load: Box<Load>) {
         match load.scene.scene() {
             Err(error) => self.messages.fail(error),
             Ok(scene) => {
                 let changes = value::differences(&scene, self.run.player.pending(), load.varied());
                 if changes.is_empty() {
-                    self.go_to_section(load);
+                    self.go_to_section(*load);
                 } else {
-                    let load = Box::new(load);
                     self.dialog = Some(Dialog::Load { load, changes });
                 }
             }
@@ -142,5 +143,28 @@ impl App {
         });
         self.messages.report(opened.clone());
         opened
+    }
+
+    /// Resets all settings and opens the first-time scene.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn reset_to_first_start(&mut self, ctx: &egui::Context) {
+        self.present(ctx, false);
+        let options = AppOptions { clock: self.run.player.clock, ..AppOptions::first() };
+        let mut new = match Self::with_context(ctx, self.graphics.state.as_ref(), options) {
+            Ok(new) => new,
+            Err(error) => return self.messages.fail(error),
+        };
+        new.host = std::mem::replace(&mut self.host, Box::new(super::NoHost));
+        new.store = self.store.take();
+        new.presentation.set_aside_zoom = Some(1.0);
+        new.follow_frame_rate();
+        *self = new;
+        if let Some(store) = &mut self.store {
+            store.forget();
+        }
+        ctx.send_viewport_cmd(egui::ViewportCommand::Maximized(false));
+        // In points at the zoom still in effect when the command arrives.
+        let size = egui::Vec2::from(INITIAL_SIZE) / ctx.zoom_factor();
+        ctx.send_viewport_cmd(egui::ViewportCommand::InnerSize(size));
     }
 }

@@ -8,6 +8,8 @@ use eframe::egui::{self, Align2, FontId, Galley, Id, Panel, Rect, Sense, Ui, Vec
 #[cfg(not(target_arch = "wasm32"))]
 use super::audience::Audience;
 use super::bench::Bench;
+#[cfg(not(target_arch = "wasm32"))]
+use super::keys::Action;
 use super::run::Run;
 use super::{App, overlay, spoken, theme, transport, value};
 use crate::view::ViewOptions;
@@ -167,6 +169,25 @@ impl App {
         }
     }
 
+    /// Shows the audience window if it is open.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn audience_ui(&mut self, ctx: &egui::Context) {
+        let plot = self.presentation.single_plot(&self.run);
+        let Some(audience) = &mut self.presentation.audience else {
+            return;
+        };
+        let (actions, closed) = audience.ui(ctx, &mut self.run, plot, self.tasks.filming().is_some());
+        for action in actions {
+            match action {
+                Action::Plots => self.show_next_plot(),
+                other => self.perform_action(ctx, other),
+            }
+        }
+        if closed {
+            self.show_audience(false);
+        }
+    }
+
     /// Contents of the whole window.
     pub(super) fn presentation_ui(&mut self, ui: &mut Ui) {
         let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(12, 4));
@@ -248,13 +269,7 @@ impl App {
         let run = &mut self.run;
         Panel::bottom("plots of the presentation").frame(bar).resizable(false).exact_size(height).show(ui, |ui| {
             ui.take_available_space();
-            let clicked_time = match single {
-                Some(index) => run.plots.single(ui, &run.player, index),
-                None => run.plots.ui(ui, &run.player),
-            };
-            if let Some(time) = clicked_time.filter(|_| free) {
-                run.show_instant(time);
-            }
+            run.plots_ui(ui, single, free);
         });
     }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::files::SCENE_TYPE;
 use super::host::SaveFile;
 use super::present::Presentation;
-use super::{App, AppOptions, layout, opening, theme};
+use super::{AppOptions, layout, opening, theme};
 use crate::files::{FileError, OutputFile, create_dir_all};
 use crate::scene::{DEFAULT_SCENE, MAX_FILE_SIZE, Scene, built_in_text, read_regular};
 use crate::session::link::ThemeChoice;
@@ -149,6 +149,17 @@ impl Store {
         self.written = self.now.clone();
     }
 
+    /// Applies theme and type size, unless other values were requested.
+    pub fn apply(&self, ctx: &egui::Context) {
+        let theme = ctx.options(|options| options.theme_preference);
+        if let Some(wanted) = self.now.theme().filter(|_| theme == ThemePreference::System) {
+            ctx.set_theme(wanted);
+        }
+        if let Some(zoom) = self.now.zoom {
+            ctx.set_zoom_factor(zoom);
+        }
+    }
+
     /// Records the settings of the window, and its `scene` with the name of its file, if any; not those of a lesson.
     pub(super) fn record(
         &mut self,
@@ -208,42 +219,6 @@ impl Store {
     /// The recent files.
     pub(super) fn recent(&self) -> &[String] {
         &self.now.recent
-    }
-}
-
-impl App {
-    /// Applies theme and type size from `store`, unless other values were requested, and records settings in it from now on.
-    pub fn store_settings_in(&mut self, ctx: &egui::Context, store: Store) {
-        let theme = ctx.options(|options| options.theme_preference);
-        if let Some(wanted) = store.now.theme().filter(|_| theme == ThemePreference::System) {
-            ctx.set_theme(wanted);
-        }
-        if let Some(zoom) = store.now.zoom {
-            ctx.set_zoom_factor(zoom);
-        }
-        self.store = Some(store);
-    }
-
-    /// Resets all settings and opens the first-time scene.
-    pub(super) fn reset_to_first_start(&mut self, ctx: &egui::Context) {
-        self.present(ctx, false);
-        let options = AppOptions { clock: self.run.player.clock, ..AppOptions::first() };
-        let mut new = match Self::with_context(ctx, self.graphics.state.as_ref(), options) {
-            Ok(new) => new,
-            Err(error) => return self.messages.fail(error),
-        };
-        new.host = std::mem::replace(&mut self.host, Box::new(super::NoHost));
-        new.store = self.store.take();
-        new.presentation.set_aside_zoom = Some(1.0);
-        new.follow_frame_rate();
-        *self = new;
-        if let Some(store) = &mut self.store {
-            store.forget();
-        }
-        ctx.send_viewport_cmd(egui::ViewportCommand::Maximized(false));
-        // In points at the zoom still in effect when the command arrives.
-        let size = egui::Vec2::from(INITIAL_SIZE) / ctx.zoom_factor();
-        ctx.send_viewport_cmd(egui::ViewportCommand::InnerSize(size));
     }
 }
 

@@ -125,6 +125,17 @@ impl Run {
         }
     }
 
+    /// The plots, or that of index `single`; a click shows its instant, unless a task is under way (not `free`).
+    pub fn plots_ui(&mut self, ui: &mut Ui, single: Option<usize>, free: bool) {
+        let clicked_time = match single {
+            Some(index) => self.plots.single(ui, &self.player, index),
+            None => self.plots.ui(ui, &self.player),
+        };
+        if let Some(time) = clicked_time.filter(|_| free) {
+            self.show_instant(time);
+        }
+    }
+
     /// Pauses and runs to `time`, s, without a time limit. Impacts on the way are recorded but do not glow.
     pub fn run_to(&mut self, time: f64) {
         self.player.run_to(time);

@@ -65,17 +65,14 @@ impl Tasks {
         Some(self.film.as_ref()?.fraction())
     }
 
-    /// The task in words; "" for none.
-    pub fn words(&self) -> &'static str {
-        if self.film.is_some() {
-            "Making the film"
-        } else if self.load.is_some() {
-            "Running to the chosen section"
-        } else if self.replay.is_some() {
-            "Reproducing the state of the link"
-        } else {
-            ""
-        }
+    /// The tasks in words, with their progress, 0 to 1.
+    pub fn progress(&self, player: &Player) -> impl Iterator<Item = (&'static str, f32)> {
+        let tasks = [
+            ("Reproducing the state of the link", self.replaying(player)),
+            ("Running to the chosen section", self.loading(player)),
+            ("Making the film", self.filming()),
+        ];
+        tasks.into_iter().filter_map(|(words, fraction)| Some((words, fraction?)))
     }
 
     /// Advances replay or run to a section by a frame. Returns whether a task was under way.

@@ -8,6 +8,7 @@ use super::control_finder::ControlFinder;
 use super::names::Names;
 use super::text::{self, Block, SpanStyle};
 use super::{Course, RunningLesson, lesson_titles};
+use crate::app::command::Command;
 use crate::app::player::Player;
 use crate::app::{layout, spoken, theme};
 
@@ -17,16 +18,6 @@ const CHOICE_HEIGHT: f32 = 24.0;
 const MIN_HIDDEN: f32 = 8.0;
 /// Width beside the navigation buttons below which the step counter is abbreviated, points.
 const MIN_COUNTER_WIDTH: f32 = 200.0;
-
-/// A request from the panel's buttons.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Request {
-    Nothing,
-    Turn(bool),
-    More,
-    Set,
-    Leave,
-}
 
 /// Menu of the built-in lessons; returns the name of the chosen one.
 pub fn menu(ui: &mut Ui) -> Option<&'static str> {
@@ -41,16 +32,16 @@ pub fn menu(ui: &mut Ui) -> Option<&'static str> {
 
 impl Course {
     /// The whole panel. `low`: in a presentation operated by mouse, whose screen is low in points.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player, presented: bool, low: bool) -> Request {
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player, presented: bool, low: bool) -> Option<Command> {
         let elsewhere = if presented { self.item_outside_presentation(ui.ctx(), player) } else { None };
         let Some(running) = &mut self.running else {
-            return Request::Nothing;
+            return None;
         };
         spoken::landmark(ui, "Lesson");
         let own = running.is_setting_machine || running.is_run_of_step(player);
         let backwards = Layout::bottom_up(egui::Align::Min);
         ui.with_layout(backwards, |ui| {
-            let request = buttons(ui, running);
+            let (command, more) = buttons(ui, running);
             ui.with_layout(Layout::top_down(egui::Align::Min), |ui| {
                 let id = (running.lesson.name.clone(), running.step);
                 let page = ScrollArea::vertical().id_salt(id).auto_shrink(false);
@@ -61,7 +52,7 @@ impl Course {
                         ui.spacing_mut().interact_size.y = CHOICE_HEIGHT;
                         ui.spacing_mut().icon_width = CHOICE_HEIGHT - 8.0;
                     }
-                    if request == Request::More {
+                    if more {
                         // The last line of a page is repeated at the top of the next.
                         ui.scroll_with_delta(egui::vec2(0.0, 40.0 - ui.clip_rect().height()));
                     }
@@ -76,7 +67,7 @@ impl Course {
                     running.hides_rest = below > MIN_HIDDEN;
                     ui.ctx().request_repaint();
                 }
-                if set.inner { Request::Set } else { request }
+                if set.inner { Some(Command::SetStep) } else { command }
             })
             .inner
         })
@@ -93,9 +84,9 @@ impl Course {
     }
 }
 
-/// Back, Next, progress, and Leave, at positions independent of the page.
-fn buttons(ui: &mut Ui, running: &RunningLesson) -> Request {
-    let mut request = Request::Nothing;
+/// Back, Next, progress, and Leave, at positions independent of the page. Returns the command, and whether to scroll.
+fn buttons(ui: &mut Ui, running: &RunningLesson) -> (Option<Command>, bool) {
+    let (mut command, mut more) = (None, false);
     let last = running.lesson.steps.len() - 1;
     ui.horizontal(|ui| {
         for (forward, name, help, possible) in [
@@ -104,7 +95,7 @@ fn buttons(ui: &mut Ui, running: &RunningLesson) -> Request {
         ] {
             let button = ui.add_enabled(possible, Button::new(name)).on_hover_text(help);
             if button.clicked() {
-                request = Request::Turn(forward);
+                command = Some(Command::TurnPage { forward });
             }
         }
         let count = format!("{} of {}", running.step + 1, last + 1);
@@ -117,14 +108,13 @@ fn buttons(ui: &mut Ui, running: &RunningLesson) -> Request {
             let help = "Ends the lesson and restores the window as it was before";
             let leave = ui.button("End").on_hover_text(help);
             if leave.accessible_name("Leave the lesson").clicked() {
-                request = Request::Leave;
+                command = Some(Command::LeaveLesson);
             }
-            if running.hides_rest && ui.button("More").on_hover_text("Scroll down to the rest of the step").clicked() {
-                request = Request::More;
-            }
+            let help = "Scroll down to the rest of the step";
+            more = running.hides_rest && ui.button("More").on_hover_text(help).clicked();
         });
     });
-    request
+    (command, more)
 }
 
 impl RunningLesson {
