@@ -68,8 +68,10 @@ pub struct Header<'a> {
     /// Whether links have a page address.
     pub has_page: bool,
     /// Recent files; `None` if settings are not stored.
+    #[cfg(not(target_arch = "wasm32"))]
     pub recent: Option<&'a [String]>,
     /// Whether the audience window is open.
+    #[cfg(not(target_arch = "wasm32"))]
     pub has_audience: bool,
     pub commands: Vec<Command>,
 }

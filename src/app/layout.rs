@@ -194,10 +194,6 @@ impl App {
     /// The header; its commands are carried out before the panels below are shown.
     fn header(&mut self, ui: &mut Ui) {
         let has_page = !self.page_address().is_empty();
-        #[cfg(not(target_arch = "wasm32"))]
-        let (recent, has_audience) = (self.store.as_ref().map(Store::recent), self.has_audience());
-        #[cfg(target_arch = "wasm32")]
-        let (recent, has_audience) = (None, false);
         let mut header = Header {
             run: &self.run,
             is_busy: self.tasks.are_under_way(),
@@ -205,8 +201,10 @@ impl App {
             picture: &mut self.picture,
             graphics: &mut self.graphics,
             has_page,
-            recent,
-            has_audience,
+            #[cfg(not(target_arch = "wasm32"))]
+            recent: self.store.as_ref().map(Store::recent),
+            #[cfg(not(target_arch = "wasm32"))]
+            has_audience: self.presentation.audience.is_some(),
             commands: Vec::new(),
         };
         header.ui(ui);
