@@ -101,7 +101,11 @@ impl App {
                     self.dialog = Some(Dialog::Open { path: argument, error: Some(reason) });
                 }
             }
-            Command::ChooseFile => self.choose_file(),
+            Command::ChooseFile => {
+                if !self.host.pick_file() {
+                    self.dialog = Some(Dialog::open());
+                }
+            }
             Command::Ask(dialog) => self.dialog = Some(dialog),
             Command::AskFilm => {
                 let settings = self.tasks.film_to_make(&self.run.player);

@@ -45,7 +45,7 @@ impl Files {
 impl App {
     /// A link to the present state.
     pub fn link(&self) -> Link {
-        if let Some(replay) = &self.tasks.replay {
+        if let Some(replay) = self.tasks.replay() {
             let (lesson, step) = self.course.running().and_then(RunningLesson::link_position).unzip();
             return Link { lesson, step, embedded: self.panels.embedded.clone(), ..replay.link().clone() };
         }
@@ -163,13 +163,6 @@ impl App {
             .and_then(|scene| self.show_scene(&scene));
         self.messages.report(opened.clone());
         opened
-    }
-
-    /// Opens the dialog for a scene file.
-    pub(super) fn choose_file(&mut self) {
-        if !self.host.pick_file() {
-            self.dialog = Some(Dialog::open());
-        }
     }
 
     /// Opens a link pasted outside a text field; other text is ignored.

@@ -376,7 +376,7 @@ impl App {
             ctx.request_repaint();
         }
         if running.is_setting_machine {
-            if self.tasks.replay.is_some() {
+            if self.tasks.replay().is_some() {
                 return;
             }
             running.is_setting_machine = false;

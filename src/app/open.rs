@@ -92,7 +92,7 @@ impl App {
                 self.run.viewport.set_pose(pose);
             }
             self.files.scene = SceneFile::named(file);
-            self.tasks.load = Some((load, twin));
+            self.tasks.start_load(load, twin);
         }
     }
 

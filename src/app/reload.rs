@@ -70,7 +70,7 @@ impl App {
     /// Makes the host watch the files of the scene, and reloads the scene after a save.
     pub(super) fn receive_saved_scene(&mut self, ctx: &egui::Context) {
         // The changes of a link arrive with its replay.
-        let has_changes = self.tasks.replay.is_none();
+        let has_changes = self.tasks.replay().is_none();
         let file = &mut self.files.scene;
         let pending = self.run.player.pending();
         if has_changes && file.saved.is_none() {

@@ -21,13 +21,13 @@ pub fn replay_budget(clock: Clock) -> impl Fn() -> bool {
 #[derive(Default)]
 pub struct Tasks {
     /// A replay to the state of a link.
-    pub replay: Option<Replay>,
+    replay: Option<Replay>,
     /// A run in progress to a section of a sweep, and whether a twin starts there.
-    pub load: Option<(Load, bool)>,
+    load: Option<(Load, bool)>,
     /// The film in progress.
-    pub film: Option<RunningFilm>,
+    pub(super) film: Option<RunningFilm>,
     /// Settings of the last film.
-    pub film_settings: Option<FilmSettings>,
+    pub(super) film_settings: Option<FilmSettings>,
 }
 
 impl Tasks {
@@ -42,6 +42,16 @@ impl Tasks {
         if self.replay.is_some() {
             player.set_playing(false);
         }
+    }
+
+    /// The replay under way.
+    pub fn replay(&self) -> Option<&Replay> {
+        self.replay.as_ref()
+    }
+
+    /// Starts the run to a section; if `twin`, a twin starts there.
+    pub fn start_load(&mut self, load: Load, twin: bool) {
+        self.load = Some((load, twin));
     }
 
     /// Forgets the tasks of another scene, whose film has been cancelled.

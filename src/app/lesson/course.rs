@@ -55,8 +55,8 @@ impl Course {
         Some((running.lesson, self.before.take()))
     }
 
-    /// Draws rings around the step's highlighted items, over everything, without affecting the layout.
-    /// `area`: of the picture.
+    /// Draws rings around the step's highlighted items, over everything, without affecting the layout; those of joints in the
+    /// `area` of the picture.
     pub fn ring_highlights(&self, ui: &egui::Ui, run: &Run, area: egui::Rect) {
         let wanted = self.running().map_or(&[][..], |running| &running.current_step().highlight);
         let player = &run.player;
