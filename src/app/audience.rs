@@ -4,7 +4,8 @@
 use eframe::egui::{self, CentralPanel, Panel, PointerButton, Ui, ViewportBuilder, ViewportCommand, ViewportId, vec2};
 
 use super::keys::Action;
-use super::{App, keys, layout, present, theme};
+use super::run::Run;
+use super::{keys, layout, present, theme};
 
 /// Initial size, points at zoom 1.
 const INITIAL_SIZE: egui::Vec2 = vec2(1280.0, 720.0);
@@ -38,35 +39,28 @@ pub fn choose_plot(ui: &mut Ui, titles: &[String], chosen: &mut Option<usize>) {
     layout::choice(ui, ["For the class", help], Some(110.0), chosen, all, title);
 }
 
-impl App {
-    /// Opens or closes the audience window.
-    pub fn show_audience(&mut self, on: bool) {
-        self.audience = on.then_some(Audience { height: INITIAL_SIZE.y, fills_screen: false });
+/// Menu entry of the window, on platforms with several windows; `on`: whether it is open. Returns whether it was clicked.
+pub fn entry(ui: &mut Ui, on: bool) -> bool {
+    let help = "A second window for the projector: picture, time, impact and one plot in large type. A double-click on it, or \
+                F5, fills its screen";
+    ui.add(egui::Button::selectable(on, "Window for the class")).on_hover_text(help).clicked()
+}
+
+impl Audience {
+    /// The window when it opens.
+    pub fn open() -> Self {
+        Self { height: INITIAL_SIZE.y, fills_screen: false }
     }
 
-    /// Whether it is open.
-    pub fn has_audience(&self) -> bool {
-        self.audience.is_some()
-    }
-
-    /// Menu entry, on platforms with several windows. Returns whether it was clicked.
-    pub(super) fn audience_entry(&mut self, ui: &mut Ui) -> bool {
-        let help = "A second window for the projector: picture, time, impact and one plot in large type. A double-click on it, or \
-                    F5, fills its screen";
-        let entry = egui::Button::selectable(self.has_audience(), "Window for the class");
-        let clicked = ui.add(entry).on_hover_text(help).clicked();
-        if clicked {
-            self.show_audience(!self.has_audience());
-        }
-        clicked
-    }
-
-    /// Shows the window if it is open.
-    pub(super) fn audience_ui(&mut self, ctx: &egui::Context) {
-        let Some(audience) = &self.audience else {
-            return;
-        };
-        let zoom = present::legible_zoom(audience.height);
+    /// Shows the window with the plot of index `plot`. Returns the actions of its keys, and whether it was closed.
+    pub fn ui(
+        &mut self,
+        ctx: &egui::Context,
+        run: &mut Run,
+        plot: Option<usize>,
+        is_filmed: bool,
+    ) -> (Vec<Action>, bool) {
+        let zoom = present::legible_zoom(self.height);
         // In points at the initial zoom; a changed size would resize the window.
         let size = INITIAL_SIZE / present::legible_zoom(INITIAL_SIZE.y);
         let builder = ViewportBuilder::default()
@@ -77,73 +71,63 @@ impl App {
         // egui has one zoom for all windows. This window is drawn immediately with its own zoom, which keys do not change.
         let own = ctx.options(|options| (options.zoom_factor, options.zoom_with_keyboard));
         ctx.options_mut(|options| (options.zoom_factor, options.zoom_with_keyboard) = (zoom, false));
-        let results = ctx.show_viewport_immediate(id(), builder, |ui, _| self.audience_contents(ui));
+        let results = ctx.show_viewport_immediate(id(), builder, |ui, _| contents(ui, run, plot, is_filmed));
         ctx.options_mut(|options| (options.zoom_factor, options.zoom_with_keyboard) = own);
-        let Some(audience) = &mut self.audience else {
-            return;
-        };
-        if audience.height != results.height {
-            audience.height = results.height;
+        if self.height != results.height {
+            self.height = results.height;
             ctx.request_repaint();
         }
-        for key in results.keys {
-            match key {
-                Action::Present => self.fill_class_screen(ctx),
-                Action::Plots => self.show_next_plot(),
-                // Leaves full screen, as in the first window.
-                Action::Close if self.audience.as_ref().is_some_and(|audience| audience.fills_screen) => {
-                    self.fill_class_screen(ctx);
-                }
-                Action::Close => {}
-                other => self.perform_action(ctx, other),
+        let mut actions = results.keys;
+        actions.retain(|key| {
+            // Close leaves full screen, as in the first window.
+            if *key == Action::Present || (*key == Action::Close && self.fills_screen) {
+                self.switch_full_screen(ctx);
             }
-        }
+            !matches!(key, Action::Present | Action::Close)
+        });
         if results.tapped {
-            self.fill_class_screen(ctx);
+            self.switch_full_screen(ctx);
         }
-        if results.closed {
-            self.show_audience(false);
-        }
+        (actions, results.closed)
     }
 
-    fn fill_class_screen(&mut self, ctx: &egui::Context) {
-        if let Some(audience) = &mut self.audience {
-            audience.fills_screen = !audience.fills_screen;
-            ctx.send_viewport_cmd_to(id(), ViewportCommand::Fullscreen(audience.fills_screen));
-        }
+    fn switch_full_screen(&mut self, ctx: &egui::Context) {
+        self.fills_screen = !self.fills_screen;
+        ctx.send_viewport_cmd_to(id(), ViewportCommand::Fullscreen(self.fills_screen));
     }
+}
 
-    /// Contents of the window.
-    fn audience_contents(&mut self, ui: &mut Ui) -> FrameResults {
-        let ctx = ui.ctx().clone();
-        let results = ctx.input(|input| {
-            let tapped = input.pointer.button_double_clicked(PointerButton::Primary);
-            (input.viewport().close_requested(), tapped)
+/// Contents of the window: the picture of `run`, and its plot of index `plot`.
+fn contents(ui: &mut Ui, run: &mut Run, plot: Option<usize>, is_filmed: bool) -> FrameResults {
+    let ctx = ui.ctx().clone();
+    let results = ctx.input(|input| {
+        let tapped = input.pointer.button_double_clicked(PointerButton::Primary);
+        (input.viewport().close_requested(), tapped)
+    });
+    let results = FrameResults {
+        height: present::screen_height(&ctx),
+        closed: results.0,
+        tapped: results.1,
+        keys: keys::pressed(&ctx),
+    };
+    ui.visuals_mut().disabled_alpha = 1.0;
+    ui.disable();
+    if let Some(index) = plot {
+        let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(12, 4));
+        let height = present::plots_height(ui);
+        Panel::bottom("plot for the class").frame(bar).resizable(false).exact_size(height).show(ui, |ui| {
+            ui.take_available_space();
+            run.plots.second(ui, &run.player, index);
         });
-        let results = FrameResults {
-            height: present::screen_height(&ctx),
-            closed: results.0,
-            tapped: results.1,
-            keys: keys::pressed(&ctx),
-        };
-        ui.visuals_mut().disabled_alpha = 1.0;
-        ui.disable();
-        if let Some(index) = self.single_plot() {
-            let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(12, 4));
-            let height = present::plots_height(ui);
-            let Self { player, plots, .. } = self;
-            Panel::bottom("plot for the class").frame(bar).resizable(false).exact_size(height).show(ui, |ui| {
-                ui.take_available_space();
-                plots.second(ui, player, index);
-            });
-        }
-        CentralPanel::no_frame().show(ui, |ui| {
-            let area = ui.available_rect_before_wrap();
-            let caption = self.caption_plate(ui, area, true);
-            let above = caption.as_ref().map(|(_, plate)| *plate);
-            self.viewport.second_ui(ui, &self.player, present::ARROW_THICKNESS, above);
-            self.caption(ui, area, caption);
-        });
-        results
     }
+    CentralPanel::no_frame().show(ui, |ui| {
+        let area = ui.available_rect_before_wrap();
+        let caption = run.caption(ui, area, true, is_filmed);
+        let above = caption.as_ref().map(|caption| caption.plate);
+        run.viewport.second_ui(ui, &run.player, present::ARROW_THICKNESS, above);
+        if let Some(caption) = caption {
+            caption.ui(ui, area);
+        }
+    });
+    results
 }

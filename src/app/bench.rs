@@ -9,7 +9,6 @@ mod diagram;
 mod divergence;
 mod plane;
 mod portrait;
-mod request;
 mod shared_job;
 mod sweep;
 mod sweep_results;
@@ -19,6 +18,7 @@ mod workspace;
 
 use eframe::egui::{Button, CollapsingHeader, Response, RichText, Ui};
 
+use super::command::Command;
 use super::host::Host;
 use super::player::Player;
 use super::spoken;
@@ -29,7 +29,6 @@ use coordinate::BenchCoordinate;
 pub use cost_study::CostStudy;
 use costs::Costs;
 use portrait::Portrait;
-pub use request::BenchRequest;
 use sweep::SweepPanel;
 pub use sweep_results::SweepResults;
 use workspace::MapPanel;
@@ -130,8 +129,8 @@ impl Bench {
         }
     }
 
-    /// The whole bench; returns the user's request to the run.
-    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<BenchRequest> {
+    /// The whole bench; returns the command chosen in it.
+    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<Command> {
         if let Some((tab, title)) = ui.horizontal_wrapped(|ui| self.tabs(ui)).inner {
             spoken::titled(ui, &tab, title);
         }
@@ -152,10 +151,10 @@ impl Bench {
             portrait.ui(ui, player, *coordinate);
         });
         let help = "The scene at many values of a parameter: the bifurcation diagram";
-        let request = part(ui, "Sweep", help, true, |ui| sweep.ui(ui, player, *coordinate)).flatten();
+        let command = part(ui, "Sweep", help, true, |ui| sweep.ui(ui, player, *coordinate)).flatten();
         let help = "How far the tip is from where it would be without play, with the drives held at many positions";
         part(ui, "Tip error over the workspace", help, false, |ui| map.ui(ui, player));
-        request
+        command
     }
 
     /// Choice between the chaos bench and what play costs; returns the chosen one, which is the heading.

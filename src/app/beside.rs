@@ -1,10 +1,8 @@
-//! Reference runs recorded before a change, as the window handles them: retain, save, and show beside the current machine.
+//! Reference runs recorded before a change, as the window handles them: retain, and show beside the current machine.
 
 use eframe::egui::{self, Button, Rect, Ui, pos2, vec2};
 
-use super::App;
-use super::compare::Comparison;
-use super::files::record_files;
+use super::run::Run;
 use super::viewport::Viewport;
 
 /// The two halves of `area`: the machine before the change, and the current one.
@@ -17,27 +15,17 @@ fn halves(area: Rect) -> (Rect, Rect) {
     }
 }
 
-impl App {
+/// Picture of a run from before a change, and that run's number.
+pub type Beside = Option<(u64, Box<Viewport>)>;
+
+impl Run {
     /// Retains the run from before the latest change, except during a lesson, whose text refers to its own plots. `is_over`: the
     /// gesture that caused the change has ended.
-    pub(super) fn compare(&mut self, is_over: bool) {
+    pub(super) fn compare(&mut self, is_over: bool, in_lesson: bool) {
         let comparison = &mut self.plots.comparison;
-        let wanted = comparison.is_on() && self.running_lesson.is_none();
+        let wanted = comparison.is_on() && !in_lesson;
         if let Some((run, key)) = self.player.take_copy_before_change(wanted, is_over).filter(|_| wanted) {
             comparison.add(run, key);
-        }
-    }
-
-    /// The runs from before a change.
-    pub fn comparison(&self) -> &Comparison {
-        &self.plots.comparison
-    }
-
-    /// Saves the record of a reference run on request.
-    pub(super) fn save_earlier_run(&mut self) {
-        if let Some(earlier) = self.plots.comparison.take_run_to_save() {
-            let files = record_files(earlier.run());
-            self.save(files);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use eframe::egui::{self, Id, Label, Modal, RichText, ScrollArea, TextEdit, Ui};
 
+use super::command::Command;
 use super::film::{self, FilmSettings};
 use super::host::SaveFile;
 use super::keys::Group;
@@ -9,7 +10,7 @@ use super::load::Load;
 use super::player::Player;
 use super::spoken;
 use crate::analysis::ready_sweeps::ReadySweep;
-use code::SharedLink;
+pub use code::SharedLink;
 
 mod code;
 
@@ -69,6 +70,11 @@ pub enum Dialog {
 }
 
 impl Dialog {
+    /// Asks for a link, a file or a built-in scene.
+    pub fn open() -> Self {
+        Self::Open { path: String::new(), error: None }
+    }
+
     fn title(&self) -> &'static str {
         match self {
             Self::Help => "Keys",
@@ -84,50 +90,39 @@ impl Dialog {
         }
     }
 
-    /// Label of its button and the answer; `None` if there is nothing to answer or no text yet.
-    fn answer(&self) -> Option<(&'static str, Option<Answer>)> {
-        let typed = |path: &str| Some(path.trim().to_owned()).filter(|path| !path.is_empty());
-        match self {
-            Self::Help | Self::About => None,
-            Self::Link(shared) => Some(("Copy", shared.can_be_copied().then_some(Answer::Copy))),
-            Self::Open { path, .. } => Some(("Open", typed(path).map(Answer::Open))),
-            Self::Save { path, .. } => Some(("Save", typed(path).map(Answer::Save))),
-            Self::Film { settings } => {
-                let possible = settings.objection().is_none();
-                Some(("Make film", possible.then_some(Answer::Film)))
-            }
-            Self::Load { .. } => Some(("Change and run", Some(Answer::Load))),
-            Self::Ready { .. } => Some(("Replace and sweep", Some(Answer::Sweep))),
+    /// Label of its button, and whether it can be pressed yet; `None` if there is nothing to answer.
+    fn button(&self) -> Option<(&'static str, bool)> {
+        Some(match self {
+            Self::Help | Self::About => return None,
+            Self::Link(shared) => ("Copy", shared.can_be_copied()),
+            Self::Open { path, .. } => ("Open", !path.trim().is_empty()),
+            Self::Save { path, .. } => ("Save", !path.trim().is_empty()),
+            Self::Film { settings } => ("Make film", settings.objection().is_none()),
+            Self::Load { .. } => ("Change and run", true),
+            Self::Ready { .. } => ("Replace and sweep", true),
             #[cfg(not(target_arch = "wasm32"))]
-            Self::StartAsNew => Some(("Start fresh", Some(Answer::StartAsNew))),
-        }
+            Self::StartAsNew => ("Start fresh", true),
+        })
+    }
+
+    /// The command that its button gives.
+    pub fn command(self) -> Option<Command> {
+        Some(match self {
+            Self::Help | Self::About => return None,
+            Self::Link(shared) => Command::CopyShared(shared),
+            Self::Open { path, .. } => Command::OpenAny(path.trim().to_owned()),
+            Self::Save { path, files, .. } => Command::SaveAs(path.trim().to_owned(), files),
+            Self::Film { settings } => Command::MakeFilm(settings),
+            Self::Load { load, .. } => Command::GoToSection(load),
+            Self::Ready { sweep, .. } => Command::StartSweep(sweep),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::StartAsNew => Command::StartAsNew,
+        })
     }
 }
 
-/// Answer of a dialog.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Answer {
-    /// Close the dialog.
-    Close,
-    /// Open this link or scene.
-    Open(String),
-    /// Save under this path.
-    Save(String),
-    /// Copy the link.
-    Copy,
-    /// Make the film.
-    Film,
-    /// Run to the section.
-    Load,
-    /// Replace the scene and start the sweep.
-    Sweep,
-    /// Erase all settings and start as new.
-    #[cfg(not(target_arch = "wasm32"))]
-    StartAsNew,
-}
-
-/// Shows `dialog`.
-pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &str) -> Option<Answer> {
+/// Shows `dialog`. Returns whether its button was pressed once it is to close.
+pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &str) -> Option<bool> {
     let mut answer = None;
     // Title, buttons and frame stay visible on a low screen and when the text grows.
     let max_height = (ctx.content_rect().height() - 140.0).max(80.0);
@@ -170,19 +165,19 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
             .inner;
         ui.add_space(8.0);
         ui.horizontal(|ui| {
-            if let Some((verb, chosen)) = dialog.answer() {
-                let button = ui.add_enabled(chosen.is_some(), egui::Button::new(verb));
-                if button.clicked() || entered {
-                    answer = chosen;
+            if let Some((verb, possible)) = dialog.button() {
+                let button = ui.add_enabled(possible, egui::Button::new(verb));
+                if possible && (button.clicked() || entered) {
+                    answer = Some(true);
                 }
             }
             if ui.button("Close").clicked() {
-                answer = Some(Answer::Close);
+                answer = Some(false);
             }
         });
     });
     if modal.should_close() {
-        answer = Some(Answer::Close);
+        answer = Some(false);
     }
     answer
 }

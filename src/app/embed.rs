@@ -14,27 +14,22 @@ const CONTROLS_FRACTION: f32 = 0.4;
 const FRAME_SIZE: [u32; 2] = [800, 500];
 
 impl App {
-    /// Panels of an embedded window; `None` for a stand-alone window.
-    pub fn embedded(&self) -> Option<&Embedded> {
-        self.embedded.as_ref()
-    }
-
     /// The complete interface of an embedded window.
     pub(super) fn embedded_ui(&mut self, ui: &mut Ui, bar: Frame) {
-        let Some(panels) = self.embedded.clone() else {
+        let Some(panels) = self.panels.embedded.clone() else {
             return;
         };
         self.lesson_panel(ui, bar);
-        let free = !self.is_under_way();
+        let free = !self.tasks.are_under_way();
         let wide = ui.available_width() > ui.available_height();
         let reset = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 spoken::landmark(ui, "Transport");
                 if panels.contains(Part::Timeline) {
-                    ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
+                    ui.add_enabled_ui(free, |ui| self.run.timeline_ui(ui));
                 }
-                ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner
+                ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player)).inner
             })
             .inner;
         if panels.contains(Part::Controls) {
@@ -46,36 +41,34 @@ impl App {
             panel.frame(bar).resizable(false).show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                     ui.set_max_width(ui.available_width() - 10.0);
-                    ui.add_enabled_ui(free, |ui| self.controls.main_controls(ui, &mut self.player));
+                    ui.add_enabled_ui(free, |ui| self.run.controls.main_controls(ui, &mut self.run.player));
                 });
             });
         }
         if panels.contains(Part::Bench) {
             let panel = Panel::right("bench").exact_size(0.45 * ui.available_width());
-            let request = panel.frame(bar).resizable(false).show(ui, |ui| {
+            let command = panel.frame(bar).resizable(false).show(ui, |ui| {
                 ScrollArea::vertical()
                     .id_salt("bench")
                     .auto_shrink(false)
                     .show(ui, |ui| {
                         ui.set_max_width(ui.available_width() - 10.0);
-                        let bench = |ui: &mut Ui| self.bench.ui(ui, &mut self.player);
+                        let bench = |ui: &mut Ui| self.bench.ui(ui, &mut self.run.player);
                         ui.add_enabled_ui(free, bench).inner
                     })
                     .inner
             });
-            if let Some(request) = request.inner {
-                self.apply_bench_request(request);
-            }
+            self.perform_all(ui.ctx(), command.inner);
         }
         if panels.contains(Part::Plots) {
             let panel = Panel::bottom("plots").exact_size(PLOTS_FRACTION * ui.available_height());
             let clicked_time = panel.frame(bar).resizable(false).show(ui, |ui| {
                 ui.take_available_space();
-                self.plots.ui(ui, &self.player)
+                self.run.plots.ui(ui, &self.run.player)
             });
             if let Some(time) = clicked_time.inner.filter(|_| free) {
-                self.player.go_to(time);
-                self.viewport.clear_history(&self.player);
+                self.run.player.go_to(time);
+                self.run.viewport.clear_history(&self.run.player);
             }
         }
         self.central(ui, reset);
@@ -91,10 +84,10 @@ impl App {
             let why = "No page address is set for the frame; set one with --page or JOINTPLAY_PAGE";
             return Err(why.to_owned());
         }
-        let panels = self.embedded.clone();
+        let panels = self.panels.embedded.clone();
         let mut link = self.link();
         link.embedded = Some(panels.unwrap_or_else(Embedded::with_controls));
-        let (fragment, _) = link.format_short(self.player.pending())?;
+        let (fragment, _) = link.format_short(self.run.player.pending())?;
         let escaped = |text: &str| {
             let text = text.replace('&', "&amp;").replace('"', "&quot;");
             text.replace('<', "&lt;")
@@ -104,7 +97,7 @@ impl App {
             "<iframe src=\"{}\" width=\"{width}\" height=\"{height}\" style=\"border: 0\" loading=\"lazy\" \
              allow=\"fullscreen; clipboard-write\" title=\"{}\"></iframe>",
             escaped(&format!("{address}#{fragment}")),
-            escaped(&self.player.running().title)
+            escaped(&self.run.player.running().title)
         ))
     }
 
@@ -113,9 +106,9 @@ impl App {
         match self.embedding() {
             Ok(line) => {
                 ctx.copy_text(line);
-                self.notify("HTML line copied".to_owned());
+                self.messages.notify("HTML line copied");
             }
-            Err(reason) => self.problem = Some(reason),
+            Err(reason) => self.messages.fail(reason),
         }
     }
 }

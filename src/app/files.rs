@@ -6,15 +6,14 @@ use std::path::Path;
 use eframe::egui;
 use serde_json::{Map, json};
 
-use super::dialogs::Dialog;
-use super::host::{Host, OpenedFile, SaveFile};
+use super::dialogs::{Dialog, SharedLink};
+use super::host::{OpenedFile, SaveFile};
 use super::lesson::RunningLesson;
 use super::player::Player;
 use super::reload::{FileContents, SceneFile};
-use super::{App, Notice, value};
+use super::{App, value};
 use crate::session::link::settings::{self as link_settings, Instruments};
 use crate::session::link::{Link, SceneText, is_link};
-use crate::session::replay::Verdict;
 use crate::simulate::Channel;
 
 /// Number of rows in a saved record.
@@ -24,29 +23,43 @@ const PICTURES: [&str; 8] = [".png", ".jpg", ".jpeg", ".gif", ".webp", ".svg", "
 /// Media type of scene files.
 pub(super) const SCENE_TYPE: &str = "application/toml";
 
-impl App {
-    /// Sets the platform services.
-    pub fn set_host(&mut self, host: Box<dyn Host>) {
-        self.host = host;
-    }
+/// Files of the scene and of what is saved, and the address for links.
+#[derive(Default)]
+pub struct Files {
+    /// The file of the scene. Empty for a scene from a link: a link must not make the program read a file.
+    pub(super) scene: SceneFile,
+    /// Page address typed by the user, which replaces the host's; "" for none.
+    pub page: String,
+    /// Files waiting for a path from the host.
+    #[cfg(not(target_arch = "wasm32"))]
+    saving: Vec<SaveFile>,
+}
 
+impl Files {
+    /// The scene file `name`, if it has one.
+    pub fn of(name: Option<String>) -> Self {
+        Self { scene: SceneFile::named(name), ..Self::default() }
+    }
+}
+
+impl App {
     /// A link to the present state.
     pub fn link(&self) -> Link {
-        if let Some(replay) = &self.replay {
-            let (lesson, step) = self.course().and_then(RunningLesson::link_position).unzip();
-            return Link { lesson, step, embedded: self.embedded.clone(), ..replay.link().clone() };
+        if let Some(replay) = self.tasks.replay() {
+            let (lesson, step) = self.course.running().and_then(RunningLesson::link_position).unzip();
+            return Link { lesson, step, embedded: self.panels.embedded.clone(), ..replay.link().clone() };
         }
-        let player = &self.player;
-        let (plots, window) = self.plots.changes_from_initial(player.pending());
-        let followed = self.viewport.followed();
+        let player = &self.run.player;
+        let (plots, window) = self.run.plots.changes_from_initial(player.pending());
+        let followed = self.run.viewport.followed();
         let joints = &player.running().machine.loose_joints;
-        let under_microscope = joints.get(self.microscope.joint());
+        let under_microscope = joints.get(self.run.microscope.joint());
         let instruments = Instruments {
-            microscope: under_microscope.filter(|_| self.microscope.is_open()).map(|joint| joint.name.clone()),
+            microscope: under_microscope.filter(|_| self.run.microscope.is_open()).map(|joint| joint.name.clone()),
             ideal: player.ideal().is_some(),
-            wear: self.viewport.options.wear,
+            wear: self.run.viewport.options.wear,
         };
-        let (lesson, step) = self.course().and_then(RunningLesson::link_position).unzip();
+        let (lesson, step) = self.course.running().and_then(RunningLesson::link_position).unzip();
         Link {
             lesson,
             step,
@@ -56,14 +69,14 @@ impl App {
             time: Some(player.pacer.shown()),
             hash: Some(player.simulation().state_hash()),
             time_scale: Some(player.pacer.scale()),
-            camera: self.viewport.pose(),
-            magnification: Some(self.viewport.options.magnification),
+            camera: self.run.viewport.pose(),
+            magnification: Some(self.run.viewport.options.magnification),
             follow: followed.and_then(|part| link_settings::name_followed(player.running(), part)),
             plots,
-            channels: (!self.plots.picked.is_empty()).then(|| self.plots.picked.clone()),
+            channels: (!self.run.plots.picked.is_empty()).then(|| self.run.plots.picked.clone()),
             window,
             instruments: (instruments != Instruments::default()).then_some(instruments),
-            embedded: self.embedded.clone(),
+            embedded: self.panels.embedded.clone(),
             playing: Some(player.is_playing()),
             theme: None,
             version: Some(crate::VERSION.to_owned()),
@@ -86,17 +99,17 @@ impl App {
     /// Whether closing this window would lose changes to the user's own scene: not for built-in scenes, nor for changes saved in
     /// a file or received with a link. `None` until something is changed or saved after opening a link.
     pub fn unsaved(&self) -> Option<bool> {
-        let pending = self.player.pending();
+        let pending = self.run.player.pending();
         if matches!(SceneText::of(pending), SceneText::BuiltIn(_)) {
             return Some(false);
         }
-        let changed = !self.scene_file.is_saved_with(&pending.changes)?;
-        (changed || self.scene_file.has_file()).then_some(changed)
+        let changed = !self.files.scene.is_saved_with(&pending.changes)?;
+        (changed || self.files.scene.has_file()).then_some(changed)
     }
 
     /// Address of the page for links; "" for none.
     pub(super) fn page_address(&self) -> String {
-        if self.page.is_empty() { self.host.address() } else { self.page.clone() }
+        if self.files.page.is_empty() { self.host.address() } else { self.files.page.clone() }
     }
 
     /// Copies a link to the present state; asks for an address first if none is known.
@@ -106,12 +119,12 @@ impl App {
             self.show_link_dialog();
             return;
         }
-        match self.link().format_short(self.player.pending()) {
+        match self.link().format_short(self.run.player.pending()) {
             Ok((fragment, note)) => {
                 self.copy(ctx, format!("{address}#{fragment}"));
-                note.into_iter().for_each(|note| self.notify(note));
+                note.into_iter().for_each(|note| self.messages.notify(note));
             }
-            Err(reason) => self.problem = Some(reason),
+            Err(reason) => self.messages.fail(reason),
         }
     }
 
@@ -120,12 +133,18 @@ impl App {
         if !self.host.publish_link(&link) {
             ctx.copy_text(link);
         }
-        self.notify("Link copied".to_owned());
+        self.messages.notify("Link copied");
     }
 
-    /// Shows a message for a few seconds.
-    pub fn notify(&mut self, text: String) {
-        self.notice = Some(Notice::new(text));
+    /// Shows the link to the present state, and asks for an address if other devices cannot reach the page.
+    pub(super) fn show_link_dialog(&mut self) {
+        match self.link().format_short(self.run.player.pending()) {
+            Ok((fragment, note)) => {
+                self.dialog = Some(Dialog::Link(SharedLink::new(fragment, self.page_address())));
+                note.into_iter().for_each(|note| self.messages.notify(note));
+            }
+            Err(reason) => self.messages.fail(reason),
+        }
     }
 
     /// Opens a scene file from its content; on an error the running scene stays, and the reason is shown and returned.
@@ -142,20 +161,8 @@ impl App {
             .map_err(|_| format!("{name}: not a text file"))
             .and_then(|text| self.parse_file(name, &text, companions, &[]).map_err(|error| error.to_string()))
             .and_then(|scene| self.show_scene(&scene));
-        self.problem = opened.clone().err();
+        self.messages.report(opened.clone());
         opened
-    }
-
-    /// Opens the dialog for a scene file.
-    pub(super) fn choose_file(&mut self) {
-        if !self.host.pick_file() {
-            self.show_open_dialog();
-        }
-    }
-
-    /// Opens the dialog for a link, a file or a built-in scene.
-    pub(super) fn show_open_dialog(&mut self) {
-        self.dialog = Some(Dialog::Open { path: String::new(), error: None });
     }
 
     /// Opens a link pasted outside a text field; other text is ignored.
@@ -183,10 +190,8 @@ impl App {
             self.host.read_dropped(dropped);
         }
         while let Some(files) = self.host.opened() {
-            // The reason is shown.
-            if let Err(reason) = self.open_together(files) {
-                self.problem = Some(reason);
-            }
+            let opened = self.open_together(files);
+            self.messages.warn(opened);
         }
     }
 
@@ -214,7 +219,7 @@ impl App {
         let own = |(name, bytes): (String, Vec<u8>)| (file_name_of(&name).to_owned(), bytes);
         let companions: FileContents = read.into_iter().map(own).collect();
         self.open_given(&name, bytes, &companions)?;
-        self.scene_file = SceneFile::opened(name, companions);
+        self.files.scene = SceneFile::opened(name, companions);
         Ok(())
     }
 
@@ -224,7 +229,7 @@ impl App {
         if let Some(first) = files.first()
             && self.host.pick_path(&first.name)
         {
-            self.saving = files;
+            self.files.saving = files;
             return;
         }
         if self.host.asks_for_path() {
@@ -237,9 +242,9 @@ impl App {
             match self.host.save(&files) {
                 Ok(done) => {
                     self.note_saved(&files);
-                    self.notice = Some(Notice::new(done));
+                    self.messages.notify(done);
                 }
-                Err(reason) => self.problem = Some(reason),
+                Err(reason) => self.messages.fail(reason),
             }
         }
     }
@@ -248,7 +253,7 @@ impl App {
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn receive_path(&mut self, ctx: &egui::Context, frame: &eframe::Frame) {
         if let Some(chosen) = self.host.picked_path(ctx, frame) {
-            let files = std::mem::take(&mut self.saving);
+            let files = std::mem::take(&mut self.files.saving);
             if let Some(path) = chosen.filter(|_| !files.is_empty()) {
                 self.save_as(path, files);
             }
@@ -270,8 +275,10 @@ impl App {
             Ok(done) => {
                 self.note_saved(&files);
                 #[cfg(not(target_arch = "wasm32"))]
-                self.note_recent(&renamed);
-                self.notice = Some(Notice::new(done));
+                if let Some(store) = &mut self.store {
+                    store.note_saved(&renamed);
+                }
+                self.messages.notify(done);
             }
             Err(reason) => {
                 self.dialog = Some(Dialog::Save { path, files, error: Some(reason) });
@@ -281,59 +288,27 @@ impl App {
 
     /// Saves the scene file including changes.
     pub fn save_scene(&mut self) {
-        let scene = self.player.pending();
+        let scene = self.run.player.pending();
         match scene.to_toml() {
             Ok(text) => {
                 let name = format!("{}.toml", scene.name);
                 self.save(vec![SaveFile { name, mime: SCENE_TYPE, bytes: text.into_bytes() }]);
             }
-            Err(error) => self.problem = Some(format!("The scene cannot be saved: {error}")),
+            Err(error) => self.messages.fail(format!("The scene cannot be saved: {error}")),
         }
     }
 
     /// Marks the changes as saved if the scene is among `files`.
     fn note_saved(&mut self, files: &[SaveFile]) {
         if files.iter().any(|file| file.mime == SCENE_TYPE) {
-            let changes = self.player.pending().changes.clone();
-            self.scene_file.record_saved(changes);
+            let changes = self.run.player.pending().changes.clone();
+            self.files.scene.record_saved(changes);
         }
     }
 
     /// Saves the record of the plots.
     pub fn save_record(&mut self) {
-        self.save(record_files(&self.player));
-    }
-
-    /// Description embedded in a picture.
-    pub(super) fn describe(&self) -> String {
-        describe(&self.player)
-    }
-
-    /// File name stem: scene and time.
-    pub(super) fn file_stem(&self) -> String {
-        file_stem(&self.player)
-    }
-
-    /// The application's current message in one sentence; "" for none.
-    pub(super) fn current_message(&self) -> String {
-        if let Some(problem) = &self.problem {
-            // The other lines show the position in the file.
-            return problem.lines().next().unwrap_or("").to_owned();
-        }
-        if self.film.is_some() {
-            return "Making the film".to_owned();
-        }
-        if self.load.is_some() {
-            return "Running to the chosen section".to_owned();
-        }
-        if self.replay.is_some() {
-            return "Reproducing the state of the link".to_owned();
-        }
-        match (&self.notice, &self.verdict) {
-            (Some(notice), _) => notice.text.clone(),
-            (None, Some(verdict)) => verdict.to_string(),
-            (None, None) => String::new(),
-        }
+        self.save(record_files(&self.run.player));
     }
 }
 
@@ -359,13 +334,8 @@ fn file_name_of(name: &str) -> &str {
     Path::new(name).file_name().and_then(|own| own.to_str()).unwrap_or(name)
 }
 
-/// Whether a verdict needs no action; it then disappears after some seconds.
-pub fn needs_no_action(verdict: &Verdict) -> bool {
-    matches!(verdict, Verdict::Agrees(_) | Verdict::Reached)
-}
-
 /// File name stem: scene and time.
-fn file_stem(player: &Player) -> String {
+pub(super) fn file_stem(player: &Player) -> String {
     format!("{}-{:.3}ms", player.running().name, player.pacer.shown() * 1e3)
 }
 
@@ -459,7 +429,7 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
 }
 
 /// Description embedded in a picture.
-fn describe(player: &Player) -> String {
+pub(super) fn describe(player: &Player) -> String {
     let mut words = format!(
         "{} at t = {}, state hash {:016x}",
         player.running().name,

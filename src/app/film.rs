@@ -5,8 +5,12 @@ use eframe::egui::{self, DragValue, RichText, Ui};
 
 use super::App;
 use super::canvas::{Canvas, Pending};
+use super::graphics::Graphics;
 use super::host::SaveFile;
 use super::picture::Contents;
+use super::player::Player;
+use super::run::Run;
+use super::tasks::Tasks;
 use super::{layout, transport, value};
 use crate::film::{Film, FilmFormat};
 
@@ -92,6 +96,15 @@ impl RunningFilm {
     pub fn fraction(&self) -> f32 {
         (self.film.frames() as f64 / self.settings.frames()) as f32
     }
+
+    /// Restores the run from before: displayed instant, time scale, and whether it played.
+    pub fn return_run(&self, run: &mut Run) {
+        let (shown, scale, playing) = self.before;
+        run.player.pacer.set_scale(scale);
+        run.player.go_to(shown);
+        run.player.set_playing(playing);
+        run.viewport.clear_history(&run.player);
+    }
 }
 
 /// Controls of the settings.
@@ -168,11 +181,11 @@ fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, help: &str, value: &mut 
     layout::choice(ui, [name, help], None, value, options.iter().map(|(option, _)| *option), label);
 }
 
-impl App {
-    /// Settings of the next film: the run so far, unless chosen otherwise before.
-    pub(super) fn film_to_make(&self) -> FilmSettings {
-        let reached = self.player.reached();
-        let all = FilmSettings::all(reached, self.player.pacer.scale());
+impl Tasks {
+    /// Settings of the next film of `player`: the run so far, unless chosen otherwise before.
+    pub fn film_to_make(&self, player: &Player) -> FilmSettings {
+        let reached = player.reached();
+        let all = FilmSettings::all(reached, player.pacer.scale());
         let mut settings = self.film_settings.clone().unwrap_or(all);
         settings.span = settings.span.map(|end| end.min(reached));
         if settings.span[0] == settings.span[1] {
@@ -185,68 +198,50 @@ impl App {
     ///
     /// # Errors
     /// Why it cannot be made, as a message.
-    pub fn make_film(&mut self, settings: FilmSettings) -> Result<(), String> {
+    pub fn start_film(&mut self, run: &mut Run, graphics: &Graphics, settings: FilmSettings) -> Result<(), String> {
         if let Some(objection) = settings.objection() {
             return Err(format!("No film: {objection}"));
         }
-        let state = self.graphics.as_ref().ok_or("No film: there is no graphics adapter")?;
+        let state = graphics.state.as_ref().ok_or("No film: there is no graphics adapter")?;
         let film = Film::new(settings.format, settings.size, settings.rate);
         let film = film.map_err(|error| format!("No film: {error}"))?;
-        let pacer = &self.player.pacer;
-        let before = (pacer.shown(), pacer.scale(), self.player.is_playing());
+        let pacer = &run.player.pacer;
+        let before = (pacer.shown(), pacer.scale(), run.player.is_playing());
         let canvas = Canvas::beside(state);
         // Impacts glow as long as in playback at this scale.
-        self.player.pacer.set_scale(settings.scale);
-        self.player.go_to(settings.span[0]);
-        self.viewport.clear_history(&self.player);
+        run.player.pacer.set_scale(settings.scale);
+        run.player.go_to(settings.span[0]);
+        run.viewport.clear_history(&run.player);
         self.film_settings = Some(settings.clone());
         self.film = Some(RunningFilm { settings, film, canvas, pending: None, next: 0, before });
         Ok(())
     }
+}
 
-    /// Progress of the film, 0 to 1; `None` if none is being made.
-    pub fn filming(&self) -> Option<f32> {
-        Some(self.film.as_ref()?.fraction())
-    }
-
-    /// Cancels the film; no file remains.
-    pub(super) fn cancel_film(&mut self) {
-        if let Some(running) = self.film.take() {
-            self.return_from_film(running.before);
-        }
-    }
-
-    /// Restores the run: displayed instant, s, time scale, and whether it played.
-    fn return_from_film(&mut self, (shown, scale, playing): (f64, f64, bool)) {
-        self.player.pacer.set_scale(scale);
-        self.player.go_to(shown);
-        self.player.set_playing(playing);
-        self.viewport.clear_history(&self.player);
-    }
-
+impl App {
     /// Draws the next frame or collects a finished one; does not block.
     pub(super) fn advance_film(&mut self, ctx: &egui::Context) {
-        let Some(mut running) = self.film.take() else {
+        let Some(mut running) = self.tasks.film.take() else {
             return;
         };
         ctx.request_repaint();
         let continues = self.advance_frame(ctx, &mut running);
         if continues == Ok(true) {
-            self.film = Some(running);
+            self.tasks.film = Some(running);
             return;
         }
-        self.return_from_film(running.before);
+        running.return_run(&mut self.run);
         let format = running.settings.format;
         let finish = |_| running.film.finish().map_err(|error| error.to_string());
         match continues.and_then(finish) {
             Ok(bytes) => {
                 self.save(vec![SaveFile {
-                    name: format!("{}.{format}", self.player.running().name),
+                    name: format!("{}.{format}", self.run.player.running().name),
                     mime: format.mime(),
                     bytes,
                 }]);
             }
-            Err(reason) => self.problem = Some(format!("The film cannot be made: {reason}")),
+            Err(reason) => self.messages.fail(format!("The film cannot be made: {reason}")),
         }
     }
 
@@ -265,10 +260,10 @@ impl App {
             return Ok(false);
         }
         let instant = running.settings.instant(running.next);
-        self.player.go_to(instant);
+        self.run.player.go_to(instant);
         // Collects the peaks since the previous frame.
-        self.player.advance(0.0);
-        self.viewport.advance(&self.player, (1.0 / running.settings.rate) as f32);
+        self.run.player.advance(0.0);
+        self.run.viewport.advance(&self.run.player, (1.0 / running.settings.rate) as f32);
         let contents = if running.settings.plots { Contents::Plots } else { Contents::View };
         let first = running.next == 0;
         let size = running.settings.size;

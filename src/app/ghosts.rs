@@ -2,8 +2,8 @@
 
 use eframe::egui::Ui;
 
-use super::App;
 use super::player::Player;
+use super::run::Run;
 use super::{theme, value};
 use crate::view::{DrawList, Ghost, SceneView, Shot};
 
@@ -39,27 +39,33 @@ pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawLi
     notes
 }
 
-impl App {
-    /// Shows or hides the ideal ghost; reports why if there is none.
-    pub fn show_ideal(&mut self, on: bool) {
+impl Run {
+    /// Shows or hides the ideal ghost.
+    ///
+    /// # Errors
+    /// There is none; the message says why.
+    pub fn show_ideal(&mut self, on: bool) -> Result<(), String> {
         self.player.set_ideal(on);
-        if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.error_message()) {
-            self.problem = Some(format!("No ideal ghost: {fault}"));
-        }
+        self.ideal_fault().map_or(Ok(()), Err)
     }
 
-    /// Switch for the ideal ghost in the view menu.
-    pub(super) fn ideal_switch(&mut self, ui: &mut Ui) {
+    /// Why there is no ideal ghost although it was asked for.
+    fn ideal_fault(&self) -> Option<String> {
+        let fault = self.player.ideal()?.error_message()?;
+        Some(format!("No ideal ghost: {fault}"))
+    }
+
+    /// Switch for the ideal ghost in the view menu; returns whether to toggle it.
+    pub(super) fn ideal_switch(&self, ui: &mut Ui) -> bool {
         let mut on = self.player.ideal().is_some();
         let help = "The same machine with ideal ball joints, the same drives and gravity, drawn pale over the run. An \
                     arrow from its tip to that of the run shows the tip error (key G), which the plot Tip error \
                     records. The run itself is not affected.";
-        if ui.checkbox(&mut on, "Ideal ghost").on_hover_text(help).changed() {
-            self.show_ideal(on);
+        let toggled = ui.checkbox(&mut on, "Ideal ghost").on_hover_text(help).changed();
+        if let Some(fault) = self.ideal_fault() {
+            theme::warning(ui, fault);
         }
-        if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.error_message()) {
-            theme::warning(ui, format!("No ideal ghost: {fault}"));
-        }
+        toggled
     }
 }
 

@@ -1,17 +1,19 @@
-//! The top bar with its menus, and the message strips below it.
+//! The top bar with its menus.
 
 use std::sync::LazyLock;
 
-use eframe::egui::{
-    self, Atom, ComboBox, Frame, RichText, TextFormat, TextStyle, ThemePreference, Ui, text::LayoutJob,
-};
+use eframe::egui::{self, Atom, ComboBox, RichText, TextFormat, TextStyle, ThemePreference, Ui, text::LayoutJob};
 
-use super::App;
+use super::command::Command;
 use super::dialogs::Dialog;
-use super::files::needs_no_action;
-use super::{layout, opening, spoken, theme};
-use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
-use crate::session::replay::Verdict;
+use super::graphics::Graphics;
+use super::panels::Panels;
+use super::picture::Picture;
+use super::run::Run;
+#[cfg(not(target_arch = "wasm32"))]
+use super::{audience, plots, remembered};
+use super::{layout, lesson, spoken, theme};
+use crate::scene::{BUILT_IN, Scene};
 
 /// Window width from which the header shows the program's name, points.
 const MIN_WIDTH_WITH_NAME: f32 = 900.0;
@@ -55,8 +57,29 @@ impl SceneEntry {
     }
 }
 
-impl App {
-    pub(super) fn header(&mut self, ui: &mut Ui, compact: bool) {
+/// The header: it reads the parts of the window and collects the commands chosen in it.
+pub struct Header<'a> {
+    pub run: &'a Run,
+    /// Whether a task is under way.
+    pub is_busy: bool,
+    pub panels: &'a mut Panels,
+    pub picture: &'a mut Picture,
+    pub graphics: &'a mut Graphics,
+    /// Whether links have a page address.
+    pub has_page: bool,
+    /// Recent files; `None` if settings are not stored.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub recent: Option<&'a [String]>,
+    /// Whether the audience window is open.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub has_audience: bool,
+    pub commands: Vec<Command>,
+}
+
+impl Header<'_> {
+    /// The bar. A small window has most of it in a menu.
+    pub fn ui(&mut self, ui: &mut Ui) {
+        let compact = self.panels.is_compact();
         spoken::landmark(ui, "Scene and files");
         ui.horizontal(|ui| {
             // In a narrow window the buttons need the space.
@@ -72,7 +95,7 @@ impl App {
                 return;
             }
             #[cfg(not(target_arch = "wasm32"))]
-            if self.is_remembered() || !ui.ctx().embed_viewports() {
+            if self.recent.is_some() || !ui.ctx().embed_viewports() {
                 layout::menu(ui, "Open", false, |ui| {
                     self.open_button(ui, "File…");
                     self.desktop_entries(ui);
@@ -89,31 +112,19 @@ impl App {
             };
             layout::menu(ui, "Save", true, save).on_hover_text("Save a picture, a film, the data or the scene");
             self.link_button(ui);
-            self.undo_buttons(ui);
+            let undone = self.run.undo.buttons(ui, !self.is_busy);
+            self.commands.extend(undone.map(|redo| Command::Undo { redo }));
             layout::menu(ui, "Lessons", false, |ui| self.lesson_menu(ui))
                 .on_hover_text("Ten lessons on play in joints, step by step");
-            let panels = [
-                (&mut self.show_controls, "Controls", "Parameters shown or hidden (key C)"),
-                (&mut self.show_plots, "Plots", "Plots shown or hidden (key P)"),
-                (
-                    &mut self.show_bench,
-                    "Bench",
-                    "Bench shown or hidden: chaos bench (key B) with sweeps and twin run; what play costs (key W)",
-                ),
-            ];
-            for (on, name, help) in panels {
-                if ui.add(egui::Button::selectable(*on, name)).on_hover_text(help).clicked() {
-                    *on = !*on;
-                }
-            }
+            self.panels.switches(ui);
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.button("?").on_hover_text("Keys (?)").accessible_name("Keys").clicked() {
-                    self.dialog = Some(Dialog::Help);
+                    self.commands.push(Command::Ask(Dialog::Help));
                 }
                 // Omitted rather than overlapped if it does not fit; the theme also has a key.
                 let room = ui.available_width();
                 if room > 80.0 && ui.button("About").clicked() {
-                    self.dialog = Some(Dialog::About);
+                    self.commands.push(Command::Ask(Dialog::About));
                 }
                 if room > 200.0 {
                     theme_box(ui);
@@ -122,104 +133,102 @@ impl App {
         });
     }
 
+    /// A menu entry for `command`.
+    fn entry(&mut self, ui: &mut Ui, name: &str, help: &str, command: Command) {
+        if layout::entry(ui, name, help) {
+            self.commands.push(command);
+        }
+    }
+
     fn scene_box(&mut self, ui: &mut Ui, compact: bool) {
-        let name = self.player.running().name.clone();
-        let (mut wanted, mut link) = (None, false);
+        let scene = self.run.player.running();
         ComboBox::from_id_salt("scene")
             .width(if compact { 150.0 } else { 170.0 })
             .truncate()
             // Shows all scenes if the window is high enough; otherwise the list scrolls.
             .height(0.85 * ui.ctx().content_rect().height())
-            .selected_text(&name)
+            .selected_text(&scene.name)
             .show_ui(ui, |ui| {
                 let help = "Open a link, a scene by its name, or a file";
-                let other = ui.selectable_label(false, "Link…").on_hover_text(help);
-                link = other.clicked();
+                if ui.selectable_label(false, "Link…").on_hover_text(help).clicked() {
+                    self.commands.push(Command::Ask(Dialog::open()));
+                }
                 ui.separator();
                 // Stays within the edges of a narrow window.
                 let width = LIST_WIDTH.min(ui.ctx().content_rect().width() - 60.0);
                 ui.set_width(width);
-                // Textures of the window are invalid on another canvas.
-                let graphics = self.graphics.as_ref().filter(|_| !self.picture.is_drawn());
-                for scene in &*ABOUT_SCENES {
-                    let load = || Scene::load(scene.name, &[]).ok();
-                    let picture = self.scene_pictures.atom(ui, graphics, scene.name, load);
-                    if scene.entry(ui, picture, name == scene.name, width).clicked() {
-                        wanted = Some(scene.name);
+                for entry in &*ABOUT_SCENES {
+                    let picture = self.graphics.scene_picture(ui, self.picture.is_drawn(), entry.name);
+                    if entry.entry(ui, picture, scene.name == entry.name, width).clicked() {
+                        self.commands.push(Command::Open(entry.name.to_owned()));
                     }
                 }
             })
             .response
-            .on_hover_text(&self.player.running().title)
+            .on_hover_text(&scene.title)
             .accessible_name("Scene");
-        if let Some(wanted) = wanted {
-            self.problem = self.open(wanted).err();
-        }
-        if link {
-            self.show_open_dialog();
-        }
     }
 
     fn open_button(&mut self, ui: &mut Ui, name: &str) {
         let help = "Open a scene file; a link can be pasted anywhere, or into Link… in the list of scenes";
-        if layout::entry(ui, name, help) {
-            self.choose_file();
-        }
+        self.entry(ui, name, help, Command::ChooseFile);
     }
 
     /// Desktop-only menu entries.
     #[cfg(not(target_arch = "wasm32"))]
     fn desktop_entries(&mut self, ui: &mut Ui) {
-        self.recent_entries(ui);
+        let chosen = remembered::recent_entries(ui, self.recent.unwrap_or_default());
+        self.commands.extend(chosen.map(Command::OpenRecent));
         ui.separator();
-        if !ui.ctx().embed_viewports() && self.audience_entry(ui) {
+        if !ui.ctx().embed_viewports() && audience::entry(ui, self.has_audience) {
+            self.commands.push(Command::Audience(!self.has_audience));
             layout::close_menu(ui);
         }
-        if self.is_remembered() {
-            self.new_entry(ui);
+        if self.recent.is_some() {
+            let help = "Forgets window size, theme, type size, last scene and recent files";
+            self.entry(ui, "Start fresh…", help, Command::Ask(Dialog::StartAsNew));
         }
     }
 
     fn link_button(&mut self, ui: &mut Ui) {
         let mut help =
             "Copies a link that opens this scene in this state and view, with every change made on the way".to_owned();
-        if self.page_address().is_empty() {
+        if !self.has_page {
             help += ". No page address is set: asks for one first";
         }
-        if layout::entry(ui, "Copy link", &help) {
-            self.copy_link(ui.ctx());
-        }
+        self.entry(ui, "Copy link", &help, Command::CopyLink);
+    }
+
+    fn code_button(&mut self, ui: &mut Ui) {
+        let help = "The link to this scene in this state and view, to be photographed by a phone";
+        self.entry(ui, "QR code", help, Command::ShowLink);
+    }
+
+    fn lesson_menu(&mut self, ui: &mut Ui) {
+        self.commands.extend(lesson::menu(ui).map(Command::Lesson));
     }
 
     fn save_menu(&mut self, ui: &mut Ui) {
-        self.picture_menu(ui);
-        ui.separator();
-        let help = "A film of a range of the timeline, MP4 or GIF";
-        if layout::entry(ui, "Film…", help) {
-            let settings = self.film_to_make();
-            self.dialog = Some(Dialog::Film { settings });
+        if self.picture.menu(ui, self.panels.picture) {
+            self.commands.push(Command::SavePicture);
         }
+        ui.separator();
+        self.entry(ui, "Film…", "A film of a range of the timeline, MP4 or GIF", Command::AskFilm);
         #[cfg(not(target_arch = "wasm32"))]
-        self.plots_menu(ui);
+        self.commands.extend(plots::format_buttons(ui).map(Command::SavePlots));
         #[cfg(target_arch = "wasm32")]
         ui.add_enabled(false, egui::Button::new("Plots…")).on_disabled_hover_text(
             "Plots as SVG and PNG are saved by the desktop program: the page leaves out the libraries that draw them, so \
              that it loads fast. Picture… can show them with the view, as PNG, and Data (CSV) has their values",
         );
-        if layout::entry(ui, "Data (CSV)…", "Everything that the plots have recorded since the reset") {
-            self.save_record();
-        }
-        if layout::entry(ui, "Impacts…", "A row for each impact up to the instant shown, CSV") {
-            self.save_impacts();
-        }
-        if layout::entry(ui, "Scene…", "The scene file with the changed values in it, TOML") {
-            self.save_scene();
-        }
+        let help = "Everything that the plots have recorded since the reset";
+        self.entry(ui, "Data (CSV)…", help, Command::SaveRecord);
+        let help = "A row for each impact up to the instant shown, CSV";
+        self.entry(ui, "Impacts…", help, Command::SaveImpacts);
+        self.entry(ui, "Scene…", "The scene file with the changed values in it, TOML", Command::SaveScene);
         ui.separator();
         let help = "Copies the HTML line that embeds this scene, in this state and view, in another page or in slides";
-        if layout::entry(ui, "Embed", help) {
-            self.copy_embedding(ui.ctx());
-        }
+        self.entry(ui, "Embed", help, Command::CopyEmbedding);
     }
 
     /// Menu of a small header, with everything that does not fit into the bar.
@@ -237,146 +246,15 @@ impl App {
         ui.label(RichText::new("Save").small().weak());
         self.save_menu(ui);
         ui.separator();
-        self.undo_entries(ui);
+        let undone = self.run.undo.entries(ui, !self.is_busy);
+        self.commands.extend(undone.map(|redo| Command::Undo { redo }));
         theme_box(ui);
-        if layout::entry(ui, "Keys", "Keys (?)") {
-            self.dialog = Some(Dialog::Help);
-        }
+        self.entry(ui, "Keys", "Keys (?)", Command::Ask(Dialog::Help));
         if ui.button("About").clicked() {
-            self.dialog = Some(Dialog::About);
+            self.commands.push(Command::Ask(Dialog::About));
             layout::close_menu(ui);
         }
     }
-
-    /// Whether [`Self::strips`] has messages.
-    pub(super) fn has_messages(&self) -> bool {
-        self.problem.is_some() || self.shows_verdict() || self.is_under_way() || self.shows_first_notice()
-    }
-
-    /// Whether the first-time scene is displayed and its notice not yet dismissed.
-    fn shows_first_notice(&self) -> bool {
-        let is_ordinary_window = self.embedded().is_none() && self.course().is_none() && !self.is_presenting();
-        is_ordinary_window && !self.changes_seen && opening::is_rattling(self.player.pending())
-    }
-
-    /// Notice of the changes the window started with; one click reverts them.
-    fn changes_strip(&mut self, ui: &mut Ui) {
-        let words = "Driven at 6 Hz; in the paper at 0.5 Hz.";
-        let row = plate(ui, ui.visuals().weak_text_color()).show(ui, |ui| {
-            ui.horizontal_wrapped(|ui| {
-                ui.label(words);
-                let help = "The scene as in its file. Its joints rattle for 70 ms and come to rest; at 6 Hz they \
-                            rattle in every period";
-                let paper = ui.button("The paper's settings").on_hover_text(help).clicked();
-                (paper, ui.button("Dismiss").clicked())
-            })
-            .inner
-        });
-        let (paper, dismissed) = row.inner;
-        self.changes_seen |= dismissed;
-        if paper {
-            let opened = Scene::load(DEFAULT_SCENE, &[]).map_err(|error| error.to_string());
-            self.problem = opened
-                .and_then(|scene| {
-                    self.show_scene(&scene)?;
-                    self.player.pacer.set_scale(opening::time_scale(&scene));
-                    Ok(())
-                })
-                .err();
-        }
-    }
-
-    /// Whether the verdict on a link is displayed. An embedded window omits verdicts that need no action, to save space.
-    fn shows_verdict(&self) -> bool {
-        let is_embedded = self.embedded().is_some();
-        let is_relevant = self.verdict.as_ref().is_some_and(|verdict| !(is_embedded && needs_no_action(verdict)));
-        is_relevant && self.verdict_shown != Some(f64::NEG_INFINITY)
-    }
-
-    /// Errors, the progress of a replay, and the verdict on a link.
-    pub(super) fn strips(&mut self, ui: &mut Ui) {
-        if self.shows_first_notice() {
-            self.changes_strip(ui);
-        }
-        if let Some(problem) = self.problem.clone() {
-            let colour = ui.visuals().error_fg_color;
-            if strip(ui, &problem, colour) {
-                self.problem = None;
-            }
-        }
-        let replay = self.replay.as_ref();
-        let tasks = [
-            ("Reproducing the state of the link…", replay.map(|replay| replay.fraction(&self.player))),
-            ("Running to the chosen section…", self.loading()),
-            ("Making the film…", self.filming()),
-        ];
-        for (words, fraction) in tasks {
-            let stop = if self.filming().is_some() {
-                ("Cancel", "Cancels the film; the run returns to where it was (Esc)")
-            } else {
-                ("Stop here", "Stay at the time that the run has reached (Esc)")
-            };
-            if fraction.is_some_and(|fraction| progress_row(ui, words, fraction, stop)) {
-                self.cancel_replay();
-            }
-        }
-        if let Some(verdict) = self.verdict.as_ref().filter(|_| self.shows_verdict()) {
-            let colour = match verdict {
-                Verdict::Agrees(_) => ui.visuals().selection.stroke.color,
-                Verdict::Reached => ui.visuals().weak_text_color(),
-                Verdict::Differs { .. } => ui.visuals().warn_fg_color,
-                Verdict::Failed(_) => ui.visuals().error_fg_color,
-            };
-            if strip(ui, &verdict.to_string(), colour) {
-                self.verdict = None;
-            }
-        }
-    }
-}
-
-/// The opaque background of a message.
-fn plate(ui: &Ui, colour: egui::Color32) -> Frame {
-    let fill = ui.visuals().panel_fill.lerp_to_gamma(colour, 0.14);
-    Frame::new().fill(fill).corner_radius(6.0).inner_margin(egui::Margin::symmetric(12, 8))
-}
-
-/// Progress of a run to its target; returns whether it was cancelled. The last argument is the label and tooltip of the stop
-/// button.
-fn progress_row(ui: &mut Ui, words: &str, fraction: f32, (stop, help): (&str, &str)) -> bool {
-    let plate = plate(ui, ui.visuals().panel_fill);
-    let row = plate.show(ui, |ui| {
-        ui.horizontal_wrapped(|ui| {
-            let percent = (fraction * 100.0).floor();
-            ui.label(format!("{words} {percent} %"));
-            ui.add(egui::ProgressBar::new(fraction).desired_width(120.0)).accessible_name("Run so far");
-            ui.button(stop).on_hover_text(help).clicked()
-        })
-        .inner
-    });
-    row.inner
-}
-
-/// A coloured strip with a message; returns whether it was dismissed.
-fn strip(ui: &mut Ui, words: &str, colour: egui::Color32) -> bool {
-    let shown = plate(ui, colour).show(ui, |ui| {
-        let narrow = ui.available_width() < 520.0;
-        let words = egui::Label::new(RichText::new(words).color(colour)).wrap();
-        if narrow {
-            ui.add(words);
-            return ui.button("Dismiss").clicked();
-        }
-        ui.horizontal_top(|ui| {
-            // Space for the button and the gap before it.
-            let room = ui.available_width() - 90.0;
-            ui.vertical(|ui| {
-                ui.set_width(room);
-                ui.add(words);
-            });
-            ui.button("Dismiss").clicked()
-        })
-        .inner
-    });
-    shown.inner
 }
 
 /// Selection of the theme: light, dark or system.

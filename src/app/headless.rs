@@ -51,7 +51,7 @@ impl Headless {
         // egui needs a few passes to settle panel sizes; time does not advance meanwhile.
         for _ in 0..3 {
             self.canvas.pass(size, scale, |ui| app.show(ui))?;
-            app.viewport.advance(&app.player, 10.0);
+            app.run.viewport.advance(&app.run.player, 10.0);
         }
         let output = self.canvas.pass(size, scale, |ui| app.show(ui))?;
         self.canvas.paint(output, size, scale).wait()
@@ -97,7 +97,7 @@ impl Headless {
     /// # Errors
     /// The size cannot be drawn.
     pub fn encode_frame(&mut self, app: &mut App, size: [u32; 2], scale: f32) -> Result<(), RenderError> {
-        app.viewport.advance(&app.player, 1.0 / 60.0);
+        app.run.viewport.advance(&app.run.player, 1.0 / 60.0);
         let output = self.canvas.pass(size, scale, |ui| app.show(ui))?;
         let (commands, _) = self.canvas.encode(output, size, scale);
         self.canvas.state().queue.submit(commands);

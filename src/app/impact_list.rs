@@ -5,9 +5,11 @@ use std::fmt::Write as _;
 use eframe::egui::{self, Align, Label, Layout, RichText, ScrollArea, Sense, Ui, WidgetInfo, vec2};
 use serde_json::json;
 
+use super::files::{file_stem, meta};
 use super::host::SaveFile;
 use super::player::Player;
-use super::{App, value};
+use super::run::Run;
+use super::value;
 use crate::analysis::impact_row;
 use crate::simulate::{ContactMode, Impact};
 
@@ -158,34 +160,33 @@ impl ImpactList {
         }
         (clicked_time, rows_height)
     }
-}
 
-impl App {
-    /// Whether the list of impacts is shown.
-    pub fn has_impact_list(&self) -> bool {
-        self.impact_list.open
+    /// Shows or closes it.
+    pub fn toggle(&mut self) {
+        self.open = !self.open;
     }
 
-    /// Shows or closes the list of impacts.
-    pub fn show_impact_list(&mut self, open: bool) {
-        self.impact_list.open = open;
+    /// Whether it is shown.
+    pub fn is_open(&self) -> bool {
+        self.open
     }
 
     /// The switch in the view menu.
-    pub(super) fn impact_switch(&mut self, ui: &mut Ui) {
-        ui.checkbox(&mut self.impact_list.open, "Impact list").on_hover_text(
+    pub fn switch(&mut self, ui: &mut Ui) {
+        ui.checkbox(&mut self.open, "Impact list").on_hover_text(
             "A row for each impact: time, duration, peak force, approach and rebound speed, restitution (key I)",
         );
     }
+}
 
-    /// The list, in a window over the lower left of the picture, never over the transport below it.
-    pub(super) fn impact_list_ui(&mut self, ctx: &egui::Context) {
+impl Run {
+    /// The list, in a window over the lower left of the picture in `area`, never over the transport below it. Returns whether to
+    /// save the impacts.
+    pub(super) fn impact_list_ui(&mut self, ctx: &egui::Context, area: egui::Rect, is_free: bool) -> bool {
         let (mut open, mut clicked_time, mut save) = (self.impact_list.open, None, false);
-        let area = self.picture_rect;
         let room = egui::Rect::from_x_y_ranges(ctx.content_rect().x_range(), area.y_range());
         let rows = ((room.height() - self.impact_list.frame) / ROW_HEIGHT).floor().clamp(1.0, MAX_VISIBLE_ROWS);
         let mut rows_height = 0.0;
-        let free = !self.is_under_way() && self.dialog.is_none();
         let shown = egui::Window::new("Impacts")
             .id(egui::Id::unique("impact list"))
             .open(&mut open)
@@ -195,7 +196,7 @@ impl App {
             .default_pos(area.left_bottom() + vec2(10.0, -10.0))
             .default_width((area.width() - 40.0).clamp(220.0, 680.0))
             .constrain_to(room)
-            .enabled(free)
+            .enabled(is_free)
             .show(ctx, |ui| {
                 (clicked_time, rows_height) = ImpactList::table(ui, &self.player, rows * ROW_HEIGHT);
                 ui.add_space(4.0);
@@ -212,19 +213,17 @@ impl App {
                 ctx.request_repaint();
             }
         }
-        if save {
-            self.save_impacts();
-        }
         if let Some(time) = clicked_time {
             self.show_instant(time);
         }
+        save
     }
 
-    /// One line about the impact at the displayed instant, e.g. after `>>` or `<<`. `None` during playback.
-    pub fn impact_badge(&self) -> Option<String> {
+    /// One line about the impact at the displayed instant, e.g. after `>>` or `<<`. `None` during playback and in a film, whose
+    /// frames are not instants chosen by the user.
+    pub fn impact_badge(&self, is_filmed: bool) -> Option<String> {
         let player = &self.player;
-        // Film frames are not instants chosen by the user.
-        if player.is_playing() || self.film.is_some() {
+        if player.is_playing() || is_filmed {
             return None;
         }
         let shown = player.pacer.shown();
@@ -248,31 +247,30 @@ impl App {
             None => format!("{onset}, peak {peak}, stays in contact"),
         })
     }
+}
 
-    /// Saves the impacts up to the displayed instant.
-    pub fn save_impacts(&mut self) {
-        let player = &self.player;
-        let mut text = impact_row::COLUMNS.join(",");
-        text.push('\n');
-        let mut rows = 0;
-        for (_, _, impact) in player.impact_record().until(player.pacer.shown()) {
-            rows += 1;
-            let values = impact_row::row(impact).map(|value| value.to_string());
-            // Writing to a String cannot fail.
-            let _ = writeln!(text, "{}", values.join(","));
-        }
-        let names: Vec<&str> = player.running().machine.loose_joints.iter().map(|joint| joint.name.as_str()).collect();
-        let extra = [
-            ("rows", json!(rows)),
-            // Indices in the column `joint` start at 0.
-            ("ball_joints", json!(names)),
-            ("impacts_no_longer_kept", json!(player.impact_record().dropped())),
-        ];
-        let name = format!("{}-impacts.csv", self.file_stem());
-        let meta = super::files::meta(player, extra);
-        self.save(vec![
-            SaveFile { name: name.clone(), mime: "text/csv", bytes: text.into_bytes() },
-            SaveFile { name: format!("{name}.meta.json"), mime: "application/json", bytes: meta.into_bytes() },
-        ]);
+/// Files with the impacts up to the displayed instant.
+pub fn files(player: &Player) -> Vec<SaveFile> {
+    let mut text = impact_row::COLUMNS.join(",");
+    text.push('\n');
+    let mut rows = 0;
+    for (_, _, impact) in player.impact_record().until(player.pacer.shown()) {
+        rows += 1;
+        let values = impact_row::row(impact).map(|value| value.to_string());
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{}", values.join(","));
     }
+    let names: Vec<&str> = player.running().machine.loose_joints.iter().map(|joint| joint.name.as_str()).collect();
+    let extra = [
+        ("rows", json!(rows)),
+        // Indices in the column `joint` start at 0.
+        ("ball_joints", json!(names)),
+        ("impacts_no_longer_kept", json!(player.impact_record().dropped())),
+    ];
+    let name = format!("{}-impacts.csv", file_stem(player));
+    let meta = meta(player, extra);
+    vec![
+        SaveFile { name: name.clone(), mime: "text/csv", bytes: text.into_bytes() },
+        SaveFile { name: format!("{name}.meta.json"), mime: "application/json", bytes: meta.into_bytes() },
+    ]
 }

@@ -4,45 +4,22 @@ use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollAr
 
 #[cfg(not(target_arch = "wasm32"))]
 use super::audience;
+use super::command::Command;
+use super::files::record_files;
+use super::header::Header;
+use super::messages::{Messages, Surroundings};
+use super::panels::{Arrangement, Sheet};
+#[cfg(not(target_arch = "wasm32"))]
+use super::remembered::Store;
 use super::{App, overlay, present, spoken, theme, transport};
 use crate::view::Preset;
 
-/// A window below this width or height is small, points.
-const SMALL_WIDTH: f32 = 760.0;
-const SMALL_HEIGHT: f32 = 480.0;
 /// Width below which time and buttons do not fit side by side in a picture, points.
 const MIN_WIDTH_SIDE_BY_SIDE: f32 = 250.0;
 /// Width below which an embedded picture shows only machine and time, points.
 const MIN_WIDTH_WITH_CONTROLS: f32 = 280.0;
 /// Width of a lesson panel beside the picture, points.
 const LESSON_WIDTH: f32 = 340.0;
-
-/// Key under which the height of the messages is stored.
-const MESSAGES_KEY: &str = "height of the messages";
-
-/// Arrangement of the window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Arrangement {
-    /// Panels beside and below the picture.
-    Large,
-    /// Picture above, sheet below.
-    Portrait,
-    /// Picture on the left, sheet on the right.
-    Landscape,
-}
-
-/// Content of a small window's sheet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sheet {
-    /// Parameters.
-    Controls,
-    /// Plots.
-    Plots,
-    /// Chaos bench, or what play costs.
-    Bench,
-    /// The lesson in progress.
-    Lesson,
-}
 
 /// Makes scroll bars in `ui` visible at rest from here on: touch input does not hover.
 pub(super) fn show_bar(ui: &mut Ui) {
@@ -179,27 +156,10 @@ fn drop_hint(ui: &Ui, area: egui::Rect) {
 impl App {
     /// The whole interface, in the available space.
     pub fn show(&mut self, ui: &mut Ui) {
-        let size = ui.available_size();
-        let arrangement = if size.y < SMALL_HEIGHT || (size.x < SMALL_WIDTH && size.x > size.y) {
-            Arrangement::Landscape
-        } else if size.x < SMALL_WIDTH {
-            Arrangement::Portrait
-        } else {
-            Arrangement::Large
-        };
-        let compact = arrangement != Arrangement::Large;
-        self.compact = compact;
-        self.touched |= ui.input(|input| input.has_touch_screen());
-        let fingers = compact || self.touched;
-        if self.fingers != Some(fingers) {
-            theme::apply_size(ui.ctx(), fingers);
-            self.fingers = Some(fingers);
-            // Applied in this pass, so that the picture is framed at its final size.
-            ui.set_style(ui.ctx().global_style());
-        }
-        self.summary(ui);
+        let arrangement = self.panels.arrange(ui);
+        self.messages.summary(ui);
         // An embedded window shares its keys with the surrounding page.
-        if self.embedded().is_none() {
+        if self.panels.embedded.is_none() {
             transport::set_first_tab_stop(ui);
         }
         if self.dialog.is_some() {
@@ -211,7 +171,7 @@ impl App {
             self.presentation_ui(ui);
             return self.floating_elements(ui);
         }
-        if self.embedded().is_some() {
+        if self.panels.embedded.is_some() {
             let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(8, 4));
             self.embedded_ui(ui, bar);
             return self.floating_elements(ui);
@@ -222,7 +182,7 @@ impl App {
             egui::Margin::symmetric(12, 8)
         };
         let bar = theme::panel(ui).inner_margin(margin);
-        Panel::top("header").frame(bar).show(ui, |ui| self.header(ui, compact));
+        Panel::top("header").frame(bar).show(ui, |ui| self.header(ui));
         match arrangement {
             Arrangement::Large => self.side_by_side(ui, bar),
             Arrangement::Portrait => self.portrait(ui, bar),
@@ -231,17 +191,44 @@ impl App {
         self.floating_elements(ui);
     }
 
+    /// The header; its commands are carried out before the panels below are shown.
+    fn header(&mut self, ui: &mut Ui) {
+        let has_page = !self.page_address().is_empty();
+        let mut header = Header {
+            run: &self.run,
+            is_busy: self.tasks.are_under_way(),
+            panels: &mut self.panels,
+            picture: &mut self.picture,
+            graphics: &mut self.graphics,
+            has_page,
+            #[cfg(not(target_arch = "wasm32"))]
+            recent: self.store.as_ref().map(Store::recent),
+            #[cfg(not(target_arch = "wasm32"))]
+            has_audience: self.presentation.audience.is_some(),
+            commands: Vec::new(),
+        };
+        header.ui(ui);
+        let commands = header.commands;
+        self.perform_all(ui.ctx(), commands);
+    }
+
     /// Elements above all panels.
     fn floating_elements(&mut self, ui: &Ui) {
-        self.save_earlier_run();
-        self.impact_list_ui(ui.ctx());
-        self.ring_highlights(ui);
+        if let Some(earlier) = self.run.plots.comparison.take_run_to_save() {
+            let files = record_files(earlier.run());
+            self.save(files);
+        }
+        let (area, is_free) = (self.panels.picture, !self.tasks.are_under_way() && self.dialog.is_none());
+        if self.run.impact_list_ui(ui.ctx(), area, is_free) {
+            self.perform(ui.ctx(), Command::SaveImpacts);
+        }
+        self.course.ring_highlights(ui, &self.run, area);
         self.dialog_ui(ui.ctx());
     }
 
     /// Lesson panel at the side of a wide window. A small window shows lessons in its sheet instead.
     pub(super) fn lesson_panel(&mut self, ui: &mut Ui, bar: Frame) {
-        if self.course().is_none() {
+        if !self.course.is_running() {
             return;
         }
         let panel = if ui.available_width() > ui.available_height() {
@@ -255,51 +242,38 @@ impl App {
 
     fn side_by_side(&mut self, ui: &mut Ui, bar: Frame) {
         self.lesson_panel(ui, bar);
-        let free = !self.is_under_way();
-        let in_lesson = self.course().is_some();
-        let Self {
-            player,
-            controls,
-            plots,
-            bench,
-            timeline,
-            viewport,
-            show_controls,
-            show_plots,
-            show_bench,
-            #[cfg(not(target_arch = "wasm32"))]
-            audience,
-            #[cfg(not(target_arch = "wasm32"))]
-            single_plot,
-            ..
-        } = self;
+        let free = !self.tasks.are_under_way();
+        let in_lesson = self.course.is_running();
+        let Self { run, bench, panels, .. } = self;
+        #[cfg(not(target_arch = "wasm32"))]
+        let presentation = &mut self.presentation;
         let mut present = false;
         Panel::left("controls").frame(bar).default_size(300.0).size_range(240.0..=480.0).show_collapsible(
             ui,
-            show_controls,
+            &mut panels.controls,
             |ui| {
                 ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                     // Space for the scroll bar beside the fields.
                     ui.set_max_width(ui.available_width() - 10.0);
                     ui.spacing_mut().item_spacing.y = 5.0;
-                    controls.title(ui, player);
-                    ui.add_enabled_ui(free, |ui| controls.ui(ui, player));
+                    run.controls.title(ui, &run.player);
+                    ui.add_enabled_ui(free, |ui| run.controls.ui(ui, &mut run.player));
                 });
             },
         );
-        let bench_request = Panel::right("bench")
+        let command = Panel::right("bench")
             .frame(bar)
             .resizable(true)
             .default_size(400.0)
             .size_range(300.0..=640.0)
-            .show_collapsible(ui, show_bench, |ui| {
+            .show_collapsible(ui, &mut panels.bench, |ui| {
                 ScrollArea::vertical()
                     // A lesson has its own scroll position.
                     .id_salt(("bench", in_lesson))
                     .auto_shrink(false)
                     .show(ui, |ui| {
                         ui.set_max_width(ui.available_width() - 10.0);
-                        ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner
+                        ui.add_enabled_ui(free, |ui| bench.ui(ui, &mut run.player)).inner
                     })
                     .inner
             });
@@ -310,21 +284,18 @@ impl App {
             .resizable(true)
             .default_size(plots_height)
             .size_range(150.0..=600.0)
-            .show_collapsible(ui, show_plots, |ui| {
+            .show_collapsible(ui, &mut panels.plots, |ui| {
                 spoken::landmark(ui, "Plots");
                 // Otherwise the panel would shrink to its content.
                 ui.take_available_space();
                 ui.horizontal(|ui| {
-                    plots.header(ui, player);
+                    run.plots.header(ui, &run.player);
                     #[cfg(not(target_arch = "wasm32"))]
-                    if audience.is_some() {
-                        audience::choose_plot(ui, &plots.titles(player), single_plot);
+                    if presentation.audience.is_some() {
+                        audience::choose_plot(ui, &run.plots.titles(&run.player), &mut presentation.plot);
                     }
                 });
-                if let Some(time) = plots.ui(ui, player).filter(|_| free) {
-                    player.go_to(time);
-                    viewport.restore_marks(player);
-                }
+                run.plots_ui(ui, None, free);
             });
         for (panel, name) in
             [("controls", "Width of the controls"), ("bench", "Width of the bench"), ("plots", "Height of the plots")]
@@ -336,10 +307,8 @@ impl App {
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
                 let contents = ui.add_enabled_ui(free, |ui| {
-                    if timeline.ui(ui, player, viewport.focus()) {
-                        viewport.restore_marks(player);
-                    }
-                    transport::ui(ui, player)
+                    run.timeline_ui(ui);
+                    transport::ui(ui, &mut run.player)
                 });
                 contents.inner
             })
@@ -348,30 +317,28 @@ impl App {
         if present {
             self.present(ui.ctx(), true);
         }
-        if let Some(request) = bench_request.and_then(|shown| shown.inner) {
-            self.apply_bench_request(request);
-        }
+        self.perform_all(ui.ctx(), command.and_then(|shown| shown.inner));
     }
 
     fn portrait(&mut self, ui: &mut Ui, bar: Frame) {
-        if self.sheet.is_some() {
+        if self.panels.sheet.is_some() {
             // Fits a lesson question with its answers.
-            let share = if self.sheet == Some(Sheet::Lesson) { 0.47 } else { 0.42 };
+            let share = if self.panels.sheet == Some(Sheet::Lesson) { 0.47 } else { 0.42 };
             let height = (ui.available_height() * share).max(160.0);
             Panel::bottom("sheet").frame(bar).exact_size(height).show(ui, |ui| self.sheet(ui));
         }
-        let free = !self.is_under_way();
+        let free = !self.tasks.are_under_way();
         let mut present = false;
         let reset = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
-                ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
-                let reset = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player));
+                ui.add_enabled_ui(free, |ui| self.run.timeline_ui(ui));
+                let reset = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player));
                 ui.horizontal(|ui| {
-                    self.sheet_tabs(ui, false);
+                    self.panels.tabs(ui, self.course.is_running(), false);
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
-                    ui.with_layout(backwards, |ui| transport::achieved_pace_below(ui, &self.player));
+                    ui.with_layout(backwards, |ui| transport::achieved_pace_below(ui, &self.run.player));
                 });
                 reset.inner
             })
@@ -383,30 +350,30 @@ impl App {
     }
 
     fn landscape(&mut self, ui: &mut Ui, bar: Frame) {
-        let free = !self.is_under_way();
+        let free = !self.tasks.are_under_way();
         let mut present = false;
         let reset = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
-                ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
+                ui.add_enabled_ui(free, |ui| self.run.timeline_ui(ui));
                 ui.horizontal(|ui| {
-                    let tabs = if self.course().is_some() { 350.0 } else { 270.0 };
+                    let tabs = if self.course.is_running() { 350.0 } else { 270.0 };
                     // Tabs that would cover the buttons become a menu.
                     let folded = ui.available_width() < tabs + transport::MIN_WIDTH;
                     let tabs = if folded { 90.0 } else { tabs };
                     let room = ui.available_width() - tabs;
                     let reset = ui
                         .allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| {
-                            ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner
+                            ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player)).inner
                         })
                         .inner;
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
                     ui.with_layout(backwards, |ui| {
                         if folded {
-                            menu(ui, "Panels", false, |ui| self.sheet_tabs(ui, false));
+                            menu(ui, "Panels", false, |ui| self.panels.tabs(ui, self.course.is_running(), false));
                         } else {
-                            self.sheet_tabs(ui, true);
+                            self.panels.tabs(ui, self.course.is_running(), true);
                         }
                     });
                     reset
@@ -414,7 +381,7 @@ impl App {
                 .inner
             })
             .inner;
-        if self.sheet.is_some() {
+        if self.panels.sheet.is_some() {
             let width = (ui.available_width() * 0.42).clamp(260.0, 340.0).min(0.55 * ui.available_width());
             Panel::right("sheet beside").frame(bar).resizable(false).exact_size(width).show(ui, |ui| self.sheet(ui));
         }
@@ -432,74 +399,34 @@ impl App {
         }
     }
 
-    pub(super) fn timeline_ui(&mut self, ui: &mut Ui) {
-        let focus = self.viewport.focus();
-        if self.timeline.ui(ui, &mut self.player, focus) {
-            self.viewport.restore_marks(&self.player);
-        }
-    }
-
-    /// Tabs of the sheet; clicking the active tab collapses it. `backwards`: the layout runs from right to left.
-    fn sheet_tabs(&mut self, ui: &mut Ui, backwards: bool) {
-        let mut tabs = vec![
-            (Sheet::Controls, "Controls", "Parameters shown or hidden"),
-            (Sheet::Plots, "Plots", "Plots shown or hidden"),
-            (Sheet::Bench, "Bench", "Chaos bench and what play costs, shown or hidden"),
-        ];
-        if self.course().is_some() {
-            tabs.insert(0, (Sheet::Lesson, "Lesson", "Lesson shown or hidden"));
-        }
-        if backwards {
-            tabs.reverse();
-        }
-        for (sheet, name, help) in tabs {
-            let on = self.sheet == Some(sheet);
-            let tab = egui::Button::selectable(on, name);
-            if ui.add(tab).on_hover_text(help).clicked() {
-                self.fold(sheet);
-            }
-        }
-    }
-
-    /// Shows `sheet`, or collapses it if it is open.
-    pub(super) fn fold(&mut self, sheet: Sheet) {
-        self.sheet = (self.sheet != Some(sheet)).then_some(sheet);
-    }
-
     fn sheet(&mut self, ui: &mut Ui) {
         show_bar(ui);
-        if self.sheet == Some(Sheet::Lesson) {
+        if self.panels.sheet == Some(Sheet::Lesson) {
             return self.lesson_ui(ui);
         }
-        let free = !self.is_under_way();
-        let Self { player, controls, plots, bench, sheet, viewport, .. } = self;
-        let mut bench_request = None;
+        let free = !self.tasks.are_under_way();
+        let Self { run, bench, panels, .. } = self;
+        let mut command = None;
         ScrollArea::vertical().id_salt("sheet").auto_shrink(false).show(ui, |ui| {
             // Space for the scroll bar.
             ui.set_max_width(ui.available_width() - 14.0);
-            match sheet {
+            match panels.sheet {
                 Some(Sheet::Controls) => {
-                    ui.add_enabled_ui(free, |ui| controls.ui(ui, player));
+                    ui.add_enabled_ui(free, |ui| run.controls.ui(ui, &mut run.player));
                 }
                 Some(Sheet::Plots) => {
                     spoken::landmark(ui, "Plots");
-                    plots.header(ui, player);
+                    run.plots.header(ui, &run.player);
                     let size = egui::vec2(ui.available_width(), 340.0);
-                    let clicked_time = ui.allocate_ui(size, |ui| plots.ui(ui, player)).inner;
-                    if let Some(time) = clicked_time.filter(|_| free) {
-                        player.go_to(time);
-                        viewport.restore_marks(player);
-                    }
+                    ui.allocate_ui(size, |ui| run.plots_ui(ui, None, free));
                 }
                 Some(Sheet::Bench) => {
-                    bench_request = ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner;
+                    command = ui.add_enabled_ui(free, |ui| bench.ui(ui, &mut run.player)).inner;
                 }
                 Some(Sheet::Lesson) | None => {}
             }
         });
-        if let Some(request) = bench_request {
-            self.apply_bench_request(request);
-        }
+        self.perform_all(ui.ctx(), command);
     }
 
     /// The 3D view with its buttons and, after a stop, the reason. Returns whether the user asked for a reset.
@@ -507,16 +434,19 @@ impl App {
         spoken::landmark(ui, "The machine");
         let plain = self.picture.hides_controls();
         if !plain {
-            self.microscope_beside(ui);
+            self.run.microscope_beside(ui);
         }
         let area = ui.available_rect_before_wrap();
         let whole = area;
-        let area = self.picture_before(ui, area, plain);
-        self.picture_rect = area;
-        let presenting = self.is_presenting() || self.embedded().is_some();
-        self.player.update_ghosts();
-        let caption = self.caption_plate(ui, area, self.is_presenting());
-        let mut above: Vec<_> = caption.iter().map(|(_, plate)| *plate).collect();
+        let area = self.run.picture_before(ui, area, plain);
+        self.panels.picture = area;
+        let presenting = self.is_presenting() || self.panels.embedded.is_some();
+        self.run.player.update_ghosts();
+        let mut caption = None;
+        if self.is_presenting() || (overlay::fits_labels(area) && !plain) {
+            caption = self.run.caption(ui, area, self.is_presenting(), self.tasks.filming().is_some());
+        }
+        let mut above: Vec<_> = caption.iter().map(|caption| caption.plate).collect();
         let inner = area.shrink(10.0);
         let row = egui::vec2(inner.width(), ui.spacing().interact_size.y);
         let width = |name: &str| {
@@ -535,23 +465,29 @@ impl App {
             let size = egui::vec2(if narrow { options } else { options + cameras }, row.y);
             above.push(edge.align_size_within_rect(size, inner));
         }
-        if !plain && self.has_messages() {
-            above.push(self.messages_area(ui, inner));
+        let around = if self.panels.embedded.is_some() {
+            Surroundings::Page
+        } else if self.course.is_running() || self.is_presenting() {
+            Surroundings::Lecture
+        } else {
+            Surroundings::Window
+        };
+        if !plain && self.messages.are_shown(&self.run.player, &self.tasks, around) {
+            above.push(Messages::area(ui, inner));
         }
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
-        self.viewport.bare = self.embedded().is_some() && area.width() < MIN_WIDTH_WITH_CONTROLS;
-        self.viewport.ui(&mut place, &self.player, plain, &above);
+        self.run.viewport.bare = self.panels.embedded.is_some() && area.width() < MIN_WIDTH_WITH_CONTROLS;
+        self.run.viewport.ui(&mut place, &self.run.player, plain, &above);
         ui.advance_cursor_after_rect(whole);
-        if let Some(joint) = self.viewport.take_clicked() {
-            self.focus(joint);
-            self.microscope.set_open(true);
+        if let Some(joint) = self.run.viewport.take_clicked() {
+            self.run.focus(joint);
+            self.run.microscope.set_open(true);
             ui.request_repaint();
         }
-        if let Some(pull) = self.viewport.take_pull()
-            && !self.is_under_way()
-            && let Err(error) = self.player.pull(pull)
+        if let Some(pull) = self.run.viewport.take_pull()
+            && !self.tasks.are_under_way()
         {
-            self.problem = Some(error.to_string());
+            self.messages.warn(self.run.player.pull(pull));
         }
         if plain {
             // A saved picture has no buttons.
@@ -559,6 +495,7 @@ impl App {
         }
         let backwards = egui::Layout::right_to_left(egui::Align::Center);
         let buttons = egui::UiBuilder::new().max_rect(edge.align_size_within_rect(row, inner)).layout(backwards);
+        let mut action = None;
         ui.scope_builder(buttons, |ui| {
             if presenting {
                 return;
@@ -566,86 +503,28 @@ impl App {
             menu(ui, "View options", false, |ui| {
                 ui.set_min_width(230.0);
                 if narrow {
-                    ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui, false));
+                    ui.horizontal_wrapped(|ui| self.run.viewport.camera_buttons(ui, false));
                     ui.separator();
                 }
-                self.instruments(ui);
+                action = self.run.instruments(ui, self.sound.is_on());
                 ui.add_space(4.0);
-                self.viewport.options_ui(ui);
+                self.run.viewport.options_ui(ui);
             });
             if !narrow {
-                ui.with_layout(backwards, |ui| self.viewport.camera_buttons(ui, true));
+                ui.with_layout(backwards, |ui| self.run.viewport.camera_buttons(ui, true));
             }
         });
-        self.caption(ui, area, caption);
+        if let Some(action) = action {
+            self.perform_action(ui.ctx(), action);
+        }
+        if let Some(caption) = caption {
+            caption.ui(ui, area);
+        }
         drop_hint(ui, whole);
-        let messages = self.messages(ui, whole.shrink(10.0));
-        self.notice_plate(ui, messages);
+        let inside = whole.shrink(10.0);
+        let command = self.messages.ui(ui, inside, &self.run.player, &self.tasks, around);
+        self.perform_all(ui.ctx(), command);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
-        ui.scope_builder(middle, |ui| transport::banner(ui, &self.player)).inner
-    }
-
-    /// Area of the messages at the lower edge of `area`.
-    fn messages_area(&self, ui: &Ui, area: egui::Rect) -> egui::Rect {
-        // Height in the previous frame; initially one line with a button.
-        let height = ui.data(|data| data.get_temp(Id::unique(MESSAGES_KEY)));
-        let height = height.unwrap_or(ui.spacing().interact_size.y + 16.0);
-        Align2::CENTER_BOTTOM.align_size_within_rect(egui::vec2(area.width().min(640.0), height), area)
-    }
-
-    /// Messages over the lower edge of the picture; they appear and disappear without affecting the layout. Returns the free part
-    /// of `area`.
-    fn messages(&mut self, ui: &mut Ui, area: egui::Rect) -> egui::Rect {
-        let id = Id::unique(MESSAGES_KEY);
-        if !self.has_messages() {
-            ui.data_mut(|data| data.remove_temp::<f32>(id));
-            return area;
-        }
-        let row = ui.spacing().interact_size.y;
-        let most = if self.is_refused() {
-            // Hides the picture, which does not show what the link promised.
-            let fill = ui.visuals().panel_fill;
-            ui.painter().rect_filled(area.expand(10.0), 0.0, fill);
-            area.height()
-        } else {
-            (area.height() - row - 8.0).max(60.0)
-        };
-        let place = self.messages_area(ui, area);
-        let shown = ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
-            ScrollArea::vertical()
-                .id_salt("messages")
-                .max_height(most)
-                .min_scrolled_height(most)
-                .show(ui, |ui| self.strips(ui));
-        });
-        let now = shown.response.rect.height();
-        if now != place.height() {
-            ui.data_mut(|data| data.insert_temp(id, now));
-            ui.ctx().request_repaint();
-        }
-        area.with_max_y(place.top() - 8.0)
-    }
-
-    /// A notice displayed for a few seconds.
-    fn notice_plate(&mut self, ui: &Ui, area: egui::Rect) {
-        let now = ui.input(|input| input.time);
-        let Some(notice) = &mut self.notice else {
-            return;
-        };
-        let left = notice.remaining_time(now);
-        if left <= 0.0 {
-            self.notice = None;
-            return;
-        }
-        ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(left));
-        let font = egui::TextStyle::Body.resolve(ui.style());
-        let colour = ui.visuals().text_color();
-        let width = (area.width() - 24.0).max(40.0);
-        let words = ui.painter().layout(notice.text.clone(), font, colour, width);
-        let above = egui::vec2(0.0, ui.spacing().interact_size.y + 8.0);
-        let place = egui::Align2::CENTER_BOTTOM.align_size_within_rect(words.size(), area.translate(-above));
-        let fill = ui.visuals().window_fill.gamma_multiply(0.92);
-        ui.painter().rect_filled(place.expand2(egui::vec2(10.0, 5.0)), 6.0, fill);
-        ui.painter().galley(place.min, words, colour);
+        ui.scope_builder(middle, |ui| transport::banner(ui, &self.run.player)).inner
     }
 }

@@ -3,6 +3,7 @@
 mod before;
 mod built_in;
 mod control_finder;
+mod course;
 mod format;
 mod measure;
 mod names;
@@ -13,20 +14,22 @@ mod text;
 
 use std::sync::Arc;
 
-use eframe::egui;
+use eframe::egui::{self, Ui};
 
-use super::layout::Sheet;
 use super::log::Event;
+use super::panels::Sheet;
 use super::player::Player;
-use super::{App, replay_budget};
+use super::tasks::replay_budget;
+use super::{App, Link};
 use crate::session::replay::Verdict;
-pub(super) use before::PreviousWindow;
+use before::PreviousWindow;
 pub use built_in::{BUILT_IN_LESSONS, lesson_titles};
-use control_finder::ControlFinder;
+pub use course::Course;
 pub use format::Lesson;
 use format::{CameraTarget, PanelName, Step};
 use measure::LessonMeasures;
 use names::{Names, comparisons};
+pub use panel::menu;
 
 /// Latest time of a live change after its nominal instant, s: the longest solver step.
 const MAX_DELAY: f64 = 10e-3;
@@ -228,16 +231,11 @@ fn known_values(condition: &str, names: &Names<'_>) -> String {
 }
 
 impl App {
-    /// The lesson in progress.
-    pub fn course(&self) -> Option<&RunningLesson> {
-        self.running_lesson.as_deref()
-    }
-
     /// Continues `lesson` at step `step`, counted from 0; if `starts_step`, the machine is set for that step.
     pub(super) fn resume_lesson(&mut self, lesson: Arc<Lesson>, step: usize, starts_step: bool) {
-        self.remember_window();
-        self.running_lesson = Some(Box::new(RunningLesson::new(lesson, step)));
-        self.sheet = Some(Sheet::Lesson);
+        self.course.remember_window(&mut self.run, &self.panels, &mut self.bench);
+        self.course.begin(lesson, step);
+        self.panels.sheet = Some(Sheet::Lesson);
         if starts_step {
             self.set_step();
         }
@@ -247,23 +245,34 @@ impl App {
     pub(super) fn open_lesson(&mut self, name: &str) {
         match Lesson::built_in(name) {
             Ok(lesson) => self.resume_lesson(lesson, 0, true),
-            Err(error) => self.problem = Some(error.to_string()),
+            Err(error) => self.messages.fail(error),
         }
     }
 
     /// Ends the lesson and restores the window.
     pub(super) fn leave_lesson(&mut self) {
-        if let Some(running) = self.running_lesson.take() {
-            self.restore_window(&running.lesson);
+        if let Some((lesson, Some(before))) = self.course.end() {
+            let Self { run, panels, bench, tasks, messages, .. } = self;
+            if let Some(file) = before.restore(&lesson, run, panels, bench, tasks, messages) {
+                self.files.scene = file;
+            }
         }
-        if self.sheet == Some(Sheet::Lesson) {
-            self.sheet = None;
+        if self.panels.sheet == Some(Sheet::Lesson) {
+            self.panels.sheet = None;
         }
+    }
+
+    /// The panel of the lesson.
+    pub(super) fn lesson_ui(&mut self, ui: &mut Ui) {
+        let presented = self.presentation.is_running();
+        let low = presented && !self.panels.is_touched();
+        let command = self.course.ui(ui, &self.run.player, presented, low);
+        self.perform_all(ui.ctx(), command);
     }
 
     /// Goes to the next or the previous step of the lesson.
     pub(super) fn change_step(&mut self, forward: bool) {
-        let Some(running) = &mut self.running_lesson else {
+        let Some(running) = &mut self.course.running else {
             return;
         };
         let last = running.lesson.steps.len() - 1;
@@ -274,17 +283,17 @@ impl App {
         };
         // A continuing step needs no new state if the machine is where the previous step left it: not before the previous step's
         // end, and not past the end of this one, which would reveal the answer.
-        let shown = self.player.pacer.shown();
+        let shown = self.run.player.pacer.shown();
         let end = |step: usize| {
             let until = running.lesson.steps[step].until.as_ref();
             until.and_then(|until| running.measured.names().time(until))
         };
         let in_place = end(running.step).is_none_or(|end| shown >= end) && end(step).is_none_or(|end| shown < end);
         let starts_run = running.lesson.steps[step].begins;
-        let continues = forward && !starts_run && in_place && running.is_run_of_step(&self.player);
+        let continues = forward && !starts_run && in_place && running.is_run_of_step(&self.run.player);
         (running.step, running.predicted, running.reached) = (step, None, false);
         if continues {
-            self.player.set_playing(false);
+            self.run.player.set_playing(false);
             self.apply_camera_of_step(false);
         } else {
             self.set_step();
@@ -293,7 +302,7 @@ impl App {
 
     /// Sets the machine for the step: to the start of its run, or to the end of the previous step in that run.
     pub(super) fn set_step(&mut self) {
-        let Some(running) = &mut self.running_lesson else {
+        let Some(running) = &mut self.course.running else {
             return;
         };
         (running.is_setting_machine, running.predicted, running.reached) = (true, None, false);
@@ -304,12 +313,13 @@ impl App {
         let mut ends = before.iter().rev().filter_map(|step| step.until.as_ref());
         let whole = begin.twin || !running.lesson.runs[begin.run].changes.is_empty();
         let left_at = ends.find_map(|until| names.time(until)).filter(|_| !whole);
-        let same = self.player.pending().source.text == scene.source.text;
-        let pose = self.viewport.pose().filter(|_| same && link.camera.is_none());
-        self.problem = self.show_scene(&scene).err();
-        self.player.set_playing(false);
+        let same = self.run.player.pending().source.text == scene.source.text;
+        let pose = self.run.viewport.pose().filter(|_| same && link.camera.is_none());
+        let shown = self.show_scene(&scene);
+        self.messages.report(shown);
+        self.run.player.set_playing(false);
         if let Some(pose) = pose {
-            self.viewport.set_pose(pose);
+            self.run.viewport.set_pose(pose);
         }
         let mut link = link;
         // Live changes and twin runs must be replayed from the start.
@@ -317,24 +327,14 @@ impl App {
             link.time = Some(end);
         }
         link.instruments.get_or_insert_default();
-        self.set_look(&link);
+        self.run.set_look(&link);
         self.show_link(link);
-    }
-
-    /// Applies the link settings that [`Self::show_link`] leaves to the caller.
-    fn set_look(&mut self, link: &super::Link) {
-        if let Some(scale) = link.time_scale {
-            self.player.pacer.set_scale(scale);
-        }
-        if let Some(magnification) = link.magnification {
-            self.viewport.options.magnification = magnification;
-        }
     }
 
     /// Applies the view settings of the step; the machine is unchanged. `is_fresh`: the machine was just set, so the settings of
     /// earlier steps apply as well.
     fn apply_camera_of_step(&mut self, is_fresh: bool) {
-        let Some(running) = &self.running_lesson else {
+        let Some(running) = &self.course.running else {
             return;
         };
         let (lesson, last) = (running.lesson.clone(), running.step);
@@ -342,110 +342,76 @@ impl App {
         let steps = &lesson.steps[first..=last];
         let begin = if is_fresh { lesson.run_start_step(last) } else { last };
         for step in &lesson.steps[begin..=last] {
-            if !step.begins && step.link != super::Link::default() {
+            if !step.begins && step.link != Link::default() {
                 // The camera continues to follow its ball joint.
-                let followed = self.viewport.followed().filter(|_| step.link.camera.is_none());
-                self.set_look(&step.link);
+                let followed = self.run.viewport.followed().filter(|_| step.link.camera.is_none());
+                self.run.set_look(&step.link);
                 self.show_link(step.link.clone());
-                self.viewport.follow(followed);
+                self.run.viewport.follow(followed);
             }
         }
         // The latest camera setting applies.
         let places = |step: &&Step| step.view.is_some() || step.link.camera.is_some();
         match steps.iter().rev().find(places).and_then(|step| step.view) {
-            Some(CameraTarget::From(preset)) => self.viewport.preset(preset),
+            Some(CameraTarget::From(preset)) => self.run.viewport.preset(preset),
             Some(CameraTarget::At(joint)) => {
-                self.viewport.show_close_up(&self.player, joint);
+                self.run.viewport.show_close_up(&self.run.player, joint);
             }
             None => {}
         }
         if let Some(open) = steps.iter().rev().find_map(|step| step.open.as_ref()) {
             let is_open = |panel| open.contains(&panel);
-            self.show_controls = is_open(PanelName::Controls);
-            self.show_plots = is_open(PanelName::Plots);
-            self.show_bench = is_open(PanelName::Bench);
+            self.panels.controls = is_open(PanelName::Controls);
+            self.panels.plots = is_open(PanelName::Plots);
+            self.panels.bench = is_open(PanelName::Bench);
         }
     }
 
     /// Advances the lesson alongside the run: computes its measures, and stops the machine at the end of the step.
     pub(super) fn advance_lesson(&mut self, ctx: &egui::Context) {
-        let Some(running) = &mut self.running_lesson else {
+        let Some(running) = &mut self.course.running else {
             return;
         };
-        if !running.measured.advance(replay_budget(self.player.clock)) {
+        if !running.measured.advance(replay_budget(self.run.player.clock)) {
             ctx.request_repaint();
         }
         if running.is_setting_machine {
-            if self.replay.is_some() {
+            if self.tasks.replay().is_some() {
                 return;
             }
             running.is_setting_machine = false;
-            if self.verdict == Some(Verdict::Reached) {
-                self.verdict = None;
+            if self.messages.verdict() == Some(&Verdict::Reached) {
+                self.messages.set_verdict(None);
             }
             let begin = &running.lesson.steps[running.lesson.run_start_step(running.step)];
             for (_, key, value) in &running.lesson.runs[begin.run].changes {
-                if let Err(error) = self.player.set(key, value) {
-                    self.problem = Some(error.to_string());
+                if let Err(error) = self.run.player.set(key, value) {
+                    self.messages.fail(error);
                 }
             }
             // These are not user edits.
-            self.player.take_edits();
+            self.run.player.take_edits();
             if begin.twin {
-                self.player.set_twin(true);
+                self.run.player.set_twin(true);
             }
             self.apply_camera_of_step(true);
             ctx.request_repaint();
             return;
         }
-        if running.reached || self.is_under_way() {
+        if running.reached || self.tasks.are_under_way() {
             return;
         }
-        let Some(running) = &mut self.running_lesson else {
+        let Some(running) = &mut self.course.running else {
             return;
         };
         if let Some(until) = running.until()
-            && self.player.pacer.shown() >= until
+            && self.run.player.pacer.shown() >= until
         {
             (running.reached, running.has_new_result) = (true, true);
-            if self.player.is_playing() {
+            if self.run.player.is_playing() {
                 self.show_instant(until);
             }
             ctx.request_repaint();
         }
-    }
-
-    /// Draws rings around the step's highlighted items, over everything, without affecting the layout.
-    pub(super) fn ring_highlights(&self, ui: &egui::Ui) {
-        let wanted = self.course().map_or(&[][..], |running| &running.current_step().highlight);
-        let joints = &self.player.running().machine.loose_joints;
-        let joint = |name: &String| joints.iter().position(|joint| joint.name == *name);
-        let places = ControlFinder::places(ui.ctx(), &self.pointed_controls());
-        let stroke = egui::Stroke::new(3.0, super::theme::series(1, ui.visuals().dark_mode));
-        let layer = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("rings"));
-        let painter = ui.ctx().layer_painter(layer);
-        for (_, rect) in places {
-            painter.rect_stroke(rect.expand(4.0), 8.0, stroke, egui::StrokeKind::Outside);
-        }
-        let inside = painter.with_clip_rect(self.picture_rect);
-        for joint in wanted.iter().filter_map(joint) {
-            let centre = self.player.frame().joints.get(joint).map(|joint| joint.ball_centre);
-            if let Some(place) = centre.and_then(|centre| self.place_in_view(&centre)) {
-                inside.circle_stroke(place, 26.0, stroke);
-            }
-        }
-    }
-
-    /// Whether all highlighted items of the step are visible.
-    pub fn shows_highlights(&self, ctx: &egui::Context) -> bool {
-        let labels = self.pointed_controls();
-        ControlFinder::places(ctx, &labels).len() == labels.len()
-    }
-
-    /// Names of the highlighted controls of the step.
-    fn pointed_controls(&self) -> Vec<String> {
-        let wanted = self.course().map_or(&[][..], |running| &running.current_step().highlight);
-        let joints = &self.player.running().machine.loose_joints;
-        wanted.iter().filter(|name| joints.iter().all(|joint| joint.name != **name)).cloned().collect()
     }
 }

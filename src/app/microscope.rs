@@ -6,8 +6,10 @@ mod magnified_joint;
 use eframe::egui::{self, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
 use glam::Vec3;
 
+use super::keys::Action;
 use super::player::Player;
-use super::{App, layout, spoken, theme, value};
+use super::run::Run;
+use super::{layout, sound, spoken, theme, value};
 use crate::simulate::ContactMode;
 pub use draw::Circle;
 use draw::{Plane, Sheet};
@@ -318,17 +320,7 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
     });
 }
 
-impl App {
-    /// The microscope.
-    pub fn microscope(&self) -> &Microscope {
-        &self.microscope
-    }
-
-    /// The microscope, mutable.
-    pub fn microscope_mut(&mut self) -> &mut Microscope {
-        &mut self.microscope
-    }
-
+impl Run {
     /// Focuses ball joint `joint` if the scene has it: the view follows its centre.
     pub(super) fn focus(&mut self, joint: usize) {
         self.microscope.focus(joint);
@@ -343,15 +335,21 @@ impl App {
         }
     }
 
-    /// Instrument switches in the view menu.
-    pub(super) fn instruments(&mut self, ui: &mut Ui) {
+    /// Instrument switches in the view menu; returns the action chosen among them. `sound`: whether impacts are heard.
+    pub(super) fn instruments(&mut self, ui: &mut Ui, sound: bool) -> Option<Action> {
+        let mut chosen = None;
         ui.label("Instruments");
         ui.horizontal(|ui| {
             ui.checkbox(&mut self.microscope.open, "Microscope")
                 .on_hover_text("The play of the joint in focus, magnified: path of the ball, contact, impacts (key L)");
-            self.sound_switch(ui);
+            if sound::switch(ui, sound) {
+                chosen = Some(Action::Sound);
+            }
         });
-        self.ideal_switch(ui);
-        self.impact_switch(ui);
+        if self.ideal_switch(ui) {
+            chosen = Some(Action::IdealGhost);
+        }
+        self.impact_list.switch(ui);
+        chosen
     }
 }

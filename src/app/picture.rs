@@ -1,11 +1,12 @@
 //! Saved pictures of the 3D view, the view with plots, or the whole window, at any size. The same code redraws them off screen at
 //! that size, so that labels and arrows are sharp.
 
-use eframe::egui::{self, Button, CentralPanel, DragValue, Panel, RichText, Ui, Vec2, vec2};
+use eframe::egui::{self, Button, CentralPanel, DragValue, Panel, Rect, RichText, Ui, Vec2, vec2};
 use eframe::egui_wgpu::RenderState;
 
 use super::App;
 use super::canvas::{Canvas, Pending};
+use super::files::{describe, file_stem};
 use super::host::SaveFile;
 use super::layout;
 use super::overlay::SMALL_PICTURE;
@@ -108,34 +109,29 @@ impl Picture {
         };
         (pixels, scale.min(room).max(readable))
     }
-}
 
-impl App {
-    /// Options and save button of the picture.
-    pub(super) fn picture_menu(&mut self, ui: &mut Ui) {
-        if layout::entry(ui, "Picture…", "A picture as chosen below, PNG") {
-            self.save_picture(ui.ctx());
-        }
-        let (points, screen) = (self.picture_points(ui.ctx()), ui.ctx().pixels_per_point());
-        let picture = &mut self.picture;
+    /// Options and save button of a picture of the window with the 3D view in `view`; returns whether to save it.
+    pub fn menu(&mut self, ui: &mut Ui, view: Rect) -> bool {
+        let asked = layout::entry(ui, "Picture…", "A picture as chosen below, PNG");
+        let (points, screen) = (self.points(ui.ctx(), view), ui.ctx().pixels_per_point());
         ui.horizontal(|ui| {
             for (contents, name, help) in Contents::ALL {
-                ui.selectable_value(&mut picture.contents, contents, name).on_hover_text(help);
+                ui.selectable_value(&mut self.contents, contents, name).on_hover_text(help);
             }
         });
         ui.horizontal(|ui| {
             for times in SCALES {
                 let help = format!("{times} times as many pixels along each edge as on the screen");
-                ui.selectable_value(&mut picture.times, Some(times), format!("{times}×")).on_hover_text(help);
+                ui.selectable_value(&mut self.times, Some(times), format!("{times}×")).on_hover_text(help);
             }
-            let own_size = Button::selectable(picture.times.is_none(), "Own size");
+            let own_size = Button::selectable(self.times.is_none(), "Own size");
             if ui.add(own_size).on_hover_text("Choose width and height").clicked() {
-                picture.times = None;
+                self.times = None;
             }
         });
-        ui.add_enabled_ui(picture.times.is_none(), |ui| {
+        ui.add_enabled_ui(self.times.is_none(), |ui| {
             ui.horizontal(|ui| {
-                for (edge, name) in picture.own_size.iter_mut().zip(["Width", "Height"]) {
+                for (edge, name) in self.own_size.iter_mut().zip(["Width", "Height"]) {
                     ui.label(name);
                     ui.add(DragValue::new(edge).range(EDGE_RANGE).suffix(" px"))
                         .on_hover_text("Edge of the picture, pixels")
@@ -143,14 +139,15 @@ impl App {
                 }
             });
         });
-        let ([width, height], _) = picture.size(points, screen);
+        let ([width, height], _) = self.size(points, screen);
         ui.label(RichText::new(format!("{width} × {height} pixels")).small().weak());
+        asked
     }
 
-    /// Screen size of the picture's contents, points.
-    fn picture_points(&self, ctx: &egui::Context) -> Vec2 {
-        let view = self.picture_rect.size();
-        let points = match self.picture.contents {
+    /// Screen size of the contents, points, with the 3D view in `view`.
+    fn points(&self, ctx: &egui::Context, view: Rect) -> Vec2 {
+        let view = view.size();
+        let points = match self.contents {
             Contents::View => view,
             Contents::Plots => view + vec2(0.0, PLOTS_HEIGHT),
             Contents::Window => ctx.content_rect().size(),
@@ -158,20 +155,22 @@ impl App {
         points.max(Vec2::splat(1.0))
     }
 
-    /// Saves the chosen picture once it has been read back from the graphics adapter; does not block.
-    pub fn save_picture(&mut self, ctx: &egui::Context) {
-        self.picture.forget();
-        self.picture.requested = true;
+    /// Asks for the chosen picture, which is saved once it has been read back from the graphics adapter.
+    pub fn request(&mut self, ctx: &egui::Context) {
+        self.forget();
+        self.requested = true;
         ctx.request_repaint();
     }
+}
 
-    /// Draws the picture requested by [`Self::save_picture`], and collects it when available.
+impl App {
+    /// Draws the picture requested by [`Picture::request`], and collects it when available.
     pub(super) fn receive_picture(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|input| input.time);
         if std::mem::take(&mut self.picture.requested) {
             match self.draw_picture(ctx) {
                 Ok(pending) => self.picture.pending = Some((pending, now)),
-                Err(reason) => self.problem = Some(reason),
+                Err(reason) => self.messages.fail(reason),
             }
         }
         let Some((pending, since)) = &mut self.picture.pending else {
@@ -180,31 +179,33 @@ impl App {
         let Some(image) = pending.take() else {
             if now - *since > TIMEOUT {
                 self.picture.forget();
-                self.problem = Some("The graphics adapter did not return the picture".into());
+                self.messages.fail("The graphics adapter did not return the picture");
             }
             ctx.request_repaint();
             return;
         };
         self.picture.pending = None;
-        let described = self.describe();
+        let described = describe(&self.run.player);
         let software = format!("jointplay {}", crate::VERSION);
         let texts = [("Software", software.as_str()), ("Description", described.as_str())];
         let bytes = image
             .map_err(|error| error.to_string())
             .and_then(|image| image.png(&texts).map_err(|error| error.to_string()));
         match bytes {
-            Ok(bytes) => {
-                self.save(vec![SaveFile { name: format!("{}.png", self.file_stem()), mime: "image/png", bytes }])
-            }
-            Err(reason) => self.problem = Some(format!("The picture cannot be saved: {reason}")),
+            Ok(bytes) => self.save(vec![SaveFile {
+                name: format!("{}.png", file_stem(&self.run.player)),
+                mime: "image/png",
+                bytes,
+            }]),
+            Err(reason) => self.messages.fail(format!("The picture cannot be saved: {reason}")),
         }
     }
 
     /// Draws the picture off screen.
     fn draw_picture(&mut self, ctx: &egui::Context) -> Result<Pending, String> {
         let state: RenderState =
-            self.graphics.clone().ok_or("The picture cannot be drawn: there is no graphics adapter")?;
-        let resolution = self.picture.size(self.picture_points(ctx), ctx.pixels_per_point());
+            self.graphics.state.clone().ok_or("The picture cannot be drawn: there is no graphics adapter")?;
+        let resolution = self.picture.size(self.picture.points(ctx, self.panels.picture), ctx.pixels_per_point());
         let contents = self.picture.contents;
         let pending = self.draw_off_screen(ctx, &mut Canvas::beside(&state), contents, resolution, true);
         pending.map_err(|error| format!("The picture cannot be drawn: {error}"))
@@ -224,7 +225,7 @@ impl App {
     ) -> Result<Pending, String> {
         let saved = (self.picture.contents, self.picture.times, self.picture.own_size);
         (self.picture.contents, self.picture.times, self.picture.own_size) = (contents, None, size);
-        let resolution = self.picture.size(self.picture_points(ctx), ctx.pixels_per_point());
+        let resolution = self.picture.size(self.picture.points(ctx, self.panels.picture), ctx.pixels_per_point());
         (self.picture.contents, self.picture.times, self.picture.own_size) = saved;
         let pending = self.draw_off_screen(ctx, canvas, contents, resolution, first);
         pending.map_err(|error| error.to_string())
@@ -249,8 +250,8 @@ impl App {
             canvas.ctx.set_theme(ctx.theme());
             canvas.time = ctx.input(|input| input.time);
         }
-        let saved = (self.picture_rect, self.compact, self.fingers);
-        self.viewport.freeze(Some(self.picture_rect.aspect_ratio()));
+        let saved = self.panels.clone();
+        self.run.viewport.freeze(Some(self.panels.picture.aspect_ratio()));
         self.picture.drawn = Some(contents);
         // egui settles new layouts over a few passes.
         let mut output = Ok(egui::FullOutput::default());
@@ -261,8 +262,8 @@ impl App {
             }
         }
         self.picture.drawn = None;
-        self.viewport.freeze(None);
-        (self.picture_rect, self.compact, self.fingers) = saved;
+        self.run.viewport.freeze(None);
+        self.panels = saved;
         Ok(canvas.paint(output?, size, scale))
     }
 
@@ -275,7 +276,7 @@ impl App {
             Panel::bottom("plots of a picture")
                 .frame(bar.inner_margin(egui::Margin::symmetric(12, 8)))
                 .exact_size(PLOTS_HEIGHT)
-                .show(ui, |ui| self.plots.ui(ui, &self.player));
+                .show(ui, |ui| self.run.plots.ui(ui, &self.run.player));
         }
         CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
     }

@@ -27,6 +27,8 @@ mod quantity;
 mod scale;
 #[cfg(not(target_arch = "wasm32"))]
 mod sheet;
+#[cfg(not(target_arch = "wasm32"))]
+pub use sheet::{PlotFormat, format_buttons};
 
 /// Selectable windows, s.
 const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];

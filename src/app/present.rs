@@ -5,7 +5,14 @@ use std::sync::Arc;
 
 use eframe::egui::{self, Align2, FontId, Galley, Id, Panel, Rect, Sense, Ui, Vec2, vec2};
 
+#[cfg(not(target_arch = "wasm32"))]
+use super::audience::Audience;
+use super::bench::Bench;
+#[cfg(not(target_arch = "wasm32"))]
+use super::keys::Action;
+use super::run::Run;
 use super::{App, overlay, spoken, theme, transport, value};
+use crate::view::ViewOptions;
 
 /// Least text height as a fraction of the screen height, legible from the last row of a lecture hall.
 const MIN_TEXT_HEIGHT: f32 = 1.0 / 40.0;
@@ -30,8 +37,21 @@ pub(super) const ARROW_THICKNESS: f32 = 2.0;
 /// Least relative change of the screen height that changes the type size.
 const MIN_HEIGHT_CHANGE: f32 = 0.02;
 
-/// Settings to restore, and the screen height.
+/// What the audience sees: the presentation in this window, and the window for the class.
+#[derive(Default)]
 pub struct Presentation {
+    running: Option<Running>,
+    /// The user's zoom while another is shown: in a presentation and in a tiny window, until it is in effect again.
+    pub set_aside_zoom: Option<f32>,
+    /// Index of the single plot shown in a presentation and in the audience window.
+    pub plot: Option<usize>,
+    /// The audience window.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub audience: Option<Audience>,
+}
+
+/// Settings to restore, and the screen height.
+struct Running {
     /// Previous thickness of arrows.
     thickness: f32,
     /// Screen height for which the type was sized, points at zoom 1.
@@ -57,57 +77,45 @@ pub(super) fn legible_zoom(height: f32) -> f32 {
     (height * MIN_TEXT_HEIGHT / SMALLEST_FONT).max(1.0)
 }
 
-impl App {
-    /// Begins or ends the presentation. `follow_screen` sizes the type once a frame: a zoom takes effect a pass later, so two
-    /// changes within a frame would not see each other.
-    pub fn present(&mut self, ctx: &egui::Context, on: bool) {
-        if on == self.presentation.is_some() {
-            return;
-        }
-        match self.presentation.take() {
-            Some(before) => self.viewport.options.arrows.thickness = before.thickness,
-            None => {
-                self.bench.set_aside();
-                let thickness = self.viewport.options.arrows.thickness;
-                self.presentation = Some(Presentation { thickness, height: None });
-                self.viewport.options.arrows.thickness = ARROW_THICKNESS;
-            }
-        }
-        self.host.fill_screen(ctx, on);
+impl Presentation {
+    /// Whether this window presents.
+    pub fn is_running(&self) -> bool {
+        self.running.is_some()
     }
 
-    /// Whether a presentation is active.
-    pub fn is_presenting(&self) -> bool {
-        self.presentation.is_some()
+    /// Begins or ends the presentation in this window.
+    fn set_running(&mut self, on: bool, options: &mut ViewOptions) {
+        if let Some(before) = self.running.take() {
+            options.arrows.thickness = before.thickness;
+        }
+        if on {
+            let thickness = std::mem::replace(&mut options.arrows.thickness, ARROW_THICKNESS);
+            self.running = Some(Running { thickness, height: None });
+        }
     }
 
     /// The user's zoom of the interface.
-    pub(super) fn own_zoom(&self, ctx: &egui::Context) -> f32 {
+    pub fn own_zoom(&self, ctx: &egui::Context) -> f32 {
         self.set_aside_zoom.unwrap_or_else(|| ctx.zoom_factor())
     }
 
     /// The plot shown in a presentation and in the audience window, if any.
-    pub fn single_plot(&self) -> Option<usize> {
-        self.single_plot.filter(|index| *index < self.plots.titles(&self.player).len())
+    pub fn single_plot(&self, run: &Run) -> Option<usize> {
+        self.plot.filter(|index| *index < run.plots.titles(&run.player).len())
     }
 
-    /// Shows the next of the chosen plots, or none after the last; in a presented lesson toggles between all and none.
-    pub(super) fn show_next_plot(&mut self) {
-        if self.is_presenting() && self.course().is_some() {
-            self.show_plots = !self.show_plots;
-            return;
-        }
-        let next = self.single_plot().map_or(0, |index| index + 1);
-        self.single_plot = Some(next);
-        self.single_plot = self.single_plot();
+    /// Shows the next of the chosen plots, or none after the last.
+    fn show_next_plot(&mut self, run: &Run) {
+        self.plot = Some(self.single_plot(run).map_or(0, |index| index + 1));
+        self.plot = self.single_plot(run);
     }
 
     /// Sizes the type: in a presentation for the screen, also after a size change such as entering or leaving full screen;
     /// otherwise as the user chose, but smaller in a window that is too small for its controls, e.g. on a page zoomed to four
     /// times the size.
-    pub(super) fn follow_screen(&mut self, ctx: &egui::Context) {
+    pub fn follow_screen(&mut self, ctx: &egui::Context) {
         let (now, own) = (ctx.zoom_factor(), self.own_zoom(ctx));
-        let zoom = if let Some(presentation) = &mut self.presentation {
+        let zoom = if let Some(presentation) = &mut self.running {
             let height = screen_height(ctx);
             let is_sized = presentation.height.is_some_and(|sized| {
                 // The new zoom takes effect a pass later; only then the height is that of the screen.
@@ -131,25 +139,73 @@ impl App {
             ctx.set_zoom_factor(zoom);
         }
     }
+}
+
+impl App {
+    /// Begins or ends the presentation. `follow_screen` sizes the type once a frame: a zoom takes effect a pass later, so two
+    /// changes within a frame would not see each other.
+    pub fn present(&mut self, ctx: &egui::Context, on: bool) {
+        if on == self.is_presenting() {
+            return;
+        }
+        if on {
+            self.bench.set_aside();
+        }
+        self.presentation.set_running(on, &mut self.run.viewport.options);
+        self.host.fill_screen(ctx, on);
+    }
+
+    /// Whether a presentation is active.
+    pub fn is_presenting(&self) -> bool {
+        self.presentation.is_running()
+    }
+
+    /// Shows the next of the chosen plots, or none after the last; in a presented lesson toggles between all and none.
+    pub(super) fn show_next_plot(&mut self) {
+        if self.is_presenting() && self.course.is_running() {
+            self.panels.plots = !self.panels.plots;
+        } else {
+            self.presentation.show_next_plot(&self.run);
+        }
+    }
+
+    /// Shows the audience window if it is open.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn audience_ui(&mut self, ctx: &egui::Context) {
+        let plot = self.presentation.single_plot(&self.run);
+        let Some(audience) = &mut self.presentation.audience else {
+            return;
+        };
+        let (actions, closed) = audience.ui(ctx, &mut self.run, plot, self.tasks.filming().is_some());
+        for action in actions {
+            match action {
+                Action::Plots => self.show_next_plot(),
+                other => self.perform_action(ctx, other),
+            }
+        }
+        if closed {
+            self.show_audience(false);
+        }
+    }
 
     /// Contents of the whole window.
     pub(super) fn presentation_ui(&mut self, ui: &mut Ui) {
         let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(12, 4));
-        let free = !self.is_under_way();
+        let free = !self.tasks.are_under_way();
         let mut leave = false;
         let reset = Panel::bottom("presentation")
             .frame(bar)
             .show(ui, |ui| {
                 leave = double_tapped(ui);
                 // A lesson needs the height, so the timeline gets the rest of the row.
-                let in_lesson = self.course().is_some();
+                let in_lesson = self.course.is_running();
                 if !in_lesson {
-                    ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
+                    ui.add_enabled_ui(free, |ui| self.run.timeline_ui(ui));
                 }
                 let backwards = egui::Layout::right_to_left(egui::Align::Center);
                 let width = ui.available_width();
                 if width < transport::MIN_WIDTH + BUTTONS_WIDTH {
-                    let reset = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner;
+                    let reset = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player)).inner;
                     let size = vec2(width, ui.spacing().interact_size.y);
                     ui.allocate_ui_with_layout(size, backwards, |ui| leave |= self.presentation_buttons(ui));
                     return reset;
@@ -160,11 +216,11 @@ impl App {
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                         ui.add_enabled_ui(free, |ui| {
                             if !in_lesson || width < MIN_BAR_WIDTH {
-                                return transport::row(ui, &mut self.player);
+                                return transport::row(ui, &mut self.run.player);
                             }
                             ui.horizontal(|ui| {
-                                let reset = transport::minimal(ui, &mut self.player);
-                                self.timeline_ui(ui);
+                                let reset = transport::minimal(ui, &mut self.run.player);
+                                self.run.timeline_ui(ui);
                                 reset
                             })
                             .inner
@@ -189,7 +245,11 @@ impl App {
     fn presentation_buttons(&mut self, ui: &mut Ui) -> bool {
         let help = "Back to the window with its panels (F5, Esc, double-tap on this bar)";
         let leave = ui.button("Leave").on_hover_text(help).clicked();
-        let on = if self.course().is_some() { self.show_plots } else { self.single_plot().is_some() };
+        let on = if self.course.is_running() {
+            self.panels.plots
+        } else {
+            self.presentation.single_plot(&self.run).is_some()
+        };
         let help = "The next of the chosen plots, after the last none (key P)";
         if ui.add(egui::Button::selectable(on, "Plot")).on_hover_text(help).clicked() {
             self.show_next_plot();
@@ -199,27 +259,35 @@ impl App {
 
     /// The selected plot; in a lesson that refers to plots, all of them.
     fn presented_plots(&mut self, ui: &mut Ui, bar: egui::Frame) {
-        let in_lesson = self.course().is_some();
-        let single = self.single_plot().filter(|_| !in_lesson);
-        if single.is_none() && !(in_lesson && self.show_plots) {
+        let in_lesson = self.course.is_running();
+        let single = self.presentation.single_plot(&self.run).filter(|_| !in_lesson);
+        if single.is_none() && !(in_lesson && self.panels.plots) {
             return;
         }
-        let free = !self.is_under_way();
+        let free = !self.tasks.are_under_way();
         let height = plots_height(ui);
-        let Self { player, plots, viewport, .. } = self;
+        let run = &mut self.run;
         Panel::bottom("plots of the presentation").frame(bar).resizable(false).exact_size(height).show(ui, |ui| {
             ui.take_available_space();
-            let clicked_time = match single {
-                Some(index) => plots.single(ui, player, index),
-                None => plots.ui(ui, player),
-            };
-            if let Some(time) = clicked_time.filter(|_| free) {
-                player.go_to(time);
-                viewport.restore_marks(player);
-            }
+            run.plots_ui(ui, single, free);
         });
     }
 
+    /// The twin's distance under the picture of a presentation, if the lesson uses the bench.
+    fn lesson_twin(&self, ui: &mut Ui, bar: egui::Frame) {
+        if !self.course.is_running() || !self.panels.bench || self.run.player.twin().is_none() {
+            return;
+        }
+        let height = 0.42 * ui.available_height();
+        Panel::bottom("twin of the lesson")
+            .frame(bar)
+            .resizable(false)
+            .exact_size(height)
+            .show(ui, |ui| Bench::twin_ui(ui, &self.run.player));
+    }
+}
+
+impl Run {
     /// The last finished impact: ball joint, largest normal force, duration.
     pub fn last_impact(&self) -> Option<String> {
         let player = &self.player;
@@ -231,14 +299,32 @@ impl App {
         Some(format!("{name}, {force}, {} ms", value::number(duration_ms, 2)))
     }
 
-    /// Text of the caption and its plate in the picture's `area`: the impact at the inspected instant; when `presenting`,
-    /// otherwise, the last finished one.
-    pub(super) fn caption_plate(&self, ui: &Ui, area: Rect, presenting: bool) -> Option<(Arc<Galley>, Rect)> {
+    /// The caption in the picture's `area`: the impact at the inspected instant; when `presenting`, otherwise, the last finished
+    /// one.
+    pub(super) fn caption(&self, ui: &Ui, area: Rect, presenting: bool, is_filmed: bool) -> Option<Caption> {
+        let badge = self.impact_badge(is_filmed);
+        let help = if badge.is_some() {
+            "The impact at this instant: its number and ball joint, when it began, its largest normal force, how long the ball \
+             touched, approach and rebound speed"
+        } else {
+            "The last impact that has ended: its ball joint, its largest normal force, and how long the ball touched"
+        };
+        let text = badge.or_else(|| self.last_impact().filter(|_| presenting))?;
+        Some(Caption::new(ui, area, &text, help, presenting))
+    }
+}
+
+/// A caption over the picture.
+pub struct Caption {
+    words: Arc<Galley>,
+    /// Its plate.
+    pub plate: Rect,
+    help: &'static str,
+}
+
+impl Caption {
+    fn new(ui: &Ui, area: Rect, text: &str, help: &'static str, presenting: bool) -> Self {
         let ink = ui.visuals().strong_text_color();
-        if !presenting && (!overlay::fits_labels(area) || self.picture.hides_controls()) {
-            return None;
-        }
-        let text = self.impact_badge().or_else(|| self.last_impact().filter(|_| presenting))?;
         let mut inside = area.shrink(12.0);
         if !presenting {
             // Below the buttons and the time.
@@ -249,7 +335,7 @@ impl App {
         let lay = |size: f32| {
             // Text too long in the smallest type wraps to a second line.
             let width = if size > SMALLEST_FONT { f32::INFINITY } else { room };
-            ui.painter().layout(text.clone(), FontId::proportional(size), ink, width)
+            ui.painter().layout(text.to_owned(), FontId::proportional(size), ink, width)
         };
         let fitting = |size: f32| {
             let words = lay(size);
@@ -273,26 +359,18 @@ impl App {
             }
             Align2::RIGHT_TOP.align_size_within_rect(words.size(), inside)
         };
-        Some((words, place.expand2(BADGE_PADDING)))
+        Self { words, plate: place.expand2(BADGE_PADDING), help }
     }
 
-    /// Draws the caption over the picture in `area`.
-    pub(super) fn caption(&self, ui: &Ui, area: Rect, caption: Option<(Arc<Galley>, Rect)>) {
-        let Some((words, plate)) = caption else {
-            return;
-        };
+    /// Draws it over the picture in `area`.
+    pub fn ui(self, ui: &Ui, area: Rect) {
+        let Self { words, plate, help } = self;
         let painter = ui.painter_at(area);
         painter.rect_filled(plate, 6.0, ui.visuals().window_fill.gamma_multiply(0.85));
         let text = words.text().to_owned();
         painter.galley(plate.min + BADGE_PADDING, words, ui.visuals().strong_text_color());
         let response = ui.interact(plate, Id::unique("last impact"), Sense::hover());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &text));
-        let help = if self.impact_badge().is_some() {
-            "The impact at this instant: its number and ball joint, when it began, its largest normal force, how long the ball \
-             touched, approach and rebound speed"
-        } else {
-            "The last impact that has ended: its ball joint, its largest normal force, and how long the ball touched"
-        };
         response.on_hover_text(help);
     }
 }

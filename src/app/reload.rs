@@ -70,9 +70,9 @@ impl App {
     /// Makes the host watch the files of the scene, and reloads the scene after a save.
     pub(super) fn receive_saved_scene(&mut self, ctx: &egui::Context) {
         // The changes of a link arrive with its replay.
-        let has_changes = self.replay.is_none();
-        let file = &mut self.scene_file;
-        let pending = self.player.pending();
+        let has_changes = self.tasks.replay().is_none();
+        let file = &mut self.files.scene;
+        let pending = self.run.player.pending();
         if has_changes && file.saved.is_none() {
             file.saved = Some(pending.changes.clone());
         }
@@ -88,10 +88,10 @@ impl App {
         }
         while let Some(file) = self.host.saved_elsewhere() {
             // The latest message may concern a file that is no longer displayed.
-            if self.scene_file.name() == Some(&file.name)
+            if self.files.scene.name() == Some(&file.name)
                 && let Err(reason) = self.reload(file)
             {
-                self.problem = Some(reason);
+                self.messages.fail(reason);
             }
         }
     }
@@ -114,15 +114,15 @@ impl App {
         let name = file.name;
         let bytes = file.content.map_err(|reason| format!("{name}: {reason}"))?;
         let text = String::from_utf8(bytes).map_err(|_| format!("{name}: not a text file"))?;
-        let pending = self.player.pending();
+        let pending = self.run.player.pending();
         let source = &pending.source;
         let has_same_files = |scene: Scene| scene.source.beside == source.beside;
         let same = *text == *source.text;
-        let companions = self.scene_file.companions.clone();
+        let companions = self.files.scene.companions.clone();
         if same && (self.parse_file(&name, &text, &companions, &pending.changes)).is_ok_and(has_same_files) {
             // Saved without changes, or reverted after an error.
-            self.problem = None;
-            self.scene_file.faulty = None;
+            self.messages.dismiss_problem();
+            self.files.scene.faulty = None;
             return Ok(());
         }
         let before = pending.with_changes(&[]);
@@ -130,7 +130,7 @@ impl App {
             Ok(after) => after,
             Err(error) => {
                 let file = error.file.clone();
-                self.scene_file.faulty = file.filter(|file| *file != name);
+                self.files.scene.faulty = file.filter(|file| *file != name);
                 return Err(error.to_string());
             }
         };
@@ -138,40 +138,41 @@ impl App {
             let before = before.as_ref().ok().and_then(|scene| scene.get(key).ok());
             before.is_some() && before == after.get(key).ok()
         };
-        let mut changes = self.player.pending().changes.clone();
+        let mut changes = self.run.player.pending().changes.clone();
         changes.retain(|(key, _)| is_unchanged_in_file(key));
         let scene = self.parse_file(&name, &text, &companions, &changes);
         let scene = scene.map_err(|error| error.to_string())?;
 
         let link = self.link();
-        let (playing, twin) = (self.player.is_playing(), self.player.twin().is_some());
-        let (phase, time) = (self.player.watch().phase(), self.player.pacer.shown());
-        let watched = self.scene_file.watched.clone();
-        let (scale, chosen, window) = (self.player.pacer.scale(), self.plots.chosen.clone(), self.plots.window);
+        let (playing, twin) = (self.run.player.is_playing(), self.run.player.twin().is_some());
+        let (phase, time) = (self.run.player.watch().phase(), self.run.player.pacer.shown());
+        let watched = self.files.scene.watched.clone();
+        let (scale, chosen, window) =
+            (self.run.player.pacer.scale(), self.run.plots.chosen.clone(), self.run.plots.window);
         self.show_scene(&scene)?;
-        self.player.pacer.set_scale(scale);
-        (self.plots.chosen, self.plots.window) = (chosen, window);
-        self.scene_file = SceneFile { watched, ..SceneFile::opened(name, companions) };
-        self.player.set_phase(phase);
-        let (clock, start) = (self.player.clock, (self.player.clock)());
-        let reached = self.player.run_towards(time, || clock() - start < MAX_REPLAY_TIME);
+        self.run.player.pacer.set_scale(scale);
+        (self.run.plots.chosen, self.run.plots.window) = (chosen, window);
+        self.files.scene = SceneFile { watched, ..SceneFile::opened(name, companions) };
+        self.run.player.set_phase(phase);
+        let (clock, start) = (self.run.player.clock, (self.run.player.clock)());
+        let reached = self.run.player.run_towards(time, || clock() - start < MAX_REPLAY_TIME);
         if !reached {
             self.reset();
         }
-        self.player.set_twin(twin);
-        self.player.set_playing(playing);
+        self.run.player.set_twin(twin);
+        self.run.player.set_playing(playing);
         if let Some(pose) = link.camera {
-            self.viewport.set_pose(pose);
+            self.run.viewport.set_pose(pose);
         }
         let followed = link.followed_part(&scene).ok().flatten();
-        self.viewport.follow(followed);
+        self.run.viewport.follow(followed);
         match link.microscope_joint(&scene) {
-            Ok(Some(joint)) => self.microscope.focus(joint),
-            _ => self.microscope.set_open(false),
+            Ok(Some(joint)) => self.run.microscope.focus(joint),
+            _ => self.run.microscope.set_open(false),
         }
-        self.viewport.clear_history(&self.player);
+        self.run.viewport.clear_history(&self.run.player);
         let at = if reached && time > 0.0 {
-            format!("at {:.3} ms", self.player.pacer.shown() * 1e3)
+            format!("at {:.3} ms", self.run.player.pacer.shown() * 1e3)
         } else {
             "from the start".to_owned()
         };
@@ -180,7 +181,7 @@ impl App {
             1 => ", keeping 1 change".to_owned(),
             more => format!(", keeping {more} changes"),
         };
-        self.notify(format!("Reloaded {at}{kept_changes}"));
+        self.messages.notify(format!("Reloaded {at}{kept_changes}"));
         Ok(())
     }
 }

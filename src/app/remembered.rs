@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use eframe::egui::{self, RichText, ThemePreference, Ui};
 use serde::{Deserialize, Serialize};
 
-use super::dialogs::Dialog;
 use super::files::SCENE_TYPE;
 use super::host::SaveFile;
-use super::{App, AppOptions, layout, opening, theme};
+use super::present::Presentation;
+use super::{AppOptions, layout, opening, theme};
 use crate::files::{FileError, OutputFile, create_dir_all};
 use crate::scene::{DEFAULT_SCENE, MAX_FILE_SIZE, Scene, built_in_text, read_regular};
 use crate::session::link::ThemeChoice;
@@ -148,36 +148,31 @@ impl Store {
         }
         self.written = self.now.clone();
     }
-}
 
-impl App {
-    /// Applies theme and type size from `store`, unless other values were requested, and records settings in it from now on.
-    pub fn store_settings_in(&mut self, ctx: &egui::Context, store: Store) {
+    /// Applies theme and type size, unless other values were requested.
+    pub fn apply(&self, ctx: &egui::Context) {
         let theme = ctx.options(|options| options.theme_preference);
-        if let Some(wanted) = store.now.theme().filter(|_| theme == ThemePreference::System) {
+        if let Some(wanted) = self.now.theme().filter(|_| theme == ThemePreference::System) {
             ctx.set_theme(wanted);
         }
-        if let Some(zoom) = store.now.zoom {
+        if let Some(zoom) = self.now.zoom {
             ctx.set_zoom_factor(zoom);
         }
-        self.store = Some(store);
     }
 
-    /// Records the settings of the window.
-    pub(super) fn remember(&mut self, ctx: &egui::Context) {
-        let (scale, zoom) = (ctx.zoom_factor(), self.own_zoom(ctx));
-        let is_full_screen = self.is_presenting();
-        let file = self.scene_file.name().map(|name| absolute(Path::new(name)));
-        let scene = self.player.pending();
-        let built_in = built_in_text(&scene.name).is_some_and(|text| *text == *scene.source.text);
-        let in_lesson = self.running_lesson.is_some();
-        let Some(store) = &mut self.store else {
-            return;
-        };
-        let before = (store.now.scene.clone(), store.now.recent.len());
-        let now = &mut store.now;
+    /// Records the settings of the window, and its `scene` with the name of its file, if any; not those of a lesson.
+    pub(super) fn record(
+        &mut self,
+        ctx: &egui::Context,
+        presentation: &Presentation,
+        scene: Option<(&Scene, Option<&str>)>,
+    ) {
+        let scale = ctx.zoom_factor();
+        let is_full_screen = presentation.is_running();
+        let before = (self.now.scene.clone(), self.now.recent.len());
+        let now = &mut self.now;
         // In the frame of a zoom change, the window size still uses the old zoom.
-        let settled = std::mem::replace(&mut store.scale, scale) == scale;
+        let settled = std::mem::replace(&mut self.scale, scale) == scale;
         ctx.input(|input| {
             let window = input.viewport();
             let is = |state: Option<bool>| state == Some(true);
@@ -195,94 +190,56 @@ impl App {
         let theme = ctx.options(|options| options.theme_preference);
         let choice = ThemeChoice::ALL.into_iter().find(|choice| theme::preference(*choice) == theme);
         now.theme = choice.map(|choice| choice.word().to_owned());
-        now.zoom = Some(zoom);
-        if let Some(file) = file.filter(|_| !in_lesson) {
-            if now.scene.as_ref() != Some(&file) {
+        now.zoom = Some(presentation.own_zoom(ctx));
+        match scene.map(|(scene, name)| (scene, name.map(|name| absolute(Path::new(name))))) {
+            Some((_, Some(file))) if now.scene.as_ref() != Some(&file) => {
                 now.add_recent(file.clone());
                 now.scene = Some(file);
             }
-        } else if built_in && !in_lesson {
-            let first = scene.name == DEFAULT_SCENE && opening::is_rattling(scene);
-            now.scene = (!first).then(|| scene.name.clone());
+            Some((scene, None)) if built_in_text(&scene.name).is_some_and(|text| *text == *scene.source.text) => {
+                let first = scene.name == DEFAULT_SCENE && opening::is_rattling(scene);
+                now.scene = (!first).then(|| scene.name.clone());
+            }
+            _ => {}
         }
         let time = ctx.input(|input| input.time);
-        if store.now != store.written
-            && (before != (store.now.scene.clone(), store.now.recent.len()) || time >= store.due)
-        {
-            store.write();
-            store.due = time + MIN_WRITE_INTERVAL;
+        if self.now != self.written && (before != (self.now.scene.clone(), self.now.recent.len()) || time >= self.due) {
+            self.write();
+            self.due = time + MIN_WRITE_INTERVAL;
         }
     }
 
     /// Adds the scene among the saved `files` to the recent files.
-    pub(super) fn note_recent(&mut self, files: &[SaveFile]) {
-        if let Some(store) = &mut self.store {
-            for file in files.iter().filter(|file| file.mime == SCENE_TYPE) {
-                store.now.add_recent(absolute(Path::new(&file.name)));
-            }
+    pub(super) fn note_saved(&mut self, files: &[SaveFile]) {
+        for file in files.iter().filter(|file| file.mime == SCENE_TYPE) {
+            self.now.add_recent(absolute(Path::new(&file.name)));
         }
     }
 
-    /// Whether settings are stored.
-    pub(super) fn is_remembered(&self) -> bool {
-        self.store.is_some()
-    }
-
-    /// Menu entries of the recent files.
-    pub(super) fn recent_entries(&mut self, ui: &mut Ui) {
-        let recent = self.store.as_ref().map_or(&[][..], |store| &store.now.recent);
-        let mut chosen = None;
-        if !recent.is_empty() {
-            ui.label(RichText::new("Recent files").small().weak());
-        }
-        for file in recent {
-            let name = Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy());
-            if ui.button(name).on_hover_text(file).clicked() {
-                chosen = Some(file.clone());
-            }
-        }
-        if let Some(file) = chosen {
-            self.problem = check_exists(&file).and_then(|()| self.open(&file)).err();
-            layout::close_menu(ui);
-        }
-    }
-
-    /// Menu entry that resets all settings.
-    pub(super) fn new_entry(&mut self, ui: &mut Ui) {
-        let help = "Forgets window size, theme, type size, last scene and recent files";
-        if layout::entry(ui, "Start fresh…", help) {
-            self.dialog = Some(Dialog::StartAsNew);
-        }
-    }
-
-    /// Resets all settings and opens the first-time scene.
-    pub(super) fn reset_to_first_start(&mut self, ctx: &egui::Context) {
-        self.present(ctx, false);
-        let options = AppOptions { clock: self.player.clock, ..AppOptions::first() };
-        let mut new = match Self::with_context(ctx, self.graphics.as_ref(), options) {
-            Ok(new) => new,
-            Err(error) => {
-                self.problem = Some(error.to_string());
-                return;
-            }
-        };
-        new.host = std::mem::replace(&mut self.host, Box::new(super::NoHost));
-        new.store = self.store.take();
-        new.set_aside_zoom = Some(1.0);
-        new.follow_frame_rate();
-        *self = new;
-        if let Some(store) = &mut self.store {
-            store.forget();
-        }
-        ctx.send_viewport_cmd(egui::ViewportCommand::Maximized(false));
-        // In points at the zoom still in effect when the command arrives.
-        let size = egui::Vec2::from(INITIAL_SIZE) / ctx.zoom_factor();
-        ctx.send_viewport_cmd(egui::ViewportCommand::InnerSize(size));
+    /// The recent files.
+    pub(super) fn recent(&self) -> &[String] {
+        &self.now.recent
     }
 }
 
+/// Menu entries of the `recent` files; returns the chosen one.
+pub fn recent_entries(ui: &mut Ui, recent: &[String]) -> Option<String> {
+    let mut chosen = None;
+    if !recent.is_empty() {
+        ui.label(RichText::new("Recent files").small().weak());
+    }
+    for file in recent {
+        let name = Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy());
+        if ui.button(name).on_hover_text(file).clicked() {
+            chosen = Some(file.clone());
+            layout::close_menu(ui);
+        }
+    }
+    chosen
+}
+
 /// Checks that the scene `name` exists; its file may have been removed.
-fn check_exists(name: &str) -> Result<(), String> {
+pub fn check_exists(name: &str) -> Result<(), String> {
     let path = Path::new(name);
     if path.is_absolute() && !path.exists() { Err(format!("{name} is no longer there")) } else { Ok(()) }
 }

@@ -6,8 +6,8 @@ use eframe::egui::{self, Key, Modifiers, Ui};
 
 use super::icons::{Icon, icon_button};
 use super::player::Edit;
-
-use super::{App, layout, theme, value};
+use super::run::Run;
+use super::{layout, theme, value};
 use crate::scene::Scene;
 use crate::session::link::CameraPose;
 use crate::session::link::settings::PlotWindow;
@@ -35,19 +35,19 @@ struct View {
 }
 
 impl View {
-    fn of(app: &App) -> Option<Self> {
-        let mut options = app.viewport.options.clone();
+    fn of(run: &Run) -> Option<Self> {
+        let mut options = run.viewport.options.clone();
         // These are not user choices.
         options.quality = Quality::FULL;
         options.theme = crate::view::Theme::Light;
         options.arrows.thickness = 1.0;
         Some(Self {
             options,
-            camera: app.viewport.pose()?,
-            followed: app.viewport.followed(),
-            chosen: app.plots.chosen.clone(),
-            picked: app.plots.picked.clone(),
-            window: app.plots.window,
+            camera: run.viewport.pose()?,
+            followed: run.viewport.followed(),
+            chosen: run.plots.chosen.clone(),
+            picked: run.plots.picked.clone(),
+            window: run.plots.window,
         })
     }
 
@@ -188,6 +188,52 @@ impl Undo {
             format!("{verb}: {}, to {value}", entry.name)
         })
     }
+
+    /// Whether the key of undo (`Some(false)`) or redo is pressed.
+    pub fn pressed(ctx: &egui::Context) -> Option<bool> {
+        let both = Modifiers::COMMAND | Modifiers::SHIFT;
+        let redo =
+            ctx.input_mut(|input| input.consume_key(both, Key::Z) || input.consume_key(Modifiers::COMMAND, Key::Y));
+        (redo || ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Z))).then_some(redo)
+    }
+
+    /// Undo and redo buttons of the header; returns `redo` of the clicked one.
+    pub fn buttons(&self, ui: &mut Ui, is_free: bool) -> Option<bool> {
+        let side = theme::side(ui, BUTTON_SIDE);
+        let mut chosen = None;
+        for (redo, icon, name, key) in
+            [(false, Icon::Undo, "Undo", "Ctrl+Z"), (true, Icon::Redo, "Redo", "Ctrl+Shift+Z")]
+        {
+            let words = self.words(redo);
+            let help = words
+                .as_ref()
+                .map_or_else(|| format!("Nothing to {}", name.to_lowercase()), |words| format!("{words} ({key})"));
+            let clicked = ui
+                .add_enabled_ui(words.is_some() && is_free, |ui| icon_button(ui, icon, name, "", side, false))
+                .inner
+                .on_hover_text(&help)
+                .on_disabled_hover_text(&help)
+                .clicked();
+            if clicked {
+                chosen = Some(redo);
+            }
+        }
+        chosen
+    }
+
+    /// The same in the menu of a small window.
+    pub fn entries(&self, ui: &mut Ui, is_free: bool) -> Option<bool> {
+        let mut chosen = None;
+        for (redo, name) in [(false, "Undo"), (true, "Redo")] {
+            let words = self.words(redo);
+            let button = egui::Button::new(words.as_deref().unwrap_or(name));
+            if ui.add_enabled(words.is_some() && is_free, button).clicked() {
+                chosen = Some(redo);
+                layout::close_menu(ui);
+            }
+        }
+        chosen
+    }
 }
 
 /// Name of the parameter `key` and the displayed form of `text`, or of the scene file's value if that is `None`.
@@ -197,15 +243,16 @@ fn name_and_value(scene: &Scene, original: Option<String>, key: &str, text: Opti
     (name, value)
 }
 
-impl App {
-    /// Undoes the latest change, or redoes the last undone one. Returns whether there was one.
-    pub fn undo(&mut self, redo: bool) -> bool {
-        if self.is_under_way() {
-            return false;
-        }
+impl Run {
+    /// Undoes the latest change, or redoes the last undone one, if there is one.
+    ///
+    /// # Errors
+    /// The value of a parameter is refused, as a message; the others are restored.
+    pub fn undo(&mut self, redo: bool) -> Result<(), String> {
+        let mut outcome = Ok(());
         let from = if redo { &mut self.undo.undone } else { &mut self.undo.done };
         let Some(entry) = from.pop() else {
-            return false;
+            return outcome;
         };
         match &entry.change {
             Change::Parameters(edits) => {
@@ -214,7 +261,7 @@ impl App {
                 for edit in edits {
                     let wanted = if redo { &edit.after } else { &edit.before };
                     if let Err(error) = self.player.restore_parameter(&edit.key, wanted.as_deref()) {
-                        self.problem = Some(error.to_string());
+                        outcome = Err(error.to_string());
                     }
                 }
                 self.player.take_edits();
@@ -240,18 +287,18 @@ impl App {
         }
         let to = if redo { &mut self.undo.done } else { &mut self.undo.undone };
         to.push(entry);
-        true
+        outcome
     }
 
-    /// Records changes since the previous frame, and handles the undo and redo keys.
-    pub(super) fn follow_changes(&mut self, ctx: &egui::Context) {
+    /// Records changes since the previous frame; during a task (`is_busy`) there are none of the user's.
+    pub(super) fn follow_changes(&mut self, ctx: &egui::Context, is_busy: bool, in_lesson: bool) {
         let (now, held) = ctx.input(|input| (input.time, input.pointer.any_down() || input.any_touches()));
         let edits = self.player.take_edits();
-        if self.is_under_way() {
+        if is_busy {
             self.undo.view = None;
             return;
         }
-        self.compare(!held && self.undo.last().is_none_or(|at| now - at > MERGE_TIME));
+        self.compare(!held && self.undo.last().is_none_or(|at| now - at > MERGE_TIME), in_lesson);
         // Those before the last give way to it: a preset, or the settings whose place it takes.
         if let Some(edit) = edits.last() {
             let original = self.player.original(&edit.key);
@@ -263,23 +310,14 @@ impl App {
                 ends.map(|text| name_and_value(scene, original.clone(), &edit.key, text.as_deref()));
             self.undo.record(Entry { name, values: [before, after], change: Change::Parameters(edits), at: now }, held);
         }
-        self.follow_view(now, held);
+        self.follow_view(now, held, in_lesson);
         self.undo.held &= held;
-        if self.dialog.is_some() || ctx.text_edit_focused() {
-            return;
-        }
-        let both = Modifiers::COMMAND | Modifiers::SHIFT;
-        let redo =
-            ctx.input_mut(|input| input.consume_key(both, Key::Z) || input.consume_key(Modifiers::COMMAND, Key::Y));
-        if redo || ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Z)) {
-            self.undo(redo);
-        }
     }
 
     /// Records a view change once its gesture has ended. Lesson steps also change the view, so in a lesson only parameter changes
     /// are recorded.
-    fn follow_view(&mut self, now: f64, held: bool) {
-        let view = View::of(self).filter(|_| self.course().is_none());
+    fn follow_view(&mut self, now: f64, held: bool, in_lesson: bool) {
+        let view = View::of(self).filter(|_| !in_lesson);
         let Some(view) = view else {
             self.undo.view = None;
             return;
@@ -298,45 +336,5 @@ impl App {
                 self.undo.record(Entry { name: name.to_owned(), values: Default::default(), change, at: now }, held);
             }
         }
-    }
-
-    /// Undo and redo buttons of the header.
-    pub(super) fn undo_buttons(&mut self, ui: &mut Ui) {
-        let side = theme::side(ui, BUTTON_SIDE);
-        for (redo, icon, name, key) in
-            [(false, Icon::Undo, "Undo", "Ctrl+Z"), (true, Icon::Redo, "Redo", "Ctrl+Shift+Z")]
-        {
-            let words = self.undo.words(redo);
-            let help = words
-                .as_ref()
-                .map_or_else(|| format!("Nothing to {}", name.to_lowercase()), |words| format!("{words} ({key})"));
-            let free = words.is_some() && !self.is_under_way();
-            let clicked = ui
-                .add_enabled_ui(free, |ui| icon_button(ui, icon, name, "", side, false))
-                .inner
-                .on_hover_text(&help)
-                .on_disabled_hover_text(&help)
-                .clicked();
-            if clicked {
-                self.undo(redo);
-            }
-        }
-    }
-
-    /// Undo and redo in the menu of a small window.
-    pub(super) fn undo_entries(&mut self, ui: &mut Ui) {
-        for (redo, name) in [(false, "Undo"), (true, "Redo")] {
-            let words = self.undo.words(redo);
-            let button = egui::Button::new(words.as_deref().unwrap_or(name));
-            if ui.add_enabled(words.is_some() && !self.is_under_way(), button).clicked() {
-                self.undo(redo);
-                layout::close_menu(ui);
-            }
-        }
-    }
-
-    /// Description of the next undo (`redo`: redo); `None` if there is none.
-    pub fn undo_words(&self, redo: bool) -> Option<String> {
-        self.undo.words(redo)
     }
 }

@@ -6,11 +6,11 @@ use eframe::egui::{Align, ComboBox, DragValue, RichText, Ui};
 
 use super::computation::Computation;
 use super::cost_study::{CostSettings, CostStudy, VariedParameter};
-use super::request::BenchRequest;
 use super::tornado::Tornado;
 use crate::analysis::one_at_a_time_task::OneAtATimeTask;
 use crate::analysis::study::NAMED;
 use crate::analysis::task::{Job, Message};
+use crate::app::command::Command;
 use crate::app::host::Host;
 use crate::app::layout::reserve_lines;
 use crate::app::player::Player;
@@ -89,7 +89,7 @@ impl Costs {
     }
 
     /// Settings, progress and tornado; returns the user's request to the run.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<BenchRequest> {
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<Command> {
         (self.unseen, self.is_set_aside) = (false, false);
         let scene = player.pending();
         if self.scene != scene.source.text {
@@ -124,7 +124,7 @@ impl Costs {
         let (input, end) = clicked?;
         let (key, ends) = &study.task.over[input];
         let text = study.parameter(input)?.write(&Value::Number(ends[end]));
-        Some(BenchRequest::Value { key: key.clone(), text })
+        Some(Command::SetValue { key: key.clone(), text })
     }
 
     fn settings_ui(&mut self, ui: &mut Ui, scene: &Scene) {

@@ -6,7 +6,6 @@ use super::computation::Computation;
 use super::coordinate::BenchCoordinate;
 use super::diagram::Diagram;
 use super::in_words;
-use super::request::BenchRequest;
 use super::sweep_results::{SweepResults, start_label};
 use crate::analysis::design::Start;
 use crate::analysis::point::MAX_EXPONENT_TOLERANCE;
@@ -14,6 +13,7 @@ use crate::analysis::ready_sweeps::{READY_SWEEPS, ReadySweep};
 use crate::analysis::source::SceneSource;
 use crate::analysis::sweep_task::SweepTask;
 use crate::analysis::task::{Job, Message};
+use crate::app::command::Command;
 use crate::app::host::Host;
 use crate::app::layout::{self, reserve_lines};
 use crate::app::load::Load;
@@ -95,10 +95,10 @@ impl SweepPanel {
     }
 
     /// Ready sweeps, settings, progress and diagram; returns the user's request to the run.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: BenchCoordinate) -> Option<BenchRequest> {
-        let ready = ready_ui(ui).map(BenchRequest::Ready);
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: BenchCoordinate) -> Option<Command> {
+        let ready = ready_ui(ui).map(Command::AskSweep);
         let load = self.sweep_ui(ui, player, coordinate);
-        ready.or(load.map(BenchRequest::Section))
+        ready.or(load.map(|load| Command::AskSection(Box::new(load))))
     }
 
     fn sweep_ui(&mut self, ui: &mut Ui, player: &Player, coordinate: BenchCoordinate) -> Option<Load> {

@@ -6,8 +6,6 @@ use eframe::egui::{
 };
 use qrcodegen::{QrCode, QrCodeEcc, QrSegment, Version};
 
-use super::Dialog;
-use crate::app::{App, layout};
 use crate::session::link::{NOT_A_PAGE_ADDRESS, is_page_address};
 
 /// Quiet zone around a code, modules.
@@ -75,7 +73,9 @@ pub struct SharedLink {
 }
 
 impl SharedLink {
-    fn new(fragment: String, page: String) -> Self {
+    /// The link with `fragment` behind the address `page`, "" for none; the user is asked for an address if other devices cannot
+    /// reach the page.
+    pub fn new(fragment: String, page: String) -> Self {
         let typed = !is_publicly_reachable(&page);
         let mut shared = Self { fragment, page, typed, code: Err(String::new()) };
         shared.encode();
@@ -110,27 +110,6 @@ impl SharedLink {
             _ if !is_publicly_reachable(page) => Err(format!("No QR code: other devices cannot reach {page}")),
             _ => encode(&self.link()),
         };
-    }
-}
-
-impl App {
-    /// Menu entry for the link dialog.
-    pub(in crate::app) fn code_button(&mut self, ui: &mut Ui) {
-        let help = "The link to this scene in this state and view, to be photographed by a phone";
-        if layout::entry(ui, "QR code", help) {
-            self.show_link_dialog();
-        }
-    }
-
-    /// Shows the link to the present state, and asks for an address if other devices cannot reach the page.
-    pub(in crate::app) fn show_link_dialog(&mut self) {
-        match self.link().format_short(self.player.pending()) {
-            Ok((fragment, note)) => {
-                self.dialog = Some(Dialog::Link(SharedLink::new(fragment, self.page_address())));
-                note.into_iter().for_each(|note| self.notify(note));
-            }
-            Err(reason) => self.problem = Some(reason),
-        }
     }
 }
 

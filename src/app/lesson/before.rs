@@ -1,14 +1,17 @@
 //! Snapshot of the window before a lesson, restored when the lesson ends.
 
 use super::Lesson;
+use crate::app::CameraPose;
 use crate::app::bench::Bench;
 use crate::app::compare::Comparison;
-use crate::app::layout::Sheet;
+use crate::app::messages::Messages;
+use crate::app::panels::{Panels, Sheet};
 use crate::app::player::Player;
 use crate::app::plots::PlotChoice;
 use crate::app::reload::SceneFile;
+use crate::app::run::Run;
+use crate::app::tasks::Tasks;
 use crate::app::undo::Undo;
-use crate::app::{App, CameraPose};
 use crate::view::{ScenePart, ViewOptions};
 
 /// All settings that a lesson changes.
@@ -33,75 +36,76 @@ pub struct PreviousWindow {
     run: Option<(Player, SceneFile)>,
 }
 
-impl App {
-    /// Takes the snapshot, unless the current lesson has already done so.
-    pub(in crate::app) fn remember_window(&mut self) {
-        if self.before_lesson.is_some() {
-            return;
-        }
-        self.bench.show_costs(false);
-        self.before_lesson = Some(Box::new(PreviousWindow {
-            panels: [self.show_controls, self.show_plots, self.show_bench],
-            sheet: self.sheet,
-            plots: self.plots.choice(),
-            // A lesson starts with an empty bench.
-            bench: std::mem::take(&mut self.bench),
-            options: self.viewport.options.clone(),
-            pose: self.viewport.pose(),
-            fitted_aspect: self.viewport.fitted_aspect(),
-            followed: self.viewport.followed(),
-            microscope: (self.microscope.is_open(), self.microscope.joint()),
-            ideal: self.player.ideal().is_some(),
-            scale: self.player.pacer.scale(),
-            comparison: std::mem::take(&mut self.plots.comparison),
-            undo: std::mem::take(&mut self.undo),
+impl PreviousWindow {
+    /// Takes the snapshot. A lesson starts with an empty bench.
+    pub fn take(run: &mut Run, panels: &Panels, bench: &mut Bench) -> Self {
+        bench.show_costs(false);
+        Self {
+            panels: [panels.controls, panels.plots, panels.bench],
+            sheet: panels.sheet,
+            plots: run.plots.choice(),
+            bench: std::mem::take(bench),
+            options: run.viewport.options.clone(),
+            pose: run.viewport.pose(),
+            fitted_aspect: run.viewport.fitted_aspect(),
+            followed: run.viewport.followed(),
+            microscope: (run.microscope.is_open(), run.microscope.joint()),
+            ideal: run.player.ideal().is_some(),
+            scale: run.player.pacer.scale(),
+            comparison: std::mem::take(&mut run.plots.comparison),
+            undo: std::mem::take(&mut run.undo),
             run: None,
-        }));
+        }
     }
 
     /// Stores the run just replaced by a lesson scene; only the first such run belongs to the snapshot.
-    pub(in crate::app) fn remember_run(&mut self, player: Player, file: SceneFile) {
-        if let Some(before) = &mut self.before_lesson
-            && before.run.is_none()
-        {
-            before.run = Some((player, file));
-        }
+    pub fn remember_run(&mut self, player: Player, file: SceneFile) {
+        self.run.get_or_insert((player, file));
     }
 
-    /// Restores the window from before `lesson`. A machine opened meanwhile that does not belong to the lesson stays.
-    pub(super) fn restore_window(&mut self, lesson: &Lesson) {
-        let Some(before) = self.before_lesson.take() else {
-            return;
-        };
-        self.cancel_film();
-        [self.show_controls, self.show_plots, self.show_bench] = before.panels;
-        self.sheet = before.sheet;
-        self.plots.restore_choice(before.plots);
-        self.bench = before.bench;
-        self.microscope.set_open(before.microscope.0);
-        let text = &self.player.pending().source.text;
+    /// Restores the window from before `lesson`; returns the file of its run if a lesson scene had replaced it. A machine opened
+    /// meanwhile that does not belong to the lesson stays.
+    pub fn restore(
+        self,
+        lesson: &Lesson,
+        run: &mut Run,
+        panels: &mut Panels,
+        bench: &mut Bench,
+        tasks: &mut Tasks,
+        messages: &mut Messages,
+    ) -> Option<SceneFile> {
+        tasks.cancel_film(run);
+        [panels.controls, panels.plots, panels.bench] = self.panels;
+        panels.sheet = self.sheet;
+        run.plots.restore_choice(self.plots);
+        *bench = self.bench;
+        run.microscope.set_open(self.microscope.0);
+        let text = &run.player.pending().source.text;
         if !lesson.runs.iter().any(|run| run.scene.source.text == *text) {
-            return;
+            return None;
         }
-        (self.replay, self.load, self.verdict, self.problem, self.film_settings) = (None, None, None, None, None);
-        let thickness = self.viewport.options.arrows.thickness;
-        self.viewport.options = before.options;
+        tasks.clear();
+        messages.clear();
+        let thickness = run.viewport.options.arrows.thickness;
+        run.viewport.options = self.options;
         // A presentation may still be active.
-        self.viewport.options.arrows.thickness = thickness;
-        if let Some((player, file)) = before.run {
-            (self.player, self.scene_file) = (player, file);
-            self.controls.clear();
-            self.timeline.reset();
-            self.viewport.show_scene(&self.player);
-            (self.plots.comparison, self.undo) = (before.comparison, before.undo);
+        run.viewport.options.arrows.thickness = thickness;
+        let mut own_file = None;
+        if let Some((player, file)) = self.run {
+            (run.player, own_file) = (player, Some(file));
+            run.controls.clear();
+            run.timeline.reset();
+            run.viewport.show_scene(&run.player);
+            (run.plots.comparison, run.undo) = (self.comparison, self.undo);
         } else {
-            self.player.pacer.set_scale(before.scale);
-            self.show_ideal(before.ideal);
+            run.player.pacer.set_scale(self.scale);
+            messages.warn(run.show_ideal(self.ideal));
         }
-        if let Some(pose) = before.pose {
-            self.viewport.set_pose_for(pose, before.fitted_aspect);
+        if let Some(pose) = self.pose {
+            run.viewport.set_pose_for(pose, self.fitted_aspect);
         }
-        self.viewport.follow(before.followed);
-        self.microscope.focus(before.microscope.1);
+        run.viewport.follow(self.followed);
+        run.microscope.focus(self.microscope.1);
+        own_file
     }
 }

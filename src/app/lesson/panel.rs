@@ -1,16 +1,16 @@
 //! The lesson panel: text, question, and navigation buttons.
 
 use eframe::egui::{
-    self, Button, FontFamily, Layout, Panel, RadioButton, RichText, ScrollArea, TextFormat, TextStyle, Ui,
-    text::LayoutJob,
+    self, Button, FontFamily, Layout, RadioButton, RichText, ScrollArea, TextFormat, TextStyle, Ui, text::LayoutJob,
 };
 
 use super::control_finder::ControlFinder;
 use super::names::Names;
 use super::text::{self, Block, SpanStyle};
-use super::{RunningLesson, lesson_titles};
-use crate::app::bench::Bench;
-use crate::app::{App, layout, spoken, theme};
+use super::{Course, RunningLesson, lesson_titles};
+use crate::app::command::Command;
+use crate::app::player::Player;
+use crate::app::{layout, spoken, theme};
 
 /// Height of a choice for mouse input, points.
 const CHOICE_HEIGHT: f32 = 24.0;
@@ -19,97 +19,64 @@ const MIN_HIDDEN: f32 = 8.0;
 /// Width beside the navigation buttons below which the step counter is abbreviated, points.
 const MIN_COUNTER_WIDTH: f32 = 200.0;
 
-/// A request from the panel's buttons.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Request {
-    Nothing,
-    Turn(bool),
-    More,
-    Set,
-    Leave,
-}
-
-impl App {
-    /// Menu of the built-in lessons.
-    pub(in crate::app) fn lesson_menu(&mut self, ui: &mut Ui) {
-        for (name, title) in lesson_titles() {
-            if layout::entry(ui, title, &format!("Lesson {name}")) {
-                self.open_lesson(name);
-            }
+/// Menu of the built-in lessons; returns the name of the chosen one.
+pub fn menu(ui: &mut Ui) -> Option<&'static str> {
+    let mut chosen = None;
+    for &(name, ref title) in lesson_titles() {
+        if layout::entry(ui, title, &format!("Lesson {name}")) {
+            chosen = Some(name);
         }
     }
+    chosen
+}
 
-    /// The whole panel.
-    pub(in crate::app) fn lesson_ui(&mut self, ui: &mut Ui) {
-        let elsewhere = self.item_outside_presentation(ui.ctx());
-        let Some(running) = &mut self.running_lesson else {
-            return;
+impl Course {
+    /// The whole panel. `low`: in a presentation operated by mouse, whose screen is low in points.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player, presented: bool, low: bool) -> Option<Command> {
+        let elsewhere = if presented { self.item_outside_presentation(ui.ctx(), player) } else { None };
+        let Some(running) = &mut self.running else {
+            return None;
         };
         spoken::landmark(ui, "Lesson");
-        let own = running.is_setting_machine || running.is_run_of_step(&self.player);
-        // A presentation screen is low in points but not operated by touch.
-        let low = self.presentation.is_some() && !self.touched;
+        let own = running.is_setting_machine || running.is_run_of_step(player);
         let backwards = Layout::bottom_up(egui::Align::Min);
-        let request = ui
-            .with_layout(backwards, |ui| {
-                let request = buttons(ui, running);
-                ui.with_layout(Layout::top_down(egui::Align::Min), |ui| {
-                    let id = (running.lesson.name.clone(), running.step);
-                    let page = ScrollArea::vertical().id_salt(id).auto_shrink(false);
-                    let set = page.show(ui, |ui| {
-                        // Space for the scroll bar.
-                        ui.set_max_width(ui.available_width() - 10.0);
-                        if low {
-                            ui.spacing_mut().interact_size.y = CHOICE_HEIGHT;
-                            ui.spacing_mut().icon_width = CHOICE_HEIGHT - 8.0;
-                        }
-                        if request == Request::More {
-                            // The last line of a page is repeated at the top of the next.
-                            ui.scroll_with_delta(egui::vec2(0.0, 40.0 - ui.clip_rect().height()));
-                        }
-                        let set = running.page(ui, own);
-                        if let Some(elsewhere) = &elsewhere {
-                            ui.label(RichText::new(elsewhere).weak());
-                        }
-                        set
-                    });
-                    let below = set.content_size.y - set.state.unclamped_offset().y - set.inner_rect.height();
-                    if running.hides_rest != (below > MIN_HIDDEN) {
-                        running.hides_rest = below > MIN_HIDDEN;
-                        ui.ctx().request_repaint();
+        ui.with_layout(backwards, |ui| {
+            let (command, more) = buttons(ui, running);
+            ui.with_layout(Layout::top_down(egui::Align::Min), |ui| {
+                let id = (running.lesson.name.clone(), running.step);
+                let page = ScrollArea::vertical().id_salt(id).auto_shrink(false);
+                let set = page.show(ui, |ui| {
+                    // Space for the scroll bar.
+                    ui.set_max_width(ui.available_width() - 10.0);
+                    if low {
+                        ui.spacing_mut().interact_size.y = CHOICE_HEIGHT;
+                        ui.spacing_mut().icon_width = CHOICE_HEIGHT - 8.0;
                     }
-                    if set.inner { Request::Set } else { request }
-                })
-                .inner
+                    if more {
+                        // The last line of a page is repeated at the top of the next.
+                        ui.scroll_with_delta(egui::vec2(0.0, 40.0 - ui.clip_rect().height()));
+                    }
+                    let set = running.page(ui, own);
+                    if let Some(elsewhere) = &elsewhere {
+                        ui.label(RichText::new(elsewhere).weak());
+                    }
+                    set
+                });
+                let below = set.content_size.y - set.state.unclamped_offset().y - set.inner_rect.height();
+                if running.hides_rest != (below > MIN_HIDDEN) {
+                    running.hides_rest = below > MIN_HIDDEN;
+                    ui.ctx().request_repaint();
+                }
+                if set.inner { Some(Command::SetStep) } else { command }
             })
-            .inner;
-        match request {
-            Request::Nothing | Request::More => {}
-            Request::Turn(forward) => self.change_step(forward),
-            Request::Set => self.set_step(),
-            Request::Leave => self.leave_lesson(),
-        }
-    }
-}
-
-impl App {
-    /// The twin's distance under the picture of a presentation, if the lesson uses the bench.
-    pub(in crate::app) fn lesson_twin(&mut self, ui: &mut Ui, bar: egui::Frame) {
-        if self.course().is_none() || !self.show_bench || self.player.twin().is_none() {
-            return;
-        }
-        let height = 0.42 * ui.available_height();
-        Panel::bottom("twin of the lesson")
-            .frame(bar)
-            .resizable(false)
-            .exact_size(height)
-            .show(ui, |ui| Bench::twin_ui(ui, &self.player));
+            .inner
+        })
+        .inner
     }
 
     /// The item the step refers to that the presentation does not show.
-    fn item_outside_presentation(&self, ctx: &egui::Context) -> Option<String> {
-        self.presentation.as_ref()?;
-        let labels = self.pointed_controls();
+    fn item_outside_presentation(&self, ctx: &egui::Context, player: &Player) -> Option<String> {
+        let labels = self.pointed_controls(player);
         let places = ControlFinder::places(ctx, &labels);
         let missing: Vec<String> =
             labels.into_iter().filter(|name| places.iter().all(|(own, _)| own != name)).collect();
@@ -117,9 +84,9 @@ impl App {
     }
 }
 
-/// Back, Next, progress, and Leave, at positions independent of the page.
-fn buttons(ui: &mut Ui, running: &RunningLesson) -> Request {
-    let mut request = Request::Nothing;
+/// Back, Next, progress, and Leave, at positions independent of the page. Returns the command, and whether to scroll.
+fn buttons(ui: &mut Ui, running: &RunningLesson) -> (Option<Command>, bool) {
+    let (mut command, mut more) = (None, false);
     let last = running.lesson.steps.len() - 1;
     ui.horizontal(|ui| {
         for (forward, name, help, possible) in [
@@ -128,7 +95,7 @@ fn buttons(ui: &mut Ui, running: &RunningLesson) -> Request {
         ] {
             let button = ui.add_enabled(possible, Button::new(name)).on_hover_text(help);
             if button.clicked() {
-                request = Request::Turn(forward);
+                command = Some(Command::TurnPage { forward });
             }
         }
         let count = format!("{} of {}", running.step + 1, last + 1);
@@ -141,14 +108,13 @@ fn buttons(ui: &mut Ui, running: &RunningLesson) -> Request {
             let help = "Ends the lesson and restores the window as it was before";
             let leave = ui.button("End").on_hover_text(help);
             if leave.accessible_name("Leave the lesson").clicked() {
-                request = Request::Leave;
+                command = Some(Command::LeaveLesson);
             }
-            if running.hides_rest && ui.button("More").on_hover_text("Scroll down to the rest of the step").clicked() {
-                request = Request::More;
-            }
+            let help = "Scroll down to the rest of the step";
+            more = running.hides_rest && ui.button("More").on_hover_text(help).clicked();
         });
     });
-    request
+    (command, more)
 }
 
 impl RunningLesson {

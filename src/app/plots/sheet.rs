@@ -4,9 +4,10 @@ use eframe::egui::Ui;
 
 use super::{Panel, PlotKind, Plots, earlier_traces, time_axis};
 use crate::app::curve;
+use crate::app::files::{describe, file_stem};
 use crate::app::host::SaveFile;
+use crate::app::layout;
 use crate::app::player::Player;
-use crate::app::{App, layout};
 use crate::chart::{Axis, Chart, Colour, PALETTE, Series, Sheet};
 use crate::session::history::Bin;
 
@@ -36,41 +37,39 @@ impl PlotFormat {
         [(Self::Svg, "SVG", "svg", "image/svg+xml"), (Self::Png, "PNG", "png", "image/png")];
 }
 
-impl App {
-    /// A button for each file format of the visible plots.
-    pub(in crate::app) fn plots_menu(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
-            ui.label("Plots");
-            for (format, name, ..) in PlotFormat::ALL {
-                let button = ui.button(format!("{name}…")).on_hover_text(format!("The plots on show, {name}"));
-                if button.accessible_name(format!("Plots as {name}")).clicked() {
-                    self.save_plots(format);
-                    layout::close_menu(ui);
-                }
+/// A button for each file format of the visible plots; returns that of the clicked one.
+pub fn format_buttons(ui: &mut Ui) -> Option<PlotFormat> {
+    let mut chosen = None;
+    ui.horizontal(|ui| {
+        ui.label("Plots");
+        for (format, name, ..) in PlotFormat::ALL {
+            let button = ui.button(format!("{name}…")).on_hover_text(format!("The plots on show, {name}"));
+            if button.accessible_name(format!("Plots as {name}")).clicked() {
+                chosen = Some(format);
+                layout::close_menu(ui);
             }
-        });
-    }
+        }
+    });
+    chosen
+}
 
-    /// Saves the visible plots.
-    pub fn save_plots(&mut self, format: PlotFormat) {
-        let Some(sheet) = self.plots.sheet(&self.player, self.describe()) else {
-            self.problem = Some("No plot is chosen".to_owned());
-            return;
-        };
+impl Plots {
+    /// A file with the visible plots.
+    ///
+    /// # Errors
+    /// No plot is chosen, or they cannot be drawn; as a message.
+    pub fn file(&self, player: &Player, format: PlotFormat) -> Result<SaveFile, String> {
+        let sheet = self.sheet(player, describe(player)).ok_or("No plot is chosen")?;
         let bytes = match format {
             PlotFormat::Svg => sheet.svg().map(String::into_bytes),
             PlotFormat::Png => sheet.png(PNG_SCALE),
         };
         let (_, _, ending, mime) = PlotFormat::ALL[format as usize];
-        let name = format!("{}-plots.{ending}", self.file_stem());
-        match bytes {
-            Ok(bytes) => self.save(vec![SaveFile { name, mime, bytes }]),
-            Err(error) => self.problem = Some(format!("The plots cannot be saved: {error}")),
-        }
+        let name = format!("{}-plots.{ending}", file_stem(player));
+        let bytes = bytes.map_err(|error| format!("The plots cannot be saved: {error}"))?;
+        Ok(SaveFile { name, mime, bytes })
     }
-}
 
-impl Plots {
     /// The visible plots with their time range, and `note` below; `None` without plots.
     pub fn sheet(&self, player: &Player, note: String) -> Option<Sheet> {
         let of_quantity = |quantity: &_| Panel::for_quantity(*quantity, player);
