@@ -112,16 +112,17 @@ fn requirements(keys: &[&FileKey]) -> Json {
 
 fn of_key(key: &FileKey, table: &FileTable) -> Json {
     let mut description = format!("{}\n\nValue: {}", capital(key.help), value(key, table));
-    let dimension = match key.value_type {
-        ValueType::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
-            Some(Kind::Number { dimension, .. }) => Some(dimension),
-            _ => None,
-        },
-        _ => key.dimension(false),
-    };
-    let mut units = dimension.map_or_else(Vec::new, unit_names);
-    if let Some((hinge, _)) = key.on_hinge.filter(|own| Some(own.0) != dimension) {
-        units.extend(unit_names(hinge));
+    let mut dimensions = [key.dimensions(false), key.dimensions(true)].concat();
+    if let ValueType::Parameter(name) = key.value_type
+        && let Some(Kind::Number { dimension, .. }) = find(name).map(|parameter| parameter.kind)
+    {
+        dimensions.push(dimension);
+    }
+    let mut units = Vec::new();
+    for unit in dimensions.into_iter().flat_map(unit_names) {
+        if !units.contains(&unit) {
+            units.push(unit);
+        }
     }
     if !units.is_empty() {
         description += &format!("; units {}", units.join(", "));
