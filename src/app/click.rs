@@ -46,9 +46,9 @@ pub struct TimeWindow {
     pub lasts: f64,
 }
 
-/// Impulse of the blow, N s, from the record of `impact`. The effective mass follows from its largest elastic energy
-/// and is at most `mass`, kg, the total. Forces during lasting contact are excluded: a ball that settles softly and
-/// leaves after a second makes no bang.
+/// Impulse of the blow, N s, from the record of `impact`. The effective mass follows from its largest elastic energy and is at most
+/// `mass`, kg, the total. Forces during lasting contact are excluded: a ball that settles softly and leaves after a second makes no
+/// bang.
 pub fn impulse(impact: &Impact, mass: f64) -> f64 {
     let effective_mass = 2.0 * impact.energy / (impact.approach_speed * impact.approach_speed);
     effective_mass.min(mass) * (impact.approach_speed + impact.separation_speed)

@@ -65,8 +65,8 @@ impl MagnifiedJoint {
         let (socket, socket_spin) = velocity_of(frame, &spec.carrier());
         let velocity = ball - socket;
         let touches = matches!(report.state, ContactMode::Creep | ContactMode::Slip);
-        let law = Coefficients::new(&spec.contact, report.clearance);
         let sliding = normal.filter(|_| touches).map(|normal| {
+            let law = Coefficients::new(&spec.contact, report.clearance);
             let gap = law.separation(&report.eccentricity, &velocity);
             let slip_velocity = law.slip_velocity(&normal, &velocity, &ball_spin, &socket_spin);
             gap.sliding_velocity(&slip_velocity)
@@ -79,7 +79,7 @@ impl MagnifiedJoint {
         let patch = (!ideal && clearance > 0.0).then(|| ContactPatch {
             effective_radius: ElasticLaw::effective_radius(radius, clearance),
             penetration: report.penetration,
-            radius: law.elastic.patch(radius, clearance, report.penetration),
+            radius: ElasticLaw::of_ball(&spec.contact, clearance).patch(radius, clearance, report.penetration),
             deepest: impact.map_or(0.0, |impact| impact.deepest),
         });
         Some(Self {

@@ -12,10 +12,9 @@ macro_rules! on_spheres {
 pub(super) use on_spheres;
 
 /// The power n of the penetration with which a force grows. A new one is a variant; the compiler names what it needs, all here.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Power {
     /// 1.5: spheres after Hertz.
-    #[default]
     Spheres,
 }
 
@@ -52,7 +51,7 @@ impl Power {
 }
 
 /// F = K d^n of a ball in its socket. Hertz's law, paper eq. (19): n = 1.5, K = 4 / (3 (s + s)) sqrt(R r / (R - r)).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ElasticLaw {
     /// Stiffness K, N/m^n.
     pub stiffness: f64,
