@@ -1,6 +1,8 @@
 //! `schema`: a JSON schema of scene files (draft 7), for editors. It is generated from the reader's own rows and rejects only
 //! what the reader rejects for its form alone.
 
+use std::collections::BTreeSet;
+
 use serde_json::{Map, Value as Json, json};
 
 use super::reference::{capital, default_text, value};
@@ -118,12 +120,8 @@ fn of_key(key: &FileKey, table: &FileTable) -> Json {
     {
         dimensions.push(dimension);
     }
-    let mut units = Vec::new();
-    for unit in dimensions.into_iter().flat_map(unit_names) {
-        if !units.contains(&unit) {
-            units.push(unit);
-        }
-    }
+    let mut known = BTreeSet::new();
+    let units: Vec<&str> = dimensions.into_iter().flat_map(unit_names).filter(|unit| known.insert(*unit)).collect();
     if !units.is_empty() {
         description += &format!("; units {}", units.join(", "));
     }

@@ -19,11 +19,11 @@ pub(super) enum Power {
 }
 
 impl Power {
-    /// n.
+    /// n, and the duration of an impact without damping times its speed over its depth: 2 B(1 / (n + 1), 1/2) / (n + 1).
     #[inline]
-    const fn exponent(self) -> f64 {
+    const fn constants(self) -> (f64, f64) {
         match self {
-            Self::Spheres => 1.5,
+            Self::Spheres => (1.5, 2.94),
         }
     }
 
@@ -39,13 +39,6 @@ impl Power {
     fn inverse(self, x: f64) -> f64 {
         match self {
             Self::Spheres => libm::cbrt(x * x),
-        }
-    }
-
-    /// Duration of an impact without damping times its speed over its depth: 2 B(1 / (n + 1), 1/2) / (n + 1).
-    const fn impact(self) -> f64 {
-        match self {
-            Self::Spheres => 2.94,
         }
     }
 }
@@ -129,7 +122,7 @@ impl ElasticLaw {
     /// d F'(d) / F(d): the power with which the force grows at any penetration.
     #[inline]
     pub fn exponent(&self) -> f64 {
-        self.power.exponent()
+        self.power.constants().0
     }
 
     /// Penetration at which the law balances `force` (N), m: the rest position of a settled contact.
@@ -140,7 +133,7 @@ impl ElasticLaw {
     /// Estimated duration of an impact of a mass `mass` (kg) at `speed` (m/s) with the damping factor `damping`, s: 2.94 d / v
     /// with the maximum penetration of Hertz's theory (K. L. Johnson, Contact Mechanics, section 11.4), reduced for strong damping.
     pub(crate) fn impact_duration(&self, damping: f64, mass: f64, speed: f64) -> f64 {
-        self.power.impact() * self.deepest(damping, mass, speed) / speed
+        self.power.constants().1 * self.deepest(damping, mass, speed) / speed
     }
 
     /// Largest penetration of that impact, m.
