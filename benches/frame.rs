@@ -136,8 +136,7 @@ fn sound(watch: &Stopwatch) {
             end: TIME + 0.5 / PITCHES.0 + 1e-6 * f64::from(k),
             approach_speed: 0.1,
             separation_speed: 0.1,
-            deepest: 1e-5,
-            peak: 10.0 * f64::from(k),
+            energy: 4e-5 * f64::from(k),
             ..Impact::default()
         })
         .collect();

@@ -39,10 +39,8 @@ fn table(own: &Bound<'_, PyDict>, rows: Option<&FileTable>, place: &str, context
         let row = rows.and_then(|rows| row(rows, &key, variant));
         // Drives and initial values of a joint with two coordinates have an entry for each, named after the coordinate.
         let is_angle = is_angle.or_else(|| is_angle_name(&key));
-        all.insert(
-            key,
-            to_toml(&value, row.map(|row| (row, row.value_type)), &place, Context { is_angle, ..context })?,
-        );
+        let row = row.map(|row| (row, *row.value_type(is_angle == Some(true))));
+        all.insert(key, to_toml(&value, row, &place, Context { is_angle, ..context })?);
     }
     Ok(all)
 }
@@ -127,11 +125,9 @@ fn to_toml(
     }
     if let Some((row, value_type)) = row {
         if let Some(dimension) = dimension(value_type) {
-            let dimension = match (row.on_hinge, context.is_angle) {
-                (None, _) | (_, Some(false)) => dimension,
-                (Some((on_hinge, _)), Some(true)) => on_hinge,
-                (Some(_), None) => return wrong("the unit depends on the joint: give it, as in \"0.1 rad\""),
-            };
+            if row.on_hinge.is_some() && context.is_angle.is_none() {
+                return wrong("the unit depends on the joint: give it, as in \"0.1 rad\"");
+            }
             return Ok(Toml::String(exact_quantity(number, si_unit(dimension), dimension)));
         }
         if let ValueType::Parameter(key) = value_type

@@ -55,7 +55,7 @@ def test_a_number_of_a_joint_has_the_unit_of_its_coordinate():
     inertia = [1e-3, 1e-3, 1e-3]
     axes = {"axis": [0, 0, 1]}
     machine = {
-        "body": [{"name": name, "mass": 1.0, "inertia": inertia} for name in ("arm", "block", "tube", "wheel")],
+        "body": [{"name": name, "mass": 1.0, "inertia": inertia} for name in ("arm", "block", "tube", "wheel", "cam")],
         "joint": [
             {"name": "hinge", "kind": "revolute", "child": "arm", "start": {"position": 0.1, "velocity": 2}} | axes,
             {"name": "slide", "kind": "prismatic", "child": "block", "start": {"position": 0.2, "velocity": 3}} | axes,
@@ -70,9 +70,11 @@ def test_a_number_of_a_joint_has_the_unit_of_its_coordinate():
             }
             | axes,
             {"name": "wheel", "kind": "revolute", "child": "wheel", "drive": {"law": "constant", "velocity": 6}} | axes,
+            {"name": "cam", "kind": "revolute", "child": "cam", "drive": {"law": "table", "points": [(0, 0), (1.5, 0.25)]}} | axes,
         ],
         "motor": [{"name": "m", "joint": "hinge", "torque": 0.7}, {"name": "n", "joint": "slide", "force": 8, "damping": 9}],
     }
+    machine["joint_spring"] = [{"name": "curved", "joint": "hinge", "characteristic": [(-0.2, -3), (0, 0), (0.6, 4)]}]
     machine["motor"][1]["target"] = {"law": "constant", "position": 0.05, "velocity": 0.0}
     toml = jp.Scene.from_dict(machine).toml
     for line in [
@@ -87,6 +89,8 @@ def test_a_number_of_a_joint_has_the_unit_of_its_coordinate():
         'velocity = "6 rad/s"',
         'damping = "9 N s/m"',
         'position = "0.05 m"',
+        '"1.5 s", "0.25 rad"',
+        '"-0.2 rad", "-3 N m"',
     ]:
         assert line in toml, toml
 

@@ -5,7 +5,6 @@
 //! simulated time, slow motion spreads the clicks but does not change them. Loudness: a power below one of the impulse, so that
 //! soft impacts are audible beside hard ones.
 
-use crate::contact::ElasticLaw;
 use crate::scene::Scene;
 use crate::simulate::Impact;
 
@@ -47,12 +46,11 @@ pub struct TimeWindow {
     pub lasts: f64,
 }
 
-/// Impulse of the blow, N s, from the record of `impact`. The effective mass follows from the elastic energy at the deepest point
-/// after Hertz, and is at most `mass`, kg, the total. Forces during lasting contact are excluded: a ball that settles softly and
-/// leaves after a second makes no bang.
+/// Impulse of the blow, N s, from the record of `impact`. The effective mass follows from its largest elastic energy and is at most
+/// `mass`, kg, the total. Forces during lasting contact are excluded: a ball that settles softly and leaves after a second makes no
+/// bang.
 pub fn impulse(impact: &Impact, mass: f64) -> f64 {
-    let energy = ElasticLaw::energy_at(impact.deepest, impact.peak);
-    let effective_mass = 2.0 * energy / (impact.approach_speed * impact.approach_speed);
+    let effective_mass = 2.0 * impact.energy / (impact.approach_speed * impact.approach_speed);
     effective_mass.min(mass) * (impact.approach_speed + impact.separation_speed)
 }
 
@@ -135,15 +133,13 @@ mod tests {
     const RATE: f64 = 48_000.0;
 
     fn impact(end: f64, duration: f64, speed: f64) -> Impact {
-        // Elastic impact of half a kilogram.
-        let deepest = 10e-6;
         Impact {
             start: end - duration,
             end,
             approach_speed: speed,
             separation_speed: speed,
-            deepest,
-            peak: 0.25 * speed * speed / (0.4 * deepest),
+            // Elastic impact of half a kilogram.
+            energy: 0.25 * speed * speed,
             ..Impact::default()
         }
     }

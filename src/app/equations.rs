@@ -19,7 +19,7 @@ pub fn law(key: &str, scene: &Scene) -> Option<ShownLaw> {
 fn law_of(last: &str, contact: &Parameters) -> Option<ShownLaw> {
     let [friction, correction] = contact.friction_law.shown();
     Some(match last {
-        "clearance" | "ball_radius" | "youngs_modulus" | "poisson_ratio" => ElasticLaw::SHOWN,
+        "clearance" | "ball_radius" | "youngs_modulus" | "poisson_ratio" => ElasticLaw::shown(contact.normal_law),
         "friction" | "friction_law" => friction,
         "slip_speed_low" | "slip_speed_high" => correction,
         "restitution" | "normal_law" => contact.normal_law.shown(),

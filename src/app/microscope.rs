@@ -199,8 +199,8 @@ fn section(ui: &mut Ui, magnified: &MagnifiedJoint, height: f32) {
     };
     let words = if patch.penetration > 0.0 {
         let pressed = draw::length(patch.penetration, 3);
-        let radius = draw::length(patch.radius(), 3);
-        format!("Section of the contact: {pressed} deep, patch of radius {radius}")
+        let radius = patch.radius.map(|radius| format!(", patch of radius {}", draw::length(radius, 3)));
+        format!("Section of the contact: {pressed} deep{}", radius.unwrap_or_default())
     } else {
         let gap = draw::length(-patch.penetration, 3);
         format!("Section of the contact: a gap of {gap}")
@@ -226,7 +226,7 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
         Some(patch) => (draw::length(-patch.penetration, 3), NONE.to_owned()),
         None => (NONE.to_owned(), NONE.to_owned()),
     };
-    let patch = magnified.patch.filter(|patch| patch.penetration > 0.0);
+    let radius = magnified.patch.and_then(|patch| patch.radius);
     let rows = [
         (
             "Eccentricity",
@@ -242,7 +242,7 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
         ("Indentation", indentation, "How deep the ball presses into the wall"),
         (
             "Elastic patch",
-            patch.map_or(NONE.to_owned(), |patch| format!("radius {}", draw::length(patch.radius(), 3))),
+            radius.map_or(NONE.to_owned(), |radius| format!("radius {}", draw::length(radius, 3))),
             "Radius of the contact patch by Hertz, a = √(R δ), R = (r + c) r / c",
         ),
         (

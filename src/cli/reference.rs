@@ -131,18 +131,17 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
         Dimension::None => "number",
         of => dimension_name(of),
     };
-    let number = |of: Dimension| match key.on_hinge {
-        Some((hinge, _)) if hinge != of => {
-            format!("{}, on a hinge {}", dimension(of), dimension(hinge))
-        }
-        _ => dimension(of).to_owned(),
+    let names = |hinge: bool| key.dimensions(hinge).iter().map(|of| dimension(*of)).collect::<Vec<_>>().join(" and ");
+    let number = || match [names(false), names(true)] {
+        [own, hinge] if hinge != own => format!("{own}, on a hinge {hinge}"),
+        [own, _] => own,
     };
     let words = |words: &[&str]| format!("`{}`", words.join("`, `"));
     match key.value_type {
-        ValueType::Number(of, range) => number(of) + &bounds(of, range),
+        ValueType::Number(of, range) => number() + &bounds(of, range),
         ValueType::Vector(Dimension::None, _) | ValueType::Direction => "direction".to_owned(),
-        ValueType::Vector(of, range) => format!("vector, {}{}", number(of), bounds(of, range)),
-        ValueType::Numbers(count, of) => format!("{count} of {}", number(of)),
+        ValueType::Vector(of, range) => format!("vector, {}{}", number(), bounds(of, range)),
+        ValueType::Numbers(count, _) => format!("{count} of {}", number()),
         ValueType::Quantity => "any quantity".to_owned(),
         ValueType::Range => "two quantities".to_owned(),
         ValueType::Whole(least, most) => format!("whole number, {least} to {most}"),
@@ -167,10 +166,8 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
         }
         ValueType::List(of, _) if of.head.starts_with("[[") => markdown_name(of),
         ValueType::List(_, limit) => format!("list of {}", limit.entries),
-        ValueType::Vectors(of, _) => format!("list of vectors, {}", number(of)),
-        ValueType::Pairs([first, second], limit) => {
-            format!("list of pairs, {} and {}, at most {}", dimension(first), number(second), limit.max)
-        }
+        ValueType::Vectors(..) => format!("list of vectors, {}", number()),
+        ValueType::Pairs(_, limit) => format!("list of pairs, {}, at most {}", number(), limit.max),
         ValueType::Files(of, _) => format!("list of names of files, or {}", markdown_name(of)),
         ValueType::Values => "table of quantities".to_owned(),
     }

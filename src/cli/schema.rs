@@ -1,6 +1,8 @@
 //! `schema`: a JSON schema of scene files (draft 7), for editors. It is generated from the reader's own rows and rejects only
 //! what the reader rejects for its form alone.
 
+use std::collections::BTreeSet;
+
 use serde_json::{Map, Value as Json, json};
 
 use super::reference::{capital, default_text, value};
@@ -112,17 +114,14 @@ fn requirements(keys: &[&FileKey]) -> Json {
 
 fn of_key(key: &FileKey, table: &FileTable) -> Json {
     let mut description = format!("{}\n\nValue: {}", capital(key.help), value(key, table));
-    let dimension = match key.value_type {
-        ValueType::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
-            Some(Kind::Number { dimension, .. }) => Some(dimension),
-            _ => None,
-        },
-        _ => key.dimension(false),
-    };
-    let mut units = dimension.map_or_else(Vec::new, unit_names);
-    if let Some((hinge, _)) = key.on_hinge.filter(|own| Some(own.0) != dimension) {
-        units.extend(unit_names(hinge));
+    let mut dimensions = [key.dimensions(false), key.dimensions(true)].concat();
+    if let ValueType::Parameter(name) = key.value_type
+        && let Some(Kind::Number { dimension, .. }) = find(name).map(|parameter| parameter.kind)
+    {
+        dimensions.push(dimension);
     }
+    let mut known = BTreeSet::new();
+    let units: Vec<&str> = dimensions.into_iter().flat_map(unit_names).filter(|unit| known.insert(*unit)).collect();
     if !units.is_empty() {
         description += &format!("; units {}", units.join(", "));
     }

@@ -1,13 +1,14 @@
 //! The tables of the scene format: each key is read as described, no other key is accepted, and the JSON schema made from the tables
 //! accepts and refuses the same files as the reader.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use boon::{Compiler, Draft, SchemaIndex, Schemas};
 use jointplay::cli::schema;
 use jointplay::scene::{
-    BUILT_IN, FILE, FileKey, FileTable, Scene, SceneError, Texts, ValueType, Variants, built_in_text, file_tables,
+    BUILT_IN, FILE, FileKey, FileTable, Scene, SceneError, Texts, ValueType, Variants, built_in_text, evaluate,
+    file_tables,
 };
 use serde_json::Value as Json;
 
@@ -245,10 +246,19 @@ fn rows_of_the_format_table_describe_their_values() {
             let place = format!("{} of {}", row.name, table.name);
             assert!(!row.help.is_empty() && !row.help.contains('|'), "{place}");
             assert!(row.of.iter().all(|word| table.words().contains(word)), "{place}");
-            for like in [Some(row.example), row.on_hinge.map(|(_, like)| like)] {
-                let text = format!("like = {}", like.unwrap_or("0"));
-                let parsed = like == Some("") || text.parse::<DocumentMut>().is_ok();
+            for (value_type, like) in [Some((row.value_type, row.example)), row.on_hinge].into_iter().flatten() {
+                let text = format!("like = {like}");
+                let parsed = like.is_empty() || text.parse::<DocumentMut>().is_ok();
                 assert!(parsed, "{place}: {text}");
+                let ValueType::Pairs(dimensions, _) = value_type else {
+                    continue;
+                };
+                let pairs: BTreeMap<String, Vec<[Json; 2]>> = toml::from_str(&text).unwrap();
+                for (number, dimension) in pairs["like"].iter().flat_map(|pair| pair.iter().zip(dimensions)) {
+                    let quantity = evaluate(number.as_str().unwrap_or("0"), &[]).unwrap();
+                    let zero = number == 0;
+                    assert!(zero || quantity.of(dimension, true).is_ok(), "{place}: {number} for {dimension:?}");
+                }
             }
         }
     }

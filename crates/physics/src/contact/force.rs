@@ -1,7 +1,7 @@
 //! The force between a ball and its socket wall, and its derivatives with respect to displacement and velocity. Every contact
 //! force and derivative is computed here.
 
-use super::{Coefficients, ContactState, ElasticLaw, FrictionBranch, FrictionVelocity, Mat3, Vec3};
+use super::{Coefficients, ContactState, FrictionBranch, FrictionVelocity, Mat3, Vec3};
 
 /// Position and motion of a ball in its socket.
 #[derive(Clone, Copy, Debug, Default)]
@@ -201,7 +201,7 @@ impl Coefficients {
         if self.clearance_rate == 0.0 {
             return 0.0;
         }
-        let by_clearance = ElasticLaw::relative_stiffening(self.ball_radius, self.clearance);
+        let by_clearance = self.elastic.relative_stiffening(self.ball_radius, self.clearance);
         let stiffening = by_clearance * self.elastic.energy(gap.penetration);
         (stiffening - force) * self.clearance_rate
     }

@@ -1,9 +1,9 @@
 //! Normal-force and friction laws.
 //!
 //! Every normal law here has the form F_N = F(delta) (1 + chi delta_dot / delta_dot0), cut off below 0, with the elastic law F of
-//! `elastic.rs`: they differ only in the damping factor chi(ce), so the force itself is one kernel.
+//! `elastic.rs`: they differ only in the damping factor chi(ce) and the power of F, so the force itself is one kernel.
 
-use super::elastic::elastic_force;
+use super::elastic::{Power, on_spheres};
 use super::{ApproachSpeed, ElasticLaw, FrictionLaw, FrictionVelocity, NormalLaw, Parameters};
 
 /// A law as a tooltip shows it.
@@ -17,81 +17,78 @@ pub struct ShownLaw {
     pub elsewhere: Option<&'static str>,
 }
 
+/// What distinguishes a normal law from the others.
+struct Entry {
+    law: &'static str,
+    formula: &'static str,
+    elsewhere: Option<&'static str>,
+    /// Damping factor chi for the requested restitution ce.
+    damping: fn(f64) -> f64,
+    /// Power of the penetration with which the elastic force grows.
+    power: Power,
+}
+
 impl NormalLaw {
-    /// The law as it is shown, and its damping factor chi for the requested restitution ce.
-    ///
     /// - Lankarani & Nikravesh (1990): derived for ce near 1.
     /// - Gonthier et al. (2004): the chi for which an undisturbed impact rebounds with exactly ce, the root of
     ///   chi (1 + ce) = ln((1 + chi) / (1 - ce chi)).
-    fn entry(self) -> (ShownLaw, fn(f64) -> f64) {
+    fn entry(self) -> Entry {
         match self {
-            Self::LankaraniNikravesh => (
-                ShownLaw {
-                    law: "Lankarani–Nikravesh normal force",
-                    formula: concat!(
-                        "N = ",
-                        elastic_force!(),
-                        " (1 + ¾ (1 - e²) d' / d'0), d: penetration, d'0: approach speed"
-                    ),
-                    elsewhere: None,
-                },
-                |ce| 0.75 * (1.0 - ce * ce),
-            ),
-            Self::Hertz => (
-                ShownLaw {
-                    law: "Hertz normal force, without damping",
-                    formula: concat!("N = ", elastic_force!(), ", d: penetration"),
-                    elsewhere: Some("Hertz (1882)"),
-                },
-                |_| 0.0,
-            ),
-            Self::HuntCrossley => (
-                ShownLaw {
-                    law: "Hunt–Crossley normal force",
-                    formula: concat!(
-                        "N = ",
-                        elastic_force!(),
-                        " (1 + 1.5 (1 - e) d' / d'0), d: penetration, d'0: approach speed"
-                    ),
-                    elsewhere: Some("Hunt & Crossley (1975)"),
-                },
-                |ce| 1.5 * (1.0 - ce),
-            ),
-            Self::Flores => (
-                ShownLaw {
-                    law: "Normal force of Flores et al.",
-                    formula: concat!(
-                        "N = ",
-                        elastic_force!(),
-                        " (1 + 1.6 (1 - e) / e · d' / d'0), d: penetration, d'0: approach speed"
-                    ),
-                    elsewhere: Some("Flores et al. (2011)"),
-                },
-                |ce| 8.0 * (1.0 - ce) / (5.0 * ce),
-            ),
-            Self::Gonthier => (
-                ShownLaw {
-                    law: "Normal force of Gonthier et al.",
-                    formula: concat!(
-                        "N = ",
-                        elastic_force!(),
-                        " (1 + χ d' / d'0), χ (1 + e) = ln((1 + χ) / (1 - e χ)), d: penetration, d'0: approach speed"
-                    ),
-                    elsewhere: Some("Gonthier et al. (2004)"),
-                },
-                exact_damping_factor,
-            ),
+            Self::LankaraniNikravesh => Entry {
+                law: "Lankarani–Nikravesh normal force",
+                formula: on_spheres!(" (1 + ¾ (1 - e²) d' / d'0), d: penetration, d'0: approach speed"),
+                elsewhere: None,
+                damping: |ce| 0.75 * (1.0 - ce * ce),
+                power: Power::Spheres,
+            },
+            Self::Hertz => Entry {
+                law: "Hertz normal force, without damping",
+                formula: on_spheres!(", d: penetration"),
+                elsewhere: Some("Hertz (1882)"),
+                damping: |_| 0.0,
+                power: Power::Spheres,
+            },
+            Self::HuntCrossley => Entry {
+                law: "Hunt–Crossley normal force",
+                formula: on_spheres!(" (1 + 1.5 (1 - e) d' / d'0), d: penetration, d'0: approach speed"),
+                elsewhere: Some("Hunt & Crossley (1975)"),
+                damping: |ce| 1.5 * (1.0 - ce),
+                power: Power::Spheres,
+            },
+            Self::Flores => Entry {
+                law: "Normal force of Flores et al.",
+                formula: on_spheres!(" (1 + 1.6 (1 - e) / e · d' / d'0), d: penetration, d'0: approach speed"),
+                elsewhere: Some("Flores et al. (2011)"),
+                damping: |ce| 8.0 * (1.0 - ce) / (5.0 * ce),
+                power: Power::Spheres,
+            },
+            Self::Gonthier => Entry {
+                law: "Normal force of Gonthier et al.",
+                formula: on_spheres!(
+                    " (1 + χ d' / d'0), χ (1 + e) = ln((1 + χ) / (1 - e χ)), d: penetration, d'0: approach speed"
+                ),
+                elsewhere: Some("Gonthier et al. (2004)"),
+                damping: exact_damping_factor,
+                power: Power::Spheres,
+            },
         }
     }
 
     /// The law as a tooltip shows it.
     pub fn shown(self) -> ShownLaw {
-        self.entry().0
+        let Entry { law, formula, elsewhere, .. } = self.entry();
+        ShownLaw { law, formula, elsewhere }
     }
 
     /// Damping factor chi for the requested restitution; infinite for 0 in a law that divides by it.
     pub fn damping_factor(self, restitution: f64) -> f64 {
-        self.entry().1(restitution)
+        (self.entry().damping)(restitution)
+    }
+
+    /// Power of the penetration with which its elastic force grows.
+    #[inline]
+    pub(super) fn power(self) -> Power {
+        self.entry().power
     }
 }
 
@@ -109,8 +106,8 @@ impl FrictionLaw {
     }
 }
 
-/// Excess of chi (1 + ce) over ln((1 + chi) / (1 - ce chi)): from dv/ddelta of m v dv = -K delta^1.5 (1 + chi v / v0)
-/// ddelta, whose right-hand side integrates to zero over a whole impact for any K and m.
+/// Excess of chi (1 + ce) over ln((1 + chi) / (1 - ce chi)): from dv/ddelta of m v dv = -F(delta) (1 + chi v / v0) ddelta,
+/// where F ddelta integrates to zero over a whole impact for any elastic law F and mass m.
 fn impact_balance(chi: f64, ce: f64) -> f64 {
     chi * (1.0 + ce) - libm::log1p(chi) + libm::log1p(-ce * chi)
 }
@@ -231,18 +228,10 @@ impl Coefficients {
 mod tests {
     use super::*;
 
-    const LAWS: [NormalLaw; 5] = [
-        NormalLaw::LankaraniNikravesh,
-        NormalLaw::Hertz,
-        NormalLaw::HuntCrossley,
-        NormalLaw::Flores,
-        NormalLaw::Gonthier,
-    ];
-
     /// Rebound speed over approach speed of a unit mass, integrated with Runge-Kutta 4 in small steps.
     fn simulated_restitution(law: NormalLaw, ce: f64) -> f64 {
         let parameters = Parameters { normal_law: law, restitution: ce, ..Parameters::default() };
-        let c = Coefficients { elastic: ElasticLaw { stiffness: 1e10 }, ..Coefficients::new(&parameters, 3e-4) };
+        let c = Coefficients::new(&parameters, 3e-4);
         let v0 = 0.1;
         let force = |x: f64, v: f64| -c.normal_force(x, v, v0);
         let (mut x, mut v, h) = (0.0, v0, 2e-9);
@@ -261,7 +250,7 @@ mod tests {
 
     #[test]
     fn the_closed_integral_agrees_with_a_simulated_impact() {
-        for law in LAWS {
+        for law in NormalLaw::ALL {
             for ce in [0.3, 0.6, 0.9] {
                 let chi = law.damping_factor(ce);
                 let expected = undisturbed_restitution(chi);

@@ -543,8 +543,7 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
     if contact.slip_speed_low >= contact.slip_speed_high {
         return Err(ContactFault::SlipSpeeds { low: contact.slip_speed_low, high: contact.slip_speed_high });
     }
-    let divides = matches!(contact.normal_law, NormalLaw::Flores | NormalLaw::Gonthier);
-    if divides && contact.restitution == 0.0 {
+    if contact.restitution == 0.0 && !contact.normal_law.damping_factor(0.0).is_finite() {
         return Err(ContactFault::DividesByRestitution(contact.normal_law));
     }
     Ok(())

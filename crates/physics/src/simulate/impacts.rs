@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use super::peaks::PenetrationCubic;
-use crate::contact::{Coefficients, undisturbed_restitution};
+use crate::contact::{Coefficients, ElasticLaw, undisturbed_restitution};
 use crate::machine::Vec3;
 use crate::mechanism::ContactId;
 
@@ -44,6 +44,8 @@ pub struct Impact {
     pub steps: u64,
     /// Deepest penetration in continuous time, m.
     pub deepest: f64,
+    /// Largest elastic energy in continuous time, J.
+    pub energy: f64,
     /// Largest normal force in continuous time, N.
     pub peak: f64,
     /// Mean rate of change of the penetration rate over the step before it, m/s^2: the effect of other forces.
@@ -273,13 +275,15 @@ impl Impacts {
         events.push(ImpactEvent::Began { id, joint: onset.joint, start: onset.time });
     }
 
-    /// Updates contact `c` over a step in which it was, or became, active, from its penetration and its largest ratio of damping to
-    /// elastic force.
-    pub(super) fn update(&mut self, c: ContactId, cubic: &PenetrationCubic, damping: f64) {
+    /// Updates contact `c` over a step in which it was, or became, active, from its elastic law, its penetration and its largest
+    /// ratio of damping to elastic force.
+    pub(super) fn update(&mut self, c: ContactId, elastic: &ElasticLaw, cubic: &PenetrationCubic, damping: f64) {
         if let Some(UnderWay { impact, .. }) = &mut self.contacts[c].under_way {
             impact.steps += 1;
             impact.damping = impact.damping.max(damping);
-            impact.deepest = impact.deepest.max(cubic.deepest());
+            let deepest = cubic.deepest();
+            impact.deepest = impact.deepest.max(deepest);
+            impact.energy = impact.energy.max(elastic.energy(deepest));
         }
     }
 

@@ -65,7 +65,7 @@ impl State {
     ) {
         let (j, law) = (contacts.joint_of(c), contacts.coefficients(c));
         let (damping, theta) = cubic.most_damped(law, contact_state, from);
-        self.record.impacts.update(c, cubic, damping);
+        self.record.impacts.update(c, &law.elastic, cubic, damping);
         if damping > self.record.statistics.joints[j].damping {
             self.record.statistics.joints[j].damping = damping;
             self.record.statistics.joints[j].damping_time = start + theta * (self.now.t - start);

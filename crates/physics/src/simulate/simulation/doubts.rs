@@ -171,15 +171,13 @@ impl DoubtContext<'_> {
         Coefficients::new(&self.machine.loose_joints[j].contact, self.state.clearance(j))
     }
 
-    /// Radius of the contact patch at the largest force so far, in ball radii; 0 for an ideal joint.
+    /// Radius of the contact patch at the largest force so far, in ball radii; 0 for an ideal joint and without contact.
     fn largest_patch(&self, j: usize) -> f64 {
         if self.machine.loose_joints[j].contact.clearance == 0.0 {
             return 0.0;
         }
         let c = self.coefficients(j);
-        let (radius, clearance) = (c.ball_radius, c.clearance);
         let depth = c.elastic.depth(self.state.statistics().joints[j].peak_normal);
-        // Hertz: a^2 = delta R r / (R - r).
-        (depth * (radius + clearance) / (clearance * radius)).sqrt()
+        c.elastic.patch(c.ball_radius, c.clearance, depth).map_or(0.0, |patch| patch / c.ball_radius)
     }
 }
