@@ -43,6 +43,7 @@ mod limits;
 mod live_changes;
 mod loads;
 mod loop_joints;
+mod loose_kinds;
 mod machines;
 mod many_joints;
 mod massless;

@@ -68,7 +68,7 @@ impl MagnifiedJoint {
         let sliding = normal.filter(|_| touches).map(|normal| {
             let law = Coefficients::new(&spec.contact, report.clearance);
             let gap = law.separation(&report.eccentricity, &velocity);
-            let slip_velocity = law.slip_velocity(&normal, &velocity, &ball_spin, &socket_spin);
+            let slip_velocity = law.slip_velocity(&normal, &velocity, [&ball_spin, &socket_spin], law.socket_levers());
             gap.sliding_velocity(&slip_velocity)
         });
         let mut impacts = player.impact_record().latest(Some(joint), shown);

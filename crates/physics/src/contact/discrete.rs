@@ -43,6 +43,11 @@ pub struct StepForce {
 }
 
 impl ContactStep {
+    /// Mean of |e| at both ends for the mean velocity `velocity` of the centres (m/s), m.
+    pub(crate) fn mean_distance(&self, velocity: &Vec3) -> f64 {
+        0.5 * (self.start.norm() + (self.start + velocity * self.h).norm())
+    }
+
     /// Mean normal for the mean velocity `velocity` of the centres, m/s; zero for a ball that stays centred.
     pub(crate) fn mean_normal(&self, velocity: &Vec3) -> Vec3 {
         let end = self.start + velocity * self.h;

@@ -71,6 +71,16 @@ impl ElasticLaw {
         Self { stiffness, power }
     }
 
+    /// Law of a sphere of radius `radius`, m, on a plane, both of the material of `parameters`: K = 4 E* sqrt(r) / 3.
+    pub fn of_corner(parameters: &Parameters, radius: f64) -> Self {
+        let power = parameters.normal_law.power();
+        let s = (1.0 - parameters.poisson_ratio * parameters.poisson_ratio) / parameters.youngs_modulus;
+        let stiffness = match power {
+            Power::Spheres => 4.0 / (6.0 * s) * radius.sqrt(),
+        };
+        Self { stiffness, power }
+    }
+
     /// Hertz's law that exerts `force` (N) at the penetration `depth` > 0, m.
     pub fn through(depth: f64, force: f64) -> Self {
         let power = Power::Spheres;

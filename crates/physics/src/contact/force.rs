@@ -75,32 +75,48 @@ impl Coefficients {
         Separation { distance, normal, penetration: distance - self.clearance, rate: opening - self.clearance_rate }
     }
 
-    /// Velocity of the ball's contact point relative to the socket's, m/s, from de/dt and the angular velocities of both.
+    /// The same across a plane with this normal: only the part of e along it counts, with its sign.
     #[inline]
-    pub(crate) fn surface_velocity(&self, normal: &Vec3, velocity: &Vec3, ball: &Vec3, socket: &Vec3) -> Vec3 {
-        let radius = self.ball_radius;
-        velocity + ball.cross(&(normal * radius)) - socket.cross(&(normal * (radius + self.clearance)))
+    pub fn separation_along(&self, normal: &Vec3, eccentricity: &Vec3, velocity: &Vec3) -> Separation {
+        let (distance, opening) = (normal.dot(eccentricity), normal.dot(velocity));
+        let (penetration, rate) = (distance - self.clearance, opening - self.clearance_rate);
+        Separation { distance, normal: *normal, penetration, rate }
+    }
+
+    /// Distances along the normal from the centres of ball and socket to the points where the force acts on each, m: r and R.
+    #[inline]
+    pub fn socket_levers(&self) -> [f64; 2] {
+        [self.ball_radius, self.ball_radius + self.clearance]
+    }
+
+    /// Velocity of the ball's contact point relative to the socket's, m/s, from de/dt and the angular velocities of both, and their
+    /// distances from the centres along the normal, m.
+    #[inline]
+    pub(crate) fn surface_velocity(
+        normal: &Vec3,
+        velocity: &Vec3,
+        [ball, socket]: [&Vec3; 2],
+        [to_ball, to_socket]: [f64; 2],
+    ) -> Vec3 {
+        velocity + ball.cross(&(normal * to_ball)) - socket.cross(&(normal * to_socket))
     }
 
     /// Derivative of [`Self::slip_velocity`] with respect to the normal, m/s. The play is so small that a slight motion of the
     /// ball turns its normal a lot, which changes the sliding velocity of spinning bodies.
-    pub(crate) fn slip_velocity_by_normal(&self, ball: &Vec3, socket: &Vec3) -> Mat3 {
+    pub(crate) fn slip_velocity_by_normal(&self, [ball, socket]: [&Vec3; 2], [to_ball, to_socket]: [f64; 2]) -> Mat3 {
         match self.friction_velocity {
             FrictionVelocity::Centres => Mat3::zeros(),
-            FrictionVelocity::Surface => {
-                let radius = self.ball_radius;
-                ball.cross_matrix() * radius - socket.cross_matrix() * (radius + self.clearance)
-            }
+            FrictionVelocity::Surface => ball.cross_matrix() * to_ball - socket.cross_matrix() * to_socket,
         }
     }
 
     /// Relative velocity used by friction, not yet projected onto the tangent plane, m/s; arguments as in
     /// `surface_velocity`.
     #[inline]
-    pub fn slip_velocity(&self, normal: &Vec3, velocity: &Vec3, ball: &Vec3, socket: &Vec3) -> Vec3 {
+    pub fn slip_velocity(&self, normal: &Vec3, velocity: &Vec3, spins: [&Vec3; 2], levers: [f64; 2]) -> Vec3 {
         match self.friction_velocity {
             FrictionVelocity::Centres => *velocity,
-            FrictionVelocity::Surface => self.surface_velocity(normal, velocity, ball, socket),
+            FrictionVelocity::Surface => Self::surface_velocity(normal, velocity, spins, levers),
         }
     }
 
@@ -129,7 +145,8 @@ impl Coefficients {
         force
     }
 
-    /// Derivatives of `force` (the result of [`Self::force`], > 0) at the fixed friction velocity `slip_velocity`.
+    /// Derivatives of `force` (the result of [`Self::force`], > 0) at the fixed friction velocity `slip_velocity`; `confined` projects
+    /// onto the directions in which the wall confines.
     pub fn linearise(
         &self,
         contact_state: &ContactState,
@@ -137,11 +154,12 @@ impl Coefficients {
         velocity: &Vec3,
         slip_velocity: &Vec3,
         force: &Force,
+        confined: &Mat3,
     ) -> Stiffness {
         let Separation { distance, normal: n, penetration, rate } = *gap;
         let approach = contact_state.approach(self, rate);
         let tangent = Mat3::identity() - n * n.transpose();
-        let normal_by_displacement = tangent / distance;
+        let normal_by_displacement = (confined - n * n.transpose()) / distance;
         let by_penetration = self.elastic.slope(penetration) * (1.0 + self.damping * rate / approach);
         let by_rate = if contact_state.approach_follows_rate(self, rate) {
             0.0
@@ -201,8 +219,13 @@ impl Coefficients {
         if self.clearance_rate == 0.0 {
             return 0.0;
         }
-        let by_clearance = self.elastic.relative_stiffening(self.ball_radius, self.clearance);
-        let stiffening = by_clearance * self.elastic.energy(gap.penetration);
+        let stiffening = match self.is_stiffened_by_clearance {
+            true => {
+                let by_clearance = self.elastic.relative_stiffening(self.ball_radius, self.clearance);
+                by_clearance * self.elastic.energy(gap.penetration)
+            }
+            false => 0.0,
+        };
         (stiffening - force) * self.clearance_rate
     }
 }
@@ -232,7 +255,7 @@ mod tests {
     /// Force on the ball.
     fn on_ball(c: &Coefficients, contact_state: &ContactState, e: &Vec3, v: &Vec3) -> Vec3 {
         let at = c.separation(e, v);
-        let slip_velocity = || c.slip_velocity(&at.normal, v, &BALL, &SOCKET);
+        let slip_velocity = || c.slip_velocity(&at.normal, v, [&BALL, &SOCKET], c.socket_levers());
         let force = c.force(contact_state, &at, slip_velocity);
         at.normal * -force.normal + force.friction
     }
@@ -247,11 +270,11 @@ mod tests {
                     let (c, e, v) = penetrating_ball(friction_velocity, speed);
                     let contact_state = contact_state(friction_branch, approach_branch);
                     let at = c.separation(&e, &v);
-                    let slip_velocity = c.slip_velocity(&at.normal, &v, &BALL, &SOCKET);
+                    let slip_velocity = c.slip_velocity(&at.normal, &v, [&BALL, &SOCKET], c.socket_levers());
                     let force = c.force(&contact_state, &at, || slip_velocity);
                     assert!(force.normal > 1.0 && force.friction.norm() > 0.01 * force.normal);
-                    let mut s = c.linearise(&contact_state, &at, &v, &slip_velocity, &force);
-                    s.add_normal_rotation(&c.slip_velocity_by_normal(&BALL, &SOCKET));
+                    let mut s = c.linearise(&contact_state, &at, &v, &slip_velocity, &force, &Mat3::identity());
+                    s.add_normal_rotation(&c.slip_velocity_by_normal([&BALL, &SOCKET], c.socket_levers()));
                     let by_velocity = s.by_rate + s.by_slip;
                     for k in 0..3 {
                         let unit = Vec3::ith(k, 1.0);

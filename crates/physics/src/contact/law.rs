@@ -161,6 +161,8 @@ pub struct Coefficients {
     pub clearance: f64,
     /// Rate of the clearance while it ramps, m/s.
     pub(crate) clearance_rate: f64,
+    /// Whether the stiffness depends on the clearance.
+    pub(crate) is_stiffened_by_clearance: bool,
     /// Whether the damping term divides by the contact's largest rate so far instead of its rate at the start.
     pub(crate) uses_largest_rate: bool,
 }
@@ -182,6 +184,7 @@ impl Coefficients {
             friction_velocity: parameters.friction_velocity,
             clearance,
             clearance_rate: 0.0,
+            is_stiffened_by_clearance: true,
             uses_largest_rate: parameters.approach_speed == ApproachSpeed::Largest,
         }
     }

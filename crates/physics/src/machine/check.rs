@@ -97,6 +97,14 @@ pub enum MachineFault {
         /// Index of the function.
         function: usize,
     },
+    /// A joint with play with impossible dimensions or settings.
+    #[error("{joint}: {fault}")]
+    Loose {
+        /// Name of the joint.
+        joint: String,
+        /// What is wrong.
+        fault: super::LooseFault,
+    },
     /// Contact parameters contradict one another.
     #[error("{joint}: {fault}")]
     Contact {
@@ -181,6 +189,7 @@ impl Machine {
         }
         for joint in &self.loose_joints {
             exists(&joint.name, joint.carrier().body.max(joint.carried().body))?;
+            joint.check(self.start).map_err(|fault| MachineFault::Loose { joint: joint.name.clone(), fault })?;
         }
         for element in &self.elements {
             let has = |on: JointCoordinate| {

@@ -1,6 +1,6 @@
 //! Joints with play.
 
-use super::{Attachment, Quat, Vec3};
+use super::{Attachment, Quat, StartRule, Vec3};
 use crate::contact;
 
 /// A joint with play: contacts between two bodies in place of constraints, unless its clearance is 0.
@@ -21,10 +21,47 @@ pub struct LooseJoint {
 }
 
 /// Kind of a joint with play.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LooseKind {
     /// A ball in a socket.
     Ball,
+    /// A pin, the carried part, in a bearing: both along the x axes of their frames.
+    Pin(Pin),
+    /// A block, the carried part, in a guide along the x axes of their frames, in the plane of x and y.
+    Slide(Slide),
+}
+
+/// A round pin in a bearing. The ball radius of the contact parameters is the radius r of the pin, the clearance R - r.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pin {
+    /// Length L of the shorter of pin and bearing, centred on the joint's point, m: they touch at its two ends. `None` for a joint
+    /// that does not tilt, and touches at one point.
+    pub length: Option<f64>,
+    /// Which part has the ends.
+    pub ends: EndsOn,
+    /// Whether the pin cannot move along the axis.
+    pub held: bool,
+}
+
+/// The part of a pin joint whose ends touch the other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EndsOn {
+    /// The bearing, shorter than the pin: forces stay at its edges.
+    #[default]
+    Bearing,
+    /// The pin, shorter than the bore, such as a piston: forces travel with it.
+    Pin,
+}
+
+/// A rectangular block between the two walls y = +-(half_width + c) of its guide. It touches with its corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slide {
+    /// Half of its length along the guide, m.
+    pub half_length: f64,
+    /// Half of its width, m.
+    pub half_width: f64,
+    /// Radius of curvature of its corners, which sets their stiffness, m. It does not enter the geometry.
+    pub corner_radius: f64,
 }
 
 /// A point of a body, or of the world, with axes.
@@ -32,7 +69,7 @@ pub enum LooseKind {
 pub struct JointFrame {
     /// Origin.
     pub origin: Attachment,
-    /// Orientation in the axes of the body, or of the world. A ball has no use for it.
+    /// Orientation in the axes of the body, or of the world; its x axis is that of the joint. A ball has no use for it.
     pub rotation: Quat,
 }
 
@@ -43,7 +80,64 @@ impl From<Attachment> for JointFrame {
     }
 }
 
+/// Why a joint with play cannot have its dimensions or settings.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LooseFault {
+    /// A dimension that is not a length.
+    #[error("{what} = {value:e} m: must be above 0 m")]
+    Length {
+        /// Which.
+        what: &'static str,
+        /// m.
+        value: f64,
+    },
+    /// Play so large that the geometry, which is linear in it, is wrong.
+    #[error("the play, {play:e} m, is above a tenth of {what}, {of:e} m")]
+    Play {
+        /// m.
+        play: f64,
+        /// The dimension.
+        what: &'static str,
+        /// m.
+        of: f64,
+    },
+    /// Friction that follows the centres, which have no meaning for a pin.
+    #[error("friction follows the velocity of the surfaces in joints other than ball joints")]
+    FrictionVelocity,
+    /// A start that only ball joints have.
+    #[error("start = \"settled\" places balls in their sockets; with other joints with play, use \"equilibrium\"")]
+    Settled,
+}
+
 impl LooseJoint {
+    /// Checks the dimensions of its kind against its play.
+    pub(super) fn check(&self, start: StartRule) -> Result<(), LooseFault> {
+        let positive = |what, value: f64| {
+            if value > 0.0 && value.is_finite() { Ok(()) } else { Err(LooseFault::Length { what, value }) }
+        };
+        let play = self.contact.clearance;
+        let limit = |what, of: f64| {
+            positive(what, of)?;
+            if play <= 0.1 * of { Ok(()) } else { Err(LooseFault::Play { play, what, of }) }
+        };
+        match self.kind {
+            LooseKind::Ball => return Ok(()),
+            LooseKind::Pin(Pin { length, .. }) => {
+                limit("the radius", self.contact.ball_radius)?;
+                length.map_or(Ok(()), |length| limit("the length", length))?;
+            }
+            LooseKind::Slide(Slide { half_length, half_width, corner_radius }) => {
+                limit("the half length", half_length)?;
+                limit("the half width", half_width)?;
+                positive("the corner radius", corner_radius)?;
+            }
+        }
+        if self.contact.friction_velocity == contact::FrictionVelocity::Centres {
+            return Err(LooseFault::FrictionVelocity);
+        }
+        if start == StartRule::Settled { Err(LooseFault::Settled) } else { Ok(()) }
+    }
+
     /// Ball joint with default contact parameters and the drawn socket open towards -z.
     pub fn ball(name: &str, socket: Attachment, ball: Attachment) -> Self {
         Self {

@@ -1,8 +1,7 @@
 //! Jacobian columns of a contact, one per coordinate.
 
 use super::equations::Equations;
-use super::model::{Anchor, Model, Site};
-use crate::contact::Coefficients;
+use super::model::{Anchor, Model};
 use crate::machine::Vec3;
 
 /// Jacobian columns of one contact for one coordinate: relative velocities per unit rate.
@@ -16,11 +15,6 @@ pub struct Column {
     pub surface: Vec3,
     /// r omega_ball - R omega_socket, with r and R the lengths of the sides.
     pub turn: Vec3,
-}
-
-/// Centres of ball and socket, in that order, each with the distance from it to the wall, m.
-pub fn contact_sides(site: &Site, c: &Coefficients) -> [(Anchor, f64); 2] {
-    [(site.carried, c.ball_radius), (site.carrier, c.ball_radius + c.clearance)]
 }
 
 /// Fills `columns` with the velocity of the first point relative to the second per unit rate of each coordinate, and likewise for

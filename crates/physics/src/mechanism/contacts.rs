@@ -90,7 +90,7 @@ impl Contacts {
         });
         let contacts = model.sites.iter().enumerate().map(|(id, &site)| {
             let parameters = &machine.loose_joints[site.joint].contact;
-            Contact::new(id, site, Coefficients::new(parameters, parameters.clearance))
+            Contact::new(id, site, site.stiffness.coefficients(parameters, parameters.clearance))
         });
         Self {
             contacts: contacts.collect(),
@@ -147,6 +147,16 @@ impl Contacts {
         &self.contacts[c].gap
     }
 
+    /// A force at contact `c` as it acts on the carried part of its joint, N.
+    pub(crate) fn on_carried(&self, c: ContactId, force: &Vec3) -> Vec3 {
+        if self.contacts[c].site.is_reversed { -force } else { *force }
+    }
+
+    /// Direction in which contact `c` pushes the carried part of its joint at the latest evaluation.
+    pub(crate) fn push(&self, c: ContactId) -> Vec3 {
+        self.on_carried(c, &-self.contacts[c].gap.separation.normal)
+    }
+
     /// Coefficients of contact `c`.
     pub fn coefficients(&self, c: ContactId) -> &Coefficients {
         &self.contacts[c].law
@@ -178,7 +188,7 @@ impl Contacts {
         let joint = &mut self.joints[j];
         joint.parameters = *parameters;
         for contact in &mut self.contacts[joint.contacts.clone()] {
-            contact.law = Coefficients::new(parameters, clearance);
+            contact.law = contact.site.stiffness.coefficients(parameters, clearance);
         }
     }
 
@@ -192,7 +202,8 @@ impl Contacts {
             if let Some(ramp) = joint.ramp {
                 let (clearance, rate) = ramp.at(t);
                 for contact in &mut self.contacts[joint.contacts.clone()] {
-                    contact.law.set_clearance(&joint.parameters, clearance, rate);
+                    let Contact { site, law, .. } = contact;
+                    site.stiffness.set_clearance(law, &joint.parameters, clearance, rate);
                 }
             }
         }
@@ -220,7 +231,7 @@ impl Contacts {
             if self.skips_inactive && !contact.may_carry_force(active_set) {
                 contact.measure(motion);
             } else {
-                contact.complete_separation();
+                contact.complete_separation(motion);
             }
         }
     }
@@ -237,6 +248,11 @@ impl Contacts {
     pub fn measure_one(&mut self, c: ContactId, t: f64, motion: &[Kinematics]) {
         self.update_ramps(t);
         self.contacts[c].measure(motion);
+    }
+
+    /// As [`Contact::reach`], of contact `c`.
+    pub fn reach(&self, c: ContactId) -> Vec3 {
+        self.contacts[c].reach()
     }
 
     /// Relative velocity used by friction at contact `c` for the normal `n`, m/s.

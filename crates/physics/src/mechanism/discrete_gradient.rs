@@ -10,13 +10,14 @@
 
 use super::band::Band;
 use super::bounds;
-use super::columns::{Column, collect_columns, collect_relative_columns, contact_sides};
+use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
 use super::coupled::{CoupledRows, add_impulse, apply_inverse_mass, mobility_between};
 use super::elements::{ActiveSet, At, Counts, ForceElement, Powers};
 use super::equations::Equations;
 use super::kinematics::Kinematics;
-use super::model::{Anchor, ContactId, Model};
+use super::loose::Wall;
+use super::model::{Anchor, ContactId, Model, Site};
 use super::systems::Evaluator;
 use super::{Latest, Mechanism, MechanismError, elements};
 use crate::contact::{Coefficients, ContactState, ContactStep, StepForce};
@@ -236,7 +237,7 @@ impl DiscreteGradient {
         for (j, start) in self.starts.iter_mut().enumerate() {
             let gap = contacts.gap(j);
             *start = ContactStart {
-                eccentricity: gap.eccentricity,
+                eccentricity: contacts.reach(j),
                 rate: gap.separation.rate,
                 slip: contacts.slip_velocity(j, &gap.separation.normal, motion),
                 clearances: [contacts.clearance(j); 2],
@@ -250,7 +251,7 @@ impl DiscreteGradient {
         for j in 0..contacts.len() {
             let start = &mut self.starts[j];
             start.clearances[1] = contacts.clearance(j);
-            let end = contacts.gap(j).eccentricity;
+            let end = contacts.reach(j);
             let deepest = (start.eccentricity.norm() - start.clearances[0]).max(end.norm() - start.clearances[1]);
             if !all && deepest + SPEED_MARGIN * from.h <= 0.0 {
                 continue;
@@ -324,12 +325,19 @@ impl DiscreteGradient {
             if let Law::Contact(law) = &row.law {
                 let (site, n) = (&model.sites[row.index], row.normal);
                 let motion = equations.motion();
-                let spin = |body: usize| &motion[body].angular_velocity;
-                let (ball, socket) = (spin(site.carried.body), spin(site.carrier.body));
-                let mean = row.guessed[0];
-                row.guessed[1] = law.slip_velocity(&n, &mean, ball, socket);
-                row.guessed[2] = law.surface_velocity(&n, &mean, ball, socket);
-                collect_columns(columns, model, equations, &contact_sides(site, law), &n);
+                let spins = [site.carried.body, site.carrier.body].map(|body| &motion[body].angular_velocity);
+                // Along a bore or a plane the centres move without a change of e.
+                let relative = |site: &Site| site.opening(motion, &site.arms(motion)).1;
+                let mean = if site.wall == Wall::Socket { row.guessed[0] } else { relative(site) };
+                let distance = if site.wall == Wall::Socket { 0.0 } else { row.step.mean_distance(&row.guessed[0]) };
+                let levers = site.wall.levers(law, distance);
+                row.guessed[1] = law.slip_velocity(&n, &mean, spins, levers);
+                row.guessed[2] = Coefficients::surface_velocity(&n, &mean, spins, levers);
+                collect_columns(columns, model, equations, &site.sides(law, distance, motion), &n);
+                if site.wall != Wall::Socket {
+                    let confined = site.wall.confined(&motion[site.carrier.body].rotation);
+                    columns.iter_mut().for_each(|column| column.centre = confined * column.centre);
+                }
             }
             let [centres, slip] = row.of_motion(moved_by(columns, |i| self.mean[i] - self.guess[i]));
             row.free = [row.guessed[0] + centres, row.guessed[1] + slip];
@@ -598,14 +606,15 @@ impl Mechanism {
         self.discrete.as_ref().map_or(&[], |discrete| &discrete.rate[positions..])
     }
 
-    /// The contacts that touched in the latest such step, with the means over it; directions are those of the latest
+    /// The balls that touched in the latest such step, with the means over it; directions are those of the latest
     /// evaluation.
     pub(crate) fn discrete_contacts(&self) -> impl Iterator<Item = (ContactId, elements::WallContact)> {
         let rows = self.discrete.iter().flat_map(|discrete| &discrete.rows);
         let contacts = rows.filter_map(|row| Some((row.contact()?.0, row)));
-        contacts.filter(|(_, row)| row.normal_force > 0.0).map(|(contact, row)| {
+        contacts.filter(|(_, row)| row.normal_force > 0.0).filter_map(|(contact, row)| {
             let (normal_force, friction_power) = (row.normal_force, row.friction_power);
-            (contact, elements::WallContact { direction: self.wall_direction(contact), normal_force, friction_power })
+            let direction = self.wall_direction(contact)?;
+            Some((contact, elements::WallContact { direction, normal_force, friction_power }))
         })
     }
 
@@ -743,12 +752,13 @@ impl Evaluator<'_> {
                 // Only friction has a lever arm about the centres.
                 let n = row.law_force.normal;
                 let turning = row.normal.cross(&(row.force - n * row.force.dot(&n)));
+                let [to_ball, to_socket] = site.wall.levers(law, law.clearance);
                 let ball = &mut wrench[site.carried.body];
                 ball.force += row.force;
-                ball.torque += arm_ball.cross(&row.force) + turning * law.ball_radius;
+                ball.torque += arm_ball.cross(&row.force) + turning * to_ball;
                 let socket = &mut wrench[site.carrier.body];
                 socket.force -= row.force;
-                socket.torque -= arm_socket.cross(&row.force) + turning * (law.ball_radius + law.clearance);
+                socket.torque -= arm_socket.cross(&row.force) + turning * to_socket;
             }
             let rates = &mut discrete.end[positions..];
             if equations.rows() > 0 {

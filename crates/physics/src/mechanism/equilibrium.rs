@@ -92,7 +92,7 @@ pub(super) fn rest_near(machine: &Machine, mut state: Vec<f64>) -> Result<Rest, 
 /// The error for a search that ended at the tree coordinates `state`: names the body with the largest accelerations there.
 fn no_rest(machine: &Machine, state: &[f64]) -> Result<MechanismError, MechanismError> {
     let mut mechanism = Mechanism::with_guess(machine, Some(state))?;
-    let contact_states = vec![ContactState::default(); mechanism.model.joints.len()];
+    let contact_states = vec![ContactState::default(); mechanism.model.sites.len()];
     let mut derivative = vec![0.0; state.len()];
     let mut evaluator = mechanism.evaluator(ActiveSet::Immediate(&contact_states));
     evaluator.evaluate_fully(0.0, state, &mut derivative);

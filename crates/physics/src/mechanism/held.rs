@@ -8,7 +8,7 @@ use super::settled::without_play;
 use super::start::{CLOSED, factor_at};
 use super::tree::Tree;
 use super::{Mechanism, MechanismError};
-use crate::machine::{Drive, Machine, Mat3, StartRule, Vec3};
+use crate::machine::{Drive, LooseKind, Machine, Mat3, StartRule, Vec3};
 
 /// Time at which the drives have reached their positions; they move from those at t = 0 at constant rates.
 pub(super) const DRIVE_END: f64 = 1.0;
@@ -35,6 +35,12 @@ pub enum HeldError {
     Unreached {
         /// Fraction of the straight path of the drives, 0 to 1.
         part: f64,
+    },
+    /// Joints whose play is not that of a point.
+    #[error("joint {joint} has play other than that of a ball: the reachable set is known for ball joints only")]
+    Kind {
+        /// Name of the joint.
+        joint: String,
     },
     /// The loops do not determine the pose.
     #[error("singular pose: without play the loops no longer determine it")]
@@ -67,6 +73,9 @@ impl HeldMachine {
     /// The machine does not start, the drives do not reach their positions, the pose is singular, or no position of rest is
     /// found.
     pub fn new(machine: &Machine, held: &[Option<f64>]) -> Result<Self, HeldError> {
+        if let Some(joint) = machine.loose_joints.iter().find(|joint| joint.kind != LooseKind::Ball) {
+            return Err(HeldError::Kind { joint: joint.name.clone() });
+        }
         let mut mechanism = Mechanism::new(&without_play(machine))?;
         // The pose is assembled from the joints; a path in closed form is no more than a first guess.
         let mut y = mechanism.start_off_path()?;

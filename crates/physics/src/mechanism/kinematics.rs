@@ -1,7 +1,7 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
 use super::closed_form::{ClosedMotion, Values};
-use super::model::{Anchor, Body, BodyIndex, Model, Motion, Site};
+use super::model::{Body, BodyIndex, Model, Motion};
 use super::path::Path;
 use crate::jet::Jet;
 use crate::machine::{Mat3, Quat, Vec3};
@@ -84,25 +84,6 @@ pub fn angular_velocity_of(q: &[f64], d: &[f64]) -> [f64; 3] {
         2.0 * (-d[0] * y + d[1] * z + d[2] * w - d[3] * x),
         2.0 * (-d[0] * z - d[1] * y + d[2] * x + d[3] * w),
     ]
-}
-
-impl Site {
-    /// Points of the carried part and of the carrier from the centroids of their bodies, m.
-    // Inlined: called three times per evaluation, and shorter than the call.
-    #[inline(always)]
-    pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
-        // Not `map`: it is not always inlined, and costs a sixth of a run with many contacts.
-        let arm = |anchor: &Anchor| motion[anchor.body].rotation * anchor.offset;
-        [arm(&self.carried), arm(&self.carrier)]
-    }
-
-    /// e and de/dt, m and m/s, given the arms of both points.
-    // Inlined: every evaluation needs it for every contact, and a call would cost a few per cent.
-    #[inline(always)]
-    pub fn opening(&self, motion: &[Kinematics], [carried, carrier]: &[Vec3; 2]) -> (Vec3, Vec3) {
-        let (b, s) = (&motion[self.carried.body], &motion[self.carrier.body]);
-        ((b.position + carried) - (s.position + carrier), b.point_velocity(carried) - s.point_velocity(carrier))
-    }
 }
 
 /// Force and torque about a body's centroid.

@@ -344,7 +344,7 @@ pub struct Mechanism {
     turns: Turns,
     /// World gravity, m/s^2.
     pub gravity: Vec3,
-    /// Names of the cut joints: ball joints, then other joints that close loops.
+    /// Names of the cut joints: loose joints, then other joints that close loops, then those of [`Model::lasting`].
     joint_names: Vec<String>,
     output_name: String,
     /// Linearisation, allocated if an implicit method is chosen.
@@ -403,6 +403,8 @@ impl Mechanism {
 
     fn with_model(machine: &Machine, model: Arc<Model>) -> Self {
         let contacts = Contacts::new(machine, &model);
+        let lasting = model.lasting.iter().map(|(j, _)| &*machine.loose_joints[*j].name);
+        let joint_names = machine.cut_joints().chain(lasting).map(str::to_owned).collect();
         let equations: Box<dyn Equations> = match machine.formulation {
             Formulation::Tree => Box::new(Forest::new(&model)),
             Formulation::Lagrange => Box::new(Lagrange::new(machine, &model)),
@@ -423,7 +425,7 @@ impl Mechanism {
             contacts,
             gravity: machine.gravity,
             output_name: machine.bodies[machine.output.body].name.clone(),
-            joint_names: machine.cut_joints().map(str::to_owned).collect(),
+            joint_names,
             stiff: None,
             discrete: None,
             free_flight_bodies: Vec::new(),
@@ -587,7 +589,17 @@ impl Mechanism {
     /// Origin of the carried part's frame of loose joint `j` from that of the carrier's at the latest evaluation, m: e = Z_j - Z_i
     /// (5).
     pub fn separation(&self, j: usize) -> Vec3 {
-        self.model.joints[j].opening(self.motion(), 0)
+        let joint = &self.model.joints[j];
+        pairs::separation([&joint.carried, &joint.carrier], self.motion(), 0)
+    }
+
+    /// Where contact `c` acts at the latest evaluation, m.
+    pub fn contact_point(&self, c: ContactId) -> Vec3 {
+        let contact = self.contacts.contact(c);
+        let gap = &contact.gap.separation;
+        let body = &self.motion()[contact.site.carried.body];
+        let [lever, _] = contact.site.wall.levers(&contact.law, gap.distance);
+        (body.position + body.rotation * contact.site.carried.offset) + gap.normal * lever
     }
 
     /// Constraint force on the carried part of loose joint `j` at the latest evaluation, N; `None` for a joint with clearance.

@@ -9,11 +9,12 @@ use super::assembly::{Assembled, Settled};
 use super::drives::{Law, Trajectory};
 use super::factor::{NONE, Pattern};
 use super::kinematics::Kinematics;
+use super::loose::{Compiled, Stiffness, Wall};
 use super::pairs::{Cut, Opening};
 use crate::expression::Tape;
 use crate::jet::Jet;
 use crate::machine::{
-    Attachment, ClosedForm, Joint, JointKind, JointStart, LooseKind, Machine, Mat3, Path, Quat, StartRule, Vec3,
+    Attachment, ClosedForm, Joint, JointKind, JointStart, Machine, Mat3, Path, Quat, StartRule, Vec3,
 };
 use bodies::BodyTrees;
 
@@ -100,13 +101,21 @@ pub struct Anchor {
     pub offset: Vec3,
 }
 
+/// A point of a body with axes, body axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    pub origin: Anchor,
+    pub axes: [Vec3; 3],
+}
+
 /// A cut joint that may have play.
 #[derive(Clone, Debug)]
 pub struct LooseJoint {
-    pub kind: LooseKind,
     /// Origins of the frames of the carrier and of the carried part.
     pub carrier: Anchor,
     pub carried: Anchor,
+    /// The joint without play.
+    pub closed: Cut,
     /// Index among the ideal joints; `None` with clearance.
     pub ideal: Option<usize>,
     /// Its contacts; none if it is ideal.
@@ -116,13 +125,19 @@ pub struct LooseJoint {
 /// Number of a contact among those of all joints.
 pub type ContactId = usize;
 
-/// Where the bodies of a loose joint can touch: a point of the carrier and one of the carried part.
+/// Where the bodies of a loose joint can touch: a point of one touches a wall of the other.
 #[derive(Clone, Copy, Debug)]
 pub struct Site {
     /// Index among the loose joints.
     pub joint: usize,
+    /// Point of the body with the wall.
     pub carrier: Anchor,
+    /// The point that touches it.
     pub carried: Anchor,
+    pub wall: Wall,
+    pub stiffness: Stiffness,
+    /// Whether the wall belongs to the carried part of the joint.
+    pub is_reversed: bool,
 }
 
 /// A joint between two bodies, in the tree or closing a loop.
@@ -141,6 +156,12 @@ pub struct Pair {
 }
 
 impl Pair {
+    /// Pair of this kind whose axis is the x axis of both frames.
+    pub fn of_frames(kind: JointKind, [parent, child]: &[Frame; 2]) -> Self {
+        let second = Vec3::zeros();
+        Self { kind, child: child.origin, parent: parent.origin, axes: parent.axes, child_axes: child.axes, second }
+    }
+
     /// Pair for `joint` between these points.
     pub fn new(joint: &Joint, child: Anchor, parent: Anchor) -> Self {
         let x = joint.axis;
@@ -189,6 +210,8 @@ pub struct Model {
     pub ideal_joints: Vec<usize>,
     /// Contacts of the loose joints, in their order.
     pub sites: Vec<Site>,
+    /// What loose joints with play do not leave free, each with the index of its joint.
+    pub lasting: Vec<(usize, Cut)>,
     pub drives: Vec<DriveLaw>,
     pub closed_form: Option<ClosedForm>,
     /// Functions of the closed form, for evaluation at every instant.
@@ -256,6 +279,7 @@ impl Model {
             joints: Vec::new(),
             ideal_joints: Vec::new(),
             sites: Vec::new(),
+            lasting: Vec::new(),
             drives,
             closed_form: machine.closed_form.clone(),
             required_values,
@@ -284,18 +308,23 @@ impl Model {
     /// Compiles the joints that are cut: loose joints with their contacts, and joints that close loops.
     fn cut_joints(&mut self, machine: &Machine) {
         for (index, joint) in machine.loose_joints.iter().enumerate() {
+            let frames = joint.frames.map(|frame| Frame {
+                origin: self.anchor(machine, &frame.origin),
+                axes: [Vec3::x(), Vec3::y(), Vec3::z()].map(|axis| frame.rotation * axis),
+            });
+            let Compiled { closed, lasting, sites } = joint.kind.compile(index, &frames);
             let ideal = (joint.contact.clearance == 0.0).then(|| {
                 self.ideal_joints.push(index);
                 self.ideal_joints.len() - 1
             });
-            let [carrier, carried] = [joint.carrier(), joint.carried()].map(|point| self.anchor(machine, &point));
             let first = self.sites.len();
             if ideal.is_none() {
-                let sites = joint.kind.sites([carrier, carried]);
-                self.sites.extend(sites.map(|[carrier, carried]| Site { joint: index, carrier, carried }));
+                self.sites.extend(sites);
+                self.lasting.extend(lasting.map(|cut| (index, cut)));
             }
             let contacts = first..self.sites.len();
-            self.joints.push(LooseJoint { kind: joint.kind, carrier, carried, ideal, contacts });
+            let [carrier, carried] = frames.map(|frame| frame.origin);
+            self.joints.push(LooseJoint { carrier, carried, closed, ideal, contacts });
         }
         for joint in &machine.closing_joints {
             let [parent, child] = joint.points().map(|point| self.anchor(machine, &point));
@@ -486,37 +515,42 @@ impl Model {
         self.length_scale / SPEED_TIME
     }
 
-    /// What closes loops if the loose joints with these indices have no play: they, then all other joints that close loops.
+    /// What closes loops if the loose joints with these indices have no play: they, then all other joints that close loops, then what
+    /// the others with play do not leave free.
     pub fn cuts(&self, joints: &[usize]) -> impl Iterator<Item = Cut> {
-        let loose = joints.iter().map(|&j| self.joints[j].closed());
-        loose.chain(self.closures.iter().map(Pair::cut))
+        let loose = joints.iter().map(|&j| self.joints[j].closed.clone());
+        let lasting = self.lasting.iter().filter(|(j, _)| !joints.contains(j)).map(|(_, cut)| cut.clone());
+        loose.chain(self.closures.iter().map(Pair::cut)).chain(lasting)
     }
 
-    /// Violation at `motion` of cut joint `k`, a loose joint or one that closes a loop, as if it had no play.
+    /// Violation at `motion` of cut joint `k`, a loose joint as if it had no play, or one that closes a loop, or then what a loose
+    /// joint does not leave free.
     pub fn opening(&self, k: usize, motion: &[Kinematics]) -> Opening {
-        match self.joints.get(k) {
-            Some(joint) => Opening { apart: joint.opening(motion, 0), turned: 0.0 },
-            None => self.closures[k - self.joints.len()].opening(motion),
+        match (self.joints.get(k), self.closures.get(k.wrapping_sub(self.joints.len()))) {
+            (Some(joint), _) => joint.closed.violation(motion, 0),
+            (_, Some(pair)) => pair.opening(motion),
+            _ => self.lasting[k - self.joints.len() - self.closures.len()].1.violation(motion, 0),
         }
     }
 
     /// Its rate.
     pub fn opening_rate(&self, k: usize, motion: &[Kinematics]) -> Opening {
-        match self.joints.get(k) {
-            Some(joint) => Opening { apart: joint.opening(motion, 1), turned: 0.0 },
-            None => self.closures[k - self.joints.len()].opening_rate(motion),
+        match (self.joints.get(k), self.closures.get(k.wrapping_sub(self.joints.len()))) {
+            (Some(joint), _) => joint.closed.violation(motion, 1),
+            (_, Some(pair)) => pair.cut().violation(motion, 1),
+            _ => self.lasting[k - self.joints.len() - self.closures.len()].1.violation(motion, 1),
         }
     }
 
     /// Cut joints whose rows close loops, in the order of [`Self::cuts`] of the ideal ones.
     pub fn closed_joints(&self) -> impl Iterator<Item = usize> {
-        let others = self.joints.len()..self.joints.len() + self.closures.len();
+        let others = self.joints.len()..self.joints.len() + self.closures.len() + self.lasting.len();
         self.ideal_joints.iter().copied().chain(others)
     }
 
     /// Whether any joint closes a loop.
     pub(crate) fn closes_loops(&self) -> bool {
-        !self.ideal_joints.is_empty() || !self.closures.is_empty()
+        !self.ideal_joints.is_empty() || !self.closures.is_empty() || !self.lasting.is_empty()
     }
 
     /// The world's index among bodies.

@@ -138,6 +138,20 @@ impl Cut {
         [arm, if slides { c.position + arm - p.position } else { p.rotation * self.parent.offset }]
     }
 
+    /// Violation of its rows, m and rad, or a derivative of this order.
+    pub fn violation(&self, motion: &[Kinematics], order: usize) -> Opening {
+        let (c, p) = (&motion[self.child.body], &motion[self.parent.body]);
+        let parts = self.rows.each_ref().map(|rows| {
+            let mut sum = Vec3::zeros();
+            for rows in rows {
+                let part = usize::from(rows.turns());
+                rows.linearise(c, p, &[], |_, row, state| sum += row.child[part] * state[order]);
+            }
+            sum
+        });
+        Opening { apart: parts[0], turned: parts[1].norm() }
+    }
+
     /// Separation of its points, m, or its first or second derivative.
     #[inline]
     pub fn separation(&self, motion: &[Kinematics], order: usize) -> Vec3 {
@@ -204,6 +218,24 @@ impl Pair {
     fn second_at_zero(&self) -> Vec3 {
         let [x, y, z] = self.child_axes.map(|child_axes| child_axes.dot(&self.second));
         self.axes[0] * x + self.axes[1] * y + self.axes[2] * z
+    }
+
+    /// The row that keeps the points together along axis `i` of the parent.
+    pub fn along(&self, i: usize) -> Rows {
+        self.offset(&self.axes[i], None)
+    }
+
+    /// The rows that keep the axes parallel.
+    pub fn parallel(&self) -> Vec<Rows> {
+        let [child, _, _] = self.child_axes;
+        self.axes[1..].iter().map(|&parent| Rows::Perpendicular { child, parent }).collect()
+    }
+
+    /// A cut with these rows for position and orientation alone, if there are any.
+    pub fn keeping(&self, positions: Vec<Rows>, orientations: Vec<Rows>) -> Option<Cut> {
+        let rows = [positions, orientations];
+        let any = rows.iter().any(|rows| !rows.is_empty());
+        any.then_some(Cut { child: self.child, parent: self.parent, rows })
     }
 
     fn point(&self) -> Rows {
@@ -287,19 +319,5 @@ impl Pair {
             }
         };
         Opening { apart, turned }
-    }
-
-    /// Rate of constraint violation, m/s and rad/s.
-    pub(crate) fn opening_rate(&self, motion: &[Kinematics]) -> Opening {
-        let [c, p] = self.ends(motion);
-        let rates = self.rows().map(|rows| {
-            let mut sum = Vec3::zeros();
-            for rows in rows {
-                let part = usize::from(rows.turns());
-                rows.linearise(c, p, &[], |_, row, [_, rate, _]| sum += row.child[part] * rate);
-            }
-            sum
-        });
-        Opening { apart: rates[0], turned: rates[1].norm() }
     }
 }

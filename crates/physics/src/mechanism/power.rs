@@ -76,14 +76,15 @@ impl Mechanism {
         powers
     }
 
-    /// The ball and its socket wall at contact `c` at the latest evaluation; `None` without contact force.
+    /// The ball and its socket wall at contact `c` at the latest evaluation; `None` without contact force, and for another wall,
+    /// which has no map.
     pub(crate) fn wall_contact(&self, c: ContactId) -> Option<WallContact> {
         self.contacts.contact(c).wall_contact(self.motion())
     }
 
     /// Unit vector from the socket centre of contact `c` to the ball centre at the latest evaluation, in the axes of the socket's
-    /// body. It points to the point of the wall nearest to the ball; the two centres must differ.
-    pub(crate) fn wall_direction(&self, c: ContactId) -> Vec3 {
+    /// body, where the two differ. It points to the point of the wall nearest to the ball. `None` for another wall.
+    pub(crate) fn wall_direction(&self, c: ContactId) -> Option<Vec3> {
         self.contacts.contact(c).wall_direction(self.motion())
     }
 }

@@ -60,7 +60,7 @@ impl Mechanism {
         let model = &self.model;
         let assembled = model.start == StartRule::Ideal;
         let all: Vec<usize> = if assembled { (0..model.joints.len()).collect() } else { model.ideal_joints.clone() };
-        let closes = !all.is_empty() || !model.closures.is_empty();
+        let closes = !all.is_empty() || model.closes_loops();
         // Poses alone need no mass matrix.
         let mut tree = if closes { Tree::new(model) } else { Tree::without_masses(model) };
         let settled = model.settled.as_ref().map(|settled| &settled.state);
@@ -73,7 +73,12 @@ impl Mechanism {
         }
         tree.update_kinematics(model, T, &y);
         let guess = tree.motion.clone();
-        let distance = |j: usize| model.joints[j].opening(&guess, 0).norm();
+        let distance = |j: usize| match all.contains(&j) {
+            true => model.opening(j, &guess).apart.norm(),
+            false => model.sites[model.joints[j].contacts.clone()]
+                .iter()
+                .fold(0.0, |far: f64, site| far.max(site.distance(&guess))),
+        };
         for j in 0..model.joints.len() {
             let d = distance(j);
             let joint = || self.joint_names[j].clone();

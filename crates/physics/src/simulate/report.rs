@@ -4,7 +4,7 @@ use super::angles::pose_of;
 use super::frame::{BodyMotion, ContactMode, Frame, JointReport};
 use crate::contact::ContactState;
 use crate::machine::{Attachment, LooseJoint, Machine, Vec3};
-use crate::mechanism::Mechanism;
+use crate::mechanism::{ContactId, Mechanism};
 
 /// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at (`time`, `y`), with the
 /// contact states `contact_states`.
@@ -70,18 +70,22 @@ fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_states: &[Con
         clearance: contacts.joint_clearance(j),
         ..JointReport::default()
     };
-    let Some(c) = contacts.of_joint(j).next() else {
+    let depth = |&c: &ContactId| contacts.gap(c).separation.penetration;
+    let Some(c) = contacts.of_joint(j).max_by(|a, b| depth(a).total_cmp(&depth(b))) else {
         let normal_force = mechanism.reaction(j).unwrap_or_default();
         return JointReport { normal_force, contact_point: ball_centre, state: ContactMode::Ideal, ..report };
     };
     let (gap, coefficients) = (contacts.gap(c), contacts.coefficients(c));
+    let normal = |c: ContactId| contacts.push(c) * contacts.gap(c).normal_force;
+    let friction = |c: ContactId| contacts.on_carried(c, &contacts.gap(c).friction);
+    let sum = |of: &dyn Fn(ContactId) -> Vec3| contacts.of_joint(j).map(of).reduce(|a, b| a + b).unwrap_or_default();
     JointReport {
         penetration: gap.separation.penetration,
         penetration_rate: gap.separation.rate,
-        contact_point: ball_centre + gap.separation.normal * coefficients.ball_radius,
+        contact_point: mechanism.contact_point(c),
         slip_speed: gap.slip_speed,
-        normal_force: gap.separation.normal * -gap.normal_force,
-        friction_force: gap.friction,
+        normal_force: sum(&normal),
+        friction_force: sum(&friction),
         state: if !contact_states[c].active && gap.normal_force == 0.0 {
             ContactMode::Free
         } else if gap.slip_speed < coefficients.slip_high {

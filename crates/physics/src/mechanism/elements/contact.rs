@@ -3,8 +3,8 @@
 use super::{ActiveSet, At, Coupling, ForceElement, Loads};
 use crate::contact::{Coefficients, Force, Separation};
 use crate::machine::Vec3;
-use crate::mechanism::columns::contact_sides;
 use crate::mechanism::kinematics::Kinematics;
+use crate::mechanism::loose::Wall;
 use crate::mechanism::model::{Anchor, ContactId, Site};
 use crate::mechanism::{Powers, WallContact};
 
@@ -51,9 +51,9 @@ impl Contact {
         if gap.friction == Vec3::zeros() {
             return 0.0;
         }
-        let [ball, socket] = self.spins(motion);
-        let n = &gap.separation.normal;
-        let surfaces = law.surface_velocity(n, &gap.eccentricity_rate, ball, socket);
+        let Separation { normal, distance, .. } = &gap.separation;
+        let levers = self.site.wall.levers(law, *distance);
+        let surfaces = Coefficients::surface_velocity(normal, &gap.eccentricity_rate, self.spins(motion), levers);
         -gap.friction.dot(&surfaces)
     }
 
@@ -63,22 +63,30 @@ impl Contact {
             return None;
         }
         Some(WallContact {
-            direction: self.wall_direction(motion),
+            direction: self.wall_direction(motion)?,
             normal_force: self.gap.normal_force,
             friction_power: self.friction_power(motion),
         })
     }
 
     /// Unit vector from the socket centre to the ball centre at the latest evaluation, in the axes of the socket's body. It
-    /// points to the point of the wall nearest to the ball; the two centres must differ.
-    pub fn wall_direction(&self, motion: &[Kinematics]) -> Vec3 {
+    /// points to the point of the wall nearest to the ball; the two centres must differ. `None` for another wall.
+    pub fn wall_direction(&self, motion: &[Kinematics]) -> Option<Vec3> {
         let socket = &motion[self.site.carrier.body];
-        socket.rotation.tr_mul(&self.direction())
+        matches!(self.site.wall, Wall::Socket).then(|| socket.rotation.tr_mul(&self.direction()))
     }
 
     /// e / |e| of a ball off centre, whether or not `complete_separation` has been called.
     pub fn direction(&self) -> Vec3 {
         self.gap.eccentricity.normalize()
+    }
+
+    /// e, or across a plane its part beyond it, m: a step's force is solved for by its length.
+    pub fn reach(&self) -> Vec3 {
+        match self.site.wall {
+            Wall::Socket | Wall::Bore(..) => self.gap.eccentricity,
+            Wall::Plane(_) => self.gap.separation.normal * self.gap.separation.distance.max(0.0),
+        }
     }
 
     /// Angular velocities of ball and socket, rad/s.
@@ -90,8 +98,8 @@ impl Contact {
     /// Relative velocity used by friction for the normal `n`, m/s.
     #[inline]
     pub fn slip_velocity(&self, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
-        let [ball, socket] = self.spins(motion);
-        self.law.slip_velocity(n, &self.gap.eccentricity_rate, ball, socket)
+        let levers = self.site.wall.levers(&self.law, self.gap.separation.distance);
+        self.law.slip_velocity(n, &self.gap.eccentricity_rate, self.spins(motion), levers)
     }
 
     /// Measures the eccentricity and its rate; forces are left unchanged.
@@ -99,29 +107,33 @@ impl Contact {
         let site = &self.site;
         let (e, rate) = site.opening(motion, &site.arms(motion));
         (self.gap.eccentricity, self.gap.eccentricity_rate) = (e, rate);
-        self.complete_separation();
+        self.complete_separation(motion);
     }
 
-    /// Completes the separation from the eccentricity of the latest evaluation.
-    pub fn complete_separation(&mut self) {
-        let Self { law, gap, .. } = self;
-        gap.separation = law.separation(&gap.eccentricity, &gap.eccentricity_rate);
+    /// Completes the separation from the eccentricity of the latest evaluation, at `motion`.
+    pub fn complete_separation(&mut self, motion: &[Kinematics]) {
+        let Self { site, law, gap, .. } = self;
+        let rotation = &motion[site.carrier.body].rotation;
+        gap.separation = site.wall.separation(law, &gap.eccentricity, &gap.eccentricity_rate, rotation);
     }
 }
 
-impl ForceElement for Contact {
-    #[inline]
-    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+impl Contact {
+    /// Force of the contact; in a socket, the most frequent wall, if `SOCKET`.
+    #[inline(always)]
+    fn load_on<const SOCKET: bool>(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
         let (site, law) = (&self.site, &self.law);
-        let arms = site.arms(at.motion);
+        let wall = if SOCKET { &Wall::Socket } else { &site.wall };
+        let arms = if SOCKET { site.arms_to_points(at.motion) } else { site.arms(at.motion) };
         let (e, velocity) = site.opening(at.motion, &arms);
         let gap = &mut self.gap;
         *gap = Gap { eccentricity: e, eccentricity_rate: velocity, ..Gap::default() };
         let clearance = law.clearance;
-        if e.norm_squared() <= clearance * clearance {
+        let rotation = &at.motion[site.carrier.body].rotation;
+        if !wall.is_beyond(&e, clearance, rotation) {
             return;
         }
-        let separation = law.separation(&e, &velocity);
+        let separation = wall.separation(law, &e, &velocity, rotation);
         gap.separation = separation;
         let Some(contact_state) = at.active_set.contact_state(self.id) else {
             return;
@@ -130,8 +142,8 @@ impl ForceElement for Contact {
         let force = law.force(contact_state, &separation, || {
             counts.friction += 1;
             let spin = |anchor: &Anchor| &at.motion[anchor.body].angular_velocity;
-            let (ball, socket) = (spin(&site.carried), spin(&site.carrier));
-            law.slip_velocity(&separation.normal, &velocity, ball, socket)
+            let levers = wall.levers(law, separation.distance);
+            law.slip_velocity(&separation.normal, &velocity, [spin(&site.carried), spin(&site.carrier)], levers)
         });
         if let Some(has_left_branch) = loads.has_left_branch.get_mut(self.id) {
             *has_left_branch |= law.leaves_branch(contact_state, &separation, &force);
@@ -144,14 +156,29 @@ impl ForceElement for Contact {
         }
         let n = separation.normal;
         let on_ball = n * -force.normal + force.friction;
-        let radius = law.ball_radius;
+        let [to_ball, to_socket] = wall.levers(law, separation.distance);
         let [arm_ball, arm_socket] = arms;
         let ball = &mut loads.wrench[site.carried.body];
         ball.force += on_ball;
-        ball.torque += (arm_ball + n * radius).cross(&on_ball);
+        ball.torque += (arm_ball + n * to_ball).cross(&on_ball);
         let socket = &mut loads.wrench[site.carrier.body];
         socket.force -= on_ball;
-        socket.torque -= (arm_socket + n * (radius + clearance)).cross(&on_ball);
+        socket.torque -= (arm_socket + n * to_socket).cross(&on_ball);
+    }
+
+    #[inline(never)]
+    fn load_on_wall(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        self.load_on::<false>(at, loads);
+    }
+}
+
+impl ForceElement for Contact {
+    #[inline]
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        match self.site.wall {
+            Wall::Socket => self.load_on::<true>(at, loads),
+            Wall::Bore(..) | Wall::Plane(_) => self.load_on_wall(at, loads),
+        }
     }
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
@@ -161,11 +188,15 @@ impl ForceElement for Contact {
         let n = gap.separation.normal;
         let read = self.slip_velocity(&n, at.motion);
         let force = Force { normal: gap.normal_force, friction: gap.friction, slip_speed: gap.slip_speed };
-        let mut stiffness = self.law.linearise(contact_state, &gap.separation, &gap.eccentricity_rate, &read, &force);
-        let [ball, socket] = self.spins(at.motion);
-        stiffness.add_normal_rotation(&self.law.slip_velocity_by_normal(ball, socket));
+        let Self { site, law, .. } = self;
+        let confined = site.wall.confined(&at.motion[site.carrier.body].rotation);
+        let mut stiffness =
+            law.linearise(contact_state, &gap.separation, &gap.eccentricity_rate, &read, &force, &confined);
+        let distance = gap.separation.distance;
+        let levers = site.wall.levers(law, distance);
+        stiffness.add_normal_rotation(&law.slip_velocity_by_normal(self.spins(at.motion), levers));
         Some(Coupling {
-            sides: contact_sides(&self.site, &self.law),
+            sides: site.sides(law, distance, at.motion),
             normal: n,
             force: n * -gap.normal_force + gap.friction,
             stiffness,
@@ -180,7 +211,7 @@ impl ForceElement for Contact {
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
         let (gap, law) = (&self.gap, &self.law);
-        if gap.eccentricity.norm_squared() <= law.clearance * law.clearance {
+        if !self.site.wall.is_beyond(&gap.eccentricity, law.clearance, &motion[self.site.carrier.body].rotation) {
             return;
         }
         let at = &gap.separation;

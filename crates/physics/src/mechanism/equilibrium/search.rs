@@ -165,7 +165,7 @@ impl<'a> Search<'a> {
             evaluations: 0,
             tree,
             constraints,
-            contact_states: vec![ContactState::default(); model.joints.len()],
+            contact_states: vec![ContactState::default(); model.sites.len()],
             derivative: vec![0.0; model.nq + model.nv],
             lu: Lu::new(model.nv),
             model,

@@ -1,15 +1,13 @@
 //! A ball in a socket: one contact, at the centres, which coincide without play.
 
-use super::{Anchor, Cut, Kind};
+use super::{Compiled, Cut, Frame, Site, Stiffness, Wall};
 
-pub(super) struct Ball;
-
-impl Kind for Ball {
-    fn closed(&self, [carrier, carried]: [Anchor; 2]) -> Cut {
-        Cut::point(carried, carrier)
-    }
-
-    fn sites(&self, frames: [Anchor; 2]) -> Vec<[Anchor; 2]> {
-        vec![frames]
+pub(super) fn compile(joint: usize, frames: &[Frame; 2]) -> Compiled {
+    let [carrier, carried] = frames.map(|frame| frame.origin);
+    let (wall, stiffness) = (Wall::Socket, Stiffness::Sphere(1.0));
+    Compiled {
+        closed: Cut::point(carried, carrier),
+        lasting: None,
+        sites: vec![Site { joint, carrier, carried, wall, stiffness, is_reversed: false }],
     }
 }

@@ -1,44 +1,33 @@
 //! Kinds of joints with play, one file each.
 
 mod ball;
+mod pin;
+mod slide;
+mod wall;
 
-use super::kinematics::Kinematics;
-use super::model::{Anchor, LooseJoint};
-use super::pairs::{Cut, separation};
-use crate::machine::{LooseKind, Vec3};
+pub use wall::{Edge, Stiffness, Wall};
 
-/// What distinguishes one kind from another. Anchors are the origins of the frames of the carrier and of the carried part.
-trait Kind: Sync {
+use super::model::{Anchor, Frame, Pair, Site};
+use super::pairs::{Cut, Rows};
+use crate::machine::{JointKind, LooseKind};
+
+/// What distinguishes one kind of joint from another.
+pub struct Compiled {
     /// The joint without play.
-    fn closed(&self, frames: [Anchor; 2]) -> Cut;
-
-    /// Where its bodies can touch: for each contact, a point of the carrier and one of the carried part.
-    fn sites(&self, frames: [Anchor; 2]) -> Vec<[Anchor; 2]>;
-}
-
-/// The file of each kind.
-fn kind_of(kind: LooseKind) -> &'static dyn Kind {
-    match kind {
-        LooseKind::Ball => &ball::Ball,
-    }
+    pub closed: Cut,
+    /// What it does not leave free with play.
+    pub lasting: Option<Cut>,
+    /// Where its bodies can touch with play.
+    pub sites: Vec<Site>,
 }
 
 impl LooseKind {
-    /// Where the bodies of a joint of this kind can touch, given the origins of the frames of the carrier and of the carried part:
-    /// for each contact, a point of either.
-    pub(super) fn sites(self, frames: [Anchor; 2]) -> impl Iterator<Item = [Anchor; 2]> {
-        kind_of(self).sites(frames).into_iter()
-    }
-}
-
-impl LooseJoint {
-    /// The joint without play.
-    pub fn closed(&self) -> Cut {
-        kind_of(self.kind).closed([self.carrier, self.carried])
-    }
-
-    /// Origin of the carried part's frame from that of the carrier's, e = Z_j - Z_i, m (5), or a derivative of this order.
-    pub fn opening(&self, motion: &[Kinematics], order: usize) -> Vec3 {
-        separation([&self.carried, &self.carrier], motion, order)
+    /// A joint of this kind between the frames of the carrier and of the carried part; `joint` is its index.
+    pub(super) fn compile(&self, joint: usize, frames: &[Frame; 2]) -> Compiled {
+        match self {
+            Self::Ball => ball::compile(joint, frames),
+            Self::Pin(pin) => pin::compile(pin, joint, frames),
+            Self::Slide(slide) => slide::compile(slide, joint, frames),
+        }
     }
 }

@@ -134,8 +134,7 @@ impl Stepping<'_> {
                 let contact_state = state.now.contact_states[c].unfrozen();
                 state.record_contact_step((c, &mechanism.contacts), before.t, &cubic, &contact_state, 0.0);
                 let (force, theta) = attempt.peak_forces[c];
-                let direction = -mechanism.contacts.gap(c).separation.normal;
-                state.record.impacts.raise_peak(c, force, direction, before.t + theta * h);
+                state.record.impacts.raise_peak(c, force, mechanism.contacts.push(c), before.t + theta * h);
             }
             // A located switch ends within rounding of the wall, on either side. The repeated step may still show that a ball
             // about to separate has turned back.
@@ -174,9 +173,8 @@ impl Stepping<'_> {
                 if fixed {
                     contact_state.update_largest_rate(coefficients, end.rate, || cubic.fastest(theta).0);
                     let (force, at) = cubic.strongest(coefficients, &contact_state);
-                    let direction = -mechanism.contacts.gap(c).separation.normal;
                     state.record_contact_step((c, &mechanism.contacts), before.t, &cubic, &contact_state, theta);
-                    state.record.impacts.raise_peak(c, force, direction, before.t + at * h);
+                    state.record.impacts.raise_peak(c, force, mechanism.contacts.push(c), before.t + at * h);
                 }
                 state.now.contact_states[c] = contact_state;
             } else {
@@ -233,11 +231,10 @@ impl Stepping<'_> {
                 state.record.statistics.joints[j].peak_time = time;
             }
             if force > state.joints[j].peak.normal {
-                let gap = mechanism.contacts.gap(c);
                 let peak = &mut state.joints[j].peak;
                 peak.normal = force;
                 peak.time = time;
-                peak.normal_force = gap.separation.normal * -force;
+                peak.normal_force = mechanism.contacts.push(c) * force;
             }
         }
     }

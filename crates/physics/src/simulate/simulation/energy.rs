@@ -106,7 +106,8 @@ impl Stepping<'_> {
         wear.begin_step(reuses_start);
         for (c, (before, now)) in before.contact_states.iter().zip(&now.contact_states).enumerate() {
             if now.active && !before.active {
-                wear.begin_contact(mechanism.contacts.joint_of(c), &mechanism.wall_direction(c));
+                let direction = mechanism.wall_direction(c);
+                direction.iter().for_each(|at| wear.begin_contact(mechanism.contacts.joint_of(c), at));
             }
         }
     }

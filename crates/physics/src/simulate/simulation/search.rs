@@ -78,10 +78,10 @@ impl Stepping<'_> {
                 }
                 for c in self.mechanism.contacts.of_joint(j) {
                     let gap = self.mechanism.contacts.gap(c);
-                    let (normal, size) = (gap.separation.normal, gap.normal_force);
-                    self.state.record.impacts.raise_peak(c, size, -normal, time);
+                    let (push, size) = (self.mechanism.contacts.push(c), gap.normal_force);
+                    self.state.record.impacts.raise_peak(c, size, push, time);
                     if self.is_peak(j, size, time) {
-                        self.state.joints[j].peak.normal_force = normal * -size;
+                        self.state.joints[j].peak.normal_force = push * size;
                     }
                 }
             }

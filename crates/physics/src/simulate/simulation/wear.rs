@@ -10,7 +10,8 @@ impl Stepping<'_> {
         self.evaluate_at(self.state.now.t);
         for (c, contact_state) in self.state.now.contact_states.iter().enumerate() {
             if contact_state.active {
-                wear.begin_contact(self.mechanism.contacts.joint_of(c), &self.mechanism.wall_direction(c));
+                let direction = self.mechanism.wall_direction(c);
+                direction.iter().for_each(|at| wear.begin_contact(self.mechanism.contacts.joint_of(c), at));
             }
         }
         wear.commit_step();
