@@ -7,7 +7,7 @@ use jointplay_physics::machine::{
     Attachment, Body, Drive, Element, ElementKind, EndsOn, Formulation, Joint, JointFrame, JointStart, Load, LoadAxes,
     LooseFault, LooseJoint, LooseKind, Machine, MachineFault, Mat3, Pin, Quat, Slide, StartRule, Vec3,
 };
-use jointplay_physics::simulate::{Frame, Impact, Simulation};
+use jointplay_physics::simulate::{Effect, Frame, Impact, Simulation};
 
 /// Contacts of the independent program: start, s, approach speed, m/s, and peak, N.
 fn contacts(csv: &str) -> Vec<[f64; 3]> {
@@ -99,7 +99,7 @@ fn thrown_pin(tilt: f64, pin: Pin) -> Machine {
 }
 
 fn pin(ends: EndsOn) -> Pin {
-    Pin { length: Some(0.024), ends, held: false }
+    Pin { length: Some(0.024), ends, kept: false, face_radius: None }
 }
 
 #[test]
@@ -120,9 +120,10 @@ fn a_thrown_pin_strikes_with_the_forces_of_the_closed_form() {
     assert!((one[0].peak / 606.323_194_4 - 1.0).abs() < 1e-6, "{}", one[0].peak);
 }
 
-/// The pin thrown into the bearing with spin and tilt, and friction 0.15. It moves along the bearing until it would meet a collar.
-fn spinning_pin(ends: EndsOn) -> Machine {
-    let mut machine = thrown_pin(0.0, pin(ends));
+/// The pin thrown into the bearing with spin and tilt, with 0.2 mm of axial play.
+fn spinning_pin(ends: EndsOn, friction: f64) -> Machine {
+    let mut machine = thrown_pin(0.0, Pin { kept: true, ..pin(ends) });
+    machine.loose_joints[0].contact.second_clearance = 2e-4;
     machine.gravity = Vec3::new(0.0, 0.0, -9.81);
     let turn =
         [0.999_999_218_750_195_5, -7.499_998_046_875_2e-7, 0.000_999_999_552_083_401_7, -0.000_749_999_554_687_568_4];
@@ -133,7 +134,7 @@ fn spinning_pin(ends: EndsOn) -> Machine {
         velocity: Vec3::new(0.05, 0.1, -0.2),
         angular_velocity: Vec3::new(20.0, 3.0, -2.0),
     };
-    machine.loose_joints[0].contact.friction = 0.15;
+    machine.loose_joints[0].contact.friction = friction;
     machine
 }
 
@@ -152,7 +153,7 @@ fn free_pair() -> Machine {
         thrown(1, at, Quat::identity(), Vec3::new(-0.13, 0.110_000_000_000_000_01, 0.34), Vec3::new(5.0, -5.5, 30.0)),
     );
     let contact = Parameters { clearance: 8e-5, friction: 0.2, ball_radius: 9e-3, ..Parameters::default() };
-    let kind = LooseKind::Pin(Pin { length: Some(0.02), ends: EndsOn::Pin, held: false });
+    let kind = LooseKind::Pin(Pin { length: Some(0.02), ends: EndsOn::Pin, kept: false, face_radius: None });
     let [carrier, carried] = [Attachment::on(housing, at), Attachment::on(body, Vec3::zeros())];
     machine.loose_joints.push(loose(kind, carrier, carried, upright(), contact));
     machine
@@ -160,8 +161,9 @@ fn free_pair() -> Machine {
 
 #[test]
 fn spinning_pins_agree_with_an_independent_program() {
-    compare("a", spinning_pin(EndsOn::Pin), include_str!("joints/a-contacts.csv"), 5.1e-3);
-    compare("a_shaft", spinning_pin(EndsOn::Bearing), include_str!("joints/a_shaft-contacts.csv"), 5.1e-3);
+    compare("a", spinning_pin(EndsOn::Pin, 0.15), include_str!("joints/a-contacts.csv"), 5.1e-3);
+    compare("a_shaft", spinning_pin(EndsOn::Bearing, 0.15), include_str!("joints/a_shaft-contacts.csv"), 5.1e-3);
+    compare("b", spinning_pin(EndsOn::Pin, 0.0), include_str!("joints/b-contacts.csv"), 5.1e-3);
     compare("h", free_pair(), include_str!("joints/h-contacts.csv"), 8e-3);
 }
 
@@ -193,7 +195,7 @@ fn a_free_pair_keeps_its_momentum() {
 
 #[test]
 fn a_pin_that_does_not_tilt_strikes_like_a_ball() {
-    let planar = Pin { length: None, ends: EndsOn::Bearing, held: true };
+    let planar = Pin { length: None, ends: EndsOn::Bearing, kept: true, face_radius: None };
     let (pin, _) = impacts(&accurately(thrown_pin(0.0, planar)), 1e-3);
     assert_eq!(pin.len(), 1);
     assert!((pin[0].peak / (2.0 * 589.701_774_0) - 1.0).abs() < 1e-8, "{}", pin[0].peak);
@@ -207,7 +209,7 @@ fn a_loaded_pin_rests_as_deep_as_the_closed_form_says() {
     for ends in [EndsOn::Pin, EndsOn::Bearing] {
         for x in [0.0, 0.006, 0.0144] {
             // Held along the axis: the forces on a tilted pin in a bearing have a part along it.
-            let mut machine = thrown_pin(0.0, Pin { held: true, ..pin(ends) });
+            let mut machine = thrown_pin(0.0, Pin { kept: true, ..pin(ends) });
             machine.joints[0].start = JointStart::Pose {
                 position: Vec3::new(0.0, 0.0, -9.9e-5),
                 rotation: Quat::identity(),
@@ -271,7 +273,7 @@ fn crank_pin(friction: f64, kind: Pin) -> Machine {
 
 #[test]
 fn a_slider_crank_with_a_loose_crank_pin_agrees_with_an_independent_program() {
-    let long = Pin { length: Some(0.02), ends: EndsOn::Pin, held: false };
+    let long = Pin { length: Some(0.02), ends: EndsOn::Pin, kept: false, face_radius: None };
     compare("c", crank_pin(0.1, long), include_str!("joints/c-contacts.csv"), 2e-3);
     compare("c_nofric", crank_pin(0.0, long), include_str!("joints/c_nofric-contacts.csv"), 2e-3);
 }
@@ -333,7 +335,7 @@ fn flores() -> SlidingBlock {
         crank_centre: 0.0,
         speed: 5000.0 / 60.0 * std::f64::consts::TAU,
         driven: true,
-        slide: Slide { half_length: 0.025, half_width: 0.025, corner_radius: 1e-3 },
+        slide: Slide { half_length: 0.025, half_width: 0.025, half_height: None, corner_radius: 1e-3 },
         contact: Parameters { clearance: 0.5e-3, friction: 0.03, youngs_modulus: 207e9, ..Parameters::default() },
     }
 }
@@ -347,7 +349,7 @@ fn released() -> SlidingBlock {
         crank_centre: 0.0765,
         speed: 150.0,
         driven: false,
-        slide: Slide { half_length: 0.05, half_width: 0.025, corner_radius: 1e-3 },
+        slide: Slide { half_length: 0.05, half_width: 0.025, half_height: None, corner_radius: 1e-3 },
         contact: Parameters {
             clearance: 1e-3,
             friction: 0.01,
@@ -365,9 +367,85 @@ fn sliders_with_a_loose_block_agree_with_an_independent_program() {
     compare("d1", released().machine(), include_str!("joints/d1-contacts.csv"), 0.02);
 }
 
+/// In space each corner of the planar slide is two, of half the stiffness: a quarter of the radius.
+#[test]
+fn a_block_in_space_strikes_like_one_in_the_plane() {
+    let mut block = released();
+    block.slide.half_height = Some(0.02);
+    block.slide.corner_radius *= 0.25;
+    block.contact.second_clearance = 0.5e-3;
+    let (mut own, _) = impacts(&accurately(block.machine()), 7e-3);
+    own.retain(|impact| impact.start < 6e-3);
+    // Four corners of two walls, each twice.
+    let reference = contacts(include_str!("joints/d1-contacts.csv"));
+    assert_eq!(own.len(), 8);
+    for [start, speed, peak] in &reference[..4] {
+        let same = own.iter().filter(|impact| (impact.start - start).abs() < 1e-9);
+        let same: Vec<&Impact> = same.filter(|impact| (2.0 * impact.peak / peak - 1.0).abs() < 1e-6).collect();
+        assert_eq!(same.len(), 2, "{start} {peak}");
+        assert!(same.iter().all(|impact| (impact.approach_speed / speed - 1.0).abs() < 1e-6));
+    }
+}
+
+/// A pin that spins under a thrust on the rim of its collar is braked by the torque mu F r, and carries a moment that a collar on its
+/// axis would not.
+#[test]
+fn a_collar_brakes_a_spin_with_the_torque_of_its_friction() {
+    let mut machine = thrown_pin(0.0, Pin { kept: true, face_radius: Some(0.015), ..pin(EndsOn::Bearing) });
+    let [spin, thrust, friction, inertia] = [100.0, 50.0, 0.2, 5e-6];
+    machine.joints[0].start = JointStart::Pose {
+        position: Vec3::new(1e-4, 0.0, 0.0),
+        rotation: Quat::identity(),
+        velocity: Vec3::zeros(),
+        angular_velocity: Vec3::new(spin, 0.0, 0.0),
+    };
+    let contact = &mut machine.loose_joints[0].contact;
+    (contact.second_clearance, contact.friction, contact.restitution) = (1e-4, friction, 0.0);
+    machine.gravity = Vec3::new(thrust / 0.1, 0.0, 0.0);
+    let mut simulation = Simulation::new(&accurately(machine)).unwrap();
+    let rate = |simulation: &mut Simulation, time: f64| {
+        simulation.step_until(time).unwrap();
+        while simulation.time() < time {
+            simulation.step_until(time).unwrap();
+        }
+        let mut frame = Frame::default();
+        simulation.sample_now(&mut frame);
+        frame.bodies[0].angular_velocity.x
+    };
+    // Once the thrust has settled on the four points.
+    let [early, late] = [1e-3, 2e-3].map(|time| rate(&mut simulation, time));
+    let braking = (early - late) / 1e-3;
+    let expected = friction * thrust * 0.015 / inertia;
+    println!("{braking} {expected}");
+    assert!((braking / expected - 1.0).abs() < 1e-3, "{braking} {expected}");
+}
+
+#[test]
+fn each_play_has_its_own_ramp_and_a_state_keeps_both() {
+    let mut simulation = Simulation::new(&accurately(spinning_pin(EndsOn::Pin, 0.15))).unwrap();
+    simulation.advance_to(1e-3).unwrap();
+    let mut next = simulation.changed_machine();
+    next.loose_joints[0].contact.clearance = 0.5e-4;
+    next.loose_joints[0].contact.second_clearance = 1e-4;
+    assert_eq!(simulation.adopt(&next), Ok(Effect::Now));
+    simulation.advance_to(5e-3).unwrap();
+    let ramping = simulation.state().plays(0);
+    assert!(ramping[0] > 0.5e-4, "the pin lies beyond the new wall: {ramping:?}");
+    let mut copy = simulation.clone();
+    simulation.advance_to(0.06).unwrap();
+    copy.advance_to(0.06).unwrap();
+    assert_eq!(simulation.state_hash(), copy.state_hash());
+    assert_eq!(simulation.state().plays(0), [0.5e-4, 1e-4]);
+    let ledger = *simulation.ledger().unwrap();
+    assert!(ledger.residual().abs() < 1e-7, "{:e} J", ledger.residual());
+    // A play that ends changes the equations.
+    next.loose_joints[0].contact.second_clearance = 0.0;
+    assert_eq!(simulation.adopt(&next), Ok(Effect::AtReset));
+}
+
 #[test]
 fn every_method_steps_pins_and_slides() {
-    let long = Pin { length: Some(0.02), ends: EndsOn::Bearing, held: true };
+    let long = Pin { length: Some(0.02), ends: EndsOn::Bearing, kept: true, face_radius: None };
     for (name, machine) in [("pin", crank_pin(0.1, long)), ("slide", flores().machine())] {
         let peak = |method: Method| {
             let mut machine = machine.clone();
@@ -391,7 +469,7 @@ fn every_method_steps_pins_and_slides() {
 
 #[test]
 fn without_play_they_are_the_ideal_joint() {
-    let long = Pin { length: Some(0.02), ends: EndsOn::Pin, held: true };
+    let long = Pin { length: Some(0.02), ends: EndsOn::Pin, kept: true, face_radius: None };
     for (name, mut machine, end) in [("pin", crank_pin(0.0, long), 2e-3), ("slide", flores().machine(), 2e-3)] {
         machine.loose_joints.last_mut().unwrap().contact.clearance = 0.0;
         let (impacts, mut simulation) = impacts(&machine, end);
@@ -402,6 +480,34 @@ fn without_play_they_are_the_ideal_joint() {
         let across = if name == "slide" { Vec3::new(0.0, open.y, open.z) } else { open };
         assert!(across.norm() < 1e-9, "{name}: {open}");
         assert!(frame.joints.last().unwrap().normal_force.norm() > 1.0, "{name}");
+    }
+}
+
+#[test]
+fn one_play_without_the_other_leaves_the_other_rows() {
+    // A pin with axial play alone stays on its axis; a block with play across y alone stays in its plane and does not roll.
+    let mut axial = spinning_pin(EndsOn::Pin, 0.15);
+    axial.loose_joints[0].contact.clearance = 0.0;
+    axial.joints[0].start = JointStart::Pose {
+        position: Vec3::zeros(),
+        rotation: Quat::identity(),
+        velocity: Vec3::new(0.05, 0.0, 0.0),
+        angular_velocity: Vec3::new(20.0, 0.0, 0.0),
+    };
+    let mut block = released();
+    block.slide.half_height = Some(0.02);
+    for (machine, free) in [(axial, 0), (block.machine(), 1)] {
+        for formulation in [Formulation::Tree, Formulation::Lagrange] {
+            let (impacts, mut simulation) = impacts(&accurately(Machine { formulation, ..machine.clone() }), 0.025);
+            assert!(impacts.len() > 1, "{free} {formulation:?}");
+            let mut frame = Frame::default();
+            simulation.sample_now(&mut frame);
+            let open = frame.joints[0].eccentricity;
+            for axis in (0..3).filter(|axis| *axis != free && !(free == 1 && *axis == 0)) {
+                assert!(open[axis].abs() < 1e-8, "{free} {formulation:?}: {open}");
+            }
+            assert!(simulation.ledger().unwrap().residual().abs() < 1e-6);
+        }
     }
 }
 
@@ -428,6 +534,6 @@ fn impossible_dimensions_are_refused() {
     ));
     let centres = |joint: &mut LooseJoint| joint.contact.friction_velocity = FrictionVelocity::Centres;
     assert_eq!(fault(&centres), Some(LooseFault::FrictionVelocity));
-    let block = Slide { half_length: 0.02, half_width: -0.01, corner_radius: 1e-3 };
+    let block = Slide { half_length: 0.02, half_width: -0.01, half_height: None, corner_radius: 1e-3 };
     assert!(matches!(fault(&|joint| joint.kind = LooseKind::Slide(block)), Some(LooseFault::Length { .. })));
 }

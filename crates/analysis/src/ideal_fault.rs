@@ -66,7 +66,7 @@ pub fn ideal_fault(scene: &Scene, mut may_continue: impl FnMut() -> bool) -> Opt
     form.pace = if form.frequency > 0.0 { SLOW / form.frequency } else { 1.0 };
     let (pace, period) = (form.pace, 1.0 / SLOW);
     for joint in &mut rigid.loose_joints {
-        joint.contact.clearance = 0.0;
+        joint.contact = joint.contact.without_play();
     }
     let limit = MAX_WEIGHTS * 9.81 * rigid.bodies.iter().map(|body| body.mass).sum::<f64>();
     let mut simulation = Simulation::new(&rigid).ok()?;

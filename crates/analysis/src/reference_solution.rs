@@ -212,7 +212,7 @@ fn require_reached(end: End) -> Result<(), AnalysisError> {
 
 /// The first impacts of the reference to have ended, in the order in which they begin, and some more.
 fn first_impacts(setting: &Setting, scene: &Scene, context: &mut RunContext) -> Result<Vec<Impact>, AnalysisError> {
-    if scene.machine.loose_joints.iter().all(|joint| joint.contact.clearance == 0.0) {
+    if scene.machine.loose_joints.iter().all(|joint| joint.contact.is_ideal()) {
         return Ok(Vec::new());
     }
     let mut simulation = setting.start(scene)?;
@@ -236,7 +236,7 @@ fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<Simul
     let mut peaks: Vec<Peak> = Vec::new();
     let (mut since, mut settled) = (0.0, false);
     let joints = scene.machine.loose_joints.iter().enumerate();
-    let loose: Vec<usize> = joints.filter(|(_, joint)| joint.contact.clearance > 0.0).map(|(j, _)| j).collect();
+    let loose: Vec<usize> = joints.filter(|(_, joint)| !joint.contact.is_ideal()).map(|(j, _)| j).collect();
     advance_capped(&mut simulation, SETTLING_TIME_LIMIT, SEARCH_COST, context, |simulation| {
         simulation.take_peaks(&mut peaks);
         if loose

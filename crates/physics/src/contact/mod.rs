@@ -91,8 +91,10 @@ words!(ApproachSpeed {
 /// Contact parameters of a ball joint. SI units.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
 pub struct Parameters {
-    /// Radial clearance c = R - r, m; 0 makes the joint ideal.
+    /// Radial clearance c = R - r, m, or play to each wall; 0 makes the joint ideal in these directions.
     pub clearance: f64,
+    /// Play of a pin along its axis, to each side, or of a block to each wall across the first two, m; 0: none. A ball has no other.
+    pub second_clearance: f64,
     /// Coulomb coefficient cf.
     pub friction: f64,
     /// Requested restitution ce, 0..=1.
@@ -120,9 +122,25 @@ pub struct Parameters {
 }
 
 impl Parameters {
+    /// Each play, m; 0 where the joint is ideal.
+    pub fn clearances(&self) -> [f64; 2] {
+        [self.clearance, self.second_clearance]
+    }
+
+    /// Whether the joint has no play.
+    pub fn is_ideal(&self) -> bool {
+        self.clearances() == [0.0; 2]
+    }
+
+    /// The same joint without play.
+    pub fn without_play(self) -> Self {
+        Self { clearance: 0.0, second_clearance: 0.0, ..self }
+    }
+
     /// The paper's values (Table 2) with the default scene's clearance and friction.
     pub const DEFAULT: Self = Self {
         clearance: 0.3e-3,
+        second_clearance: 0.0,
         friction: 0.15,
         restitution: 0.9,
         youngs_modulus: 206e9,

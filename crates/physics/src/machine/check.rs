@@ -370,7 +370,7 @@ impl Machine {
 
     /// Warns of a tolerance too loose for impacts.
     fn tolerance_warning(&self) -> Option<Doubt> {
-        let has_clearance = self.loose_joints.iter().any(|j| j.contact.clearance > 0.0);
+        let has_clearance = self.loose_joints.iter().any(|j| !j.contact.is_ideal());
         let loose = self.solver.method.is_adaptive() && self.solver.tolerance > LOOSEST_TOLERANCE;
         (has_clearance && loose)
             .then_some(Doubt::Tolerance { tolerance: self.solver.tolerance, loosest: LOOSEST_TOLERANCE })
@@ -381,7 +381,7 @@ impl Machine {
         if self.solver.method.control() != StepControl::Fixed {
             return None;
         }
-        let clearances = self.loose_joints.iter().filter(|j| j.contact.clearance > 0.0);
+        let clearances = self.loose_joints.iter().filter(|j| !j.contact.is_ideal());
         let element_forces = self.element_forces();
         let (joint, duration) = clearances
             .map(|joint| (joint, self.impact_duration(joint, &element_forces)))

@@ -20,7 +20,7 @@ impl Machine {
     pub fn coupled_joints(&self) -> Coupled {
         let tree_of = self.trees();
         let mut linked: Vec<usize> = (0..self.bodies.len()).collect();
-        let ideal = self.loose_joints.iter().filter(|joint| joint.contact.clearance == 0.0);
+        let ideal = self.loose_joints.iter().filter(|joint| joint.contact.is_ideal());
         let ends = ideal.map(|joint| [joint.carrier(), joint.carried()]);
         let mut loops = 0;
         for [a, b] in ends.chain(self.closing_joints.iter().map(super::Joint::points)) {
@@ -49,7 +49,7 @@ impl Machine {
         // Linked trees count as one; a joint within it counts once.
         let mut on = vec![0; self.bodies.len()];
         let mut acts_on = Vec::with_capacity(self.loose_joints.len());
-        for (_, trees) in self.loose_joints.iter().zip(&rows).filter(|(joint, _)| joint.contact.clearance > 0.0) {
+        for (_, trees) in self.loose_joints.iter().zip(&rows).filter(|(joint, _)| !joint.contact.is_ideal()) {
             let mut trees = trees.map(|tree| tree.map(|tree| root(&mut linked, tree)));
             if trees[0] == trees[1] {
                 trees[1] = None;

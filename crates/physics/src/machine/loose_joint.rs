@@ -27,7 +27,7 @@ pub enum LooseKind {
     Ball,
     /// A pin, the carried part, in a bearing: both along the x axes of their frames.
     Pin(Pin),
-    /// A block, the carried part, in a guide along the x axes of their frames, in the plane of x and y.
+    /// A block, the carried part, in a guide along the x axes of their frames.
     Slide(Slide),
 }
 
@@ -39,8 +39,10 @@ pub struct Pin {
     pub length: Option<f64>,
     /// Which part has the ends.
     pub ends: EndsOn,
-    /// Whether the pin cannot move along the axis.
-    pub held: bool,
+    /// Whether collars keep the pin in the bearing, with the second clearance to each side.
+    pub kept: bool,
+    /// Radius of the collars' faces, m. `None`: they touch on the axis, and exert no torque.
+    pub face_radius: Option<f64>,
 }
 
 /// The part of a pin joint whose ends touch the other.
@@ -53,13 +55,16 @@ pub enum EndsOn {
     Pin,
 }
 
-/// A rectangular block between the two walls y = +-(half_width + c) of its guide. It touches with its corners.
+/// A rectangular block between the walls y = +-(half_width + c) and z = +-(half_height + second clearance) of its guide. It touches
+/// with its corners.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slide {
     /// Half of its length along the guide, m.
     pub half_length: f64,
-    /// Half of its width, m.
+    /// Half of its width, along y, m.
     pub half_width: f64,
+    /// Half of its height, along z, m. `None`: it stays in the plane of x and y.
+    pub half_height: Option<f64>,
     /// Radius of curvature of its corners, which sets their stiffness, m. It does not enter the geometry.
     pub corner_radius: f64,
 }
@@ -101,6 +106,11 @@ pub enum LooseFault {
         /// m.
         of: f64,
     },
+    /// Play in a direction in which the joint has none to have.
+    #[error(
+        "it has one play: a ball, a pin that does not tilt or slides freely, and a block in a plane have no second"
+    )]
+    SecondPlay,
     /// Friction that follows the centres, which have no meaning for a pin.
     #[error("friction follows the velocity of the surfaces in joints other than ball joints")]
     FrictionVelocity,
@@ -115,21 +125,32 @@ impl LooseJoint {
         let positive = |what, value: f64| {
             if value > 0.0 && value.is_finite() { Ok(()) } else { Err(LooseFault::Length { what, value }) }
         };
-        let play = self.contact.clearance;
-        let limit = |what, of: f64| {
+        let [radial, second] = self.contact.clearances();
+        let limit = |play: f64, what, of: f64| {
             positive(what, of)?;
             if play <= 0.1 * of { Ok(()) } else { Err(LooseFault::Play { play, what, of }) }
         };
         match self.kind {
+            LooseKind::Ball if second > 0.0 => return Err(LooseFault::SecondPlay),
             LooseKind::Ball => return Ok(()),
-            LooseKind::Pin(Pin { length, .. }) => {
-                limit("the radius", self.contact.ball_radius)?;
-                length.map_or(Ok(()), |length| limit("the length", length))?;
+            LooseKind::Pin(Pin { length, kept, face_radius, .. }) => {
+                limit(radial, "the radius", self.contact.ball_radius)?;
+                length.map_or(Ok(()), |length| limit(radial, "the length", length))?;
+                face_radius.map_or(Ok(()), |radius| positive("the radius of the faces", radius))?;
+                // A pin that may leave its bearing by a quarter of the length has no two ends to touch.
+                length.map_or(Ok(()), |length| limit(second, "two and a half lengths", 2.5 * length))?;
+                if second > 0.0 && !(kept && length.is_some()) {
+                    return Err(LooseFault::SecondPlay);
+                }
             }
-            LooseKind::Slide(Slide { half_length, half_width, corner_radius }) => {
-                limit("the half length", half_length)?;
-                limit("the half width", half_width)?;
+            LooseKind::Slide(Slide { half_length, half_width, half_height, corner_radius }) => {
+                limit(radial.max(second), "the half length", half_length)?;
+                limit(radial, "the half width", half_width)?;
+                half_height.map_or(Ok(()), |height| limit(second, "the half height", height))?;
                 positive("the corner radius", corner_radius)?;
+                if second > 0.0 && half_height.is_none() {
+                    return Err(LooseFault::SecondPlay);
+                }
             }
         }
         if self.contact.friction_velocity == contact::FrictionVelocity::Centres {

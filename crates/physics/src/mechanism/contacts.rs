@@ -76,7 +76,8 @@ pub struct Contacts {
 /// A loose joint's play, and its contacts.
 struct JointContacts {
     parameters: Parameters,
-    ramp: Option<Ramp>,
+    /// Of each play.
+    ramps: [Option<Ramp>; 2],
     contacts: Range<ContactId>,
 }
 
@@ -85,12 +86,12 @@ impl Contacts {
     pub fn new(machine: &Machine, model: &Model) -> Self {
         let joints = machine.loose_joints.iter().zip(&model.joints).map(|(joint, compiled)| JointContacts {
             parameters: joint.contact,
-            ramp: None,
+            ramps: [None; 2],
             contacts: compiled.contacts.clone(),
         });
         let contacts = model.sites.iter().enumerate().map(|(id, &site)| {
             let parameters = &machine.loose_joints[site.joint].contact;
-            Contact::new(id, site, site.stiffness.coefficients(parameters, parameters.clearance))
+            Contact::new(id, site, site.stiffness.coefficients(parameters, parameters.clearances()[site.play]))
         });
         Self {
             contacts: contacts.collect(),
@@ -172,23 +173,33 @@ impl Contacts {
         &self.joints[j].parameters
     }
 
+    /// Contacts of loose joint `j` that share its play `play`.
+    pub(crate) fn of_play(&self, j: usize, play: usize) -> impl Iterator<Item = ContactId> + '_ {
+        self.of_joint(j).filter(move |&c| self.contacts[c].site.play == play)
+    }
+
     /// Clearance of loose joint `j` at the latest evaluation, m; 0 if it is ideal.
     pub fn joint_clearance(&self, j: usize) -> f64 {
-        self.of_joint(j).next().map_or(0.0, |c| self.clearance(c))
+        self.play(j, 0)
     }
 
-    /// Starts, ends or restores the ramp of joint `j`.
-    pub(crate) fn set_ramp(&mut self, j: usize, ramp: Option<Ramp>) {
-        self.joints[j].ramp = ramp;
-        self.has_ramps = self.joints.iter().any(|joint| joint.ramp.is_some());
+    /// Current size of a play of loose joint `j`, m; 0 if it has none.
+    pub(crate) fn play(&self, j: usize, play: usize) -> f64 {
+        self.of_play(j, play).next().map_or(0.0, |c| self.clearance(c))
     }
 
-    /// Sets parameters of joint `j`; `clearance`, m, is its current clearance.
-    pub(crate) fn set_parameters(&mut self, j: usize, parameters: &Parameters, clearance: f64) {
+    /// Starts, ends or restores the ramps of the plays of joint `j`.
+    pub(crate) fn set_ramps(&mut self, j: usize, ramps: [Option<Ramp>; 2]) {
+        self.joints[j].ramps = ramps;
+        self.has_ramps = self.joints.iter().any(|joint| joint.ramps != [None; 2]);
+    }
+
+    /// Sets parameters of joint `j`; `plays`, m, are its current plays.
+    pub(crate) fn set_parameters(&mut self, j: usize, parameters: &Parameters, plays: [f64; 2]) {
         let joint = &mut self.joints[j];
         joint.parameters = *parameters;
         for contact in &mut self.contacts[joint.contacts.clone()] {
-            contact.law = contact.site.stiffness.coefficients(parameters, clearance);
+            contact.law = contact.site.stiffness.coefficients(parameters, plays[contact.site.play]);
         }
     }
 
@@ -199,10 +210,10 @@ impl Contacts {
             return;
         }
         for joint in &self.joints {
-            if let Some(ramp) = joint.ramp {
-                let (clearance, rate) = ramp.at(t);
-                for contact in &mut self.contacts[joint.contacts.clone()] {
-                    let Contact { site, law, .. } = contact;
+            for contact in &mut self.contacts[joint.contacts.clone()] {
+                let Contact { site, law, .. } = contact;
+                if let Some(ramp) = joint.ramps[site.play] {
+                    let (clearance, rate) = ramp.at(t);
                     site.stiffness.set_clearance(law, &joint.parameters, clearance, rate);
                 }
             }

@@ -32,7 +32,7 @@ pub(super) fn rest_state(machine: &Machine, near: Option<&[f64]>) -> Result<Sett
     let Settled { mut state, mut assembly } = settle(machine, near)?;
     let mut constant = with_constant_laws(machine);
     constant.formulation = Formulation::Tree;
-    let play = |joint: &LooseJoint| joint.contact.clearance > 0.0;
+    let play = |joint: &LooseJoint| !joint.contact.is_ideal();
     let mut without = None;
     if constant.loose_joints.iter().any(play) {
         let ideal = without_play(&constant);

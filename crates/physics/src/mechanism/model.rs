@@ -135,6 +135,8 @@ pub struct Site {
     /// The point that touches it.
     pub carried: Anchor,
     pub wall: Wall,
+    /// Index of its play among [`Parameters::clearances`](crate::contact::Parameters::clearances).
+    pub play: usize,
     pub stiffness: Stiffness,
     /// Whether the wall belongs to the carried part of the joint.
     pub is_reversed: bool,
@@ -312,8 +314,9 @@ impl Model {
                 origin: self.anchor(machine, &frame.origin),
                 axes: [Vec3::x(), Vec3::y(), Vec3::z()].map(|axis| frame.rotation * axis),
             });
-            let Compiled { closed, lasting, sites } = joint.kind.compile(index, &frames);
-            let ideal = (joint.contact.clearance == 0.0).then(|| {
+            let Compiled { closed, lasting, sites } =
+                joint.kind.compile(index, &frames, joint.contact.clearances().map(|clearance| clearance > 0.0));
+            let ideal = joint.contact.is_ideal().then(|| {
                 self.ideal_joints.push(index);
                 self.ideal_joints.len() - 1
             });

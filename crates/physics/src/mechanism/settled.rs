@@ -25,7 +25,7 @@ pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled,
         let mut rate = vec![0.0; state.len()];
         mechanism.evaluator(ActiveSet::Nothing).evaluate_fully(0.0, &state, &mut rate);
         for (j, joint) in machine.loose_joints.iter().enumerate() {
-            if joint.contact.clearance == 0.0 {
+            if joint.contact.is_ideal() {
                 continue;
             }
             // Balls that share a load in an indeterminate way stay centred: the loops could not close with both on a wall.
@@ -49,7 +49,7 @@ pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled,
 pub(super) fn without_play(machine: &Machine) -> Machine {
     let mut ideal = machine.clone();
     for joint in &mut ideal.loose_joints {
-        joint.contact.clearance = 0.0;
+        joint.contact = joint.contact.without_play();
     }
     Machine { start: StartRule::Ideal, formulation: Formulation::Tree, ..ideal }
 }

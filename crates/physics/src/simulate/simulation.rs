@@ -130,9 +130,9 @@ pub struct State {
 struct JointState {
     /// Number of its contacts: none if it is ideal.
     contacts: usize,
-    /// Active ramp of the clearance, and the clearance without it, m.
-    ramp: Option<Ramp>,
-    clearance: f64,
+    /// Active ramp of each play, and the play without it, m.
+    ramps: [Option<Ramp>; 2],
+    plays: [f64; 2],
     /// Reaction at the latest two instants, if the joint is ideal, for its peak between steps.
     reaction: Recent,
     /// Peak since it was last taken.

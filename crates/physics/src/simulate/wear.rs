@@ -193,7 +193,7 @@ impl Wear {
         let grid = grid_of_sockets();
         let socket = |joint: &LooseJoint| {
             let contact = &joint.contact;
-            let ideal = contact.clearance == 0.0;
+            let ideal = contact.is_ideal();
             let cells = vec![Cell::default(); if ideal { 0 } else { grid.cells() }];
             Socket {
                 grid_from_body: axes(&joint.opening),

@@ -22,12 +22,12 @@ pub struct Compiled {
 }
 
 impl LooseKind {
-    /// A joint of this kind between the frames of the carrier and of the carried part; `joint` is its index.
-    pub(super) fn compile(&self, joint: usize, frames: &[Frame; 2]) -> Compiled {
+    /// A joint of this kind between the frames of the carrier and of the carried part, with these of its plays; `joint` is its index.
+    pub(super) fn compile(&self, joint: usize, frames: &[Frame; 2], plays: [bool; 2]) -> Compiled {
         match self {
             Self::Ball => ball::compile(joint, frames),
-            Self::Pin(pin) => pin::compile(pin, joint, frames),
-            Self::Slide(slide) => slide::compile(slide, joint, frames),
+            Self::Pin(pin) => pin::compile(pin, joint, frames, plays),
+            Self::Slide(slide) => slide::compile(slide, joint, frames, plays),
         }
     }
 }

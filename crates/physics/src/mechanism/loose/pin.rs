@@ -1,40 +1,80 @@
-//! A pin in a bearing: contacts at both ends of the shorter part, or one in the middle of a joint that does not tilt (Ambrosio &
-//! Pombo 2018, Multibody System Dynamics 42, for the unified joint; the ends share the stiffness of the joint).
+//! A pin in a bearing: contacts at both ends of the shorter part, or one in the middle of a joint that does not tilt, and those of its
+//! collars (Ambrosio & Pombo 2018, Multibody System Dynamics 42, for the unified joint; the ends share the stiffness of the joint).
 
 use super::{Anchor, Compiled, Edge, Frame, JointKind, Pair, Site, Stiffness, Wall};
 use crate::machine::{EndsOn, Pin};
 
-pub(super) fn compile(pin: &Pin, joint: usize, frames: &[Frame; 2]) -> Compiled {
-    let kind = if pin.held { JointKind::Revolute } else { JointKind::Cylindrical };
+pub(super) fn compile(pin: &Pin, joint: usize, frames: &[Frame; 2], [radial, axial]: [bool; 2]) -> Compiled {
+    let kind = if pin.kept { JointKind::Revolute } else { JointKind::Cylindrical };
     let pair = Pair::of_frames(kind, frames);
-    let [bearing, carried] = frames;
+    let mut sites = Vec::new();
+    if radial {
+        sites.extend(ends(pin, joint, frames));
+    }
+    if axial {
+        sites.extend(faces(pin, joint, frames));
+    }
+    // Across the axis: two lines coincide, or the axes of a pin that does not tilt stay parallel.
+    let mut positions = if radial { Vec::new() } else { vec![pair.along(1), pair.along(2)] };
+    positions.extend((pin.kept && !axial).then(|| pair.along(0)));
+    let orientations = if radial && pin.length.is_some() { Vec::new() } else { pair.parallel() };
+    Compiled { closed: pair.cut(), lasting: pair.keeping(positions, orientations), sites }
+}
+
+/// Where pin and bearing touch across the axis.
+fn ends(pin: &Pin, joint: usize, [bearing, carried]: &[Frame; 2]) -> Vec<Site> {
     // The wall belongs to the part that is longer.
     let (wall, edge, at_edge, is_reversed) = match pin.ends {
-        EndsOn::Pin => (bearing, carried, Edge::Pin, false),
         EndsOn::Bearing if pin.length.is_some() => (carried, bearing, Edge::Bearing, true),
-        EndsOn::Bearing => (bearing, carried, Edge::Pin, false),
+        EndsOn::Pin | EndsOn::Bearing => (bearing, carried, Edge::Pin, false),
     };
     let (offsets, share) = match pin.length {
         Some(length) => (vec![-0.5 * length, 0.5 * length], 0.5),
         None => (vec![0.0], 1.0),
     };
-    let site = |offset: f64| {
-        let end = Anchor { offset: edge.origin.offset + edge.axes[0] * offset, ..edge.origin };
-        let wall_of = Wall::Bore(wall.axes[0], at_edge);
-        Site {
-            joint,
-            carrier: wall.origin,
-            carried: end,
-            wall: wall_of,
-            stiffness: Stiffness::Sphere(share),
-            is_reversed,
-        }
+    let site = |offset: f64| Site {
+        joint,
+        carrier: wall.origin,
+        carried: Anchor { offset: edge.origin.offset + edge.axes[0] * offset, ..edge.origin },
+        wall: Wall::Bore(wall.axes[0], at_edge),
+        play: 0,
+        stiffness: Stiffness::Sphere(share),
+        is_reversed,
     };
-    let axial = pin.held.then(|| pair.along(0));
-    let tilts = pin.length.is_none().then(|| pair.parallel());
-    Compiled {
-        closed: pair.cut(),
-        lasting: pair.keeping(axial.into_iter().collect(), tilts.into_iter().flatten().collect()),
-        sites: offsets.into_iter().map(site).collect(),
+    offsets.into_iter().map(site).collect()
+}
+
+/// Where the collars touch the faces of the bearing: on the axis, or at four points on the rim of each, which belong to the bearing, so
+/// that a spin moves none of them. The back comes first.
+fn faces(pin: &Pin, joint: usize, [bearing, carried]: &[Frame; 2]) -> Vec<Site> {
+    let [x, y, z] = bearing.axes;
+    match pin.face_radius {
+        None => [-1.0, 1.0]
+            .map(|side| Site {
+                joint,
+                carrier: bearing.origin,
+                carried: carried.origin,
+                wall: Wall::Plane(x * side),
+                play: 1,
+                stiffness: Stiffness::Face(1.0),
+                is_reversed: false,
+            })
+            .to_vec(),
+        Some(radius) => {
+            let rim = [y, z, -y, -z].map(|direction| bearing.origin.offset + direction * radius);
+            // Seen from the pin, whose axis the directions follow, the bearing moves the other way.
+            let of_side = |side: f64| {
+                rim.map(|offset| Site {
+                    joint,
+                    carrier: carried.origin,
+                    carried: Anchor { offset, ..bearing.origin },
+                    wall: Wall::Plane(carried.axes[0] * -side),
+                    play: 1,
+                    stiffness: Stiffness::Face(0.25),
+                    is_reversed: true,
+                })
+            };
+            [-1.0, 1.0].into_iter().flat_map(of_side).collect()
+        }
     }
 }

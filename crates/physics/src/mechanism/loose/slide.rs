@@ -1,29 +1,43 @@
-//! A block in a guide, in a plane: each corner touches its own wall (Flores et al. 2008, J. Comput. Nonlinear Dynam. 3, 011007).
+//! A block in a guide: each corner touches its own walls (Flores et al. 2008, J. Comput. Nonlinear Dynam. 3, 011007, for the plane).
 
 use super::{Anchor, Compiled, Frame, JointKind, Pair, Rows, Site, Stiffness, Wall};
 use crate::machine::Slide;
 
-pub(super) fn compile(slide: &Slide, joint: usize, frames: &[Frame; 2]) -> Compiled {
+pub(super) fn compile(slide: &Slide, joint: usize, frames: &[Frame; 2], [across, second]: [bool; 2]) -> Compiled {
     let pair = Pair::of_frames(JointKind::Prismatic, frames);
     let [guide, block] = frames;
-    let sites = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)].map(|(x, y)| {
-        let corner = block.axes[0] * (x * slide.half_length) + block.axes[1] * (y * slide.half_width);
-        let on_wall = guide.axes[1] * (y * slide.half_width);
-        Site {
-            joint,
-            carrier: Anchor { offset: guide.origin.offset + on_wall, ..guide.origin },
-            carried: Anchor { offset: block.origin.offset + corner, ..block.origin },
-            wall: Wall::Plane(guide.axes[1] * y),
-            stiffness: Stiffness::Corner(slide.corner_radius),
-            is_reversed: false,
+    let [x, y, z] = [slide.half_length, slide.half_width, slide.half_height.unwrap_or(0.0)];
+    // In a plane two corners are one.
+    let heights = if slide.half_height.is_some() { vec![-1.0, 1.0] } else { vec![0.0] };
+    let mut sites = Vec::new();
+    for (sx, sy) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+        for &sz in &heights {
+            let corner = block.axes[0] * (sx * x) + block.axes[1] * (sy * y) + block.axes[2] * (sz * z);
+            let carried = Anchor { offset: block.origin.offset + corner, ..block.origin };
+            for (play, side, axis, half) in [(0, sy, 1, y), (1, sz, 2, z)] {
+                let normal = guide.axes[axis] * side;
+                if [across, second][play] && side != 0.0 {
+                    sites.push(Site {
+                        joint,
+                        carrier: Anchor { offset: guide.origin.offset + normal * half, ..guide.origin },
+                        carried,
+                        wall: Wall::Plane(normal),
+                        play,
+                        stiffness: Stiffness::Corner(slide.corner_radius),
+                        is_reversed: false,
+                    });
+                }
+            }
         }
-    });
-    let [x, y, _] = pair.axes;
-    let across = pair.child_axes[2];
-    let in_plane = [x, y].map(|parent| Rows::Perpendicular { child: across, parent });
-    Compiled {
-        closed: pair.cut(),
-        lasting: pair.keeping(vec![pair.along(2)], in_plane.to_vec()),
-        sites: sites.to_vec(),
     }
+    // Without one play, its pair of walls holds the block across them and against yaw or pitch, and against roll.
+    let [child_x, child_y, _] = pair.child_axes;
+    let held = [(!across, 1), (!second, 2)].into_iter().filter_map(|(held, axis)| held.then_some(axis));
+    let held: Vec<usize> = held.collect();
+    let parallel = |axis: usize| Rows::Perpendicular { child: child_x, parent: pair.axes[axis] };
+    let roll = Rows::Perpendicular { child: child_y, parent: pair.axes[2] };
+    let mut orientations: Vec<Rows> = held.iter().map(|axis| parallel(*axis)).collect();
+    orientations.extend((!held.is_empty()).then_some(roll));
+    let positions = held.iter().map(|axis| pair.along(*axis)).collect();
+    Compiled { closed: pair.cut(), lasting: pair.keeping(positions, orientations), sites }
 }

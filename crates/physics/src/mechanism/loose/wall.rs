@@ -33,6 +33,8 @@ pub enum Stiffness {
     Sphere(f64),
     /// That of a sphere of this radius on a plane, m.
     Corner(f64),
+    /// This share of a ball's, whatever the play along the axis.
+    Face(f64),
 }
 
 impl Stiffness {
@@ -55,6 +57,12 @@ impl Stiffness {
             Self::Sphere(share) => law.elastic.stiffness *= share,
             Self::Corner(radius) => {
                 law.elastic = ElasticLaw::of_corner(parameters, radius);
+                law.is_stiffened_by_clearance = false;
+            }
+            Self::Face(share) => {
+                let [radial, axial] = parameters.clearances();
+                law.elastic = ElasticLaw::of_ball(parameters, if radial > 0.0 { radial } else { axial });
+                law.elastic.stiffness *= share;
                 law.is_stiffened_by_clearance = false;
             }
         }

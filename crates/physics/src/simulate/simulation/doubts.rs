@@ -173,7 +173,7 @@ impl DoubtContext<'_> {
 
     /// Radius of the contact patch at the largest force so far, in ball radii; 0 for an ideal joint and without contact.
     fn largest_patch(&self, j: usize) -> f64 {
-        if self.machine.loose_joints[j].contact.clearance == 0.0 {
+        if self.machine.loose_joints[j].contact.is_ideal() {
             return 0.0;
         }
         let c = self.coefficients(j);

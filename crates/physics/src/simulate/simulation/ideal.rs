@@ -49,7 +49,7 @@ impl IdealSource {
         let Some(probe) = machine.output.probe.filter(|_| !closed_form) else {
             return Self::ClosedForm;
         };
-        if machine.loose_joints.iter().all(|j| j.contact.clearance == 0.0) {
+        if machine.loose_joints.iter().all(|j| j.contact.is_ideal()) {
             return Self::SelfReference;
         }
         match Model::new(&closed(machine)) {
@@ -161,7 +161,7 @@ impl IdealState {
 pub fn closed(machine: &Machine) -> Machine {
     let mut ideal = machine.clone();
     for joint in &mut ideal.loose_joints {
-        joint.contact.clearance = 0.0;
+        joint.contact = joint.contact.without_play();
     }
     // Balls may start off-centre in their play.
     ideal.start = StartRule::Ideal;

@@ -5,7 +5,7 @@ use super::workspace::sync_parameters;
 use super::{CLEARANCE_SPEED, Stepping};
 use crate::contact::ContactState;
 use crate::integrate::Polynomial;
-use crate::machine::{Machine, Vec3};
+use crate::machine::{LooseJoint, Machine, Vec3};
 use crate::mechanism::{ContactId, MechanismError, Pull, Ramp};
 use crate::simulate::Effect;
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
@@ -52,8 +52,8 @@ impl Stepping<'_> {
     /// As [`Simulation::adopt`](crate::simulate::Simulation::adopt).
     pub(in crate::simulate) fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
         let pairs = self.machine.loose_joints.iter().zip(&next.loose_joints);
-        let clearances = pairs.map(|(a, b)| (a.contact.clearance, b.contact.clearance));
-        let changes_equations = clearances.into_iter().any(|(a, b)| (a == 0.0) != (b == 0.0));
+        let loose = |joint: &LooseJoint| joint.contact.clearances().map(|play| play > 0.0);
+        let changes_equations = pairs.into_iter().any(|(a, b)| loose(a) != loose(b));
         if changes_equations || !self.machine.differs_only_in_conditions(next) {
             return Ok(Effect::AtReset);
         }
@@ -121,27 +121,29 @@ impl Stepping<'_> {
 
     /// Applies new contact parameters from this instant; a clearance that would place the ball inside the wall is ramped.
     fn change_contact(&mut self, j: usize) {
-        let contact = self.state.conditions.joints[j];
-        if contact.clearance == 0.0 {
-            return;
+        for (play, clearance) in self.state.conditions.joints[j].clearances().into_iter().enumerate() {
+            if clearance > 0.0 {
+                self.change_play(j, play, clearance);
+            }
         }
+    }
+
+    /// Sets a play of joint `j` to `next`, m, at once or by a ramp.
+    fn change_play(&mut self, j: usize, play: usize, next: f64) {
         let Self { mechanism, state, attempt, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
-        let now = mechanism.contacts.joint_clearance(j);
-        let contacts = mechanism.contacts.of_joint(j);
+        let now = mechanism.contacts.play(j, play);
         let distance = |c: ContactId| mechanism.contacts.gap(c).separation.penetration + now;
-        let farthest = contacts.clone().map(distance).fold(0.0, f64::max);
-        let clearance = if contact.clearance < now && farthest > contact.clearance {
-            let ramp = Ramp { start: state.now.t, from: now, rate: -CLEARANCE_SPEED, to: contact.clearance };
-            state.joints[j].ramp = Some(ramp);
-            now
+        let farthest = mechanism.contacts.of_play(j, play).map(distance).fold(0.0, f64::max);
+        let (ramp, clearance) = if next < now && farthest > next {
+            (Some(Ramp { start: state.now.t, from: now, rate: -CLEARANCE_SPEED, to: next }), now)
         } else {
-            state.joints[j].ramp = None;
-            contact.clearance
+            (None, next)
         };
-        state.joints[j].clearance = clearance;
+        state.joints[j].ramps[play] = ramp;
+        state.joints[j].plays[play] = clearance;
         // The wall has moved away from the ball. The state of a ball just arriving or leaving does not change.
-        for c in contacts {
+        for c in mechanism.contacts.of_play(j, play) {
             if clearance > now && state.now.contact_states[c].active && distance(c) <= clearance {
                 state.now.contact_states[c] = ContactState::default();
             }
@@ -153,19 +155,19 @@ impl Stepping<'_> {
     /// End of the active clearance ramp that finishes first, s.
     pub(super) fn ramp_end(&self) -> f64 {
         let end = |r: &Ramp| r.start + (r.to - r.from) / r.rate;
-        self.state.joints.iter().filter_map(|joint| joint.ramp.as_ref()).map(end).fold(f64::INFINITY, f64::min)
+        self.state.joints.iter().flat_map(|joint| joint.ramps.iter().flatten()).map(end).fold(f64::INFINITY, f64::min)
     }
 
     pub(super) fn finish_ramps(&mut self) {
         let t = self.state.now.t;
         let mut finished = false;
         for joint in &mut self.state.joints {
-            let Some(ramp) = joint.ramp else {
-                continue;
-            };
-            if t >= ramp.start + (ramp.to - ramp.from) / ramp.rate {
-                (joint.ramp, joint.clearance) = (None, ramp.to);
-                finished = true;
+            for (ramp, play) in joint.ramps.iter_mut().zip(&mut joint.plays) {
+                if let Some(Ramp { to, .. }) = ramp.take_if(|ramp| t >= ramp.start + (ramp.to - ramp.from) / ramp.rate)
+                {
+                    *play = to;
+                    finished = true;
+                }
             }
         }
         if finished {

@@ -20,8 +20,8 @@ impl JointState {
     fn new(mechanism: &Mechanism, j: usize) -> Self {
         Self {
             contacts: mechanism.contacts.of_joint(j).len(),
-            ramp: None,
-            clearance: mechanism.contacts.joint_clearance(j),
+            ramps: [None; 2],
+            plays: [0, 1].map(|play| mechanism.contacts.play(j, play)),
             reaction: Recent::default(),
             peak: Peak::default(),
         }
@@ -131,7 +131,13 @@ impl State {
 
     /// Clearance of ball joint `j`, m.
     pub fn clearance(&self, j: usize) -> f64 {
-        self.joints[j].ramp.map_or(self.joints[j].clearance, |ramp| ramp.at(self.now.t).0)
+        self.plays(j)[0]
+    }
+
+    /// Current plays of loose joint `j`, m; 0 where it is ideal.
+    pub fn plays(&self, j: usize) -> [f64; 2] {
+        let JointState { ramps, plays, .. } = &self.joints[j];
+        [0, 1].map(|play| ramps[play].map_or(plays[play], |ramp| ramp.at(self.now.t).0))
     }
 
     /// The pull of the hand, if any.
@@ -171,7 +177,7 @@ impl State {
     }
 
     /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, then for each loose joint
-    /// whether each of its contacts touches and its approach speed (0 and 0 if it is ideal), and its current clearance; then, of the angles that elements act on and
+    /// whether each of its contacts touches and its approach speed (0 and 0 if it is ideal), and its current clearance, with the second, if it has one; then, of the angles that elements act on and
     /// coordinates do not count, the number and the quarter turns of each that has at least two. The current branch of the friction law is excluded: like the step size, it belongs to
     /// the stepper.
     pub fn hash(&self) -> u64 {
@@ -194,7 +200,11 @@ impl State {
                 add(u64::from(contact.active));
                 add(contact.approach_speed.to_bits());
             }
-            add(self.clearance(j).to_bits());
+            let [first, second] = self.plays(j);
+            add(first.to_bits());
+            if second > 0.0 {
+                add(second.to_bits());
+            }
         }
         // Closer to 0 the poses determine the angle.
         for (i, quarters) in self.quarter_turns.iter().enumerate().filter(|(_, quarters)| quarters.unsigned_abs() > 1) {
@@ -225,8 +235,9 @@ impl State {
         let record = &self.record;
         let worn = record.wear.as_ref();
         let conditions = &self.conditions;
-        let loose =
-            |contacts: &Conditions| contacts.joints.iter().map(|contact| contact.clearance > 0.0).collect::<Vec<_>>();
+        let loose = |contacts: &Conditions| -> Vec<[bool; 2]> {
+            contacts.joints.iter().map(|contact| contact.clearances().map(|play| play > 0.0)).collect()
+        };
         let fits = self.now.fits(dimension, contacts)
             && self.quarter_turns.len() == own.quarter_turns.len()
             && record.quarter_turns.len() == own.record.quarter_turns.len()

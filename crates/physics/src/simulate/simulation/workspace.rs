@@ -95,9 +95,9 @@ pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &
         mechanism.set_pull(model.machine(), state.pull);
     }
     for (j, contact) in state.conditions.joints.iter().enumerate() {
-        if contact.clearance > 0.0 {
-            mechanism.contacts.set_ramp(j, state.joints[j].ramp);
-            mechanism.contacts.set_parameters(j, contact, state.joints[j].clearance);
+        if !contact.is_ideal() {
+            mechanism.contacts.set_ramps(j, state.joints[j].ramps);
+            mechanism.contacts.set_parameters(j, contact, state.joints[j].plays);
         }
     }
 }
