@@ -472,7 +472,7 @@ impl App {
         } else {
             Surroundings::Window
         };
-        if !plain && self.messages.are_shown(&self.run.player, &self.tasks, around) {
+        if !plain && self.messages.are_shown(&self.tasks, around) {
             above.push(Messages::area(ui, inner));
         }
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));

@@ -145,7 +145,7 @@ impl App {
         opened
     }
 
-    /// Resets all settings and opens the first-time scene.
+    /// Resets all settings and opens the default scene.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn reset_to_first_start(&mut self, ctx: &egui::Context) {
         self.present(ctx, false);

@@ -58,10 +58,9 @@ impl AppOptions {
         }
     }
 
-    /// The first-time scene: the default scene, driven so fast that its joints rattle at every turn. The window states the
-    /// change, and how to revert to the scene file.
+    /// Plays the default scene.
     pub fn first() -> Self {
-        Self { time_scale: opening::RATTLING_SCALE, ..Self::new(opening::rattling()) }
+        Self::new(Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right"))
     }
 
     /// Starts `lesson` at step `step`, counted from 0.
@@ -121,9 +120,8 @@ impl AppOptions {
     /// reason as [`Self::problem`].
     pub fn from_link_or_default(text: &str) -> Self {
         Self::from_link(text).unwrap_or_else(|problem| {
-            let scene = Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right");
             let embedded = link::requested_panels(text);
-            Self { problem: Some(problem), playing: false, embedded, ..Self::new(scene) }
+            Self { problem: Some(problem), playing: false, embedded, ..Self::first() }
         })
     }
 }
