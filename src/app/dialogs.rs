@@ -77,7 +77,7 @@ impl Dialog {
 
     fn title(&self) -> &'static str {
         match self {
-            Self::Help => "Keys",
+            Self::Help => "Keyboard shortcuts",
             Self::About => "About Jointplay",
             Self::Open { .. } => "Open a link or a scene",
             Self::Save { .. } => "Save as",

@@ -118,7 +118,7 @@ impl Header<'_> {
                 .on_hover_text("Ten lessons on play in joints, step by step");
             self.panels.switches(ui);
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if ui.button("?").on_hover_text("Keys (?)").accessible_name("Keys").clicked() {
+                if ui.button("?").on_hover_text("Keyboard shortcuts (?)").accessible_name("Keyboard shortcuts").clicked() {
                     self.commands.push(Command::Ask(Dialog::Help));
                 }
                 // Omitted rather than overlapped if it does not fit; the theme also has a key.
@@ -249,7 +249,7 @@ impl Header<'_> {
         let undone = self.run.undo.entries(ui, !self.is_busy);
         self.commands.extend(undone.map(|redo| Command::Undo { redo }));
         theme_box(ui);
-        self.entry(ui, "Keys", "Keys (?)", Command::Ask(Dialog::Help));
+        self.entry(ui, "Keyboard shortcuts", "The list of keys (?)", Command::Ask(Dialog::Help));
         if ui.button("About").clicked() {
             self.commands.push(Command::Ask(Dialog::About));
             layout::close_menu(ui);

@@ -475,6 +475,13 @@ impl App {
         if !plain && self.messages.are_shown(&self.tasks, around) {
             above.push(Messages::area(ui, inner));
         }
+        // A caption answers a question, and takes the place of the sentence that the scene opens with.
+        let hint = if plain || caption.is_some() || around == Surroundings::Lecture {
+            None
+        } else {
+            self.hint.place(ui, area)
+        };
+        above.extend(hint.iter().map(|hint| hint.plate));
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
         self.run.viewport.bare = self.panels.embedded.is_some() && area.width() < MIN_WIDTH_WITH_CONTROLS;
         self.run.viewport.ui(&mut place, &self.run.player, plain, &above);
@@ -519,6 +526,9 @@ impl App {
         }
         if let Some(caption) = caption {
             caption.ui(ui, area);
+        }
+        if let Some(hint) = hint {
+            hint.ui(ui);
         }
         drop_hint(ui, whole);
         let inside = whole.shrink(10.0);

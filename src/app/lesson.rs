@@ -257,6 +257,8 @@ impl App {
                 self.files.scene = file;
             }
         }
+        // That of the lesson's scene.
+        self.hint.end();
         if self.panels.sheet == Some(Sheet::Lesson) {
             self.panels.sheet = None;
         }

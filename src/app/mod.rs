@@ -30,6 +30,7 @@ mod graphics;
 mod header;
 #[cfg(not(target_arch = "wasm32"))]
 mod headless;
+mod hint;
 mod host;
 mod icons;
 mod impact_list;
@@ -97,6 +98,7 @@ pub use film::FilmSettings;
 use graphics::Graphics;
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::Headless;
+use hint::Hint;
 pub use host::{BackgroundTask, Clock, DroppedFile, Host, NoHost, OpenedFile, SaveFile};
 use keys::Action;
 use lesson::Course;
@@ -130,6 +132,7 @@ pub struct App {
     tasks: Tasks,
     course: Course,
     messages: Messages,
+    hint: Hint,
     dialog: Option<Dialog>,
     panels: Panels,
     presentation: Presentation,
@@ -178,6 +181,7 @@ impl App {
             tasks: Tasks::default(),
             course: Course::default(),
             messages: Messages::new(options.problem),
+            hint: Hint::new(options.calm),
             dialog: None,
             panels: Panels::new(options.embedded),
             presentation: Presentation::default(),
@@ -190,6 +194,7 @@ impl App {
             store: None,
         };
         let starts_step = options.link.is_none();
+        app.hint.begin(&options.scene);
         if let Some(link) = options.link {
             app.show_link(link);
         }

@@ -23,11 +23,16 @@ impl App {
         self.course.remember_run(before, std::mem::take(&mut self.files.scene));
         self.tasks.clear();
         self.messages.clear();
+        self.hint.begin(scene);
         Ok(())
     }
 
     /// Applies camera, followed part, plots and instruments of `link`, and goes to its instant; other settings stay.
     pub(super) fn show_link(&mut self, link: Link) {
+        if link.has_instant() {
+            // The link shows something of its own.
+            self.hint.end();
+        }
         self.messages.warn(self.run.apply_link(&link));
         self.tasks.start_replay(link, &mut self.run.player);
     }

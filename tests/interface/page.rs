@@ -363,7 +363,7 @@ fn small_screens_have_touch_sized_controls_and_a_folding_sheet() {
         harness.run();
         harness.get_by_label("Choose plots");
         click(&mut harness, "Menu");
-        for name in ["Open…", "Copy link", "Picture…", "Data (CSV)…", "Scene…", "Keys", "About"] {
+        for name in ["Open…", "Copy link", "Picture…", "Data (CSV)…", "Scene…", "Keyboard shortcuts", "About"] {
             harness.get_by_label(name);
         }
     }
