@@ -173,6 +173,9 @@ impl App {
         if self.dialog.is_some() && !matches!(action, Action::Help | Action::Close) {
             return;
         }
+        if self.leave_visit_for(action) {
+            return;
+        }
         let moves = matches!(
             action,
             Action::PlayPause
@@ -246,7 +249,7 @@ impl App {
         let Some(mut dialog) = self.dialog.take() else {
             return;
         };
-        match dialogs::ui(ctx, &mut dialog, &self.run.player, &self.graphics.renderer) {
+        match dialogs::ui(ctx, &mut dialog, &self.run.player, &mut self.graphics) {
             None => self.dialog = Some(dialog),
             Some(accepted) => self.perform_all(ctx, dialog.command().filter(|_| accepted)),
         }

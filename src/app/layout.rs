@@ -167,6 +167,10 @@ impl App {
             ui.visuals_mut().disabled_alpha = 1.0;
             ui.disable();
         }
+        if self.visit.is_some() {
+            self.visit_ui(ui);
+            return self.floating_elements(ui);
+        }
         if self.is_presenting() {
             self.presentation_ui(ui);
             return self.floating_elements(ui);

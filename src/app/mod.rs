@@ -11,6 +11,7 @@ mod background;
 mod bench;
 mod beside;
 mod canvas;
+mod cards;
 #[cfg(not(target_arch = "wasm32"))]
 mod chooser;
 mod click;
@@ -68,6 +69,7 @@ mod timeline;
 mod transport;
 mod undo;
 mod viewport;
+mod visit;
 #[cfg(not(target_arch = "wasm32"))]
 mod window;
 mod zoom;
@@ -118,6 +120,7 @@ pub use remembered::{Store, StoredSettings};
 use run::Run;
 use sound::Sound;
 use tasks::Tasks;
+use visit::Visit;
 #[cfg(not(target_arch = "wasm32"))]
 pub use window::{WindowError, run_native};
 
@@ -133,6 +136,9 @@ pub struct App {
     course: Course,
     messages: Messages,
     hint: Hint,
+    visit: Option<Visit>,
+    /// Reduced motion.
+    calm: bool,
     dialog: Option<Dialog>,
     panels: Panels,
     presentation: Presentation,
@@ -182,6 +188,8 @@ impl App {
             course: Course::default(),
             messages: Messages::new(options.problem),
             hint: Hint::new(options.calm),
+            visit: None,
+            calm: options.calm,
             dialog: None,
             panels: Panels::new(options.embedded),
             presentation: Presentation::default(),
@@ -200,6 +208,9 @@ impl App {
         }
         if let Some((lesson, step)) = options.lesson {
             app.resume_lesson(lesson, step, starts_step);
+        }
+        if options.visit {
+            app.begin_visit();
         }
         app.attach(ctx, state, options.theme);
         Ok(app)
@@ -459,7 +470,8 @@ impl eframe::App for App {
         self.receive_picture(ctx);
         self.advance_film(ctx);
         self.presentation.follow_screen(ctx);
-        if let Some(why) = self.sound.check(self.host.as_mut()) {
+        // Without sound the first visit is silent: nobody has asked for it.
+        if let Some(why) = self.sound.check(self.host.as_mut()).filter(|_| self.visit.is_none()) {
             self.messages.notify(why);
         }
         if self.bench.update(self.host.as_mut()) {

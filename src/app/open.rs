@@ -17,6 +17,7 @@ impl App {
     /// Shows `scene` from its start; the tasks and messages of the previous one end.
     pub(super) fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
         let player = Player::new(scene).map_err(|error| scene.locate(&error).to_string())?;
+        self.end_visit();
         // Cancelled first, because a film uses another time scale.
         self.tasks.cancel_film(&mut self.run);
         let before = self.run.show_scene(scene, player);

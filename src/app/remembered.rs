@@ -113,7 +113,7 @@ impl Store {
         self.write();
     }
 
-    /// Options of a window without arguments: the last scene. If that is missing or invalid, the message names it, and the
+    /// Options of a window without arguments: the last scene, or the first visit. If that is missing or invalid, the message names it, and the
     /// default scene is opened.
     pub fn start_options(&self) -> AppOptions {
         let Some(name) = &self.now.scene else {
@@ -127,7 +127,7 @@ impl Store {
         });
         started.unwrap_or_else(|reason| AppOptions {
             problem: Some(format!("Cannot open the last scene: {reason}")),
-            ..AppOptions::first()
+            ..AppOptions::default_scene()
         })
     }
 
