@@ -142,7 +142,7 @@ impl Controls {
     /// The three contact parameters alone, the first in large type.
     pub fn contact_controls(&mut self, ui: &mut Ui, player: &mut Player) {
         spoken::landmark(ui, "Parameters");
-        let table = player.pending().parameters();
+        let (table, fingers) = (player.pending().parameters(), theme::has_fingers(ui));
         for (place, key) in FIRST.into_iter().enumerate() {
             let Some(parameter) = table.iter().find(|p| p.key == key) else {
                 continue;
@@ -151,8 +151,10 @@ impl Controls {
                 if place == 0 {
                     let style = ui.style_mut();
                     style.text_styles.values_mut().for_each(|font| font.size *= LARGE);
-                    style.spacing.interact_size.y *= LARGE;
                     style.spacing.slider_rail_height *= LARGE;
+                    if !fingers {
+                        style.spacing.interact_size.y *= LARGE;
+                    }
                 }
                 self.control(ui, player, parameter, key);
             });

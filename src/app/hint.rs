@@ -48,6 +48,11 @@ impl Hint {
         *self = Self { text, ..Self::new(self.calm) };
     }
 
+    /// Whether it has been shown and has not left yet.
+    pub fn is_shown(&self) -> bool {
+        !self.text.is_empty() && self.since.is_some()
+    }
+
     /// Removes the sentence.
     pub fn end(&mut self) {
         self.text.clear();

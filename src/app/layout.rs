@@ -483,7 +483,13 @@ impl App {
         let hint = if plain || caption.is_some() || around == Surroundings::Lecture {
             None
         } else {
-            self.hint.place(ui, area)
+            let was_shown = self.hint.is_shown();
+            let hint = self.hint.place(ui, area);
+            if was_shown && hint.is_none() && !self.calm {
+                // The machine takes the room that it leaves.
+                self.run.viewport.fit_again();
+            }
+            hint
         };
         above.extend(hint.iter().map(|hint| hint.plate));
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));

@@ -31,7 +31,7 @@ const TRAIL_LENGTH: usize = 1500;
 const MAX_CAMERA_DISTANCE: f32 = 30.0;
 
 /// Distance of the camera at the first visit relative to that of a close-up.
-const NEARER: f32 = 0.75;
+const NEARER: f32 = 0.62;
 
 /// A touch that stays this long, s, within this distance, points, grips the body under it.
 const GRIP_TIME: f64 = 0.5;
@@ -298,6 +298,11 @@ impl Viewport {
     pub fn fit(&mut self) {
         self.follow(None);
         self.fit_pending = true;
+    }
+
+    /// Fits the scene again, unless the camera was moved since the last fit.
+    pub fn fit_again(&mut self) {
+        self.fit_pending |= self.fits;
     }
 
     /// Moves close to ball joint `joint`.

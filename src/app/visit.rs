@@ -1,11 +1,12 @@
 //! The first visit: one ball of the machine from close up, in slow motion, with a sentence, the contact parameters, and ways on.
 
-use eframe::egui::{self, Button, CentralPanel, Event, Panel, RichText, ScrollArea, Ui, vec2};
+use eframe::egui::{self, Button, CentralPanel, Event, Panel, Rect, RichText, ScrollArea, Ui, vec2};
 
 use super::command::Command;
 use super::dialogs::Dialog;
 use super::keys::Action;
-use super::{App, BUILT_IN_LESSONS, layout, opening, spoken, value};
+use super::run::Run;
+use super::{App, BUILT_IN_LESSONS, layout, opening, spoken, theme, value};
 
 /// Simulated seconds per second: a ball takes about half a second from wall to wall.
 const SCALE: f64 = 0.01;
@@ -13,9 +14,9 @@ const SCALE: f64 = 0.01;
 const JOINT: usize = 0;
 /// Width of the panel beside the picture relative to the window's, and its range, points.
 const PANEL_SHARE: f32 = 0.3;
-const PANEL_WIDTHS: [f32; 2] = [260.0, 400.0];
+const PANEL_WIDTHS: [f32; 2] = [340.0, 420.0];
 /// Height of the panel below the picture relative to the window's.
-const PANEL_HEIGHT_SHARE: f32 = 0.52;
+const PANEL_HEIGHT_SHARE: f32 = 0.61;
 
 /// The first visit under way.
 #[derive(Default)]
@@ -86,9 +87,11 @@ impl App {
             self.host.note_visit();
         }
         let size = ui.available_size();
-        let frame = super::theme::panel(ui).inner_margin(egui::Margin::symmetric(20, 14));
+        let margin =
+            if self.panels.is_compact() { egui::Margin::symmetric(12, 8) } else { egui::Margin::symmetric(20, 14) };
+        let frame = theme::panel(ui).inner_margin(margin);
         let panel = if size.x > size.y {
-            let width = (PANEL_SHARE * size.x).clamp(PANEL_WIDTHS[0], PANEL_WIDTHS[1]);
+            let width = (PANEL_SHARE * size.x).clamp(PANEL_WIDTHS[0], PANEL_WIDTHS[1]).min(0.5 * size.x);
             Panel::right("first visit").exact_size(width)
         } else {
             Panel::bottom("first visit below").exact_size(PANEL_HEIGHT_SHARE * size.y)
@@ -128,7 +131,8 @@ impl App {
         self.panels.picture = area;
         self.run.player.update_ghosts();
         self.run.viewport.bare = false;
-        self.run.viewport.ui(ui, &self.run.player, false, &[]);
+        let socket = self.socket_in_picture(area);
+        self.run.viewport.ui(ui, &self.run.player, false, socket.as_slice());
         self.run.viewport.take_clicked();
         self.run.viewport.take_pull();
         let is_free = self.dialog.is_none();
@@ -143,6 +147,19 @@ impl App {
         })
     }
 
+    /// The square around the socket in the picture in `area`, with its play as drawn: no label may lie there.
+    fn socket_in_picture(&self, area: Rect) -> Option<Rect> {
+        let Run { player, viewport, .. } = &self.run;
+        let joint = player.frame().joints.get(JOINT)?;
+        let ball = player.running().machine.loose_joints.get(JOINT)?.contact.ball_radius;
+        let radius = ball + f64::from(viewport.options.magnification) * joint.clearance;
+        let up = -player.running().view.down.unit();
+        let centre = joint.socket_centre;
+        let middle = viewport.place(&centre, area)?;
+        let edge = viewport.place(&(centre + up * radius), area)?;
+        Some(Rect::from_center_size(middle, egui::Vec2::splat(2.0 * middle.distance(edge))))
+    }
+
     /// Sentence, sliders, and ways on; returns the command chosen.
     fn visit_panel(&mut self, ui: &mut Ui) -> Option<Command> {
         // Space for the scroll bar.
@@ -151,7 +168,12 @@ impl App {
         let player = &self.run.player;
         let clearance = player.frame().joints.get(JOINT).map_or(0.0, |joint| joint.clearance);
         let sentence = sentence(clearance);
-        let heading = ui.add(egui::Label::new(RichText::new(&sentence).size(22.0).strong()).wrap());
+        let heading = ui.add(
+            egui::Label::new(
+                RichText::new(&sentence).size(if self.panels.is_compact() { 20.0 } else { 24.0 }).strong(),
+            )
+            .wrap(),
+        );
         spoken::heading(&heading, &sentence);
         let scale = value::number(1.0 / player.pacer.scale(), 3);
         ui.label(if self.calm && !player.is_playing() {
@@ -177,34 +199,34 @@ impl App {
             }
         });
         ui.add_space(10.0);
-        let mut command = None;
-        for (way, name, help) in [
-            (Way::Whole, "The whole machine", "The camera moves back, and the panels appear (Esc)"),
-            (Way::Lesson, "Show me why", "The first lesson, step by step"),
-            (Way::Choose, "Choose a machine", "All machines, with pictures"),
-        ] {
-            let size = vec2(ui.available_width(), 1.3 * ui.spacing().interact_size.y);
-            if ui.add_sized(size, Button::new(RichText::new(name).strong())).on_hover_text(help).clicked() {
-                match way {
-                    Way::Whole => self.leave_visit(),
-                    Way::Lesson => {
-                        self.leave_visit();
-                        command = Some(Command::Lesson(BUILT_IN_LESSONS[0].0));
-                    }
-                    Way::Choose => command = Some(Command::Ask(Dialog::Machines { chosen: None })),
-                }
-            }
-        }
-        command
+        self.ways_on(ui)
     }
-}
 
-/// Ways on from the first visit.
-#[derive(Clone, Copy)]
-enum Way {
-    Whole,
-    Lesson,
-    Choose,
+    /// The three ways on; returns the command of the one chosen.
+    fn ways_on(&mut self, ui: &mut Ui) -> Option<Command> {
+        let height = 1.2 * ui.spacing().interact_size.y;
+        // A phone has the buttons of a finger's size, and no room for three rows of them.
+        let short = theme::has_fingers(ui);
+        let way = |ui: &mut Ui, width: f32, name: &str, help: &str| {
+            let button = Button::new(RichText::new(name).strong());
+            ui.add_sized(vec2(width, if short { 0.0 } else { height }), button).on_hover_text(help).clicked()
+        };
+        let width = ui.available_width();
+        if way(ui, width, "The whole machine", "The camera moves back, and the panels appear (Esc)") {
+            self.leave_visit();
+        }
+        let half = if short { 0.5 * (width - ui.spacing().item_spacing.x) } else { width };
+        let others = |ui: &mut Ui| {
+            let why = way(ui, half, "Show me why", "The first lesson, step by step");
+            (why, way(ui, half, "Choose a machine", "All machines, with pictures"))
+        };
+        let (why, choose) = if short { ui.horizontal(others).inner } else { others(ui) };
+        if why {
+            self.leave_visit();
+            return Some(Command::Lesson(BUILT_IN_LESSONS[0].0));
+        }
+        choose.then_some(Command::Ask(Dialog::Machines { chosen: None }))
+    }
 }
 
 /// What the run's own `clearance`, m, means for the ball.
@@ -213,5 +235,17 @@ fn sentence(clearance: f64) -> String {
         format!("This ball is {} too small for its socket.", value::quantity(clearance, "mm", 3))
     } else {
         "This ball fits its socket without play.".to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sentence_has_the_clearance_with_its_unit() {
+        assert_eq!(sentence(0.3e-3), "This ball is 0.3 mm too small for its socket.");
+        assert_eq!(sentence(0.4567e-3), "This ball is 0.457 mm too small for its socket.");
+        assert_eq!(sentence(0.0), "This ball fits its socket without play.");
     }
 }
