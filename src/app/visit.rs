@@ -16,7 +16,7 @@ const JOINT: usize = 0;
 const PANEL_SHARE: f32 = 0.3;
 const PANEL_WIDTHS: [f32; 2] = [340.0, 420.0];
 /// Height of the panel below the picture relative to the window's.
-const PANEL_HEIGHT_SHARE: f32 = 0.61;
+const PANEL_HEIGHT_SHARE: f32 = 0.56;
 
 /// The first visit under way.
 #[derive(Default)]
@@ -181,9 +181,10 @@ impl App {
         } else {
             format!("Slowed down {scale} times. Move a slider, watch the ball and listen.")
         });
-        ui.add_space(8.0);
+        let gap = if self.panels.is_compact() { 0.0 } else { 8.0 };
+        ui.add_space(gap);
         self.run.controls.contact_controls(ui, &mut self.run.player);
-        ui.add_space(4.0);
+        ui.add_space(0.5 * gap);
         ui.horizontal(|ui| {
             let playing = self.run.player.is_playing();
             if ui.button(if playing { "Pause" } else { "Play" }).clicked() {
@@ -198,18 +199,18 @@ impl App {
                 let _ = self.sound.set(on, self.host.as_mut());
             }
         });
-        ui.add_space(10.0);
+        ui.add_space(gap);
         self.ways_on(ui)
     }
 
     /// The three ways on; returns the command of the one chosen.
     fn ways_on(&mut self, ui: &mut Ui) -> Option<Command> {
-        let height = 1.2 * ui.spacing().interact_size.y;
-        // A phone has the buttons of a finger's size, and no room for three rows of them.
+        // A phone has buttons of a finger's size, and no room for three rows of them.
         let short = theme::has_fingers(ui);
+        let height = if short { 1.0 } else { 1.2 } * ui.spacing().interact_size.y;
         let way = |ui: &mut Ui, width: f32, name: &str, help: &str| {
             let button = Button::new(RichText::new(name).strong());
-            ui.add_sized(vec2(width, if short { 0.0 } else { height }), button).on_hover_text(help).clicked()
+            ui.add_sized(vec2(width, height), button).on_hover_text(help).clicked()
         };
         let width = ui.available_width();
         if way(ui, width, "The whole machine", "The camera moves back, and the panels appear (Esc)") {
