@@ -15,6 +15,9 @@ use super::{cards, layout, spoken, theme};
 /// Window width from which the header shows the program's name, points.
 const MIN_WIDTH_WITH_NAME: f32 = 900.0;
 
+/// Room in a small header for its menu and the lessons, points.
+const MIN_WIDTH_WITH_LESSONS: f32 = 150.0;
+
 /// Width of the list of scenes, points.
 const LIST_WIDTH: f32 = 560.0;
 
@@ -34,6 +37,8 @@ pub struct Header<'a> {
     /// Whether the audience window is open.
     #[cfg(not(target_arch = "wasm32"))]
     pub has_audience: bool,
+    /// Whether a small header has a button for the lessons beside its menu.
+    pub has_lessons_button: bool,
     pub commands: Vec<Command>,
 }
 
@@ -50,8 +55,12 @@ impl Header<'_> {
             }
             self.scene_box(ui, compact);
             if compact {
+                self.has_lessons_button = ui.available_width() > MIN_WIDTH_WITH_LESSONS;
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     layout::menu(ui, "Menu", true, |ui| self.menu(ui)).on_hover_text("Open, save, share, theme, keys");
+                    if self.has_lessons_button {
+                        self.lessons_button(ui);
+                    }
                 });
                 return;
             }
@@ -206,7 +215,9 @@ impl Header<'_> {
         self.desktop_entries(ui);
         self.link_button(ui);
         self.code_button(ui);
-        self.lessons_button(ui);
+        if !self.has_lessons_button {
+            self.lessons_button(ui);
+        }
         ui.separator();
         ui.label(RichText::new("Save").small().weak());
         self.save_menu(ui);

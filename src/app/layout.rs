@@ -209,6 +209,7 @@ impl App {
             recent: self.store.as_ref().map(Store::recent),
             #[cfg(not(target_arch = "wasm32"))]
             has_audience: self.presentation.audience.is_some(),
+            has_lessons_button: false,
             commands: Vec::new(),
         };
         header.ui(ui);
@@ -485,7 +486,7 @@ impl App {
         } else {
             let was_shown = self.hint.is_shown();
             let hint = self.hint.place(ui, area);
-            if was_shown && hint.is_none() && !self.calm {
+            if was_shown && !self.hint.is_shown() && !self.calm {
                 // The machine takes the room that it leaves.
                 self.run.viewport.fit_again();
             }

@@ -1026,7 +1026,7 @@ fn every_link_without_a_scene_opens_the_default_machine_in_its_own_motion() {
     // Links written before the default machine changed name theirs.
     let options = AppOptions::from_link("?scene=spcmm&c=0.5mm").expect("a link");
     assert_eq!((options.scene.name.as_str(), options.time_scale), ("spcmm", 0.02));
-    let (mut harness, _) = open(AppOptions::from_link("?theme=light").expect("a link"), LARGE);
+    let (mut harness, _) = open(AppOptions::from_link("?play=1").expect("a link"), LARGE);
     harness.run_steps(120);
     let turns = harness.state().player().pacer.shown() * 6.0;
     assert!((0.4..1.2).contains(&turns), "{turns}");

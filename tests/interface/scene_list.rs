@@ -28,10 +28,6 @@ fn the_lessons_have_pictures_lengths_and_an_order() {
         [([1280.0, 800.0], Theme::Light), ([1280.0, 800.0], Theme::Dark), ([390.0, 844.0], Theme::Light)]
     {
         let mut harness = window(size, theme);
-        if size[0] < 760.0 {
-            harness.get_by_label("Menu").click();
-            harness.run_steps(3);
-        }
         harness.get_by_role_and_label(Role::Button, "Lessons").click();
         harness.run_steps(2);
         harness.get_by_label("Start here");

@@ -71,7 +71,7 @@ fn the_default_scene_is_the_papers_machine_but_for_its_motion() {
     assert_eq!(own.machine, paper.machine);
     assert_eq!(own.overrides, paper.overrides);
     assert!(own.view.time_scale > paper.view.time_scale);
-    own.view.time_scale = paper.view.time_scale;
+    (own.view.time_scale, own.view.plots) = (paper.view.time_scale, paper.view.plots);
     assert_eq!(own.view, paper.view);
     // Its parameters are those of the paper's scene, but for what is said of the frequency and for how far its slider goes.
     assert_eq!(own.own.len(), paper.own.len());
