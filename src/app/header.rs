@@ -117,7 +117,7 @@ impl Header<'_> {
     fn scene_box(&mut self, ui: &mut Ui, compact: bool) {
         let scene = self.run.player.running();
         ComboBox::from_id_salt("scene")
-            .width(if compact { 150.0 } else { 170.0 })
+            .width(if compact || ui.ctx().content_rect().width() < MIN_WIDTH_WITH_NAME { 150.0 } else { 170.0 })
             .truncate()
             // Shows all scenes if the window is high enough; otherwise the list scrolls.
             .height(0.85 * ui.ctx().content_rect().height())
