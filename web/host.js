@@ -5,6 +5,8 @@ const $ = (id) => document.getElementById(id);
 
 /** Least interval between routine reports to a screen reader, ms, which cannot read them out faster. */
 const REPORT_INTERVAL = 10_000;
+/** `localStorage` key under which the first visit is remembered. */
+const VISIT_KEY = 'jointplay visited';
 /** How long the data of a download must exist, ms. */
 const DOWNLOAD_TIME = 60_000;
 /** Delay from a frame to its sound, s: longer than the transfer takes, so that the clicks of a frame keep their intervals. */
@@ -114,6 +116,21 @@ export function makeHost(laboratory, graphicsLost) {
         },
 
         pick: () => picker.click(),
+
+        // A browser may withhold its storage; the first visit is then shown again.
+        noteVisit() {
+            try {
+                localStorage.setItem(VISIT_KEY, '1');
+            } catch {}
+        },
+
+        wasHere() {
+            try {
+                return localStorage.getItem(VISIT_KEY) !== null;
+            } catch {
+                return false;
+            }
+        },
 
         /** A browser may refuse, as on some phones; the page then fills its viewport. */
         fillScreen(on) {

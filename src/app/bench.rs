@@ -161,7 +161,7 @@ impl Bench {
     fn tabs(&mut self, ui: &mut Ui) -> Option<(Response, &'static str)> {
         let (open, mut heading) = (self.costs.is_some(), None);
         for (costs, title, help) in [
-            (false, "Chaos bench", "Phase portrait, Poincaré section, sweeps, twin run (key B)"),
+            (false, "Order or chaos", "Phase portrait, Poincaré section, sweeps, a twin a billionth away (key B)"),
             (true, "What play costs", "How far an output moves with the play of each joint alone (key W)"),
         ] {
             let tab = ui.add(Button::selectable(costs == open, title)).on_hover_text(help);

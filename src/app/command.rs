@@ -6,15 +6,14 @@ use super::App;
 use super::dialogs::{self, Dialog, SharedLink};
 use super::film::FilmSettings;
 use super::host::SaveFile;
+use super::impact_list;
 use super::keys::Action;
 use super::load::Load;
 use super::panels::Sheet;
 #[cfg(not(target_arch = "wasm32"))]
 use super::plots::PlotFormat;
 use super::undo::Undo;
-use super::{impact_list, opening};
 use crate::analysis::ready_sweeps::ReadySweep;
-use crate::scene::{DEFAULT_SCENE, Scene};
 
 /// What a widget asks of the application.
 pub enum Command {
@@ -72,11 +71,9 @@ pub enum Command {
     /// Opens or closes the audience window.
     #[cfg(not(target_arch = "wasm32"))]
     Audience(bool),
-    /// Reverts the changes of the first-time scene.
-    PaperSettings,
     /// Stops or cancels the task under way.
     StopTasks,
-    /// Forgets all settings and opens the first-time scene.
+    /// Forgets all settings and opens the default scene.
     #[cfg(not(target_arch = "wasm32"))]
     StartAsNew,
 }
@@ -159,15 +156,6 @@ impl App {
             Command::LeaveLesson => self.leave_lesson(),
             #[cfg(not(target_arch = "wasm32"))]
             Command::Audience(on) => self.show_audience(on),
-            Command::PaperSettings => {
-                let opened = Scene::load(DEFAULT_SCENE, &[]).map_err(|error| error.to_string());
-                let opened = opened.and_then(|scene| {
-                    self.show_scene(&scene)?;
-                    self.run.player.pacer.set_scale(opening::time_scale(&scene));
-                    Ok(())
-                });
-                self.messages.report(opened);
-            }
             Command::StopTasks => self.tasks.cancel(&mut self.run, &mut self.messages),
             #[cfg(not(target_arch = "wasm32"))]
             Command::StartAsNew => self.reset_to_first_start(ctx),
@@ -183,6 +171,9 @@ impl App {
     pub(super) fn perform_action(&mut self, ctx: &egui::Context, action: Action) {
         // An open dialog blocks the machine's controls.
         if self.dialog.is_some() && !matches!(action, Action::Help | Action::Close) {
+            return;
+        }
+        if self.leave_visit_for(action) {
             return;
         }
         let moves = matches!(
@@ -258,7 +249,7 @@ impl App {
         let Some(mut dialog) = self.dialog.take() else {
             return;
         };
-        match dialogs::ui(ctx, &mut dialog, &self.run.player, &self.graphics.renderer) {
+        match dialogs::ui(ctx, &mut dialog, &self.run.player, &mut self.graphics) {
             None => self.dialog = Some(dialog),
             Some(accepted) => self.perform_all(ctx, dialog.command().filter(|_| accepted)),
         }

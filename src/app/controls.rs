@@ -21,6 +21,9 @@ const PRESET: &str = "solver.preset";
 /// Parameters shown first.
 pub(super) const FIRST: [&str; 3] = ["contact.clearance", "contact.friction", "contact.restitution"];
 
+/// Size of the first parameter of the first visit relative to the others.
+const LARGE: f32 = 1.4;
+
 /// Width from which a touch slider has its value beside it, points.
 const MIN_WIDTH_WITH_VALUE: f32 = 220.0;
 /// Side of the undo button, points.
@@ -132,6 +135,29 @@ impl Controls {
         // Parameters defined by the scene's author.
         for parameter in table.iter().filter(|p| is_scene_parameter(p)) {
             self.control(ui, player, parameter, parameter.key);
+            ui.add_space(4.0);
+        }
+    }
+
+    /// The three contact parameters alone, the first in large type.
+    pub fn contact_controls(&mut self, ui: &mut Ui, player: &mut Player) {
+        spoken::landmark(ui, "Parameters");
+        let (table, fingers) = (player.pending().parameters(), theme::has_fingers(ui));
+        for (place, key) in FIRST.into_iter().enumerate() {
+            let Some(parameter) = table.iter().find(|p| p.key == key) else {
+                continue;
+            };
+            ui.scope(|ui| {
+                if place == 0 {
+                    let style = ui.style_mut();
+                    style.text_styles.values_mut().for_each(|font| font.size *= LARGE);
+                    style.spacing.slider_rail_height *= LARGE;
+                    if !fingers {
+                        style.spacing.interact_size.y *= LARGE;
+                    }
+                }
+                self.control(ui, player, parameter, key);
+            });
             ui.add_space(4.0);
         }
     }

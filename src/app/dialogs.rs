@@ -4,11 +4,12 @@ use eframe::egui::{self, Id, Label, Modal, RichText, ScrollArea, TextEdit, Ui};
 
 use super::command::Command;
 use super::film::{self, FilmSettings};
+use super::graphics::Graphics;
 use super::host::SaveFile;
 use super::keys::Group;
 use super::load::Load;
 use super::player::Player;
-use super::spoken;
+use super::{cards, spoken};
 use crate::analysis::ready_sweeps::ReadySweep;
 pub use code::SharedLink;
 
@@ -25,6 +26,16 @@ const MIN_WIDTH_SIDE_BY_SIDE: f32 = 300.0;
 pub enum Dialog {
     /// List of keys.
     Help,
+    /// The lessons, and the one chosen.
+    Lessons {
+        /// Its name.
+        chosen: Option<&'static str>,
+    },
+    /// The built-in machines, and the one chosen.
+    Machines {
+        /// Its name.
+        chosen: Option<&'static str>,
+    },
     /// Version and state.
     About,
     /// Opens a link, a file or a built-in scene: the text typed so far and its error.
@@ -77,7 +88,9 @@ impl Dialog {
 
     fn title(&self) -> &'static str {
         match self {
-            Self::Help => "Keys",
+            Self::Help => "Keyboard shortcuts",
+            Self::Lessons { .. } => "Lessons",
+            Self::Machines { .. } => "Choose a machine",
             Self::About => "About Jointplay",
             Self::Open { .. } => "Open a link or a scene",
             Self::Save { .. } => "Save as",
@@ -93,7 +106,7 @@ impl Dialog {
     /// Label of its button, and whether it can be pressed yet; `None` if there is nothing to answer.
     fn button(&self) -> Option<(&'static str, bool)> {
         Some(match self {
-            Self::Help | Self::About => return None,
+            Self::Help | Self::About | Self::Lessons { .. } | Self::Machines { .. } => return None,
             Self::Link(shared) => ("Copy", shared.can_be_copied()),
             Self::Open { path, .. } => ("Open", !path.trim().is_empty()),
             Self::Save { path, .. } => ("Save", !path.trim().is_empty()),
@@ -109,6 +122,8 @@ impl Dialog {
     pub fn command(self) -> Option<Command> {
         Some(match self {
             Self::Help | Self::About => return None,
+            Self::Lessons { chosen } => Command::Lesson(chosen?),
+            Self::Machines { chosen } => Command::Open(chosen?.to_owned()),
             Self::Link(shared) => Command::CopyShared(shared),
             Self::Open { path, .. } => Command::OpenAny(path.trim().to_owned()),
             Self::Save { path, files, .. } => Command::SaveAs(path.trim().to_owned(), files),
@@ -122,13 +137,15 @@ impl Dialog {
 }
 
 /// Shows `dialog`. Returns whether its button was pressed once it is to close.
-pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &str) -> Option<bool> {
+pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, graphics: &mut Graphics) -> Option<bool> {
     let mut answer = None;
     // Title, buttons and frame stay visible on a low screen and when the text grows.
     let max_height = (ctx.content_rect().height() - 140.0).max(80.0);
     let width = match dialog {
         Dialog::Link(_) => max_height.clamp(200.0, 720.0),
         Dialog::Help => 1120.0,
+        Dialog::Lessons { .. } => 960.0,
+        Dialog::Machines { .. } => 640.0,
         _ => 520.0,
     };
     let widest = (ctx.content_rect().width() - 48.0).min(width);
@@ -143,7 +160,15 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
         let entered = scrolled
             .show(ui, |ui| match dialog {
                 Dialog::Help => help(ui),
-                Dialog::About => about(ui, player, renderer),
+                Dialog::Lessons { chosen } => {
+                    *chosen = cards::lessons(ui, graphics);
+                    chosen.is_some()
+                }
+                Dialog::Machines { chosen } => {
+                    *chosen = cards::machines(ui, graphics, &player.running().name);
+                    chosen.is_some()
+                }
+                Dialog::About => about(ui, player, &graphics.renderer),
                 Dialog::Open { path, error } => open(ui, path, error.as_deref()),
                 Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
                 Dialog::Link(shared) => code::ui(ui, shared, max_height),
@@ -170,6 +195,8 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
                 if possible && (button.clicked() || entered) {
                     answer = Some(true);
                 }
+            } else if entered {
+                answer = Some(true);
             }
             if ui.button("Close").clicked() {
                 answer = Some(false);

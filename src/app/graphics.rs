@@ -3,7 +3,8 @@
 use eframe::egui::{self, Atom, ThemePreference, Ui};
 use eframe::egui_wgpu::RenderState;
 
-use super::scene_pictures::ScenePictures;
+use super::lesson::LessonCard;
+use super::scene_pictures::{ScenePictures, Still};
 use super::theme;
 use crate::render;
 use crate::scene::Scene;
@@ -39,9 +40,15 @@ impl Graphics {
         self.scene_pictures = ScenePictures::default();
     }
 
+    /// Picture of a lesson.
+    pub fn lesson_picture(&mut self, ui: &Ui, lesson: &LessonCard) -> Atom<'static> {
+        let key = format!("lesson {}", lesson.name);
+        self.scene_pictures.atom(ui, self.state.as_ref(), &key, || lesson.picture().map(Still::from))
+    }
+
     /// Thumbnail of a built-in scene; blank on another canvas, where textures of the window are invalid.
     pub fn scene_picture(&mut self, ui: &Ui, is_other_canvas: bool, name: &str) -> Atom<'static> {
         let state = self.state.as_ref().filter(|_| !is_other_canvas);
-        self.scene_pictures.atom(ui, state, name, || Scene::load(name, &[]).ok())
+        self.scene_pictures.atom(ui, state, name, || Some(Still::start(Scene::load(name, &[]).ok()?)))
     }
 }

@@ -1,8 +1,6 @@
 //! The top bar with its menus.
 
-use std::sync::LazyLock;
-
-use eframe::egui::{self, Atom, ComboBox, RichText, TextFormat, TextStyle, ThemePreference, Ui, text::LayoutJob};
+use eframe::egui::{self, ComboBox, RichText, ThemePreference, Ui};
 
 use super::command::Command;
 use super::dialogs::Dialog;
@@ -12,50 +10,16 @@ use super::picture::Picture;
 use super::run::Run;
 #[cfg(not(target_arch = "wasm32"))]
 use super::{audience, plots, remembered};
-use super::{layout, lesson, spoken, theme};
-use crate::scene::{BUILT_IN, Scene};
+use super::{cards, layout, spoken, theme};
 
 /// Window width from which the header shows the program's name, points.
 const MIN_WIDTH_WITH_NAME: f32 = 900.0;
 
+/// Room in a small header for its menu and the lessons, points.
+const MIN_WIDTH_WITH_LESSONS: f32 = 150.0;
+
 /// Width of the list of scenes, points.
 const LIST_WIDTH: f32 = 560.0;
-
-/// Entry of a built-in scene in the list.
-struct SceneEntry {
-    name: &'static str,
-    title: String,
-    /// The first sentence of its description.
-    sentence: String,
-}
-
-static ABOUT_SCENES: LazyLock<Vec<SceneEntry>> = LazyLock::new(|| {
-    let about = |name| {
-        let scene = Scene::load(name, &[]).ok()?;
-        let description = scene.description.trim();
-        let end = description.find(". ").map_or(description.len(), |end| end + 1);
-        Some(SceneEntry { name, sentence: description[..end].to_owned(), title: scene.title.clone() })
-    };
-    BUILT_IN.into_iter().filter_map(about).collect()
-});
-
-impl SceneEntry {
-    /// Draws the entry: picture, title, and the sentence below it.
-    fn entry(&self, ui: &mut Ui, picture: Atom<'_>, chosen: bool, width: f32) -> egui::Response {
-        let mut words = LayoutJob::default();
-        let format = |style: TextStyle, colour| TextFormat::simple(style.resolve(ui.style()), colour);
-        words.append(&self.title, 0.0, format(TextStyle::Body, ui.visuals().strong_text_color()));
-        words.append("\n", 0.0, format(TextStyle::Small, ui.visuals().text_color()));
-        words.append(&self.sentence, 0.0, format(TextStyle::Small, ui.visuals().text_color()));
-        let entry =
-            egui::Button::selectable(chosen, (picture, words)).gap(10.0).wrap().min_size(egui::vec2(width, 0.0));
-        let response = ui.add(entry).on_hover_text(self.name);
-        let id = response.id;
-        let response = response.accessible_name(self.name);
-        ui.ctx().accesskit_node_builder(id, |node| node.set_description(&*self.title));
-        response
-    }
-}
 
 /// The header: it reads the parts of the window and collects the commands chosen in it.
 pub struct Header<'a> {
@@ -73,6 +37,8 @@ pub struct Header<'a> {
     /// Whether the audience window is open.
     #[cfg(not(target_arch = "wasm32"))]
     pub has_audience: bool,
+    /// Whether a small header has a button for the lessons beside its menu.
+    pub has_lessons_button: bool,
     pub commands: Vec<Command>,
 }
 
@@ -89,8 +55,12 @@ impl Header<'_> {
             }
             self.scene_box(ui, compact);
             if compact {
+                self.has_lessons_button = ui.available_width() > MIN_WIDTH_WITH_LESSONS;
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     layout::menu(ui, "Menu", true, |ui| self.menu(ui)).on_hover_text("Open, save, share, theme, keys");
+                    if self.has_lessons_button {
+                        self.lessons_button(ui);
+                    }
                 });
                 return;
             }
@@ -114,11 +84,15 @@ impl Header<'_> {
             self.link_button(ui);
             let undone = self.run.undo.buttons(ui, !self.is_busy);
             self.commands.extend(undone.map(|redo| Command::Undo { redo }));
-            layout::menu(ui, "Lessons", false, |ui| self.lesson_menu(ui))
-                .on_hover_text("Ten lessons on play in joints, step by step");
+            self.lessons_button(ui);
             self.panels.switches(ui);
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if ui.button("?").on_hover_text("Keys (?)").accessible_name("Keys").clicked() {
+                if ui
+                    .button("?")
+                    .on_hover_text("Keyboard shortcuts (?)")
+                    .accessible_name("Keyboard shortcuts")
+                    .clicked()
+                {
                     self.commands.push(Command::Ask(Dialog::Help));
                 }
                 // Omitted rather than overlapped if it does not fit; the theme also has a key.
@@ -143,7 +117,7 @@ impl Header<'_> {
     fn scene_box(&mut self, ui: &mut Ui, compact: bool) {
         let scene = self.run.player.running();
         ComboBox::from_id_salt("scene")
-            .width(if compact { 150.0 } else { 170.0 })
+            .width(if compact || ui.ctx().content_rect().width() < MIN_WIDTH_WITH_NAME { 150.0 } else { 170.0 })
             .truncate()
             // Shows all scenes if the window is high enough; otherwise the list scrolls.
             .height(0.85 * ui.ctx().content_rect().height())
@@ -157,9 +131,9 @@ impl Header<'_> {
                 // Stays within the edges of a narrow window.
                 let width = LIST_WIDTH.min(ui.ctx().content_rect().width() - 60.0);
                 ui.set_width(width);
-                for entry in &*ABOUT_SCENES {
+                for entry in &*cards::SCENES {
                     let picture = self.graphics.scene_picture(ui, self.picture.is_drawn(), entry.name);
-                    if entry.entry(ui, picture, scene.name == entry.name, width).clicked() {
+                    if entry.ui(ui, picture, scene.name == entry.name, width).clicked() {
                         self.commands.push(Command::Open(entry.name.to_owned()));
                     }
                 }
@@ -204,8 +178,9 @@ impl Header<'_> {
         self.entry(ui, "QR code", help, Command::ShowLink);
     }
 
-    fn lesson_menu(&mut self, ui: &mut Ui) {
-        self.commands.extend(lesson::menu(ui).map(Command::Lesson));
+    fn lessons_button(&mut self, ui: &mut Ui) {
+        let help = "Ten lessons on play in joints, step by step, with pictures and in order";
+        self.entry(ui, "Lessons", help, Command::Ask(Dialog::Lessons { chosen: None }));
     }
 
     fn save_menu(&mut self, ui: &mut Ui) {
@@ -240,8 +215,9 @@ impl Header<'_> {
         self.desktop_entries(ui);
         self.link_button(ui);
         self.code_button(ui);
-        // Collapsed, so that the following entries are visible.
-        ui.collapsing("Lessons", |ui| self.lesson_menu(ui));
+        if !self.has_lessons_button {
+            self.lessons_button(ui);
+        }
         ui.separator();
         ui.label(RichText::new("Save").small().weak());
         self.save_menu(ui);
@@ -249,7 +225,7 @@ impl Header<'_> {
         let undone = self.run.undo.entries(ui, !self.is_busy);
         self.commands.extend(undone.map(|redo| Command::Undo { redo }));
         theme_box(ui);
-        self.entry(ui, "Keys", "Keys (?)", Command::Ask(Dialog::Help));
+        self.entry(ui, "Keyboard shortcuts", "The list of keys (?)", Command::Ask(Dialog::Help));
         if ui.button("About").clicked() {
             self.commands.push(Command::Ask(Dialog::About));
             layout::close_menu(ui);

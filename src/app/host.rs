@@ -121,6 +121,9 @@ pub trait Host {
         None
     }
 
+    /// Remembers that the first visit has been shown; a window has its settings for that.
+    fn note_visit(&mut self) {}
+
     /// Enters or leaves full screen.
     fn fill_screen(&mut self, ctx: &egui::Context, on: bool) {
         ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(on));

@@ -108,7 +108,7 @@ pub const BINDINGS: [Binding; 42] = [
     bind(Group::Picture, Key::A, Action::Arrows, "A", "Force arrows on or off"),
     bind(Group::Window, Key::C, Action::Panel, "C", "Controls shown or hidden"),
     bind(Group::Window, Key::P, Action::Plots, "P", "Plots shown or hidden; in a presentation the next of them"),
-    bind(Group::Window, Key::B, Action::Bench, "B", "Chaos bench shown or hidden"),
+    bind(Group::Window, Key::B, Action::Bench, "B", "Experiments shown or hidden"),
     bind(Group::Window, Key::W, Action::Costs, "W", "What play costs, shown or hidden"),
     bind(
         Group::Window,

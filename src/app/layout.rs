@@ -167,6 +167,10 @@ impl App {
             ui.visuals_mut().disabled_alpha = 1.0;
             ui.disable();
         }
+        if self.visit.is_some() {
+            self.visit_ui(ui);
+            return self.floating_elements(ui);
+        }
         if self.is_presenting() {
             self.presentation_ui(ui);
             return self.floating_elements(ui);
@@ -205,6 +209,7 @@ impl App {
             recent: self.store.as_ref().map(Store::recent),
             #[cfg(not(target_arch = "wasm32"))]
             has_audience: self.presentation.audience.is_some(),
+            has_lessons_button: false,
             commands: Vec::new(),
         };
         header.ui(ui);
@@ -472,9 +477,22 @@ impl App {
         } else {
             Surroundings::Window
         };
-        if !plain && self.messages.are_shown(&self.run.player, &self.tasks, around) {
+        if !plain && self.messages.are_shown(&self.tasks, around) {
             above.push(Messages::area(ui, inner));
         }
+        // A caption answers a question, and takes the place of the sentence that the scene opens with.
+        let hint = if plain || caption.is_some() || around == Surroundings::Lecture {
+            None
+        } else {
+            let was_shown = self.hint.is_shown();
+            let hint = self.hint.place(ui, area);
+            if was_shown && !self.hint.is_shown() && !self.calm {
+                // The machine takes the room that it leaves.
+                self.run.viewport.fit_again();
+            }
+            hint
+        };
+        above.extend(hint.iter().map(|hint| hint.plate));
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
         self.run.viewport.bare = self.panels.embedded.is_some() && area.width() < MIN_WIDTH_WITH_CONTROLS;
         self.run.viewport.ui(&mut place, &self.run.player, plain, &above);
@@ -519,6 +537,9 @@ impl App {
         }
         if let Some(caption) = caption {
             caption.ui(ui, area);
+        }
+        if let Some(hint) = hint {
+            hint.ui(ui);
         }
         drop_hint(ui, whole);
         let inside = whole.shrink(10.0);

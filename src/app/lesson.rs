@@ -23,13 +23,12 @@ use super::tasks::replay_budget;
 use super::{App, Link};
 use crate::session::replay::Verdict;
 use before::PreviousWindow;
-pub use built_in::{BUILT_IN_LESSONS, lesson_titles};
+pub use built_in::{BUILT_IN_LESSONS, LessonCard, cards, lesson_titles};
 pub use course::Course;
-pub use format::Lesson;
-use format::{CameraTarget, PanelName, Step};
+pub use format::{CameraTarget, Lesson};
+use format::{PanelName, Step};
 use measure::LessonMeasures;
 use names::{Names, comparisons};
-pub use panel::menu;
 
 /// Latest time of a live change after its nominal instant, s: the longest solver step.
 const MAX_DELAY: f64 = 10e-3;
@@ -257,6 +256,8 @@ impl App {
                 self.files.scene = file;
             }
         }
+        // That of the lesson's scene.
+        self.hint.end();
         if self.panels.sheet == Some(Sheet::Lesson) {
             self.panels.sheet = None;
         }

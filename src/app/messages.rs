@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use eframe::egui::{self, Align2, Color32, Frame, Id, Label, Rect, RichText, ScrollArea, Ui};
 
+use super::Verdict;
 use super::announce::Announcer;
 use super::command::Command;
 use super::host::Host;
 use super::player::Player;
 use super::tasks::Tasks;
-use super::{Verdict, opening};
 
 /// Display time of a verdict that needs no action, s.
 const VERDICT_TIME: f64 = 6.0;
@@ -55,8 +55,6 @@ pub struct Messages {
     /// Time of the verdict's first display, s of viewing, if it needs no action; minus infinity once it has expired.
     verdict_shown: Option<f64>,
     notice: Option<Notice>,
-    /// Whether the user has dismissed the notice of the initial changes.
-    changes_seen: bool,
     announcer: Announcer,
 }
 
@@ -183,14 +181,9 @@ impl Messages {
     }
 
     /// Whether [`Self::ui`] has messages.
-    pub fn are_shown(&self, player: &Player, tasks: &Tasks, around: Surroundings) -> bool {
+    pub fn are_shown(&self, tasks: &Tasks, around: Surroundings) -> bool {
         let shows_verdict = self.shown_verdict(around).is_some();
-        self.problem.is_some() || shows_verdict || tasks.are_under_way() || self.shows_first_notice(player, around)
-    }
-
-    /// Whether the first-time scene is displayed and its notice not yet dismissed.
-    fn shows_first_notice(&self, player: &Player, around: Surroundings) -> bool {
-        around == Surroundings::Window && !self.changes_seen && opening::is_rattling(player.pending())
+        self.problem.is_some() || shows_verdict || tasks.are_under_way()
     }
 
     /// The verdict on a link while it is displayed.
@@ -219,7 +212,7 @@ impl Messages {
         around: Surroundings,
     ) -> Option<Command> {
         let id = Id::unique(MESSAGES_KEY);
-        if !self.are_shown(player, tasks, around) {
+        if !self.are_shown(tasks, around) {
             ui.data_mut(|data| data.remove_temp::<f32>(id));
             self.notice_plate(ui, area);
             return None;
@@ -253,9 +246,6 @@ impl Messages {
     /// Errors, the progress of a task, and the verdict on a link.
     fn strips(&mut self, ui: &mut Ui, player: &Player, tasks: &Tasks, around: Surroundings) -> Option<Command> {
         let mut chosen = None;
-        if self.shows_first_notice(player, around) && self.changes_strip(ui) {
-            chosen = Some(Command::PaperSettings);
-        }
         let colour = ui.visuals().error_fg_color;
         if self.problem.as_ref().is_some_and(|problem| strip(ui, problem, colour)) {
             self.problem = None;
@@ -282,24 +272,6 @@ impl Messages {
             self.verdict = None;
         }
         chosen
-    }
-
-    /// Notice of the changes the window started with; returns whether to revert them.
-    fn changes_strip(&mut self, ui: &mut Ui) -> bool {
-        let words = "Driven at 6 Hz; in the paper at 0.5 Hz.";
-        let row = plate(ui, ui.visuals().weak_text_color()).show(ui, |ui| {
-            ui.horizontal_wrapped(|ui| {
-                ui.label(words);
-                let help = "The scene as in its file. Its joints rattle for 70 ms and come to rest; at 6 Hz they \
-                            rattle in every period";
-                let paper = ui.button("The paper's settings").on_hover_text(help).clicked();
-                (paper, ui.button("Dismiss").clicked())
-            })
-            .inner
-        });
-        let (paper, dismissed) = row.inner;
-        self.changes_seen |= dismissed;
-        paper
     }
 
     /// A notice displayed for a few seconds.

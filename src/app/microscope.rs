@@ -283,12 +283,12 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
         ),
         ("Deepest", formatted(|impact| value::quantity(impact.deepest, "um", 3)), "Its largest indentation"),
         (
-            "Restitution asked",
+            "Restitution set",
             impact.map_or(NONE.to_owned(), |impact| ratio(impact.requested)),
             "Coefficient of restitution set for the joint",
         ),
         (
-            "By its law",
+            "Restitution by law",
             impact.map_or(NONE.to_owned(), |impact| ratio(impact.law)),
             "Restitution that the normal-force law gives an undisturbed impact",
         ),
@@ -308,7 +308,7 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
     });
     let remark = match impact {
         Some(impact) if impact.below_speed_floor => {
-            "It began slower than impact_speed_floor: it rebounds higher than asked"
+            "It began slower than impact_speed_floor: it rebounds higher than set"
         }
         Some(impact) if impact.disturbed => {
             "Another joint was in contact meanwhile, or a parameter changed: the law alone does not set its restitution"

@@ -11,6 +11,7 @@ mod background;
 mod bench;
 mod beside;
 mod canvas;
+mod cards;
 #[cfg(not(target_arch = "wasm32"))]
 mod chooser;
 mod click;
@@ -30,6 +31,7 @@ mod graphics;
 mod header;
 #[cfg(not(target_arch = "wasm32"))]
 mod headless;
+mod hint;
 mod host;
 mod icons;
 mod impact_list;
@@ -67,6 +69,7 @@ mod timeline;
 mod transport;
 mod undo;
 mod viewport;
+mod visit;
 #[cfg(not(target_arch = "wasm32"))]
 mod window;
 mod zoom;
@@ -97,6 +100,7 @@ pub use film::FilmSettings;
 use graphics::Graphics;
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::Headless;
+use hint::Hint;
 pub use host::{BackgroundTask, Clock, DroppedFile, Host, NoHost, OpenedFile, SaveFile};
 use keys::Action;
 use lesson::Course;
@@ -116,6 +120,7 @@ pub use remembered::{Store, StoredSettings};
 use run::Run;
 use sound::Sound;
 use tasks::Tasks;
+use visit::Visit;
 #[cfg(not(target_arch = "wasm32"))]
 pub use window::{WindowError, run_native};
 
@@ -130,6 +135,10 @@ pub struct App {
     tasks: Tasks,
     course: Course,
     messages: Messages,
+    hint: Hint,
+    visit: Option<Visit>,
+    /// Reduced motion.
+    calm: bool,
     dialog: Option<Dialog>,
     panels: Panels,
     presentation: Presentation,
@@ -178,6 +187,9 @@ impl App {
             tasks: Tasks::default(),
             course: Course::default(),
             messages: Messages::new(options.problem),
+            hint: Hint::new(options.calm),
+            visit: None,
+            calm: options.calm,
             dialog: None,
             panels: Panels::new(options.embedded),
             presentation: Presentation::default(),
@@ -190,11 +202,15 @@ impl App {
             store: None,
         };
         let starts_step = options.link.is_none();
+        app.hint.begin(&options.scene);
         if let Some(link) = options.link {
             app.show_link(link);
         }
         if let Some((lesson, step)) = options.lesson {
             app.resume_lesson(lesson, step, starts_step);
+        }
+        if options.visit {
+            app.begin_visit();
         }
         app.attach(ctx, state, options.theme);
         Ok(app)
@@ -454,7 +470,8 @@ impl eframe::App for App {
         self.receive_picture(ctx);
         self.advance_film(ctx);
         self.presentation.follow_screen(ctx);
-        if let Some(why) = self.sound.check(self.host.as_mut()) {
+        // Without sound the first visit is silent: nobody has asked for it.
+        if let Some(why) = self.sound.check(self.host.as_mut()).filter(|_| self.visit.is_none()) {
             self.messages.notify(why);
         }
         if self.bench.update(self.host.as_mut()) {

@@ -17,17 +17,23 @@ impl App {
     /// Shows `scene` from its start; the tasks and messages of the previous one end.
     pub(super) fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
         let player = Player::new(scene).map_err(|error| scene.locate(&error).to_string())?;
+        self.end_visit();
         // Cancelled first, because a film uses another time scale.
         self.tasks.cancel_film(&mut self.run);
         let before = self.run.show_scene(scene, player);
         self.course.remember_run(before, std::mem::take(&mut self.files.scene));
         self.tasks.clear();
         self.messages.clear();
+        self.hint.begin(scene);
         Ok(())
     }
 
     /// Applies camera, followed part, plots and instruments of `link`, and goes to its instant; other settings stay.
     pub(super) fn show_link(&mut self, link: Link) {
+        if link.has_instant() {
+            // The link shows something of its own.
+            self.hint.end();
+        }
         self.messages.warn(self.run.apply_link(&link));
         self.tasks.start_replay(link, &mut self.run.player);
     }
@@ -145,7 +151,7 @@ impl App {
         opened
     }
 
-    /// Resets all settings and opens the first-time scene.
+    /// Resets all settings and opens the default scene.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn reset_to_first_start(&mut self, ctx: &egui::Context) {
         self.present(ctx, false);

@@ -1,7 +1,7 @@
-//! Initial state of a window: time scale and plots of a scene, and the scene for first-time visitors.
+//! Initial state of a window: time scale and plots of a scene.
 
 use crate::analysis::drive::common_period;
-use crate::scene::{DEFAULT_SCENE, Scene};
+use crate::scene::Scene;
 use crate::session::pace::SCALE_RANGE;
 use crate::simulate::Quantity;
 
@@ -9,12 +9,6 @@ use crate::simulate::Quantity;
 const PERIOD_VIEWING_TIME: f64 = 4.0;
 /// Time scale if neither the scene nor a drive defines one.
 const UNDRIVEN_SCALE: f64 = 0.1;
-
-/// Changes to the default scene that keep its joints rattling: with the paper's drive they come to rest after 70 ms. A ball that
-/// is hit again during contact also needs the changed approach speed.
-const RATTLING_CHANGES: [(&str, &str); 2] = [("spcmm.frequency", "6 Hz"), ("contact.approach_speed", "largest")];
-/// Time scale of the rattling scene, simulated seconds per second: a turn takes 3.3 s.
-pub const RATTLING_SCALE: f64 = 0.05;
 
 /// Initial time scale of a window on `scene`, simulated seconds per second: the value in its file, or one at which a drive period
 /// takes about four seconds.
@@ -44,23 +38,11 @@ pub fn plots(scene: &Scene) -> Vec<Quantity> {
     all.filter(|quantity| words.contains(&Some(quantity.word()))).collect()
 }
 
-/// The default scene for first-time visitors, whose joints keep rattling.
-pub fn rattling() -> Scene {
-    let changes = RATTLING_CHANGES.map(|(key, value)| (key.to_owned(), value.to_owned()));
-    Scene::load(DEFAULT_SCENE, &changes).expect("built-in scenes are right")
-}
-
-/// Whether `scene` is the scene of [`rattling`] without further changes.
-pub fn is_rattling(scene: &Scene) -> bool {
-    let changes = scene.changes.iter().map(|(key, value)| (key.as_str(), value.as_str()));
-    scene.name == DEFAULT_SCENE && changes.eq(RATTLING_CHANGES)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::analysis::drive::drive_period;
-    use crate::scene::BUILT_IN;
+    use crate::scene::{BUILT_IN, DEFAULT_SCENE};
     use crate::simulate::Simulation;
 
     #[test]
@@ -70,7 +52,7 @@ mod tests {
             let scale = time_scale(&scene);
             match drive_period(&scene) {
                 // With the paper's drive only the first 70 ms matter; the scene file sets a time scale for them.
-                Ok(_) if name == DEFAULT_SCENE => assert_eq!(scale, 0.02),
+                Ok(_) if name == "spcmm" => assert_eq!(scale, 0.02),
                 Ok(period) => assert!((3.0..6.0).contains(&(period / scale)), "{name}: {period} s at {scale}"),
                 Err(_) => assert!(scene.view.time_scale.is_some(), "{name}"),
             }
@@ -107,11 +89,9 @@ mod tests {
     }
 
     #[test]
-    fn the_first_time_scene_has_impacts_in_every_period() {
-        let scene = rattling();
-        assert!(is_rattling(&scene));
+    fn the_default_scene_has_impacts_in_every_period() {
+        let scene = Scene::load(DEFAULT_SCENE, &[]).expect("built in");
         let period = drive_period(&scene).expect("driven");
-        assert!((3.0..6.0).contains(&(period / RATTLING_SCALE)));
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut peaks = Vec::new();
         for turn in 1..=12 {

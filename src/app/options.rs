@@ -27,6 +27,8 @@ pub struct AppOptions {
     pub link: Option<Link>,
     /// The lesson of the scene, and its step, counted from 0.
     pub lesson: Option<(Arc<Lesson>, usize)>,
+    /// Whether the window begins with one ball from close up, for somebody who comes for the first time.
+    pub visit: bool,
     /// Panels of an embedded window; `None` for a stand-alone window.
     pub embedded: Option<Embedded>,
     /// A message to show at once, e.g. why a link could not be opened.
@@ -50,6 +52,7 @@ impl AppOptions {
             view: ViewOptions { magnification: 20.0, ..ViewOptions::default() },
             link: None,
             lesson: None,
+            visit: false,
             embedded: None,
             problem: None,
             calm: false,
@@ -58,10 +61,14 @@ impl AppOptions {
         }
     }
 
-    /// The first-time scene: the default scene, driven so fast that its joints rattle at every turn. The window states the
-    /// change, and how to revert to the scene file.
+    /// Plays the default scene.
+    pub fn default_scene() -> Self {
+        Self::new(Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right"))
+    }
+
+    /// The first visit, in the default scene.
     pub fn first() -> Self {
-        Self { time_scale: opening::RATTLING_SCALE, ..Self::new(opening::rattling()) }
+        Self { visit: true, ..Self::default_scene() }
     }
 
     /// Starts `lesson` at step `step`, counted from 0.
@@ -94,7 +101,8 @@ impl AppOptions {
         }
         if link.requests_nothing(text) {
             let theme = link.theme.map_or(ThemePreference::System, theme::preference);
-            return Ok(Self { theme, embedded: link.embedded, ..Self::first() });
+            let visit = link.embedded.is_none();
+            return Ok(Self { theme, visit, embedded: link.embedded, ..Self::default_scene() });
         }
         let scene = link.load().map_err(|error| format!("link: {error}"))?;
         Simulation::new(&scene.machine).map_err(|error| format!("link: {}", scene.locate(&error)))?;
@@ -121,9 +129,8 @@ impl AppOptions {
     /// reason as [`Self::problem`].
     pub fn from_link_or_default(text: &str) -> Self {
         Self::from_link(text).unwrap_or_else(|problem| {
-            let scene = Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right");
             let embedded = link::requested_panels(text);
-            Self { problem: Some(problem), playing: false, embedded, ..Self::new(scene) }
+            Self { problem: Some(problem), playing: false, embedded, ..Self::default_scene() }
         })
     }
 }

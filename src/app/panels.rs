@@ -26,7 +26,7 @@ pub enum Sheet {
     Controls,
     /// Plots.
     Plots,
-    /// Chaos bench, or what play costs.
+    /// Experiments: order or chaos, or what play costs.
     Bench,
     /// The lesson in progress.
     Lesson,
@@ -136,8 +136,8 @@ impl Panels {
             (&mut self.plots, "Plots", "Plots shown or hidden (key P)"),
             (
                 &mut self.bench,
-                "Bench",
-                "Bench shown or hidden: chaos bench (key B) with sweeps and twin run; what play costs (key W)",
+                "Experiments",
+                "Experiments shown or hidden: order or chaos (key B) with sweeps and a twin; what play costs (key W)",
             ),
         ];
         for (on, name, help) in panels {
@@ -152,7 +152,7 @@ impl Panels {
         let mut tabs = vec![
             (Sheet::Controls, "Controls", "Parameters shown or hidden"),
             (Sheet::Plots, "Plots", "Plots shown or hidden"),
-            (Sheet::Bench, "Bench", "Chaos bench and what play costs, shown or hidden"),
+            (Sheet::Bench, "Experiments", "Order or chaos, and what play costs, shown or hidden"),
         ];
         if in_lesson {
             tabs.insert(0, (Sheet::Lesson, "Lesson", "Lesson shown or hidden"));

@@ -150,6 +150,7 @@ impl App {
         let (scale, chosen, window) =
             (self.run.player.pacer.scale(), self.run.plots.chosen.clone(), self.run.plots.window);
         self.show_scene(&scene)?;
+        self.hint.end();
         self.run.player.pacer.set_scale(scale);
         (self.run.plots.chosen, self.run.plots.window) = (chosen, window);
         self.files.scene = SceneFile { watched, ..SceneFile::opened(name, companions) };

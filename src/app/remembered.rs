@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 use super::files::SCENE_TYPE;
 use super::host::SaveFile;
 use super::present::Presentation;
-use super::{AppOptions, layout, opening, theme};
+use super::{AppOptions, layout, theme};
 use crate::files::{FileError, OutputFile, create_dir_all};
-use crate::scene::{DEFAULT_SCENE, MAX_FILE_SIZE, Scene, built_in_text, read_regular};
+use crate::scene::{MAX_FILE_SIZE, Scene, built_in_text, read_regular};
 use crate::session::link::ThemeChoice;
 use crate::simulate::Simulation;
 use crate::words::Words as _;
@@ -40,7 +40,7 @@ pub struct StoredSettings {
     pub theme: Option<String>,
     /// Zoom of the interface.
     pub zoom: Option<f32>,
-    /// File or name of the last scene; `None` for the first-time scene.
+    /// File or name of the last scene; `None` for the default scene.
     pub scene: Option<String>,
     /// Opened or saved scene files, latest first.
     pub recent: Vec<String>,
@@ -113,8 +113,8 @@ impl Store {
         self.write();
     }
 
-    /// Options of a window without arguments: the last scene. If that is missing or invalid, the message names it, and the
-    /// first-time scene is opened.
+    /// Options of a window without arguments: the last scene, or the first visit. If that is missing or invalid, the message names it, and the
+    /// default scene is opened.
     pub fn start_options(&self) -> AppOptions {
         let Some(name) = &self.now.scene else {
             return AppOptions::first();
@@ -127,7 +127,7 @@ impl Store {
         });
         started.unwrap_or_else(|reason| AppOptions {
             problem: Some(format!("Cannot open the last scene: {reason}")),
-            ..AppOptions::first()
+            ..AppOptions::default_scene()
         })
     }
 
@@ -197,8 +197,7 @@ impl Store {
                 now.scene = Some(file);
             }
             Some((scene, None)) if built_in_text(&scene.name).is_some_and(|text| *text == *scene.source.text) => {
-                let first = scene.name == DEFAULT_SCENE && opening::is_rattling(scene);
-                now.scene = (!first).then(|| scene.name.clone());
+                now.scene = Some(scene.name.clone());
             }
             _ => {}
         }
@@ -252,6 +251,7 @@ fn absolute(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::DEFAULT_SCENE;
 
     #[test]
     fn settings_are_read_back_and_broken_or_implausible_ones_are_dropped() {
@@ -289,23 +289,23 @@ mod tests {
         let mut store = Store::at(folder.path().join("window.json"));
         let opens = |store: &Store| {
             let options = store.start_options();
-            (options.scene.name.clone(), opening::is_rattling(&options.scene), options.problem)
+            (options.scene.name.clone(), options.problem)
         };
-        assert_eq!(opens(&store), (DEFAULT_SCENE.to_owned(), true, None));
+        assert_eq!(opens(&store), (DEFAULT_SCENE.to_owned(), None));
         store.now.scene = Some("pendulum".to_owned());
-        assert_eq!(opens(&store), ("pendulum".to_owned(), false, None));
+        assert_eq!(opens(&store), ("pendulum".to_owned(), None));
         let file = folder.path().join("mine.toml");
         store.now.scene = Some(absolute(&file));
         for text in [None, Some("no scene")] {
             if let Some(text) = text {
                 std::fs::write(&file, text).expect("writable");
             }
-            let (name, rattles, problem) = opens(&store);
-            assert!(name == DEFAULT_SCENE && rattles);
+            let (name, problem) = opens(&store);
+            assert_eq!(name, DEFAULT_SCENE);
             let problem = problem.expect("a message");
             assert!(problem.contains("mine.toml"), "{problem}");
         }
         std::fs::write(&file, built_in_text("chain").expect("built in")).expect("writable");
-        assert_eq!(opens(&store).2, None);
+        assert_eq!(opens(&store).1, None);
     }
 }

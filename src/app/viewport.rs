@@ -30,6 +30,9 @@ const TRAIL_LENGTH: usize = 1500;
 /// Largest camera distance by zooming, in radii of the machine.
 const MAX_CAMERA_DISTANCE: f32 = 30.0;
 
+/// Distance of the camera at the first visit relative to that of a close-up.
+const NEARER: f32 = 0.62;
+
 /// A touch that stays this long, s, within this distance, points, grips the body under it.
 const GRIP_TIME: f64 = 0.5;
 const GRIP_DISTANCE: f32 = 6.0;
@@ -297,6 +300,11 @@ impl Viewport {
         self.fit_pending = true;
     }
 
+    /// Fits the scene again, unless the camera was moved since the last fit.
+    pub fn fit_again(&mut self) {
+        self.fit_pending |= self.fits;
+    }
+
     /// Moves close to ball joint `joint`.
     pub fn show_close_up(&mut self, player: &Player, joint: usize) {
         if joint < player.frame().joints.len() {
@@ -305,6 +313,25 @@ impl Viewport {
             self.view.close_up(&mut goal, joint, scene, player.frame(), &self.options);
             self.move_and_follow(player, goal, joint);
         }
+    }
+
+    /// Shows ball joint `joint` from close up at once, larger than [`Self::show_close_up`].
+    pub fn begin_close_up(&mut self, player: &Player, joint: usize) {
+        self.show_close_up(player, joint);
+        if let Some(mut goal) = self.goal.take() {
+            goal.distance *= NEARER;
+            self.camera = goal;
+        }
+    }
+
+    /// Moves back to the whole scene, as it was first shown.
+    pub fn show_whole(&mut self) {
+        self.follow(None);
+        let first = self.view.camera();
+        let mut goal = self.goal.unwrap_or(self.camera);
+        (goal.yaw, goal.pitch) = (first.yaw, first.pitch);
+        self.goal = Some(goal);
+        (self.fit_pending, self.moved) = (true, false);
     }
 
     /// Centres the view on ball joint `joint` and follows it.

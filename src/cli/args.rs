@@ -98,7 +98,7 @@ pub struct CheckArguments {
 #[derive(Debug, Default, Args)]
 pub struct ViewArguments {
     /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`), which is shown again whenever it is saved
-    /// [default: the scene opened last; the first time spcmm at 6 Hz, where its joints rattle in every period].
+    /// [default: the scene opened last; the first time measuring-machine].
     pub scene: Option<OsString>,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_change)]

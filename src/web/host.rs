@@ -27,6 +27,12 @@ extern "C" {
     fn fill_screen(on: bool);
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn announce(text: &str, event: bool);
+    /// Remembers that the first visit has been shown, if the browser lets the page store anything.
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = noteVisit)]
+    fn note_visit();
+    /// Whether it has been shown before.
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = wasHere)]
+    pub fn was_here() -> bool;
     /// Switches sound on or off; returns the reason for a failure, or "".
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn sound(on: bool) -> String;
@@ -162,6 +168,10 @@ impl Host for WebHost {
 
     fn no_sound(&mut self) -> Option<String> {
         self.no_sound.take()
+    }
+
+    fn note_visit(&mut self) {
+        note_visit();
     }
 
     fn announce(&mut self, text: &str, event: bool) {

@@ -12,7 +12,7 @@ use serde_json::json;
 use wasm_bindgen::prelude::*;
 
 use super::crash;
-use super::host::{Inbox, WebHost, are_graphics_lost, graphics_lost, schedule_steps};
+use super::host::{Inbox, WebHost, are_graphics_lost, graphics_lost, schedule_steps, was_here};
 use super::mirror::Mirror;
 use crate::app::{App, AppOptions};
 use crate::render::wgpu::Backends;
@@ -305,6 +305,7 @@ impl Laboratory {
             contrast: preferences.contains("contrast"),
             ..AppOptions::from_link_or_default(link)
         };
+        let options = AppOptions { visit: options.visit && !was_here(), ..options };
         let mut app = App::new(cc, options)?;
         app.set_host(Box::new(WebHost { inbox, no_sound: None }));
         app.follow_frame_rate();

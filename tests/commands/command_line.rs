@@ -40,7 +40,7 @@ impl Csv {
 }
 
 #[test]
-fn rows_of_the_default_scene_have_the_promised_columns_and_times() {
+fn rows_of_the_papers_scene_have_the_promised_columns_and_times() {
     let folder = folder();
     let run = jointplay(folder.path(), "run spcmm --duration 20ms --every 0.1ms --out run.csv").expect(0);
     assert!(run.stdout.contains("impacts"), "{}", run.stdout);

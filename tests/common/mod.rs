@@ -25,7 +25,8 @@ pub fn at_random_instants(length: Duration, default_count: u32, mut kill: impl F
 }
 
 /// The built-in scenes with few joints, which every method runs quickly.
-pub const SCENES: [&str; 5] = ["spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain"];
+pub const SCENES: [&str; 6] =
+    ["measuring-machine", "spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain"];
 /// The other built-in scenes, whose long runs are slow; `tests/physics/machines.rs` checks each of them.
 pub const MACHINES: [&str; 5] = ["hexapod", "delta", "four-bar", "suspension", "press"];
 /// Words of `solver.method`.

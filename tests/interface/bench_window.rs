@@ -297,7 +297,7 @@ fn a_scene_without_a_drive_explains_why_it_has_no_phase() {
 fn a_twin_diverges_from_the_run_without_affecting_it() {
     let changes = [FAST, ("contact.friction", "0")];
     let mut harness = window("spcmm", &changes);
-    click(&mut harness, Role::CheckBox, "Twin run");
+    click(&mut harness, Role::CheckBox, "Twin a billionth away");
     let player = harness.state_mut().player_mut();
     assert!(player.twin().is_some());
     player.run_to(0.1);
@@ -309,7 +309,7 @@ fn a_twin_diverges_from_the_run_without_affecting_it() {
     harness.run();
     harness.get_by_label_contains("Exponent — 1/s, known in 5");
 
-    click(&mut harness, Role::CheckBox, "Twin run");
+    click(&mut harness, Role::CheckBox, "Twin a billionth away");
     let player = harness.state_mut().player_mut();
     assert!(player.twin().is_none());
     player.reset().expect("starts");
@@ -320,7 +320,7 @@ fn a_twin_diverges_from_the_run_without_affecting_it() {
 #[test]
 fn an_ideal_mechanism_has_no_twin() {
     let harness = window("spcmm", &[("contact.clearance", "0")]);
-    let switch = harness.get_by_role_and_label(Role::CheckBox, "Twin run");
+    let switch = harness.get_by_role_and_label(Role::CheckBox, "Twin a billionth away");
     assert!(switch.accesskit_node().is_disabled());
 }
 

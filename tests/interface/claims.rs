@@ -337,7 +337,7 @@ fn plots_twin_distance(shown: &mut Shown) -> bool {
         harness.run_steps(3);
     };
     if shown.mode == Mode::Phone {
-        tab(&mut shown.harness, "Bench");
+        tab(&mut shown.harness, "Experiments");
     }
     let is_shown = shows_text(&shown.harness, "Distance to twin");
     if shown.mode == Mode::Phone {

@@ -121,7 +121,7 @@ fn every_button_list_and_switch_can_be_clicked_at_its_centre() {
 fn every_list_and_menu_opens_by_a_press_at_its_centre() {
     let mut harness = sized("spcmm", WIDE, egui::Theme::Light);
     assert!(open_lists(&mut harness, "window") >= 3);
-    for menu in ["Save", "Lessons", "View options", "Choose plots"] {
+    for menu in ["Save", "View options", "Choose plots"] {
         assert_opens(&mut harness, "window", Role::Button, menu);
     }
     let mut harness = presenting(WIDE);
@@ -163,7 +163,7 @@ fn a_time_scale_is_chosen_from_the_list_by_a_mouse_and_by_a_drag_across_it() {
 
 #[test]
 fn a_menu_opens_at_the_first_click_after_a_slider_drag() {
-    for menu in ["Save", "Lessons", "Before and after (1)"] {
+    for menu in ["Save", "Before and after (1)"] {
         let mut harness = sized("slider-crank", WIDE, egui::Theme::Light);
         let track = harness.get_by_role_and_label(Role::Slider, "Clearance").rect();
         harness.drag_at(track.left_center() + vec2(12.0, 0.0));

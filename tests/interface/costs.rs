@@ -213,14 +213,14 @@ fn a_click_on_an_end_moves_the_slider_of_its_joint_and_is_undone() {
 fn closing_the_panel_cancels_the_study_and_discards_results() {
     let mut harness = large();
     let points = throttle(&mut harness);
-    for close in ["What play costs", "Bench", "tab"] {
+    for close in ["What play costs", "Experiments", "tab"] {
         click(&mut harness, Role::Button, "Start runs");
         harness.run_steps(2);
         assert!(harness.state().bench().is_computing_costs());
         let running = Rc::strong_count(&points);
         match close {
-            "tab" => click(&mut harness, Role::Button, "Chaos bench"),
-            "Bench" => click(&mut harness, Role::Button, "Bench"),
+            "tab" => click(&mut harness, Role::Button, "Order or chaos"),
+            "Experiments" => click(&mut harness, Role::Button, "Experiments"),
             _ => harness.key_press(Key::W),
         }
         harness.run();
@@ -282,7 +282,7 @@ fn on_a_phone_the_slider_replaces_the_panel_until_it_is_reopened() {
     let bottom = slider.rect().bottom();
     assert!(bottom < 844.0, "{bottom}");
     assert!(!harness.state().shows_costs());
-    click(&mut harness, Role::Button, "Bench");
+    click(&mut harness, Role::Button, "Experiments");
     harness.run();
     harness.get_by_label_contains("Of an earlier setting.");
     bar_end(&harness, "Clearance of S1 0.45 mm:");

@@ -242,7 +242,7 @@ fn theme_zoom_and_scenes_are_remembered_until_a_fresh_start() {
     assert_eq!(harness.ctx.zoom_factor(), 1.0);
     assert!(harness.ctx.options(|options| options.theme_preference == ThemePreference::System));
     let now = stored(&path);
-    assert_eq!((now.scene, now.recent.len(), now.size), (None, 0, None));
+    assert_eq!((now.scene.as_deref(), now.recent.len(), now.size), (Some(DEFAULT_SCENE), 0, None));
 }
 
 /// A desktop host whose dialogs are answered by a test.

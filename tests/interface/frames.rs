@@ -25,7 +25,8 @@ fn golden_in(folder: &str, name: &str, arguments: &str) {
 const IMPACT: &str = "spcmm --at 7.85ms --size 640x400 --magnification 20 --overlay";
 
 /// Every built-in scene: the instant, and the magnification of its clearances.
-const SCENES: [(&str, &str, u32); 10] = [
+const SCENES: [(&str, &str, u32); 11] = [
+    ("measuring-machine", "0.108s", 20),
     ("spcmm", "7.85ms", 20),
     ("pendulum", "0.1s", 1),
     ("slider-crank", "0.1s", 1),
@@ -70,7 +71,7 @@ fn spcmm_in_the_window_is_drawn_as_stored() {
 
 #[test]
 fn the_readme_shows_the_current_window() {
-    golden_in("assets", "window", "spcmm --at 26ms --size 1200x740 --ui");
+    golden_in("assets", "window", "measuring-machine --at 0.108s --size 1200x740 --ui");
 }
 
 #[test]

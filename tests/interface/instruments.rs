@@ -151,7 +151,7 @@ fn the_microscope_shows_the_recorded_values_of_an_impact() {
     let impact = *impact.expect("S1 was hit");
     let restitution = format!("{:.4}", impact.achieved());
     harness.get_by_label(restitution.trim_end_matches('0'));
-    harness.get_by_label("Restitution asked");
+    harness.get_by_label("Restitution set");
     harness.get_by_label("0.9");
     harness.get_by_label("The ball touches nothing");
     for step in 0.. {

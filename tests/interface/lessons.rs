@@ -218,7 +218,7 @@ fn the_window_is_restored_when_a_lesson_ends() {
         player.run_to(12e-3);
         harness.run();
         let panels = |harness: &Harness<'_, App>| {
-            ["Accuracy", "Normal force, N", "Chaos bench"].map(|panel| harness.query_by_label(panel).is_some())
+            ["Accuracy", "Normal force, N", "Order or chaos"].map(|panel| harness.query_by_label(panel).is_some())
         };
         assert_eq!(panels(&harness), [true, false, true]);
         let before = harness.state().share_state();

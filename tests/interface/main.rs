@@ -33,4 +33,5 @@ mod scene_list;
 mod sound;
 mod touch;
 mod undo;
+mod visit;
 mod window;

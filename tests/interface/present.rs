@@ -165,7 +165,7 @@ fn a_double_click_on_the_bar_toggles_presentation_too() {
         let rect_of = |label: &str| harness.get_by_label(label).rect();
         let at = match size {
             [844.0, _] => rect_of("Controls").left_center() - vec2(14.0, 0.0),
-            [390.0, _] => egui::pos2(370.0, rect_of("Bench").center().y),
+            [390.0, _] => egui::pos2(370.0, rect_of("Experiments").center().y),
             _ => egui::pos2(size[0] - 24.0, rect_of("Play").center().y),
         };
         for _ in 0..2 {

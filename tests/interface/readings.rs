@@ -153,7 +153,7 @@ fn high_first_peaks_are_cut_from_a_plot_of_forces_and_their_height_is_displayed(
     let words = texts.lines().find(|text| text.ends_with(" N above")).expect("the height of the cut peaks");
     let displayed: f64 = words.split_whitespace().nth(1).and_then(|word| word.parse().ok()).expect("a number");
     assert!((displayed / first - 1.0).abs() < 5.1e-3, "{words}: {first} N");
-    let toggle = |harness: &Harness<'_, App>| harness.get_by_label("Cut first peaks in Normal force").click();
+    let toggle = |harness: &Harness<'_, App>| harness.get_by_label("Whole first peaks in Normal force").click();
     toggle(&harness);
     harness.run();
     assert!(above(&mut harness, first) < 0.0, "the plot lacks the whole range");

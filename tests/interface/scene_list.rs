@@ -4,7 +4,7 @@ use eframe::egui::{Rect, Theme, accesskit::Role};
 use eframe::egui_wgpu::RendererOptions;
 use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state, default_wgpu_setup};
 use egui_kittest::{Harness, kittest::Queryable as _};
-use jointplay::app::{App, AppOptions};
+use jointplay::app::{App, AppOptions, lesson_titles};
 use jointplay::scene::{BUILT_IN, Scene};
 
 /// A window that uses one adapter for on-screen and off-screen drawing.
@@ -19,6 +19,37 @@ fn window(size: [f32; 2], theme: Theme) -> Harness<'static, App> {
     harness.state_mut().attach(&ctx, Some(&state), theme.into());
     harness.run();
     harness
+}
+
+/// The list of lessons: in order, each with a picture and its length, and the first to start with.
+#[test]
+fn the_lessons_have_pictures_lengths_and_an_order() {
+    for (size, theme) in
+        [([1280.0, 800.0], Theme::Light), ([1280.0, 800.0], Theme::Dark), ([390.0, 844.0], Theme::Light)]
+    {
+        let mut harness = window(size, theme);
+        harness.get_by_role_and_label(Role::Button, "Lessons").click();
+        harness.run_steps(2);
+        harness.get_by_label("Start here");
+        let places: Vec<Rect> = lesson_titles()
+            .iter()
+            .map(|(_, title)| harness.get_by_role_and_label(Role::Button, title).rect())
+            .collect();
+        for pair in places.windows(2) {
+            assert!(pair[0].bottom() <= pair[1].top() || pair[0].right() <= pair[1].left(), "{pair:?}: in order");
+        }
+        harness.run_steps(places.len() + 2);
+        if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
+            let name = format!("lessons-{}-{theme:?}.png", size[0]);
+            harness.render().expect("drawn").save(std::path::Path::new(&keep).join(name)).expect("writable");
+        }
+        let seen: Vec<Rect> = places.into_iter().filter(|place| place.bottom() < size[1] * 0.8).collect();
+        assert!(seen.len() >= 5, "{seen:?}");
+        for place in seen {
+            let colours = count_colours(&mut harness, place);
+            assert!(colours > 60, "{place:?}: {colours}");
+        }
+    }
 }
 
 fn entries(harness: &Harness<'_, App>) -> Vec<Rect> {

@@ -84,7 +84,7 @@ const FIXED: [(Role, &str); 12] = [
     (Role::Button, "Panels"),
     (Role::Button, "Controls"),
     (Role::Button, "Plots"),
-    (Role::Button, "Bench"),
+    (Role::Button, "Experiments"),
 ];
 
 #[test]
@@ -206,7 +206,7 @@ fn a_phone_in_portrait_shows_the_achieved_speed() {
     harness.run_steps(90);
     assert!(label(&harness, "reached 1:"));
     let words = harness.get_by_label_contains("reached 1:").rect();
-    let bench = rect(&harness, Role::Button, "Bench");
+    let bench = rect(&harness, Role::Button, "Experiments");
     assert!(words.left() >= bench.right() && words.right() <= PORTRAIT[0], "{words:?}");
     assert!((words.center().y - bench.center().y).abs() < 4.0);
 }

@@ -225,7 +225,9 @@ fn the_whole_list_of_keys_is_visible() {
 fn switches_in_the_header_show_and_hide_the_panels() {
     for size in [[780.0, 700.0], [1280.0, 800.0]] {
         let mut harness = sized("pendulum", size, egui::Theme::Light);
-        for (switch, inside) in [("Controls", "Accuracy"), ("Plots", "Normal force, N"), ("Bench", "Chaos bench")] {
+        for (switch, inside) in
+            [("Controls", "Accuracy"), ("Plots", "Normal force, N"), ("Experiments", "Order or chaos")]
+        {
             let shown = |harness: &Harness<'_, App>| harness.query_by_label(inside).is_some();
             let before = shown(&harness);
             for on in [!before, before] {

@@ -14,7 +14,7 @@ const ENERGY_TOLERANCE: f64 = 1e-4;
 
 #[test]
 fn the_list_of_built_in_scenes_is_complete() {
-    assert_eq!([SCENES, MACHINES].concat(), BUILT_IN);
+    assert_eq!([&SCENES[..], &MACHINES].concat(), BUILT_IN);
 }
 
 /// Pose of body `name`: position and rotation matrix.

@@ -150,10 +150,10 @@ test('a screen reader hears events; elements have names and the places of their 
         await clean(`as opened, ${size.width} pixels wide`);
     }
     await lab.key('KeyB');
-    await lab.element('heading', 'Chaos bench');
+    await lab.element('heading', 'Order or chaos');
     await clean('with the bench');
     await lab.key('F1');
-    await lab.element('dialog', 'Keys');
+    await lab.element('dialog', 'Keyboard shortcuts');
     await clean('with a dialog');
     await lab.key('Escape');
     await lab.key('F5');

@@ -66,7 +66,7 @@ for (const backend of ['webgl', 'webgpu']) {
 }
 
 test('keys and mouse play, step, reset, move a slider and present, without a first click', async () => {
-    const lab = await open('', { backend: 'webgl' });
+    const lab = await open('play=1', { backend: 'webgl' });
     await lab.until(async () => (await lab.state()).time_s > 0, 'time does not pass');
     await lab.key('Space');
     const paused = await lab.state();
@@ -107,6 +107,25 @@ test('keys and mouse play, step, reset, move a slider and present, without a fir
     // More play means a longer fall and a harder first impact.
     assert.ok(Math.max(...loose.peak_normal_N) > Math.max(...plain.peak_normal_N));
     await lab.close();
+});
+
+test('a first visit opens on one ball, and a later one on the machine', async () => {
+    const first = await open('', { backend: 'webgl' });
+    await first.find('Button', 'The whole machine');
+    assert.ok(!(await first.has('Button', 'Save')), 'the panels are there');
+    assert.ok(await first.page.evaluate(() => localStorage.getItem('jointplay visited')));
+    await first.key('Escape');
+    await first.find('Button', 'Save');
+    await first.close();
+    const later = await open('', { backend: 'webgl', before: [() => localStorage.setItem('jointplay visited', '1')] });
+    await later.find('Button', 'Save');
+    assert.ok(!(await later.has('Button', 'The whole machine')), 'the visit is repeated');
+    await later.close();
+    // Without storage it is shown.
+    const withheld = () => Object.defineProperty(globalThis, 'localStorage', { get: () => { throw new Error('withheld'); } });
+    const strange = await open('', { backend: 'webgl', before: [withheld] });
+    await strange.find('Button', 'The whole machine');
+    await strange.close();
 });
 
 test('loading shows its progress, and then time follows the clock', async () => {

@@ -271,7 +271,7 @@ test('computations run in workers: they report progress, the page keeps running,
     await lab.activate('button', 'Start runs');
     for (let run = 0; run < 3; run += 1) await lab.nextMessage('Run');
     await lab.until(async () => (await lab.widgets()).some(({ label }) => /; 3 of 7 runs$/.test(label)), 'no runs are shown');
-    await lab.activate('button', 'Bench');
+    await lab.activate('button', 'Experiments');
     await ended();
     await lab.close();
 });

@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn the_reference_of_the_default_scene_matches_the_published_impacts() {
+    fn the_reference_of_the_papers_scene_matches_the_published_impacts() {
         let reference = reference("spcmm", &[]);
         // (joint, start in ms, peak in N) of an independent solution, with rounded last digits.
         let published = [

@@ -225,6 +225,14 @@ static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
         )
         .default_text("normal force and eccentricity")
         .fixed(),
+        key(
+            "watch",
+            ValueType::Text,
+            "\"Which ball strikes first?\"",
+            "a sentence that a window begins with: what to watch",
+        )
+        .default_text("none")
+        .fixed(),
     ];
     let keys = concatenated(&[&parameters("view"), &own]);
     FileTable::new("view", "[view]", "how the machine is viewed", keys)

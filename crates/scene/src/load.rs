@@ -26,7 +26,8 @@ macro_rules! embedded {
 embedded! {
     /// Names of the built-in scenes, which the window lists.
     BUILT_IN in "scenes":
-        "spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain", "hexapod", "delta", "four-bar", "suspension", "press";
+        "measuring-machine", "spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain", "hexapod", "delta", "four-bar",
+        "suspension", "press";
     /// Names of the benchmarks, machines with known answers (`docs/validation.md`): known by name alone.
     BENCHMARKS in "benchmarks":
         "simple-pendulum", "n-four-bar", "squeezer", "bricard", "governor", "flores", "flip", "cardan", "backlash", "ball",

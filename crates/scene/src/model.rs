@@ -52,6 +52,8 @@ pub struct Source {
     pub title: String,
     /// A paragraph for the user.
     pub description: String,
+    /// What the machine is for and what to watch, in a sentence; "" for none.
+    pub watch: String,
     /// The file as the user named it; `None` for a built-in scene.
     pub file: Option<String>,
     /// The TOML text.

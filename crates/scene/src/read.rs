@@ -211,8 +211,12 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         time_scale: None,
         plots: [None; MAX_PLOTS],
     };
+    let mut watch = "";
     if let Some(node) = top.get("view") {
         let section = node.section()?;
+        if let Some(node) = section.get("watch") {
+            watch = node.text()?;
+        }
         let get = |name: &str| section.get(name).map(|node| node.number()).transpose();
         view.floor = get("floor")?;
         view.time_scale = get("time_scale")?;
@@ -229,6 +233,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
     }
     let source = Source {
         title: visible_line(text("title")?.unwrap_or(&name)).into_owned(),
+        watch: visible_line(watch).into_owned(),
         description: visible(text("description")?.unwrap_or("").trim()).into_owned(),
         name,
         file: document.file.map(str::to_owned),

@@ -61,6 +61,32 @@ fn joints_follow_their_bodies_and_parents_come_first() {
     }
 }
 
+/// The default scene is the paper's machine in another motion, and no copy that drifts away from it.
+#[test]
+fn the_default_scene_is_the_papers_machine_but_for_its_motion() {
+    let paper = Scene::load("spcmm", &[]).unwrap();
+    let settings = [("spcmm.frequency", "0.5 Hz"), ("contact.approach_speed", "start")];
+    let mut own = changed(DEFAULT_SCENE, &settings);
+    assert_ne!(own.machine, changed(DEFAULT_SCENE, &[]).machine);
+    assert_eq!(own.machine, paper.machine);
+    assert_eq!(own.overrides, paper.overrides);
+    assert!(own.view.time_scale > paper.view.time_scale);
+    (own.view.time_scale, own.view.plots) = (paper.view.time_scale, paper.view.plots);
+    assert_eq!(own.view, paper.view);
+    // Its parameters are those of the paper's scene, but for what is said of the frequency and for how far its slider goes.
+    assert_eq!(own.own.len(), paper.own.len());
+    for (own, paper) in own.own.iter().zip(&paper.own) {
+        let differs = own.key == "spcmm.frequency";
+        assert_eq!((own.key, own.label, own.equation), (paper.key, paper.label, paper.equation));
+        assert!(own == paper || differs, "{}", own.key);
+    }
+    // What neither of these holds, such as comments, differs in no more lines than the values and words above have.
+    let lines = |scene: &Scene| scene.source.text.lines().map(str::to_owned).collect::<std::collections::BTreeSet<_>>();
+    let (own, paper) = (lines(&own), lines(&paper));
+    let other = own.difference(&paper).chain(paper.difference(&own)).count();
+    assert!(other <= 32, "{other} lines differ");
+}
+
 fn changed(name: &str, changes: &[(&str, &str)]) -> Scene {
     let changes: Vec<_> = changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
     Scene::load(name, &changes).unwrap_or_else(|error| panic!("{error}"))

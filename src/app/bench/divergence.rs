@@ -19,7 +19,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
     let mut on = player.twin().is_some();
     ui.horizontal_wrapped(|ui| {
         let switch = ui
-            .add_enabled(moves, Checkbox::new(&mut on, "Twin run"))
+            .add_enabled(moves, Checkbox::new(&mut on, "Twin a billionth away"))
             .on_hover_text(
                 "Starts a second run from the current state, displaced by a billionth of the scales of its \
                  coordinates and velocities and drawn as a violet ghost in the 3D view, and a third run, whose \

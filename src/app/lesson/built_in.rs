@@ -4,8 +4,8 @@ use std::sync::{Arc, LazyLock};
 
 use serde::Deserialize;
 
-use super::format::Lesson;
-use crate::scene::{SceneError, visible_line};
+use super::format::{CameraTarget, Lesson, Picture, Question};
+use crate::scene::{Scene, SceneError, visible_line};
 use crate::suggest::nearest;
 
 /// Names and texts in the order of a lecture.
@@ -29,19 +29,75 @@ pub const BUILT_IN_LESSONS: [(&str, &str); 10] = lessons![
     "to-the-class",
 ];
 
-/// The part of a lesson shown in the menu.
+/// Words of a text read aloud or with care in a minute, and minutes that a step takes besides: predicting and watching.
+const WORDS_PER_MINUTE: f64 = 150.0;
+const MINUTES_PER_STEP: f64 = 0.3;
+
+/// The part of a lesson shown in the list.
 #[derive(Deserialize)]
 struct Head {
     title: String,
+    about: String,
+    scene: String,
+    picture: Picture,
+    step: Vec<StepWords>,
+}
+
+/// The words of a step that are read.
+#[derive(Deserialize)]
+struct StepWords {
+    text: String,
+    #[serde(default)]
+    seen: String,
+    question: Option<Question>,
+}
+
+/// A built-in lesson in the list.
+pub struct LessonCard {
+    /// Its name.
+    pub name: &'static str,
+    /// Its title.
+    pub title: String,
+    /// What one learns, in a sentence.
+    pub about: String,
+    /// About how long it takes, min.
+    pub minutes: u32,
+    /// Number of its steps.
+    pub steps: usize,
+    scene: String,
+    picture: Picture,
+}
+
+impl LessonCard {
+    fn read(name: &'static str, text: &str) -> Option<Self> {
+        let Head { title, about, scene, picture, step: steps } = toml::from_str(text).ok()?;
+        let count = |text: &str| text.split_whitespace().count();
+        let asked = |question: &Question| {
+            count(&question.ask) + question.choices.iter().map(|choice| count(&choice.text)).sum::<usize>()
+        };
+        let read = |step: &StepWords| count(&step.text) + count(&step.seen) + step.question.as_ref().map_or(0, asked);
+        let words: usize = steps.iter().map(read).sum();
+        let minutes = words as f64 / WORDS_PER_MINUTE + steps.len() as f64 * MINUTES_PER_STEP;
+        Some(Self { name, title, about, minutes: minutes.round() as u32, steps: steps.len(), scene, picture })
+    }
+
+    /// The scene of its picture, with the instant, s, and the joint seen from close up, or else the point of view.
+    pub fn picture(&self) -> Option<(Scene, f64, Option<CameraTarget>)> {
+        self.picture.instant(&self.scene).ok()
+    }
+}
+
+/// The built-in lessons in the order of a lecture.
+pub fn cards() -> &'static [LessonCard] {
+    static CARDS: LazyLock<Vec<LessonCard>> =
+        LazyLock::new(|| BUILT_IN_LESSONS.iter().filter_map(|(name, text)| LessonCard::read(name, text)).collect());
+    &CARDS
 }
 
 /// Name and title of each lesson.
 pub fn lesson_titles() -> &'static [(&'static str, String)] {
-    static TITLES: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
-        let title = |text: &str| toml::from_str::<Head>(text).map_or(String::new(), |h| h.title);
-        let all = BUILT_IN_LESSONS.iter();
-        all.map(|(name, text)| (*name, title(text))).collect()
-    });
+    static TITLES: LazyLock<Vec<(&str, String)>> =
+        LazyLock::new(|| cards().iter().map(|card| (card.name, card.title.clone())).collect());
     &TITLES
 }
 

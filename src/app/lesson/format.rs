@@ -216,6 +216,9 @@ pub struct Choice {
 #[serde(deny_unknown_fields)]
 struct File {
     title: String,
+    #[serde(default, rename = "about")]
+    _about: String,
+    picture: Option<Spanned<Picture>>,
     scene: Spanned<String>,
     #[serde(default)]
     measure: BTreeMap<String, Spanned<MeasureRow>>,
@@ -261,6 +264,29 @@ struct StepRow {
     seen: Option<Spanned<String>>,
     #[serde(default)]
     claims: Vec<Spanned<String>>,
+}
+
+/// The picture of a lesson in the list.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Picture {
+    /// Instant and changes, as in the state of a step.
+    state: String,
+    /// Camera target, as that of a step.
+    view: Option<String>,
+}
+
+impl Picture {
+    /// The scene, the instant, s, and the camera target; `scene` is that of the lesson.
+    ///
+    /// # Errors
+    /// The state, the scene or the target is wrong; as a message.
+    pub fn instant(&self, scene: &str) -> Result<(Scene, f64, Option<CameraTarget>), String> {
+        let link = Link::parse(&format!("?{}", self.state)).map_err(|error| error.to_string())?;
+        let scene = Scene::load(scene, &link.log.base).map_err(|error| error.to_string())?;
+        let target = self.view.as_ref().map(|view| parse_camera_target(view, &scene)).transpose()?;
+        Ok((scene, link.time.unwrap_or(0.0), target))
+    }
 }
 
 /// The text of a lesson with its origin.
@@ -344,6 +370,11 @@ impl Lesson {
                 .measure(name, row.get_ref())
                 .map_err(|message| source.error(row.span(), &format!("measure.{name}"), message))?;
             lesson.measures.push(measure);
+        }
+        if let Some(picture) = &rows.picture {
+            let scene = resolve_scene_path(rows.scene.get_ref(), file);
+            let drawn = picture.get_ref().instant(&scene);
+            drawn.map_err(|message| source.error(picture.span(), "picture", message))?;
         }
         lesson.check(&source, &rows)?;
         Ok(lesson)

@@ -7,10 +7,10 @@ use eframe::egui::{
 use super::control_finder::ControlFinder;
 use super::names::Names;
 use super::text::{self, Block, SpanStyle};
-use super::{Course, RunningLesson, lesson_titles};
+use super::{Course, RunningLesson};
 use crate::app::command::Command;
 use crate::app::player::Player;
-use crate::app::{layout, spoken, theme};
+use crate::app::{spoken, theme};
 
 /// Height of a choice for mouse input, points.
 const CHOICE_HEIGHT: f32 = 24.0;
@@ -18,17 +18,6 @@ const CHOICE_HEIGHT: f32 = 24.0;
 const MIN_HIDDEN: f32 = 8.0;
 /// Width beside the navigation buttons below which the step counter is abbreviated, points.
 const MIN_COUNTER_WIDTH: f32 = 200.0;
-
-/// Menu of the built-in lessons; returns the name of the chosen one.
-pub fn menu(ui: &mut Ui) -> Option<&'static str> {
-    let mut chosen = None;
-    for &(name, ref title) in lesson_titles() {
-        if layout::entry(ui, title, &format!("Lesson {name}")) {
-            chosen = Some(name);
-        }
-    }
-    chosen
-}
 
 impl Course {
     /// The whole panel. `low`: in a presentation operated by mouse, whose screen is low in points.

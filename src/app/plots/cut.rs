@@ -81,15 +81,16 @@ pub fn note(ui: &Ui, frame: Rect, peak: f64, unit: (&str, f64)) {
     ui.painter().galley(plate.min + NOTE_PADDING, words, ink);
 }
 
-/// The button that cuts first peaks in all plots, in the title of `plot`; `on`: whether they are cut. Returns whether it was clicked.
+/// The button that shows first peaks whole in all plots, in the title of `plot`; `on`: whether they are cut. Returns whether it was
+/// clicked.
 pub fn switch(ui: &mut Ui, plot: &str, on: bool) -> bool {
-    let help = "Cuts off peaks in the first half of the range that are more than four times any later value, so that they do not \
-                flatten the rest. Until clicked, only those in the first quarter are cut. The axis then ends at 1.26 times the \
+    let help = "Shows peaks in the first half of the range whole, which otherwise are cut off where they are more than four times any \
+                later value, so that they do not flatten the rest. Until clicked, only those in the first quarter are cut. The axis then ends at 1.26 times the \
                 largest later value; a mark at the upper edge stands for each peak beyond it. Readings and saved files have the \
                 whole values, and a range that was zoomed is not cut";
-    let button = Button::selectable(on, RichText::new("Cut peaks").small());
+    let button = Button::selectable(!on, RichText::new("Whole peaks").small());
     let button = ui.add(button).on_hover_text(help);
-    ui.ctx().accesskit_node_builder(button.id, |node| node.set_label(format!("Cut first peaks in {plot}")));
+    ui.ctx().accesskit_node_builder(button.id, |node| node.set_label(format!("Whole first peaks in {plot}")));
     button.clicked()
 }
 
