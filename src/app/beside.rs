@@ -1,7 +1,8 @@
 //! Reference runs recorded before a change, as the window handles them: retain, and show beside the current machine.
 
-use eframe::egui::{self, Button, Rect, Ui, pos2, vec2};
+use eframe::egui::{self, Align2, Button, Rect, Ui, pos2, vec2};
 
+use super::overlay::Room;
 use super::run::Run;
 use super::viewport::Viewport;
 
@@ -70,17 +71,20 @@ impl Run {
         picture.title = Some(format!("before: {}", earlier.name()));
         viewport.title = Some(format!("now: {}", earlier.named_in(player)));
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(before).id_salt("before"));
-        let close =
-            Rect::from_min_size(before.right_top() + vec2(-80.0, 10.0), vec2(70.0, ui.spacing().interact_size.y));
-        picture.ui(&mut place, earlier.run(), plain, if plain { &[] } else { std::slice::from_ref(&close) });
+        let close = vec2(70.0, ui.spacing().interact_size.y);
+        let buttons = if plain { vec2(0.0, 0.0) } else { close + vec2(10.0, 0.0) };
+        let strips = picture.ui(&mut place, earlier.run(), plain, Room { buttons, ..Room::default() });
         viewport.copy_camera(picture);
         picture.take_clicked();
         if let Some(pull) = picture.take_pull() {
             // A body that cannot be pulled stays unchanged.
             let _ = earlier.run_mut().pull(pull);
         }
+        let close =
+            Align2::RIGHT_CENTER.align_size_within_rect(close, strips.top.with_max_x(strips.top.right() - 10.0));
         if !plain && ui.put(close, Button::new("Close")).on_hover_text("Show only the current machine").clicked() {
             plots.comparison.hide_comparison();
+            viewport.fit();
         }
         now
     }

@@ -74,6 +74,8 @@ pub enum Command {
     Audience(bool),
     /// Reverts the changes of the first-time scene.
     PaperSettings,
+    /// Back to t = 0, with all changes applied.
+    Reset,
     /// Stops or cancels the task under way.
     StopTasks,
     /// Forgets all settings and opens the first-time scene.
@@ -168,6 +170,7 @@ impl App {
                 });
                 self.messages.report(opened);
             }
+            Command::Reset => self.reset(),
             Command::StopTasks => self.tasks.cancel(&mut self.run, &mut self.messages),
             #[cfg(not(target_arch = "wasm32"))]
             Command::StartAsNew => self.reset_to_first_start(ctx),

@@ -103,6 +103,7 @@ impl RunningFilm {
         run.player.pacer.set_scale(scale);
         run.player.go_to(shown);
         run.player.set_playing(playing);
+        run.viewport.release_scale();
         run.viewport.clear_history(&run.player);
     }
 }
@@ -210,6 +211,7 @@ impl Tasks {
         let canvas = Canvas::beside(state);
         // Impacts glow as long as in playback at this scale.
         run.player.pacer.set_scale(settings.scale);
+        run.viewport.hold_scale(&run.player, settings.span[1]);
         run.player.go_to(settings.span[0]);
         run.viewport.clear_history(&run.player);
         self.film_settings = Some(settings.clone());

@@ -251,7 +251,7 @@ impl App {
             canvas.time = ctx.input(|input| input.time);
         }
         let saved = self.panels.clone();
-        self.run.viewport.freeze(Some(self.panels.picture.aspect_ratio()));
+        self.run.viewport.freeze(Some(self.run.viewport.scene_area().aspect_ratio()));
         self.picture.drawn = Some(contents);
         // egui settles new layouts over a few passes.
         let mut output = Ok(egui::FullOutput::default());

@@ -263,6 +263,15 @@ pub struct WearScale {
     pub largest: f32,
 }
 
+/// The colour legend of a map of the tip's errors; linear from 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorScale {
+    /// Name of the error quantity.
+    pub name: &'static str,
+    /// Largest error in the map, m.
+    pub largest: f32,
+}
+
 /// Everything to draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawList {
@@ -318,6 +327,8 @@ pub struct DrawList {
     pub legend: Option<Legend>,
     /// The wear-map legend; `None` if none is drawn.
     pub wear_scale: Option<WearScale>,
+    /// The legend of the tip's errors; `None` if no map is drawn.
+    pub error_scale: Option<ErrorScale>,
     /// Magnification of the play as drawn.
     pub magnification: f32,
     /// Its label: "clearance drawn ×50"; notes a reduced magnification.
@@ -355,6 +366,7 @@ impl Default for DrawList {
             labels: Vec::new(),
             legend: None,
             wear_scale: None,
+            error_scale: None,
             magnification: 1.0,
             magnification_text: String::new(),
         }

@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use eframe::egui::ThemePreference;
-use jointplay::app::{AppOptions, Headless, Overlay, force_notes};
+use eframe::egui::{self, ThemePreference};
+use jointplay::app::{AppOptions, Headless, Overlay, Strips, force_notes};
 use jointplay::render::{Image, RenderError};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
@@ -75,9 +75,10 @@ fn the_overlay_adds_to_the_plain_picture() {
     assert!(notes[0].starts_with("S1  normal "), "{}", notes[0]);
 
     let mut headless = Headless::new().expect("software Vulkan at least");
-    let plain = headless.picture(&list, &Overlay::default(), Theme::Light, 1.0).expect("drawn");
-    let overlay = Overlay { time: Some(7.85e-3), notes, legend: true, labels: true };
-    let with_overlay = headless.picture(&list, &overlay, Theme::Light, 1.0).expect("drawn");
+    let scene = Strips::of_scene(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(640.0, 360.0)));
+    let plain = headless.picture(&list, &Overlay::default(), &scene, Theme::Light).expect("drawn");
+    let overlay = Overlay { time: Some(7.85e-3), notes, legend: true, labels: true, ..Overlay::default() };
+    let with_overlay = headless.picture(&list, &overlay, &scene, Theme::Light).expect("drawn");
     let changed = plain.rgba.chunks_exact(4).zip(with_overlay.rgba.chunks_exact(4)).filter(|(a, b)| a != b).count();
     let part = changed as f64 / (640.0 * 360.0);
     assert!((0.01..0.3).contains(&part), "the overlay covers {part} of the picture");
