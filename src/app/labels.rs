@@ -24,7 +24,7 @@ const PADDING: Vec2 = vec2(4.0, 1.0);
 /// Cell size of the coverage map of bodies, points.
 const CELL_SIZE: f32 = 3.0;
 /// Distances of a new place from the machine, points, if there is one: the farther, the longer a label keeps it.
-const CLEARANCES: [f32; 3] = [24.0, 10.0, 3.0];
+const CLEARANCES: [f32; 3] = [16.0, 8.0, 3.0];
 /// Cost of a place: each further distance, each further direction.
 const GAP_COST: f32 = 0.08;
 const DIRECTION_COST: f32 = 0.015;

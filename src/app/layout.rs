@@ -1,6 +1,6 @@
 //! Layout: panels side by side in a large window; picture and a collapsible sheet in a small one.
 
-use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollArea, Ui};
+use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, Rangef, ScrollArea, Ui};
 
 #[cfg(not(target_arch = "wasm32"))]
 use super::audience;
@@ -20,6 +20,8 @@ use crate::view::Preset;
 const MIN_WIDTH_SIDE_BY_SIDE: f32 = 250.0;
 /// Width below which an embedded picture shows only machine and time, points.
 const MIN_WIDTH_WITH_CONTROLS: f32 = 280.0;
+/// Least and largest width of the controls and of the bench, and height of the plots, points.
+const PANEL_SIZES: [[f32; 2]; 3] = [[240.0, 480.0], [300.0, 640.0], [150.0, 600.0]];
 /// Distance of buttons and messages from the edge of the picture, points.
 const MARGIN: f32 = 10.0;
 /// Width of a lesson panel beside the picture, points.
@@ -254,7 +256,9 @@ impl App {
         #[cfg(not(target_arch = "wasm32"))]
         let presentation = &mut self.presentation;
         let mut present = false;
-        Panel::left("controls").frame(bar).default_size(300.0).size_range(240.0..=480.0).show_collapsible(
+        let [controls, side, below] = PANEL_SIZES.map(|[least, most]| Rangef::new(least, most));
+        panels.keep_shares(ui, [("controls", false, controls), ("bench", false, side), ("plots", true, below)]);
+        Panel::left("controls").frame(bar).default_size(300.0).size_range(controls).show_collapsible(
             ui,
             &mut panels.controls,
             |ui| {
@@ -271,7 +275,7 @@ impl App {
             .frame(bar)
             .resizable(true)
             .default_size(400.0)
-            .size_range(300.0..=640.0)
+            .size_range(side)
             .show_collapsible(ui, &mut panels.bench, |ui| {
                 ScrollArea::vertical()
                     // A lesson has its own scroll position.
@@ -289,7 +293,7 @@ impl App {
             .frame(bar)
             .resizable(true)
             .default_size(plots_height)
-            .size_range(150.0..=600.0)
+            .size_range(below)
             .show_collapsible(ui, &mut panels.plots, |ui| {
                 spoken::landmark(ui, "Plots");
                 // Otherwise the panel would shrink to its content.

@@ -461,6 +461,14 @@ impl Viewport {
         Some(self.scene.min + vec2(pixel.x, pixel.y))
     }
 
+    /// Position, points, of the ball of joint `joint` as drawn in the latest picture; `None` behind the camera.
+    pub fn place_of_ball(&self, player: &Player, joint: usize) -> Option<Pos2> {
+        let centre = self.view.ball(player.running(), player.frame(), &self.options, joint)?;
+        let screen = Screen::new(self.scene, 1.0);
+        let pixel = self.framed(screen.aspect()).project(centre, screen.size)?;
+        Some(self.scene.min + vec2(pixel.x, pixel.y))
+    }
+
     /// Area of the scene in the latest picture, points, without the strips of text above and below it.
     pub fn scene_area(&self) -> Rect {
         self.scene

@@ -254,6 +254,12 @@ impl SceneView {
         solids
     }
 
+    /// Centre of the ball of joint `joint` as drawn, m.
+    pub fn ball(&self, scene: &Scene, frame: &Frame, options: &ViewOptions, joint: usize) -> Option<Vec3> {
+        let m = self.magnification(scene, frame, options);
+        drawn::joints(scene, frame, m).get(joint).map(|drawn| drawn.ball_centre)
+    }
+
     /// Turns `camera` to a close-up of ball joint `joint`, looking into its opening.
     pub fn close_up(&self, camera: &mut Camera, joint: usize, scene: &Scene, frame: &Frame, options: &ViewOptions) {
         let m = self.magnification(scene, frame, options);
@@ -421,6 +427,7 @@ impl SceneView {
             up,
             radius,
             studio: palette.studio,
+            behind: palette.behind,
         };
         out.floor = shot.options.floor.then(|| {
             let spacing = 10_f32.powf(radius.log10().floor() - 1.0);

@@ -164,6 +164,8 @@ pub struct Light {
     pub radius: f32,
     /// Brightness of the key light, and of the reflected ground, sky and window.
     pub studio: [f32; 4],
+    /// Brightness of the light along the edges of parts.
+    pub behind: f32,
 }
 
 /// Background of the picture.
@@ -342,7 +344,14 @@ impl Default for DrawList {
         Self {
             size: [0, 0],
             eye: Eye { clip_from_world: Mat4::IDENTITY, position: Vec3::ZERO },
-            light: Light { direction: Vec3::Z, strip: Vec3::Z, up: Vec3::Z, radius: 1.0, studio: [1.0; 4] },
+            light: Light {
+                direction: Vec3::Z,
+                strip: Vec3::Z,
+                up: Vec3::Z,
+                radius: 1.0,
+                studio: [1.0; 4],
+                behind: 0.0,
+            },
             background: Background { top: ground, bottom: ground },
             exposure: 1.0,
             outline: Colour::hex(0),

@@ -71,8 +71,7 @@ impl Course {
         }
         let inside = painter.with_clip_rect(run.viewport.scene_area());
         for joint in wanted.iter().filter_map(joint) {
-            let centre = player.frame().joints.get(joint).map(|joint| joint.ball_centre);
-            if let Some(place) = centre.and_then(|centre| run.viewport.place(&centre)) {
+            if let Some(place) = run.viewport.place_of_ball(player, joint) {
                 inside.circle_stroke(place, 26.0, stroke);
             }
         }
