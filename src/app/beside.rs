@@ -45,14 +45,18 @@ impl Run {
         lags
     }
 
-    /// Shows the machine before the change beside the current one on request; returns the remaining part of `area`.
-    pub(super) fn picture_before(&mut self, ui: &mut Ui, area: Rect, plain: bool) -> Rect {
+    /// The halves of `area` for the machine before the change and the current one, if both are shown.
+    pub(super) fn halves(&mut self, area: Rect) -> Option<[Rect; 2]> {
+        self.plots.comparison.beside().is_some().then(|| halves(area).into())
+    }
+
+    /// Shows the machine before the change in `area` on request, with as much `room` for widgets as the current one has.
+    pub(super) fn picture_before(&mut self, ui: &mut Ui, area: Option<Rect>, plain: bool, room: Room) {
         let Self { plots, player, viewport, beside, .. } = self;
-        let Some((earlier, number)) = plots.comparison.beside() else {
+        let Some(((earlier, number), area)) = plots.comparison.beside().zip(area) else {
             (viewport.title, viewport.common, *beside) = (None, None, None);
-            return area;
+            return;
         };
-        let (before, now) = halves(area);
         if plain {
             earlier.run_mut().follow(player.pacer.shown(), || true);
             earlier.run_mut().publish_peaks();
@@ -70,10 +74,11 @@ impl Run {
         (viewport.common, picture.common) = (Some(common), Some(common));
         picture.title = Some(format!("before: {}", earlier.name()));
         viewport.title = Some(format!("now: {}", earlier.named_in(player)));
-        let mut place = ui.new_child(egui::UiBuilder::new().max_rect(before).id_salt("before"));
+        let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area).id_salt("before"));
+        picture.hides_time = viewport.hides_time;
         let close = vec2(70.0, ui.spacing().interact_size.y);
-        let buttons = if plain { vec2(0.0, 0.0) } else { close + vec2(10.0, 0.0) };
-        let strips = picture.ui(&mut place, earlier.run(), plain, Room { buttons, ..Room::default() });
+        let room = Room { notes: viewport.notes(player), ..room };
+        let strips = picture.ui(&mut place, earlier.run(), plain, room);
         viewport.copy_camera(picture);
         picture.take_clicked();
         if let Some(pull) = picture.take_pull() {
@@ -86,6 +91,5 @@ impl Run {
             plots.comparison.hide_comparison();
             viewport.fit();
         }
-        now
     }
 }

@@ -447,7 +447,8 @@ impl App {
             self.run.microscope_beside(ui);
         }
         let whole = ui.available_rect_before_wrap();
-        let area = self.run.picture_before(ui, whole, plain);
+        let halves = self.run.halves(whole);
+        let area = halves.map_or(whole, |[_, now]| now);
         self.panels.picture = area;
         let presenting = self.is_presenting() || self.panels.embedded.is_some();
         self.run.player.update_ghosts();
@@ -485,10 +486,11 @@ impl App {
         if has_messages {
             (room.words, room.is_wide) = (room.words.max(Messages::height(ui)), true);
         }
+        // The transport of a large window shows it.
+        self.run.viewport.hides_time = has_buttons && !self.panels.is_compact();
+        self.run.picture_before(ui, halves.map(|[before, _]| before), plain, room);
         let viewport = &mut self.run.viewport;
         viewport.bare = self.panels.embedded.is_some() && area.width() < MIN_WIDTH_WITH_CONTROLS;
-        // The transport of a large window shows it.
-        viewport.hides_time = has_buttons && !self.panels.is_compact();
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
         let strips = viewport.ui(&mut place, &self.run.player, plain, room);
         ui.advance_cursor_after_rect(whole);

@@ -15,9 +15,9 @@ use crate::view::{Colour, DrawList, ErrorScale, Legend, Palette, Scaling, Theme,
 const MARGIN: f32 = 14.0;
 
 /// Font size of the time, and of the notes beside it, in a picture with enough room and in a small one, points.
-const FONT_SIZES: [[f32; 2]; 2] = [[18.0, 13.0], [11.0, 10.0]];
+const FONT_SIZES: [[f32; 2]; 2] = [[18.0, 13.0], [11.0, 11.0]];
 /// Widths reserved for the time, the magnification, and any other note at these sizes, points: they stay in place as digits change.
-const CELLS: [[f32; 3]; 2] = [[148.0, 140.0, 228.0], [84.0, 100.0, 150.0]];
+const CELLS: [[f32; 3]; 2] = [[148.0, 140.0, 228.0], [88.0, 112.0, 150.0]];
 /// Heights of a line with the time and of one with notes alone, points.
 const LINES: [[f32; 2]; 2] = [[24.0, 18.0], [15.0, 13.0]];
 
@@ -61,6 +61,8 @@ pub struct Room {
     pub buttons: Vec2,
     /// Height of the place for words in the lower strip.
     pub words: f32,
+    /// Least number of notes above the scene to reserve places for.
+    pub notes: usize,
     /// Whether the words need the whole width of a narrow picture; otherwise they may cover the names in the legend.
     pub is_wide: bool,
 }
@@ -138,10 +140,11 @@ fn cut(rect: Rect, overlay: &Overlay, notes: usize, has_legend: bool, has_scale:
     let class = class(rect);
     let (large, margin) = (class == 0, if class == 0 { MARGIN } else { 6.0 });
     // In a small picture the first note, which states the magnification of the play, is the only one.
+    let notes = notes.max(overlay.room.notes);
     let notes = if large { notes } else { notes.min(1) };
     let width = rect.width() - 2.0 * margin - overlay.room.buttons.x;
     let (_, height) = cells(class, width, overlay.time.is_some(), notes);
-    let buttons = if overlay.room.buttons.y > 0.0 { overlay.room.buttons.y + 8.0 } else { 0.0 };
+    let buttons = if overlay.room.buttons.y > 0.0 { overlay.room.buttons.y + 4.0 } else { 0.0 };
     let mut top = height.max(buttons).round();
     let legend = if has_legend { LEGEND_HEIGHT } else { 0.0 };
     let beside = rect.width() >= MIN_WIDTH_BESIDE_LEGEND;
@@ -152,7 +155,7 @@ fn cut(rect: Rect, overlay: &Overlay, notes: usize, has_legend: bool, has_scale:
     // Beside the legend if no words are.
     let own_row = if words > 0.0 || !beside { scale } else { 0.0 };
     let row = row.max(scale - own_row);
-    let mut bottom = if row + own_row > 0.0 { row + own_row + 6.0 } else { 0.0 };
+    let mut bottom = if row + own_row > 0.0 { row + own_row + 4.0 } else { 0.0 };
     let room = (rect.height() - MIN_SCENE_HEIGHT).max(0.0);
     if top + bottom > room {
         bottom = bottom.min((room - top).max(0.0)).floor();
@@ -160,7 +163,7 @@ fn cut(rect: Rect, overlay: &Overlay, notes: usize, has_legend: bool, has_scale:
     }
     let low = rect.bottom() - bottom;
     let bottom = rect.with_min_y(low);
-    let inside = bottom.shrink2(vec2(margin.min(bottom.width() / 2.0), (bottom.height() / 2.0).min(3.0)));
+    let inside = bottom.shrink2(vec2(margin.min(bottom.width() / 2.0), (bottom.height() / 2.0).min(2.0)));
     let scale = inside.with_max_y((inside.top() + scale).min(inside.bottom()));
     let rest = inside.with_min_y((inside.top() + own_row).min(inside.bottom()));
     let (legend, words) = if beside {

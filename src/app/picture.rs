@@ -251,7 +251,8 @@ impl App {
             canvas.time = ctx.input(|input| input.time);
         }
         let saved = self.panels.clone();
-        self.run.viewport.freeze(Some(self.run.viewport.scene_area().aspect_ratio()));
+        let scene = self.run.viewport.scene_area();
+        self.run.viewport.freeze(Some(scene.aspect_ratio()));
         self.picture.drawn = Some(contents);
         // egui settles new layouts over a few passes.
         let mut output = Ok(egui::FullOutput::default());
@@ -263,6 +264,7 @@ impl App {
         }
         self.picture.drawn = None;
         self.run.viewport.freeze(None);
+        self.run.viewport.set_scene_area(scene);
         self.panels = saved;
         Ok(canvas.paint(output?, size, scale))
     }

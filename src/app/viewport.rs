@@ -469,6 +469,11 @@ impl Viewport {
         Some(self.scene.min + vec2(pixel.x, pixel.y))
     }
 
+    /// Restores the area of the scene on the screen after a picture off screen.
+    pub fn set_scene_area(&mut self, area: Rect) {
+        self.scene = area;
+    }
+
     /// Area of the scene in the latest picture, points, without the strips of text above and below it.
     pub fn scene_area(&self) -> Rect {
         self.scene
@@ -506,7 +511,7 @@ impl Viewport {
         let aspect = screen.aspect();
         // Collapsing the sheet or rotating a phone would leave half of the mechanism outside. A mere touch enlarges the controls
         // and shrinks the picture a little: nothing may move under the finger.
-        let reshaped = !(0.88..=1.25).contains(&(aspect / self.fitted)) && !ui.input(|i| i.pointer.any_down());
+        let reshaped = !(0.8..=1.4).contains(&(aspect / self.fitted)) && !ui.input(|i| i.pointer.any_down());
         if self.frozen.is_none() && (self.fit_pending || (reshaped && self.fits)) {
             self.fit_pending = false;
             (self.fitted, self.fits) = (aspect, true);
@@ -568,13 +573,19 @@ impl Viewport {
         strips
     }
 
+    /// Number of notes above the picture for which there are places.
+    pub(super) fn notes(&self, player: &Player) -> usize {
+        // The magnification, and the colours of a wear map.
+        let own = 1 + usize::from(self.options.wear != WearMap::Off) + ghosts::most_notes(player);
+        own + usize::from(self.title.is_some()) + usize::from(self.followed.is_some())
+    }
+
     /// Cuts the picture in `whole`.
     fn cut(&self, whole: Rect, player: &Player, room: Room, hides_time: bool) -> Strips {
-        let ghost_notes = vec![String::new(); ghosts::most_notes(player)];
-        let overlay = self.overlay(player, ghost_notes, room, hides_time);
-        // The magnification, and the colours of a wear map.
-        let notes = 1 + usize::from(self.options.wear != WearMap::Off) + overlay.notes.len();
-        overlay::strips(whole, &overlay, notes, &self.options, self.cloud.is_some())
+        let overlay = self.overlay(player, Vec::new(), room, hides_time);
+        let notes = self.notes(player);
+        let has_map = self.cloud.as_ref().is_some_and(|cloud| !cloud.arrows.is_empty());
+        overlay::strips(whole, &overlay, notes, &self.options, has_map)
     }
 
     /// The overlay of the picture; `ghost_notes`: notes on ghosts.
@@ -1076,7 +1087,7 @@ mod tests {
     }
 
     /// As in a window: buttons above, a caption below.
-    const ROOM: Room = Room { buttons: vec2(118.0, 26.0), words: 40.0, is_wide: false };
+    const ROOM: Room = Room { buttons: vec2(118.0, 26.0), words: 40.0, notes: 0, is_wide: false };
 
     impl<const N: usize> Watched<N> {
         fn new(scene: &str) -> Self {

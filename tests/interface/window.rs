@@ -608,7 +608,8 @@ fn the_wear_map_appears_with_its_scale_and_a_reset_clears_it() {
     // A colour of the scale that nothing else in the view has.
     let purple = |harness: &mut Harness<'_, App>| {
         let view = harness.get_by_label("3D view").rect();
-        let area = [view.left(), view.top(), view.right(), view.bottom()].map(|edge| edge as usize);
+        let low = harness.get_by_role_and_label(Role::Slider, "Timeline, s").rect().top();
+        let area = [view.left(), view.top(), view.right(), low].map(|edge| edge as usize);
         picture(harness).coloured(area, [0x47, 0x2D, 0x7B], 12).len()
     };
     let choose = |harness: &mut Harness<'_, App>, name: &str| {

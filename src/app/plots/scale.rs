@@ -72,7 +72,7 @@ impl Scale<'_> {
         let faint = ui.visuals().weak_text_color();
         let font = egui::TextStyle::Small.resolve(ui.style());
         let axis = |hints: AxisHints<'static>| hints.tick_label_color(faint).tick_label_font(font.clone());
-        let width = space.x - PLOT_GAP;
+        let width = space.x;
         let (to, (time_unit, time_size)) = (self.to, self.time_unit);
         let time_mark =
             move |mark: &GridMark| format!("{} {time_unit}", tick(mark.value, mark.step_size, to / time_size));
@@ -81,7 +81,7 @@ impl Scale<'_> {
             let words = time_mark(&mark);
             let beyond = (range.end() - mark.value) / (range.end() - range.start()) * frame;
             // Omits a mark that would extend into the next plot, or beyond the window.
-            if 0.5 * LETTER_WIDTH * words.chars().count() as f64 > beyond + f64::from(PLOT_GAP) {
+            if 0.5 * LETTER_WIDTH * words.chars().count() as f64 > beyond + f64::from(0.5 * PLOT_GAP) {
                 return String::new();
             }
             words

@@ -41,8 +41,6 @@ impl PlotFormat {
 pub fn format_buttons(ui: &mut Ui) -> Option<PlotFormat> {
     let mut chosen = None;
     ui.horizontal(|ui| {
-        // In line with the words of the entries above and below.
-        ui.add_space(ui.spacing().button_padding.x - ui.spacing().item_spacing.x);
         ui.label("Plots");
         for (format, name, ..) in PlotFormat::ALL {
             let button = ui.button(format!("{name}…")).on_hover_text(format!("The plots on show, {name}"));
