@@ -484,7 +484,8 @@ impl App {
             room.buttons = buttons;
         }
         if has_messages {
-            (room.words, room.is_wide) = (room.words.max(Messages::height(ui)), true);
+            room.words = room.words.max(Messages::height(ui));
+            room.is_wide |= self.messages.have_buttons(&self.run.player, &self.tasks, around);
         }
         // The transport of a large window shows it.
         self.run.viewport.hides_time = has_buttons && !self.panels.is_compact();

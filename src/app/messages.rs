@@ -195,9 +195,13 @@ impl Messages {
 
     /// Whether [`Self::ui`] has messages.
     pub fn are_shown(&self, player: &Player, tasks: &Tasks, around: Surroundings) -> bool {
-        let shows_verdict = self.shown_verdict(around).is_some();
-        let said = self.problem.is_some() || self.notice.is_some() || player.stopped().is_some();
-        said || shows_verdict || tasks.are_under_way() || self.shows_first_notice(player, around)
+        self.notice.is_some() || self.have_buttons(player, tasks, around)
+    }
+
+    /// Whether there is a message with a button, which needs width.
+    pub fn have_buttons(&self, player: &Player, tasks: &Tasks, around: Surroundings) -> bool {
+        let stays = self.problem.is_some() || player.stopped().is_some() || self.shown_verdict(around).is_some();
+        stays || tasks.are_under_way() || self.shows_first_notice(player, around)
     }
 
     /// Whether the first-time scene is displayed and its notice not yet dismissed.
