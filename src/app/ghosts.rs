@@ -16,7 +16,7 @@ pub fn most_notes(player: &Player) -> usize {
 pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawList) -> Vec<String> {
     let mut notes = Vec::new();
     let mut note = |ghost: &str, is_apart: bool| {
-        let near = if is_apart { "" } else { ", less than a pixel away" };
+        let near = if is_apart { "" } else { ", under a pixel away" };
         notes.push(format!("{ghost}{near}"));
     };
     let now = player.frame().time;

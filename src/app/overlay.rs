@@ -17,7 +17,7 @@ const MARGIN: f32 = 14.0;
 /// Font size of the time, and of the notes beside it, in a picture with enough room and in a small one, points.
 const FONT_SIZES: [[f32; 2]; 2] = [[18.0, 13.0], [11.0, 11.0]];
 /// Widths reserved for the time, the magnification, and any other note at these sizes, points: they stay in place as digits change.
-const CELLS: [[f32; 3]; 2] = [[148.0, 140.0, 228.0], [88.0, 112.0, 150.0]];
+const CELLS: [[f32; 3]; 2] = [[148.0, 250.0, 228.0], [88.0, 214.0, 150.0]];
 /// Heights of a line with the time and of one with notes alone, points.
 const LINES: [[f32; 2]; 2] = [[24.0, 18.0], [15.0, 13.0]];
 
@@ -37,7 +37,7 @@ const MIN_WIDTH_BESIDE_LEGEND: f32 = 640.0;
 /// Least height of the scene between its strips, points; with less room, strips are left out.
 const MIN_SCENE_HEIGHT: f32 = 56.0;
 /// Least share of the scene in a picture with a colour scale.
-const MIN_SCENE_SHARE: f32 = 0.45;
+const MIN_SCENE_SHARE: f32 = 0.5;
 
 /// Contents of the overlay.
 #[derive(Clone, Debug, Default)]
@@ -150,6 +150,9 @@ fn cut(rect: Rect, overlay: &Overlay, notes: usize, has_legend: bool, has_scale:
     let beside = rect.width() >= MIN_WIDTH_BESIDE_LEGEND;
     let words = overlay.room.words.round();
     let is_stacked = !beside && overlay.room.is_wide;
+    // A long message with its button comes before the legend.
+    let crowded = is_stacked && top + legend + words + 4.0 > rect.height() - 2.0 * MIN_SCENE_HEIGHT;
+    let (legend, has_legend) = if crowded { (0.0, false) } else { (legend, has_legend) };
     let row = if is_stacked { legend + words } else { legend.max(words) };
     let scale = if has_scale { LEGEND_HEIGHT } else { 0.0 };
     // Beside the legend if no words are.
@@ -242,10 +245,15 @@ fn time(painter: &Painter, strip: Rect, overlay: &Overlay, notes: &[String], the
     // Single lines stand in the middle of a strip made higher by buttons.
     let corner = strip.min + vec2(margin, ((strip.height() - height) / 2.0).max(0.0) + 3.0);
     let first = LINES[class][usize::from(overlay.time.is_none())];
-    for ((words, size), offset) in words.zip(offsets) {
+    for (k, (words, size)) in words.enumerate() {
+        let Some(&offset) = offsets.get(k) else {
+            break;
+        };
+        let next = offsets.get(k + 1).filter(|next| next.y == offset.y);
+        let room = next.map_or(width, |next| next.x - 8.0) - offset.x;
         let line = if offset.y == 0.0 { first } else { LINES[class][1] };
         let mut job = LayoutJob::simple_singleline(words, FontId::proportional(size), ink);
-        job.wrap = TextWrapping::truncate_at_width((width - offset.x).max(40.0));
+        job.wrap = TextWrapping::truncate_at_width(room.max(40.0));
         let words = painter.layout_job(job);
         let at = corner + offset + vec2(0.0, (line - words.size().y) / 2.0);
         painter.galley(at, words, ink);

@@ -511,7 +511,7 @@ impl Viewport {
         let aspect = screen.aspect();
         // Collapsing the sheet or rotating a phone would leave half of the mechanism outside. A mere touch enlarges the controls
         // and shrinks the picture a little: nothing may move under the finger.
-        let reshaped = !(0.8..=1.4).contains(&(aspect / self.fitted)) && !ui.input(|i| i.pointer.any_down());
+        let reshaped = !(0.88..=1.4).contains(&(aspect / self.fitted)) && !ui.input(|i| i.pointer.any_down());
         if self.frozen.is_none() && (self.fit_pending || (reshaped && self.fits)) {
             self.fit_pending = false;
             (self.fitted, self.fits) = (aspect, true);
