@@ -37,7 +37,7 @@ const MIN_WIDTH_BESIDE_LEGEND: f32 = 640.0;
 /// Least height of the scene between its strips, points; with less room, strips are left out.
 const MIN_SCENE_HEIGHT: f32 = 56.0;
 /// Least share of the scene in a picture with a colour scale.
-const MIN_SCENE_SHARE: f32 = 0.5;
+const MIN_SCENE_SHARE: f32 = 0.42;
 
 /// Contents of the overlay.
 #[derive(Clone, Debug, Default)]

@@ -1005,6 +1005,8 @@ fn a_link_from_the_window_opens_in_every_form_and_restores_the_camera() {
     // On a screen of another aspect ratio the camera fits the scene again.
     let (mut phone, _) = open(AppOptions::from_link(&full).expect("a link"), PORTRAIT);
     verdict(&mut phone);
+    // The verdict leaves after 5 s and returns its room to the picture.
+    phone.run_steps(320);
     phone.run();
     let fitted = camera(&phone).expect("a camera");
     assert!(fitted.fitted.is_some_and(|aspect| aspect < 3.0), "{fitted:?}");
