@@ -1251,6 +1251,33 @@ mod tests {
     }
 
     #[test]
+    fn arrows_have_the_scale_of_the_run_while_it_is_reproduced() {
+        let scene = Scene::load("spcmm", &[]).expect("built in");
+        let mut player = Player::new(&scene).expect("starts");
+        player.run_to(20e-3);
+        let peaks = player.impact_record().peaks(0.0, 20e-3);
+        let largest = peaks.map(|(_, peak)| peak.force.norm() as f32).fold(0.0, f32::max);
+        let mut viewport = Viewport::new(&player, ViewOptions::default());
+        // As after a jump: no recent peak is known.
+        viewport.clear_history(&player);
+        viewport.hold_scale(&player, 20e-3);
+        let ctx = egui::Context::default();
+        theme::apply(&ctx, false);
+        let mut reference = |viewport: &mut Viewport| {
+            let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
+                viewport.ui(ui, &player, true, Room::default());
+            });
+            output.textures_delta.clear();
+            viewport.list.legend.as_ref().expect("drawn").reference
+        };
+        // Rounded up to 1, 2 or 5 times a power of ten.
+        let held = reference(&mut viewport);
+        assert!(largest > 100.0 && held >= largest && held < 2.6 * largest, "{held} for {largest}");
+        viewport.release_scale();
+        assert!(reference(&mut viewport) < largest);
+    }
+
+    #[test]
     fn the_first_picture_does_not_move_into_place() {
         let scene = Scene::load("spcmm", &[]).expect("built in");
         let player = Player::new(&scene).expect("starts");
