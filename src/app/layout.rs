@@ -392,7 +392,8 @@ impl App {
             })
             .inner;
         if self.panels.sheet.is_some() {
-            let width = (ui.available_width() * 0.42).clamp(260.0, 340.0).min(0.55 * ui.available_width());
+            // Leaves sliders tracks of 120 points, if the picture can spare the width.
+            let width = (ui.available_width() * 0.42).clamp(310.0, 340.0).min(0.55 * ui.available_width());
             Panel::right("sheet beside").frame(bar).resizable(false).exact_size(width).show(ui, |ui| self.sheet(ui));
         }
         self.central(ui, reset);

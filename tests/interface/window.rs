@@ -1152,3 +1152,15 @@ fn an_error_makes_room_for_itself_below_the_scene() {
         assert!(dismiss.bottom() <= timeline.top(), "{size:?}: {dismiss} {timeline}");
     }
 }
+
+#[test]
+fn sliders_keep_tracks_of_120_points_at_twice_the_type_size() {
+    // 1280 × 800 pixels at 200 %.
+    let mut harness = sized("spcmm", [640.0, 400.0], egui::Theme::Light);
+    harness.run();
+    let view = harness.get_by_label("3D view").rect();
+    for name in ["Clearance", "Friction coefficient", "Restitution"] {
+        let track = harness.get_by_role_and_label(Role::Slider, name).rect();
+        assert!(track.width() >= 120.0 && track.left() > view.right(), "{name}: {track} {view}");
+    }
+}
