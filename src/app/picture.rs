@@ -235,7 +235,6 @@ impl App {
 
     /// Draws `contents` with (pixels, pixels per point) on `canvas`, with everything in a view of `aspect`; `new` if it has not drawn
     /// these contents before.
-    #[expect(clippy::too_many_arguments, reason = "one call for a whole picture")]
     fn draw_off_screen(
         &mut self,
         ctx: &egui::Context,
