@@ -84,8 +84,11 @@ fn shade(s: Finish, n: vec3<f32>, v: vec3<f32>, shadow: f32, open: f32) -> vec3<
     let turned = 1.0 - nv;
     let turned2 = turned * turned;
     let edge = f0 + (max(vec3<f32>(1.0 - s.roughness), f0) - f0) * (turned2 * turned2 * turned);
+    // From behind, so that a part turned from the light stands out from a dark ground.
+    let behind = globals.strip.w * turned2 * turned;
     let mirror = edge * (surroundings(reflect(-v, n), s.roughness) * mix(MIRROR_IN_SHADOW, 1.0, shadow));
-    return (key * mix(KEY_WHEN_NEAR, 1.0, open) + (diffuse * sky + mirror) * open) * globals.light.w;
+    let around = diffuse * sky + mirror + mix(s.base, vec3<f32>(1.0), 0.5) * behind;
+    return (key * mix(KEY_WHEN_NEAR, 1.0, open) + around * open) * globals.light.w;
 }
 
 // Part of the surrounding light that reaches a surface at a distance of `gaps` from a wall: 1 - 2 E3(x) for a plane whose shade

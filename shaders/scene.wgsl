@@ -11,7 +11,7 @@ struct Globals {
     up: vec4<f32>,
     // brightness of the key light, the ground, the sky and the studio's window
     studio: vec4<f32>,
-    // xyz: towards the studio's strip
+    // xyz: towards the studio's strip; w: light along the edges of parts
     strip: vec4<f32>,
     // w: comparisons for a shadow on either side of the middle one
     background_top: vec4<f32>,

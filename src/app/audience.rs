@@ -4,6 +4,7 @@
 use eframe::egui::{self, CentralPanel, Panel, PointerButton, Ui, ViewportBuilder, ViewportCommand, ViewportId, vec2};
 
 use super::keys::Action;
+use super::overlay::Room;
 use super::run::Run;
 use super::{keys, layout, present, theme};
 
@@ -121,12 +122,10 @@ fn contents(ui: &mut Ui, run: &mut Run, plot: Option<usize>, is_filmed: bool) ->
         });
     }
     CentralPanel::no_frame().show(ui, |ui| {
-        let area = ui.available_rect_before_wrap();
-        let caption = run.caption(ui, area, true, is_filmed);
-        let above = caption.as_ref().map(|caption| caption.plate);
-        run.viewport.second_ui(ui, &run.player, present::ARROW_THICKNESS, above);
-        if let Some(caption) = caption {
-            caption.ui(ui, area);
+        let room = Room { words: present::CAPTION_HEIGHT, ..Room::default() };
+        let strips = run.viewport.second_ui(ui, &run.player, present::ARROW_THICKNESS, room);
+        if let Some(caption) = run.caption(ui, strips.words, true, is_filmed) {
+            caption.ui(ui);
         }
     });
     results

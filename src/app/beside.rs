@@ -1,7 +1,8 @@
 //! Reference runs recorded before a change, as the window handles them: retain, and show beside the current machine.
 
-use eframe::egui::{self, Button, Rect, Ui, pos2, vec2};
+use eframe::egui::{self, Align2, Button, Rect, Ui, pos2, vec2};
 
+use super::overlay::Room;
 use super::run::Run;
 use super::viewport::Viewport;
 
@@ -44,14 +45,18 @@ impl Run {
         lags
     }
 
-    /// Shows the machine before the change beside the current one on request; returns the remaining part of `area`.
-    pub(super) fn picture_before(&mut self, ui: &mut Ui, area: Rect, plain: bool) -> Rect {
+    /// The halves of `area` for the machine before the change and the current one, if both are shown.
+    pub(super) fn halves(&mut self, area: Rect) -> Option<[Rect; 2]> {
+        self.plots.comparison.beside().is_some().then(|| halves(area).into())
+    }
+
+    /// Shows the machine before the change in `area` on request, with as much `room` for widgets as the current one has.
+    pub(super) fn picture_before(&mut self, ui: &mut Ui, area: Option<Rect>, plain: bool, room: Room) {
         let Self { plots, player, viewport, beside, .. } = self;
-        let Some((earlier, number)) = plots.comparison.beside() else {
+        let Some(((earlier, number), area)) = plots.comparison.beside().zip(area) else {
             (viewport.title, viewport.common, *beside) = (None, None, None);
-            return area;
+            return;
         };
-        let (before, now) = halves(area);
         if plain {
             earlier.run_mut().follow(player.pacer.shown(), || true);
             earlier.run_mut().publish_peaks();
@@ -69,19 +74,22 @@ impl Run {
         (viewport.common, picture.common) = (Some(common), Some(common));
         picture.title = Some(format!("before: {}", earlier.name()));
         viewport.title = Some(format!("now: {}", earlier.named_in(player)));
-        let mut place = ui.new_child(egui::UiBuilder::new().max_rect(before).id_salt("before"));
-        let close =
-            Rect::from_min_size(before.right_top() + vec2(-80.0, 10.0), vec2(70.0, ui.spacing().interact_size.y));
-        picture.ui(&mut place, earlier.run(), plain, if plain { &[] } else { std::slice::from_ref(&close) });
+        let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area).id_salt("before"));
+        picture.hides_time = viewport.hides_time;
+        let close = vec2(70.0, ui.spacing().interact_size.y);
+        let room = Room { notes: viewport.notes(player), ..room };
+        let strips = picture.ui(&mut place, earlier.run(), plain, room);
         viewport.copy_camera(picture);
         picture.take_clicked();
         if let Some(pull) = picture.take_pull() {
             // A body that cannot be pulled stays unchanged.
             let _ = earlier.run_mut().pull(pull);
         }
+        let close =
+            Align2::RIGHT_CENTER.align_size_within_rect(close, strips.top.with_max_x(strips.top.right() - 10.0));
         if !plain && ui.put(close, Button::new("Close")).on_hover_text("Show only the current machine").clicked() {
             plots.comparison.hide_comparison();
+            viewport.fit();
         }
-        now
     }
 }

@@ -71,6 +71,8 @@ pub enum Command {
     /// Opens or closes the audience window.
     #[cfg(not(target_arch = "wasm32"))]
     Audience(bool),
+    /// Back to t = 0, with all changes applied.
+    Reset,
     /// Stops or cancels the task under way.
     StopTasks,
     /// Forgets all settings and opens the default scene.
@@ -156,6 +158,7 @@ impl App {
             Command::LeaveLesson => self.leave_lesson(),
             #[cfg(not(target_arch = "wasm32"))]
             Command::Audience(on) => self.show_audience(on),
+            Command::Reset => self.reset(),
             Command::StopTasks => self.tasks.cancel(&mut self.run, &mut self.messages),
             #[cfg(not(target_arch = "wasm32"))]
             Command::StartAsNew => self.reset_to_first_start(ctx),

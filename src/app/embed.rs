@@ -7,6 +7,8 @@ use crate::session::embedded::{Embedded, Part};
 
 /// Width of the controls beside the picture, points.
 const CONTROLS_WIDTH: f32 = 250.0;
+/// Least width that leaves a slider a track of 120 points.
+const MIN_CONTROLS_WIDTH: f32 = 160.0;
 /// Height of the plots, and of the controls below the picture, as shares of the window's.
 const PLOTS_FRACTION: f32 = 0.34;
 const CONTROLS_FRACTION: f32 = 0.4;
@@ -34,7 +36,8 @@ impl App {
             .inner;
         if panels.contains(Part::Controls) {
             let panel = if wide {
-                Panel::left("controls").exact_size(CONTROLS_WIDTH.min(0.45 * ui.available_width()))
+                let width = CONTROLS_WIDTH.min((0.45 * ui.available_width()).max(MIN_CONTROLS_WIDTH));
+                Panel::left("controls").exact_size(width)
             } else {
                 Panel::bottom("controls below").exact_size(CONTROLS_FRACTION * ui.available_height())
             };

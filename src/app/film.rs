@@ -85,6 +85,8 @@ pub struct RunningFilm {
     film: Film,
     canvas: Canvas,
     pending: Option<Pending>,
+    /// Width over height of the view at the start.
+    aspect: f32,
     /// Index of the next frame.
     next: u64,
     /// State of the run before: displayed instant, s, time scale, and whether it played.
@@ -103,6 +105,7 @@ impl RunningFilm {
         run.player.pacer.set_scale(scale);
         run.player.go_to(shown);
         run.player.set_playing(playing);
+        run.viewport.release_scale();
         run.viewport.clear_history(&run.player);
     }
 }
@@ -208,12 +211,14 @@ impl Tasks {
         let pacer = &run.player.pacer;
         let before = (pacer.shown(), pacer.scale(), run.player.is_playing());
         let canvas = Canvas::beside(state);
+        let aspect = run.viewport.scene_area().aspect_ratio();
         // Impacts glow as long as in playback at this scale.
         run.player.pacer.set_scale(settings.scale);
+        run.viewport.hold_scale(&run.player, settings.span[1]);
         run.player.go_to(settings.span[0]);
         run.viewport.clear_history(&run.player);
         self.film_settings = Some(settings.clone());
-        self.film = Some(RunningFilm { settings, film, canvas, pending: None, next: 0, before });
+        self.film = Some(RunningFilm { settings, film, canvas, aspect, pending: None, next: 0, before });
         Ok(())
     }
 }
@@ -267,7 +272,8 @@ impl App {
         let contents = if running.settings.plots { Contents::Plots } else { Contents::View };
         let first = running.next == 0;
         let size = running.settings.size;
-        running.pending = Some(self.draw_frame(ctx, &mut running.canvas, contents, size, first)?);
+        let frame = self.draw_frame(ctx, &mut running.canvas, contents, size, running.aspect, first)?;
+        running.pending = Some(frame);
         running.next += 1;
         Ok(true)
     }

@@ -7,11 +7,16 @@ use super::run::Run;
 use super::{theme, value};
 use crate::view::{DrawList, Ghost, SceneView, Shot};
 
+/// Most notes on the ghosts of `player`; the room for them does not change while one is computed.
+pub fn most_notes(player: &Player) -> usize {
+    usize::from(player.twin().is_some()) + 2 * usize::from(player.ideal().is_some())
+}
+
 /// Adds the ghosts at the displayed instant to the draw list built from `shot`; returns a note on each.
 pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawList) -> Vec<String> {
     let mut notes = Vec::new();
     let mut note = |ghost: &str, is_apart: bool| {
-        let near = if is_apart { "" } else { ", less than a pixel away" };
+        let near = if is_apart { "" } else { ", under a pixel away" };
         notes.push(format!("{ghost}{near}"));
     };
     let now = player.frame().time;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::canvas::Canvas;
 use super::labels::LabelPositions;
-use super::overlay::{self, Overlay};
+use super::overlay::{self, Overlay, Strips};
 use super::{App, AppOptions, theme};
 use crate::render::{self, Image, NoAdapter, RenderError, wgpu};
 use crate::simulate::StartError;
@@ -70,7 +70,7 @@ impl Headless {
         App::with_context(&self.canvas.ctx, None, options)
     }
 
-    /// A plain picture of `list` at `list.size` with the text of `overlay`; `scale` is pixels per point.
+    /// A plain picture of `list`, which fills the scene of `strips`, with the text of `overlay`, one pixel per point.
     ///
     /// # Errors
     /// The size cannot be drawn.
@@ -78,17 +78,18 @@ impl Headless {
         &mut self,
         list: &Arc<DrawList>,
         overlay: &Overlay,
+        strips: &Strips,
         theme: Theme,
-        scale: f32,
     ) -> Result<Image, RenderError> {
         theme::apply(&self.canvas.ctx, false);
-        let output = self.canvas.pass(list.size, scale, |ui| {
-            let rect = ui.max_rect();
-            let painter = ui.painter_at(rect);
-            painter.add(render::Viewport::shape(rect, list.clone()));
-            overlay::paint(&painter, rect, scale, list, theme, overlay, &[], &mut self.places);
+        let size = strips.top.union(strips.bottom).size();
+        let size = [size.x as u32, size.y as u32];
+        let output = self.canvas.pass(size, 1.0, |ui| {
+            let painter = ui.painter_at(ui.max_rect());
+            painter.add(render::Viewport::shape(strips.scene, list.clone()));
+            overlay::paint(&painter, strips, 1.0, list, theme, overlay, &mut self.places);
         })?;
-        self.canvas.paint(output, list.size, scale).wait()
+        self.canvas.paint(output, size, 1.0).wait()
     }
 
     /// CPU work of one frame of a running window without stepping: interface, draw list, tessellation, upload and encoded

@@ -1,11 +1,9 @@
 //! The sentence that a scene opens with: what the machine is for, and what to watch. It leaves by itself.
 
-use std::sync::Arc;
 use std::time::Duration;
 
-use eframe::egui::{Align2, Event, Galley, Label, Rect, TextStyle, Ui, UiBuilder, Vec2, vec2};
+use eframe::egui::{Align, Event, Label, Layout, Rect, RichText, Ui, UiBuilder};
 
-use super::overlay;
 use crate::scene::Scene;
 
 /// Display time of an empty sentence, and of each character, s.
@@ -14,9 +12,6 @@ const READING_TIME: [f64; 2] = [4.0, 0.06];
 const FADE_TIME: f64 = 1.5;
 /// Interval between pictures of the fade, s.
 const FADE_INTERVAL: f64 = 1.0 / 30.0;
-/// Longest line, points.
-const MAX_WIDTH: f32 = 460.0;
-const PADDING: Vec2 = vec2(10.0, 5.0);
 
 /// The sentence of the scene just opened, if it is still shown.
 #[derive(Default)]
@@ -26,14 +21,6 @@ pub struct Hint {
     since: Option<f64>,
     /// Reduced motion: it does not fade, but leaves at once, also at the first gesture.
     calm: bool,
-}
-
-/// The sentence laid out over the picture.
-pub struct ShownHint {
-    words: Arc<Galley>,
-    /// Its plate.
-    pub plate: Rect,
-    opacity: f32,
 }
 
 impl Hint {
@@ -48,20 +35,15 @@ impl Hint {
         *self = Self { text, ..Self::new(self.calm) };
     }
 
-    /// Whether it has been shown and has not left yet.
-    pub fn is_shown(&self) -> bool {
-        !self.text.is_empty() && self.since.is_some()
-    }
-
     /// Removes the sentence.
     pub fn end(&mut self) {
         self.text.clear();
     }
 
-    /// The sentence in the picture in `area`, below its buttons; `None` once it has left, or without room for it.
-    pub fn place(&mut self, ui: &Ui, area: Rect) -> Option<ShownHint> {
-        if self.text.is_empty() || !overlay::fits_labels(area) {
-            return None;
+    /// Shows the sentence in `place`, until it has left.
+    pub fn ui(&mut self, ui: &mut Ui, place: Rect) {
+        if self.text.is_empty() {
+            return;
         }
         let now = ui.input(|input| input.time);
         let reading = READING_TIME[0] + READING_TIME[1] * self.text.chars().count() as f64;
@@ -70,18 +52,15 @@ impl Hint {
         let fade = if self.calm { 0.0 } else { FADE_TIME };
         if left <= -fade || has_gesture {
             self.end();
-            return None;
+            return;
         }
         let wait = if left > 0.0 { left } else { FADE_INTERVAL };
         ui.ctx().request_repaint_after(Duration::from_secs_f64(wait));
-        let opacity = if left > 0.0 { 1.0 } else { (1.0 + left / fade) as f32 };
-        let mut inside = area.shrink(12.0);
-        inside.min.y += overlay::plate(2)[1].max(ui.spacing().interact_size.y + 8.0);
-        let width = (inside.width() - 2.0 * PADDING.x).min(MAX_WIDTH);
-        let font = TextStyle::Body.resolve(ui.style());
-        let words = ui.painter().layout(self.text.clone(), font, ui.visuals().strong_text_color(), width);
-        let place = Align2::CENTER_TOP.align_size_within_rect(words.size(), inside);
-        Some(ShownHint { words, plate: place.expand2(PADDING), opacity })
+        let inside = UiBuilder::new().max_rect(place).layout(Layout::left_to_right(Align::Center));
+        ui.scope_builder(inside, |ui| {
+            ui.set_opacity(if left > 0.0 { 1.0 } else { (1.0 + left / fade) as f32 });
+            ui.add(Label::new(RichText::new(&self.text).strong()).selectable(false).wrap());
+        });
     }
 }
 
@@ -95,17 +74,4 @@ pub(super) fn is_gesture(event: &Event) -> bool {
             | Event::Zoom(_)
             | Event::Touch { phase: eframe::egui::TouchPhase::Start, .. }
     )
-}
-
-impl ShownHint {
-    /// Shows it.
-    pub fn ui(self, ui: &mut Ui) {
-        let fill = ui.visuals().window_fill.gamma_multiply(0.92 * self.opacity);
-        ui.painter().rect_filled(self.plate, 6.0, fill);
-        let inside = UiBuilder::new().max_rect(self.plate.shrink2(PADDING));
-        ui.scope_builder(inside, |ui| {
-            ui.set_opacity(self.opacity);
-            ui.add(Label::new(self.words).selectable(false));
-        });
-    }
 }

@@ -234,6 +234,11 @@ impl Run {
         let (number, own) = record.in_progress(self.viewport.focus().filter(touches), shown)?;
         let report = player.frame().joints.get(own.joint)?;
         let onset = format!("Impact {number}, {}: {}", joint(player, own.joint), value::time(own.start));
+        if shown < own.force_peak.time {
+            // What comes is not told.
+            let now = value::quantity(report.normal_force.norm(), "N", 3);
+            return Some(format!("{onset}, force now {now}"));
+        }
         let peak = value::quantity(own.force_peak.force.norm(), "N", 3);
         Some(match own.finished() {
             Some(impact) => format!(

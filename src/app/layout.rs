@@ -1,13 +1,15 @@
 //! Layout: panels side by side in a large window; picture and a collapsible sheet in a small one.
 
-use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollArea, Ui};
+use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, Rangef, ScrollArea, Ui};
 
 #[cfg(not(target_arch = "wasm32"))]
 use super::audience;
 use super::command::Command;
 use super::files::record_files;
 use super::header::Header;
+use super::keys::Action;
 use super::messages::{Messages, Surroundings};
+use super::overlay::Room;
 use super::panels::{Arrangement, Sheet};
 #[cfg(not(target_arch = "wasm32"))]
 use super::remembered::Store;
@@ -18,6 +20,10 @@ use crate::view::Preset;
 const MIN_WIDTH_SIDE_BY_SIDE: f32 = 250.0;
 /// Width below which an embedded picture shows only machine and time, points.
 const MIN_WIDTH_WITH_CONTROLS: f32 = 280.0;
+/// Least and largest width of the controls and of the bench, and height of the plots, points.
+const PANEL_SIZES: [[f32; 2]; 3] = [[240.0, 480.0], [300.0, 640.0], [150.0, 600.0]];
+/// Distance of buttons and messages from the edge of the picture, points.
+const MARGIN: f32 = 10.0;
 /// Width of a lesson panel beside the picture, points.
 const LESSON_WIDTH: f32 = 340.0;
 
@@ -227,7 +233,7 @@ impl App {
         if self.run.impact_list_ui(ui.ctx(), area, is_free) {
             self.perform(ui.ctx(), Command::SaveImpacts);
         }
-        self.course.ring_highlights(ui, &self.run, area);
+        self.course.ring_highlights(ui, &self.run);
         self.dialog_ui(ui.ctx());
     }
 
@@ -236,11 +242,13 @@ impl App {
         if !self.course.is_running() {
             return;
         }
+        // In a presentation the machine has two thirds of the screen.
+        let share = if self.is_presenting() { 1.0 / 3.0 } else { 0.42 };
         let panel = if ui.available_width() > ui.available_height() {
-            let width = LESSON_WIDTH.min(0.42 * ui.available_width());
+            let width = LESSON_WIDTH.min(share * ui.available_width());
             Panel::right("lesson").exact_size(width)
         } else {
-            Panel::bottom("lesson").exact_size(0.42 * ui.available_height())
+            Panel::bottom("lesson").exact_size(share * ui.available_height())
         };
         panel.frame(bar).resizable(false).show(ui, |ui| self.lesson_ui(ui));
     }
@@ -253,7 +261,9 @@ impl App {
         #[cfg(not(target_arch = "wasm32"))]
         let presentation = &mut self.presentation;
         let mut present = false;
-        Panel::left("controls").frame(bar).default_size(300.0).size_range(240.0..=480.0).show_collapsible(
+        let [controls, side, below] = PANEL_SIZES.map(|[least, most]| Rangef::new(least, most));
+        panels.keep_shares(ui, [("controls", false, controls), ("bench", false, side), ("plots", true, below)]);
+        Panel::left("controls").frame(bar).default_size(300.0).size_range(controls).show_collapsible(
             ui,
             &mut panels.controls,
             |ui| {
@@ -270,7 +280,7 @@ impl App {
             .frame(bar)
             .resizable(true)
             .default_size(400.0)
-            .size_range(300.0..=640.0)
+            .size_range(side)
             .show_collapsible(ui, &mut panels.bench, |ui| {
                 ScrollArea::vertical()
                     // A lesson has its own scroll position.
@@ -288,7 +298,7 @@ impl App {
             .frame(bar)
             .resizable(true)
             .default_size(plots_height)
-            .size_range(150.0..=600.0)
+            .size_range(below)
             .show_collapsible(ui, &mut panels.plots, |ui| {
                 spoken::landmark(ui, "Plots");
                 // Otherwise the panel would shrink to its content.
@@ -387,7 +397,8 @@ impl App {
             })
             .inner;
         if self.panels.sheet.is_some() {
-            let width = (ui.available_width() * 0.42).clamp(260.0, 340.0).min(0.55 * ui.available_width());
+            // Leaves sliders tracks of 120 points, if the picture can spare the width.
+            let width = (ui.available_width() * 0.42).clamp(310.0, 340.0).min(0.55 * ui.available_width());
             Panel::right("sheet beside").frame(bar).resizable(false).exact_size(width).show(ui, |ui| self.sheet(ui));
         }
         self.central(ui, reset);
@@ -396,10 +407,10 @@ impl App {
         }
     }
 
-    /// The picture in the remaining space. Resets the run if a panel (`reset`) or the picture requests it.
+    /// The picture in the remaining space. Resets the run if a panel requests it (`reset`).
     pub(super) fn central(&mut self, ui: &mut Ui, reset: bool) {
-        let picture = CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
-        if reset || picture.inner {
+        CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
+        if reset {
             self.reset();
         }
     }
@@ -434,26 +445,19 @@ impl App {
         self.perform_all(ui.ctx(), command);
     }
 
-    /// The 3D view with its buttons and, after a stop, the reason. Returns whether the user asked for a reset.
-    pub(super) fn picture(&mut self, ui: &mut Ui) -> bool {
+    /// The 3D view with its buttons, and the messages below it.
+    pub(super) fn picture(&mut self, ui: &mut Ui) {
         spoken::landmark(ui, "The machine");
         let plain = self.picture.hides_controls();
         if !plain {
             self.run.microscope_beside(ui);
         }
-        let area = ui.available_rect_before_wrap();
-        let whole = area;
-        let area = self.run.picture_before(ui, area, plain);
+        let whole = ui.available_rect_before_wrap();
+        let halves = self.run.halves(whole);
+        let area = halves.map_or(whole, |[_, now]| now);
         self.panels.picture = area;
         let presenting = self.is_presenting() || self.panels.embedded.is_some();
         self.run.player.update_ghosts();
-        let mut caption = None;
-        if self.is_presenting() || (overlay::fits_labels(area) && !plain) {
-            caption = self.run.caption(ui, area, self.is_presenting(), self.tasks.filming().is_some());
-        }
-        let mut above: Vec<_> = caption.iter().map(|caption| caption.plate).collect();
-        let inner = area.shrink(10.0);
-        let row = egui::vec2(inner.width(), ui.spacing().interact_size.y);
         let width = |name: &str| {
             let font = egui::TextStyle::Button.resolve(ui.style());
             let words = ui.painter().layout_no_wrap(name.to_owned(), font, egui::Color32::BLACK);
@@ -461,15 +465,12 @@ impl App {
         };
         let options = width("View options");
         let cameras: f32 = Preset::ALL.into_iter().map(Preset::label).chain(["Fit"]).map(width).sum();
-        // The time is to the left of the buttons.
-        let gap = ui.spacing().item_spacing.x;
-        let narrow = area.width() < overlay::time_extent(ui.painter()) + cameras + options - gap + 10.0;
+        let narrow = area.width() < overlay::NOTES_WIDTH + cameras + options;
+        let row = ui.spacing().interact_size.y;
+        let buttons = egui::vec2(if narrow { options } else { options + cameras } + MARGIN, row);
+        let has_buttons = !plain && !presenting;
         // Beside the microscope on a phone, the time needs the full upper edge.
-        let edge = if area.width() < MIN_WIDTH_SIDE_BY_SIDE { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
-        if !plain && !presenting {
-            let size = egui::vec2(if narrow { options } else { options + cameras }, row.y);
-            above.push(edge.align_size_within_rect(size, inner));
-        }
+        let below = has_buttons && area.width() < MIN_WIDTH_SIDE_BY_SIDE;
         let around = if self.panels.embedded.is_some() {
             Surroundings::Page
         } else if self.course.is_running() || self.is_presenting() {
@@ -477,25 +478,28 @@ impl App {
         } else {
             Surroundings::Window
         };
-        if !plain && self.messages.are_shown(&self.tasks, around) {
-            above.push(Messages::area(ui, inner));
+        let has_messages = !plain && self.messages.are_shown(&self.run.player, &self.tasks, around);
+        let has_caption = self.is_presenting() || (overlay::fits_labels(area) && !plain);
+        let mut room = Room::default();
+        if has_caption {
+            room.words = present::CAPTION_HEIGHT;
         }
-        // A caption answers a question, and takes the place of the sentence that the scene opens with.
-        let hint = if plain || caption.is_some() || around == Surroundings::Lecture {
-            None
-        } else {
-            let was_shown = self.hint.is_shown();
-            let hint = self.hint.place(ui, area);
-            if was_shown && !self.hint.is_shown() && !self.calm {
-                // The machine takes the room that it leaves.
-                self.run.viewport.fit_again();
-            }
-            hint
-        };
-        above.extend(hint.iter().map(|hint| hint.plate));
+        if below {
+            (room.words, room.is_wide) = (room.words.max(row), true);
+        } else if has_buttons {
+            room.buttons = buttons;
+        }
+        if has_messages {
+            room.words = room.words.max(Messages::height(ui));
+            room.is_wide |= self.messages.have_buttons(&self.run.player, &self.tasks, around);
+        }
+        // The transport of a large window shows it.
+        self.run.viewport.hides_time = has_buttons && !self.panels.is_compact();
+        self.run.picture_before(ui, halves.map(|[before, _]| before), plain, room);
+        let viewport = &mut self.run.viewport;
+        viewport.bare = self.panels.embedded.is_some() && area.width() < MIN_WIDTH_WITH_CONTROLS;
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
-        self.run.viewport.bare = self.panels.embedded.is_some() && area.width() < MIN_WIDTH_WITH_CONTROLS;
-        self.run.viewport.ui(&mut place, &self.run.player, plain, &above);
+        let strips = viewport.ui(&mut place, &self.run.player, plain, room);
         ui.advance_cursor_after_rect(whole);
         if let Some(joint) = self.run.viewport.take_clicked() {
             self.run.focus(joint);
@@ -509,43 +513,53 @@ impl App {
         }
         if plain {
             // A saved picture has no buttons.
-            return false;
+            return;
         }
-        let backwards = egui::Layout::right_to_left(egui::Align::Center);
-        let buttons = egui::UiBuilder::new().max_rect(edge.align_size_within_rect(row, inner)).layout(backwards);
-        let mut action = None;
-        ui.scope_builder(buttons, |ui| {
-            if presenting {
-                return;
+        if has_buttons && !(below && has_messages) {
+            let inside = if below { strips.words } else { strips.top };
+            let backwards = egui::Layout::right_to_left(egui::Align::Center);
+            let place =
+                Align2::RIGHT_CENTER.align_size_within_rect(buttons, inside.with_max_x(inside.right() - MARGIN));
+            let place = egui::UiBuilder::new().max_rect(place).layout(backwards);
+            if let Some(action) = ui.scope_builder(place, |ui| self.picture_buttons(ui, narrow)).inner {
+                self.perform_action(ui.ctx(), action);
             }
-            menu(ui, "View options", false, |ui| {
-                ui.set_min_width(230.0);
-                if narrow {
-                    ui.horizontal_wrapped(|ui| self.run.viewport.camera_buttons(ui, false));
-                    ui.separator();
-                }
-                action = self.run.instruments(ui, self.sound.is_on());
-                ui.add_space(4.0);
-                self.run.viewport.options_ui(ui);
-            });
-            if !narrow {
-                ui.with_layout(backwards, |ui| self.run.viewport.camera_buttons(ui, true));
-            }
-        });
-        if let Some(action) = action {
-            self.perform_action(ui.ctx(), action);
         }
+        let caption = if has_caption && !has_messages {
+            self.run.caption(ui, strips.words, self.is_presenting(), self.tasks.filming().is_some())
+        } else {
+            None
+        };
         if let Some(caption) = caption {
-            caption.ui(ui, area);
-        }
-        if let Some(hint) = hint {
-            hint.ui(ui);
+            caption.ui(ui);
+        } else if !has_messages && around != Surroundings::Lecture && overlay::fits_labels(area) {
+            // A caption answers a question, and takes the place of the sentence that the scene opens with.
+            let taken = if below && has_buttons { buttons.x } else { 0.0 };
+            self.hint.ui(ui, strips.words.with_max_x(strips.words.right() - taken));
         }
         drop_hint(ui, whole);
-        let inside = whole.shrink(10.0);
+        let refused = self.messages.is_refused(&self.run.player);
+        let inside = if refused { whole.shrink(MARGIN) } else { strips.words };
         let command = self.messages.ui(ui, inside, &self.run.player, &self.tasks, around);
         self.perform_all(ui.ctx(), command);
-        let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
-        ui.scope_builder(middle, |ui| transport::banner(ui, &self.run.player)).inner
+    }
+
+    /// Buttons in the strip above the picture, from right to left; in a `narrow` one only the menu. Returns the action chosen in it.
+    fn picture_buttons(&mut self, ui: &mut Ui, narrow: bool) -> Option<Action> {
+        let mut action = None;
+        menu(ui, "View options", false, |ui| {
+            ui.set_min_width(230.0);
+            if narrow {
+                ui.horizontal_wrapped(|ui| self.run.viewport.camera_buttons(ui, false));
+                ui.separator();
+            }
+            action = self.run.instruments(ui, self.sound.is_on());
+            ui.add_space(4.0);
+            self.run.viewport.options_ui(ui);
+        });
+        if !narrow {
+            self.run.viewport.camera_buttons(ui, true);
+        }
+        action
     }
 }

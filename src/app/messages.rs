@@ -11,9 +11,15 @@ use super::command::Command;
 use super::host::Host;
 use super::player::Player;
 use super::tasks::Tasks;
+use super::transport;
 
 /// Display time of a verdict that needs no action, s.
-const VERDICT_TIME: f64 = 6.0;
+const VERDICT_TIME: f64 = 5.0;
+/// Display time of a notice, s.
+const NOTICE_TIME: f64 = 5.0;
+/// Least height of the messages in a window too low for more, and their greatest width, points.
+const LEAST_HEIGHT: f32 = 30.0;
+const MAX_WIDTH: f32 = 640.0;
 /// Key under which the height of the messages is stored.
 const MESSAGES_KEY: &str = "height of the messages";
 
@@ -25,10 +31,8 @@ struct Notice {
 }
 
 impl Notice {
-    /// Longer messages take longer to read.
     fn remaining_time(&mut self, now: f64) -> f64 {
-        let length = 3.0 + 0.05 * self.text.len() as f64;
-        *self.since.get_or_insert(now) + length - now
+        *self.since.get_or_insert(now) + NOTICE_TIME - now
     }
 }
 
@@ -118,12 +122,20 @@ impl Messages {
         self.set_verdict(None);
     }
 
-    /// Expires a verdict that needs no action after some seconds.
-    pub fn expire_verdict(&mut self, ctx: &egui::Context) {
+    /// Expires a notice, and a verdict that needs no action, after some seconds.
+    pub fn expire(&mut self, ctx: &egui::Context) {
+        let now = ctx.input(|input| input.time);
+        if let Some(notice) = &mut self.notice {
+            let left = notice.remaining_time(now);
+            if left <= 0.0 {
+                self.notice = None;
+            } else {
+                ctx.request_repaint_after(Duration::from_secs_f64(left));
+            }
+        }
         if !self.verdict.as_ref().is_some_and(needs_no_action) {
             return;
         }
-        let now = ctx.input(|input| input.time);
         let left = *self.verdict_shown.get_or_insert(now) + VERDICT_TIME - now;
         if left <= 0.0 {
             self.verdict_shown = Some(f64::NEG_INFINITY);
@@ -181,9 +193,14 @@ impl Messages {
     }
 
     /// Whether [`Self::ui`] has messages.
-    pub fn are_shown(&self, tasks: &Tasks, around: Surroundings) -> bool {
-        let shows_verdict = self.shown_verdict(around).is_some();
-        self.problem.is_some() || shows_verdict || tasks.are_under_way()
+    pub fn are_shown(&self, player: &Player, tasks: &Tasks, around: Surroundings) -> bool {
+        self.notice.is_some() || self.have_buttons(player, tasks, around)
+    }
+
+    /// Whether there is a message with a button, which needs width.
+    pub fn have_buttons(&self, player: &Player, tasks: &Tasks, around: Surroundings) -> bool {
+        let stays = self.problem.is_some() || player.stopped().is_some() || self.shown_verdict(around).is_some();
+        stays || tasks.are_under_way()
     }
 
     /// The verdict on a link while it is displayed.
@@ -193,16 +210,13 @@ impl Messages {
         self.verdict.as_ref().filter(is_relevant).filter(|_| is_shown)
     }
 
-    /// Area of the messages at the lower edge of `area`.
-    pub fn area(ui: &Ui, area: Rect) -> Rect {
-        // Height in the previous frame; initially one line with a button.
+    /// Height of the messages in the previous frame, points; initially one line with a button.
+    pub fn height(ui: &Ui) -> f32 {
         let height = ui.data(|data| data.get_temp(Id::unique(MESSAGES_KEY)));
-        let height = height.unwrap_or(ui.spacing().interact_size.y + 16.0);
-        Align2::CENTER_BOTTOM.align_size_within_rect(egui::vec2(area.width().min(640.0), height), area)
+        height.unwrap_or(ui.spacing().interact_size.y + 16.0)
     }
 
-    /// Messages over the lower edge of the picture in `area`; they appear and disappear without affecting the layout. Returns the
-    /// command chosen in them.
+    /// Messages in `area`, which has [`Self::height`] if the window permits. Returns the command chosen in them.
     pub fn ui(
         &mut self,
         ui: &mut Ui,
@@ -212,40 +226,42 @@ impl Messages {
         around: Surroundings,
     ) -> Option<Command> {
         let id = Id::unique(MESSAGES_KEY);
-        if !self.are_shown(tasks, around) {
+        if !self.are_shown(player, tasks, around) {
             ui.data_mut(|data| data.remove_temp::<f32>(id));
-            self.notice_plate(ui, area);
             return None;
         }
-        let row = ui.spacing().interact_size.y;
-        let most = if self.is_refused(player) {
+        if self.is_refused(player) {
             // Hides the picture, which does not show what the link promised.
             let fill = ui.visuals().panel_fill;
             ui.painter().rect_filled(area.expand(10.0), 0.0, fill);
-            area.height()
-        } else {
-            (area.height() - row - 8.0).max(60.0)
-        };
-        let place = Self::area(ui, area);
+        }
+        let height = area.height().max(LEAST_HEIGHT);
+        let width = area.width().min(MAX_WIDTH);
+        let place = Align2::LEFT_BOTTOM.align_size_within_rect(egui::vec2(width, height), area);
         let shown = ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
             ScrollArea::vertical()
                 .id_salt("messages")
-                .max_height(most)
-                .min_scrolled_height(most)
+                .max_height(height)
+                .min_scrolled_height(height)
                 .show(ui, |ui| self.strips(ui, player, tasks, around))
         });
-        let now = shown.response.rect.height();
-        if now != place.height() {
-            ui.data_mut(|data| data.insert_temp(id, now));
+        let content = shown.inner.content_size.y;
+        let most = 0.5 * ui.ctx().content_rect().height();
+        let wanted = content.min(most);
+        // Nothing moves under a pressed pointer.
+        if wanted != Self::height(ui) && !ui.input(|input| input.pointer.any_down()) {
+            ui.data_mut(|data| data.insert_temp(id, wanted));
             ui.ctx().request_repaint();
         }
-        self.notice_plate(ui, area.with_max_y(place.top() - 8.0));
         shown.inner.inner
     }
 
     /// Errors, the progress of a task, and the verdict on a link.
     fn strips(&mut self, ui: &mut Ui, player: &Player, tasks: &Tasks, around: Surroundings) -> Option<Command> {
         let mut chosen = None;
+        if transport::banner(ui, player) {
+            chosen = Some(Command::Reset);
+        }
         let colour = ui.visuals().error_fg_color;
         if self.problem.as_ref().is_some_and(|problem| strip(ui, problem, colour)) {
             self.problem = None;
@@ -271,30 +287,15 @@ impl Messages {
         if dismissed {
             self.verdict = None;
         }
+        self.notice_plate(ui);
         chosen
     }
 
     /// A notice displayed for a few seconds.
-    fn notice_plate(&mut self, ui: &Ui, area: Rect) {
-        let now = ui.input(|input| input.time);
-        let Some(notice) = &mut self.notice else {
-            return;
-        };
-        let left = notice.remaining_time(now);
-        if left <= 0.0 {
-            self.notice = None;
-            return;
+    fn notice_plate(&self, ui: &mut Ui) {
+        if let Some(notice) = &self.notice {
+            plate(ui, ui.visuals().panel_fill).show(ui, |ui| ui.add(Label::new(&notice.text).wrap()));
         }
-        ui.ctx().request_repaint_after(Duration::from_secs_f64(left));
-        let font = egui::TextStyle::Body.resolve(ui.style());
-        let colour = ui.visuals().text_color();
-        let width = (area.width() - 24.0).max(40.0);
-        let words = ui.painter().layout(notice.text.clone(), font, colour, width);
-        let above = egui::vec2(0.0, ui.spacing().interact_size.y + 8.0);
-        let place = Align2::CENTER_BOTTOM.align_size_within_rect(words.size(), area.translate(-above));
-        let fill = ui.visuals().window_fill.gamma_multiply(0.92);
-        ui.painter().rect_filled(place.expand2(egui::vec2(10.0, 5.0)), 6.0, fill);
-        ui.painter().galley(place.min, words, colour);
     }
 }
 

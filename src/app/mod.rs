@@ -109,7 +109,7 @@ pub use log::{Entry, Event, Log};
 use messages::Messages;
 pub use microscope::{Circle, Microscope};
 pub use options::AppOptions;
-pub use overlay::{Overlay, force_notes, plates};
+pub use overlay::{Overlay, Room, Strips, force_notes, strips, triad};
 use panels::{Panels, Sheet};
 use picture::Picture;
 pub use player::Player;
@@ -386,7 +386,7 @@ impl App {
 
     /// Window position, points, of a point of the scene, m; `None` behind the camera.
     pub fn place_in_view(&self, point: &Vec3) -> Option<egui::Pos2> {
-        self.run.viewport.place(point, self.panels.picture)
+        self.run.viewport.place(point)
     }
 
     /// Ball joint, force in N and age in s of every marked peak.
@@ -485,7 +485,7 @@ impl eframe::App for App {
         }
         self.bench.report_frame(now, moves);
         self.advance_lesson(ctx);
-        self.messages.expire_verdict(ctx);
+        self.messages.expire(ctx);
         self.messages.announce(ctx, self.host.as_mut(), &self.run.player, &self.tasks);
         #[cfg(not(target_arch = "wasm32"))]
         if let Some(store) = &mut self.store {

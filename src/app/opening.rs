@@ -18,6 +18,12 @@ pub fn time_scale(scene: &Scene) -> f64 {
     scene.view.time_scale.unwrap_or_else(from_period).clamp(SCALE_RANGE.0, SCALE_RANGE.1)
 }
 
+/// Simulated time, s, after which the drives of `scene` repeat, or that is worth watching if nothing repeats.
+pub fn viewing_period(scene: &Scene) -> f64 {
+    let period = common_period(&scene.machine).unwrap_or_else(|[first, second]| Some(first.max(second)));
+    period.unwrap_or_else(|| PERIOD_VIEWING_TIME * time_scale(scene))
+}
+
 /// The nearest of 1, 1:1.5, 1:2, 1:3, 1:4, 1:5, 1:6, 1:8, 1:10, 1:15, ….
 fn round(scale: f64) -> f64 {
     let slower = 1.0 / scale.max(f64::MIN_POSITIVE);

@@ -1,7 +1,7 @@
 //! Overlays painted on a picture: labels, arrow legend, time. Used by the viewport and by headless frames.
 
-use eframe::egui::epaint::RectShape;
-use eframe::egui::{Align2, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
+use eframe::egui::text::{LayoutJob, TextWrapping};
+use eframe::egui::{Align2, FontId, Painter, Rect, Shape, Stroke, Vec2, pos2, vec2};
 
 use super::labels::{self, LabelPositions};
 pub(super) use super::labels::{SMALL_PICTURE, colour, fits_labels, text};
@@ -9,138 +9,262 @@ use super::value;
 use crate::scene::Scene;
 use crate::simulate::{ContactMode, Frame};
 use crate::units::format_quantity_digits;
-use crate::view::{ARROW_LENGTH, DrawList, Legend, Palette, Scaling, Theme, ViewOptions, WearMap, WearScale};
+use crate::view::{Colour, DrawList, ErrorScale, Legend, Palette, Scaling, Theme, ViewOptions, WearMap, WearScale};
 
 /// Distance of overlays from the edge, points.
 const MARGIN: f32 = 14.0;
 
-/// Font size of the time in a picture with enough room, points.
-const TIME_FONT_SIZE: f32 = 18.0;
+/// Font size of the time, and of the notes beside it, in a picture with enough room and in a small one, points.
+const FONT_SIZES: [[f32; 2]; 2] = [[18.0, 13.0], [11.0, 11.0]];
+/// Widths reserved for the time, the magnification, and any other note at these sizes, points: they stay in place as digits change.
+const CELLS: [[f32; 3]; 2] = [[148.0, 250.0, 228.0], [88.0, 214.0, 150.0]];
+/// Heights of a line with the time and of one with notes alone, points.
+const LINES: [[f32; 2]; 2] = [[24.0, 18.0], [15.0, 13.0]];
 
-/// Usual longest line of the time, and of the notes on joints below it, points.
-const LINE_LENGTHS: [f32; 2] = [150.0, 230.0];
+/// Width of the time and the magnification side by side, points.
+pub const NOTES_WIDTH: f32 = 2.0 * MARGIN + CELLS[0][0] + CELLS[0][1];
 
+/// Height of the legend of the arrows, and of a colour scale, points.
+const LEGEND_HEIGHT: f32 = 40.0;
+/// Width of the names in the legend, with their arrows, points.
+const NAMES_WIDTH: f32 = 168.0;
+/// Least width of its axis with a title, linear and logarithmic, points.
+const AXIS_WIDTH: [f32; 2] = [136.0, 200.0];
 /// Longest axis of the legend relative to the picture's width.
-const MAX_AXIS_FRACTION: f32 = 0.4;
+const MAX_AXIS_FRACTION: f32 = 0.3;
+/// Width below which words do not fit beside the legend, points.
+const MIN_WIDTH_BESIDE_LEGEND: f32 = 640.0;
+/// Least height of the scene between its strips, points; with less room, strips are left out.
+const MIN_SCENE_HEIGHT: f32 = 56.0;
+/// Least share of the scene in a picture with a colour scale.
+const MIN_SCENE_SHARE: f32 = 0.42;
 
 /// Contents of the overlay.
 #[derive(Clone, Debug, Default)]
 pub struct Overlay {
     /// Simulated time, s.
     pub time: Option<f64>,
-    /// Lines below the time, after those about the picture itself; e.g. [`force_notes`].
+    /// Notes after those about the picture itself; e.g. [`force_notes`].
     pub notes: Vec<String>,
     /// Whether to draw the legend of the arrows.
     pub legend: bool,
     /// Whether to draw names of joints and axes.
     pub labels: bool,
+    /// Room for the caller's own widgets.
+    pub room: Room,
 }
 
-/// Paints the overlay of `list` in `rect`; `scale` is pixels per point. Names avoid the rest and the rectangles painted `above`
-/// it, and reuse their `places` in the previous picture where possible.
-#[expect(clippy::too_many_arguments, reason = "one call for a whole picture")]
+/// Room for widgets in the strips above and below the scene, points.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Room {
+    /// At the right end of the upper strip.
+    pub buttons: Vec2,
+    /// Height of the place for words in the lower strip.
+    pub words: f32,
+    /// Least number of notes above the scene to reserve places for.
+    pub notes: usize,
+    /// Whether the words need the whole width of a narrow picture; otherwise they may cover the names in the legend.
+    pub is_wide: bool,
+}
+
+/// A picture, cut so that no text lies over the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Strips {
+    /// Time and notes; buttons at its right end.
+    pub top: Rect,
+    /// The scene.
+    pub scene: Rect,
+    /// Legends and words.
+    pub bottom: Rect,
+    /// Place for words in the lower strip.
+    pub words: Rect,
+    /// Place of the legend of the arrows.
+    legend: Rect,
+    /// Place of the colour scale of a wear map or an error map.
+    scale: Rect,
+}
+
+impl Strips {
+    /// The scene alone in `rect`, without text.
+    pub fn of_scene(rect: Rect) -> Self {
+        let (top, bottom) = (rect.with_max_y(rect.top()), rect.with_min_y(rect.bottom()));
+        Self { top, scene: rect, bottom, words: bottom, legend: bottom, scale: bottom }
+    }
+}
+
+/// Whether `rect` has room for a legend, as an index of the sizes.
+fn class(rect: Rect) -> usize {
+    usize::from(!fits_labels(rect))
+}
+
+/// Notes on the picture itself, before the caller's.
+fn all_notes(list: &DrawList, overlay: &Overlay) -> Vec<String> {
+    let own = [Some(list.magnification_text.clone()), wear_note(list)];
+    let notes = own.into_iter().flatten().chain(overlay.notes.iter().cloned());
+    notes.filter(|note| !note.is_empty()).collect()
+}
+
+/// Offsets of the time, if shown, and of `notes` notes in a strip `width` points wide, and its height.
+fn cells(class: usize, width: f32, time: bool, notes: usize) -> (Vec<Vec2>, f32) {
+    let [time_width, magnification, other] = CELLS[class];
+    let widths =
+        time.then_some(time_width).into_iter().chain((0..notes).map(|k| if k == 0 { magnification } else { other }));
+    let (mut x, mut y) = (0.0, 0.0);
+    let mut line = LINES[class][usize::from(!time)];
+    let mut offsets = Vec::new();
+    for cell in widths {
+        if x > 0.0 && x + cell > width {
+            (x, y) = (0.0, y + line);
+            line = LINES[class][1];
+        }
+        offsets.push(vec2(x, y));
+        x += cell;
+    }
+    let height = if offsets.is_empty() { 0.0 } else { y + line + 6.0 };
+    (offsets, height)
+}
+
+/// Cuts the picture in `rect` for `notes` notes, those on the picture itself included. The strips depend on what is shown, not on
+/// its digits, so that nothing moves as numbers change.
+pub fn strips(rect: Rect, overlay: &Overlay, notes: usize, options: &ViewOptions, map: bool) -> Strips {
+    let large = fits_labels(rect);
+    let has_legend = overlay.legend && large && (options.arrows.normal || options.arrows.friction);
+    let has_scale = large && (map || options.wear != WearMap::Off);
+    let strips = cut(rect, overlay, notes, has_legend, has_scale);
+    // In a low picture the note on the colours must do.
+    let is_low = has_scale && strips.scene.height() < MIN_SCENE_SHARE * rect.height();
+    if is_low { cut(rect, overlay, notes, has_legend, false) } else { strips }
+}
+
+fn cut(rect: Rect, overlay: &Overlay, notes: usize, has_legend: bool, has_scale: bool) -> Strips {
+    let class = class(rect);
+    let (large, margin) = (class == 0, if class == 0 { MARGIN } else { 6.0 });
+    // In a small picture the first note, which states the magnification of the play, is the only one.
+    let notes = notes.max(overlay.room.notes);
+    let notes = if large { notes } else { notes.min(1) };
+    let width = rect.width() - 2.0 * margin - overlay.room.buttons.x;
+    let (_, height) = cells(class, width, overlay.time.is_some(), notes);
+    let buttons = if overlay.room.buttons.y > 0.0 { overlay.room.buttons.y + 4.0 } else { 0.0 };
+    let mut top = height.max(buttons).round();
+    let legend = if has_legend { LEGEND_HEIGHT } else { 0.0 };
+    let beside = rect.width() >= MIN_WIDTH_BESIDE_LEGEND;
+    let words = overlay.room.words.round();
+    let is_stacked = !beside && overlay.room.is_wide;
+    // A long message with its button comes before the legend.
+    let crowded = is_stacked && top + legend + words + 4.0 > rect.height() - 2.0 * MIN_SCENE_HEIGHT;
+    let (legend, has_legend) = if crowded { (0.0, false) } else { (legend, has_legend) };
+    let row = if is_stacked { legend + words } else { legend.max(words) };
+    let scale = if has_scale { LEGEND_HEIGHT } else { 0.0 };
+    // Beside the legend if no words are.
+    let own_row = if words > 0.0 || !beside { scale } else { 0.0 };
+    let row = row.max(scale - own_row);
+    let mut bottom = if row + own_row > 0.0 { row + own_row + 4.0 } else { 0.0 };
+    let room = (rect.height() - MIN_SCENE_HEIGHT).max(0.0);
+    if top + bottom > room {
+        bottom = bottom.min((room - top).max(0.0)).floor();
+        top = top.min(room).floor();
+    }
+    let low = rect.bottom() - bottom;
+    let bottom = rect.with_min_y(low);
+    let inside = bottom.shrink2(vec2(margin.min(bottom.width() / 2.0), (bottom.height() / 2.0).min(2.0)));
+    let scale = inside.with_max_y((inside.top() + scale).min(inside.bottom()));
+    let rest = inside.with_min_y((inside.top() + own_row).min(inside.bottom()));
+    let (legend, words) = if beside {
+        let legend_width = if has_legend { legend_width(rect) } else { 0.0 };
+        let cut = rest.right() - legend_width;
+        let words = rest.with_max_x(if has_legend { cut - 12.0 } else { cut });
+        (rest.with_min_x(cut).with_min_y(rest.bottom() - legend), words)
+    } else if !is_stacked {
+        let axis = if has_legend { AXIS_WIDTH[0] + 24.0 } else { 0.0 };
+        (rest.with_min_y(rest.bottom() - legend), rest.with_max_x(rest.right() - axis))
+    } else {
+        let cut = (rest.top() + legend).min(rest.bottom());
+        (rest.with_max_y(cut), rest.with_min_y(cut))
+    };
+    Strips {
+        top: rect.with_max_y(rect.top() + top),
+        scene: Rect::from_min_max(pos2(rect.left(), rect.top() + top), pos2(rect.right(), low)),
+        bottom,
+        words,
+        legend,
+        scale,
+    }
+}
+
+/// Width reserved for the legend in a picture in `rect`.
+fn legend_width(rect: Rect) -> f32 {
+    NAMES_WIDTH + (MAX_AXIS_FRACTION * rect.width()).max(AXIS_WIDTH[1]) + 24.0
+}
+
+/// Paints the overlay of `list`, drawn in `strips.scene`; `scale` is pixels per point. Names reuse their `places` in the previous
+/// picture where possible.
 pub fn paint(
     painter: &Painter,
-    rect: Rect,
+    strips: &Strips,
     scale: f32,
     list: &DrawList,
     theme: Theme,
     overlay: &Overlay,
-    above: &[Rect],
     places: &mut LabelPositions,
 ) {
-    let mut occupied = above.to_vec();
-    if !list.overlay.is_empty() {
-        occupied.push(triad(rect));
-    }
-    if let Some(scale) = &list.wear_scale {
-        occupied.extend(wear_scale(painter, rect, scale, theme));
-    }
-    if let Some(shown) = list.legend.as_ref().filter(|_| overlay.legend && fits_labels(rect)) {
-        occupied.push(legend(painter, rect, scale, shown, theme));
-    }
-    if let Some(at) = overlay.time {
-        let notes = [Some(list.magnification_text.clone()), wear_note(list)];
-        let notes = notes.into_iter().flatten().chain(overlay.notes.clone());
-        occupied.push(time(painter, rect, at, notes, theme));
-    }
-    if overlay.labels {
-        labels::paint(painter, rect, scale, list, occupied, places);
-    }
-}
-
-/// Simulated time in the upper left corner with notes below it, on a plate; returns the plate.
-fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = String>, theme: Theme) -> Rect {
     let palette = Palette::of(theme);
-    let ink = colour(palette.text);
-    let line = |words: String, size: f32| painter.layout_no_wrap(words, FontId::proportional(size), ink);
-    let large = fits_labels(rect);
-    let (size, small_size, margin) = if large { (TIME_FONT_SIZE, 13.0, MARGIN) } else { (11.0, 10.0, 6.0) };
-    let mut lines = vec![line(format!("t = {}", value::time(time)), size)];
-    // The first note states the magnification of the play and is never omitted for lack of room alone.
-    let notes = notes.filter(|note| !note.is_empty());
-    let notes = notes.take(if large { usize::MAX } else { 1 });
-    lines.extend(notes.map(|note| line(note, small_size)));
-    lines.retain(|line| line.size().x + 2.0 * margin <= rect.width());
-    let mut width = lines.iter().map(|l| l.size().x).fold(0.0, f32::max);
-    if large {
-        // Otherwise the plate would jump as the digits of the time change.
-        width = width.max(LINE_LENGTHS[0].min(rect.width() - 2.0 * margin));
+    painter.rect_filled(strips.top, 0.0, colour(palette.sky));
+    painter.rect_filled(strips.bottom, 0.0, colour(palette.sky));
+    let Strips { scene, .. } = *strips;
+    if let Some(scale) = &list.wear_scale {
+        wear_scale(painter, strips.scale, scale, theme);
     }
-    let height: f32 = lines.iter().map(|l| l.size().y + 1.0).sum();
-    let corner = rect.min + vec2(margin, margin);
-    let plate = Rect::from_min_size(corner, vec2(width, height)).expand2(vec2(8.0, 4.0));
-    painter.rect_filled(plate, 6.0, colour(palette.sky).gamma_multiply(0.75));
-    let mut at = corner;
-    for line in lines {
-        let step = line.size().y + 1.0;
-        painter.galley(at, line, ink);
-        at.y += step;
+    if let Some(scale) = &list.error_scale {
+        error_scale(painter, strips.scale, scale, theme);
     }
-    plate
+    if let Some(shown) = list.legend.as_ref().filter(|_| overlay.legend && strips.legend.height() >= LEGEND_HEIGHT) {
+        legend(painter, strips.legend, scale, shown, theme);
+    }
+    let whole = scene.union(strips.top).union(strips.bottom);
+    time(painter, strips.top, overlay, &all_notes(list, overlay), theme, whole);
+    if overlay.labels && fits_labels(whole) {
+        let occupied = if list.overlay.is_empty() { Vec::new() } else { vec![triad(scene)] };
+        labels::paint(painter, scene, scale, list, occupied, places);
+    }
 }
 
-/// Right edge of the longest possible time in a picture, points.
-pub fn time_extent(painter: &Painter) -> f32 {
-    let longest = format!("t = {} ms", "0".repeat(value::MAX_TIME_CHARACTERS - 3));
-    let words =
-        painter.layout_no_wrap(longest, FontId::proportional(TIME_FONT_SIZE), colour(Palette::of(Theme::Light).text));
-    MARGIN + words.size().x + 8.0
-}
-
-/// Approximate width and height of the time with one note per joint, whatever the text; points.
-pub fn plate(joints: usize) -> [f32; 2] {
-    const LINE: f32 = 16.0;
-    // The first lines are time and magnification.
-    let longest = LINE_LENGTHS[usize::from(joints > 0)];
-    [MARGIN + longest + 8.0, MARGIN + 38.0 + LINE * joints as f32 + 8.0]
+/// Simulated time and notes in the upper strip of the picture in `whole`.
+fn time(painter: &Painter, strip: Rect, overlay: &Overlay, notes: &[String], theme: Theme, whole: Rect) {
+    let ink = colour(Palette::of(theme).text);
+    let class = class(whole);
+    let (large, margin) = (class == 0, if class == 0 { MARGIN } else { 6.0 });
+    let notes = if large { notes } else { &notes[..notes.len().min(1)] };
+    let width = strip.width() - 2.0 * margin - overlay.room.buttons.x;
+    let (offsets, height) = cells(class, width, overlay.time.is_some(), notes.len());
+    if strip.height() < height.min(LINES[class][1]) {
+        return;
+    }
+    let [large_font, small] = FONT_SIZES[class];
+    let words = overlay.time.map(|time| (format!("t = {}", value::time(time)), large_font));
+    let words = words.into_iter().chain(notes.iter().map(|note| (note.clone(), small)));
+    // Single lines stand in the middle of a strip made higher by buttons.
+    let corner = strip.min + vec2(margin, ((strip.height() - height) / 2.0).max(0.0) + 3.0);
+    let first = LINES[class][usize::from(overlay.time.is_none())];
+    for (k, (words, size)) in words.enumerate() {
+        let Some(&offset) = offsets.get(k) else {
+            break;
+        };
+        let next = offsets.get(k + 1).filter(|next| next.y == offset.y);
+        let room = next.map_or(width, |next| next.x - 8.0) - offset.x;
+        let line = if offset.y == 0.0 { first } else { LINES[class][1] };
+        let mut job = LayoutJob::simple_singleline(words, FontId::proportional(size), ink);
+        job.wrap = TextWrapping::truncate_at_width(room.max(40.0));
+        let words = painter.layout_job(job);
+        let at = corner + offset + vec2(0.0, (line - words.size().y) / 2.0);
+        painter.galley(at, words, ink);
+    }
 }
 
 /// Approximate area of axes and gravity.
-fn triad(rect: Rect) -> Rect {
+pub fn triad(rect: Rect) -> Rect {
     // Gravity is beside the axes if there is room: `SceneView::push_triad`.
     let width = if rect.width() < 300.0 { 118.0 } else { 164.0 };
     Align2::LEFT_BOTTOM.align_size_within_rect(vec2(width, 118.0), rect)
-}
-
-/// Approximate areas of the time with one note per joint, the axes and the legend in a picture in `rect`.
-pub fn plates(rect: Rect, joints: usize, options: &ViewOptions) -> Vec<Rect> {
-    let large = fits_labels(rect);
-    let [width, height] = if large { plate(joints) } else { [130.0, 36.0] };
-    let mut plates = vec![Align2::LEFT_TOP.align_size_within_rect(vec2(width, height), rect)];
-    if options.triad && large {
-        plates.push(triad(rect));
-    }
-    if (options.arrows.normal || options.arrows.friction) && large {
-        let [least, rows] = match options.arrows.scaling {
-            Scaling::Linear => [112.0, 88.0],
-            Scaling::Logarithmic => [190.0, 88.0],
-        };
-        let axis = (ARROW_LENGTH * rect.height()).min(MAX_AXIS_FRACTION * rect.width()) + 24.0;
-        let size = vec2(axis.max(least) + MARGIN + 6.0, rows + MARGIN);
-        plates.push(Align2::RIGHT_BOTTOM.align_size_within_rect(size, rect));
-    }
-    plates
 }
 
 /// One line per ball joint: its forces as the step reported them.
@@ -166,21 +290,22 @@ pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
         .collect()
 }
 
-/// Legend of the arrows in the lower right corner; returns its area.
-fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: Theme) -> Rect {
+/// Legend of the arrows at the right end of `place`: names on the left, the axis on the right.
+fn legend(painter: &Painter, place: Rect, scale: f32, legend: &Legend, theme: Theme) {
     let palette = Palette::of(theme);
     let (ink, halo) = (colour(palette.text), colour(palette.sky));
     let full = legend.pixels / scale;
-    let longest = rect.width() * MAX_AXIS_FRACTION;
     // In a close-up the reference arrow may be wider than the view; only the part that fits is drawn.
+    let names = place.width() >= NAMES_WIDTH + AXIS_WIDTH[0] + 24.0;
+    let longest = place.width() - 24.0 - if names { NAMES_WIDTH } else { 0.0 };
     let shown = full.min(longest);
+    let least = AXIS_WIDTH[usize::from(legend.scaling == Scaling::Logarithmic)];
+    let reserved = shown.max(least).min(longest);
     // Space for half a number beyond the last mark.
-    let corner = lower_right(rect, MARGIN) - vec2(12.0, 0.0);
-    let axis = corner.y - 18.0;
-    let back = painter.add(Shape::Noop);
-    let left = corner.x - shown;
-    painter.line_segment([pos2(left, axis), pos2(corner.x, axis)], Stroke::new(1.5, ink));
-    let mut all = Rect::from_min_max(pos2(left, axis), corner + vec2(12.0, 0.0));
+    let right = place.right() - 12.0;
+    let axis = place.bottom() - 18.0;
+    let left = right - shown;
+    painter.line_segment([pos2(left, axis), pos2(right, axis)], Stroke::new(1.5, ink));
     let mut free_from = f32::NEG_INFINITY;
     for tick in legend.ticks.iter().filter(|tick| tick.fraction * full <= shown + 0.5) {
         let x = left + tick.fraction * full;
@@ -188,31 +313,35 @@ fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: The
         let words = format_quantity_digits(f64::from(tick.force), "", 3);
         // Omitted if it would touch the previous mark.
         if x - 12.0 >= free_from {
-            let placed = text(painter, pos2(x, axis + 5.0), Align2::CENTER_TOP, &words, 11.0, ink, halo);
+            let placed = text(painter, pos2(x, axis + 4.0), Align2::CENTER_TOP, &words, 11.0, ink, halo);
             free_from = placed.max.x + 4.0;
         }
     }
-    let mut at = pos2(corner.x + 12.0, axis - 8.0);
-    let mut title = match legend.scaling {
-        Scaling::Linear => "Force on the ball, N".to_owned(),
-        Scaling::Logarithmic => "Force on the ball, N (logarithmic)".to_owned(),
+    let (kind, short) = match legend.scaling {
+        Scaling::Linear => ("Force on the ball, N", "Force, N"),
+        Scaling::Logarithmic => ("Force on the ball, N (logarithmic)", "N (logarithmic)"),
     };
-    if legend.clipped {
-        title.push_str(", broken ones are longer");
+    let font = FontId::proportional(12.0);
+    let broken = [format!("{kind}, broken ones are longer"), format!("{short}, broken: longer")];
+    let whole = [kind.to_owned(), short.to_owned()];
+    let titles = if legend.clipped { broken } else { whole };
+    let lay = |title: &String| painter.layout_no_wrap(title.clone(), font.clone(), ink);
+    let title = titles.iter().map(lay).find(|words| words.size().x <= reserved + 24.0);
+    if let Some(title) = title {
+        painter.galley(pos2(place.right() - title.size().x, place.top() - 1.0), title, ink);
     }
-    let placed = text(painter, at, Align2::RIGHT_BOTTOM, &title, 12.0, ink, halo);
-    all |= placed;
-    at.y = placed.min.y - 2.0;
-    for (name, hue, hollow) in [
-        ("friction", legend.friction, false),
-        ("last peak", legend.normal.filter(|_| legend.peaks), true),
+    if !names {
+        return;
+    }
+    let hues = [
         ("normal", legend.normal, false),
-    ] {
-        let Some(hue) = hue else {
-            continue;
-        };
-        let placed = text(painter, at, Align2::RIGHT_BOTTOM, name, 12.0, ink, halo);
-        let tail = pos2(placed.min.x - 30.0, placed.center().y);
+        ("last peak", legend.normal.filter(|_| legend.peaks), true),
+        ("friction", legend.friction, false),
+    ];
+    let rows = [place.top() + 9.0, place.bottom() - 11.0];
+    let corner = (place.right() - 24.0 - reserved - NAMES_WIDTH).max(place.left());
+    for (k, (name, hue, hollow)) in hues.into_iter().filter_map(|(n, h, o)| h.map(|h| (n, h, o))).enumerate() {
+        let tail = pos2(corner + [0.0, 76.0][k / 2], rows[k % 2]);
         if hollow {
             let outline = [
                 vec2(0.0, -2.0),
@@ -224,17 +353,12 @@ fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: The
                 vec2(0.0, 2.0),
             ];
             let corners = outline.map(|corner| tail + corner).to_vec();
-            let line = Stroke::new(1.3, colour(hue));
-            painter.add(Shape::closed_line(corners, line));
+            painter.add(Shape::closed_line(corners, Stroke::new(1.3, colour(hue))));
         } else {
             painter.arrow(tail, vec2(24.0, 0.0), Stroke::new(2.5, colour(hue)));
         }
-        all |= Rect::from_min_max(tail - vec2(0.0, 4.5), placed.max);
-        at.y = placed.min.y - 1.0;
+        text(painter, tail + vec2(30.0, 0.0), Align2::LEFT_CENTER, name, 12.0, ink, halo);
     }
-    let plate = all.expand2(vec2(6.0, 3.0)).intersect(rect);
-    painter.set(back, RectShape::filled(plate, 6.0, halo.gamma_multiply(0.75)));
-    plate
 }
 
 /// Quantity of a wear map, and its unit.
@@ -258,51 +382,60 @@ fn wear_note(list: &DrawList) -> Option<String> {
     })
 }
 
-/// Colour scale of a wear map, at the right edge above the legend of the arrows; returns its area. Omitted if there is no room.
-fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme) -> Option<Rect> {
-    const BAR_SIZE: [f32; 2] = [12.0, 110.0];
+/// Colour scale of a wear map in `place`.
+fn wear_scale(painter: &Painter, place: Rect, scale: &WearScale, theme: Theme) {
+    let Some((what, unit)) = wear_words(scale.map).filter(|_| scale.largest > 0.0) else {
+        return;
+    };
+    let ticks = scale.ticks();
+    let ticks = ticks.into_iter().map(|tick| (scale.position(tick), format_quantity_digits(f64::from(tick), "", 1)));
+    colour_scale(painter, place, &format!("Wear: {what}, {unit}"), ticks, WearScale::colour, theme);
+}
+
+/// Colour scale of the tip's errors in `place`.
+fn error_scale(painter: &Painter, place: Rect, scale: &ErrorScale, theme: Theme) {
+    let ticks = [0.0, 0.5, 1.0].map(|share| {
+        let micrometres = f64::from(share * scale.largest) * 1e6;
+        (share, format_quantity_digits(micrometres, "", 3))
+    });
+    let title = format!("{}, µm", scale.name);
+    colour_scale(painter, place, &title, ticks.into_iter(), WearScale::colour, theme);
+}
+
+/// A colour bar with its title above and marks at (position 0 to 1, words) below, in `place`.
+fn colour_scale(
+    painter: &Painter,
+    place: Rect,
+    title: &str,
+    ticks: impl Iterator<Item = (f32, String)>,
+    hue: impl Fn(f32) -> Colour,
+    theme: Theme,
+) {
     const PARTS: u32 = 48;
-    // Above: title, time with notes, buttons of the window. Below: legend of the arrows.
-    const MARGINS: [f32; 2] = [100.0, 122.0];
-    let (what, unit) = wear_words(scale.map).filter(|_| scale.largest > 0.0)?;
-    let room = rect.height() - MARGINS[0] - MARGINS[1];
-    if room < 0.5 * BAR_SIZE[1] || !fits_labels(rect) {
-        return None;
+    if place.height() < LEGEND_HEIGHT {
+        return;
     }
     let palette = Palette::of(theme);
     let (ink, halo) = (colour(palette.text), colour(palette.sky));
-    let corner = lower_right(rect, MARGIN) - vec2(0.0, MARGINS[1] - MARGIN);
-    let bar = Rect::from_min_max(corner - vec2(BAR_SIZE[0], BAR_SIZE[1].min(room)), corner);
-    let at = |place: f32| bar.max.y - place * bar.height();
+    let bar = Rect::from_min_size(place.min + vec2(12.0, 15.0), vec2((place.width() - 24.0).min(220.0), 8.0));
+    let at = |share: f32| bar.left() + share * bar.width();
     for part in 0..PARTS {
         let [from, to] = [part, part + 1].map(|part| part as f32 / PARTS as f32);
-        let rows = [pos2(bar.min.x, at(to)), pos2(bar.max.x, at(from))];
-        let hue = colour(WearScale::colour(0.5 * (from + to)));
-        painter.rect_filled(Rect::from_points(&rows), 0.0, hue);
+        let columns = [pos2(at(from), bar.top()), pos2(at(to), bar.bottom())];
+        painter.rect_filled(Rect::from_points(&columns), 0.0, colour(hue(0.5 * (from + to))));
     }
     let outline = [bar.left_top(), bar.right_top(), bar.right_bottom(), bar.left_bottom()];
     painter.add(Shape::closed_line(outline.to_vec(), Stroke::new(1.0, ink)));
-    let mut all = bar;
-    for tick in scale.ticks() {
-        let y = at(scale.position(tick));
-        let left = bar.min.x - 4.0;
-        painter.line_segment([pos2(left, y), pos2(bar.min.x, y)], Stroke::new(1.0, ink));
-        let words = format_quantity_digits(f64::from(tick), "", 1);
-        let place = pos2(left - 3.0, y);
-        all |= text(painter, place, Align2::RIGHT_CENTER, &words, 11.0, ink, halo);
+    let mut free_from = f32::NEG_INFINITY;
+    for (share, words) in ticks {
+        let x = at(share);
+        painter.line_segment([pos2(x, bar.bottom()), pos2(x, bar.bottom() + 3.0)], Stroke::new(1.0, ink));
+        if x - 12.0 >= free_from {
+            let placed = text(painter, pos2(x, bar.bottom() + 2.0), Align2::CENTER_TOP, &words, 11.0, ink, halo);
+            free_from = placed.max.x + 4.0;
+        }
     }
-    // In a narrow picture the title would cover a joint; the note beside the time has the same information.
-    if rect.width() >= 520.0 {
-        let title = format!("Wear: {what}, {unit}");
-        let place = pos2(bar.max.x, bar.min.y - 6.0);
-        all |= text(painter, place, Align2::RIGHT_BOTTOM, &title, 12.0, ink, halo);
-    }
-    Some(all)
-}
-
-/// Lower right corner, `margin` points away from both edges.
-pub(super) fn lower_right(rect: Rect, margin: f32) -> Pos2 {
-    pos2(rect.max.x - margin, rect.max.y - margin)
+    text(painter, place.min - vec2(0.0, 1.0), Align2::LEFT_TOP, title, 12.0, ink, halo);
 }
 
 #[cfg(test)]
@@ -310,8 +443,8 @@ mod tests {
     use super::*;
     use crate::app::labels::{MAX_GAP, MAX_PLATES, MIN_LEADER};
     use crate::app::theme;
-    use crate::view::{Label, LabelKind, PeakMarks, SceneView, Shot, ViewOptions};
-    use eframe::egui::{Context, LayerId, RawInput};
+    use crate::view::{Label, LabelKind, PeakMarks, SceneView, Shot, Tick};
+    use eframe::egui::{Context, LayerId, Pos2, RawInput};
     use glam::Vec3;
 
     /// Painted names of a column of `count` joints, `apart` points from each other.
@@ -399,69 +532,82 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_plate_of_the_time_does_not_move_as_digits_change() {
-        let rect = Rect::from_min_size(Pos2::ZERO, vec2(800.0, 600.0));
-        let plates = [0.0, 9.9e-6, 0.9999e-3, 9.9999e-3, 10e-3, 0.9999, 123.4].map(|at| {
-            let found = std::cell::Cell::new(Rect::NOTHING);
-            let note = ["clearance drawn ×20".to_owned()];
-            shapes(rect, |painter| found.set(time(painter, rect, at, note.clone().into_iter(), Theme::Light)));
-            found.get()
+    /// Texts painted for `overlay` over `list`, cut as `strips`.
+    fn texts(list: &DrawList, strips: &Strips, overlay: &Overlay) -> Vec<(String, Rect)> {
+        let whole = Rect::from_min_size(Pos2::ZERO, vec2(1000.0, 1000.0));
+        let shapes = shapes(whole, |painter| {
+            paint(painter, strips, 1.0, list, Theme::Light, overlay, &mut LabelPositions::default());
         });
-        assert!(plates.iter().all(|plate| *plate == plates[0]), "{plates:?}");
+        let texts = shapes.into_iter().filter_map(|shape| match shape {
+            Shape::Text(text) => Some((text.galley.text().to_owned(), text.visual_bounding_rect())),
+            _ => None,
+        });
+        texts.collect()
+    }
+
+    fn full_legend(clipped: bool) -> Legend {
+        let ink = Palette::of(Theme::Light).text;
+        let tick = |force: f32| Tick { force, fraction: force / 100.0 };
+        Legend {
+            reference: 100.0,
+            pixels: 120.0,
+            scaling: Scaling::Linear,
+            clipped,
+            ticks: vec![tick(50.0), tick(100.0)],
+            normal: Some(ink),
+            peaks: true,
+            friction: Some(ink),
+        }
     }
 
     #[test]
-    fn a_name_keeps_clear_of_time_legend_and_caption() {
-        let rect = Rect::from_min_size(Pos2::ZERO, vec2(800.0, 600.0));
-        let caption = Rect::from_min_size(pos2(300.0, 12.0), vec2(200.0, 40.0));
-        let at = |x: f32, y: f32| Label {
-            text: "S1".into(),
-            kind: LabelKind::Joint(0),
-            anchor: Vec3::ZERO,
-            pixel: glam::Vec2::new(x, y),
-            colour: Palette::of(Theme::Light).text,
-        };
-        // Inside the time's plate, below the caption, and at the legend.
-        let list = DrawList {
-            labels: vec![at(60.0, 45.0), at(400.0, 60.0), at(700.0, 575.0)],
-            legend: Some(Legend {
-                reference: 100.0,
-                pixels: 120.0,
-                scaling: Scaling::Linear,
-                clipped: false,
-                ticks: Vec::new(),
-                normal: Some(Palette::of(Theme::Light).text),
-                peaks: false,
-                friction: None,
-            }),
-            ..DrawList::default()
-        };
-        let overlay = Overlay { time: Some(0.0), legend: true, labels: true, ..Overlay::default() };
-        let texts = |overlay: &Overlay| {
-            let shapes = shapes(rect, |painter| {
-                let mut places = LabelPositions::default();
-                paint(painter, rect, 1.0, &list, Theme::Light, overlay, &[caption], &mut places);
-            });
-            let texts = shapes.into_iter().filter_map(|shape| match shape {
-                Shape::Text(text) => Some((text.galley.text().to_owned(), text.visual_bounding_rect())),
-                _ => None,
-            });
-            texts.collect::<Vec<_>>()
-        };
-        let all = texts(&overlay);
-        let (names, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|(text, _)| text == "S1");
-        assert_eq!(names.len(), 3);
-        assert!(others.len() > 2);
-        for (_, name) in &names {
-            assert!(!name.intersects(caption));
-            for (other, place) in &others {
-                assert!(!name.intersects(*place), "over {other}");
+    fn time_notes_legend_and_scale_stay_in_the_strips_whatever_the_size() {
+        let sizes = [[1600.0, 900.0], [980.0, 432.0], [640.0, 400.0], [390.0, 296.0], [500.0, 235.0], [180.0, 165.0]];
+        for [width, height] in sizes {
+            let whole = Rect::from_min_size(pos2(20.0, 30.0), vec2(width, height));
+            for (room, wear) in [(Room::default(), false), (Room { words: 40.0, ..Room::default() }, true)] {
+                let options =
+                    ViewOptions { wear: if wear { WearMap::Impulse } else { WearMap::Off }, ..ViewOptions::default() };
+                let notes = vec!["following S1".to_owned(), "tip error 123.4 µm".to_owned()];
+                let overlay = Overlay { time: Some(0.0), notes, legend: true, labels: true, room };
+                let strips = strips(whole, &overlay, 3 + usize::from(wear), &options, false);
+                let Strips { top, scene, bottom, words, .. } = strips;
+                assert_eq!(top.union(scene).union(bottom), whole, "{whole}");
+                assert!((top.height() + scene.height() + bottom.height() - height).abs() < 1e-3, "{whole}");
+                assert!(scene.height() >= 0.4 * height, "{whole}: {scene}");
+                assert!(bottom.contains_rect(words), "{whole}: {words}");
+                let list = DrawList {
+                    legend: Some(full_legend(wear)),
+                    wear_scale: wear.then_some(WearScale { map: WearMap::Impulse, largest: 1.2 }),
+                    magnification_text: "clearance drawn ×20".to_owned(),
+                    ..DrawList::default()
+                };
+                let all = texts(&list, &strips, &overlay);
+                assert!(all.iter().any(|(text, _)| text.starts_with("t = ")), "{whole}: {all:?}");
+                assert!(all.iter().any(|(text, _)| text.contains("×20")), "{whole}: {all:?}");
+                for (text, place) in all {
+                    // The halo is a point wide.
+                    let place = place.shrink(1.5);
+                    assert!(!place.intersects(scene) && whole.contains_rect(place), "{whole}: {text} at {place}");
+                }
             }
         }
-        // Alone, the labels would overlap the time.
-        let labels_only = texts(&Overlay { labels: true, ..Overlay::default() });
-        assert!(labels_only[0].1.intersects(others.iter().find(|(text, _)| text.starts_with("t =")).expect("time").1));
+    }
+
+    #[test]
+    fn nothing_moves_as_the_digits_of_the_time_change() {
+        let whole = Rect::from_min_size(Pos2::ZERO, vec2(800.0, 600.0));
+        let list = DrawList { magnification_text: "clearance drawn ×20".to_owned(), ..DrawList::default() };
+        let places = [0.0, 9.9e-6, 0.9999e-3, 9.9999e-3, 10e-3, 0.9999, 123.4].map(|at| {
+            let overlay = Overlay { time: Some(at), ..Overlay::default() };
+            let strips = strips(whole, &overlay, 1, &ViewOptions::default(), false);
+            let texts = texts(&list, &strips, &overlay);
+            let note = texts.iter().find(|(text, _)| text.starts_with("clearance")).expect("noted").1;
+            let time = texts.iter().find(|(text, _)| text.starts_with("t =")).expect("written").1;
+            assert!(!note.intersects(time), "{at}");
+            (strips.scene, note)
+        });
+        assert!(places.iter().all(|place| *place == places[0]), "{places:?}");
     }
 
     #[test]

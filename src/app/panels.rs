@@ -1,6 +1,7 @@
 //! Which panels are shown, and the arrangement of the window.
 
-use eframe::egui::{self, Rect, Ui};
+use eframe::egui::containers::panel::PanelState;
+use eframe::egui::{self, Rangef, Rect, Ui, Vec2, vec2};
 
 use super::{Embedded, theme};
 
@@ -51,6 +52,9 @@ pub struct Panels {
     pub embedded: Option<Embedded>,
     /// Area of the 3D view, points.
     pub picture: Rect,
+    /// Shares of the window that the panels of a large one have, by name, and the size that they refer to, points.
+    shares: Vec<(&'static str, f32)>,
+    shared: Vec2,
 }
 
 impl Panels {
@@ -66,6 +70,8 @@ impl Panels {
             fingers: None,
             embedded,
             picture: Rect::ZERO,
+            shares: Vec::new(),
+            shared: Vec2::ZERO,
         }
     }
 
@@ -104,6 +110,37 @@ impl Panels {
             ui.set_style(ui.ctx().global_style());
         }
         arrangement
+    }
+
+    /// Lets the resizable panels of a large window keep their shares when its size changes: (name, whether its height
+    /// counts, allowed sizes).
+    pub fn keep_shares(&mut self, ui: &Ui, panels: [(&'static str, bool, Rangef); 3]) {
+        let size = ui.ctx().content_rect().size();
+        for (name, is_height, range) in panels {
+            let id = ui.scope_id().with(name);
+            let Some(mut state) = PanelState::load(ui.ctx(), id) else {
+                continue;
+            };
+            let along = |size: Vec2| if is_height { size.y } else { size.x };
+            let known = self.shares.iter_mut().find(|(known, _)| *known == name);
+            match known {
+                Some((_, share)) if size != self.shared => {
+                    let side = range.clamp(*share * along(size));
+                    let wanted = if is_height { vec2(state.size().x, side) } else { vec2(side, state.size().y) };
+                    state.outer_rect = Rect::from_min_size(state.outer_rect.min, wanted);
+                    ui.data_mut(|data| data.insert_persisted(id, state));
+                }
+                Some((_, share)) => {
+                    // Within its range the panel has the share it was given; the user may have moved its edge.
+                    let side = range.clamp(*share * along(size));
+                    if (along(state.size()) - side).abs() > 0.5 {
+                        *share = along(state.size()) / along(size);
+                    }
+                }
+                None => self.shares.push((name, along(state.size()) / along(size))),
+            }
+        }
+        self.shared = size;
     }
 
     /// Shows or hides `panel` as the arrangement demands: in the sheet or at its side.

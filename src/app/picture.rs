@@ -207,11 +207,12 @@ impl App {
             self.graphics.state.clone().ok_or("The picture cannot be drawn: there is no graphics adapter")?;
         let resolution = self.picture.size(self.picture.points(ctx, self.panels.picture), ctx.pixels_per_point());
         let contents = self.picture.contents;
-        let pending = self.draw_off_screen(ctx, &mut Canvas::beside(&state), contents, resolution, true);
+        let aspect = self.run.viewport.scene_area().aspect_ratio();
+        let pending = self.draw_off_screen(ctx, &mut Canvas::beside(&state), contents, resolution, aspect, true);
         pending.map_err(|error| format!("The picture cannot be drawn: {error}"))
     }
 
-    /// Draws a film frame of `size` pixels; the `first` one settles the layout.
+    /// Draws a film frame of `size` pixels that contains everything in a view of `aspect`; the `first` one settles the layout.
     ///
     /// # Errors
     /// The size cannot be drawn; the message says why.
@@ -221,23 +222,26 @@ impl App {
         canvas: &mut Canvas,
         contents: Contents,
         size: [u32; 2],
+        aspect: f32,
         first: bool,
     ) -> Result<Pending, String> {
         let saved = (self.picture.contents, self.picture.times, self.picture.own_size);
         (self.picture.contents, self.picture.times, self.picture.own_size) = (contents, None, size);
         let resolution = self.picture.size(self.picture.points(ctx, self.panels.picture), ctx.pixels_per_point());
         (self.picture.contents, self.picture.times, self.picture.own_size) = saved;
-        let pending = self.draw_off_screen(ctx, canvas, contents, resolution, first);
+        let pending = self.draw_off_screen(ctx, canvas, contents, resolution, aspect, first);
         pending.map_err(|error| error.to_string())
     }
 
-    /// Draws `contents` with (pixels, pixels per point) on `canvas`; `new` if it has not drawn these contents before.
+    /// Draws `contents` with (pixels, pixels per point) on `canvas`, with everything in a view of `aspect`; `new` if it has not drawn
+    /// these contents before.
     fn draw_off_screen(
         &mut self,
         ctx: &egui::Context,
         canvas: &mut Canvas,
         contents: Contents,
         (size, scale): ([u32; 2], f32),
+        aspect: f32,
         new: bool,
     ) -> Result<Pending, RenderError> {
         if new {
@@ -251,7 +255,8 @@ impl App {
             canvas.time = ctx.input(|input| input.time);
         }
         let saved = self.panels.clone();
-        self.run.viewport.freeze(Some(self.panels.picture.aspect_ratio()));
+        let scene = self.run.viewport.scene_area();
+        self.run.viewport.freeze(Some(aspect));
         self.picture.drawn = Some(contents);
         // egui settles new layouts over a few passes.
         let mut output = Ok(egui::FullOutput::default());
@@ -263,6 +268,7 @@ impl App {
         }
         self.picture.drawn = None;
         self.run.viewport.freeze(None);
+        self.run.viewport.set_scene_area(scene);
         self.panels = saved;
         Ok(canvas.paint(output?, size, scale))
     }

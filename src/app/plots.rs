@@ -38,6 +38,9 @@ const MIN_WINDOW: f64 = 1e-6;
 const MIN_HEIGHT: f32 = 110.0;
 /// Least distance between two marks on an axis, points: the text height of their labels.
 const MIN_MARK_DISTANCE: f32 = 16.0;
+/// Least width of a plot beside another, and room between them, points.
+const MIN_WIDTH: f32 = 230.0;
+const PLOT_GAP: f32 = 20.0;
 /// Upper estimate of the width of a label's character, points.
 const LETTER_WIDTH: f64 = 7.0;
 /// Least room for the switch of the cut in a title, points.
@@ -428,11 +431,12 @@ impl Plots {
         }
         let mut clicked_time = None;
         let space = ui.available_size();
-        let columns = ((space.x / 300.0).floor() as usize).clamp(1, chosen.len());
+        let columns = ((space.x / MIN_WIDTH).floor() as usize).clamp(1, chosen.len());
         let rows = chosen.len().div_ceil(columns);
+        ui.spacing_mut().item_spacing.x = PLOT_GAP;
         let gap = ui.spacing().item_spacing;
-        // The last mark of the lower axis extends beyond the plot.
-        let width = (space.x - 16.0 - gap.x * (columns - 1) as f32) / columns as f32;
+        // The last plot of a row reaches the right edge, as the timeline does.
+        let width = (space.x - gap.x * (columns - 1) as f32) / columns as f32;
         let height = ((space.y - gap.y * (rows - 1) as f32) / rows as f32).max(MIN_HEIGHT);
         egui::ScrollArea::vertical().id_salt("plots").show(ui, |ui| {
             for row in chosen.chunks(columns) {

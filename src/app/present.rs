@@ -12,7 +12,7 @@ use super::bench::Bench;
 use super::keys::Action;
 use super::run::Run;
 use super::{App, overlay, spoken, theme, transport, value};
-use crate::view::ViewOptions;
+use crate::view::{Palette, Theme, ViewOptions};
 
 /// Least text height as a fraction of the screen height, legible from the last row of a lecture hall.
 const MIN_TEXT_HEIGHT: f32 = 1.0 / 40.0;
@@ -23,11 +23,9 @@ const CAPTION_FONT: f32 = 24.0;
 /// Type of the badge of an impact in a window, points.
 const BADGE_FONT: f32 = 15.0;
 /// Padding around its text, points.
-const BADGE_PADDING: Vec2 = vec2(12.0, 4.0);
-/// Width of the time in the corner of the picture, points.
-const TIME_WIDTH: f32 = 170.0;
-/// Least height of the plots, points.
-const MIN_PLOTS_HEIGHT: f32 = 130.0;
+const BADGE_PADDING: Vec2 = vec2(4.0, 0.0);
+/// Height reserved for a caption, points: one line in its large type, or two in the smallest.
+pub(super) const CAPTION_HEIGHT: f32 = 40.0;
 /// Least width of a bar with transport and timeline side by side, points.
 const MIN_BAR_WIDTH: f32 = 700.0;
 /// Width of the buttons at the right end of the bar, points.
@@ -58,9 +56,9 @@ struct Running {
     height: Option<f32>,
 }
 
-/// Height of the plots below the picture in the rest of `ui`, points.
+/// Height of the plots below the picture, points: a third of the screen.
 pub(super) fn plots_height(ui: &Ui) -> f32 {
-    (0.36 * ui.available_height()).max(MIN_PLOTS_HEIGHT)
+    (ui.ctx().content_rect().height() / 3.0).min(0.5 * ui.available_height())
 }
 
 /// Least size for controls and picture, points, and smallest zoom that makes room for them.
@@ -299,9 +297,8 @@ impl Run {
         Some(format!("{name}, {force}, {} ms", value::number(duration_ms, 2)))
     }
 
-    /// The caption in the picture's `area`: the impact at the inspected instant; when `presenting`, otherwise, the last finished
-    /// one.
-    pub(super) fn caption(&self, ui: &Ui, area: Rect, presenting: bool, is_filmed: bool) -> Option<Caption> {
+    /// The caption in `place`: the impact at the inspected instant; when `presenting`, otherwise, the last finished one.
+    pub(super) fn caption(&self, ui: &Ui, place: Rect, presenting: bool, is_filmed: bool) -> Option<Caption> {
         let badge = self.impact_badge(is_filmed);
         let help = if badge.is_some() {
             "The impact at this instant: its number and ball joint, when it began, its largest normal force, how long the ball \
@@ -310,65 +307,46 @@ impl Run {
             "The last impact that has ended: its ball joint, its largest normal force, and how long the ball touched"
         };
         let text = badge.or_else(|| self.last_impact().filter(|_| presenting))?;
-        Some(Caption::new(ui, area, &text, help, presenting))
+        Some(Caption::new(ui, place, &text, help, presenting))
     }
 }
 
-/// A caption over the picture.
+/// A caption in the strip below the picture.
 pub struct Caption {
     words: Arc<Galley>,
-    /// Its plate.
-    pub plate: Rect,
+    plate: Rect,
     help: &'static str,
 }
 
 impl Caption {
-    fn new(ui: &Ui, area: Rect, text: &str, help: &'static str, presenting: bool) -> Self {
+    /// `text` as large as `place` permits.
+    fn new(ui: &Ui, place: Rect, text: &str, help: &'static str, presenting: bool) -> Self {
         let ink = ui.visuals().strong_text_color();
-        let mut inside = area.shrink(12.0);
-        if !presenting {
-            // Below the buttons and the time.
-            inside.min.y += overlay::plate(2)[1].max(ui.spacing().interact_size.y + 8.0);
-        }
         let full = if presenting { CAPTION_FONT } else { BADGE_FONT };
-        let room = inside.width() - 2.0 * BADGE_PADDING.x;
+        let room = place.width() - 2.0 * BADGE_PADDING.x;
         let lay = |size: f32| {
             // Text too long in the smallest type wraps to a second line.
             let width = if size > SMALLEST_FONT { f32::INFINITY } else { room };
             ui.painter().layout(text.to_owned(), FontId::proportional(size), ink, width)
         };
-        let fitting = |size: f32| {
-            let words = lay(size);
-            let width = words.size().x;
-            if width > room { lay((size * room / width).max(SMALLEST_FONT)) } else { words }
-        };
-        let beside = |words: &Galley| inside.right() - words.size().x >= area.left() + TIME_WIDTH;
-        let mut words = fitting(full);
-        if presenting && !beside(&words) {
-            // Below the time, large type would cover the joint under the microscope.
-            words = fitting(BADGE_FONT);
+        let mut words = lay(full);
+        let width = words.size().x;
+        if width > room {
+            words = lay((full * room / width).max(SMALLEST_FONT));
         }
-        let middle = Align2::CENTER_TOP.align_size_within_rect(words.size(), inside);
-        // Beside a lesson the middle is too narrow, so the time is on the left. Beside the microscope, too, there is room only
-        // below the time.
-        let place = if !presenting || middle.left() >= area.left() + TIME_WIDTH {
-            middle
-        } else {
-            if !beside(&words) {
-                inside.min.y += overlay::plate(1)[1];
-            }
-            Align2::RIGHT_TOP.align_size_within_rect(words.size(), inside)
-        };
-        Self { words, plate: place.expand2(BADGE_PADDING), help }
+        Self { words, plate: place, help }
     }
 
-    /// Draws it over the picture in `area`.
-    pub fn ui(self, ui: &Ui, area: Rect) {
+    /// Draws it.
+    pub fn ui(self, ui: &Ui) {
         let Self { words, plate, help } = self;
-        let painter = ui.painter_at(area);
-        painter.rect_filled(plate, 6.0, ui.visuals().window_fill.gamma_multiply(0.85));
+        // In a narrow picture the names of the arrows give way.
+        let theme = if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light };
+        let painter = ui.painter_at(plate);
+        painter.rect_filled(plate, 0.0, overlay::colour(Palette::of(theme).sky));
         let text = words.text().to_owned();
-        painter.galley(plate.min + BADGE_PADDING, words, ui.visuals().strong_text_color());
+        let at = Align2::LEFT_CENTER.align_size_within_rect(words.size(), plate.shrink2(BADGE_PADDING));
+        painter.galley(at.min, words, ui.visuals().strong_text_color());
         let response = ui.interact(plate, Id::unique("last impact"), Sense::hover());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &text));
         response.on_hover_text(help);

@@ -92,14 +92,17 @@ impl Tasks {
             let verdict = replay.advance(&mut run.player, may_step);
             let is_over = verdict.is_some();
             messages.set_verdict(verdict);
+            run.viewport.hold_scale(&run.player, run.player.pacer.shown());
             if is_over {
                 self.replay = None;
+                run.viewport.release_scale();
                 run.viewport.clear_history(&run.player);
             }
             return true;
         }
         if let Some((load, twin)) = &mut self.load {
             let may_step = replay_budget(run.player.clock);
+            run.viewport.hold_scale(&run.player, run.player.pacer.shown());
             if let Some(arrival) = load.advance(&mut run.player, may_step) {
                 match arrival {
                     Ok(()) => {
@@ -109,6 +112,7 @@ impl Tasks {
                     Err(why) => messages.fail(why),
                 }
                 self.load = None;
+                run.viewport.release_scale();
                 run.viewport.clear_history(&run.player);
             }
             return true;
@@ -119,6 +123,7 @@ impl Tasks {
     /// Stops a replay or a run to a section at the present instant; cancels a film.
     pub fn cancel(&mut self, run: &mut Run, messages: &mut Messages) {
         self.cancel_film(run);
+        run.viewport.release_scale();
         if self.load.take().is_some() {
             run.viewport.clear_history(&run.player);
         }

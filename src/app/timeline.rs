@@ -17,6 +17,9 @@ use crate::simulate::{ContactMode, RECORDED_JOINTS};
 /// Height of the row of flags, and total height of the lanes, points.
 const FLAGS_HEIGHT: f32 = 9.0;
 const LANES_HEIGHT: f32 = 24.0;
+/// Height of a lane among many, and largest height of all lanes, points.
+const LANE_HEIGHT: f32 = 4.0;
+const MAX_LANES_HEIGHT: f32 = 56.0;
 /// Window height below which only a low strip is shown, points.
 const MIN_WINDOW_HEIGHT: f32 = 360.0;
 /// The shortest time range shown, s.
@@ -80,7 +83,9 @@ impl Timeline {
                     moved = true;
                 }
             });
-            moved |= self.strip(ui, player, side.max(FLAGS_HEIGHT + LANES_HEIGHT));
+            let joints = player.contact_history().joints().min(RECORDED_JOINTS);
+            let lanes = (LANE_HEIGHT * joints as f32).clamp(LANES_HEIGHT, MAX_LANES_HEIGHT);
+            moved |= self.strip(ui, player, side.max(FLAGS_HEIGHT + lanes));
         });
         moved
     }
@@ -200,7 +205,7 @@ impl Scale {
         let lanes = self.lanes();
         let height = lanes.height() / joints.max(1) as f32;
         let top = lanes.top() + joint as f32 * height;
-        let gap = if height > 5.0 { 1.0 } else { 0.0 };
+        let gap = if height >= LANE_HEIGHT { 1.0 } else { 0.0 };
         Rect::from_x_y_ranges(lanes.x_range(), top..=top + height - gap)
     }
 }

@@ -64,14 +64,10 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
     reset
 }
 
-/// The bar in one row, without items that do not fit. Returns as [`ui`].
+/// The bar in one row, without items that do not fit; the time is above the picture. Returns as [`ui`].
 pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
     ui.horizontal(|ui| {
         let reset = buttons(ui, player);
-        // Otherwise the time scale would overflow; the time is also shown over the picture.
-        if ui.available_width() > clock(ui).x + SCALES_WIDTH + ui.spacing().item_spacing.x {
-            time(ui, player);
-        }
         if ui.available_width() >= SCALES_WIDTH {
             scales(ui, player);
         }

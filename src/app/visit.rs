@@ -1,11 +1,11 @@
 //! The first visit: one ball of the machine from close up, in slow motion, with a sentence, the contact parameters, and ways on.
 
-use eframe::egui::{self, Button, CentralPanel, Event, Panel, Rect, RichText, ScrollArea, Ui, vec2};
+use eframe::egui::{self, Button, CentralPanel, Event, Panel, RichText, ScrollArea, Ui, vec2};
 
 use super::command::Command;
 use super::dialogs::Dialog;
 use super::keys::Action;
-use super::run::Run;
+use super::overlay::Room;
 use super::{App, BUILT_IN_LESSONS, layout, opening, spoken, theme, value};
 
 /// Simulated seconds per second: a ball takes about half a second from wall to wall.
@@ -131,8 +131,8 @@ impl App {
         self.panels.picture = area;
         self.run.player.update_ghosts();
         self.run.viewport.bare = false;
-        let socket = self.socket_in_picture(area);
-        self.run.viewport.ui(ui, &self.run.player, false, socket.as_slice());
+        self.run.viewport.hides_time = false;
+        self.run.viewport.ui(ui, &self.run.player, false, Room::default());
         self.run.viewport.take_clicked();
         self.run.viewport.take_pull();
         let is_free = self.dialog.is_none();
@@ -145,19 +145,6 @@ impl App {
             };
             is_free && input.events.iter().any(on_it)
         })
-    }
-
-    /// The square around the socket in the picture in `area`, with its play as drawn: no label may lie there.
-    fn socket_in_picture(&self, area: Rect) -> Option<Rect> {
-        let Run { player, viewport, .. } = &self.run;
-        let joint = player.frame().joints.get(JOINT)?;
-        let ball = player.running().machine.loose_joints.get(JOINT)?.contact.ball_radius;
-        let radius = ball + f64::from(viewport.options.magnification) * joint.clearance;
-        let up = -player.running().view.down.unit();
-        let centre = joint.socket_centre;
-        let middle = viewport.place(&centre, area)?;
-        let edge = viewport.place(&(centre + up * radius), area)?;
-        Some(Rect::from_center_size(middle, egui::Vec2::splat(2.0 * middle.distance(edge))))
     }
 
     /// Sentence, sliders, and ways on; returns the command chosen.

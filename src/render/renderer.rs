@@ -365,7 +365,7 @@ impl Renderer {
             light: with(light.direction, list.exposure),
             up: with(light.up, texel),
             studio: light.studio,
-            strip: with(light.strip, 0.0),
+            strip: with(light.strip, light.behind),
             background_top: coloured(list.background.top, shadow_neighbours),
             background_bottom: coloured(list.background.bottom, 1.0),
             picture: [size[0] as f32, size[1] as f32, 1.0 / texels as f32, shadow_edge],

@@ -22,6 +22,8 @@ const FULL_THICKNESS_LENGTH: f32 = 10.0;
 const HEAD: [f32; 2] = [5.5, 2.3];
 /// Gaps in the shaft of an arrow too long to be drawn in full: its three parts, from tail to neck.
 const BREAK: [[f32; 2]; 3] = [[0.0, 0.44], [0.48, 0.52], [0.56, 1.0]];
+/// Most past peaks with a label: the largest.
+const MAX_PEAK_LABELS: usize = 3;
 /// Outline width of a mark, points.
 const OUTLINE_WIDTH: f32 = 1.8;
 
@@ -187,6 +189,9 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         return;
     }
     let draws_peaks = options.normal && options.peaks;
+    let mut forces: Vec<f32> = shot.marks.marks(shot.frame).map(|mark| mark.force.length()).collect();
+    forces.sort_by(|a, b| b.total_cmp(a));
+    let least_labelled = forces.get(MAX_PEAK_LABELS - 1).copied().unwrap_or(0.0);
     for mark in shot.marks.marks(shot.frame).filter(|_| draws_peaks) {
         let Some(joint) = joints.get(mark.joint) else {
             continue;
@@ -197,6 +202,9 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
             let [colour, ink] = [palette.normal, palette.text].map(|colour| colour.with_opacity(mark.strength.sqrt()));
             let width = OUTLINE_WIDTH * shot.options.arrows.thickness * shot.pixels_per_point;
             arrow.outline(ruler.eye, colour, width, &mut out.marks);
+            if mark.force.length() < least_labelled {
+                continue;
+            }
             let kind = LabelKind::Peak(mark.joint);
             push_label(out, &peak_label(&mark).into(), kind, arrow.tail + arrow.along, ink);
         }

@@ -19,7 +19,7 @@ use super::symbols::{Symbol, symbols};
 use super::theme::Material;
 use super::{
     Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh, MeshData, Palette,
-    Shot, ViewOptions, WearMap, to_f32,
+    Shot, Swept, ViewOptions, WearMap, to_f32,
 };
 use crate::machine::{Element, ElementKind, Role};
 use crate::scene::{Scene, SignedAxis};
@@ -126,11 +126,17 @@ impl SceneView {
 
     /// Moves `camera` so that everything drawn in `frame` fills a picture of `size`; the direction is kept.
     pub fn fit(&self, camera: &mut Camera, scene: &Scene, frame: &Frame, options: &ViewOptions, size: [u32; 2]) {
-        self.fit_around(camera, scene, frame, options, size, &[]);
+        self.fit_around(camera, scene, frame, options, size, &[], &Swept::default());
     }
 
-    /// As [`Self::fit`], with the machine clear of `plates` (minimum and maximum corner, pixels), which overlay the picture.
-    /// Selects the view with the largest machine, or the one with the least area under plates.
+    /// Adds everything drawn in `frame` to `motion`.
+    pub fn add_motion(&self, motion: &mut Swept, scene: &Scene, frame: &Frame, options: &ViewOptions) {
+        motion.add(self.solids(scene, frame, options).into_iter().flatten());
+    }
+
+    /// As [`Self::fit`], with room for `motion`, and with the machine clear of `plates` (minimum and maximum corner, pixels), which
+    /// overlay the picture. Selects the view with the largest machine, or the one with the least area under plates.
+    #[expect(clippy::too_many_arguments, reason = "one call for a whole picture")]
     pub fn fit_around(
         &self,
         camera: &mut Camera,
@@ -139,6 +145,7 @@ impl SceneView {
         options: &ViewOptions,
         size: [u32; 2],
         plates: &[[Vec2; 2]],
+        motion: &Swept,
     ) {
         // Fractions of the width of the plates at a side that are kept clear.
         const SHARES: [f32; 4] = [0.0, 0.35, 0.7, 1.0];
@@ -153,6 +160,7 @@ impl SceneView {
         // not drawn, so that pictures with and without them can be compared.
         let arrow = ARROW_LENGTH * self.bounds.radius;
         balls.extend(frame.joints.iter().map(|joint| (to_f32(&joint.socket_centre), arrow)));
+        balls.extend(motion.spheres());
         balls.retain(|(centre, radius)| centre.is_finite() && radius.is_finite());
         let whole = Vec2::new(size[0] as f32, size[1] as f32);
         let mut reserved = [0.0_f32; 4];
@@ -244,6 +252,12 @@ impl SceneView {
             solids.push(lines.iter().flat_map(|line| [(line.from.into(), 0.0), (line.to.into(), 0.0)]).collect());
         }
         solids
+    }
+
+    /// Centre of the ball of joint `joint` as drawn, m.
+    pub fn ball(&self, scene: &Scene, frame: &Frame, options: &ViewOptions, joint: usize) -> Option<Vec3> {
+        let m = self.magnification(scene, frame, options);
+        drawn::joints(scene, frame, m).get(joint).map(|drawn| drawn.ball_centre)
     }
 
     /// Turns `camera` to a close-up of ball joint `joint`, looking into its opening.
@@ -388,7 +402,7 @@ impl SceneView {
         out.lines.clear();
         out.marks.clear();
         out.labels.clear();
-        (out.legend, out.wear_scale) = (None, None);
+        (out.legend, out.wear_scale, out.error_scale) = (None, None, None);
         out.size = shot.size;
         out.eye = shot.camera.view(shot.size);
         out.background = Background { top: palette.sky, bottom: palette.ground };
@@ -413,6 +427,7 @@ impl SceneView {
             up,
             radius,
             studio: palette.studio,
+            behind: palette.behind,
         };
         out.floor = shot.options.floor.then(|| {
             let spacing = 10_f32.powf(radius.log10().floor() - 1.0);

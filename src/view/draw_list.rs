@@ -164,6 +164,8 @@ pub struct Light {
     pub radius: f32,
     /// Brightness of the key light, and of the reflected ground, sky and window.
     pub studio: [f32; 4],
+    /// Brightness of the light along the edges of parts.
+    pub behind: f32,
 }
 
 /// Background of the picture.
@@ -263,6 +265,15 @@ pub struct WearScale {
     pub largest: f32,
 }
 
+/// The colour legend of a map of the tip's errors; linear from 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorScale {
+    /// Name of the error quantity.
+    pub name: &'static str,
+    /// Largest error in the map, m.
+    pub largest: f32,
+}
+
 /// Everything to draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawList {
@@ -318,6 +329,8 @@ pub struct DrawList {
     pub legend: Option<Legend>,
     /// The wear-map legend; `None` if none is drawn.
     pub wear_scale: Option<WearScale>,
+    /// The legend of the tip's errors; `None` if no map is drawn.
+    pub error_scale: Option<ErrorScale>,
     /// Magnification of the play as drawn.
     pub magnification: f32,
     /// Its label: "clearance drawn ×50"; notes a reduced magnification.
@@ -331,7 +344,14 @@ impl Default for DrawList {
         Self {
             size: [0, 0],
             eye: Eye { clip_from_world: Mat4::IDENTITY, position: Vec3::ZERO },
-            light: Light { direction: Vec3::Z, strip: Vec3::Z, up: Vec3::Z, radius: 1.0, studio: [1.0; 4] },
+            light: Light {
+                direction: Vec3::Z,
+                strip: Vec3::Z,
+                up: Vec3::Z,
+                radius: 1.0,
+                studio: [1.0; 4],
+                behind: 0.0,
+            },
             background: Background { top: ground, bottom: ground },
             exposure: 1.0,
             outline: Colour::hex(0),
@@ -355,6 +375,7 @@ impl Default for DrawList {
             labels: Vec::new(),
             legend: None,
             wear_scale: None,
+            error_scale: None,
             magnification: 1.0,
             magnification_text: String::new(),
         }

@@ -32,6 +32,7 @@ mod shot;
 mod solids;
 mod sticks;
 mod surface;
+mod swept;
 mod symbols;
 #[cfg(test)]
 mod tests;
@@ -46,13 +47,14 @@ pub use camera::{Camera, Preset};
 pub use cloud::Cloud;
 pub use cover::Cover;
 pub use draw_list::{
-    Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh, MeshData, Tick,
-    WearScale,
+    Background, DrawList, ErrorScale, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh,
+    MeshData, Tick, WearScale,
 };
 pub use options::{ArrowOptions, Quality, Scaling, ViewOptions};
 pub use peaks::{MARK_DURATION, Mark, PeakMarks};
 pub use pick::Hit;
 pub use shot::Shot;
+pub use swept::Swept;
 pub use theme::{Colour, Ghost, GhostLook, Palette, Theme};
 
 /// Converts a physics vector to the view's type.

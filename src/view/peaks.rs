@@ -192,6 +192,16 @@ impl PeakMarks {
         })
     }
 
+    /// Force of the reference length for a largest force, N.
+    pub fn reference_for(largest: f32) -> f32 {
+        round_up_125(largest)
+    }
+
+    /// Largest recent force, N.
+    pub fn largest(&self) -> f32 {
+        self.largest
+    }
+
     /// Force of the reference length: the one set in `options`, or the largest recent force rounded up to 1, 2 or 5 times a power of
     /// ten.
     pub fn reference(&self, options: &ArrowOptions) -> f32 {

@@ -318,7 +318,7 @@ fn fitting_includes_protruding_parts_and_keeps_clear_of_plates() {
         let corners = [[Vec2::ZERO, Vec2::new(300.0, 180.0)], [Vec2::new(1000.0, 500.0), Vec2::new(1280.0, 720.0)]];
         for plates in [&[][..], &corners] {
             let mut camera = view.camera();
-            view.fit_around(&mut camera, &scene, &frame, &options, SIZE, plates);
+            view.fit_around(&mut camera, &scene, &frame, &options, SIZE, plates, &Swept::default());
             let marks = PeakMarks::new();
             let mut list = DrawList::default();
             view.build(&shot(&scene, &frame, &marks, &options, &camera), &mut list);

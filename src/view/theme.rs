@@ -153,6 +153,8 @@ pub struct Palette {
     pub exposure: f32,
     /// Brightness of the key light, and of the reflected ground, sky and window of the studio.
     pub studio: [f32; 4],
+    /// Brightness of the light along the edges of parts.
+    pub behind: f32,
     /// Outline of arrows.
     pub outline: Colour,
     /// Rim around a contact point.
@@ -166,8 +168,8 @@ impl Palette {
         Self {
             sky: pick(dark, 0xF5F7F9, 0x2A3138),
             ground: pick(dark, 0xD5DCE3, 0x181D22),
-            floor: pick(dark, 0xE3E8ED, 0x2A323A),
-            grid: pick(dark, 0x8C99A6, 0x697785),
+            floor: pick(dark, 0xE3E8ED, 0x232A31),
+            grid: pick(dark, 0x8C99A6, 0x56626E),
             text: pick(dark, 0x1E2A36, 0xE6EBF0),
             normal: pick(dark, 0xB83818, 0xFF6B6B),
             friction: pick(dark, 0x1769C9, 0x4DABF7),
@@ -183,8 +185,9 @@ impl Palette {
             } else {
                 [twin(0x7B2FBE, 0.85, 0x5A189A), ideal(0xFFFFFF, 0.9, 0x2F4858)]
             },
-            exposure: if dark { 0.92 } else { 1.0 },
-            studio: if dark { [1.0, 0.16, 0.62, 2.6] } else { [1.0, 0.42, 0.95, 2.2] },
+            exposure: if dark { 1.2 } else { 1.0 },
+            studio: if dark { [1.0, 0.3, 0.62, 2.2] } else { [1.0, 0.42, 0.95, 2.2] },
+            behind: if dark { 0.3 } else { 0.0 },
             outline: pick(dark, 0x20262C, 0x0B0E11),
             rim: pick(dark, 0xFFD43B, 0xFFF6C2),
         }

@@ -500,7 +500,7 @@ fn a_map_of_the_tip_error_is_drawn_while_its_panel_is_open() {
     harness.get_by_role_and_label(Role::Slider, "Scale of the arrows").set_value_accesskit(1.0);
     harness.run();
     let small = view(&mut harness);
-    assert!(count_differing(&before_map, &small) < arrows);
+    assert!(count_differing(&with_map, &small) > 20, "the arrow of the largest error is shorter");
     toggle(&mut harness);
     let closed = view(&mut harness);
     assert_eq!(count_differing(&before_map, &closed), 0);

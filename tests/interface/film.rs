@@ -236,6 +236,12 @@ fn the_window_makes_a_film_of_the_timeline_and_returns_to_its_instant() {
     };
     let before = state(&harness);
 
+    // Otherwise the arrows of a film have the scale of the run, and those of a picture that of recent forces.
+    click(&mut harness, "View options");
+    click(&mut harness, "Automatic scale");
+    harness.key_press(eframe::egui::Key::Escape);
+    harness.run();
+
     // A cancelled film leaves no file.
     click(&mut harness, "Save");
     click(&mut harness, "Film…");
@@ -287,8 +293,8 @@ fn the_window_makes_a_film_of_the_timeline_and_returns_to_its_instant() {
         let (_, rgba) = decoded(&next_file(&mut harness, &calls));
         let picture: Vec<u8> = rgba.chunks_exact(4).flat_map(|pixel| pixel[..3].to_vec()).collect();
         let ratio = |k: usize| signal_to_noise(&picture, &frames[k].2);
-        // The tolerance covers the trail and the fading impact marks, which only a film has.
-        assert!(ratio(k) > 25.0, "{k}: {}", ratio(k));
+        // The tolerance covers the trail and the fading impact marks, which only a film has, and names, which keep their places.
+        assert!(ratio(k) > 20.0, "{k}: {}", ratio(k));
         let other = if k == 9 { 0 } else { 9 };
         assert!(ratio(k) > ratio(other) + 1.0, "{k}: {} {}", ratio(k), ratio(other));
     }

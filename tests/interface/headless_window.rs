@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use eframe::egui::ThemePreference;
+use eframe::egui::{self, ThemePreference};
 use jointplay::app::{AppOptions, Headless, Overlay, force_notes};
 use jointplay::render::{Image, RenderError};
 use jointplay::scene::Scene;
@@ -55,6 +55,11 @@ fn the_overlay_adds_to_the_plain_picture() {
     let options = ViewOptions::default();
     let mut marks = PeakMarks::new();
     marks.update(&frame, &[], f64::INFINITY);
+    let notes = force_notes(&scene, &frame);
+    let overlay =
+        Overlay { time: Some(7.85e-3), notes: notes.clone(), legend: true, labels: true, ..Overlay::default() };
+    let whole = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(640.0, 360.0));
+    let strips = jointplay::app::strips(whole, &overlay, 1 + notes.len(), &options, false);
     let mut list = DrawList::default();
     view.build(
         &Shot {
@@ -64,20 +69,18 @@ fn the_overlay_adds_to_the_plain_picture() {
             options: &options,
             camera: &view.camera(),
             trail: &[],
-            size: [640, 360],
+            size: [strips.scene.width() as u32, strips.scene.height() as u32],
             pixels_per_point: 1.0,
         },
         &mut list,
     );
     let list = Arc::new(list);
-    let notes = force_notes(&scene, &frame);
     assert_eq!(notes.len(), 3);
     assert!(notes[0].starts_with("S1  normal "), "{}", notes[0]);
 
     let mut headless = Headless::new().expect("software Vulkan at least");
-    let plain = headless.picture(&list, &Overlay::default(), Theme::Light, 1.0).expect("drawn");
-    let overlay = Overlay { time: Some(7.85e-3), notes, legend: true, labels: true };
-    let with_overlay = headless.picture(&list, &overlay, Theme::Light, 1.0).expect("drawn");
+    let plain = headless.picture(&list, &Overlay::default(), &strips, Theme::Light).expect("drawn");
+    let with_overlay = headless.picture(&list, &overlay, &strips, Theme::Light).expect("drawn");
     let changed = plain.rgba.chunks_exact(4).zip(with_overlay.rgba.chunks_exact(4)).filter(|(a, b)| a != b).count();
     let part = changed as f64 / (640.0 * 360.0);
     assert!((0.01..0.3).contains(&part), "the overlay covers {part} of the picture");

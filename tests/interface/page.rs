@@ -324,7 +324,7 @@ fn small_screens_have_touch_sized_controls_and_a_folding_sheet() {
         let (mut harness, _) = window("spcmm", size);
         harness.run();
         let view = harness.get_by_label("3D view").rect();
-        assert!(view.width() > 240.0 && view.height() > 200.0, "{size:?}: {view:?}");
+        assert!(view.width() > 240.0 && view.height() > 140.0, "{size:?}: {view:?}");
         let mut seen = 0;
         for name in ["Reset", "Play", "Step", "Menu", "View options", "Controls", "Plots"] {
             let rect = harness.get_by_role_and_label(Role::Button, name).rect();
@@ -508,14 +508,18 @@ fn scene_record_and_picture_are_saved() {
     assert_eq!((picture.name.as_str(), picture.mime), ("spcmm-12.000ms.png", "image/png"));
     let (info, rgba) = decoded(&picture);
     let view = harness.get_by_label("3D view").rect();
-    assert_eq!((info.width, info.height), (view.width().round() as u32, view.height().round() as u32));
+    // The strips of text above and below belong to it.
+    assert_eq!(info.width, view.width().round() as u32);
+    assert!((40..=120).contains(&(info.height - view.height().round() as u32)), "{}", info.height);
     let texts = &info.uncompressed_latin1_text;
     assert!(texts.iter().any(|t| t.text.contains("contact.clearance = 0.45 mm")));
     let pixels: std::collections::HashSet<&[u8]> = rgba.chunks_exact(4).collect();
     assert!(pixels.len() > 500, "an empty picture has few colours: {}", pixels.len());
     // The saved picture shows the background where the screen shows a button.
     let button = harness.get_by_role_and_label(Role::Button, "View options").rect();
-    let at = (button.left_top() + vec2(6.0, 10.0)) - view.min;
+    // The strip is 4 points higher than the button.
+    let corner = pos2(view.left(), button.top() - 2.0);
+    let at = (button.left_top() + vec2(6.0, 10.0)) - corner;
     let pixel = |x: f32, y: f32| {
         let i = 4 * (y as usize * info.width as usize + x as usize);
         [0, 1, 2].map(|c| i32::from(rgba[i + c]))
@@ -1001,9 +1005,11 @@ fn a_link_from_the_window_opens_in_every_form_and_restores_the_camera() {
     // On a screen of another aspect ratio the camera fits the scene again.
     let (mut phone, _) = open(AppOptions::from_link(&full).expect("a link"), PORTRAIT);
     verdict(&mut phone);
+    // The verdict leaves after 5 s and returns its room to the picture.
+    phone.run_steps(320);
     phone.run();
     let fitted = camera(&phone).expect("a camera");
-    assert!(fitted.fitted.is_some_and(|aspect| aspect < 1.5), "{fitted:?}");
+    assert!(fitted.fitted.is_some_and(|aspect| aspect < 3.0), "{fitted:?}");
     assert_ne!(Some(fitted), here.1);
 }
 

@@ -121,7 +121,7 @@ fn controls_do_not_overlap_in_windows_of_any_size() {
 
 #[test]
 fn a_phone_shows_the_machine_play_and_all_three_sliders() {
-    for (size, picture) in [([390.0, 664.0], 150.0), (LANDSCAPE, 180.0)] {
+    for (size, picture) in [([390.0, 664.0], 140.0), (LANDSCAPE, 140.0)] {
         let (mut harness, _) = window("spcmm", size);
         harness.run();
         let sliders = ["Clearance", "Friction coefficient", "Restitution"];

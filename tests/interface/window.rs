@@ -610,7 +610,8 @@ fn the_wear_map_appears_with_its_scale_and_a_reset_clears_it() {
     // A colour of the scale that nothing else in the view has.
     let purple = |harness: &mut Harness<'_, App>| {
         let view = harness.get_by_label("3D view").rect();
-        let area = [view.left(), view.top(), view.right(), view.bottom()].map(|edge| edge as usize);
+        let low = harness.get_by_role_and_label(Role::Slider, "Timeline, s").rect().top();
+        let area = [view.left(), view.top(), view.right(), low].map(|edge| edge as usize);
         picture(harness).coloured(area, [0x47, 0x2D, 0x7B], 12).len()
     };
     let choose = |harness: &mut Harness<'_, App>, name: &str| {
@@ -1098,5 +1099,70 @@ fn nothing_moves_while_a_scene_plays() {
         check_layout_is_steady(&mut harness, &format!("doubts in {size:?}"));
         let doubts = harness.state().player().simulation().doubts();
         assert!(!doubts.is_empty());
+    }
+}
+
+#[test]
+fn panels_keep_their_shares_when_the_window_changes_size() {
+    let mut harness = window("spcmm");
+    harness.run();
+    let shares = |harness: &Harness<'_, App>| {
+        let size = harness.ctx.content_rect().size();
+        let view = harness.get_by_label("3D view").rect();
+        let plots = harness.get_by_label("Choose plots").rect();
+        [view.left() / size.x, (size.y - plots.top()) / size.y]
+    };
+    let before = shares(&harness);
+    for size in [[1500.0, 940.0], [1100.0, 760.0], [1280.0, 800.0]] {
+        harness.set_size(size.into());
+        harness.run();
+        for (now, before) in shares(&harness).into_iter().zip(before) {
+            // The frame around the plots does not scale.
+            assert!((now - before).abs() < 0.01, "{size:?}: {now} {before}");
+        }
+    }
+}
+
+#[test]
+fn a_notice_lies_below_the_scene_and_leaves_after_five_seconds() {
+    for size in [[1280.0, 800.0], [390.0, 844.0], [844.0, 390.0]] {
+        let mut harness = sized("spcmm", size, egui::Theme::Light);
+        harness.run();
+        let before = harness.get_by_label("3D view").rect();
+        harness.state_mut().notify("Link copied".to_owned());
+        harness.run_steps(30);
+        let view = harness.get_by_label("3D view").rect();
+        assert_eq!(view, before, "{size:?}: nothing moves");
+        let notice = harness.get_by_label("Link copied").rect();
+        assert!(notice.top() >= view.bottom(), "{size:?}: {notice} {view}");
+        harness.run_steps(280);
+        assert!(harness.query_by_label("Link copied").is_none(), "{size:?}");
+    }
+}
+
+#[test]
+fn an_error_makes_room_for_itself_below_the_scene() {
+    for size in [[1280.0, 800.0], [390.0, 844.0]] {
+        let mut harness = sized("spcmm", size, egui::Theme::Light);
+        let ctx = harness.ctx.clone();
+        harness.state_mut().open_link(&ctx, "#scene=nowhere").expect_err("no such scene");
+        harness.run_steps(5);
+        let view = harness.get_by_label("3D view").rect();
+        let dismiss = harness.get_by_role_and_label(Role::Button, "Dismiss").rect();
+        assert!(dismiss.top() >= view.bottom(), "{size:?}: {dismiss} {view}");
+        let timeline = harness.get_by_role_and_label(Role::Slider, "Timeline, s").rect();
+        assert!(dismiss.bottom() <= timeline.top(), "{size:?}: {dismiss} {timeline}");
+    }
+}
+
+#[test]
+fn sliders_keep_tracks_of_120_points_at_twice_the_type_size() {
+    // 1280 × 800 pixels at 200 %.
+    let mut harness = sized("spcmm", [640.0, 400.0], egui::Theme::Light);
+    harness.run();
+    let view = harness.get_by_label("3D view").rect();
+    for name in ["Clearance", "Friction coefficient", "Restitution"] {
+        let track = harness.get_by_role_and_label(Role::Slider, name).rect();
+        assert!(track.width() >= 120.0 && track.left() > view.right(), "{name}: {track} {view}");
     }
 }

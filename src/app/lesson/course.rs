@@ -57,7 +57,7 @@ impl Course {
 
     /// Draws rings around the step's highlighted items, over everything, without affecting the layout; those of joints in the
     /// `area` of the picture.
-    pub fn ring_highlights(&self, ui: &egui::Ui, run: &Run, area: egui::Rect) {
+    pub fn ring_highlights(&self, ui: &egui::Ui, run: &Run) {
         let wanted = self.running().map_or(&[][..], |running| &running.current_step().highlight);
         let player = &run.player;
         let joints = &player.running().machine.loose_joints;
@@ -69,10 +69,9 @@ impl Course {
         for (_, rect) in places {
             painter.rect_stroke(rect.expand(4.0), 8.0, stroke, egui::StrokeKind::Outside);
         }
-        let inside = painter.with_clip_rect(area);
+        let inside = painter.with_clip_rect(run.viewport.scene_area());
         for joint in wanted.iter().filter_map(joint) {
-            let centre = player.frame().joints.get(joint).map(|joint| joint.ball_centre);
-            if let Some(place) = centre.and_then(|centre| run.viewport.place(&centre, area)) {
+            if let Some(place) = run.viewport.place_of_ball(player, joint) {
                 inside.circle_stroke(place, 26.0, stroke);
             }
         }

@@ -4,8 +4,8 @@ use eframe::egui::{self, Rangef, Ui, Vec2b};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot};
 
 use super::{
-    LETTER_WIDTH, MAX_MARKS, MIN_MARK_DISTANCE, Panel, Trace, largest, marks, short_tick, still_plot, theme, tick,
-    value,
+    LETTER_WIDTH, MAX_MARKS, MIN_MARK_DISTANCE, PLOT_GAP, Panel, Trace, largest, marks, short_tick, still_plot, theme,
+    tick, value,
 };
 
 /// Ranges and units of the two axes of a plot.
@@ -72,7 +72,7 @@ impl Scale<'_> {
         let faint = ui.visuals().weak_text_color();
         let font = egui::TextStyle::Small.resolve(ui.style());
         let axis = |hints: AxisHints<'static>| hints.tick_label_color(faint).tick_label_font(font.clone());
-        let width = space.x - 12.0;
+        let width = space.x;
         let (to, (time_unit, time_size)) = (self.to, self.time_unit);
         let time_mark =
             move |mark: &GridMark| format!("{} {time_unit}", tick(mark.value, mark.step_size, to / time_size));
@@ -80,8 +80,8 @@ impl Scale<'_> {
         let x_axis = axis(AxisHints::new_x()).label_spacing(Rangef::new(0.0, 1.0)).formatter(move |mark, range| {
             let words = time_mark(&mark);
             let beyond = (range.end() - mark.value) / (range.end() - range.start()) * frame;
-            // Omits a mark that would extend into the next plot.
-            if 0.5 * LETTER_WIDTH * words.chars().count() as f64 > beyond + 28.0 {
+            // Omits a mark that would extend into the next plot, or beyond the window.
+            if 0.5 * LETTER_WIDTH * words.chars().count() as f64 > beyond + f64::from(0.5 * PLOT_GAP) {
                 return String::new();
             }
             words

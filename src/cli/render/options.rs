@@ -1,14 +1,19 @@
 //! Options of a picture: point of view, arrows, colours.
 
-use eframe::egui::{Pos2, Rect, vec2};
+use eframe::egui::Rect;
 use glam::Vec2;
 
-use crate::app::plates;
+use crate::app::{Strips, triad};
 use crate::cli::args::{ArrowChoice, ArrowScale, CameraView, Hideable, RenderArguments, ThemeChoice, WearChoice};
 use crate::cli::{Failure, quantity};
 use crate::scene::Scene;
 use crate::simulate::Frame;
-use crate::view::{ArrowOptions, Camera, Preset, Quality, Scaling, SceneView, Theme, ViewOptions, WearMap};
+use crate::view::{ArrowOptions, Camera, Preset, Quality, Scaling, SceneView, Swept, Theme, ViewOptions, WearMap};
+
+/// Size of `area` in pixels, one per point.
+pub fn size_of(area: Rect) -> [u32; 2] {
+    [area.width(), area.height()].map(|edge| (edge as u32).max(1))
+}
 
 /// Point of view requested by `arguments`, at the frame of t = 0.
 ///
@@ -20,6 +25,7 @@ pub fn camera(
     view: &SceneView,
     frame: &Frame,
     options: &ViewOptions,
+    strips: &Strips,
 ) -> Result<Camera, Failure> {
     positive("--zoom", f64::from(arguments.zoom), 1e3)?;
     let mut camera = view.camera();
@@ -44,17 +50,11 @@ pub fn camera(
             view.close_up(&mut camera, joint, scene, frame, options);
         }
         None => {
-            let size = [arguments.size.0, arguments.size.1];
-            if arguments.overlay {
-                // A line per joint, and one for the wear map.
-                let lines = scene.machine.loose_joints.len() + usize::from(arguments.wear.is_some());
-                let whole = Rect::from_min_size(Pos2::ZERO, vec2(size[0] as f32, size[1] as f32));
-                let corners = |plate: Rect| [plate.min, plate.max].map(|corner| Vec2::new(corner.x, corner.y));
-                let plates: Vec<_> = plates(whole, lines, options).into_iter().map(corners).collect();
-                view.fit_around(&mut camera, scene, frame, options, size, &plates);
-            } else {
-                view.fit(&mut camera, scene, frame, options, size);
-            }
+            let size = size_of(strips.scene);
+            let plate = triad(strips.scene.translate(-strips.scene.min.to_vec2()));
+            let plate = [plate.min, plate.max].map(|corner| Vec2::new(corner.x, corner.y));
+            let plates = if arguments.overlay && options.triad { vec![plate] } else { Vec::new() };
+            view.fit_around(&mut camera, scene, frame, options, size, &plates, &Swept::default());
         }
     }
     camera.distance /= arguments.zoom;

@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use eframe::egui::{Pos2, Rect, vec2};
+
 use super::options;
-use crate::app::{App, AppOptions, Headless, Link, Overlay, force_notes};
+use crate::app::{App, AppOptions, Headless, Link, Overlay, Strips, force_notes, strips};
 use crate::cli::args::{RenderArguments, ThemeChoice};
 use crate::cli::{Failure, interrupt, link, start};
 use crate::machine::Vec3;
@@ -56,13 +58,14 @@ pub struct SceneStudio {
     probe: Option<(usize, Vec3)>,
     trail: Vec<glam::Vec3>,
     screen: Screen,
-    overlay: bool,
+    /// Text over the scene, without its numbers.
+    overlay: Overlay,
+    strips: Strips,
     view: SceneView,
     camera: Camera,
     options: ViewOptions,
     marks: PeakMarks,
     list: Arc<DrawList>,
-    size: [u32; 2],
 }
 
 impl SceneStudio {
@@ -75,14 +78,24 @@ impl SceneStudio {
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
         let view = SceneView::new(scene, &frame);
-        let camera = options::camera(arguments, scene, &view, &frame, &options)?;
         let size = [arguments.size.0, arguments.size.1];
         let wear = options.wear != WearMap::Off;
+        let whole = Rect::from_min_size(Pos2::ZERO, vec2(size[0] as f32, size[1] as f32));
+        // Magnified play and wear colours are never shown unlabelled.
+        let has_text = arguments.overlay || options.magnification != 1.0 || wear;
+        let contents =
+            Overlay { time: Some(0.0), legend: arguments.overlay, labels: arguments.overlay, ..Overlay::default() };
+        let lines = if arguments.overlay { scene.machine.loose_joints.len() } else { 0 };
+        let strips = if has_text {
+            strips(whole, &contents, 1 + usize::from(wear) + lines, &options, false)
+        } else {
+            Strips::of_scene(whole)
+        };
+        let camera = options::camera(arguments, scene, &view, &frame, &options, &strips)?;
         if wear {
             simulation.track_wear();
         }
-        // Magnified play and wear colours are never shown unlabelled.
-        let screen = if arguments.overlay || options.magnification != 1.0 || wear {
+        let screen = if has_text {
             Screen::Annotated(Box::new(Headless::new().map_err(|error| no_adapter(&error))?))
         } else {
             let offscreen = Offscreen::new().map_err(|error| no_adapter(&error))?;
@@ -96,13 +109,13 @@ impl SceneStudio {
             probe: scene.machine.output.probe.map(|tip| (scene.machine.output.body, tip)),
             trail: Vec::new(),
             screen,
-            overlay: arguments.overlay,
+            overlay: contents,
+            strips,
             view,
             camera,
             options,
             marks: PeakMarks::new(),
             list: Arc::default(),
-            size,
         })
     }
 }
@@ -143,7 +156,7 @@ impl Studio for SceneStudio {
             options: &self.options,
             camera: &self.camera,
             trail: &self.trail,
-            size: self.size,
+            size: options::size_of(self.strips.scene),
             pixels_per_point: 1.0,
         };
         let list = Arc::make_mut(&mut self.list);
@@ -154,13 +167,11 @@ impl Studio for SceneStudio {
         match &mut self.screen {
             Screen::Plain(offscreen) => offscreen.render(&self.list),
             Screen::Annotated(headless) => {
-                let mut overlay = Overlay { time: Some(instant), ..Overlay::default() };
-                if self.overlay {
-                    overlay.notes = force_notes(self.simulation.pending(), &self.frame);
-                    overlay.legend = true;
-                    overlay.labels = true;
+                self.overlay.time = Some(instant);
+                if self.overlay.labels {
+                    self.overlay.notes = force_notes(self.simulation.pending(), &self.frame);
                 }
-                headless.picture(&self.list, &overlay, self.options.theme, 1.0)
+                headless.picture(&self.list, &self.overlay, &self.strips, self.options.theme)
             }
         }
         .map_err(|error| render_failure(&error))
