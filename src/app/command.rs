@@ -235,6 +235,8 @@ impl App {
             self.tasks.cancel(&mut self.run, &mut self.messages);
         } else if self.messages.dismiss_problem() {
             // Only the message closes.
+        } else if self.run.impact_list.close() {
+            // Only the list closes.
         } else if self.is_presenting() {
             self.present(ctx, false);
         } else {

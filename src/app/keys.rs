@@ -20,6 +20,10 @@ pub enum Action {
     Slower,
     Faster,
     Fit,
+    /// Undo or redo the latest change of the point of view.
+    Camera {
+        redo: bool,
+    },
     /// Point of view, by index.
     Preset(usize),
     /// Close-up of a ball joint, by index.
@@ -63,7 +67,7 @@ const fn bind(group: Group, key: Key, action: Action, written: &'static str, hel
 }
 
 /// All key bindings.
-pub const BINDINGS: [Binding; 42] = [
+pub const BINDINGS: [Binding; 44] = [
     bind(Group::Run, Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(Group::Run, Key::ArrowRight, Action::Step, "Right arrow", "One step of the solver"),
     bind(Group::Run, Key::ArrowLeft, Action::StepBack, "Left arrow", "Undo the latest step"),
@@ -78,13 +82,21 @@ pub const BINDINGS: [Binding; 42] = [
     bind(Group::Run, Key::J, Action::Backwards, "J", "Play backwards"),
     bind(Group::Run, Key::Home, Action::Home, "Home, End", "Start and end of the run so far"),
     bind(Group::Run, Key::End, Action::End, "", ""),
-    bind(Group::Run, Key::R, Action::Reset, "R", "Reset to t = 0"),
+    bind(Group::Run, Key::R, Action::Reset, "R", "Restart at t = 0"),
     bind(Group::Run, Key::ArrowUp, Action::Faster, "Up arrow, +", "Faster"),
     bind(Group::Run, Key::Plus, Action::Faster, "", ""),
     bind(Group::Run, Key::Equals, Action::Faster, "", ""),
     bind(Group::Run, Key::ArrowDown, Action::Slower, "Down arrow, -", "Slower"),
     bind(Group::Run, Key::Minus, Action::Slower, "", ""),
     bind(Group::Picture, Key::F, Action::Fit, "F", "Show everything"),
+    bind(
+        Group::Picture,
+        Key::Z,
+        Action::Camera { redo: false },
+        "Z, Y",
+        "Back to the previous point of view, and forward to the next",
+    ),
+    bind(Group::Picture, Key::Y, Action::Camera { redo: true }, "", ""),
     bind(Group::Picture, Key::Num1, Action::Preset(0), "1", "Isometric view"),
     bind(Group::Picture, Key::Num2, Action::Preset(1), "2", "Front view"),
     bind(Group::Picture, Key::Num3, Action::Preset(2), "3", "Side view"),
@@ -165,7 +177,7 @@ pub const FOCUS: [(&str, &str); 7] = [
     ("Left, right arrow on the timeline", "Show the instant a hundredth of the range earlier or later"),
     ("Space, Enter", "Press the button with the focus"),
     ("Ctrl +, Ctrl -, Ctrl 0", "Larger, smaller and default type"),
-    ("Ctrl Z, Ctrl Shift Z, Ctrl Y", "Undo and redo a change of a parameter or of the view"),
+    ("Ctrl Z, Ctrl Shift Z, Ctrl Y", "Undo and redo a change of a parameter, of the view options or of the plots"),
 ];
 
 /// Groups of the overlay.

@@ -348,7 +348,10 @@ impl App {
         match key.and_then(keys::action).filter(|_| !command) {
             None => command,
             Some(Action::TurnPage { .. }) => self.course.is_running(),
-            Some(Action::Close) => self.dialog.is_some() || self.messages.has_problem() || self.tasks.are_under_way(),
+            Some(Action::Close) => {
+                let list = self.has_impact_list();
+                list || self.dialog.is_some() || self.messages.has_problem() || self.tasks.are_under_way()
+            },
             Some(_) => true,
         }
     }

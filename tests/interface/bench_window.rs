@@ -278,7 +278,7 @@ fn the_portrait_and_the_section_fill_while_the_scene_runs() {
     assert_eq!(player.watch().sections().len(), 0);
     player.run_to(1.5);
     assert!(player.watch().sections().len() > 0);
-    click(&mut harness, Role::Button, "Reset");
+    click(&mut harness, Role::Button, "Restart");
     assert_eq!(harness.state().player().watch().sections().len(), 0);
 }
 

@@ -326,7 +326,7 @@ fn small_screens_have_touch_sized_controls_and_a_folding_sheet() {
         let view = harness.get_by_label("3D view").rect();
         assert!(view.width() > 240.0 && view.height() > 200.0, "{size:?}: {view:?}");
         let mut seen = 0;
-        for name in ["Reset", "Play", "Step", "Menu", "View options", "Controls", "Plots"] {
+        for name in ["Restart", "Play", "Step", "Menu", "View options", "Controls", "Plots"] {
             let rect = harness.get_by_role_and_label(Role::Button, name).rect();
             assert!(rect.size().min_elem() >= 43.5, "{size:?} {name}: {rect:?}");
             assert!(rect.right() <= size[0] && rect.bottom() <= size[1], "{name}: {rect:?}");
@@ -345,7 +345,7 @@ fn small_screens_have_touch_sized_controls_and_a_folding_sheet() {
         }
         assert_eq!(seen, 11);
         // No two touch targets overlap.
-        let rects: Vec<egui::Rect> = ["Reset", "Play", "Step", "Controls", "Plots"]
+        let rects: Vec<egui::Rect> = ["Restart", "Play", "Step", "Controls", "Plots"]
             .map(|name| harness.get_by_role_and_label(Role::Button, name).rect())
             .into();
         for (i, a) in rects.iter().enumerate() {

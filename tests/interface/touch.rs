@@ -77,7 +77,7 @@ const FIXED: [(Role, &str); 12] = [
     (Role::Button, "Menu"),
     (Role::Button, "View options"),
     (Role::Slider, "Timeline, s"),
-    (Role::Button, "Reset"),
+    (Role::Button, "Restart"),
     (Role::Button, "Play"),
     (Role::Button, "Step"),
     (Role::ComboBox, "Time scale preset"),

@@ -26,13 +26,13 @@ test('the most important actions work without pointer and canvas, and the canvas
     await lab.key('Space');
     assert.equal((await lab.state()).playing, true);
     await lab.key('Space');
-    await lab.activate('button', 'Reset');
+    await lab.activate('button', 'Restart');
 
     await lab.activate('button', 'Play');
     assert.equal((await lab.state()).playing, true);
     await lab.activate('button', 'Pause');
     assert.equal((await lab.state()).playing, false);
-    await lab.activate('button', 'Reset');
+    await lab.activate('button', 'Restart');
     await lab.activate('button', 'Step');
     assert.equal((await lab.state()).steps, 1);
 
@@ -76,7 +76,7 @@ test('the most important actions work without pointer and canvas, and the canvas
     const wider = await clearance();
     assert.ok(wider > narrow && wider < 1.2 * narrow, `${narrow} mm to ${wider} mm`);
 
-    await lab.activate('button', 'Reset');
+    await lab.activate('button', 'Restart');
     const focused = () => lab.page.evaluate(() => {
         const canvas = document.getElementById('laboratory');
         const element = document.getElementById(canvas.getAttribute('aria-activedescendant') ?? '');

@@ -112,6 +112,12 @@ impl Costs {
         let study = self.study.as_ref()?;
         let choice = ui.cursor().top();
         output_ui(ui, &mut self.output, study);
+        let verdict = study.verdict(self.output);
+        reserve_lines(ui, "verdict", 3, |ui| match &verdict {
+            Some(verdict) if differences.is_empty() => drop(ui.label(RichText::new(verdict).strong())),
+            Some(verdict) => drop(ui.label(RichText::new(format!("At the earlier setting: {verdict}")).weak())),
+            None => drop(ui.label(RichText::new("Which value matters most is said once all runs are finished").small().weak())),
+        });
         let tornado = ui.cursor().top();
         let clicked = self.tornado.ui(ui, study, self.output, player, !differences.is_empty());
         if self.reveal && self.computation.has_current_results() {
