@@ -260,7 +260,7 @@ impl App {
         let Some(mut dialog) = self.dialog.take() else {
             return;
         };
-        match dialogs::ui(ctx, &mut dialog, &self.run.player, &self.graphics.renderer) {
+        match dialogs::ui(ctx, &mut dialog, self.focus.is_new_dialog(), &self.run.player, &self.graphics.renderer) {
             None => self.dialog = Some(dialog),
             Some(accepted) => self.perform_all(ctx, dialog.command().filter(|_| accepted)),
         }

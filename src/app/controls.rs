@@ -232,7 +232,8 @@ impl Controls {
             Some(advice) => &*advice.brief,
             None => return,
         };
-        let said: Vec<&str> = waits.then_some(WAITS).into_iter().chain(advice.as_ref().map(|own| &*own.words)).collect();
+        let said: Vec<&str> =
+            waits.then_some(WAITS).into_iter().chain(advice.as_ref().map(|own| &*own.words)).collect();
         let said = said.join(" ");
         let colour = ui.visuals().warn_fg_color;
         let text = |words: &str| RichText::new(words).small().strong().color(colour);
@@ -324,7 +325,7 @@ impl Controls {
             .max_decimals_opt(decimals)
             .clamping(SliderClamping::Never)
             .show_value(false);
-        let response = keys::slider(ui, slider);
+        let response = keys::slider(ui, slider, [least, greatest]);
         tooltip(ui, &response, player, row);
         if self.revealed.as_deref() == Some(row.key) {
             response.request_focus();

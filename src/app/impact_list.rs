@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use eframe::egui::{
-    self, Align, Button, Label, Layout, Panel, RichText, ScrollArea, Sense, Shape, Stroke, Ui, WidgetInfo, accesskit, vec2,
+    self, Align, Button, Label, Layout, Panel, RichText, ScrollArea, Sense, Shape, Stroke, Ui, WidgetInfo, accesskit,
+    vec2,
 };
 use serde_json::json;
 

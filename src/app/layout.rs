@@ -12,7 +12,7 @@ use super::messages::{Messages, Surroundings};
 use super::panels::{Arrangement, Sheet};
 #[cfg(not(target_arch = "wasm32"))]
 use super::remembered::Store;
-use super::{App, overlay, present, spoken, theme, transport};
+use super::{App, overlay, present, spoken, theme, touch, transport};
 use crate::view::Preset;
 
 /// Width below which time and buttons do not fit side by side in a picture, points.
@@ -249,6 +249,7 @@ impl App {
             ui,
             &mut panels.controls,
             |ui| {
+                touch::pinch_enlarges(ui, ui.max_rect());
                 ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                     // Space for the scroll bar beside the fields.
                     ui.set_max_width(ui.available_width() - 10.0);
@@ -403,6 +404,9 @@ impl App {
 
     fn sheet(&mut self, ui: &mut Ui) {
         show_bar(ui);
+        if self.panels.sheet != Some(Sheet::Plots) {
+            touch::pinch_enlarges(ui, ui.max_rect());
+        }
         if self.panels.sheet == Some(Sheet::Lesson) {
             return self.lesson_ui(ui);
         }

@@ -23,8 +23,10 @@ mod desktop;
 mod dialogs;
 mod embed;
 mod equations;
+mod field;
 mod files;
 mod film;
+mod focus;
 mod ghosts;
 mod graphics;
 mod header;
@@ -64,6 +66,7 @@ mod stack;
 mod tasks;
 mod theme;
 mod timeline;
+mod touch;
 mod transport;
 mod undo;
 mod viewport;
@@ -94,6 +97,7 @@ pub use desktop::DesktopHost;
 use dialogs::Dialog;
 use files::Files;
 pub use film::FilmSettings;
+use focus::FocusKeeper;
 use graphics::Graphics;
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::Headless;
@@ -131,6 +135,7 @@ pub struct App {
     course: Course,
     messages: Messages,
     dialog: Option<Dialog>,
+    focus: FocusKeeper,
     panels: Panels,
     presentation: Presentation,
     files: Files,
@@ -179,6 +184,7 @@ impl App {
             course: Course::default(),
             messages: Messages::new(options.problem),
             dialog: None,
+            focus: FocusKeeper::default(),
             panels: Panels::new(options.embedded),
             presentation: Presentation::default(),
             files: Files::of(named_file),
@@ -351,7 +357,7 @@ impl App {
             Some(Action::Close) => {
                 let list = self.has_impact_list();
                 list || self.dialog.is_some() || self.messages.has_problem() || self.tasks.are_under_way()
-            },
+            }
             Some(_) => true,
         }
     }
@@ -444,9 +450,10 @@ impl eframe::App for App {
         if ctx.input(|input| input.viewport().visible()) == Some(false) {
             return;
         }
+        self.focus.begin(ctx);
         self.run.follow_changes(ctx, self.tasks.are_under_way(), self.course.is_running());
         self.receive_undo(ctx);
-        for action in keys::pressed(ctx) {
+        for action in keys::pressed(ctx, self.course.is_running()) {
             self.perform_action(ctx, action);
         }
         #[cfg(not(target_arch = "wasm32"))]
@@ -472,7 +479,8 @@ impl eframe::App for App {
         self.bench.report_frame(now, moves);
         self.advance_lesson(ctx);
         self.messages.expire_verdict(ctx);
-        self.messages.announce(ctx, self.host.as_mut(), &self.run.player, &self.tasks);
+        let lesson = self.course.running().map_or_else(String::new, RunningLesson::report);
+        self.messages.announce(ctx, self.host.as_mut(), &self.run.player, &self.tasks, &lesson);
         #[cfg(not(target_arch = "wasm32"))]
         if let Some(store) = &mut self.store {
             let scene = (self.run.player.pending(), self.files.scene.name());
@@ -482,6 +490,7 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         self.show(ui);
+        self.focus.end(ui.ctx(), self.dialog.is_some());
         #[cfg(not(target_arch = "wasm32"))]
         self.audience_ui(ui.ctx());
     }

@@ -42,7 +42,7 @@ const MIN_MARK_DISTANCE: f32 = 16.0;
 const LETTER_WIDTH: f64 = 7.0;
 /// Least room for the switch of the cut in a title, points.
 const MIN_SWITCH_WIDTH: f32 = 70.0;
-/// Least room for the button to the hardest impact in a title, points.
+/// Room for the button to the hardest impact in a title, points. Without it, the note on cut peaks leads there.
 const MIN_HARDEST_WIDTH: f32 = 96.0;
 /// Fraction of the time range by which an arrow key moves the cursor.
 const KEY_FRACTION: f64 = 0.01;
@@ -781,9 +781,12 @@ impl Plots {
                     }
                 }
             }
-            if panel.quantity == Some(Quantity::NormalForce) && ui.available_width() > MIN_HARDEST_WIDTH {
+            if panel.quantity == Some(Quantity::NormalForce)
+                && ui.available_width() > MIN_HARDEST_WIDTH + MIN_SWITCH_WIDTH
+            {
                 let hardest = player.impact_record().hardest(player.reached());
-                let button = ui.add_enabled(hardest.is_some(), egui::Button::new(RichText::new("Hardest impact").small()));
+                let button =
+                    ui.add_enabled(hardest.is_some(), egui::Button::new(RichText::new("Hardest impact").small()));
                 let help = "To the peak of the impact with the largest normal force so far";
                 if button.on_hover_text(help).on_disabled_hover_text("No impact so far").clicked() {
                     asked = hardest.map(|(_, own)| own.force_peak.time);

@@ -194,7 +194,8 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     );
     ui.spacing_mut().slider_width = if narrow { 90.0 } else { 150.0 };
     let slider = Slider::new(&mut scale, SCALE_RANGE.0..=SCALE_RANGE.1).logarithmic(true).show_value(false);
-    let response = keys::slider(ui, slider).on_hover_text("1:1 is real time, 1:10 000 the slowest motion");
+    let response = keys::slider(ui, slider, [SCALE_RANGE.0, SCALE_RANGE.1])
+        .on_hover_text("1:1 is real time, 1:10 000 the slowest motion");
     if response.changed() {
         player.pacer.set_scale(scale);
     }

@@ -763,7 +763,7 @@ impl Viewport {
              motion of the machine is not magnified. Key X.",
         );
         let slider = Slider::new(&mut options.magnification, 1.0..=100.0).logarithmic(true).prefix("×").max_decimals(1);
-        let slider = keys::slider(ui, slider).accessible_name("Magnification of the clearance");
+        let slider = keys::slider(ui, slider, [1.0, 100.0]).accessible_name("Magnification of the clearance");
         spoken::value(&slider, &format!("{} times", value::number(f64::from(options.magnification), 3)));
         ui.add_space(4.0);
         ui.label("Force arrows");

@@ -82,7 +82,8 @@ impl Advice {
             }
             Warning::StiffFriction { joints, slip_speed_high } => {
                 let speed = format_quantity_digits(*slip_speed_high, "mm/s", 3);
-                let words = format!("{joints}: full friction from {speed} on makes the run slow: it needs small steps.");
+                let words =
+                    format!("{joints}: full friction from {speed} on makes the run slow: it needs small steps.");
                 ("slow".to_owned(), words, None)
             }
             Warning::Doubt(Doubt::MoreJoints | Doubt::Overshoot { .. }) | Warning::MeshUnit { .. } => {

@@ -212,9 +212,14 @@ fn the_whole_list_of_keys_is_visible() {
         harness.run();
         let dialog = egui::Rect::from_min_size(egui::Pos2::ZERO, size.into());
         let bottom = harness.get_by_role_and_label(Role::Button, "Close").rect().top();
-        for words in
-            ["Play or pause", "Faster", "Force arrows on or off", "This list", "Open a link", "Move that slider"]
-        {
+        for words in [
+            "Play or pause",
+            "Faster",
+            "Force arrows on or off",
+            "This list",
+            "Open a link",
+            "Move that slider by one step, by ten, to its ends",
+        ] {
             let row = harness.get_by_label(words).rect();
             assert!(dialog.contains_rect(row) && row.bottom() <= bottom, "{size:?}: {words} at {row}");
         }
@@ -263,10 +268,13 @@ fn another_scene_opens_and_a_bad_one_leaves_the_running_scene() {
     harness.run();
     assert_eq!(harness.state().player().simulation().pending().name, "pendulum");
 
-    click(&mut harness, "Open…");
-    type_into(&mut harness, "Path", "missing/scene.toml");
+    click(&mut harness, "Open");
+    click(&mut harness, "Link…");
+    type_into(&mut harness, "Path", "missing/card.toml");
     harness.run();
-    harness.get_by_label_contains("missing/scene.toml");
+    let why = harness.get_by_label_contains("missing/card.toml");
+    // It is not taken for the name of a benchmark.
+    assert!(!why.accesskit_node().value().or(why.accesskit_node().label()).expect("a text").contains("cardan"));
     assert_eq!(harness.state().player().simulation().pending().name, "pendulum");
 }
 
@@ -381,7 +389,9 @@ fn a_value_that_waits_offers_the_restart() {
 fn a_clicked_value_is_selected_and_read_with_a_comma_or_a_unit() {
     let mut harness = window("spcmm");
     let clearance = |harness: &Harness<'_, App>| harness.state().player().pending().machine.contact.clearance;
-    for (typed, expected) in [("0.8", 0.8e-3), ("0,7", 0.7e-3), ("0.6 mm", 0.6e-3), ("500 µm", 0.5e-3), ("0,25 mm", 0.25e-3)] {
+    for (typed, expected) in
+        [("0.8", 0.8e-3), ("0,7", 0.7e-3), ("0.6 mm", 0.6e-3), ("500 µm", 0.5e-3), ("0,25 mm", 0.25e-3)]
+    {
         let entry = harness.get_by_role_and_label(Role::TextInput, "Clearance").rect().center();
         harness.drag_at(entry);
         harness.step();
@@ -1104,7 +1114,8 @@ fn control_rects(harness: &Harness<'_, App>) -> Vec<(Role, String, [f64; 4])> {
                 | Role::DisclosureTriangle
                 | Role::Image
         );
-        is_control.then_some((node.role(), name, rect))
+        // A note on cut peaks comes with them, inside the plot.
+        (is_control && !name.contains(" above in ")).then_some((node.role(), name, rect))
     })
     .collect()
 }

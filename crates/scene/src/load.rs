@@ -99,9 +99,15 @@ fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
     let bytes = read_regular(path, MAX_FILE_SIZE).map_err(|cause| match cause {
         ReadError::TooLarge(_) => SceneError { unreadable: false, ..error(too_large()) },
         ReadError::Unreadable(_) if !path.exists() => {
+            // The name of a built-in scene written as a file.
             let stem = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".toml");
-            let (near, known) = known_names(stem);
-            error(format!("{cause}; built-in scenes, named without `/` and `.toml`: {known}{near}"))
+            let known = BUILT_IN.contains(&stem) || BENCHMARKS.contains(&stem);
+            let hint = if known {
+                format!("; the built-in scene is named `{stem}`, without `/` and `.toml`")
+            } else {
+                String::new()
+            };
+            error(format!("{cause}{hint}"))
         }
         _ => error(cause.to_string()),
     })?;

@@ -193,8 +193,10 @@ impl CostStudy {
         }
         let name = |input: usize| {
             let key = &self.task.over[input].0;
-            let joint = key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')).map_or(&**key, |(joint, _)| joint);
-            self.parameter(input).map_or_else(|| joint.to_owned(), |parameter| format!("{} of {joint}", parameter.label))
+            let joint =
+                key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')).map_or(&**key, |(joint, _)| joint);
+            self.parameter(input)
+                .map_or_else(|| joint.to_owned(), |parameter| format!("{} of {joint}", parameter.label))
         };
         let others: Vec<usize> = ranked[1..]
             .iter()
@@ -214,7 +216,11 @@ impl CostStudy {
         let by = if (halves[0] - halves[1]).abs() <= 1e-9 * (ends[1] - ends[0]) {
             format!("±{}", value::quantity(halves[1], unit, VERDICT_DIGITS))
         } else {
-            format!("from {} to {}", value::number(to_display(ends[0], unit), VERDICT_DIGITS), value::quantity(ends[1], unit, VERDICT_DIGITS))
+            format!(
+                "from {} to {}",
+                value::number(to_display(ends[0], unit), VERDICT_DIGITS),
+                value::quantity(ends[1], unit, VERDICT_DIGITS)
+            )
         };
         let place = if others.is_empty() { " there".to_owned() } else { format!(" of {}", lower_first(&name(first))) };
         let shown = self.display_unit(output);
@@ -234,9 +240,7 @@ impl CostStudy {
 
     /// Inputs by their effect on `output`, the largest first; those with a run without result before all others.
     pub fn ranked_by_effect(&self, output: usize) -> Vec<usize> {
-        let spread = |input: usize| {
-            self.extent(output, input).map_or(f64::INFINITY, |[least, most]| most - least)
-        };
+        let spread = |input: usize| self.extent(output, input).map_or(f64::INFINITY, |[least, most]| most - least);
         let mut order: Vec<usize> = (0..self.task.over.len()).collect();
         order.sort_by(|&a, &b| spread(b).total_cmp(&spread(a)));
         order
