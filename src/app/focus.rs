@@ -23,7 +23,8 @@ impl FocusKeeper {
     /// Begins a frame, before any key is taken.
     pub fn begin(&mut self, ctx: &egui::Context) {
         if let Some((opener, frames)) = self.returns_to.take()
-            && ctx.memory(|memory| memory.focused().is_none_or(|focused| focused == opener))
+            // At first the closed dialog's text field may still have it.
+            && (frames == RETRIES || ctx.memory(|memory| memory.focused().is_none_or(|focused| focused == opener)))
         {
             ctx.memory_mut(|memory| memory.request_focus(opener));
             ctx.request_repaint();

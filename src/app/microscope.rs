@@ -22,10 +22,8 @@ const INITIAL_FRACTION: f32 = 0.4;
 const MAX_INITIAL_SIDE: f32 = 330.0;
 /// Largest fraction of the picture.
 const MAX_FRACTION: f32 = 0.5;
-/// Width from which the plane is chosen beside the joint with a finger, points.
-const MIN_WIDTH_WITH_PLANE: f32 = 230.0;
-/// Height that the panel must have beyond its width for that, points.
-const MIN_REMAINDER_WITH_PLANE: f32 = 170.0;
+/// Width of a window below which it is that of an upright phone, points.
+const PHONE_WIDTH: f32 = 480.0;
 /// Least remainder of the picture, points; the microscope stays hidden if there is less.
 const MIN_REMAINDER: f32 = 120.0;
 /// Height of the section of the contact, and least height in a low panel, points.
@@ -105,9 +103,7 @@ impl Microscope {
         self.joint = self.joint.min(joints.len().saturating_sub(1));
         let mut joint = self.joint;
         // On a phone the circle needs the height, and the plane is chosen below it.
-        let room = ui.available_size();
-        let is_narrow =
-            theme::has_fingers(ui) && room.x < MIN_WIDTH_WITH_PLANE && room.y < room.x + MIN_REMAINDER_WITH_PLANE;
+        let is_narrow = theme::has_fingers(ui) && ui.ctx().content_rect().width() < PHONE_WIDTH;
         ui.horizontal_wrapped(|ui| {
             if ui.available_width() > 300.0 {
                 spoken::heading(&ui.label(RichText::new("Microscope").strong()), "Microscope");
