@@ -232,7 +232,7 @@ fn paragraph(ui: &mut Ui, block: &Block) {
                 format.background = ui.visuals().code_bg_color;
             }
         }
-        job.append(&piece.text, 0.0, format);
+        job.append(&text::unbroken(&piece.text), 0.0, format);
     }
     ui.add(egui::Label::new(job).wrap());
 }
