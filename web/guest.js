@@ -64,6 +64,7 @@ class Refusal extends Error {}
 /** The field `name` of a message as a text. Any page may send any object, also one that JavaScript cannot turn into a text. */
 function textOf(message, name) {
     const value = message[name];
+    if (value === undefined) throw new Refusal(`\`${name}\` is missing`);
     if (!['string', 'number', 'boolean'].includes(typeof value)) throw new Refusal(`\`${name}\` must be a text`);
     const text = String(value);
     if (text.length > MAX_TEXT) throw new Refusal(`\`${name}\` has ${text.length} characters; allowed at most ${MAX_TEXT}`);

@@ -24,20 +24,12 @@ globalThis.jointplay = laboratory;
 
 /** Messages about missing features of the browser. */
 const MISSING = {
-    wasm:
-        'This browser does not support WebAssembly SIMD, which the laboratory needs. Firefox 89, Chrome and Edge 91, Safari 16.4 ' +
-        'and newer versions do.',
     graphics:
         'The laboratory draws with WebGPU or WebGL2, and this browser offers neither. They may be switched off in its ' +
         'settings, or the graphics driver is not supported. A current Firefox, Chrome, Edge or Safari has at least WebGL2.',
     webgpu: 'The address asks for WebGPU, which this browser does not offer.',
     webgl: 'The address asks for WebGL2, which this browser does not offer.',
 };
-
-/** The smallest module with a SIMD instruction. */
-const SIMD_MODULE = Uint8Array.of(
-    ...[0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11],
-);
 
 /** The renderer that the address requests, if any. */
 const requestedRenderer = () => new URLSearchParams(location.hash.slice(1)).get('renderer') ?? query.get('renderer');
@@ -358,7 +350,8 @@ function load() {
 }
 
 async function main() {
-    if (typeof WebAssembly !== 'object' || !WebAssembly.validate(SIMD_MODULE)) return showTrouble('Something is missing', MISSING.wasm);
+    // The page says so (stuck.js).
+    if (globalThis.jointplayMissing.length) return;
     $('loading').hidden = false;
     showProgress('Loading', 0);
     const { firstVisible, isFramed, Messages, yieldInput } = await import(`./guest.js${build}`);

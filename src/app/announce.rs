@@ -18,6 +18,8 @@ pub struct Announcer {
     text_without_impacts: String,
     /// A change of this text is an event.
     event_key: String,
+    /// What the lesson said in the latest report that included it: it is said once.
+    lesson: String,
     reported: f64,
     /// Whether the latest report is about an event.
     event: bool,
@@ -46,13 +48,14 @@ impl Announcer {
     }
 
     /// Makes a report at `now`, s of viewing, if one is due. Returns whether it did, and the time until the next check if a
-    /// report is due later. `news` is the application's own message.
-    pub fn update(&mut self, now: f64, player: &Player, news: &str) -> (bool, Option<f64>) {
+    /// report is due later. `news` is the application's own message, `lesson` that of the lesson in progress.
+    pub fn update(&mut self, now: f64, player: &Player, news: &str, lesson: &str) -> (bool, Option<f64>) {
         let event_key =
             format!("{} {} {} {news}", player.running().name, player.is_playing(), player.stopped().is_some());
-        let event = event_key != self.event_key;
+        let teaches = lesson != self.lesson;
+        let event = event_key != self.event_key || teaches;
         let text_without_impacts = sentences(player, news, None);
-        if text_without_impacts == self.text_without_impacts && self.strongest.is_none() {
+        if !teaches && text_without_impacts == self.text_without_impacts && self.strongest.is_none() {
             return (false, None);
         }
         let wait = self.reported + MIN_INTERVAL - now;
@@ -61,6 +64,10 @@ impl Announcer {
         }
         (self.event_key, self.event) = (event_key, event);
         self.text = sentences(player, news, self.strongest);
+        if teaches && !lesson.is_empty() {
+            self.text = format!("{lesson} {}", self.text);
+        }
+        lesson.clone_into(&mut self.lesson);
         self.text_without_impacts = text_without_impacts;
         self.reported = now;
         self.strongest = None;
@@ -163,11 +170,11 @@ mod tests {
     fn a_report_states_the_activity_and_the_strongest_impact() {
         let mut player = player("pendulum");
         let mut announcer = Announcer::default();
-        assert_eq!(announcer.update(0.0, &player, ""), (true, None));
+        assert_eq!(announcer.update(0.0, &player, "", ""), (true, None));
         assert_eq!(announcer.text(), "Pendulum on a ball joint. Paused at the start. S1 free.");
         player.pacer.set_scale(0.02);
         player.set_playing(true);
-        assert!(announcer.update(0.1, &player, "").0, "at once");
+        assert!(announcer.update(0.1, &player, "", "").0, "at once");
         assert!(announcer.is_event());
         assert!(announcer.text().contains("Running at time scale 1:50"));
         let (mut reports, mut hit) = (0, false);
@@ -175,7 +182,7 @@ mod tests {
             player.advance(1.0 / 60.0);
             announcer.observe(&player);
             let now = 0.1 + f64::from(frame) / 60.0;
-            if announcer.update(now, &player, "").0 {
+            if announcer.update(now, &player, "", "").0 {
                 reports += 1;
                 hit |= announcer.text().contains("Largest normal force since");
             }
@@ -184,14 +191,20 @@ mod tests {
         assert!(!announcer.is_event());
         assert!(hit, "{}", announcer.text());
         player.set_playing(false);
-        assert!(announcer.update(2.2, &player, "").0);
-        assert!(!announcer.update(9.0, &player, "").0, "nothing new");
+        assert!(announcer.update(2.2, &player, "", "").0);
+        assert!(!announcer.update(9.0, &player, "", "").0, "nothing new");
         player.single_step();
-        let (announced, wait) = announcer.update(2.3, &player, "");
+        let (announced, wait) = announcer.update(2.3, &player, "", "");
         assert!(!announced && wait.is_some_and(|wait| wait > 0.8));
-        assert!(announcer.update(3.3, &player, "").0);
-        assert!(announcer.update(3.4, &player, "Link copied").0);
+        assert!(announcer.update(3.3, &player, "", "").0);
+        assert!(announcer.update(3.4, &player, "Link copied", "").0);
         assert!(announcer.text().starts_with("Link copied. Pendulum"));
+        // What a lesson says is said at once, and once.
+        assert!(announcer.update(3.5, &player, "", "Answer: It falls freely.").0 && announcer.is_event());
+        assert!(announcer.text().starts_with("Answer: It falls freely. Pendulum"), "{}", announcer.text());
+        player.single_step();
+        assert!(announcer.update(5.0, &player, "", "Answer: It falls freely.").0);
+        assert!(announcer.text().starts_with("Pendulum"), "{}", announcer.text());
     }
 
     #[test]
@@ -207,11 +220,11 @@ mod tests {
             rests.advance(1.0 / 60.0);
         }
         let mut announcer = Announcer::default();
-        announcer.update(0.0, &rests, "");
+        announcer.update(0.0, &rests, "", "");
         let text = announcer.text();
         assert!(text.contains("S1 settled, ") && text.contains(" newtons"), "{text}");
         let mut announcer = Announcer::default();
-        announcer.update(0.0, &player("chain"), "");
+        announcer.update(0.0, &player("chain"), "", "");
         let all_free = "Of 8 ball joints 8 are free and 0 in contact.";
         assert!(announcer.text().ends_with(all_free), "{}", announcer.text());
     }

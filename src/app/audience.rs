@@ -109,7 +109,7 @@ fn contents(ui: &mut Ui, run: &mut Run, plot: Option<usize>, is_filmed: bool) ->
         height: present::screen_height(&ctx),
         closed: results.0,
         tapped: results.1,
-        keys: keys::pressed(&ctx),
+        keys: keys::pressed(&ctx, true),
     };
     ui.visuals_mut().disabled_alpha = 1.0;
     ui.disable();

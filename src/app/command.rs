@@ -229,6 +229,8 @@ impl App {
             self.tasks.cancel(&mut self.run, &mut self.messages);
         } else if self.messages.dismiss_problem() {
             // Only the message closes.
+        } else if self.run.impact_list.close() {
+            // Only the list closes.
         } else if self.is_presenting() {
             self.present(ctx, false);
         } else {
@@ -252,7 +254,7 @@ impl App {
         let Some(mut dialog) = self.dialog.take() else {
             return;
         };
-        match dialogs::ui(ctx, &mut dialog, &self.run.player, &mut self.graphics) {
+        match dialogs::ui(ctx, &mut dialog, self.focus.is_new_dialog(), &self.run.player, &mut self.graphics) {
             None => self.dialog = Some(dialog),
             Some(accepted) => self.perform_all(ctx, dialog.command().filter(|_| accepted)),
         }

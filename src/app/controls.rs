@@ -4,9 +4,11 @@
 use std::collections::HashMap;
 
 use eframe::egui::{
-    self, ComboBox, DragValue, FontId, Frame, Rect, RectAlign, Response, RichText, Slider, SliderClamping, TextEdit,
-    Tooltip, Ui,
+    self, ComboBox, DragValue, FontId, Frame, Popup, PopupCloseBehavior, Rect, RectAlign, Response, RichText, Slider,
+    SliderClamping, TextEdit, Tooltip, Ui,
 };
+
+use eframe::egui::text::{CCursor, CCursorRange};
 
 use super::accuracy;
 use super::icons::{Icon, icon_button};
@@ -31,6 +33,13 @@ const UNDO_SIDE: f32 = 22.0;
 /// Width of a text field, and its margin on either side, points.
 const ENTRY_WIDTH: f32 = 84.0;
 const ENTRY_MARGIN: i8 = 6;
+/// Width of the sign of a note beside a name, and of the note that it opens, points.
+const SIGN_WIDTH: f32 = 16.0;
+const SIGN_PADDING: f32 = 4.0;
+const NOTE_WIDTH: f32 = 260.0;
+
+/// What is said of a changed value that does not act yet.
+const WAITS: &str = "Applies when the run starts again from t = 0.";
 
 /// State of the controls outside the simulation: partially typed values and their errors.
 #[derive(Default)]
@@ -39,6 +48,8 @@ pub struct Controls {
     joint: usize,
     /// Key of a joint whose slider is scrolled into view and focused.
     revealed: Option<String>,
+    /// Whether the user asked for a restart, which applies the changes that wait for it.
+    asks_restart: bool,
 }
 
 #[derive(Default)]
@@ -55,6 +66,8 @@ struct Row<'a> {
     /// Accessible name.
     name: String,
     now: Value,
+    /// Width of what stands at the right of its name, points.
+    room: f32,
 }
 
 impl Row<'_> {
@@ -79,6 +92,11 @@ impl Controls {
     /// Discards only partially typed values.
     pub fn forget_drafts(&mut self) {
         self.drafts.clear();
+    }
+
+    /// Whether the user has asked for a restart since the last call.
+    pub fn take_restart(&mut self) -> bool {
+        std::mem::take(&mut self.asks_restart)
     }
 
     /// Title of the scene.
@@ -215,31 +233,87 @@ impl Controls {
             Some((joint, _)) => format!("{} of {joint}", parameter.label),
             None => parameter.label.to_owned(),
         };
-        let row = Row { parameter, key, name, now };
+        let room = theme::side(ui, UNDO_SIDE)
+            + match &parameter.kind {
+                Kind::Number { .. } if Self::has_value_beside(ui) => -theme::side(ui, UNDO_SIDE),
+                Kind::Number { .. } => 92.0,
+                Kind::Choice(_) => 168.0,
+                Kind::Count { .. } => 78.0,
+            };
+        let row = Row { parameter, key, name, now, room };
         ui.push_id(key, |ui| match &parameter.kind {
             Kind::Number { .. } => self.number(ui, player, &row),
             Kind::Choice(words) => self.choice(ui, player, &row, words),
             Kind::Count { min, max } => self.count(ui, player, &row, (*min, *max)),
         });
-        if let Some(error) = self.drafts.get(key).and_then(|draft| draft.error.as_ref()) {
-            theme::error(ui, value::typeset(error));
-        }
-        if player.is_pending(key) {
-            theme::warning(ui, "Applies at the next reset");
-        }
-        if let Some(warning) = player.warning(key) {
-            theme::warning(ui, value::typeset(warning));
-        }
+    }
+
+    /// A sign beside the name of `row` if something is to be said about its value, which opens with the remedy. It has its place
+    /// whether it is shown or not, so that it moves nothing.
+    fn note(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
+        let waits = player.is_pending(row.key);
+        let advice = player.warning(row.key).cloned();
+        let brief = match &advice {
+            _ if waits => "at restart",
+            Some(advice) => &*advice.brief,
+            None => return,
+        };
+        let said: Vec<&str> =
+            waits.then_some(WAITS).into_iter().chain(advice.as_ref().map(|own| &*own.words)).collect();
+        let said = said.join(" ");
+        let colour = ui.visuals().warn_fg_color;
+        let text = |words: &str| RichText::new(words).small().strong().color(colour);
+        let whole = format!("! {brief}");
+        let font = egui::TextStyle::Small.resolve(ui.style());
+        let fits = ui.painter().layout_no_wrap(whole.clone(), font, colour).size().x + 2.0 * SIGN_PADDING
+            <= ui.available_width() - row.room - ui.spacing().item_spacing.x;
+        // No higher than the name beside it.
+        ui.spacing_mut().button_padding = egui::vec2(SIGN_PADDING, 0.0);
+        let line = ui.text_style_height(&egui::TextStyle::Body);
+        let sign = egui::Button::new(text(if fits { &whole } else { "!" })).min_size(egui::vec2(SIGN_WIDTH, line));
+        let sign = ui.scope(|ui| {
+            ui.spacing_mut().interact_size.y = line;
+            ui.add(sign)
+        });
+        let sign = sign.inner;
+        let popup = Popup::from_toggle_button_response(&sign)
+            .close_behavior(PopupCloseBehavior::CloseOnClickOutside)
+            .align(RectAlign::BOTTOM_START)
+            .width(NOTE_WIDTH);
+        popup.show(|ui| {
+            ui.set_max_width(NOTE_WIDTH);
+            ui.label(&said);
+            if waits && ui.button("Restart now").clicked() {
+                self.asks_restart = true;
+                ui.close();
+            }
+            if let Some(remedy) = advice.as_ref().and_then(|own| own.remedy.as_ref())
+                && ui.button(&remedy.label).clicked()
+            {
+                self.set(player, &remedy.key_for(row.key), &remedy.value);
+                ui.close();
+            }
+        });
+        let sign = if Popup::is_id_open(ui.ctx(), Popup::default_response_id(&sign)) {
+            sign
+        } else {
+            sign.on_hover_text(&said)
+        };
+        sign.accessible_name(format!("{}: {said}", row.name));
     }
 
     fn number(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
         let Value::Number(si) = row.now else {
             return;
         };
-        if theme::has_fingers(ui) && ui.available_width() > MIN_WIDTH_WITH_VALUE {
+        if Self::has_value_beside(ui) {
             // Slider and value share a row, so that a phone shows three controls.
             ui.spacing_mut().item_spacing.y = 0.0;
-            label(ui, player, row);
+            let size = egui::vec2(ui.available_width(), ui.text_style_height(&egui::TextStyle::Body));
+            ui.allocate_ui_with_layout(size, egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                label(ui, player, row);
+                self.note(ui, player, row);
+            });
             let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
             let backwards = egui::Layout::right_to_left(egui::Align::Center);
             ui.allocate_ui_with_layout(size, backwards, |ui| {
@@ -250,12 +324,16 @@ impl Controls {
             return;
         }
         theme::use_dense_rows(ui);
-        let room = 92.0 + theme::side(ui, UNDO_SIDE);
-        self.heading(ui, player, room, row, |this, ui, player| {
+        self.heading(ui, player, row, |this, ui, player| {
             this.default_button(ui, player, row);
             this.entry(ui, player, row);
         });
         self.slider(ui, player, row, si);
+    }
+
+    /// Whether the value of a number stands beside its slider.
+    fn has_value_beside(ui: &Ui) -> bool {
+        theme::has_fingers(ui) && ui.available_width() > MIN_WIDTH_WITH_VALUE
     }
 
     /// A slider of the available width; `si` is the position of its handle.
@@ -273,7 +351,7 @@ impl Controls {
             .max_decimals_opt(decimals)
             .clamping(SliderClamping::Never)
             .show_value(false);
-        let response = keys::slider(ui, slider);
+        let response = keys::slider(ui, slider, [least, greatest]);
         tooltip(ui, &response, player, row);
         if self.revealed.as_deref() == Some(row.key) {
             response.request_focus();
@@ -289,8 +367,7 @@ impl Controls {
     }
 
     fn choice(&mut self, ui: &mut Ui, player: &mut Player, row: &Row, words: &[&'static str]) {
-        let room = 168.0 + theme::side(ui, UNDO_SIDE);
-        self.heading(ui, player, room, row, |this, ui, player| {
+        self.heading(ui, player, row, |this, ui, player| {
             this.default_button(ui, player, row);
             let mut chosen = None;
             let width = ui.available_width().min(170.0);
@@ -319,8 +396,7 @@ impl Controls {
         let Value::Count(mut count) = row.now else {
             return;
         };
-        let room = 78.0 + theme::side(ui, UNDO_SIDE);
-        self.heading(ui, player, room, row, |this, ui, player| {
+        self.heading(ui, player, row, |this, ui, player| {
             this.default_button(ui, player, row);
             let response = ui.add(DragValue::new(&mut count).range(min..=max).update_while_editing(false));
             tooltip(ui, &response, player, row);
@@ -332,12 +408,11 @@ impl Controls {
         });
     }
 
-    /// Name on the left, and the widgets of `rest` from the right; on a line below if fewer than `room` points are left for them.
+    /// Name on the left with the sign of a note, and the widgets of `rest` from the right; on a line below without room for them.
     fn heading(
         &mut self,
         ui: &mut Ui,
         player: &mut Player,
-        room: f32,
         row: &Row,
         rest: impl FnOnce(&mut Self, &mut Ui, &mut Player),
     ) {
@@ -345,11 +420,13 @@ impl Controls {
         let colour = ui.visuals().text_color();
         let name = row.parameter.label;
         let words = ui.painter().layout_no_wrap(name.to_owned(), font, colour);
-        let below = words.size().x + ui.spacing().item_spacing.x + room > ui.available_width();
+        let gap = ui.spacing().item_spacing.x;
+        let below = words.size().x + gap + SIGN_WIDTH + row.room > ui.available_width();
         let backwards = egui::Layout::right_to_left(egui::Align::Center);
         let mut rest = Some(rest);
         ui.horizontal(|ui| {
             label(ui, player, row);
+            self.note(ui, player, row);
             if !below && let Some(rest) = rest.take() {
                 ui.with_layout(backwards, |ui| rest(self, ui, player));
             }
@@ -365,15 +442,21 @@ impl Controls {
         let shown = row.shown();
         let mut text = self.drafts.get(row.key).map_or_else(|| shown.clone(), |draft| draft.text.clone());
         let font = fitting_font(ui, &text, ENTRY_WIDTH - 2.0 * f32::from(ENTRY_MARGIN));
-        let response = ui.add(
-            TextEdit::singleline(&mut text)
-                .font(font)
-                .desired_width(ENTRY_WIDTH)
-                .min_size(egui::vec2(0.0, ui.spacing().interact_size.y))
-                .align(egui::Align2::RIGHT_CENTER)
-                .background_color(ui.visuals().faint_bg_color)
-                .margin(egui::Margin::symmetric(ENTRY_MARGIN, 3)),
-        );
+        let edit = TextEdit::singleline(&mut text)
+            .font(font)
+            .desired_width(ENTRY_WIDTH)
+            .min_size(egui::vec2(0.0, ui.spacing().interact_size.y))
+            .align(egui::Align2::RIGHT_CENTER)
+            .background_color(ui.visuals().faint_bg_color)
+            .margin(egui::Margin::symmetric(ENTRY_MARGIN, 3));
+        let mut edit = edit.show(ui);
+        let response = edit.response.response;
+        if response.gained_focus() {
+            // What is typed takes the place of the value.
+            let all = CCursorRange::two(CCursor::new(0), CCursor::new(text.chars().count()));
+            edit.state.cursor.set_char_range(Some(all));
+            edit.state.store(ui.ctx(), response.id);
+        }
         if response.changed() {
             self.drafts.insert(row.key.to_owned(), Draft { text: text.clone(), error: None });
         }
@@ -387,7 +470,15 @@ impl Controls {
                 }
             }
         }
-        tooltip(ui, &response, player, row);
+        match self.drafts.get(row.key).and_then(|draft| draft.error.as_ref()) {
+            // Over the controls below, which stay where they are.
+            Some(error) => Tooltip::always_open(ui.ctx().clone(), ui.layer_id(), response.id.with("error"), &response)
+                .show(|ui| drop(theme::error(ui, value::typeset(error)))),
+            None => {
+                tooltip(ui, &response, player, row);
+                None
+            }
+        };
         response.accessible_name(&row.name);
     }
 
@@ -480,9 +571,9 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
         ui.label(RichText::new(format!("Key {key}")).small().weak());
         if parameter.at_reset {
             let when = if parameter.scope == Scope::Own {
-                "Applies at the next reset; at once where only contacts and gravity depend on it"
+                "Applies at the next restart; at once where only contacts and gravity depend on it"
             } else {
-                "Applies at the next reset"
+                "Applies at the next restart"
             };
             ui.label(RichText::new(when).small());
         }

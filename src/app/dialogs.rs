@@ -1,6 +1,6 @@
 //! Dialogs: list of keys, about box, file opening, link with QR code, and others.
 
-use eframe::egui::{self, Id, Label, Modal, RichText, ScrollArea, TextEdit, Ui};
+use eframe::egui::{self, Align2, Id, Label, Modal, RichText, ScrollArea, TextEdit, Ui};
 
 use super::command::Command;
 use super::film::{self, FilmSettings};
@@ -118,6 +118,26 @@ impl Dialog {
         })
     }
 
+    /// Label of the button that closes it without an effect.
+    fn refusal(&self) -> &'static str {
+        match self {
+            Self::Load { .. } | Self::Ready { .. } => "Keep this scene",
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::StartAsNew => "Keep everything",
+            Self::Help | Self::About | Self::Lessons { .. } | Self::Machines { .. } | Self::Link(_) => "Close",
+            Self::Open { .. } | Self::Save { .. } | Self::Film { .. } => "Cancel",
+        }
+    }
+
+    /// Whether a text field takes the focus.
+    fn has_field(&self) -> bool {
+        match self {
+            Self::Open { .. } | Self::Save { .. } => true,
+            Self::Link(shared) => shared.is_editable(),
+            _ => false,
+        }
+    }
+
     /// The command that its button gives.
     pub fn command(self) -> Option<Command> {
         Some(match self {
@@ -136,8 +156,14 @@ impl Dialog {
     }
 }
 
-/// Shows `dialog`. Returns whether its button was pressed once it is to close.
-pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, graphics: &mut Graphics) -> Option<bool> {
+/// Shows `dialog`, which takes the focus if it is `new`. Returns whether its button was pressed once it is to close.
+pub fn ui(
+    ctx: &egui::Context,
+    dialog: &mut Dialog,
+    new: bool,
+    player: &Player,
+    graphics: &mut Graphics,
+) -> Option<bool> {
     let mut answer = None;
     // Title, buttons and frame stay visible on a low screen and when the text grows.
     let max_height = (ctx.content_rect().height() - 140.0).max(80.0);
@@ -151,7 +177,11 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, graphics: &
     let widest = (ctx.content_rect().width() - 48.0).min(width);
     let frame = egui::Frame::window(&ctx.global_style());
     let id = Id::unique("dialog");
-    let area = Modal::default_area(id).accessible_name(dialog.title());
+    let mut area = Modal::default_area(id).accessible_name(dialog.title());
+    if let Dialog::Link(_) = dialog {
+        // It grows downwards when its code appears.
+        area = area.anchor(Align2::CENTER_TOP, [0.0, 24.0]);
+    }
     let modal = Modal::new(id).area(area).frame(frame).show(ctx, |ui| {
         ui.set_width(widest);
         spoken::heading(&ui.heading(dialog.title()), dialog.title());
@@ -169,9 +199,9 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, graphics: &
                     chosen.is_some()
                 }
                 Dialog::About => about(ui, player, &graphics.renderer),
-                Dialog::Open { path, error } => open(ui, path, error.as_deref()),
-                Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
-                Dialog::Link(shared) => code::ui(ui, shared, max_height),
+                Dialog::Open { path, error } => open(ui, path, error.as_deref(), new),
+                Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref(), new),
+                Dialog::Link(shared) => code::ui(ui, shared, new),
                 Dialog::Film { settings } => film::settings_ui(ui, settings, player.reached()),
                 Dialog::Load { changes, .. } => {
                     list(ui, "The sweep was made from a different scene. Running to this section changes:", changes)
@@ -198,10 +228,17 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, graphics: &
             } else if entered {
                 answer = Some(true);
             }
-            if ui.button("Close").clicked() {
+            let close = ui.button(dialog.refusal());
+            if new && !dialog.has_field() {
+                close.request_focus();
+            }
+            if close.clicked() {
                 answer = Some(false);
             }
         });
+        if let Dialog::Link(shared) = dialog {
+            code::picture(ui, shared);
+        }
     });
     if modal.should_close() {
         answer = Some(false);
@@ -285,15 +322,15 @@ fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
     false
 }
 
-fn open(ui: &mut Ui, path: &mut String, error: Option<&str>) -> bool {
+fn open(ui: &mut Ui, path: &mut String, error: Option<&str>, new: bool) -> bool {
     ui.label(
         "A link, the path of a scene file (.toml), or the name of a built-in scene. A file can also be dropped on the \
          window, together with the files that it names, and a link can be pasted.",
     );
-    path_field(ui, path, "https://…#scene=…, scene.toml or pendulum", error)
+    path_field(ui, path, "https://…#scene=…, scene.toml or pendulum", error, new)
 }
 
-fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>) -> bool {
+fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>, new: bool) -> bool {
     ui.label("Path of the file. A name without a folder is saved in the folder in which the program was started.");
     if let [first, rest @ ..] = files {
         for file in rest {
@@ -301,7 +338,7 @@ fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>)
             ui.label(RichText::new(format!("Its metadata is saved beside it (…{ending})")).weak());
         }
     }
-    path_field(ui, path, "name", error)
+    path_field(ui, path, "name", error, new)
 }
 
 fn list(ui: &mut Ui, words: &str, changes: &[String]) -> bool {
@@ -313,10 +350,10 @@ fn list(ui: &mut Ui, words: &str, changes: &[String]) -> bool {
 }
 
 /// The text field with its error below; returns whether Enter was pressed.
-fn path_field(ui: &mut Ui, path: &mut String, hint: &str, error: Option<&str>) -> bool {
+fn path_field(ui: &mut Ui, path: &mut String, hint: &str, error: Option<&str>, new: bool) -> bool {
     let field = ui.add(TextEdit::singleline(path).desired_width(f32::INFINITY).hint_text(hint));
     let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
-    if !entered && ui.memory(|memory| memory.focused().is_none()) {
+    if new || (!entered && ui.memory(|memory| memory.focused().is_none())) {
         field.request_focus();
     }
     field.accessible_name("Path");

@@ -9,6 +9,7 @@ use serde_json::{Map, json};
 use super::dialogs::{Dialog, SharedLink};
 use super::host::{OpenedFile, SaveFile};
 use super::lesson::RunningLesson;
+use super::open::with_home;
 use super::player::Player;
 use super::reload::{FileContents, SceneFile};
 use super::{App, value};
@@ -262,6 +263,7 @@ impl App {
 
     /// Saves files under the path from [`Dialog::Save`].
     pub(super) fn save_as(&mut self, path: String, files: Vec<SaveFile>) {
+        let path = with_home(&path).into_owned();
         let suggested = files.first().map_or(String::new(), |f| f.name.clone());
         let renamed: Vec<SaveFile> = files
             .iter()

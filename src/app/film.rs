@@ -1,7 +1,7 @@
 //! Films of a time window. Each frame is an instant of the run, reached by stepping and drawn off screen like a saved picture, so
 //! the film does not depend on computing speed. Afterwards the run returns to its previous instant.
 
-use eframe::egui::{self, DragValue, RichText, Ui};
+use eframe::egui::{self, RichText, Ui};
 
 use super::App;
 use super::canvas::{Canvas, Pending};
@@ -11,7 +11,7 @@ use super::picture::Contents;
 use super::player::Player;
 use super::run::Run;
 use super::tasks::Tasks;
-use super::{layout, transport, value};
+use super::{field, layout, transport, value};
 use crate::film::{Film, FilmFormat};
 
 /// Sizes to choose from, pixels.
@@ -119,19 +119,19 @@ pub fn settings_ui(ui: &mut Ui, settings: &mut FilmSettings, reached: f64) -> bo
         ];
         for (end, (name, help)) in settings.span.iter_mut().zip(ends) {
             ui.label(name);
-            let mut milliseconds = *end * 1e3;
-            let field = DragValue::new(&mut milliseconds)
-                .range(0.0..=reached * 1e3)
-                .speed(reached * 2.0)
-                .max_decimals(4)
-                .suffix(" ms");
-            if ui.add(field).on_hover_text(help).changed() {
-                *end = milliseconds / 1e3;
-            }
+            ui.add(field::time(end).range(0.0..=reached).speed(reached * 2e-3))
+                .on_hover_text(help)
+                .accessible_name(name);
             ui.end_row();
         }
         ui.label("Time scale");
-        let scales = transport::SCALES.map(|scale| (scale, value::time_scale(scale)));
+        let mut scales: Vec<f64> = transport::SCALES.to_vec();
+        // The window's own may be another one.
+        if !scales.contains(&settings.scale) {
+            scales.push(settings.scale);
+            scales.sort_by(|a, b| b.total_cmp(a));
+        }
+        let scales: Vec<(f64, String)> = scales.into_iter().map(|scale| (scale, value::time_scale(scale))).collect();
         let help = "Simulated seconds per second of film";
         choice(ui, "Time scale of the film", help, &mut settings.scale, &scales);
         ui.end_row();
@@ -179,7 +179,7 @@ pub fn settings_ui(ui: &mut Ui, settings: &mut FilmSettings, reached: f64) -> bo
 fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, help: &str, value: &mut T, options: &[(T, String)]) {
     let label = |value: T| {
         let chosen = options.iter().find(|(option, _)| *option == value);
-        chosen.map_or("custom", |(_, text)| text.as_str())
+        chosen.map_or("", |(_, text)| text.as_str())
     };
     layout::choice(ui, [name, help], None, value, options.iter().map(|(option, _)| *option), label);
 }

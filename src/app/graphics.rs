@@ -6,6 +6,7 @@ use eframe::egui_wgpu::RenderState;
 use super::lesson::LessonCard;
 use super::scene_pictures::{ScenePictures, Still};
 use super::theme;
+use super::touch::FirstTouch;
 use crate::render;
 use crate::scene::Scene;
 
@@ -29,6 +30,7 @@ impl Graphics {
     /// Continues on the device of `state`.
     pub fn attach(&mut self, ctx: &egui::Context, state: Option<&RenderState>, theme: ThemePreference) {
         theme::apply(ctx, self.contrast);
+        ctx.add_plugin(FirstTouch::default());
         ctx.set_theme(theme);
         self.renderer = String::new();
         if let Some(state) = state {

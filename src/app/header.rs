@@ -10,7 +10,7 @@ use super::picture::Picture;
 use super::run::Run;
 #[cfg(not(target_arch = "wasm32"))]
 use super::{audience, plots, remembered};
-use super::{cards, layout, spoken, theme};
+use super::{cards, layout, spoken};
 
 /// Window width from which the header shows the program's name, points.
 const MIN_WIDTH_WITH_NAME: f32 = 900.0;
@@ -64,18 +64,12 @@ impl Header<'_> {
                 });
                 return;
             }
-            #[cfg(not(target_arch = "wasm32"))]
-            if self.recent.is_some() || !ui.ctx().embed_viewports() {
-                layout::menu(ui, "Open", false, |ui| {
-                    self.open_button(ui, "File…");
-                    self.desktop_entries(ui);
-                })
-                .on_hover_text("Open a scene, a recent file or a second window");
-            } else {
-                self.open_button(ui, "Open…");
-            }
-            #[cfg(target_arch = "wasm32")]
-            self.open_button(ui, "Open…");
+            layout::menu(ui, "Open", false, |ui| {
+                self.open_button(ui, "File…");
+                #[cfg(not(target_arch = "wasm32"))]
+                self.desktop_entries(ui);
+            })
+            .on_hover_text("Open a file or a link");
             let save = |ui: &mut Ui| {
                 self.save_menu(ui);
                 self.code_button(ui);
@@ -115,19 +109,21 @@ impl Header<'_> {
     }
 
     fn scene_box(&mut self, ui: &mut Ui, compact: bool) {
+        let width = if compact { 190.0_f32.min(ui.available_width() - 90.0) } else { 190.0 };
+        let size = egui::vec2(width, ui.spacing().interact_size.y);
+        ui.allocate_ui(size, |ui| self.scene_list(ui, width));
+    }
+
+    fn scene_list(&mut self, ui: &mut Ui, width: f32) {
         let scene = self.run.player.running();
+        ui.set_max_width(width);
         ComboBox::from_id_salt("scene")
-            .width(if compact || ui.ctx().content_rect().width() < MIN_WIDTH_WITH_NAME { 150.0 } else { 170.0 })
+            .width(width)
             .truncate()
             // Shows all scenes if the window is high enough; otherwise the list scrolls.
             .height(0.85 * ui.ctx().content_rect().height())
-            .selected_text(&scene.name)
+            .selected_text(&scene.title)
             .show_ui(ui, |ui| {
-                let help = "Open a link, a scene by its name, or a file";
-                if ui.selectable_label(false, "Link…").on_hover_text(help).clicked() {
-                    self.commands.push(Command::Ask(Dialog::open()));
-                }
-                ui.separator();
                 // Stays within the edges of a narrow window.
                 let width = LIST_WIDTH.min(ui.ctx().content_rect().width() - 60.0);
                 ui.set_width(width);
@@ -139,13 +135,14 @@ impl Header<'_> {
                 }
             })
             .response
-            .on_hover_text(&scene.title)
+            .on_hover_text(format!("{} (`{}` on the command line)", scene.title, scene.name))
             .accessible_name("Scene");
     }
 
     fn open_button(&mut self, ui: &mut Ui, name: &str) {
-        let help = "Open a scene file; a link can be pasted anywhere, or into Link… in the list of scenes";
-        self.entry(ui, name, help, Command::ChooseFile);
+        self.entry(ui, name, "Open a scene file; it can also be dropped on the window", Command::ChooseFile);
+        let help = "A link, which can also be pasted anywhere, a scene by its name, or a file by its path";
+        self.entry(ui, "Link…", help, Command::Ask(Dialog::open()));
     }
 
     /// Desktop-only menu entries.
@@ -209,7 +206,6 @@ impl Header<'_> {
     /// Menu of a small header, with everything that does not fit into the bar.
     fn menu(&mut self, ui: &mut Ui) {
         ui.set_min_width(180.0);
-        theme::use_dense_rows(ui);
         self.open_button(ui, "Open…");
         #[cfg(not(target_arch = "wasm32"))]
         self.desktop_entries(ui);

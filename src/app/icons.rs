@@ -12,7 +12,7 @@ pub enum Icon {
     /// Bar and triangle: one step.
     Step,
     /// Bar and triangle backwards: to the start.
-    Restart,
+    Start,
     /// Triangle to the left.
     Backwards,
     /// Two triangles, to the left or to the right: to the previous or the next impact.
@@ -65,7 +65,7 @@ fn paint(ui: &Ui, icon: Icon, rect: Rect, colour: Color32) {
             painter.rect_filled(bar(0.0, 0.2), 1.0, colour);
             painter.add(triangle([at(0.34, 0.0), at(1.0, 0.5), at(0.34, 1.0)]));
         }
-        Icon::Restart => {
+        Icon::Start => {
             painter.rect_filled(bar(0.0, 0.2), 1.0, colour);
             painter.add(triangle([at(1.0, 0.0), at(1.0, 1.0), at(0.3, 0.5)]));
         }

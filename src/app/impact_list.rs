@@ -1,49 +1,80 @@
-//! The list of impacts: one row per finished impact, latest first; and the badge over the picture at an impact's instant.
+//! The list of impacts: one row per finished impact, sorted by any column; and the badge over the picture at an impact's instant.
 
 use std::fmt::Write as _;
 
-use eframe::egui::{self, Align, Label, Layout, RichText, ScrollArea, Sense, Ui, WidgetInfo, vec2};
+use eframe::egui::{
+    self, Align, Button, Label, Layout, Panel, RichText, ScrollArea, Sense, Shape, Stroke, Ui, WidgetInfo, accesskit,
+    vec2,
+};
 use serde_json::json;
 
 use super::files::{file_stem, meta};
 use super::host::SaveFile;
 use super::player::Player;
+use super::player::impact_record::RecordedImpact;
 use super::run::Run;
-use super::value;
+use super::{spoken, theme, value};
 use crate::analysis::impact_row;
 use crate::simulate::{ContactMode, Impact};
 
-/// Height of a row, points.
-const ROW_HEIGHT: f32 = 20.0;
-/// Most visible rows at first.
-const MAX_VISIBLE_ROWS: f32 = 9.0;
+/// Height of a row for a mouse and for touch, points.
+const ROW_HEIGHTS: (f32, f32) = (20.0, 32.0);
+/// Rows shown at first, and the share of the height that the list takes at most.
+const FIRST_ROWS: f32 = 5.0;
+const MAX_SHARE: f32 = 0.5;
 
-/// Columns: heading, width in points, tooltip.
-const COLUMNS: [(&str, f32, &str); 9] = [
-    ("No.", 44.0, "Number of the impact in this run, in the order of their beginnings"),
-    ("Joint", 58.0, "Ball joint"),
-    ("Time", 82.0, "Instant at which it began"),
-    ("Duration", 62.0, "From its beginning to its end"),
-    ("Peak", 62.0, "Largest normal force"),
-    ("Approach", 74.0, "Approach speed: penetration rate when it began"),
-    ("Rebound", 74.0, "Rebound speed: minus the penetration rate when it ended"),
-    ("Restitution", 70.0, "Rebound speed over approach speed"),
-    (
-        "Law",
-        132.0,
-        "Restitution that the normal-force law gives an undisturbed impact. Disturbed: another joint was in contact meanwhile or \
-         a parameter changed, so the law alone does not set the ratio. Slow: it began below the impact speed floor and rebounds \
-         higher.",
-    ),
+/// A column.
+struct Column {
+    heading: &'static str,
+    /// Points.
+    width: f32,
+    help: &'static str,
+}
+
+const fn column(heading: &'static str, width: f32, help: &'static str) -> Column {
+    Column { heading, width, help }
+}
+
+const COLUMNS: [Column; 10] = [
+    column("No.", 44.0, "Number of the impact in this run, in the order of their beginnings"),
+    column("Joint", 58.0, "Ball joint"),
+    column("Time", 82.0, "Instant at which it began"),
+    column("Duration", 66.0, "From its beginning to its end"),
+    column("Peak", 66.0, "Largest normal force"),
+    column("Approach", 76.0, "Approach speed: penetration rate when it began"),
+    column("Rebound", 76.0, "Rebound speed: minus the penetration rate when it ended"),
+    column("Restitution", 80.0, "Rebound speed over approach speed"),
+    column("Undisturbed", 84.0, "Restitution that the contact law gives if nothing else acts during the impact"),
+    column("Remark", 300.0, "Why the restitution may differ from that of an undisturbed impact"),
 ];
+
+/// Order of the rows.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Order {
+    /// Index of the column.
+    column: usize,
+    /// Whether the greatest value comes first.
+    falls: bool,
+}
+
+impl Default for Order {
+    /// The latest first.
+    fn default() -> Self {
+        Self { column: 0, falls: true }
+    }
+}
 
 /// State of the panel.
 #[derive(Default)]
 pub struct ImpactList {
     open: bool,
-    /// Height of the window without its rows in the latest frame, points.
-    frame: f32,
+    order: Order,
+    /// End of what is listed while the pointer is over the rows, s: they do not move under it.
+    held: Option<f64>,
 }
+
+/// A row: number, record and data.
+type Listed<'a> = (u64, &'a RecordedImpact, &'a Impact);
 
 /// Formats a duration to three digits.
 fn duration(seconds: f64) -> String {
@@ -55,34 +86,51 @@ fn duration(seconds: f64) -> String {
     value::quantity(seconds, unit, 3)
 }
 
-/// Formats a speed in mm/s to three digits, without unit.
-fn millimetres(speed: f64) -> String {
-    value::number(1e3 * speed, 3)
+/// Formats a speed to three digits.
+fn speed(speed: f64) -> String {
+    value::quantity(speed, "mm/s", 3)
 }
 
-/// The law's coefficient of restitution, and why an impact's may differ.
-fn law(impact: &Impact) -> String {
-    let law = value::number(impact.law, 3);
+/// Why the restitution of an impact may differ from that of its law.
+fn remark(impact: &Impact) -> &'static str {
     match (impact.disturbed, impact.below_speed_floor) {
-        (true, _) => format!("{law}, disturbed"),
-        (false, true) => format!("{law}, slow"),
-        (false, false) => law,
+        (true, _) if impact.achieved() > 1.0 => "left faster: another contact or a change meanwhile",
+        (true, _) => "another contact or a change meanwhile",
+        (false, true) => "began below the impact speed floor",
+        (false, false) => "",
     }
 }
 
 /// Cells of an impact's row.
-fn cells(player: &Player, number: u64, impact: &Impact) -> [String; COLUMNS.len()] {
+fn cells(player: &Player, (number, _, impact): Listed<'_>) -> [String; COLUMNS.len()] {
     [
         number.to_string(),
         joint(player, impact.joint),
         value::time(impact.start),
         duration(impact.end - impact.start),
         value::quantity(impact.peak, "N", 3),
-        format!("{} mm/s", millimetres(impact.approach_speed)),
-        format!("{} mm/s", millimetres(impact.separation_speed)),
+        speed(impact.approach_speed),
+        speed(impact.separation_speed),
         value::number(impact.achieved(), 3),
-        law(impact),
+        value::number(impact.law, 3),
+        remark(impact).to_owned(),
     ]
+}
+
+/// The value by which `column` sorts.
+fn sorting_value((number, _, impact): &Listed<'_>, column: usize) -> f64 {
+    match column {
+        0 => *number as f64,
+        1 => impact.joint as f64,
+        2 => impact.start,
+        3 => impact.end - impact.start,
+        4 => impact.peak,
+        5 => impact.approach_speed,
+        6 => impact.separation_speed,
+        7 => impact.achieved(),
+        8 => impact.law,
+        _ => f64::from(u8::from(impact.disturbed) + u8::from(impact.disturbed || impact.below_speed_floor)),
+    }
 }
 
 fn joint(player: &Player, joint: usize) -> String {
@@ -90,12 +138,12 @@ fn joint(player: &Player, joint: usize) -> String {
     joints.get(joint).map_or_else(String::new, |joint| joint.name.clone())
 }
 
-/// A row of cells with the column widths.
-fn row(ui: &mut Ui, mut cell: impl FnMut(&mut Ui, usize)) {
+/// A row of cells with the column widths, `height` points high.
+fn row(ui: &mut Ui, height: f32, mut cell: impl FnMut(&mut Ui, usize)) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        for (index, (_, width, _)) in COLUMNS.iter().enumerate() {
-            ui.allocate_ui_with_layout(vec2(*width, ROW_HEIGHT), Layout::left_to_right(Align::Center), |ui| {
+        for (index, Column { width, .. }) in COLUMNS.iter().enumerate() {
+            ui.allocate_ui_with_layout(vec2(*width, height), Layout::left_to_right(Align::Center), |ui| {
                 ui.set_width(*width);
                 cell(ui, index);
             });
@@ -103,47 +151,98 @@ fn row(ui: &mut Ui, mut cell: impl FnMut(&mut Ui, usize)) {
     });
 }
 
-impl ImpactList {
-    /// The table with rows up to `height`, points. Returns the instant of a clicked row, s, and the height of the rows.
-    fn table(ui: &mut Ui, player: &Player, height: f32) -> (Option<f64>, f32) {
-        let (shown, known) = (player.pacer.shown(), player.reached());
-        let record = player.impact_record();
-        let count = record.until(known).count();
-        let (mut clicked_time, mut rows_height) = (None, 0.0);
-        ui.spacing_mut().interact_size.y = ROW_HEIGHT;
-        ui.spacing_mut().item_spacing.y = 0.0;
-        let width = COLUMNS.iter().map(|(_, width, _)| width + 4.0).sum::<f32>();
-        ScrollArea::horizontal().id_salt("impacts sideways").auto_shrink([false, true]).show(ui, |ui| {
-            ui.set_min_width(width);
-            row(ui, |ui, index| {
-                let (heading, _, help) = COLUMNS[index];
-                ui.label(RichText::new(heading).small().strong()).on_hover_text(help);
+impl Order {
+    /// The headings: a click sorts by the column, another one turns the order round.
+    fn headings(&mut self, ui: &mut Ui, height: f32) {
+        row(ui, height, |ui, index| {
+            let Column { heading, help, .. } = COLUMNS[index];
+            let sorts = self.column == index;
+            ui.spacing_mut().button_padding.x = 0.0;
+            let text = RichText::new(heading).small().strong();
+            let heading_button = ui.add(Button::new(text).frame(false).min_size(vec2(0.0, height)));
+            if sorts {
+                // A triangle that points to where the values are smaller.
+                let tip = heading_button.rect.right_center() + vec2(8.0, if self.falls { 3.0 } else { -3.0 });
+                let foot = |side: f32| tip + vec2(3.5 * side, if self.falls { -6.0 } else { 6.0 });
+                let fill = ui.visuals().strong_text_color();
+                ui.painter().add(Shape::convex_polygon(vec![tip, foot(-1.0), foot(1.0)], fill, Stroke::NONE));
+            }
+            let sorted = match (sorts, self.falls) {
+                (false, _) => None,
+                (true, true) => Some(accesskit::SortDirection::Descending),
+                (true, false) => Some(accesskit::SortDirection::Ascending),
+            };
+            ui.ctx().accesskit_node_builder(heading_button.id, |node| {
+                node.set_label(format!("Sort by {}", if index == 0 { "number" } else { heading }));
+                if let Some(direction) = sorted {
+                    node.set_sort_direction(direction);
+                }
             });
+            if heading_button.on_hover_text(format!("{help}. A click sorts by it")).clicked() {
+                *self = Self { column: index, falls: !(sorts && self.falls) };
+            }
+        });
+    }
+}
+
+impl ImpactList {
+    /// The table in the rest of `ui`. Returns the instant of a clicked row, s.
+    fn table(&mut self, ui: &mut Ui, player: &Player) -> Option<f64> {
+        let row_height = if theme::has_fingers(ui) { ROW_HEIGHTS.1 } else { ROW_HEIGHTS.0 };
+        let reached = player.reached();
+        let known = self.held.map_or(reached, |held| held.min(reached));
+        let shown = player.pacer.shown();
+        let record = player.impact_record();
+        let mut clicked_time = None;
+        ui.spacing_mut().interact_size.y = row_height;
+        ui.spacing_mut().item_spacing.y = 0.0;
+        let width = COLUMNS.iter().map(|column| column.width + 4.0).sum::<f32>();
+        let sideways = ScrollArea::horizontal().id_salt("impacts sideways").auto_shrink([false, false]);
+        let whole = sideways.show(ui, |ui| {
+            ui.set_min_width(width);
+            self.order.headings(ui, ROW_HEIGHTS.0.max(0.75 * row_height));
             ui.separator();
+            let Order { column, falls } = self.order;
+            let count = record.until(known).count();
             if count == 0 {
                 ui.label(RichText::new("No impact has ended yet").weak());
                 return;
             }
-            let place = ScrollArea::vertical().id_salt("impacts").auto_shrink([false, true]);
-            let place = place.max_height(height).min_scrolled_height(height);
-            let output = place.show_rows(ui, ROW_HEIGHT, count, |ui, rows| {
-                let visible = record.until(known).rev().skip(rows.start).take(rows.len());
-                for (number, own, impact) in visible {
-                    let words = cells(player, number, impact);
-                    let later = impact.end > shown;
+            let mut all: Vec<Listed<'_>> = Vec::new();
+            if column > 0 {
+                all.extend(record.until(known));
+                all.sort_by(|a, b| {
+                    let order = sorting_value(a, column).total_cmp(&sorting_value(b, column));
+                    if falls { order.reverse() } else { order }
+                });
+            }
+            let listed = |rows: std::ops::Range<usize>| -> Vec<Listed<'_>> {
+                match (column, falls) {
+                    (0, true) => record.until(known).rev().skip(rows.start).take(rows.len()).collect(),
+                    (0, false) => record.until(known).skip(rows.start).take(rows.len()).collect(),
+                    _ => all[rows].to_vec(),
+                }
+            };
+            let place = ScrollArea::vertical().id_salt("impacts").auto_shrink([false, false]);
+            place.show_rows(ui, row_height, count, |ui, rows| {
+                for impact in listed(rows) {
+                    let (number, own, _) = impact;
+                    let words = cells(player, impact);
+                    let later = own.end > shown;
                     let top = ui.cursor().min;
-                    let place = egui::Rect::from_min_size(top, vec2(width, ROW_HEIGHT));
+                    let place = egui::Rect::from_min_size(top, vec2(width, row_height));
                     let response = ui.interact(place, ui.scope_id().with(("impact", number)), Sense::click());
                     let hovered = response.hovered();
-                    if hovered {
+                    if hovered || response.has_focus() {
                         ui.painter().rect_filled(place, 3.0, ui.visuals().widgets.hovered.weak_bg_fill);
                     }
                     let all = format!("Impact {}", words.join(", "));
-                    response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &all));
+                    let all = all.trim_end_matches(", ");
+                    response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, all));
                     if response.on_hover_text("Go to its peak").clicked() {
                         clicked_time = Some(own.force_peak.time);
                     }
-                    row(ui, |ui, index| {
+                    row(ui, row_height, |ui, index| {
                         let mut text = RichText::new(&words[index]).small();
                         if later && !hovered {
                             text = text.weak();
@@ -152,18 +251,20 @@ impl ImpactList {
                     });
                 }
             });
-            rows_height = output.inner_rect.height();
         });
-        if record.dropped() > 0 {
-            let words = format!("The first {} impacts are no longer stored", record.dropped());
-            ui.label(RichText::new(words).small().weak());
-        }
-        (clicked_time, rows_height)
+        let is_pointed_at = ui.rect_contains_pointer(whole.inner_rect);
+        self.held = is_pointed_at.then_some(self.held.unwrap_or(reached));
+        clicked_time
     }
 
     /// Shows or closes it.
     pub fn toggle(&mut self) {
         self.open = !self.open;
+    }
+
+    /// Closes it; returns whether it was shown.
+    pub fn close(&mut self) -> bool {
+        std::mem::take(&mut self.open)
     }
 
     /// Whether it is shown.
@@ -180,39 +281,51 @@ impl ImpactList {
 }
 
 impl Run {
-    /// The list, in a window over the lower left of the picture in `area`, never over the transport below it. Returns whether to
-    /// save the impacts.
-    pub(super) fn impact_list_ui(&mut self, ctx: &egui::Context, area: egui::Rect, is_free: bool) -> bool {
-        let (mut open, mut clicked_time, mut save) = (self.impact_list.open, None, false);
-        let room = egui::Rect::from_x_y_ranges(ctx.content_rect().x_range(), area.y_range());
-        let rows = ((room.height() - self.impact_list.frame) / ROW_HEIGHT).floor().clamp(1.0, MAX_VISIBLE_ROWS);
-        let mut rows_height = 0.0;
-        let shown = egui::Window::new("Impacts")
-            .id(egui::Id::unique("impact list"))
-            .open(&mut open)
-            .resizable([true, false])
-            .collapsible(false)
-            .pivot(egui::Align2::LEFT_BOTTOM)
-            .default_pos(area.left_bottom() + vec2(10.0, -10.0))
-            .default_width((area.width() - 40.0).clamp(220.0, 680.0))
-            .constrain_to(room)
-            .enabled(is_free)
-            .show(ctx, |ui| {
-                (clicked_time, rows_height) = ImpactList::table(ui, &self.player, rows * ROW_HEIGHT);
-                ui.add_space(4.0);
-                save = ui
-                    .button("Save impacts…")
-                    .on_hover_text("All of them, CSV, with the columns of `run --impacts`")
-                    .clicked();
-            });
-        self.impact_list.open = open;
-        if let Some(shown) = shown {
-            let frame = shown.response.rect.height() - rows_height;
-            if (frame - self.impact_list.frame).abs() > 0.5 {
-                self.impact_list.frame = frame;
-                ctx.request_repaint();
-            }
+    /// The list at the lower edge of `ui`, which leaves the rest to the picture. Returns whether to save the impacts.
+    pub(super) fn impact_list_ui(&mut self, ui: &mut Ui, is_free: bool) -> bool {
+        if !self.impact_list.open {
+            return false;
         }
+        let (mut clicked_time, mut save, mut close) = (None, false, false);
+        let fingers = theme::has_fingers(ui);
+        let row_height = if fingers { ROW_HEIGHTS.1 } else { ROW_HEIGHTS.0 };
+        let most = MAX_SHARE * ui.available_height();
+        let height = (ui.spacing().interact_size.y + 50.0 + FIRST_ROWS * row_height).min(most);
+        let frame = theme::panel(ui).inner_margin(egui::Margin::symmetric(12, 6));
+        Panel::bottom("impact list")
+            .frame(frame)
+            .resizable(!fingers)
+            .default_size(height)
+            .size_range(height.min(100.0)..=most)
+            .show(ui, |ui| {
+                spoken::landmark(ui, "Impacts");
+                ui.add_enabled_ui(is_free, |ui| {
+                    ui.horizontal(|ui| {
+                        spoken::heading(&ui.label(RichText::new("Impacts").strong()), "Impacts");
+                        let hardest = self.player.impact_record().hardest(self.player.reached());
+                        let help = "To the peak of the impact with the largest normal force so far";
+                        let button = ui.add_enabled(hardest.is_some(), Button::new("Hardest impact"));
+                        if button.on_hover_text(help).clicked() {
+                            clicked_time = hardest.map(|(_, own)| own.force_peak.time);
+                        }
+                        let help = "All of them, CSV, with the columns of `run --impacts`";
+                        save = ui.button("Save impacts…").on_hover_text(help).clicked();
+                        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                            close = ui.button("Close").on_hover_text("Close the list (Esc, key I)").clicked();
+                            let dropped = self.player.impact_record().dropped();
+                            if dropped > 0 {
+                                let words = format!("The first {dropped} impacts are no longer stored");
+                                ui.add(Label::new(RichText::new(words).small().weak()).truncate());
+                            } else if self.impact_list.held.is_some_and(|held| held < self.player.reached()) {
+                                let words = "Newer impacts follow when the pointer leaves the list";
+                                ui.add(Label::new(RichText::new(words).small().weak()).truncate());
+                            }
+                        });
+                    });
+                    clicked_time = self.impact_list.table(ui, &self.player).or(clicked_time);
+                });
+            });
+        self.impact_list.open = !close;
         if let Some(time) = clicked_time {
             self.show_instant(time);
         }
@@ -241,11 +354,13 @@ impl Run {
         }
         let peak = value::quantity(own.force_peak.force.norm(), "N", 3);
         Some(match own.finished() {
+            // The peak is told once it has been reached.
+            _ if own.force_peak.time > shown => format!("{onset}, before its peak"),
             Some(impact) => format!(
-                "{onset}, peak {peak}, {}, approach {}, rebound {} mm/s",
+                "{onset}, peak {peak}, {}, approach {}, rebound {}",
                 duration(impact.end - impact.start),
-                millimetres(impact.approach_speed),
-                millimetres(impact.separation_speed)
+                speed(impact.approach_speed),
+                speed(impact.separation_speed)
             ),
             // A change may have removed the wall.
             None if report.state == ContactMode::Free => return None,

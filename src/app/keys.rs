@@ -1,6 +1,7 @@
 //! Keyboard: one table defines both the actions and the overlay that lists them.
 
-use eframe::egui::{self, EventFilter, Id, Key, Response, Slider, Ui};
+use eframe::egui::accesskit::{self, ActionData, ActionRequest};
+use eframe::egui::{self, EventFilter, Id, Key, Modifiers, Response, Slider, Ui};
 
 /// Action of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,6 +21,10 @@ pub enum Action {
     Slower,
     Faster,
     Fit,
+    /// Undo or redo the latest change of the point of view.
+    Camera {
+        redo: bool,
+    },
     /// Point of view, by index.
     Preset(usize),
     /// Close-up of a ball joint, by index.
@@ -63,7 +68,7 @@ const fn bind(group: Group, key: Key, action: Action, written: &'static str, hel
 }
 
 /// All key bindings.
-pub const BINDINGS: [Binding; 42] = [
+pub const BINDINGS: [Binding; 44] = [
     bind(Group::Run, Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(Group::Run, Key::ArrowRight, Action::Step, "Right arrow", "One step of the solver"),
     bind(Group::Run, Key::ArrowLeft, Action::StepBack, "Left arrow", "Undo the latest step"),
@@ -78,13 +83,21 @@ pub const BINDINGS: [Binding; 42] = [
     bind(Group::Run, Key::J, Action::Backwards, "J", "Play backwards"),
     bind(Group::Run, Key::Home, Action::Home, "Home, End", "Start and end of the run so far"),
     bind(Group::Run, Key::End, Action::End, "", ""),
-    bind(Group::Run, Key::R, Action::Reset, "R", "Reset to t = 0"),
+    bind(Group::Run, Key::R, Action::Reset, "R", "Restart at t = 0"),
     bind(Group::Run, Key::ArrowUp, Action::Faster, "Up arrow, +", "Faster"),
     bind(Group::Run, Key::Plus, Action::Faster, "", ""),
     bind(Group::Run, Key::Equals, Action::Faster, "", ""),
     bind(Group::Run, Key::ArrowDown, Action::Slower, "Down arrow, -", "Slower"),
     bind(Group::Run, Key::Minus, Action::Slower, "", ""),
     bind(Group::Picture, Key::F, Action::Fit, "F", "Show everything"),
+    bind(
+        Group::Picture,
+        Key::Z,
+        Action::Camera { redo: false },
+        "Z, Y",
+        "Back to the previous point of view, and forward to the next",
+    ),
+    bind(Group::Picture, Key::Y, Action::Camera { redo: true }, "", ""),
     bind(Group::Picture, Key::Num1, Action::Preset(0), "1", "Isometric view"),
     bind(Group::Picture, Key::Num2, Action::Preset(1), "2", "Front view"),
     bind(Group::Picture, Key::Num3, Action::Preset(2), "3", "Side view"),
@@ -160,12 +173,12 @@ pub const POINTER: [(&str, &str); 10] = [
 /// Keys of the control with the focus, and key combinations, for the overlay.
 pub const FOCUS: [(&str, &str); 7] = [
     ("Tab, Shift Tab", "Next and previous control, from Play on; a drag on a slider also gives it the focus"),
-    ("Arrows on a slider", "Move that slider"),
+    ("Arrows, Page Up and Down, Home, End on a slider", "Move that slider by one step, by ten, to its ends"),
     ("Left, right arrow on a plot", "Move its cursor, which reads all curves at an instant"),
     ("Left, right arrow on the timeline", "Show the instant a hundredth of the range earlier or later"),
     ("Space, Enter", "Press the button with the focus"),
     ("Ctrl +, Ctrl -, Ctrl 0", "Larger, smaller and default type"),
-    ("Ctrl Z, Ctrl Shift Z, Ctrl Y", "Undo and redo a change of a parameter or of the view"),
+    ("Ctrl Z, Ctrl Shift Z, Ctrl Y", "Undo and redo a change of a parameter, of the view options or of the plots"),
 ];
 
 /// Groups of the overlay.
@@ -212,6 +225,9 @@ const SLIDER_KEY: &str = "slider with the focus";
 
 /// Key under which is stored whether a text field had the focus in the previous frame.
 const TYPING_KEY: &str = "text field with the focus";
+
+/// Steps of an arrow key that Page Up and Page Down take on a slider.
+const PAGE_STEPS: usize = 10;
 
 /// Finger travel that determines the direction of a drag, points.
 const DRAG_THRESHOLD: f32 = 8.0;
@@ -272,12 +288,25 @@ fn scrolling_at(ui: &Ui, point: egui::Pos2) -> Option<Id> {
     })
 }
 
-/// A slider that captures the arrow keys after a drag or Tab focus, until something else is clicked. Only a sideways drag of a
-/// finger moves it.
-pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
+/// A slider that captures the arrow keys, Home, End, Page Up and Page Down after a drag or Tab focus, until something else is clicked.
+/// `ends`: its least and greatest value. Only a sideways drag of a finger moves it.
+pub fn slider(ui: &mut Ui, slider: Slider<'_>, ends: [f64; 2]) -> Response {
     let place = ui.next_auto_id().with("finger");
     let own = place.with("slider");
     let before: Option<Id> = ui.data(|data| data.get_temp(own));
+    if let Some(own) = before.filter(|own| ui.memory(|memory| memory.has_focus(*own))) {
+        ui.input_mut(|input| {
+            let to = [Key::Home, Key::End].map(|key| input.consume_key(Modifiers::NONE, key));
+            for (_, end) in to.into_iter().zip(ends).filter(|(pressed, _)| *pressed) {
+                input.events.push(egui::Event::AccessKitActionRequest(ActionRequest {
+                    action: accesskit::Action::SetValue,
+                    target_tree: accesskit::TreeId::ROOT,
+                    target_node: own.accesskit_id(),
+                    data: Some(ActionData::NumericValue(end)),
+                }));
+            }
+        });
+    }
     let receives_touch = before.is_none_or(|before| slider_receives_touch(ui, place, before));
     let response = if receives_touch {
         ui.add(slider)
@@ -301,8 +330,9 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
 }
 
 /// Actions of the keys pressed since the last frame. An active text field captures all keys, a focused slider the arrows, and any
-/// other focused control also the space bar.
-pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
+/// other focused control also the space bar. `turns_pages`: Page Up and Page Down are those of a presenter's remote, wherever the focus
+/// is.
+pub fn pressed(ctx: &egui::Context, turns_pages: bool) -> Vec<Action> {
     // Esc has already taken the focus from a text field, and does nothing else.
     let typing = ctx.text_edit_focused();
     let before = Id::unique(TYPING_KEY).with(ctx.viewport_id());
@@ -315,6 +345,22 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     if slider {
         // egui's slider handles only the arrows in its own direction.
         ctx.input_mut(|input| {
+            let pages = input.events.iter().filter_map(|event| match event {
+                egui::Event::Key { key: key @ (Key::PageUp | Key::PageDown), pressed: true, .. } if !turns_pages => {
+                    let arrow = if *key == Key::PageUp { Key::ArrowRight } else { Key::ArrowLeft };
+                    let pressed = |key| egui::Event::Key {
+                        key,
+                        physical_key: None,
+                        pressed: true,
+                        repeat: false,
+                        modifiers: Modifiers::NONE,
+                    };
+                    Some(std::iter::repeat_n(pressed(arrow), PAGE_STEPS))
+                }
+                _ => None,
+            });
+            let pages: Vec<egui::Event> = pages.flatten().collect();
+            input.events.extend(pages);
             for event in &mut input.events {
                 if let egui::Event::Key { key, .. } = event {
                     *key = match *key {
@@ -329,9 +375,10 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     let is_captured = |key: Key| match key {
         Key::Space => focused.is_some() && !slider,
         Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight | Key::Home | Key::End => focused.is_some(),
+        Key::PageUp | Key::PageDown => slider && !turns_pages,
         _ => false,
     };
-    ctx.input(|input| {
+    let actions = ctx.input(|input| {
         input
             .events
             .iter()
@@ -348,7 +395,13 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
                 _ => None,
             })
             .collect()
-    })
+    });
+    if turns_pages {
+        // The timeline does not take them either.
+        let turns = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::PageUp | Key::PageDown, .. });
+        ctx.input_mut(|input| input.events.retain(|event| !turns(event)));
+    }
+    actions
 }
 
 #[cfg(test)]

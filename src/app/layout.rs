@@ -13,7 +13,7 @@ use super::overlay::Room;
 use super::panels::{Arrangement, Sheet};
 #[cfg(not(target_arch = "wasm32"))]
 use super::remembered::Store;
-use super::{App, overlay, present, spoken, theme, transport};
+use super::{App, overlay, present, spoken, theme, touch, transport};
 use crate::view::Preset;
 
 /// Width below which time and buttons do not fit side by side in a picture, points.
@@ -229,10 +229,6 @@ impl App {
             let files = record_files(earlier.run());
             self.save(files);
         }
-        let (area, is_free) = (self.panels.picture, !self.tasks.are_under_way() && self.dialog.is_none());
-        if self.run.impact_list_ui(ui.ctx(), area, is_free) {
-            self.perform(ui.ctx(), Command::SaveImpacts);
-        }
         self.course.ring_highlights(ui, &self.run);
         self.dialog_ui(ui.ctx());
     }
@@ -267,6 +263,7 @@ impl App {
             ui,
             &mut panels.controls,
             |ui| {
+                touch::pinch_enlarges(ui, ui.max_rect());
                 ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                     // Space for the scroll bar beside the fields.
                     ui.set_max_width(ui.available_width() - 10.0);
@@ -317,7 +314,7 @@ impl App {
         {
             spoken::splitter(ui, panel, name);
         }
-        let reset = Panel::bottom("transport")
+        let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
@@ -328,7 +325,7 @@ impl App {
                 contents.inner
             })
             .inner;
-        self.central(ui, reset);
+        self.central(ui, asked);
         if present {
             self.present(ui.ctx(), true);
         }
@@ -344,21 +341,21 @@ impl App {
         }
         let free = !self.tasks.are_under_way();
         let mut present = false;
-        let reset = Panel::bottom("transport")
+        let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
                 ui.add_enabled_ui(free, |ui| self.run.timeline_ui(ui));
-                let reset = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player));
+                let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player));
                 ui.horizontal(|ui| {
                     self.panels.tabs(ui, self.course.is_running(), false);
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
                     ui.with_layout(backwards, |ui| transport::achieved_pace_below(ui, &self.run.player));
                 });
-                reset.inner
+                asked.inner
             })
             .inner;
-        self.central(ui, reset);
+        self.central(ui, asked);
         if present {
             self.present(ui.ctx(), true);
         }
@@ -367,7 +364,7 @@ impl App {
     fn landscape(&mut self, ui: &mut Ui, bar: Frame) {
         let free = !self.tasks.are_under_way();
         let mut present = false;
-        let reset = Panel::bottom("transport")
+        let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
@@ -378,7 +375,7 @@ impl App {
                     let folded = ui.available_width() < tabs + transport::MIN_WIDTH;
                     let tabs = if folded { 90.0 } else { tabs };
                     let room = ui.available_width() - tabs;
-                    let reset = ui
+                    let asked = ui
                         .allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| {
                             ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player)).inner
                         })
@@ -391,7 +388,7 @@ impl App {
                             self.panels.tabs(ui, self.course.is_running(), true);
                         }
                     });
-                    reset
+                    asked
                 })
                 .inner
             })
@@ -401,29 +398,38 @@ impl App {
             let width = (ui.available_width() * 0.42).clamp(310.0, 340.0).min(0.55 * ui.available_width());
             Panel::right("sheet beside").frame(bar).resizable(false).exact_size(width).show(ui, |ui| self.sheet(ui));
         }
-        self.central(ui, reset);
+        self.central(ui, asked);
         if present {
             self.present(ui.ctx(), true);
         }
     }
 
-    /// The picture in the remaining space. Resets the run if a panel requests it (`reset`).
-    pub(super) fn central(&mut self, ui: &mut Ui, reset: bool) {
+    /// The picture in the remaining space. Carries out what the transport bar `asked` for, and restarts the run if the controls
+    /// request it.
+    pub(super) fn central(&mut self, ui: &mut Ui, asked: Option<Action>) {
+        if self.run.impact_list_ui(ui, !self.tasks.are_under_way()) {
+            self.perform(ui.ctx(), Command::SaveImpacts);
+        }
         CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
-        if reset {
-            self.reset();
+        let restart = self.run.controls.take_restart();
+        if let Some(action) = asked.or(restart.then_some(Action::Reset)) {
+            self.perform_action(ui.ctx(), action);
         }
     }
 
     fn sheet(&mut self, ui: &mut Ui) {
         show_bar(ui);
+        if self.panels.sheet != Some(Sheet::Plots) {
+            touch::pinch_enlarges(ui, ui.max_rect());
+        }
         if self.panels.sheet == Some(Sheet::Lesson) {
             return self.lesson_ui(ui);
         }
         let free = !self.tasks.are_under_way();
         let Self { run, bench, panels, .. } = self;
         let mut command = None;
-        ScrollArea::vertical().id_salt("sheet").auto_shrink(false).show(ui, |ui| {
+        // Each content keeps its scroll position.
+        ScrollArea::vertical().id_salt(("sheet", panels.sheet)).auto_shrink(false).show(ui, |ui| {
             // Space for the scroll bar.
             ui.set_max_width(ui.available_width() - 14.0);
             match panels.sheet {
@@ -553,7 +559,8 @@ impl App {
                 ui.horizontal_wrapped(|ui| self.run.viewport.camera_buttons(ui, false));
                 ui.separator();
             }
-            action = self.run.instruments(ui, self.sound.is_on());
+            action = self.run.undo.camera_buttons(ui);
+            action = action.or(self.run.instruments(ui, self.sound.is_on()));
             ui.add_space(4.0);
             self.run.viewport.options_ui(ui);
         });

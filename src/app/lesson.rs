@@ -160,6 +160,39 @@ impl RunningLesson {
         Ok(())
     }
 
+    /// What is said of the lesson to those who do not see it: the step, and once it is reached the answer and the next step.
+    pub fn report(&self) -> String {
+        let step = self.current_step();
+        let names = self.measured.names();
+        let plain = |markdown: &str| {
+            let filled = text::fill(markdown, &names).unwrap_or_default();
+            let letters = |block: text::Block| block.pieces.iter().map(|piece| &*piece.text).collect::<String>();
+            text::blocks(&filled).into_iter().map(letters).collect::<Vec<_>>().join(" ")
+        };
+        let count = self.lesson.steps.len();
+        if !self.reached || step.until.is_none() {
+            let ask = step.question.as_ref().map_or_else(String::new, |question| format!(" {}", plain(&question.ask)));
+            return format!("Step {} of {count}: {}. {}{ask}", self.step + 1, step.title, plain(&step.text));
+        }
+        let answer = self.verdict().map_or_else(String::new, |verdict| format!("{verdict}. "));
+        let seen = plain(&step.seen);
+        let next = match self.lesson.steps.get(self.step + 1) {
+            Some(next) => format!("Next step: {}.", next.title),
+            None => "This was the last step.".to_owned(),
+        };
+        format!("{answer}{seen} {next}")
+    }
+
+    /// The answer to the step's question, compared with the prediction; `None` while unknown.
+    fn verdict(&self) -> Option<String> {
+        let (correct, words) = (self.correct_choice()?, self.answer()?);
+        Some(match self.predicted {
+            Some(choice) if choice == correct => format!("As predicted: {words}"),
+            Some(_) => format!("Not as predicted. Answer: {words}"),
+            None => format!("Answer: {words}"),
+        })
+    }
+
     /// Text of the correct choice; `None` while unknown.
     pub fn answer(&self) -> Option<String> {
         let choice = &self.current_step().question.as_ref()?.choices[self.correct_choice()?];

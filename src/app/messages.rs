@@ -166,11 +166,11 @@ impl Messages {
         self.announcer.observe(player);
     }
 
-    /// Makes an announcement if one is due.
-    pub fn announce(&mut self, ctx: &egui::Context, host: &mut dyn Host, player: &Player, tasks: &Tasks) {
+    /// Makes an announcement if one is due; `lesson`: what the lesson says, "" for none.
+    pub fn announce(&mut self, ctx: &egui::Context, host: &mut dyn Host, player: &Player, tasks: &Tasks, lesson: &str) {
         let now = ctx.input(|input| input.time);
         let news = self.current(player, tasks);
-        let (announced, wait) = self.announcer.update(now, player, &news);
+        let (announced, wait) = self.announcer.update(now, player, &news, lesson);
         if announced {
             host.announce(self.announcer.text(), self.announcer.is_event());
             ctx.request_repaint();

@@ -22,6 +22,8 @@ const INITIAL_FRACTION: f32 = 0.4;
 const MAX_INITIAL_SIDE: f32 = 330.0;
 /// Largest fraction of the picture.
 const MAX_FRACTION: f32 = 0.5;
+/// Width of a window below which it is that of an upright phone, points.
+const PHONE_WIDTH: f32 = 480.0;
 /// Least remainder of the picture, points; the microscope stays hidden if there is less.
 const MIN_REMAINDER: f32 = 120.0;
 /// Height of the section of the contact, and least height in a low panel, points.
@@ -100,6 +102,8 @@ impl Microscope {
         let joints = &player.running().machine.loose_joints;
         self.joint = self.joint.min(joints.len().saturating_sub(1));
         let mut joint = self.joint;
+        // On a phone the circle needs the height, and the plane is chosen below it.
+        let is_narrow = theme::has_fingers(ui) && ui.ctx().content_rect().width() < PHONE_WIDTH;
         ui.horizontal_wrapped(|ui| {
             if ui.available_width() > 300.0 {
                 spoken::heading(&ui.label(RichText::new("Microscope").strong()), "Microscope");
@@ -107,9 +111,9 @@ impl Microscope {
             let help = "Ball joint in focus (a click on it, or keys 5 to 9)";
             let name = |index: usize| joints.get(index).map_or("", |joint| &joint.name);
             layout::choice(ui, ["Ball joint in focus", help], Some(54.0), &mut joint, 0..joints.len(), name);
-            let help = "Plane of the picture, seen along its normal: as the 3D view, or that of two world axes";
-            let names = ["Plane of the microscope", help];
-            layout::choice(ui, names, Some(54.0), &mut self.plane, Plane::ALL, Plane::label);
+            if !is_narrow {
+                self.plane_choice(ui);
+            }
             let close = ui.button("Close").on_hover_text("Esc, or key L");
             if close.clicked() {
                 self.open = false;
@@ -137,14 +141,23 @@ impl Microscope {
         } else {
             scrolled(ui, |ui| {
                 let width = ui.available_width();
-                let side = draw::side(vec2(width, space.y), 150.0);
+                let side = if is_narrow { width.min(space.y) } else { draw::side(vec2(width, space.y), 150.0) };
                 self.sphere(ui, player, &magnified, axes, vec2(width, side));
+                if is_narrow {
+                    self.plane_choice(ui);
+                }
                 let left = space.y - side - ui.spacing().item_spacing.y;
                 section(ui, &magnified, left.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT));
                 numbers(ui, player, &magnified, axes);
             });
         }
         chosen
+    }
+
+    fn plane_choice(&mut self, ui: &mut Ui) {
+        let help = "Plane of the picture, seen along its normal: as the 3D view, or that of two world axes";
+        let names = ["Plane of the microscope", help];
+        layout::choice(ui, names, Some(54.0), &mut self.plane, Plane::ALL, Plane::label);
     }
 
     /// The picture of the clearance sphere.

@@ -24,8 +24,10 @@ mod desktop;
 mod dialogs;
 mod embed;
 mod equations;
+mod field;
 mod files;
 mod film;
+mod focus;
 mod ghosts;
 mod graphics;
 mod header;
@@ -66,6 +68,7 @@ mod stack;
 mod tasks;
 mod theme;
 mod timeline;
+mod touch;
 mod transport;
 mod undo;
 mod viewport;
@@ -97,6 +100,7 @@ pub use desktop::DesktopHost;
 use dialogs::Dialog;
 use files::Files;
 pub use film::FilmSettings;
+use focus::FocusKeeper;
 use graphics::Graphics;
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::Headless;
@@ -140,6 +144,7 @@ pub struct App {
     /// Reduced motion.
     calm: bool,
     dialog: Option<Dialog>,
+    focus: FocusKeeper,
     panels: Panels,
     presentation: Presentation,
     files: Files,
@@ -191,6 +196,7 @@ impl App {
             visit: None,
             calm: options.calm,
             dialog: None,
+            focus: FocusKeeper::default(),
             panels: Panels::new(options.embedded),
             presentation: Presentation::default(),
             files: Files::of(named_file),
@@ -364,7 +370,10 @@ impl App {
         match key.and_then(keys::action).filter(|_| !command) {
             None => command,
             Some(Action::TurnPage { .. }) => self.course.is_running(),
-            Some(Action::Close) => self.dialog.is_some() || self.messages.has_problem() || self.tasks.are_under_way(),
+            Some(Action::Close) => {
+                let list = self.has_impact_list();
+                list || self.dialog.is_some() || self.messages.has_problem() || self.tasks.are_under_way()
+            }
             Some(_) => true,
         }
     }
@@ -457,9 +466,10 @@ impl eframe::App for App {
         if ctx.input(|input| input.viewport().visible()) == Some(false) {
             return;
         }
+        self.focus.begin(ctx);
         self.run.follow_changes(ctx, self.tasks.are_under_way(), self.course.is_running());
         self.receive_undo(ctx);
-        for action in keys::pressed(ctx) {
+        for action in keys::pressed(ctx, self.course.is_running()) {
             self.perform_action(ctx, action);
         }
         #[cfg(not(target_arch = "wasm32"))]
@@ -486,7 +496,8 @@ impl eframe::App for App {
         self.bench.report_frame(now, moves);
         self.advance_lesson(ctx);
         self.messages.expire(ctx);
-        self.messages.announce(ctx, self.host.as_mut(), &self.run.player, &self.tasks);
+        let lesson = self.course.running().map_or_else(String::new, RunningLesson::report);
+        self.messages.announce(ctx, self.host.as_mut(), &self.run.player, &self.tasks, &lesson);
         #[cfg(not(target_arch = "wasm32"))]
         if let Some(store) = &mut self.store {
             let scene = (self.run.player.pending(), self.files.scene.name());
@@ -496,6 +507,7 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         self.show(ui);
+        self.focus.end(ui.ctx(), self.dialog.is_some());
         #[cfg(not(target_arch = "wasm32"))]
         self.audience_ui(ui.ctx());
     }

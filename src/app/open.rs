@@ -1,5 +1,7 @@
 //! Opening of scenes, links and sections of sweeps in place of the running scene.
 
+use std::borrow::Cow;
+
 use eframe::egui;
 
 use super::dialogs::Dialog;
@@ -12,6 +14,17 @@ use super::{App, AppOptions, Link, link, theme, value};
 use crate::analysis::ready_sweeps::{READY_SWEEPS, ReadySweep};
 use crate::analysis::source::SceneSource;
 use crate::scene::Scene;
+
+/// A path with the user's folder in place of a leading `~/`, as a shell writes it.
+pub(super) fn with_home(path: &str) -> Cow<'_, str> {
+    #[cfg(not(target_arch = "wasm32"))]
+    if let Some(rest) = path.strip_prefix("~/")
+        && let Some(home) = std::env::home_dir()
+    {
+        return home.join(rest).to_string_lossy().into_owned().into();
+    }
+    path.into()
+}
 
 impl App {
     /// Shows `scene` from its start; the tasks and messages of the previous one end.
@@ -115,7 +128,7 @@ impl App {
     /// # Errors
     /// As [`Self::open_link`] and [`Self::open`], as a message.
     pub fn open_any(&mut self, ctx: &egui::Context, text: &str) -> Result<(), String> {
-        if link::is_link(text) { self.open_link(ctx, text) } else { self.open(text.trim()) }
+        if link::is_link(text) { self.open_link(ctx, text) } else { self.open(&with_home(text.trim())) }
     }
 
     /// Opens a link in place of the running scene; on an error that scene stays, and the reason is shown and returned.
@@ -172,5 +185,19 @@ impl App {
         // In points at the zoom still in effect when the command arrives.
         let size = egui::Vec2::from(INITIAL_SIZE) / ctx.zoom_factor();
         ctx.send_viewport_cmd(egui::ViewportCommand::InnerSize(size));
+    }
+}
+
+#[cfg(all(test, not(target_arch = "wasm32")))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_folder_of_the_user_may_be_written_as_in_a_shell() {
+        let home = std::env::home_dir().expect("has one");
+        assert_eq!(with_home("~/own/mine.toml"), home.join("own/mine.toml").to_string_lossy());
+        for path in ["pendulum", "own/~/mine.toml", "~other/mine.toml", "/tmp/mine.toml"] {
+            assert_eq!(with_home(path), path);
+        }
     }
 }

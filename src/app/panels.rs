@@ -21,7 +21,7 @@ pub enum Arrangement {
 }
 
 /// A panel; in a small window, content of its sheet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Sheet {
     /// Parameters.
     Controls,

@@ -1,7 +1,7 @@
 //! Saved pictures of the 3D view, the view with plots, or the whole window, at any size. The same code redraws them off screen at
 //! that size, so that labels and arrows are sharp.
 
-use eframe::egui::{self, Button, CentralPanel, DragValue, Panel, Rect, RichText, Ui, Vec2, vec2};
+use eframe::egui::{self, CentralPanel, DragValue, Panel, Rect, RichText, Ui, Vec2, vec2};
 use eframe::egui_wgpu::RenderState;
 
 use super::App;
@@ -114,20 +114,18 @@ impl Picture {
     pub fn menu(&mut self, ui: &mut Ui, view: Rect) -> bool {
         let asked = layout::entry(ui, "Picture…", "A picture as chosen below, PNG");
         let (points, screen) = (self.points(ui.ctx(), view), ui.ctx().pixels_per_point());
-        ui.horizontal(|ui| {
+        // Options have round marks, unlike the actions around them.
+        ui.horizontal_wrapped(|ui| {
             for (contents, name, help) in Contents::ALL {
-                ui.selectable_value(&mut self.contents, contents, name).on_hover_text(help);
+                ui.radio_value(&mut self.contents, contents, name).on_hover_text(help);
             }
         });
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             for times in SCALES {
                 let help = format!("{times} times as many pixels along each edge as on the screen");
-                ui.selectable_value(&mut self.times, Some(times), format!("{times}×")).on_hover_text(help);
+                ui.radio_value(&mut self.times, Some(times), format!("{times}×")).on_hover_text(help);
             }
-            let own_size = Button::selectable(self.times.is_none(), "Own size");
-            if ui.add(own_size).on_hover_text("Choose width and height").clicked() {
-                self.times = None;
-            }
+            ui.radio_value(&mut self.times, None, "Own size").on_hover_text("Choose width and height");
         });
         ui.add_enabled_ui(self.times.is_none(), |ui| {
             ui.horizontal(|ui| {

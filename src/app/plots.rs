@@ -45,12 +45,16 @@ const PLOT_GAP: f32 = 20.0;
 const LETTER_WIDTH: f64 = 7.0;
 /// Least room for the switch of the cut in a title, points.
 const MIN_SWITCH_WIDTH: f32 = 70.0;
+/// Room for the button to the hardest impact in a title, points. Without it, the note on cut peaks leads there.
+const MIN_HARDEST_WIDTH: f32 = 96.0;
 /// Fraction of the time range by which an arrow key moves the cursor.
 const KEY_FRACTION: f64 = 0.01;
 /// Approximate maximum number of marks on an axis.
 const MAX_MARKS: f64 = 5.0;
 /// A range below this fraction of the values, or below this in axis units, is rounding error rather than motion.
 const ROUNDING: f64 = 1e-9;
+/// The record holds single precision: relative difference of a recorded peak from that of its impact.
+const PEAK_ROUNDING: f64 = 1e-5;
 
 /// The plots and their settings.
 #[derive(Default)]
@@ -473,7 +477,7 @@ impl Plots {
             }));
         }
         ui.vertical(|ui| {
-            self.title(ui, player, panel, cut_off.is_some());
+            let hardest = self.title(ui, player, panel, cut_off.is_some());
             let PlotResponse { response, transform, .. } = self.curves(ui, &scale, &bands, space);
             let cursor = self.cursor.and_then(|(plot, time)| (plot == response.id).then_some(time));
             self.describe(ui, &response, &scale, cursor);
@@ -487,8 +491,12 @@ impl Plots {
                 }
             }
             self.instants(ui, player, &scale, cursor, frame, x);
+            let mut clicked_time = clicked_time.or(hardest);
             if let Some(peaks) = cut_off {
-                cut::note(ui, frame, peaks.largest, panel.unit);
+                let peak = self.instant_of(player, peaks.largest);
+                if cut::note(ui, &panel.name(), frame, peaks.largest, panel.unit, peak.is_some()) {
+                    clicked_time = peak;
+                }
             }
             if let Some(quantity) = panel.quantity {
                 self.places.push((quantity, Place { transform, units: scale.units() }));
@@ -496,6 +504,17 @@ impl Plots {
             clicked_time
         })
         .inner
+    }
+
+    /// The instant of the value `largest`, SI, of this run's curves, s; that of the impact which has it, if one does. `None` if only an
+    /// earlier run has it.
+    fn instant_of(&self, player: &Player, largest: f64) -> Option<f64> {
+        let bin = self.traces.iter().flat_map(|trace| &trace.bins).find(|bin| bin.greatest == largest)?;
+        let within = player.impact_record().peaks(bin.from, bin.to);
+        let nearest = within.map(|(_, peak)| (peak.force.norm(), peak.time));
+        let hardest = nearest.filter(|(force, _)| (force / largest - 1.0).abs() < PEAK_ROUNDING);
+        let time = hardest.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.5 * (bin.from + bin.to), |(_, time)| time);
+        Some(time).filter(|time| *time <= player.reached())
     }
 
     /// Collects the curves of `panel` between the instants `from` and `to`, s, for a plot `width` points wide.
@@ -736,7 +755,9 @@ impl Plots {
     }
 
     /// Title with unit, and switches of the members in the colours of their lines. `is_cut`: whether first peaks are cut.
-    fn title(&mut self, ui: &mut Ui, player: &Player, panel: &Panel<'_>, is_cut: bool) {
+    /// Returns the instant of the hardest impact, s, if the user asks for it.
+    fn title(&mut self, ui: &mut Ui, player: &Player, panel: &Panel<'_>, is_cut: bool) -> Option<f64> {
+        let mut asked = None;
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().button_padding = vec2(4.0, 1.0);
@@ -764,6 +785,17 @@ impl Plots {
                     }
                 }
             }
+            if panel.quantity == Some(Quantity::NormalForce)
+                && ui.available_width() > MIN_HARDEST_WIDTH + MIN_SWITCH_WIDTH
+            {
+                let hardest = player.impact_record().hardest(player.reached());
+                let button =
+                    ui.add_enabled(hardest.is_some(), egui::Button::new(RichText::new("Hardest impact").small()));
+                let help = "To the peak of the impact with the largest normal force so far";
+                if button.on_hover_text(help).on_disabled_hover_text("No impact so far").clicked() {
+                    asked = hardest.map(|(_, own)| own.force_peak.time);
+                }
+            }
             if panel.kind == PlotKind::FromZero && ui.available_width() > MIN_SWITCH_WIDTH {
                 let on = is_cut || self.cut == Some(true);
                 if cut::switch(ui, &panel.name(), on) {
@@ -774,6 +806,7 @@ impl Plots {
                 self.comparison.legend(ui, player, height, &panel.name());
             }
         });
+        asked
     }
 }
 

@@ -207,6 +207,7 @@ impl Run {
                 player.pacer.set_scale(scale);
             }
             Action::Fit => self.viewport.fit(),
+            Action::Camera { redo } => self.undo_camera(redo),
             Action::Preset(index) => {
                 if let Some(preset) = Preset::ALL.get(index) {
                     self.viewport.preset(*preset);

@@ -149,6 +149,11 @@ impl Timeline {
             ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
             let pressed = |key| ui.input(|input| input.num_presses(key)) as f64;
             by += pressed(Key::ArrowRight) - pressed(Key::ArrowLeft);
+            by += 10.0 * (pressed(Key::PageUp) - pressed(Key::PageDown));
+            let ends = [(Key::Home, 0.0), (Key::End, player.reached())];
+            if let Some((_, end)) = ends.into_iter().find(|(key, _)| pressed(*key) > 0.0) {
+                return Some(end);
+            }
         }
         if by != 0.0 {
             return Some(player.pacer.shown() + by * KEY_FRACTION * length);

@@ -5,6 +5,7 @@ use eframe::egui::{
 };
 
 use super::icons::{Icon, icon_button};
+use super::keys::Action;
 use super::player::Player;
 use super::{keys, spoken, theme, value};
 use crate::session::pace::{Limit, SCALE_RANGE};
@@ -20,7 +21,7 @@ const PACE_WIDTH: f32 = 120.0;
 const SCALE_DISTANCE: f32 = 20.0;
 
 /// Width of [`row`] with its buttons and the list of time scales in touch size, points.
-pub const MIN_WIDTH: f32 = 270.0;
+pub const MIN_WIDTH: f32 = 306.0;
 
 /// Key under which the play button's ID is stored between frames.
 const FIRST_STOP_KEY: &str = "first stop of Tab";
@@ -37,22 +38,21 @@ pub fn next_scale(scale: f64, faster: bool) -> f64 {
     }
 }
 
-/// The bar in one row, or in two if it is narrow. Returns whether the user asked for a reset; the caller performs it, since it
-/// affects more than the player.
-pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
+/// The bar in one row, or in two if it is narrow. Returns what the user asked for that affects more than the player.
+pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Action> {
     let narrow = ui.available_width() < 620.0;
     let row = egui::Layout::left_to_right(egui::Align::Center);
     let size = egui::vec2(ui.available_width(), theme::side(ui, PLAY_SIDE));
-    let reset = ui
+    let asked = ui
         .allocate_ui_with_layout(size, row, |ui| {
-            let reset = buttons(ui, player);
+            let asked = buttons(ui, player);
             time(ui, player);
             if !narrow {
                 ui.add_space(6.0);
                 speed(ui, player, narrow);
                 settled_hint(ui, player);
             }
-            reset
+            asked
         })
         .inner;
     if narrow {
@@ -61,13 +61,13 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
             settled_hint(ui, player);
         });
     }
-    reset
+    asked
 }
 
 /// The bar in one row, without items that do not fit; the time is above the picture. Returns as [`ui`].
-pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
+pub fn row(ui: &mut Ui, player: &mut Player) -> Option<Action> {
     ui.horizontal(|ui| {
-        let reset = buttons(ui, player);
+        let asked = buttons(ui, player);
         if ui.available_width() >= SCALES_WIDTH {
             scales(ui, player);
         }
@@ -75,16 +75,16 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
             achieved_scale(ui, player);
         }
         settled_hint(ui, player);
-        reset
+        asked
     })
     .inner
 }
 
 /// The buttons and the list of time scales alone. Returns as [`ui`].
-pub fn minimal(ui: &mut Ui, player: &mut Player) -> bool {
-    let reset = buttons(ui, player);
+pub fn minimal(ui: &mut Ui, player: &mut Player) -> Option<Action> {
+    let asked = buttons(ui, player);
     scales(ui, player);
-    reset
+    asked
 }
 
 /// Hint for a settled run, at the right end, where it displaces nothing.
@@ -123,36 +123,49 @@ pub fn set_first_tab_stop(ui: &Ui) {
     }
 }
 
-/// Reset, play and step. Returns as [`ui`].
-fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
+/// To the start, play, step and restart. Returns as [`ui`].
+fn buttons(ui: &mut Ui, player: &mut Player) -> Option<Action> {
     let (small, large) = (theme::side(ui, 30.0), theme::side(ui, PLAY_SIDE));
+    let mut asked = None;
+    // The others come first where there is little room; a drag on the timeline goes to the start, too.
+    if ui.available_width() > MIN_WIDTH + small + ui.spacing().item_spacing.x {
+        let past = player.pacer.shown() > 0.0;
+        ui.add_enabled_ui(past, |ui| {
+            let help = "To the start of the run, which keeps what has been computed (key Home)";
+            if icon_button(ui, Icon::Start, "Start of the run", help, small, false).clicked() {
+                asked = Some(Action::Home);
+            }
+        });
+    }
     let help = if player.has_pending_changes() {
-        "Back to t = 0; applies the changes that wait for it (key R)"
+        "Runs again from t = 0 with the changes that wait for it (key R)"
     } else {
-        "Back to t = 0 (key R)"
+        "Runs again from t = 0 (key R)"
     };
-    let reset = icon_button(ui, Icon::Restart, "Reset", help, small, false).clicked();
-    let (icon, name, help) = if player.is_playing() {
+    let (icon, name, play_help) = if player.is_playing() {
         (Icon::Pause, "Pause", "Pause (space)")
     } else {
         (Icon::Play, "Play", "Play (space)")
     };
     let runs = player.stopped().is_none();
     ui.add_enabled_ui(runs, |ui| {
-        let play = icon_button(ui, icon, name, help, large, true);
+        let play = icon_button(ui, icon, name, play_help, large, true);
         if ui.is_enabled() {
             ui.data_mut(|data| data.insert_temp(Id::unique(FIRST_STOP_KEY), Some(play.id)));
         }
         if play.clicked() {
             player.set_playing(!player.is_playing());
         }
-        let help = "One step of the solver (right arrow; left arrow takes it back)";
-        if icon_button(ui, Icon::Step, "Step", help, small, false).clicked() {
+        let step_help = "One step of the solver (right arrow; left arrow takes it back)";
+        if icon_button(ui, Icon::Step, "Step", step_help, small, false).clicked() {
             player.single_step();
         }
     });
+    if ui.add(egui::Button::new("Restart").min_size(Vec2::splat(small))).on_hover_text(help).clicked() {
+        asked = Some(Action::Reset);
+    }
     ui.add_space(6.0);
-    reset
+    asked
 }
 
 /// Fixed size for any time, so that neighbours do not move when digits change.
@@ -177,7 +190,8 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     );
     ui.spacing_mut().slider_width = if narrow { 90.0 } else { 150.0 };
     let slider = Slider::new(&mut scale, SCALE_RANGE.0..=SCALE_RANGE.1).logarithmic(true).show_value(false);
-    let response = keys::slider(ui, slider).on_hover_text("1:1 is real time, 1:10 000 the slowest motion");
+    let response = keys::slider(ui, slider, [SCALE_RANGE.0, SCALE_RANGE.1])
+        .on_hover_text("1:1 is real time, 1:10 000 the slowest motion");
     if response.changed() {
         player.pacer.set_scale(scale);
     }
@@ -268,7 +282,7 @@ fn achieved_scale(ui: &mut Ui, player: &Player) {
     }
 }
 
-/// Banner of a run that the divergence guard stopped. Returns as [`ui`].
+/// Banner of a run that the divergence guard stopped. Returns whether the user asked for a restart.
 pub fn banner(ui: &mut Ui, player: &Player) -> bool {
     let Some(stopped) = player.stopped() else {
         return false;
@@ -284,7 +298,7 @@ pub fn banner(ui: &mut Ui, player: &Player) -> bool {
                 ui.label(RichText::new(format!("Stopped at {}", value::time(stopped.time))).strong().color(colour));
                 ui.label(stopped.fault.to_string());
                 ui.label(stopped.advice.to_string());
-                ui.button("Reset the run").clicked()
+                ui.button("Restart the run").clicked()
             })
             .inner
         })

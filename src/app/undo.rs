@@ -1,10 +1,12 @@
-//! Undo and redo of parameter and view changes. A gesture, such as a slider drag, is one change.
+//! Undo and redo of parameter and view changes, and apart from them of the point of view. A gesture, such as a slider drag, is one
+//! change.
 //!
 //! Undoing a parameter change applies at the displayed instant, like any other change: it does not go back in time.
 
 use eframe::egui::{self, Key, Modifiers, Ui};
 
 use super::icons::{Icon, icon_button};
+use super::keys::Action;
 use super::player::Edit;
 use super::run::Run;
 use super::{layout, theme, value};
@@ -62,7 +64,7 @@ impl View {
         same_direction && (fits || (follows && near(a.distance, b.distance)) || same_place())
     }
 
-    /// Name of the difference from `other`; `None` if equal.
+    /// Name of the difference from `other` apart from the camera; `None` if equal.
     fn difference(&self, other: &Self) -> Option<&'static str> {
         if self.options.magnification != other.options.magnification {
             return Some("Magnification of the play");
@@ -73,10 +75,7 @@ impl View {
         if self.chosen != other.chosen || self.picked != other.picked {
             return Some("Choice of plots");
         }
-        if self.window != other.window {
-            return Some("Window of the plots");
-        }
-        (!self.has_camera_of(other)).then_some("Camera")
+        (self.window != other.window).then_some("Window of the plots")
     }
 }
 
@@ -84,6 +83,7 @@ impl View {
 enum Change {
     Parameters(Vec<Edit>),
     View(Box<[View; 2]>),
+    Camera(Box<[View; 2]>),
 }
 
 struct Entry {
@@ -100,7 +100,7 @@ impl Entry {
     fn keys(&self) -> Vec<&str> {
         match &self.change {
             Change::Parameters(edits) => edits.iter().map(|edit| &*edit.key).collect(),
-            Change::View(_) => Vec::new(),
+            Change::View(_) | Change::Camera(_) => Vec::new(),
         }
     }
 
@@ -117,6 +117,7 @@ impl Entry {
         match &self.change {
             Change::Parameters(edits) => edits.iter().all(|edit| edit.before == edit.after),
             Change::View(ends) => ends[0].difference(&ends[1]).is_none(),
+            Change::Camera(ends) => ends[0].has_camera_of(&ends[1]),
         }
     }
 
@@ -129,7 +130,7 @@ impl Entry {
                     }
                 }
             }
-            (Change::View(own), Change::View(later)) => {
+            (Change::View(own), Change::View(later)) | (Change::Camera(own), Change::Camera(later)) => {
                 let [_, after] = *later;
                 own[1] = after;
             }
@@ -141,11 +142,42 @@ impl Entry {
     }
 }
 
+/// Changes, and those undone.
+#[derive(Default)]
+struct History {
+    done: Vec<Entry>,
+    undone: Vec<Entry>,
+}
+
+impl History {
+    /// Adds a change; `is_held`: the pointer has stayed down since the one before.
+    fn record(&mut self, entry: Entry, is_held: bool) {
+        self.undone.clear();
+        let last = self.done.last_mut().filter(|last| last.is_continued_by(&entry));
+        match last.filter(|last| is_held || entry.at - last.at < MERGE_TIME) {
+            Some(last) => last.extend(entry),
+            None => self.done.push(entry),
+        }
+        self.done.pop_if(|last| last.has_no_effect());
+        if self.done.len() > MAX_CHANGES {
+            self.done.remove(0);
+        }
+    }
+
+    /// Moves the change to undo, or to redo, to the other side and returns it.
+    fn take(&mut self, redo: bool) -> Option<&Entry> {
+        let Self { done, undone } = self;
+        let (from, to) = if redo { (undone, done) } else { (done, undone) };
+        to.push(from.pop()?);
+        to.last()
+    }
+}
+
 /// The undo and redo history.
 #[derive(Default)]
 pub struct Undo {
-    done: Vec<Entry>,
-    undone: Vec<Entry>,
+    changes: History,
+    cameras: History,
     /// The view at the latest check.
     view: Option<View>,
     /// Whether the pointer has stayed down since the latest change.
@@ -159,27 +191,19 @@ impl Undo {
     }
 
     fn record(&mut self, entry: Entry, held: bool) {
-        self.undone.clear();
-        let last = self.done.last_mut().filter(|last| last.is_continued_by(&entry));
-        match last.filter(|last| self.held || entry.at - last.at < MERGE_TIME) {
-            Some(last) => last.extend(entry),
-            None => self.done.push(entry),
-        }
+        let history = if matches!(entry.change, Change::Camera(_)) { &mut self.cameras } else { &mut self.changes };
+        history.record(entry, self.held);
         self.held = held;
-        self.done.pop_if(|last| last.has_no_effect());
-        if self.done.len() > MAX_CHANGES {
-            self.done.remove(0);
-        }
     }
 
     /// Time of the latest change, s of viewing.
     fn last(&self) -> Option<f64> {
-        self.done.last().map(|last| last.at)
+        self.changes.done.last().map(|last| last.at)
     }
 
     /// Description of the next undo or redo; `None` if there is none.
     pub fn words(&self, redo: bool) -> Option<String> {
-        let entry = if redo { &self.undone } else { &self.done }.last()?;
+        let entry = if redo { &self.changes.undone } else { &self.changes.done }.last()?;
         let value = &entry.values[usize::from(redo)];
         let verb = if redo { "Redo" } else { "Undo" };
         Some(if value.is_empty() {
@@ -221,6 +245,24 @@ impl Undo {
         chosen
     }
 
+    /// Buttons for the previous and the next point of view; returns the action of the clicked one.
+    pub fn camera_buttons(&self, ui: &mut Ui) -> Option<Action> {
+        let mut chosen = None;
+        ui.horizontal(|ui| {
+            for (redo, name, help) in [
+                (false, "Previous view", "Back to the point of view before the latest turn of the camera (key Z)"),
+                (true, "Next view", "Forward again (key Y)"),
+            ] {
+                let all = if redo { &self.cameras.undone } else { &self.cameras.done };
+                let button = ui.add_enabled(!all.is_empty(), egui::Button::new(name));
+                if button.on_hover_text(help).clicked() {
+                    chosen = Some(Action::Camera { redo });
+                }
+            }
+        });
+        chosen
+    }
+
     /// The same in the menu of a small window.
     pub fn entries(&self, ui: &mut Ui, is_free: bool) -> Option<bool> {
         let mut chosen = None;
@@ -250,11 +292,10 @@ impl Run {
     /// The value of a parameter is refused, as a message; the others are restored.
     pub fn undo(&mut self, redo: bool) -> Result<(), String> {
         let mut outcome = Ok(());
-        let from = if redo { &mut self.undo.undone } else { &mut self.undo.done };
-        let Some(entry) = from.pop() else {
+        let Some(change) = self.undo.changes.take(redo).map(|entry| entry.change.clone()) else {
             return outcome;
         };
-        match &entry.change {
+        match &change {
             Change::Parameters(edits) => {
                 let mut edits: Vec<&Edit> = edits.iter().collect();
                 edits.sort_by_key(|edit| edit.key != PRESET);
@@ -274,20 +315,25 @@ impl Run {
                 self.viewport.options = view.options.clone();
                 let options = &mut self.viewport.options;
                 (options.quality, options.theme, options.arrows.thickness) = (quality, theme, thickness);
-                let other = View::of(self);
-                if other.is_some_and(|other| !other.has_camera_of(&view)) {
-                    self.viewport.set_pose(view.camera);
-                    self.viewport.follow(view.followed);
-                }
                 self.plots.chosen.clone_from(&view.chosen);
                 self.plots.picked.clone_from(&view.picked);
                 self.plots.window = view.window;
-                self.undo.view = Some(view);
+                self.undo.view = View::of(self);
             }
+            Change::Camera(_) => {}
         }
-        let to = if redo { &mut self.undo.done } else { &mut self.undo.undone };
-        to.push(entry);
         outcome
+    }
+
+    /// Returns to the point of view before the latest change of the camera, or to that after the last undone one.
+    pub fn undo_camera(&mut self, redo: bool) {
+        let change = self.undo.cameras.take(redo).map(|entry| entry.change.clone());
+        if let Some(Change::Camera(ends)) = change {
+            let view = &ends[usize::from(redo)];
+            self.viewport.set_pose(view.camera);
+            self.viewport.follow(view.followed);
+            self.undo.view = View::of(self);
+        }
     }
 
     /// Records changes since the previous frame; during a task (`is_busy`) there are none of the user's.
@@ -326,15 +372,19 @@ impl Run {
             self.undo.view = Some(view);
             return;
         };
-        match view.difference(before) {
+        let (differs, turned) = (view.difference(before), !view.has_camera_of(before));
+        if differs.is_none() && !turned {
             // A camera that follows a body or fits the scene moves by itself.
-            None => *before = view,
-            Some(_) if held => {}
-            Some(name) => {
-                let ends = [std::mem::replace(before, view.clone()), view];
-                let change = Change::View(Box::new(ends));
-                self.undo.record(Entry { name: name.to_owned(), values: Default::default(), change, at: now }, held);
-            }
+            *before = view;
+            return;
+        }
+        if held {
+            return;
+        }
+        let ends = Box::new([std::mem::replace(before, view.clone()), view]);
+        let changes = differs.map(|name| (name, Change::View(ends.clone())));
+        for (name, change) in changes.into_iter().chain(turned.then_some(("Camera", Change::Camera(ends)))) {
+            self.undo.record(Entry { name: name.to_owned(), values: Default::default(), change, at: now }, held);
         }
     }
 }

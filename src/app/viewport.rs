@@ -44,6 +44,8 @@ const MAX_EXPECTED_DISTANCE: f32 = 4.0;
 /// A touch that stays this long, s, within this distance, points, grips the body under it.
 const GRIP_TIME: f64 = 0.5;
 const GRIP_DISTANCE: f32 = 6.0;
+/// Rings around the pointer that are searched for a body to pull: radius, points, and number of places.
+const GRIP_RINGS: [(f32, usize); 3] = [(0.0, 1), (5.0, 6), (10.0, 8)];
 
 /// The shot of the player's displayed instant. A macro, because the draw list is borrowed at the same time.
 macro_rules! shot {
@@ -567,6 +569,16 @@ impl Viewport {
         } else {
             self.compose(player, &camera, &screen, self.options.quality)
         };
+        // A hand where a drag pulls a body.
+        if self.grip.is_some() {
+            ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
+        } else if !plain
+            && !response.dragged()
+            && let Some(pos) = response.hover_pos()
+            && self.grip_near(player, &camera, &screen, pos).is_some()
+        {
+            ui.ctx().set_cursor_icon(egui::CursorIcon::Grab);
+        }
         if let Some(ScenePart::Joint(joint)) = tapped {
             self.clicked = Some(joint);
         } else if response.double_clicked() {
@@ -746,9 +758,7 @@ impl Viewport {
             if finger { self.is_long_touch(ui, response) } else { response.drag_started_by(PointerButton::Primary) };
         if let Some(origin) = origin.filter(|_| starts_grip) {
             let camera = self.framed(screen.aspect());
-            let shot = shot!(self, player, &camera, screen);
-            let hit = self.view.pick(&shot, screen.pixel(origin));
-            self.grip = hit.and_then(|hit| Grip::new(player, hit));
+            self.grip = self.grip_near(player, &camera, screen, origin);
             self.grip_changed |= self.grip.is_some();
         }
         let camera = self.framed(screen.aspect());
@@ -772,6 +782,16 @@ impl Viewport {
             }
         }
         true
+    }
+
+    /// A grip of the body at `pos`, points, or of the nearest within reach: thin rods are hard to hit.
+    fn grip_near(&self, player: &Player, camera: &Camera, screen: &Screen, pos: Pos2) -> Option<Grip> {
+        let shot = shot!(self, player, camera, screen);
+        let around = GRIP_RINGS.into_iter().flat_map(|(radius, count)| {
+            (0..count).map(move |k| radius * egui::Vec2::angled(std::f32::consts::TAU * k as f32 / count as f32))
+        });
+        let mut all = around.map(|offset| pos + offset).filter(|pos| screen.rect.contains(*pos));
+        all.find_map(|pos| Grip::new(player, self.view.pick(&shot, screen.pixel(pos))?))
     }
 
     /// Whether a touch has just stayed in place long enough. (egui's own long touch is not reported to draggable widgets.)
@@ -855,7 +875,7 @@ impl Viewport {
              motion of the machine is not magnified. Key X.",
         );
         let slider = Slider::new(&mut options.magnification, 1.0..=100.0).logarithmic(true).prefix("×").max_decimals(1);
-        let slider = keys::slider(ui, slider).accessible_name("Magnification of the clearance");
+        let slider = keys::slider(ui, slider, [1.0, 100.0]).accessible_name("Magnification of the clearance");
         spoken::value(&slider, &format!("{} times", value::number(f64::from(options.magnification), 3)));
         ui.add_space(4.0);
         ui.label("Force arrows");

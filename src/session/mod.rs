@@ -1,5 +1,6 @@
 //! An interactive run: played, rewound, recorded and changed, with companion runs. Independent of any window.
 
+pub mod advice;
 pub mod clock;
 mod companion;
 pub mod embedded;

@@ -9,6 +9,7 @@ mod record;
 mod tests;
 mod travel;
 
+use super::advice::{self, Advice};
 use super::clock::{Clock, wall};
 use super::goal::Goal;
 use super::history::History;
@@ -19,8 +20,6 @@ use super::paths::Paths;
 use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::RunWatch;
-use crate::analysis::presets::too_slow;
-use crate::machine::Warning;
 use crate::scene::{LiveScene, Scene, SetError, Value};
 use crate::simulate::{
     ChannelInfo, Channels, ContactMode, Effect, Frame, Peak, Pull, Simulation, StartError, Stopped, Wear,
@@ -50,8 +49,8 @@ pub struct Player {
     unchanged: Option<Box<LiveScene>>,
     /// The scene as loaded from its file.
     original: Scene,
-    /// Key and text of each warning about settings that are valid but may surprise the user.
-    warnings: Vec<(Option<&'static str>, String)>,
+    /// Warnings about settings that are valid but may surprise the user.
+    warnings: Vec<Advice>,
     playing: bool,
     /// Time runs backwards while it plays.
     backwards: bool,
@@ -105,13 +104,6 @@ const MIN_AVERAGING_TIME: f64 = 1e-3;
 /// Largest number of instants recorded within one step.
 const MAX_RECORDED_PER_STEP: f64 = 64.0;
 
-/// Key, as in [`Warning::key`], and text of every warning about `scene` before it runs.
-fn warnings_of(scene: &Scene) -> Vec<(Option<&'static str>, String)> {
-    let entry = |warning: Warning| (warning.key(), warning.to_string());
-    let slow = too_slow(scene).map(|slow| (Some("solver.preset"), slow.to_string()));
-    scene.machine.warnings().into_iter().map(entry).chain(slow).collect()
-}
-
 impl Player {
     /// Starts `scene` at t = 0, paused.
     ///
@@ -133,7 +125,7 @@ impl Player {
             plotted: f64::INFINITY,
             clock: wall,
             original,
-            warnings: warnings_of(scene),
+            warnings: advice::of(scene),
             playing: false,
             backwards: false,
             stopped: None,
@@ -577,7 +569,7 @@ impl Player {
     }
 
     fn after_change(&mut self) {
-        self.warnings = warnings_of(self.pending());
+        self.warnings = advice::of(self.pending());
         self.record.watch.restart(self.simulation.running(), self.simulation.time());
         self.record.settling = Settling::new(self.simulation.running());
         // While the run is retraced, the twin may begin later than now.
@@ -598,14 +590,12 @@ impl Player {
 
     /// Texts of the warnings about settings that are valid but may surprise the user.
     pub fn warnings(&self) -> impl Iterator<Item = &str> {
-        self.warnings.iter().map(|(_, text)| &**text)
+        self.warnings.iter().map(|advice| &*advice.text)
     }
 
     /// Warning about the current value of `key`, if any.
-    pub fn warning(&self, key: &str) -> Option<&str> {
-        let last = key.strip_prefix("contact.").or_else(|| key.strip_prefix("joint.")?.rsplit('.').next());
-        let mut warnings = self.warnings.iter();
-        warnings.find(|(own, _)| own.is_some_and(|own| own == last.unwrap_or(key))).map(|(_, text)| &**text)
+    pub fn warning(&self, key: &str) -> Option<&Advice> {
+        self.warnings.iter().find(|advice| advice.concerns(key))
     }
 
     /// Value of `key` after [`Self::set_original`]: that of the scene file, or what it follows there, such as the common value of the

@@ -139,9 +139,24 @@ pub fn differences(new_scene: &Scene, old_scene: &Scene, except: &[String]) -> V
     all
 }
 
+/// Typed text with a decimal point where its number has a decimal comma, as in `0,8 mm`. A comma that may stand between thousands, as
+/// in `1,500`, stays and is refused.
+pub fn with_decimal_point(typed: &str) -> String {
+    let digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
+    if let Some((whole, rest)) = typed.split_once(',') {
+        let bare = whole.trim_start_matches(['-', '+']);
+        let (before, after) = (digits(bare), digits(rest));
+        let thousands = after == 3 && bare != "0" && before > 0;
+        if before == bare.len() && after > 0 && !thousands && !rest[after..].starts_with(['.', ',']) {
+            return format!("{whole}.{rest}");
+        }
+    }
+    typed.to_owned()
+}
+
 /// Text typed by the user, with the display unit added to a bare number.
 pub fn with_display_unit(typed: &str, kind: &Kind) -> String {
-    let typed = typed.trim();
+    let typed = &*with_decimal_point(typed.trim());
     match kind {
         Kind::Number { display, .. } if !display.is_empty() && typed.parse::<f64>().is_ok() => {
             format!("{typed} {display}")
@@ -239,6 +254,12 @@ mod tests {
         assert_eq!(with_display_unit(" 0.5 ", &LENGTH), "0.5 mm");
         assert_eq!(with_display_unit("500 um", &LENGTH), "500 um");
         assert_eq!(with_display_unit("half", &LENGTH), "half");
+        assert_eq!(with_display_unit("0,8", &LENGTH), "0.8 mm");
+        assert_eq!(with_display_unit("-0,125 mm", &LENGTH), "-0.125 mm");
+        assert_eq!(with_display_unit("1,5e-1 mm", &LENGTH), "1.5e-1 mm");
+        // Thousands or thousandths.
+        assert_eq!(with_display_unit("1,500", &LENGTH), "1,500");
+        assert_eq!(with_display_unit("1,2,3", &LENGTH), "1,2,3");
     }
 
     #[test]

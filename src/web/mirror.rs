@@ -12,6 +12,8 @@ type Nodes<'a> = HashMap<accesskit::NodeId, &'a accesskit::Node>;
 #[derive(Default)]
 pub struct Mirror {
     tree: Option<accesskit::TreeUpdate>,
+    /// The visible parts of the controls, points: a control that is scrolled out of sight has none.
+    visible: HashMap<accesskit::NodeId, egui::Rect>,
     requests: Vec<accesskit::ActionRequest>,
 }
 
@@ -30,8 +32,14 @@ impl egui::Plugin for Mirror {
         input.events.extend(events);
     }
 
-    fn output_hook(&mut self, _ctx: &egui::Context, output: &mut egui::FullOutput) {
+    fn output_hook(&mut self, ctx: &egui::Context, output: &mut egui::FullOutput) {
         let tree = output.platform_output.accesskit_update.take();
+        if tree.is_some() {
+            self.visible = ctx.viewport(|viewport| {
+                let widgets = viewport.this_pass.widgets.layers().flat_map(|(_, widgets)| widgets);
+                widgets.map(|widget| (widget.id.accesskit_id(), widget.interact_rect)).collect()
+            });
+        }
         self.tree = tree.or(self.tree.take());
     }
 }
@@ -39,7 +47,7 @@ impl egui::Plugin for Mirror {
 impl Mirror {
     /// Controls, texts and parts of the window in reading order, as JSON: `[{"id", "inside", "role", "label", "text", "value",
     /// "min", "max", "step", "on", "expanded", "disabled", "live", "focusable", "focused", "rect": [x0, y0, x1, y1]}, …]`.
-    /// Rectangles are in CSS pixels of the canvas, `zoom` pixels per point; `inside` is the part of the window. Empty before
+    /// Rectangles are the visible parts in CSS pixels of the canvas, `zoom` pixels per point; `inside` is the part of the window. Empty before
     /// the first frame.
     pub fn widgets(&self, zoom: f32) -> String {
         let Some(tree) = &self.tree else {
@@ -52,7 +60,8 @@ impl Mirror {
             let Some(node) = nodes.get(&id) else { continue };
             let own = is_part(node, &nodes).then_some(id).or(part);
             open.extend(node.children().iter().rev().map(|child| (*child, own)));
-            let widget = describe(id, node, &nodes, tree.focus, f64::from(zoom));
+            let visible = self.visible.get(&id).copied();
+            let widget = describe(id, node, &nodes, tree.focus, f64::from(zoom), visible);
             widgets.extend(widget.map(|mut widget| {
                 widget["inside"] = part.map(|part| part.0.to_string()).into();
                 widget
@@ -94,10 +103,11 @@ fn describe(
     nodes: &Nodes<'_>,
     focus: accesskit::NodeId,
     zoom: f64,
+    visible: Option<egui::Rect>,
 ) -> Option<Value> {
     // A part of the window has no bounds of its own.
     let bounds = node.bounds().or_else(|| is_part(node, nodes).then_some(accesskit::Rect::ZERO))?;
-    let rect = [bounds.x0, bounds.y0, bounds.x1, bounds.y1];
+    let rect = within([bounds.x0, bounds.y0, bounds.x1, bounds.y1], visible);
     // Focusable nodes are listed even without a name, so that tests find them.
     let nameless = || node.supports_action(accesskit::Action::Focus).then_some("");
     let label = label(node, nodes).or_else(nameless)?;
@@ -119,6 +129,22 @@ fn describe(
         "focused": id == focus,
         "rect": rect.map(|x| x * zoom),
     }))
+}
+
+/// The part of `bounds` that is `visible`, so that nothing out of sight lies where something else is: without any, a place of no size at
+/// the nearest edge.
+fn within(bounds: [f64; 4], visible: Option<egui::Rect>) -> [f64; 4] {
+    let Some(visible) = visible else {
+        return bounds;
+    };
+    let [left, top, right, bottom] = [visible.left(), visible.top(), visible.right(), visible.bottom()].map(f64::from);
+    let inside = |x: f64, a: f64, b: f64| if a <= b { x.clamp(a, b) } else { 0.5 * (a + b) };
+    [
+        inside(bounds[0], left, right),
+        inside(bounds[1], top, bottom),
+        inside(bounds[2], left, right),
+        inside(bounds[3], top, bottom),
+    ]
 }
 
 /// A control's own name, else the name of its label (sliders, text fields), else its text.

@@ -198,7 +198,7 @@ fn a_sweep_of_another_scene_is_labelled_and_a_click_asks_before_replacing_the_cu
     assert_eq!(harness.state().loading(), None);
     harness.get_by_role_and_label(Role::Dialog, "Change the running scene?");
     harness.get_by_label("Scene: spcmm instead of pendulum");
-    click(&mut harness, Role::Button, "Close");
+    click(&mut harness, Role::Button, "Keep this scene");
     assert_eq!(harness.state().player().running().name, "pendulum");
     click_point(&mut harness);
     click(&mut harness, Role::Button, "Change and run");
@@ -278,7 +278,7 @@ fn the_portrait_and_the_section_fill_while_the_scene_runs() {
     assert_eq!(player.watch().sections().len(), 0);
     player.run_to(1.5);
     assert!(player.watch().sections().len() > 0);
-    click(&mut harness, Role::Button, "Reset");
+    click(&mut harness, Role::Button, "Restart");
     assert_eq!(harness.state().player().watch().sections().len(), 0);
 }
 
@@ -429,7 +429,8 @@ fn a_ready_sweep_asks_before_it_replaces_a_changed_scene() {
     let player = harness.state_mut().player_mut();
     player.set("contact.clearance", "0.5 mm").expect("in range");
     harness.run_steps(2);
-    for (answer, scene, sweeps) in [("Close", "pendulum", 0), ("Replace and sweep", READY_SWEEPS[0].scene, 1)] {
+    for (answer, scene, sweeps) in [("Keep this scene", "pendulum", 0), ("Replace and sweep", READY_SWEEPS[0].scene, 1)]
+    {
         click(&mut harness, Role::Button, READY_SWEEPS[0].name);
         harness.run_steps(2);
         harness.get_by_label("Clearance 0.5 mm");

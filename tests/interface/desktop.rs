@@ -138,10 +138,12 @@ fn the_window_for_the_class_shows_the_same_instant_in_large_type_and_closes_with
 }
 
 #[test]
-fn a_single_window_platform_has_no_second_window_and_without_stored_settings_no_menu() {
-    let harness = window("spcmm");
-    harness.get_by_label("Open…");
-    assert!(harness.query_by_label("Open").is_none());
+fn a_single_window_platform_has_no_second_window_and_without_stored_settings_no_fresh_start() {
+    let mut harness = window("spcmm");
+    click(&mut harness, "Open");
+    harness.get_by_label("File…");
+    assert!(harness.query_by_label("Start fresh…").is_none());
+    assert!(harness.query_by_label_contains("Window for the class").is_none());
 }
 
 /// The window with its settings stored in `path`.

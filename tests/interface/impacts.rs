@@ -56,7 +56,7 @@ fn the_list_shows_the_impacts_of_the_run_and_a_click_seeks_to_the_peak() {
         ];
         assert_eq!(displayed.len(), expected.len(), "{words}");
         assert!(displayed.iter().zip(expected).all(|(a, b)| is_close(*a, b)), "{words}: {expected:?}");
-        assert_eq!(words.contains("disturbed"), impact.disturbed, "{words}");
+        assert_eq!(words.contains("meanwhile"), impact.disturbed, "{words}");
     }
     assert_eq!(harness.state().player().simulation().state_hash(), before);
     let (_, peak) = *peaks_of_run(harness.state(), 40e-3).last().expect("some");
@@ -69,14 +69,13 @@ fn the_list_shows_the_impacts_of_the_run_and_a_click_seeks_to_the_peak() {
 }
 
 #[test]
-fn the_list_stays_above_the_transport_in_windows_of_every_size() {
+fn the_list_hides_neither_the_machine_nor_the_transport_and_closes_by_esc() {
     for (size, presents) in [
         ([1280.0, 800.0], false),
         ([1280.0, 720.0], true),
         ([800.0, 500.0], false),
         ([390.0, 844.0], false),
         ([844.0, 390.0], false),
-        ([640.0, 360.0], false),
     ] {
         let mut harness = sized("spcmm", size, egui::Theme::Light);
         harness.state_mut().player_mut().run_to(40e-3);
@@ -89,24 +88,108 @@ fn the_list_stays_above_the_transport_in_windows_of_every_size() {
         }
         harness.key_press(Key::I);
         harness.run();
-        let list = |harness: &egui_kittest::Harness<'_, App>| {
-            let list = harness.ctx.memory(|memory| memory.area_rect(egui::Id::unique("impact list")));
-            list.expect("the list")
-        };
-        let bar = harness.get_by_label("Transport bar").rect();
-        let before = list(&harness);
-        assert!(before.bottom() <= bar.top() && before.top() >= 0.0, "{size:?}: {before:?}, {bar:?}");
-        // It cannot be dragged over the bar either.
-        let title = before.center_top() + egui::vec2(0.0, 20.0);
-        harness.drag_at(title);
-        harness.step();
-        harness.hover_at(title + egui::vec2(0.0, 300.0));
-        harness.step();
-        harness.drop_at(title + egui::vec2(0.0, 300.0));
+        let (view, bar) = (harness.get_by_label("3D view").rect(), harness.get_by_label("Transport bar").rect());
+        let latest = format!("Impact {}, ", impacts_of_run(harness.state(), 40e-3).len());
+        let row = harness.get_by_label_contains(&latest).rect();
+        assert!(row.top() >= view.bottom() && row.top() < bar.top(), "{size:?}: {row:?}, {view:?}, {bar:?}");
+        assert!(view.height() >= 60.0, "{size:?}: {view:?}");
+        harness.key_press(Key::Escape);
         harness.run();
-        let after = list(&harness);
-        assert!(after.bottom() <= bar.top(), "{size:?}: {after:?}, {bar:?}");
+        assert!(!harness.state().has_impact_list());
+        assert_eq!(harness.state().is_presenting(), presents, "Esc closes only the list");
     }
+}
+
+/// Numbers of the listed impacts from top to bottom.
+fn listed(harness: &egui_kittest::Harness<'_, App>) -> Vec<usize> {
+    let rows = harness.query_all_by_label_contains("Impact ");
+    let rows = rows.filter_map(|row| {
+        let words = row.accesskit_node().label()?;
+        let number = words.strip_prefix("Impact ")?.split(',').next()?.parse().ok()?;
+        Some((row.rect().top(), number))
+    });
+    let mut rows: Vec<(f32, usize)> = rows.collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    rows.into_iter().map(|(_, number)| number).collect()
+}
+
+#[test]
+fn the_list_sorts_by_every_column_both_ways() {
+    let mut harness = sized("spcmm", [1600.0, 1000.0], egui::Theme::Light);
+    harness.state_mut().player_mut().run_to(40e-3);
+    harness.key_press(Key::I);
+    harness.run();
+    let impacts = impacts_of_run(harness.state(), 40e-3);
+    type Column = (&'static str, fn(&Impact) -> f64);
+    let columns: [Column; 8] = [
+        ("Joint", |impact| impact.joint as f64),
+        ("Time", |impact| impact.start),
+        ("Duration", |impact| impact.end - impact.start),
+        ("Peak", |impact| impact.peak),
+        ("Approach", |impact| impact.approach_speed),
+        ("Rebound", |impact| impact.separation_speed),
+        ("Restitution", |impact| impact.achieved()),
+        ("Undisturbed", |impact| impact.law),
+    ];
+    for (name, value) in columns {
+        for falls in [true, false] {
+            click(&mut harness, &format!("Sort by {name}"));
+            harness.remove_cursor();
+            harness.run();
+            let shown: Vec<f64> = listed(&harness).into_iter().map(|number| value(&impacts[number - 1])).collect();
+            assert!(shown.len() > 3, "{name}: {shown:?}");
+            let in_order = |pair: &[f64]| if falls { pair[0] >= pair[1] } else { pair[0] <= pair[1] };
+            assert!(shown.windows(2).all(in_order), "{name}: {shown:?}");
+            let all = impacts.iter().map(value);
+            let first = if falls { all.fold(f64::NEG_INFINITY, f64::max) } else { all.fold(f64::INFINITY, f64::min) };
+            assert_eq!(shown[0], first, "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_hardest_impact_is_one_click_away() {
+    let mut harness = sized("spcmm", [1600.0, 1000.0], egui::Theme::Light);
+    harness.state_mut().player_mut().run_to(60e-3);
+    harness.run();
+    let peaks = peaks_of_run(harness.state(), 60e-3);
+    let hardest = peaks.iter().max_by(|a, b| a.0.peak.total_cmp(&b.0.peak)).expect("impacts");
+    let start = |harness: &mut egui_kittest::Harness<'_, App>| {
+        harness.state_mut().show_instant(1e-3);
+        harness.run();
+    };
+    start(&mut harness);
+    click(&mut harness, "Hardest impact");
+    assert_eq!(shown(&harness), hardest.1);
+    let force = harness.state().player().frame().joints[hardest.0.joint].normal_force.norm();
+    assert!(is_close(force, hardest.0.peak), "{force} N, {} N", hardest.0.peak);
+    // From the list as well, whose button is the lower of the two; the plot's is below the list.
+    start(&mut harness);
+    harness.key_press(Key::I);
+    harness.run();
+    let buttons: Vec<_> = harness.query_all_by_label("Hardest impact").map(|node| node.rect()).collect();
+    let upper = buttons.iter().min_by(|a, b| a.top().total_cmp(&b.top())).expect("two").center();
+    assert_eq!(buttons.len(), 2);
+    harness.drag_at(upper);
+    harness.step();
+    harness.drop_at(upper);
+    harness.run();
+    assert_eq!(shown(&harness), hardest.1);
+}
+
+#[test]
+fn a_cut_peak_leads_to_its_instant() {
+    let mut harness = sized("hexapod", [1280.0, 800.0], egui::Theme::Light);
+    harness.state_mut().player_mut().run_to(0.2);
+    harness.state_mut().plots_mut().window = jointplay::app::PlotWindow::Everything;
+    harness.run();
+    let note = harness.get_by_label_contains(" above in Normal force");
+    let told = numbers(&note.accesskit_node().label().expect("a label"))[0];
+    note.click();
+    harness.run();
+    let peaks = peaks_of_run(harness.state(), 0.2);
+    let (impact, _) = peaks.iter().find(|(_, time)| *time == shown(&harness)).expect("at the peak of an impact");
+    assert!(is_close(impact.peak, told), "{} N, told {told} N", impact.peak);
 }
 
 #[test]

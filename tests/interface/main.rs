@@ -15,6 +15,7 @@ mod costs;
 mod desktop;
 mod embed;
 mod film;
+mod focus;
 mod frames;
 mod golden;
 mod hands;

@@ -48,7 +48,7 @@ fn slow_motion_reduces_the_resolution_and_rest_restores_it() {
     assert_eq!(adaptive.state().picture_quality(), LOWEST);
     assert_eq!(plain.state().picture_quality(), Quality::FULL);
     // The panel beside the picture keeps the full resolution.
-    let panel = adaptive.get_by_label("Reset").rect().left() - 30.0;
+    let panel = adaptive.get_by_label("Start of the run").rect().left() - 30.0;
     assert!(panel > 200.0, "{panel}");
     let [moving, full] = [&mut adaptive, &mut plain].map(|harness| split_pixels(harness, panel));
     assert!(moving[0] == full[0], "the resolution of the panel changed");

@@ -326,7 +326,7 @@ fn small_screens_have_touch_sized_controls_and_a_folding_sheet() {
         let view = harness.get_by_label("3D view").rect();
         assert!(view.width() > 240.0 && view.height() > 140.0, "{size:?}: {view:?}");
         let mut seen = 0;
-        for name in ["Reset", "Play", "Step", "Menu", "View options", "Controls", "Plots"] {
+        for name in ["Restart", "Play", "Step", "Menu", "View options", "Controls", "Plots"] {
             let rect = harness.get_by_role_and_label(Role::Button, name).rect();
             assert!(rect.size().min_elem() >= 43.5, "{size:?} {name}: {rect:?}");
             assert!(rect.right() <= size[0] && rect.bottom() <= size[1], "{name}: {rect:?}");
@@ -345,7 +345,7 @@ fn small_screens_have_touch_sized_controls_and_a_folding_sheet() {
         }
         assert_eq!(seen, 11);
         // No two touch targets overlap.
-        let rects: Vec<egui::Rect> = ["Reset", "Play", "Step", "Controls", "Plots"]
+        let rects: Vec<egui::Rect> = ["Restart", "Play", "Step", "Controls", "Plots"]
             .map(|name| harness.get_by_role_and_label(Role::Button, name).rect())
             .into();
         for (i, a) in rects.iter().enumerate() {
@@ -461,7 +461,7 @@ fn a_link_in_an_open_window_brings_its_theme() {
 #[test]
 fn touch_enlarges_the_controls_of_a_large_window() {
     let (mut harness, _) = window("spcmm", LARGE);
-    let height = |harness: &Harness<'_, App>| harness.get_by_label("Open…").rect().height();
+    let height = |harness: &Harness<'_, App>| harness.get_by_label("Open").rect().height();
     assert!(height(&harness) < 30.0);
     touch(&harness, 1, TouchPhase::Start, pos2(700.0, 300.0));
     harness.step();
@@ -654,7 +654,8 @@ fn the_desktop_asks_for_a_path_and_overwrites_nothing() {
 #[test]
 fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
     let (mut harness, calls) = window("spcmm", LARGE);
-    click(&mut harness, "Open…");
+    click(&mut harness, "Open");
+    click(&mut harness, "File…");
     assert_eq!(calls.borrow().picked, 1);
     assert!(harness.query_by_label("Path").is_none(), "the host has its own dialog");
     let file = |name: &str, content| vec![OpenedFile { name: name.to_owned(), content }];
@@ -870,12 +871,15 @@ fn the_buttons_of_a_dialog_stay_in_place_while_it_shows_an_error() {
     for size in [LARGE, LANDSCAPE, TINY] {
         let (mut harness, _) = window("spcmm", size);
         harness.state_mut().set_host(Box::new(DesktopHost::default()));
-        harness.get_by_role_and_label(Role::ComboBox, "Scene").click();
+        click(&mut harness, if size == LARGE { "Open" } else { "Menu" });
         harness.run_steps(3);
         click(&mut harness, "Link…");
         enter_path(&mut harness, &path.display().to_string());
         harness.get_by_label_contains("bad.toml:");
-        let [open, close] = ["Open", "Close"].map(|name| harness.get_by_role_and_label(Role::Button, name).rect());
+        let of = |name| harness.get_all_by_role_and_label(Role::Button, name).map(|node| node.rect());
+        // The lowest: the header has a menu of that name.
+        let lowest = |a: &egui::Rect, b: &egui::Rect| a.top().total_cmp(&b.top());
+        let [open, close] = ["Open", "Cancel"].map(|name| of(name).max_by(lowest).expect("a button"));
         assert!(!open.intersects(close.shrink(1.0)), "{open:?} {close:?}");
         assert!(open.bottom() <= size[1] && (open.center().y - close.center().y).abs() < 1.0);
         // The path can be corrected and confirmed with the mouse.
@@ -887,7 +891,8 @@ fn the_buttons_of_a_dialog_stay_in_place_while_it_shows_an_error() {
         let field = harness.get_by_role_and_label(Role::TextInput, "Path");
         field.type_text("pendulum");
         harness.run_steps(2);
-        harness.get_by_role_and_label(Role::Button, "Open").click();
+        let buttons = harness.get_all_by_role_and_label(Role::Button, "Open");
+        buttons.max_by(|a, b| a.rect().top().total_cmp(&b.rect().top())).expect("a button").click();
         harness.run_steps(3);
         assert_eq!(harness.state().player().running().name, "pendulum");
         assert!(harness.query_by_label("Path").is_none());
@@ -986,7 +991,8 @@ fn a_link_from_the_window_opens_in_every_form_and_restores_the_camera() {
             let (mut other, _) = window("pendulum", LARGE);
             other.state_mut().set_host(Box::new(DesktopHost::default()));
             if !pasted {
-                click(&mut other, "Open…");
+                click(&mut other, "Open");
+                click(&mut other, "Link…");
                 enter_path(&mut other, &link);
             } else if link == pairs {
                 // Pasted text without a leading # or ? is ignored unless it contains key=value pairs.

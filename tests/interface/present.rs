@@ -256,7 +256,7 @@ fn nothing_beside_the_clock_moves_as_its_digits_change() {
             toggle_presentation(&mut harness, SCREEN);
         }
         let rects = |harness: &Harness<'_, App>| {
-            ["Reset", "Play", "Step", "Next impact", "Timeline, s", "Time scale preset"]
+            ["Restart", "Play", "Step", "Next impact", "Timeline, s", "Time scale preset"]
                 .map(|name| harness.get_by_label(name).rect())
         };
         let before = rects(&harness);

@@ -77,7 +77,7 @@ const FIXED: [(Role, &str); 12] = [
     (Role::Button, "Menu"),
     (Role::Button, "View options"),
     (Role::Slider, "Timeline, s"),
-    (Role::Button, "Reset"),
+    (Role::Button, "Restart"),
     (Role::Button, "Play"),
     (Role::Button, "Step"),
     (Role::ComboBox, "Time scale preset"),
@@ -263,4 +263,92 @@ fn a_menu_that_is_longer_than_the_screen_scrolls_under_a_finger() {
     fingers(&mut harness, &[&[about.center()]]);
     harness.run();
     assert!(label(&harness, "State hash"));
+}
+
+#[test]
+fn the_first_gesture_of_a_finger_scrolls() {
+    for size in [PORTRAIT, [1024.0, 700.0]] {
+        let top_after = |offset: egui::Vec2| {
+            let (mut harness, _) = window("spcmm", size);
+            harness.run();
+            if size != PORTRAIT {
+                // More than fits, so that there is something to scroll.
+                click(&mut harness, "Accuracy");
+                click(&mut harness, "One joint");
+            }
+            let before = rect(&harness, Role::Slider, "Friction coefficient");
+            // Beside a name, where nothing but the panel is under the finger.
+            let from = egui::pos2(before.right() - 130.0, before.top() - 6.0);
+            fingers(&mut harness, &[&path(from, offset)]);
+            harness.run();
+            rect(&harness, Role::Slider, "Friction coefficient").top()
+        };
+        // A touch alone sizes the controls for fingers.
+        let moved = top_after(egui::Vec2::ZERO) - top_after(vec2(2.0, -80.0));
+        assert!(moved > 50.0, "{size:?}: scrolled by {moved}");
+    }
+}
+
+#[test]
+fn controls_and_bench_keep_their_scroll_positions() {
+    let (mut harness, _) = window("spcmm", PORTRAIT);
+    harness.run();
+    let top = |harness: &Harness<'_, App>| rect(harness, Role::Slider, "Clearance").top();
+    let first = top(&harness);
+    let from = egui::pos2(300.0, rect(&harness, Role::Slider, "Restitution").top() - 6.0);
+    fingers(&mut harness, &[&path(from, vec2(0.0, -70.0))]);
+    harness.run();
+    let scrolled = top(&harness);
+    assert!(first - scrolled > 40.0, "{first} {scrolled}");
+    click(&mut harness, "Bench");
+    harness.run();
+    let bench = rect(&harness, Role::Button, "What play costs").top();
+    assert!(bench > scrolled, "the bench begins at its top: {bench}");
+    click(&mut harness, "Controls");
+    harness.run();
+    assert_eq!(top(&harness), scrolled);
+}
+
+#[test]
+fn a_pinch_on_the_controls_enlarges_the_type() {
+    let (mut harness, _) = window("spcmm", [1024.0, 900.0]);
+    harness.run();
+    let at = rect(&harness, Role::Slider, "Friction coefficient").center();
+    let before = clearance(&harness);
+    let zoom = harness.ctx.zoom_factor();
+    let [left, right] = [-1.0, 1.0]
+        .map(|side: f32| (0..=20).map(|k| at + vec2(side * (30.0 + 2.0 * k as f32), 0.0)).collect::<Vec<Pos2>>());
+    fingers(&mut harness, &[&left, &right]);
+    harness.run();
+    // From 30 to 70 points beside the middle, in steps of a tenth; the frames after a step do not count.
+    let enlarged = harness.ctx.zoom_factor() / zoom;
+    assert!(enlarged > 1.2 && enlarged < 70.0 / 30.0, "{enlarged}");
+    assert_eq!(clearance(&harness), before);
+}
+
+#[test]
+fn in_a_lesson_on_a_phone_the_circle_is_whole_and_all_answers_are_in_sight() {
+    for step in [2, 4] {
+        let link = format!("?lesson=first-impact&step={step}");
+        let (mut harness, _) = open(AppOptions::from_link(&link).expect("a link"), PORTRAIT);
+        harness.run_steps(40);
+        if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
+            let image = harness.render().expect("drawn");
+            image.save(std::path::Path::new(&keep).join(format!("lesson_phone_{step}.png"))).expect("writable");
+        }
+        let next = rect(&harness, Role::Button, "Next");
+        let answers: Vec<Rect> = harness.query_all_by_role(Role::RadioButton).map(|node| node.rect()).collect();
+        assert!(answers.len() > 1);
+        for answer in &answers {
+            assert!(answer.height() >= 44.0 && answer.bottom() <= next.top() + 1.0, "{answer:?} {next:?}");
+        }
+        let circle = harness.state().microscope().circle().expect("a microscope");
+        let edge = circle.radius * egui::Vec2::splat(1.0);
+        let whole = Rect::from_center_size(circle.centre, 2.0 * edge);
+        let view = harness.get_by_label("3D view").rect();
+        let top = rect(&harness, Role::Slider, "Timeline, s").top();
+        assert!(whole.left() >= 0.0 && whole.right() <= PORTRAIT[0] && whole.bottom() <= top, "{whole:?}");
+        assert!(whole.top() >= view.bottom() || whole.left() >= view.right(), "{whole:?} {view:?}");
+        assert!(circle.radius >= 60.0, "{}", circle.radius);
+    }
 }

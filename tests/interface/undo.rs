@@ -93,7 +93,7 @@ fn changes_are_undone_in_reverse_order_and_a_new_change_clears_redo() {
 }
 
 #[test]
-fn changes_of_the_camera_and_of_the_plots_are_undone() {
+fn the_camera_has_its_own_undo_apart_from_parameters_and_plots() {
     let mut harness = window();
     harness.run_steps(60);
     let pose = harness.state().camera_pose().expect("drawn");
@@ -101,27 +101,38 @@ fn changes_of_the_camera_and_of_the_plots_are_undone() {
     harness.run_steps(90);
     let rotated = harness.state().camera_pose().expect("drawn");
     assert!((rotated.pitch - pose.pitch).abs() > 0.1);
-    assert_eq!(harness.state().undo_words(false).as_deref(), Some("Undo: Camera"));
+    assert_eq!(harness.state().undo_words(false), None);
     harness.key_press(Key::X);
     harness.run_steps(60);
     assert_eq!(harness.state().undo_words(false).as_deref(), Some("Undo: Magnification of the play"));
     harness.state_mut().plots_mut().chosen.push(Quantity::TipError);
     harness.run_steps(3);
     assert_eq!(harness.state().undo_words(false).as_deref(), Some("Undo: Choice of plots"));
+    let is_at = |harness: &Harness<'_, App>, pose: &jointplay::app::CameraPose| {
+        let now = harness.state().camera_pose().expect("drawn");
+        (now.pitch - pose.pitch).abs() < 1e-3 && (now.yaw - pose.yaw).abs() < 1e-3
+    };
     press(&mut harness, UNDO);
     assert_eq!(harness.state_mut().plots_mut().chosen.len(), 2);
     press(&mut harness, UNDO);
-    press(&mut harness, UNDO);
     harness.run_steps(60);
-    let restored = harness.state().camera_pose().expect("drawn");
-    assert!(
-        (restored.pitch - pose.pitch).abs() < 1e-3 && (restored.yaw - pose.yaw).abs() < 1e-3,
-        "{restored:?} {pose:?}"
-    );
+    assert!(is_at(&harness, &rotated), "undo turned the camera");
     assert_eq!(harness.state().undo_words(false), None);
+    harness.key_press(Key::Z);
+    harness.run_steps(60);
+    assert!(is_at(&harness, &pose));
+    harness.key_press(Key::Y);
+    harness.run_steps(60);
+    assert!(is_at(&harness, &rotated));
+    // The same from the menu.
+    click(&mut harness, "View options");
+    click(&mut harness, "Previous view");
+    harness.run_steps(60);
+    assert!(is_at(&harness, &pose));
+    // Redo of the plots is not lost by turning the camera.
     press(&mut harness, redo());
-    let redone = harness.state().camera_pose().expect("drawn");
-    assert!((redone.pitch - rotated.pitch).abs() < 1e-3, "{redone:?} {rotated:?}");
+    press(&mut harness, redo());
+    assert_eq!(harness.state_mut().plots_mut().chosen.len(), 3);
 }
 
 #[test]

@@ -26,13 +26,13 @@ test('the most important actions work without pointer and canvas, and the canvas
     await lab.key('Space');
     assert.equal((await lab.state()).playing, true);
     await lab.key('Space');
-    await lab.activate('button', 'Reset');
+    await lab.activate('button', 'Restart');
 
     await lab.activate('button', 'Play');
     assert.equal((await lab.state()).playing, true);
     await lab.activate('button', 'Pause');
     assert.equal((await lab.state()).playing, false);
-    await lab.activate('button', 'Reset');
+    await lab.activate('button', 'Restart');
     await lab.activate('button', 'Step');
     assert.equal((await lab.state()).steps, 1);
 
@@ -76,7 +76,7 @@ test('the most important actions work without pointer and canvas, and the canvas
     const wider = await clearance();
     assert.ok(wider > narrow && wider < 1.2 * narrow, `${narrow} mm to ${wider} mm`);
 
-    await lab.activate('button', 'Reset');
+    await lab.activate('button', 'Restart');
     const focused = () => lab.page.evaluate(() => {
         const canvas = document.getElementById('laboratory');
         const element = document.getElementById(canvas.getAttribute('aria-activedescendant') ?? '');
@@ -164,5 +164,34 @@ test('a screen reader hears events; elements have names and the places of their 
     await lab.activate('button', 'Why the first impact comes when it does');
     await lab.element('region', 'Lesson');
     await clean('with a lesson');
+    await lab.close();
+});
+
+test('dialogs take the focus and Esc gives it back, and a lesson is read out with its answer and its next step', async () => {
+    const lab = await open('lesson=first-impact&step=2', { backend: 'webgl', size: { width: 1000, height: 620 } });
+    const focused = async () => (await lab.widgets()).find((widget) => widget.focused)?.label;
+    await lab.until(async () => /Step 2 of 7: Nothing holds the platform\./.test(await lab.summary()), 'the step is not read out');
+    await lab.activate('button', 'Keys');
+    await lab.until(async () => (await focused()) === 'Close', 'the dialog does not take the focus');
+    await lab.key('Escape');
+    await lab.until(async () => (await focused()) === 'Keys', 'Esc does not give the focus back');
+    await lab.activate('radio', 'It falls freely');
+    await lab.activate('button', 'Play');
+    const answered = /As predicted: It falls freely\. .* Next step: Half g t squared\./;
+    const aloud = lab.page.locator('[aria-live=polite]');
+    await lab.until(async () => answered.test(await aloud.textContent()), 'the answer is not read out');
+    await lab.close();
+});
+
+test('what is scrolled out of sight has no place where something else is', async () => {
+    const lab = await open('scene=spcmm&play=0', { backend: 'webgl', size: { width: 390, height: 600 } });
+    await lab.element('slider', 'Restitution');
+    const play = (await lab.find('Button', 'Play')).rect;
+    const timeline = (await lab.find('Slider', 'Timeline, s')).rect;
+    const overlaps = ([a0, a1, a2, a3], [b0, b1, b2, b3]) => Math.min(a2, b2) - Math.max(a0, b0) > 1 && Math.min(a3, b3) - Math.max(a1, b1) > 1;
+    const inside = (await lab.widgets()).filter(({ role }) => ['Slider', 'TextInput', 'Button', 'DisclosureTriangle', 'ComboBox'].includes(role));
+    const others = inside.filter(({ label, role }) => !(label === 'Play' || (role === 'Slider' && label === 'Timeline, s')));
+    const covering = others.filter(({ rect }) => overlaps(rect, play) || overlaps(rect, timeline));
+    assert.deepEqual(covering.map(({ role, label }) => `${role} ${label}`), []);
     await lab.close();
 });

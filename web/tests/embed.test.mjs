@@ -142,11 +142,14 @@ test('the embedding page opens, sets, plays and pauses by messages, and receives
     await send({ do: 'set', key: 'contact.clearence', value: '0.5 mm' });
     const [problem] = await lab.until(async () => ((await received('problem')).length ? received('problem') : null), 'no problem');
     assert.match(problem.text, /contact\.clearance/);
+    await send({ do: 'set' });
+    const missing = await lab.until(async () => (await received('problem'))[1], 'a message without a key is accepted');
+    assert.equal(missing.text, '`key` is missing');
     await send({ do: 'jump' });
     await send({ do: 'open', link: 'scene=pendulun' });
-    await lab.until(async () => (await received('problem')).length === 3, 'an unknown message or a bad link is accepted');
-    assert.match((await received('problem'))[1].text, /open, set, play, pause, reset, state/);
-    assert.match((await received('problem'))[2].text, /did you mean `pendulum`/);
+    await lab.until(async () => (await received('problem')).length === 4, 'an unknown message or a bad link is accepted');
+    assert.match((await received('problem'))[2].text, /open, set, play, pause, reset, state/);
+    assert.match((await received('problem'))[3].text, /did you mean `pendulum`/);
 
     await send({ do: 'open', link: 'scene=spcmm&scale=0.02&play=0' });
     await lab.until(async () => (await state()).scene === 'spcmm', 'the link is not opened');

@@ -90,17 +90,17 @@ test('keys and mouse play, step, reset, move a slider and present, without a fir
     await lab.find('Button', 'Save');
     assert.equal((await lab.state()).state_hash, paused.state_hash);
 
-    await lab.click('Button', 'Reset');
+    await lab.click('Button', 'Restart');
     const start = await lab.state();
     assert.equal(start.time_s, 0);
     await lab.runTo(0.02);
     const plain = await lab.state();
-    await lab.click('Button', 'Reset');
+    await lab.click('Button', 'Restart');
     assert.equal((await lab.state()).state_hash, start.state_hash, 'a reset is a new start');
     await lab.slide('Clearance', 0.9);
     const changed = (await lab.state()).changed_parameters['contact.clearance'];
     assert.ok(parseFloat(changed) > 0.3, `the slider set ${changed}`);
-    await lab.click('Button', 'Reset');
+    await lab.click('Button', 'Restart');
     await lab.runTo(0.02);
     const loose = await lab.state();
     assert.notEqual(loose.state_hash, plain.state_hash);

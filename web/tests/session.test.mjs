@@ -87,7 +87,8 @@ child = "a"\naxis = [0, 0, 1]\ndrive = { law = "table", file = "lift.csv" }\n`],
 /** Opens files with the button. */
 async function choose(lab, files) {
     const chosen = lab.page.waitForEvent('filechooser');
-    await lab.click('Button', 'Open…');
+    await lab.click('Button', 'Open');
+    await lab.click('Button', 'File…');
     await (await chosen).setFiles(files);
 }
 

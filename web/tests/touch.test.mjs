@@ -45,3 +45,14 @@ test('on a phone fingers tap, turn and pinch, and the canvas has all pixels of i
     }
     await lab.close();
 });
+
+test('the first gesture of a finger scrolls', async () => {
+    const size = { width: 390, height: 600 };
+    const lab = await open('scene=spcmm&play=0', { backend: 'webgl', size, context: { hasTouch: true, isMobile: true } });
+    const top = async () => (await lab.find('Slider', 'Friction coefficient')).rect[1];
+    const before = await top();
+    // Beside a name, where nothing but the panel is under the finger.
+    await lab.fingers([0, 10, 25, 45, 70, 70, 70].map((by) => [250, before - 6 - by]));
+    await lab.until(async () => before - (await top()) > 40, 'the first swipe does not scroll');
+    await lab.close();
+});

@@ -4,7 +4,7 @@ use super::assets::{AssetResolver, MAX_FILE_SIZE};
 use super::error::line_and_column;
 use super::file::{ReadError, read_regular};
 use super::{Scene, SceneError, visible_line};
-use jointplay_physics::suggest::{brief, nearest};
+use jointplay_physics::suggest::{brief, did_you_mean, nearest, nearest_name};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -61,6 +61,12 @@ fn known_names(name: &str) -> (String, String) {
     (near, format!("{}; benchmarks: {}", BUILT_IN.join(", "), BENCHMARKS.join(", ")))
 }
 
+/// Whether `typed` may be `name` with a letter too many, too few or wrong, after a right beginning.
+fn is_slip(typed: &str, name: &str) -> bool {
+    let beginning = name.len().div_ceil(2);
+    typed.len().abs_diff(name.len()) <= 1 && typed.get(..beginning) == name.get(..beginning)
+}
+
 impl Scene {
     /// Loads a built-in scene or benchmark by name, or a file (contains `/` or ends in `.toml`). Changes are applied in order;
     /// the last change of a key wins.
@@ -100,9 +106,14 @@ fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
     let bytes = read_regular(path, MAX_FILE_SIZE).map_err(|cause| match cause {
         ReadError::TooLarge(_) => SceneError { unreadable: false, ..error(too_large()) },
         ReadError::Unreadable(_) if !path.exists() => {
+            // Perhaps the name of a built-in scene, written as a file or with a slip; a file of one's own is another name.
             let stem = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".toml");
-            let (near, known) = known_names(stem);
-            error(format!("{cause}; built-in scenes, named without `/` and `.toml`: {known}{near}"))
+            let near = nearest_name(stem, BUILT_IN.into_iter().chain(BENCHMARKS)).filter(|near| is_slip(stem, near));
+            let (_, known) = known_names(stem);
+            let hint = near.map_or_else(String::new, |near| {
+                format!("; built-in scenes, named without `/` and `.toml`: {known}{}", did_you_mean(Some(near)))
+            });
+            error(format!("{cause}{hint}"))
         }
         _ => error(cause.to_string()),
     })?;

@@ -296,6 +296,10 @@ fn a_chain_is_rebuilt_when_its_number_of_links_changes() {
     scene.set("body.link9.mass", "1 kg").unwrap();
     scene.undo_change("chain.links").unwrap();
     assert_eq!(scene.changes, [("joint.J2.friction".to_owned(), "0.4".to_owned())]);
+    for many in ["100000", "1000000000", "1e300"] {
+        let why = scene.set("chain.links", many).expect_err("too many").to_string();
+        assert!(why.contains("allowed 1 to 4096; a whole number"), "{why}");
+    }
     assert_eq!(changed("chain", &[("chain.links", "256")]).machine.bodies.len(), 256);
 }
 

@@ -88,7 +88,6 @@ fn read_parameter(
         return Err(node.error("a whole number has no unit"));
     }
     let value_node = value_node.with_key(key.clone());
-    let value = value_node.quantity(dimension).map_err(|error| defined_later(&value_node, later).unwrap_or(error))?;
     let pair = |key: &str| section.get(key).map(|node| read_range(&node, dimension)).transpose();
     let words = |key: &str| section.get(key).map(|node| node.text()).transpose();
     let label = words("label")?.unwrap_or(&full);
@@ -110,16 +109,23 @@ fn read_parameter(
     let given = default.map_or(Value::Unset, |default| kind.value_of(default));
     let shown = visible_line;
     let row = row_of_file([&key, &shown(label), &shown(help), &shown(equation), &shown(group)], kind, given);
-    let checked =
-        if is_integer { row.read(value_node.scalar()?).map(|_| ()) } else { row.check(&Value::Number(value)) };
-    checked.map_err(|error| {
+    let refuse = |error: ValueError| {
         let place = passed.map(|_| {
             let (line, _) = place_of(document.text, section.offset());
             let file = document.file.map_or_else(String::new, |file| format!(" of {}", visible_line(file)));
             format!("; the parameter is defined in line {line}{file}")
         });
         value_node.error(format!("{error}{}", place.unwrap_or_default()))
-    })?;
+    };
+    let scalar = value_node.scalar()?;
+    let reads = || row.read(scalar).map(|_| ());
+    if is_integer && parse_quantity(scalar, dimension).is_ok() {
+        // Before the general limit of numbers, which is wider.
+        reads().map_err(refuse)?;
+    }
+    let value = value_node.quantity(dimension).map_err(|error| defined_later(&value_node, later).unwrap_or(error))?;
+    let checked = if is_integer { reads() } else { row.check(&Value::Number(value)) };
+    checked.map_err(refuse)?;
     document.reading.define_parameter(&full, value, dimension);
     // An expression without a range is an ordinary number, not an adjustable parameter.
     Ok((row, default.is_some() || range.is_some()))

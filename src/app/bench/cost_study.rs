@@ -21,6 +21,19 @@ pub struct VariedParameter {
     pub range: [f64; 2],
 }
 
+/// Digits of the values in a verdict.
+const VERDICT_DIGITS: usize = 3;
+/// Spread relative to the largest at which an input matters about as much.
+const ABOUT_EQUAL: f64 = 0.9;
+/// Spread relative to the result that is rounding.
+const NO_EFFECT: f64 = 1e-9;
+
+/// `words` within a sentence.
+fn lower_first(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
+}
+
 /// Settings of the next study.
 pub struct CostSettings {
     /// Parameters to choose from.
@@ -136,16 +149,98 @@ impl CostStudy {
         (self.runs.iter().flatten().count(), self.runs.len())
     }
 
+    /// Least and greatest `output` of the runs at the scene's value and at both ends of `input`, SI; `None` without all three results.
+    fn extent(&self, output: usize, input: usize) -> Option<[f64; 2]> {
+        let ends = [0, 1].map(|end| self.end(output, input, end).flatten());
+        let all = [self.base(output)?, ends[0]?, ends[1]?];
+        Some([all.into_iter().fold(f64::INFINITY, f64::min), all.into_iter().fold(f64::NEG_INFINITY, f64::max)])
+    }
+
+    /// The unit in which values of `output` are shown.
+    pub fn display_unit(&self, output: usize) -> &str {
+        let all = self.runs.iter().flatten().filter_map(|run| run.get(output).copied().flatten());
+        let most = all.fold(0.0_f64, |most, value| most.max(value.abs()));
+        match self.plan.units[output].as_deref().unwrap_or_default() {
+            "m" if most < 1e-3 => "um",
+            "m" => "mm",
+            other => other,
+        }
+    }
+
+    /// Which input matters most to `output`, and by how much, in a sentence of the results; `None` before all runs are finished.
+    pub fn verdict(&self, output: usize) -> Option<String> {
+        let (finished, all) = self.run_counts();
+        let base = self.base(output)?;
+        if finished < all {
+            return None;
+        }
+        let what = lower_first(NAMED[output].label);
+        let failed = self.runs.iter().flatten().filter(|run| run.get(output).copied().flatten().is_none()).count();
+        let without = match failed {
+            0 => String::new(),
+            1 => " One run has no result and does not count.".to_owned(),
+            _ => format!(" {failed} runs have no result and do not count."),
+        };
+        let spread = |input: usize| self.extent(output, input).map(|[least, most]| most - least);
+        let mut ranked = self.ranked_by_effect(output);
+        ranked.retain(|&input| spread(input).is_some());
+        let Some(&first) = ranked.first() else {
+            return Some(format!("No changed value has a result.{without}"));
+        };
+        let most = spread(first).unwrap_or_default();
+        if most <= NO_EFFECT * base.abs() {
+            return Some(format!("None of these values moves the {what}.{without}"));
+        }
+        let name = |input: usize| {
+            let key = &self.task.over[input].0;
+            let joint =
+                key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')).map_or(&**key, |(joint, _)| joint);
+            self.parameter(input)
+                .map_or_else(|| joint.to_owned(), |parameter| format!("{} of {joint}", parameter.label))
+        };
+        let others: Vec<usize> = ranked[1..]
+            .iter()
+            .copied()
+            .filter(|&other| spread(other).is_some_and(|own| own >= ABOUT_EQUAL * most))
+            .collect();
+        let lead = match &others[..] {
+            [] => format!("{} matters most: ", name(first)),
+            [second] => format!("{} and {} matter about equally: ", name(first), lower_first(&name(*second))),
+            _ if others.len() + 1 == self.task.over.len() => "All matter about equally: ".to_owned(),
+            _ => format!("{} and {} others matter about equally: ", name(first), others.len()),
+        };
+        let unit = self.parameter(first).map_or("", Parameter::display_unit);
+        let ends = self.task.over[first].1;
+        let nominal = self.plan.nominal[first];
+        let halves = [nominal - ends[0], ends[1] - nominal];
+        let by = if (halves[0] - halves[1]).abs() <= 1e-9 * (ends[1] - ends[0]) {
+            format!("±{}", value::quantity(halves[1], unit, VERDICT_DIGITS))
+        } else {
+            format!(
+                "from {} to {}",
+                value::number(to_display(ends[0], unit), VERDICT_DIGITS),
+                value::quantity(ends[1], unit, VERDICT_DIGITS)
+            )
+        };
+        let place = if others.is_empty() { " there".to_owned() } else { format!(" of {}", lower_first(&name(first))) };
+        let shown = self.display_unit(output);
+        let number = |si: f64| value::number(to_display(si, shown), VERDICT_DIGITS);
+        let last = |si: f64| value::quantity(si, shown, VERDICT_DIGITS);
+        let [least, greatest] = self.extent(output, first)?;
+        let [low, high] = [0, 1].map(|end| self.end(output, first, end).flatten());
+        let (low, high) = (low?, high?);
+        let moves = if low.min(high) == least && low.max(high) == greatest {
+            format!("from {} to {}", number(low), last(high))
+        } else {
+            // Both ends lie on one side of the scene's own result.
+            format!("between {} and {}", number(least), last(greatest))
+        };
+        Some(format!("{lead}{by}{place} moves the {what} {moves}.{without}"))
+    }
+
     /// Inputs by their effect on `output`, the largest first; those with a run without result before all others.
     pub fn ranked_by_effect(&self, output: usize) -> Vec<usize> {
-        let spread = |input: usize| {
-            let ends = [0, 1].map(|end| self.end(output, input, end).flatten());
-            let all: Option<Vec<f64>> = [self.base(output), ends[0], ends[1]].into_iter().collect();
-            all.map_or(f64::INFINITY, |all| {
-                all.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-                    - all.iter().copied().fold(f64::INFINITY, f64::min)
-            })
-        };
+        let spread = |input: usize| self.extent(output, input).map_or(f64::INFINITY, |[least, most]| most - least);
         let mut order: Vec<usize> = (0..self.task.over.len()).collect();
         order.sort_by(|&a, &b| spread(b).total_cmp(&spread(a)));
         order

@@ -14,9 +14,10 @@ use crate::app::command::Command;
 use crate::app::host::Host;
 use crate::app::layout::reserve_lines;
 use crate::app::player::Player;
-use crate::app::{theme, value};
+use crate::app::{field, theme, value};
 use crate::scene::{Kind, Scene, Value};
 use crate::simulate::MAX_RUN_DURATION;
+use crate::units::Dimension;
 
 /// Largest part of a run that is a transient.
 const MAX_TRANSIENT: f64 = 0.99;
@@ -112,6 +113,14 @@ impl Costs {
         let study = self.study.as_ref()?;
         let choice = ui.cursor().top();
         output_ui(ui, &mut self.output, study);
+        let verdict = study.verdict(self.output);
+        reserve_lines(ui, "verdict", 3, |ui| match &verdict {
+            Some(verdict) if differences.is_empty() => drop(ui.label(RichText::new(verdict).strong())),
+            Some(verdict) => drop(ui.label(RichText::new(format!("At the earlier setting: {verdict}")).weak())),
+            None => drop(
+                ui.label(RichText::new("Which value matters most is said once all runs are finished").small().weak()),
+            ),
+        });
         let tornado = ui.cursor().top();
         let clicked = self.tornado.ui(ui, study, self.output, player, !differences.is_empty());
         if self.reveal && self.computation.has_current_results() {
@@ -152,17 +161,15 @@ impl Costs {
             settings.varied.iter_mut().filter(|varied| settings.ranges && varied.on)
         {
             ui.horizontal_wrapped(|ui| {
-                let Kind::Number { min, max, display, slider, .. } = parameter.kind else {
+                let Kind::Number { min, max, display, slider, dimension, .. } = parameter.kind else {
                     return;
                 };
                 ui.label(parameter.label).on_hover_text(value::typeset(parameter.help));
                 let shown = |si| crate::units::to_display(si, display);
-                let unit = value::typeset(display);
-                let suffix = if unit.is_empty() { unit } else { format!(" {unit}") };
                 for (end, word) in range.iter_mut().zip(["from", "to"]) {
                     ui.label(word);
                     let speed = 0.002 * (shown(slider.1) - shown(slider.0));
-                    ui.add(DragValue::new(end).range(shown(min)..=shown(max)).speed(speed).suffix(&suffix))
+                    ui.add(field::quantity(end, dimension, display).range(shown(min)..=shown(max)).speed(speed))
                         .on_hover_text(format!("{}: {word} this value", parameter.label))
                         .accessible_name(format!("{} {word}", parameter.label));
                 }
@@ -172,7 +179,7 @@ impl Costs {
             let span = &mut settings.span;
             let mut time = |name: &str, time: &mut f64, range, help: &str| {
                 ui.label(name);
-                ui.add(DragValue::new(time).range(range).speed(0.01).suffix(" s"))
+                ui.add(field::quantity(time, Dimension::Time, "s").range(range).speed(0.01))
                     .on_hover_text(help)
                     .accessible_name(name);
             };

@@ -80,7 +80,7 @@ impl Portrait {
             let mut degrees = 360.0 * player.watch().phase();
             let slider =
                 Slider::new(&mut degrees, 0.0..=359.0).suffix("°").max_decimals(1).clamping(SliderClamping::Always);
-            let slider = keys::slider(ui, slider)
+            let slider = keys::slider(ui, slider, [0.0, 359.0])
                 .on_hover_text(
                     "Phase of the drive at which sections are taken, of the running scene and of the next sweep; 0° \
                      is the phase at t = 0. A change restarts the section.",

@@ -5,12 +5,14 @@ use eframe::egui::{
     Align2, CursorIcon, Id, Rect, RichText, Role, Sense, Stroke, StrokeKind, TextStyle, TextWrapMode, Ui, WidgetInfo,
     WidgetText, pos2, vec2,
 };
+use egui_plot::GridInput;
 
 use super::cost_study::CostStudy;
 use crate::analysis::study::NAMED;
 use crate::app::player::Player;
-use crate::app::{theme, value};
+use crate::app::{plots, theme, value};
 use crate::scene::Value;
+use crate::units::{from_display, to_display};
 
 /// Height of a bar with its texts, for a mouse and for touch, points.
 const BAR_HEIGHTS: (f32, f32) = (18.0, 30.0);
@@ -22,6 +24,10 @@ const MARGIN: f32 = 2.0;
 const MAX_NAMES_FRACTION: f32 = 0.3;
 /// Opacity of the bars of an earlier setting.
 const PALE_OPACITY: f32 = 0.45;
+/// Length of a mark on the axis, least distance of two, points, and their approximate number.
+const MARK: f32 = 4.0;
+const MIN_MARK_DISTANCE: f32 = 44.0;
+const MAX_MARKS: f64 = 4.0;
 /// Digits of a displayed value.
 const DIGITS: usize = 4;
 
@@ -80,13 +86,14 @@ impl Tornado {
         let values = self.order.iter().flat_map(|&input| [0, 1].map(|end| study.end(output, input, end).flatten()));
         let values = || values.clone().chain([study.base(output)]).flatten();
         let (least, most) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
-        let unit = unit(study.plan.units[output].as_deref().unwrap_or_default(), least.abs().max(most.abs()));
+        let unit = study.display_unit(output);
         let shown = |si: f64| value::quantity(si, unit, DIGITS);
         let what = NAMED[output].label.to_lowercase();
         let base = study.base(output);
         let with_base = base.map_or_else(|| "…".to_owned(), shown);
         ui.label(RichText::new(format!("With the values of the scene: {with_base}")).small())
             .on_hover_text(format!("{}; at the line from which the bars begin", NAMED[output].help));
+        legend(ui, earlier);
         let ends = |input: usize| [0, 1].map(|end| End::new(study, output, (input, end), player, &what, &shown));
         let ends: Vec<[End; 2]> = self.order.iter().map(|&input| ends(input)).collect();
 
@@ -121,6 +128,7 @@ impl Tornado {
             let ink = Stroke::new(1.0, ui.visuals().text_color());
             ui.painter().vline(place.across(base), area.y_range(), ink);
         }
+        place.axis_ui(ui, unit, NAMED[output].label);
         clicked
     }
 }
@@ -154,6 +162,31 @@ impl Place {
     fn strip(&self, row: usize, line: usize) -> Rect {
         let top = self.area.top() + row as f32 * (2.0 * self.bar + GAP) + 0.5 * GAP + line as f32 * self.bar;
         Rect::from_x_y_ranges(self.area.x_range(), top..=top + self.bar)
+    }
+
+    /// The axis below the bars: marks in `unit`, and what it shows.
+    fn axis_ui(&self, ui: &mut Ui, unit: &str, what: &str) {
+        let line = ui.text_style_height(&TextStyle::Small);
+        let (area, _) = ui.allocate_exact_size(vec2(self.area.width(), 2.0 * line + MARK + 4.0), Sense::hover());
+        let [left, right] = self.plane;
+        let (painter, ink) = (ui.painter(), ui.visuals().weak_text_color());
+        let (font, stroke) = (TextStyle::Small.resolve(ui.style()), Stroke::new(1.0, ink));
+        painter.hline(left..=right, area.top(), stroke);
+        let bounds = self.values.map(|si| to_display(si, unit));
+        let distance = f64::from(MIN_MARK_DISTANCE / (right - left).max(1.0)) * (bounds[1] - bounds[0]);
+        let input = GridInput { bounds: (bounds[0], bounds[1]), base_step_size: distance };
+        let most = bounds[0].abs().max(bounds[1].abs());
+        for mark in plots::marks(&input, MAX_MARKS) {
+            let x = self.across(from_display(mark.value, unit));
+            painter.vline(x, area.top()..=area.top() + MARK, stroke);
+            let text = plots::tick(mark.value, mark.step_size, most);
+            painter.text(pos2(x, area.top() + MARK), Align2::CENTER_TOP, text, font.clone(), ink);
+        }
+        let name = match unit {
+            "" => what.to_owned(),
+            unit => format!("{what}, {}", value::typeset(unit)),
+        };
+        painter.text(pos2(right, area.top() + MARK + line), Align2::RIGHT_TOP, name, font, ink);
     }
 
     fn name_ui(&self, ui: &Ui, strip: Rect, text: &str, strong: bool) {
@@ -243,13 +276,21 @@ fn name(key: &str) -> [&str; 2] {
     [joint, part]
 }
 
-/// The unit in which values up to `most` are shown.
-fn unit(si: &str, most: f64) -> &str {
-    match si {
-        "m" if most < 1e-3 => "um",
-        "m" => "mm",
-        other => other,
-    }
+/// What the two colours stand for; pale if the bars are of an `earlier` setting.
+fn legend(ui: &mut Ui, earlier: bool) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 5.0;
+        ui.spacing_mut().interact_size.y = ui.text_style_height(&TextStyle::Small);
+        for (end, words) in ["With the lower value", "With the upper value"].into_iter().enumerate() {
+            let (swatch, _) = ui.allocate_exact_size(vec2(10.0, 10.0), Sense::hover());
+            let colour = theme::series(end, ui.visuals().dark_mode);
+            // Round, unlike the bars.
+            let fill = if earlier { colour.gamma_multiply(PALE_OPACITY) } else { colour };
+            ui.painter().circle_filled(swatch.center(), 5.0, fill);
+            ui.label(RichText::new(words).small());
+            ui.add_space(8.0);
+        }
+    });
 }
 
 /// Width of a column of `texts`, with the gap beside it, points.

@@ -1,8 +1,7 @@
 //! The link to the present state, its page address, and a QR code of it for phones in the room.
 
 use eframe::egui::{
-    self, Color32, Direction, Label, Layout, Mesh, Rect, Role, Sense, Shape, TextEdit, Ui, UiBuilder, Vec2, WidgetInfo,
-    vec2,
+    self, Color32, Label, Mesh, Rect, Role, Sense, Shape, TextEdit, Ui, UiBuilder, Vec2, WidgetInfo, vec2,
 };
 use qrcodegen::{QrCode, QrCodeEcc, QrSegment, Version};
 
@@ -14,6 +13,11 @@ const QUIET_ZONE: i32 = 4;
 const MAX_VERSION: u8 = 25;
 /// Largest number of characters in a code of that version.
 const MAX_CHARACTERS: usize = 1273;
+
+/// Width from which what is said of a link has one line, points.
+const MIN_WIDTH_OF_ONE_LINE: f32 = 560.0;
+/// Space below a code for the frame of the dialog, points.
+const BOTTOM_MARGIN: f32 = 28.0;
 
 /// A QR code.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -113,9 +117,8 @@ impl SharedLink {
     }
 }
 
-/// Address and QR code within a height of `max_height`, points; returns whether Enter was pressed.
-pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, max_height: f32) -> bool {
-    let top = ui.cursor().top();
+/// Address, and what the link is good for; returns whether Enter was pressed.
+pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, new: bool) -> bool {
     let mut entered = false;
     if shared.typed {
         ui.label(
@@ -124,29 +127,32 @@ pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, max_height: f32) -> bool 
         );
         let field = TextEdit::singleline(&mut shared.page).desired_width(f32::INFINITY);
         let field = ui.add(field.hint_text("https://example.org/lab/")).accessible_name("Address of the page");
+        if new {
+            field.request_focus();
+        }
         entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         if field.changed() {
             shared.encode();
         }
     }
-    let line = ui.text_style_height(&egui::TextStyle::Body) + 2.0 * ui.spacing().item_spacing.y;
-    // Reserves the same size before and after drawing.
-    let side = (max_height - (ui.cursor().top() - top) - line).min(ui.available_width()).max(1.0);
-    match &shared.code {
-        Ok(code) => draw(ui, code, side),
-        Err(reason) => {
-            let (place, _) = ui.allocate_exact_size(Vec2::splat(side), Sense::hover());
-            ui.painter().rect_filled(place, 6.0, ui.visuals().faint_bg_color);
-            let layout = Layout::centered_and_justified(Direction::TopDown);
-            let inside = UiBuilder::new().max_rect(place.shrink(16.0)).layout(layout);
-            ui.new_child(inside).add(Label::new(reason).wrap());
-        }
-    }
-    ui.label(match shared.page() {
-        "" => "No address: the link begins with #".to_owned(),
-        page => format!("{page} in this state and view"),
-    });
+    // The same lines for every address, so that the buttons below stay in place.
+    let words = match (&shared.code, shared.page()) {
+        (Err(reason), _) => reason.clone(),
+        (Ok(_), page) => format!("{page} in this state and view"),
+    };
+    let lines = 1.0 + f32::from(u8::from(ui.available_width() < MIN_WIDTH_OF_ONE_LINE));
+    let height = lines * ui.text_style_height(&egui::TextStyle::Body) + 4.0;
+    let (place, _) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
+    ui.new_child(UiBuilder::new().max_rect(place)).add(Label::new(words).wrap());
     entered
+}
+
+/// The QR code below the buttons, if the link has one.
+pub(super) fn picture(ui: &mut Ui, shared: &SharedLink) {
+    if let Ok(code) = &shared.code {
+        let below = ui.ctx().content_rect().bottom() - ui.cursor().top() - BOTTOM_MARGIN;
+        draw(ui, code, below.min(ui.available_width()).max(1.0));
+    }
 }
 
 /// Draws dark on light in every theme, with whole pixels per module, at most `side` points large.

@@ -12,6 +12,8 @@ use crate::app::command::Command;
 use crate::app::player::Player;
 use crate::app::{spoken, theme};
 
+/// Height from which a step on a phone shows the title of its lesson, points.
+const MIN_HEIGHT_WITH_TITLE: f32 = 290.0;
 /// Height of a choice for mouse input, points.
 const CHOICE_HEIGHT: f32 = 24.0;
 /// Hidden height of a page above which a button to scroll appears, points.
@@ -114,7 +116,12 @@ impl RunningLesson {
         let mut set = false;
         {
             let names = self.measured.names();
-            ui.label(RichText::new(&lesson.title).small().weak());
+            if theme::has_fingers(ui) && ui.clip_rect().height() < MIN_HEIGHT_WITH_TITLE {
+                // The answers come first.
+                ui.spacing_mut().item_spacing.y = 2.0;
+            } else {
+                ui.label(RichText::new(&lesson.title).small().weak());
+            }
             spoken::heading(&ui.label(RichText::new(&step.title).heading().strong()), &step.title);
             if let Some(why) = self.measured.fault() {
                 theme::error(ui, format!("This lesson cannot be computed: {why}"));
@@ -122,7 +129,7 @@ impl RunningLesson {
             prose(ui, &step.text, &names);
         }
         if let Some(question) = &step.question {
-            theme::use_dense_rows(ui);
+            ui.spacing_mut().item_spacing.y = 2.0;
             let (correct, names) = (self.correct_choice(), self.measured.names());
             let shows = self.reached && own;
             let mut predicted = self.predicted;
@@ -149,14 +156,8 @@ impl RunningLesson {
                     predicted = Some(index).filter(|_| !chosen);
                 }
             }
-            if shows && let Some(correct) = correct {
-                let words = filled(&question.choices[correct].text, &names);
+            if let Some(verdict) = self.verdict().filter(|_| shows) {
                 let colour = ui.visuals().selection.stroke.color;
-                let verdict = match predicted {
-                    Some(choice) if choice == correct => format!("As predicted: {words}"),
-                    Some(_) => format!("Not as predicted. Answer: {words}"),
-                    None => format!("Answer: {words}"),
-                };
                 ui.label(RichText::new(verdict).strong().color(colour));
             } else if !self.reached {
                 ui.label(RichText::new("Make a prediction, then press Play (space)").weak());
@@ -220,7 +221,7 @@ fn paragraph(ui: &mut Ui, block: &Block) {
                 format.background = ui.visuals().code_bg_color;
             }
         }
-        job.append(&piece.text, 0.0, format);
+        job.append(&text::unbroken(&piece.text), 0.0, format);
     }
     ui.add(egui::Label::new(job).wrap());
 }

@@ -75,6 +75,20 @@ pub fn blocks(markdown: &str) -> Vec<Block> {
     blocks
 }
 
+/// `text` with the spaces between thousands, as in 10 000, replaced by ones at which egui breaks no line.
+pub fn unbroken(text: &str) -> String {
+    let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+    let mut before = None;
+    let mut out = String::with_capacity(text.len());
+    for (at, c) in text.char_indices() {
+        let after = text[at + c.len_utf8()..].chars().next();
+        let joins = matches!(c, ' ' | '\u{202f}' | '\u{2009}') && is_digit(before) && is_digit(after);
+        out.push(if joins { '\u{a0}' } else { c });
+        before = Some(c);
+    }
+    out
+}
+
 fn pieces(line: &str) -> Vec<TextSpan> {
     const MARKS: [(&str, SpanStyle); 3] =
         [("**", SpanStyle::Strong), ("*", SpanStyle::Emphasis), ("`", SpanStyle::Code)];
@@ -198,6 +212,31 @@ mod tests {
         let faces: Vec<SpanStyle> = read[0].pieces.iter().map(|piece| piece.face).collect();
         use SpanStyle::{Code, Emphasis, Plain, Strong};
         assert_eq!(faces, [Plain, Emphasis, Plain, Strong, Plain, Code, Plain]);
+    }
+
+    #[test]
+    fn no_line_breaks_within_a_number() {
+        use eframe::egui;
+        let ctx = egui::Context::default();
+        crate::app::theme::apply(&ctx, false);
+        // Last row in a width into which all but two digits fit.
+        let last_row = |text: &str| {
+            let mut last = String::new();
+            let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
+                let font = egui::TextStyle::Body.resolve(ui.style());
+                let lay_out =
+                    |text: &str, width| ui.painter().layout(text.to_owned(), font.clone(), egui::Color32::BLACK, width);
+                let width = lay_out("runs 10 0", f32::INFINITY).size().x;
+                last = lay_out(text, width).rows.last().map_or_else(String::new, |row| row.text());
+            });
+            output.textures_delta.clear();
+            last
+        };
+        for number in ["runs 10 000", "runs 10\u{202f}000"] {
+            assert_eq!(last_row(&unbroken(number)), "10\u{a0}000");
+        }
+        assert_eq!(last_row("runs 10 000"), "000");
+        assert_eq!(unbroken("runs 5 times, S1 2"), "runs 5 times, S1\u{a0}2");
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! Cuts off tall peaks at the start of a run, which would flatten the rest of a plot. Each is marked, and a note states the height.
 
-use eframe::egui::{self, Align2, Button, Pos2, Rect, RichText, Shape, Stroke, TextStyle, Ui, vec2};
+use eframe::egui::{
+    self, Align2, Button, CursorIcon, Pos2, Rect, RichText, Role, Sense, Shape, Stroke, TextStyle, Ui, WidgetInfo, vec2,
+};
 
 use super::{ROUNDING, Trace, value};
 
@@ -71,14 +73,27 @@ pub fn mark(ui: &Ui, frame: Rect, trace: &Trace, most: f64, x: impl Fn(f64) -> f
     }
 }
 
-/// Notes the height of the `peak` at the upper right of `frame`, in units of `unit`.
-pub fn note(ui: &Ui, frame: Rect, peak: f64, unit: (&str, f64)) {
+/// Notes the height of the `peak` of `plot` at the upper right of `frame`, in units of `unit`; a click on the note `leads` to the peak.
+/// Returns whether it was clicked.
+pub fn note(ui: &Ui, plot: &str, frame: Rect, peak: f64, unit: (&str, f64), leads: bool) -> bool {
     let words = format!("Peak {} {} above", value::number(peak / unit.1, 3), unit.0);
     let ink = ui.visuals().strong_text_color();
     let words = ui.painter().layout_no_wrap(words, TextStyle::Small.resolve(ui.style()), ink);
     let plate = Align2::RIGHT_TOP.align_size_within_rect(words.size() + 2.0 * NOTE_PADDING, frame.shrink(2.0));
-    ui.painter().rect_filled(plate, 4.0, ui.visuals().widgets.inactive.weak_bg_fill);
+    let mut fill = ui.visuals().widgets.inactive.weak_bg_fill;
+    let mut clicked = false;
+    if leads {
+        let name = format!("Peak {} {} above in {plot}", value::number(peak / unit.1, 3), unit.0);
+        let note = ui.interact(plate.expand(3.0), ui.scope_id().with(("peak above", plot)), Sense::click());
+        note.widget_info(|| WidgetInfo::labeled(Role::Button, ui.is_enabled(), &name));
+        if note.hovered() || note.has_focus() {
+            fill = ui.visuals().widgets.hovered.weak_bg_fill;
+        }
+        clicked = note.on_hover_cursor(CursorIcon::PointingHand).on_hover_text("Go to that instant").clicked();
+    }
+    ui.painter().rect_filled(plate, 4.0, fill);
     ui.painter().galley(plate.min + NOTE_PADDING, words, ink);
+    clicked
 }
 
 /// The button that shows first peaks whole in all plots, in the title of `plot`; `on`: whether they are cut. Returns whether it was

@@ -163,6 +163,13 @@ impl ImpactRecord {
         ended.take(MAX_SEARCHED).max_by(|a, b| a.end.total_cmp(&b.end))
     }
 
+    /// The impact with the largest force of those that had peaked by `time`, s, with its number in the run, from 1.
+    pub fn hardest(&self, time: f64) -> Option<(u64, &RecordedImpact)> {
+        let peaked = self.numbered().filter(|(_, own)| own.force_peak.time <= time);
+        let force = |own: &RecordedImpact| own.force_peak.force.norm_squared();
+        peaked.filter(|(_, own)| force(own) > 0.0).max_by(|(_, a), (_, b)| force(a).total_cmp(&force(b)))
+    }
+
     /// The impact in progress at `time`, s, of ball joint `joint`, or of any, once its peak is known; resting balls are
     /// excluded. Among several, the one that peaks at that instant, otherwise the one that began last.
     pub fn in_progress(&self, joint: Option<usize>, time: f64) -> Option<(u64, &RecordedImpact)> {

@@ -105,7 +105,7 @@ fn a_warning_is_found_by_the_key_of_its_parameter() {
         }
         for key in [Some(key), of_joint].into_iter().flatten() {
             let warning = player.warning(key).unwrap_or_else(|| panic!("no warning about {key}"));
-            assert!(warning.contains(key.rsplit('.').next().unwrap_or(key)), "{key}: {warning}");
+            assert!(warning.text.contains(key.rsplit('.').next().unwrap_or(key)), "{key}: {}", warning.text);
         }
         for unaffected in ["contact.friction", "gravity.x", "solver.preset"] {
             assert_eq!(player.warning(unaffected), None, "{key}");

@@ -7,7 +7,7 @@ use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
 use super::keyframes::Keyframe;
 use super::record::{FINEST_BIN, drop_before};
-use super::{Player, warnings_of};
+use super::{Player, advice};
 use crate::session::goal::{Goal, Obstacle};
 use crate::session::history::{Bin, History, Mark};
 use crate::session::log::Event;
@@ -280,7 +280,7 @@ impl Player {
         self.stopped = None;
         self.unchanged = None;
         self.record.go_back(now, self.simulation.running());
-        self.warnings = warnings_of(self.pending());
+        self.warnings = advice::of(self.pending());
         if starts_detail {
             self.keyframes.drop_fine();
             self.record.begin_detailed();

@@ -39,8 +39,20 @@ const LICENCES: &str = "licences.txt";
 /// Preview picture that other sites show; opening the page does not load it.
 const PREVIEW: &str = "web/preview.png";
 
+/// The environment variable with the address of the page, as for the program's links.
+const ADDRESS: &str = "JOINTPLAY_PAGE";
+
 /// Content codings of the precompressed copies beside a file, best first, each with its file extension.
 const CODINGS: [(&str, &str); 2] = [("br", "br"), ("gzip", "gz")];
+
+/// The page with the whole address of its preview, which programs that show previews need; unchanged if its `address` is not known.
+fn with_address(page: &str, address: &str) -> String {
+    let relative = "property=\"og:image\" content=\"";
+    if !(address.starts_with("https://") || address.starts_with("http://")) || address.contains(['"', '<', '?', '#']) {
+        return page.to_owned();
+    }
+    page.replace(relative, &format!("{relative}{}/", address.trim_end_matches('/')))
+}
 
 /// The project's folder.
 pub fn root() -> PathBuf {
@@ -90,6 +102,7 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
     // Every address contains the build, so that a browser never combines new scripts with old code from its cache.
     let build = format!("{:016x}", hash(&all));
     let page = page.replace("{{build}}", &build).replace("{{wasm_bytes}}", &code.len().to_string());
+    let page = with_address(&page, &std::env::var(ADDRESS).unwrap_or_default());
     let to = scratch.join(PAGE);
     fs::write(&to, page).map_err(|e| failed(&to, &e))?;
     for file in files(&scratch)? {
@@ -224,4 +237,22 @@ fn remove(folder: &Path) -> Result<(), String> {
 
 pub fn failed(path: &Path, error: &std::io::Error) -> String {
     format!("{}: {error}", path.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_preview_has_a_whole_address_where_that_of_the_page_is_known() {
+        let page = fs::read_to_string(root().join(PAGE)).expect("the page");
+        assert_eq!(page.matches("property=\"og:image\"").count(), 1);
+        for address in ["https://example.org/lab/", "https://example.org/lab"] {
+            let packed = with_address(&page, address);
+            assert!(packed.contains("property=\"og:image\" content=\"https://example.org/lab/preview.png\""));
+        }
+        for unknown in ["", "example.org", "https://example.org/\"><script>"] {
+            assert_eq!(with_address(&page, unknown), page);
+        }
+    }
 }
