@@ -109,7 +109,12 @@ impl Header<'_> {
     }
 
     fn scene_box(&mut self, ui: &mut Ui, compact: bool) {
-        let width = if compact { 190.0_f32.min(ui.available_width() - 90.0) } else { 190.0 };
+        let is_narrow = ui.ctx().content_rect().width() < MIN_WIDTH_WITH_NAME;
+        let width = match (compact, is_narrow) {
+            (true, _) => 190.0_f32.min(ui.available_width() - 90.0),
+            (false, true) => 150.0,
+            (false, false) => 190.0,
+        };
         let size = egui::vec2(width, ui.spacing().interact_size.y);
         ui.allocate_ui(size, |ui| self.scene_list(ui, width));
     }

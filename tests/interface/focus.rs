@@ -25,7 +25,9 @@ fn focused(harness: &Harness<'_, App>) -> Option<String> {
 #[test]
 fn a_dialog_takes_the_focus_and_esc_gives_it_back_to_what_opened_it() {
     let mut harness = window();
-    for (openers, inside) in [(&["Keys"][..], "Close"), (&["Save", "Film…"], "Cancel"), (&["About"], "Close")] {
+    for (openers, inside) in
+        [(&["Keyboard shortcuts"][..], "Close"), (&["Save", "Film…"], "Cancel"), (&["About"], "Close")]
+    {
         for opener in openers {
             harness.get_by_role_and_label(Role::Button, opener).click();
             harness.run_steps(3);

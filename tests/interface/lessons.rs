@@ -275,7 +275,7 @@ fn a_presented_lesson_is_legible_from_the_last_row() {
         assert!(share >= 1.0 / 40.0 - 1e-6, "{style:?}: {share}");
     }
     // The line height has the same minimum.
-    let line = harness.get_by_label_contains("2 of 6").rect().height();
+    let line = harness.get_by_label("2 of 6").rect().height();
     assert!(line * zoom / WIDE[1] >= 1.0 / 40.0, "{line}");
     press(&mut harness, Key::PageDown);
     assert_eq!(step(&harness), 2);

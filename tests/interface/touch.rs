@@ -300,7 +300,7 @@ fn controls_and_bench_keep_their_scroll_positions() {
     harness.run();
     let scrolled = top(&harness);
     assert!(first - scrolled > 40.0, "{first} {scrolled}");
-    click(&mut harness, "Bench");
+    click(&mut harness, "Experiments");
     harness.run();
     let bench = rect(&harness, Role::Button, "What play costs").top();
     assert!(bench > scrolled, "the bench begins at its top: {bench}");
