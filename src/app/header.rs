@@ -15,6 +15,9 @@ use super::{cards, layout, spoken};
 /// Window width from which the header shows the program's name, points.
 const MIN_WIDTH_WITH_NAME: f32 = 900.0;
 
+/// Window width from which the list of scenes has its full width, points.
+const MIN_WIDTH_WITH_TITLES: f32 = 1080.0;
+
 /// Room in a small header for its menu and the lessons, points.
 const MIN_WIDTH_WITH_LESSONS: f32 = 150.0;
 
@@ -109,7 +112,7 @@ impl Header<'_> {
     }
 
     fn scene_box(&mut self, ui: &mut Ui, compact: bool) {
-        let is_narrow = ui.ctx().content_rect().width() < MIN_WIDTH_WITH_NAME;
+        let is_narrow = ui.ctx().content_rect().width() < MIN_WIDTH_WITH_TITLES;
         let width = match (compact, is_narrow) {
             (true, _) => 190.0_f32.min(ui.available_width() - 90.0),
             (false, true) => 150.0,

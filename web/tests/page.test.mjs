@@ -36,7 +36,7 @@ function recordShaders() {
 for (const backend of ['webgl', 'webgpu']) {
     test(`${backend}: the page shows the same picture as the native window`, async (t) => {
         const frames = nativeFrames();
-        const lab = await open('play=0&theme=light', { backend, picture: true, before: recordShaders });
+        const lab = await open('scene=spcmm&play=0&theme=light', { backend, picture: true, before: recordShaders });
         const { renderer } = await lab.state();
         assert.match(renderer, backend === 'webgl' ? /^gl / : /^webgpu\b(?!.*\(\))/i);
         const start = await lab.pixels();

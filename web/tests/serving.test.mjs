@@ -208,6 +208,8 @@ test('on a page that other devices can reach, the menu shows the link as a QR co
         const lab = await open('scene=pendulum&c=0.5mm&play=0', { at, backend: 'webgl' });
         await lab.click('Button', 'Save');
         await lab.click('Button', 'QR code');
+        // The dialog takes its place in the middle once it knows the size of the code.
+        await lab.frame(4);
         const { rect: [x0, y0, x1, y1] } = await lab.find('Image', 'QR code of the link');
         await lab.draw();
         const picture = await lab.pixels({ x: Math.round(x0), y: Math.round(y0), width: Math.round(x1 - x0), height: Math.round(y1 - y0) });
