@@ -35,7 +35,8 @@ pub static SCENES: LazyLock<Vec<SceneCard>> = LazyLock::new(|| {
 impl SceneCard {
     /// Draws it: picture, title, and the sentence below it.
     pub fn ui(&self, ui: &mut Ui, picture: Atom<'_>, chosen: bool, width: f32) -> Response {
-        let response = card(ui, picture, [&self.title, &self.sentence, ""], chosen, width).on_hover_text(self.name);
+        let help = format!("`{}` on the command line", self.name);
+        let response = card(ui, picture, [&self.title, &self.sentence, ""], chosen, width).on_hover_text(help);
         let id = response.id;
         let response = response.accessible_name(self.name);
         ui.ctx().accesskit_node_builder(id, |node| node.set_description(&*self.title));

@@ -17,9 +17,9 @@ use super::pull::Grip;
 use super::{ghosts, keys, opening, spoken, value, zoom};
 use crate::machine::Vec3 as Exact;
 use crate::render;
-use crate::scene::Scene;
+use crate::session::expected::ExpectedMotion;
 use crate::session::link::CameraPose;
-use crate::simulate::{ContactMode, Frame, Pull, Simulation, closed};
+use crate::simulate::{ContactMode, Pull};
 use crate::view::{
     Camera, Cloud, DrawList, MARK_DURATION, PeakMarks, Preset, Quality, Scaling, ScenePart, SceneView, Shot, Swept,
     Theme, ViewOptions, WearMap, to_f32,
@@ -33,12 +33,7 @@ const MAX_CAMERA_DISTANCE: f32 = 30.0;
 
 /// Distance of the camera at the first visit relative to that of a close-up.
 const NEARER: f32 = 0.62;
-/// The expected motion: instants of a turn, most steps, tolerance of their method, most bodies and joints, and greatest distance from
-/// the machine in its radii.
-const EXPECTED_INSTANTS: u32 = 48;
-const MAX_EXPECTED_STEPS: u32 = 3000;
-const EXPECTED_TOLERANCE: f64 = 1e-5;
-const MAX_EXPECTED_PARTS: usize = 60;
+/// Greatest distance of the expected motion from the machine, in its radii.
 const MAX_EXPECTED_DISTANCE: f32 = 4.0;
 
 /// A touch that stays this long, s, within this distance, points, grips the body under it.
@@ -94,8 +89,7 @@ pub struct Viewport {
     trail: Vec<Vec3>,
     /// Where the machine was, and where it is expected during the next turn of its drives.
     motion: Swept,
-    /// Changes of the scene for which the expected motion is known.
-    expected_for: Option<Vec<(String, String)>>,
+    expected: ExpectedMotion,
     followed: Option<ScenePart>,
     time: f64,
     /// Whether the user has changed the view from the scene's initial one.
@@ -152,7 +146,7 @@ impl Viewport {
             second: <_>::default(),
             trail: Vec::new(),
             motion: Swept::default(),
-            expected_for: None,
+            expected: ExpectedMotion::default(),
             followed: None,
             time: player.pacer.shown(),
             moved: false,
@@ -283,7 +277,7 @@ impl Viewport {
     pub fn restart(&mut self, player: &Player) {
         self.view = SceneView::new(player.running(), player.frame());
         self.clear_history(player);
-        (self.motion, self.expected_for) = (Swept::default(), None);
+        (self.motion, self.expected) = (Swept::default(), ExpectedMotion::default());
         self.followed = None;
     }
 
@@ -958,14 +952,13 @@ impl Viewport {
     /// Adds where the machine will be during a turn of its drives, as it moves without play.
     fn expect_motion(&mut self, player: &Player) {
         let scene = player.running();
-        if self.expected_for.as_ref() == Some(&scene.changes) {
+        let Some(frames) = self.expected.of(&scene.machine, opening::viewing_period(scene)) else {
             return;
-        }
-        self.expected_for = Some(scene.changes.clone());
+        };
         let farthest = MAX_EXPECTED_DISTANCE * self.view.bounds().radius;
         let centre = self.view.bounds().centre;
         let mut solids = Swept::default();
-        for frame in expected_motion(scene) {
+        for frame in frames {
             self.view.add_motion(&mut solids, scene, &frame, &self.options);
         }
         // What flies or runs away is not followed so far.
@@ -984,34 +977,6 @@ impl Viewport {
         }
         self.trail.push(to_f32(&(body.position + body.rotation * probe)));
     }
-}
-
-/// Instants of a turn of the drives of `scene`, as it moves with its joints closed; as many as can be computed at once.
-fn expected_motion(scene: &Scene) -> Vec<Frame> {
-    if scene.machine.bodies.len() + scene.machine.loose_joints.len() > MAX_EXPECTED_PARTS {
-        return Vec::new();
-    }
-    let mut machine = closed(&scene.machine);
-    machine.solver.tolerance = EXPECTED_TOLERANCE;
-    let Ok(mut run) = Simulation::new(&machine) else {
-        return Vec::new();
-    };
-    let mut steps_left = MAX_EXPECTED_STEPS;
-    let turn = opening::viewing_period(scene);
-    let mut frames = Vec::new();
-    for k in 1..=EXPECTED_INSTANTS {
-        let time = turn * f64::from(k) / f64::from(EXPECTED_INSTANTS);
-        while run.time() < time {
-            steps_left -= 1;
-            if steps_left == 0 || run.step().is_err() {
-                return frames;
-            }
-        }
-        let mut frame = Frame::default();
-        run.sample(time, &mut frame);
-        frames.push(frame);
-    }
-    frames
 }
 
 /// Displays `next` in place of `list`, as a new picture.
@@ -1110,6 +1075,7 @@ mod tests {
 
     use super::*;
     use crate::app::theme;
+    use crate::scene::Scene;
     use crate::view::{Cover, LabelKind};
 
     /// A scene displayed in pictures of several sizes at once.

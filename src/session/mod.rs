@@ -4,6 +4,7 @@ pub mod advice;
 pub mod clock;
 mod companion;
 pub mod embedded;
+pub mod expected;
 pub mod goal;
 pub mod history;
 pub mod ideal;
