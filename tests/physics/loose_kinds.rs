@@ -574,11 +574,20 @@ fn impossible_dimensions_are_refused() {
     let length = |length: f64| LooseKind::Pin(Pin { length: Some(length), ..pin(EndsOn::Pin) });
     assert_eq!(fault(&|_| ()), None);
     assert!(matches!(fault(&|joint| joint.kind = length(0.0)), Some(LooseFault::Length { .. })));
-    assert!(matches!(fault(&|joint| joint.kind = length(9e-4)), Some(LooseFault::Play { what: "the length", .. })));
+    assert!(matches!(
+        fault(&|joint| joint.kind = length(9e-4)),
+        Some(LooseFault::Play { part: "a tenth of the length", .. })
+    ));
     assert!(matches!(
         fault(&|joint| joint.contact.clearance = 1.1e-3),
-        Some(LooseFault::Play { what: "the radius", .. })
+        Some(LooseFault::Play { part: "a tenth of the radius", .. })
     ));
+    let far = |joint: &mut LooseJoint| {
+        joint.kind = LooseKind::Pin(Pin { kept: true, ..pin(EndsOn::Pin) });
+        joint.contact.second_clearance = 6.1e-3;
+    };
+    assert!(matches!(fault(&far), Some(LooseFault::Play { part: "a quarter of the length", .. })));
+    assert_eq!(fault(&|joint| joint.contact.second_clearance = 1e-4), Some(LooseFault::SecondPlay));
     let centres = |joint: &mut LooseJoint| joint.contact.friction_velocity = FrictionVelocity::Centres;
     assert_eq!(fault(&centres), Some(LooseFault::FrictionVelocity));
     let block = Slide { half_length: 0.02, half_width: -0.01, half_height: None, corner_radius: 1e-3 };

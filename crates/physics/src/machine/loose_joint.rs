@@ -97,14 +97,14 @@ pub enum LooseFault {
         value: f64,
     },
     /// Play so large that the geometry, which is linear in it, is wrong.
-    #[error("the play, {play:e} m, is above a tenth of {what}, {of:e} m")]
+    #[error("the play, {play:e} m, is above {part}, {most:e} m")]
     Play {
         /// m.
         play: f64,
-        /// The dimension.
-        what: &'static str,
+        /// The part of a dimension that bounds it.
+        part: &'static str,
         /// m.
-        of: f64,
+        most: f64,
     },
     /// Play in a direction in which the joint has none to have.
     #[error(
@@ -126,30 +126,39 @@ impl LooseJoint {
             if value > 0.0 && value.is_finite() { Ok(()) } else { Err(LooseFault::Length { what, value }) }
         };
         let [radial, second] = self.contact.clearances();
-        let limit = |play: f64, what, of: f64| {
-            positive(what, of)?;
-            if play <= 0.1 * of { Ok(()) } else { Err(LooseFault::Play { play, what, of }) }
+        let limit = |play: f64, part, most: f64| {
+            if play <= most { Ok(()) } else { Err(LooseFault::Play { play, part, most }) }
         };
         match self.kind {
             LooseKind::Ball if second > 0.0 => return Err(LooseFault::SecondPlay),
             LooseKind::Ball => return Ok(()),
             LooseKind::Pin(Pin { length, kept, face_radius, .. }) => {
-                limit(radial, "the radius", self.contact.ball_radius)?;
-                length.map_or(Ok(()), |length| limit(radial, "the length", length))?;
+                positive("the radius", self.contact.ball_radius)?;
+                limit(radial, "a tenth of the radius", 0.1 * self.contact.ball_radius)?;
+                if let Some(length) = length {
+                    positive("the length", length)?;
+                    limit(radial, "a tenth of the length", 0.1 * length)?;
+                    // Farther out, the ends no longer face each other.
+                    limit(second, "a quarter of the length", 0.25 * length)?;
+                }
                 face_radius.map_or(Ok(()), |radius| positive("the radius of the faces", radius))?;
-                // A pin that may leave its bearing by a quarter of the length has no two ends to touch.
-                length.map_or(Ok(()), |length| limit(second, "two and a half lengths", 2.5 * length))?;
                 if second > 0.0 && !(kept && length.is_some()) {
                     return Err(LooseFault::SecondPlay);
                 }
             }
             LooseKind::Slide(Slide { half_length, half_width, half_height, corner_radius }) => {
-                limit(radial.max(second), "the half length", half_length)?;
-                limit(radial, "the half width", half_width)?;
-                half_height.map_or(Ok(()), |height| limit(second, "the half height", height))?;
+                positive("the half length", half_length)?;
+                positive("the half width", half_width)?;
                 positive("the corner radius", corner_radius)?;
-                if second > 0.0 && half_height.is_none() {
-                    return Err(LooseFault::SecondPlay);
+                limit(radial.max(second), "a tenth of the half length", 0.1 * half_length)?;
+                limit(radial, "a tenth of the half width", 0.1 * half_width)?;
+                match half_height {
+                    Some(height) => {
+                        positive("the half height", height)?;
+                        limit(second, "a tenth of the half height", 0.1 * height)?;
+                    }
+                    None if second > 0.0 => return Err(LooseFault::SecondPlay),
+                    None => {}
                 }
             }
         }
