@@ -261,7 +261,7 @@ impl Contacts {
         self.contacts[c].measure(motion);
     }
 
-    /// As [`Contact::reach`], of contact `c`.
+    /// The eccentricity of contact `c`, or across a plane its part beyond it, m.
     pub fn reach(&self, c: ContactId) -> Vec3 {
         self.contacts[c].reach()
     }
