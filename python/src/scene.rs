@@ -8,9 +8,7 @@ use std::time::{Duration, Instant};
 use jointplay_analysis::assembly::StartReport;
 use jointplay_analysis::ideal_fault::ideal_fault;
 use jointplay_physics::simulate::{ChannelInfo, Frame, Simulation, channels_of};
-use jointplay_scene::{
-    BENCHMARKS, BUILT_IN, Kind, LiveScene, Scene, SceneError, Texts, check_solver_changes, contact_parts,
-};
+use jointplay_scene::{BENCHMARKS, BUILT_IN, Kind, LiveScene, Scene, SceneError, Texts, check_solver_changes};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -130,9 +128,7 @@ impl PyScene {
     /// Keys of the parameters: those of the scene, then those of each ball joint.
     fn keys(&self) -> Vec<String> {
         let own = self.scene.parameters().into_iter().map(|parameter| parameter.key.to_owned());
-        let joints = self.scene.machine.loose_joints.iter();
-        let of_joints =
-            joints.flat_map(|joint| contact_parts().map(move |part| format!("joint.{}.{part}", joint.name)));
+        let of_joints = (0..self.scene.machine.loose_joints.len()).flat_map(|joint| self.scene.joint_keys(joint));
         own.chain(of_joints).collect()
     }
 

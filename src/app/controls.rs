@@ -114,7 +114,7 @@ impl Controls {
         let table = player.pending().parameters();
         ui.separator();
         self.accuracy_ui(ui, player, &table);
-        self.one_joint(ui, player, &table);
+        self.one_joint(ui, player);
         let mut groups: Vec<&'static str> = Vec::new();
         // The groups of the scene's author come first.
         let own = table.iter().filter(|p| p.scope == Scope::Own);
@@ -194,7 +194,7 @@ impl Controls {
     }
 
     /// Contact parameters of a ball joint, which override those of the scene.
-    fn one_joint(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
+    fn one_joint(&mut self, ui: &mut Ui, player: &mut Player) {
         let names: Vec<String> = player.pending().machine.loose_joints.iter().map(|j| j.name.clone()).collect();
         if names.is_empty() {
             return;
@@ -211,16 +211,17 @@ impl Controls {
                 ui.label("Joint");
                 layout::choice(ui, ["Joint", ""], None, &mut self.joint, 0..names.len(), |index| names[index].as_str());
             });
-            let joint = &names[self.joint];
-            for parameter in table.iter().filter(|p| p.scope == Scope::Contact) {
-                let last = parameter.key.rsplit('.').next().unwrap_or(parameter.key);
-                self.control(ui, player, parameter, &format!("joint.{joint}.{last}"));
+            let keys: Vec<String> = player.pending().joint_keys(self.joint).collect();
+            for key in keys {
+                if let Ok(parameter) = player.pending().parameter(&key) {
+                    self.control(ui, player, parameter, &key);
+                }
             }
         });
         if header.fully_open() {
             self.revealed = None;
         }
-        header.header_response.on_hover_text("Values of one ball joint only; they override those of the whole scene.");
+        header.header_response.on_hover_text("Values of one joint only; they override those of the whole scene.");
     }
 
     /// Control of a parameter under `key`, which may belong to a joint.
@@ -230,7 +231,9 @@ impl Controls {
             return;
         };
         let name = match key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
-            Some((joint, _)) => format!("{} of {joint}", parameter.label),
+            Some((joint, _)) => {
+                format!("{} of {}", parameter.label, joint.strip_suffix(".play").unwrap_or(joint))
+            }
             None => parameter.label.to_owned(),
         };
         let room = theme::side(ui, UNDO_SIDE)

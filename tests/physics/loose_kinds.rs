@@ -4,8 +4,8 @@
 use jointplay_physics::contact::{FrictionVelocity, NormalLaw, Parameters};
 use jointplay_physics::integrate::Method;
 use jointplay_physics::machine::{
-    Attachment, Body, Drive, Element, ElementKind, EndsOn, Formulation, Joint, JointFrame, JointStart, Load, LoadAxes,
-    LooseFault, LooseJoint, LooseKind, Machine, MachineFault, Mat3, Pin, Quat, Slide, StartRule, Vec3,
+    Attachment, Body, ContactFault, Drive, Element, ElementKind, EndsOn, Formulation, Joint, JointFrame, JointStart,
+    Load, LoadAxes, LooseFault, LooseJoint, LooseKind, Machine, MachineFault, Mat3, Pin, Quat, Slide, StartRule, Vec3,
 };
 use jointplay_physics::simulate::{Effect, Frame, Impact, Simulation};
 
@@ -57,7 +57,7 @@ fn accurately(mut machine: Machine) -> Machine {
 }
 
 /// Compares the first contacts with those of the independent program.
-fn compare(name: &str, machine: Machine, csv: &str, end: f64) {
+pub(super) fn compare(name: &str, machine: Machine, csv: &str, end: f64) {
     let mut reference = contacts(csv);
     reference.retain(|row| row[0] < end);
     for formulation in [Formulation::Tree, Formulation::Lagrange] {
@@ -99,7 +99,7 @@ fn thrown_pin(tilt: f64, pin: Pin) -> Machine {
 }
 
 fn pin(ends: EndsOn) -> Pin {
-    Pin { length: Some(0.024), ends, kept: false, face_radius: None }
+    Pin { length: Some(0.024), ends, kept: false, face_radius: None, travel: None }
 }
 
 #[test]
@@ -153,7 +153,8 @@ fn free_pair() -> Machine {
         thrown(1, at, Quat::identity(), Vec3::new(-0.13, 0.110_000_000_000_000_01, 0.34), Vec3::new(5.0, -5.5, 30.0)),
     );
     let contact = Parameters { clearance: 8e-5, friction: 0.2, ball_radius: 9e-3, ..Parameters::default() };
-    let kind = LooseKind::Pin(Pin { length: Some(0.02), ends: EndsOn::Pin, kept: false, face_radius: None });
+    let kind =
+        LooseKind::Pin(Pin { length: Some(0.02), ends: EndsOn::Pin, kept: false, face_radius: None, travel: None });
     let [carrier, carried] = [Attachment::on(housing, at), Attachment::on(body, Vec3::zeros())];
     machine.loose_joints.push(loose(kind, carrier, carried, upright(), contact));
     machine
@@ -242,7 +243,7 @@ fn a_free_pair_keeps_its_momentum() {
 
 #[test]
 fn a_pin_that_does_not_tilt_strikes_like_a_ball() {
-    let planar = Pin { length: None, ends: EndsOn::Bearing, kept: true, face_radius: None };
+    let planar = Pin { length: None, ends: EndsOn::Bearing, kept: true, face_radius: None, travel: None };
     let (pin, _) = impacts(&accurately(thrown_pin(0.0, planar)), 1e-3);
     assert_eq!(pin.len(), 1);
     assert!((pin[0].peak / (2.0 * 589.701_774_0) - 1.0).abs() < 1e-8, "{}", pin[0].peak);
@@ -320,7 +321,7 @@ fn crank_pin(friction: f64, kind: Pin) -> Machine {
 
 #[test]
 fn a_slider_crank_with_a_loose_crank_pin_agrees_with_an_independent_program() {
-    let long = Pin { length: Some(0.02), ends: EndsOn::Pin, kept: false, face_radius: None };
+    let long = Pin { length: Some(0.02), ends: EndsOn::Pin, kept: false, face_radius: None, travel: None };
     compare("c", crank_pin(0.1, long), include_str!("joints/c-contacts.csv"), 2e-3);
     compare("c_nofric", crank_pin(0.0, long), include_str!("joints/c_nofric-contacts.csv"), 2e-3);
 }
@@ -492,7 +493,7 @@ fn each_play_has_its_own_ramp_and_a_state_keeps_both() {
 
 #[test]
 fn every_method_steps_pins_and_slides() {
-    let long = Pin { length: Some(0.02), ends: EndsOn::Bearing, kept: true, face_radius: None };
+    let long = Pin { length: Some(0.02), ends: EndsOn::Bearing, kept: true, face_radius: None, travel: None };
     for (name, machine) in [("pin", crank_pin(0.1, long)), ("slide", flores().machine())] {
         let peak = |method: Method| {
             let mut machine = machine.clone();
@@ -516,7 +517,7 @@ fn every_method_steps_pins_and_slides() {
 
 #[test]
 fn without_play_they_are_the_ideal_joint() {
-    let long = Pin { length: Some(0.02), ends: EndsOn::Pin, kept: true, face_radius: None };
+    let long = Pin { length: Some(0.02), ends: EndsOn::Pin, kept: true, face_radius: None, travel: None };
     for (name, mut machine, end) in [("pin", crank_pin(0.0, long), 2e-3), ("slide", flores().machine(), 2e-3)] {
         machine.loose_joints.last_mut().unwrap().contact.clearance = 0.0;
         let (impacts, mut simulation) = impacts(&machine, end);
@@ -564,7 +565,7 @@ fn impossible_dimensions_are_refused() {
         let mut machine = thrown_pin(0.0, pin(EndsOn::Pin));
         change(&mut machine.loose_joints[0]);
         match machine.check() {
-            Err(MachineFault::Loose { joint, fault }) => {
+            Err(MachineFault::Contact { joint, fault: ContactFault::Loose(fault) }) => {
                 assert_eq!(joint, "J");
                 Some(fault)
             }
@@ -587,7 +588,10 @@ fn impossible_dimensions_are_refused() {
         joint.contact.second_clearance = 6.1e-3;
     };
     assert!(matches!(fault(&far), Some(LooseFault::Play { part: "a quarter of the length", .. })));
-    assert_eq!(fault(&|joint| joint.contact.second_clearance = 1e-4), Some(LooseFault::SecondPlay));
+    assert_eq!(
+        fault(&|joint| joint.contact.second_clearance = 1e-4),
+        Some(LooseFault::SecondPlay { key: "play.axial" })
+    );
     let centres = |joint: &mut LooseJoint| joint.contact.friction_velocity = FrictionVelocity::Centres;
     assert_eq!(fault(&centres), Some(LooseFault::FrictionVelocity));
     let block = Slide { half_length: 0.02, half_width: -0.01, half_height: None, corner_radius: 1e-3 };

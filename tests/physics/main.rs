@@ -44,6 +44,7 @@ mod live_changes;
 mod loads;
 mod loop_joints;
 mod loose_kinds;
+mod loose_scenes;
 mod machines;
 mod many_joints;
 mod massless;

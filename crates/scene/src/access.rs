@@ -6,10 +6,10 @@ use super::field::Access;
 use super::model::AsRead;
 use super::numbers::row_of_number;
 use super::read::{changes_of_text, is_fixed_in_file, replaces_text};
-use super::table::{contact_part, contact_rows, find, joint_part};
+use super::table::{contact_part, find, joint_part};
 use super::*;
 use jointplay_physics::integrate::StepControl;
-use jointplay_physics::machine::Solver;
+use jointplay_physics::machine::{LooseKind, Slide, Solver};
 use jointplay_physics::suggest::{did_you_mean, nearest, nearest_name};
 use std::sync::Arc;
 
@@ -41,17 +41,26 @@ pub fn check_solver_changes(changes: &[(String, String)]) -> Result<(), SceneErr
 struct Resolved {
     parameter: &'static Parameter,
     joint: Option<usize>,
-}
-
-/// Last parts of the keys of contact parameters, which every ball joint has: `clearance` of `joint.S1.clearance`.
-pub fn contact_parts() -> impl Iterator<Item = &'static str> {
-    contact_rows().map(|(part, _)| part)
+    /// The key, as changes have it.
+    key: Option<String>,
 }
 
 impl Scene {
     /// Keys (without prefix) in which ball joint `joint` differs from the scene's `contact.*`.
     pub fn overrides(&self, joint: usize) -> &[&'static str] {
         &self.overrides[joint]
+    }
+
+    /// Keys of the parameters of joint with play `joint`.
+    pub fn joint_keys(&self, joint: usize) -> impl Iterator<Item = String> + '_ {
+        let joint = &self.machine.loose_joints[joint];
+        play::parts_of(joint).map(|part| format!("joint.{}.{part}", joint.name))
+    }
+
+    /// Key of the contact parameter `part` of joint with play `joint`: `joint.J.play.radial` for the clearance of a pin.
+    pub(super) fn joint_key(&self, joint: usize, part: &str) -> String {
+        let joint = &self.machine.loose_joints[joint];
+        format!("joint.{}.{}", joint.name, play::own_part(&joint.kind, part))
     }
 
     /// Parameters of this scene in table order, then user-defined ones; a contact row also stands for `joint.<name>.<key>`.
@@ -71,13 +80,31 @@ impl Scene {
 
     fn lookup(&self, key: &str) -> Option<Resolved> {
         if let Some(parameter) = self.number(key) {
-            return Some(Resolved { parameter, joint: None });
+            return Some(Resolved { parameter, joint: None, key: None });
         }
         let Some((name, part)) = joint_part(key) else {
-            return Some(Resolved { parameter: find(key)?, joint: None });
+            let parameter = find(key).filter(|parameter| parameter.scope != Scope::Joint)?;
+            return Some(Resolved { parameter, joint: None, key: None });
         };
-        let joint = self.machine.loose_joints.iter().position(|joint| joint.name == name)?;
-        Some(Resolved { parameter: find(&format!("contact.{part}"))?, joint: Some(joint) })
+        let (joint, part) = self.loose_joint(name, part)?;
+        let (parameter, part) = play::parameter_of(&self.machine.loose_joints[joint], &part)?;
+        let key = format!("joint.{}.{part}", self.machine.loose_joints[joint].name);
+        Some(Resolved { parameter, joint: Some(joint), key: Some(key) })
+    }
+
+    /// The joint with play of a key, and what follows its name in it.
+    pub(super) fn loose_joint_of(&self, key: &str) -> Option<(&LooseJoint, String)> {
+        let (name, part) = joint_part(key)?;
+        let (joint, part) = self.loose_joint(name, part)?;
+        Some((&self.machine.loose_joints[joint], part))
+    }
+
+    /// The joint with play to which the last parts of a key belong, with what follows its name: `play.radial` of `J.play` and
+    /// `radial`.
+    fn loose_joint(&self, name: &str, part: &str) -> Option<(usize, String)> {
+        let named = |name: &str| self.machine.loose_joints.iter().position(|joint| joint.name == name);
+        let with_table = || Some((named(name.strip_suffix(".play")?)?, format!("play.{part}")));
+        named(name).map(|joint| (joint, part.to_owned())).or_else(with_table)
     }
 
     fn resolve(&self, key: &str) -> Result<Resolved, SceneError> {
@@ -97,12 +124,15 @@ impl Scene {
             let near = nearest_parameter(key, table.chain(numbers.take(MAX_CHANGES)), &[]);
             return format!("unknown key{near}");
         };
-        let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
         let balls = &self.machine.loose_joints;
-        if balls.iter().any(|joint| joint.name == name) {
-            let near = nearest_name(part, parts.iter().copied()).map(|near| format!("joint.{name}.{near}"));
+        if let Some((joint, part)) = self.loose_joint(name, part) {
+            let joint = &balls[joint];
+            let of_play = play::own_part(&joint.kind, &part);
+            let near = if of_play == part { nearest_name(&part, play::parts_of(joint)) } else { Some(of_play) };
+            let near = near.map(|near| format!("joint.{}.{near}", joint.name));
             return format!("unknown key{}", did_you_mean(near.as_deref()));
         }
+        let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
         // The name of a joint in an included file has dots.
         let matches_start = |joint: &&Joint| {
             name.strip_prefix(&*joint.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
@@ -129,7 +159,7 @@ impl Scene {
     /// # Errors
     /// A key this scene does not have; the error suggests the nearest one.
     pub fn get(&self, key: &str) -> Result<Value, SceneError> {
-        let Resolved { parameter, joint } = self.resolve(key)?;
+        let Resolved { parameter, joint, .. } = self.resolve(key)?;
         Ok(match parameter.access {
             Access::Contact(field) => {
                 let own = joint.map(|joint| &self.machine.loose_joints[joint].contact);
@@ -137,6 +167,7 @@ impl Scene {
             }
             Access::Machine(field) => (field.get)(&self.machine),
             Access::View(field) => (field.get)(&self.view),
+            Access::Joint(get) => joint.map_or(Value::Unset, |joint| get(&self.machine.loose_joints[joint])),
             Access::Number => {
                 let number = self.source.numbers.get(key);
                 number.map_or(Value::Unset, |number| parameter.kind.value_of(number.value))
@@ -235,13 +266,19 @@ impl Scene {
         if !self.changes.iter().any(|(changed, _)| changed == key) {
             return self.get(key).ok();
         }
-        let Resolved { parameter, joint } = self.lookup(key)?;
+        let Resolved { parameter, joint, .. } = self.lookup(key)?;
         let is_own = |part: &str| {
             let joint = text.lookup(key).and_then(|resolved| resolved.joint);
             joint.is_some_and(|joint| text.overrides[joint].contains(&part))
         };
         if joint.is_some() && !contact_part(parameter).is_some_and(is_own) {
-            return self.get(parameter.key).ok();
+            return match (parameter.scope, contact_part(parameter)) {
+                // Nothing moves along the axis of a pin that does not say so.
+                (Scope::Joint, Some("second_clearance")) if parameter.key == "play.axial" => Some(Value::Number(0.0)),
+                (Scope::Joint, Some("second_clearance")) => self.get("contact.clearance").ok(),
+                (Scope::Joint, Some(part)) => self.get(&format!("contact.{part}")).ok(),
+                _ => self.get(parameter.key).ok(),
+            };
         }
         if let (true, Some(preset)) = (SOLVER_KEYS.contains(&key), text.machine.solver.preset) {
             if sets_solver(&self.changes).any(|changed| changed != key) {
@@ -307,10 +344,11 @@ impl Scene {
     /// Applies and records one change, without the checks across parameters.
     pub(super) fn change(&mut self, key: &str, text: &str) -> Result<&'static Parameter, SceneError> {
         let text = text.trim();
-        let Resolved { parameter, joint } = self.resolve(key).map_err(|mut error| {
+        let Resolved { parameter, joint, key: own } = self.resolve(key).map_err(|mut error| {
             error.value = Some(text.into());
             error
         })?;
+        let key = own.as_deref().unwrap_or(key);
         let value = parameter.read(text).map_err(|error| SceneError::about(key, Some(text), error.to_string()))?;
         match (parameter.access, joint) {
             (Access::Contact(field), Some(joint)) => {
@@ -364,13 +402,22 @@ impl Scene {
                 (field.set)(&mut machine.contact, value);
                 let part = contact_part(parameter).unwrap_or_default();
                 let joints = machine.loose_joints.iter_mut().zip(&*self.overrides);
-                for (joint, _) in joints.filter(|(_, overrides)| !overrides.contains(&part)) {
-                    (field.set)(&mut joint.contact, value);
+                for (joint, overrides) in joints {
+                    let [follows, follows_second] = [part, "second_clearance"].map(|own| !overrides.contains(&own));
+                    // Of other joints only the velocity of the surfaces has a meaning.
+                    let has = joint.kind == LooseKind::Ball || part != "friction_velocity";
+                    if follows && has {
+                        (field.set)(&mut joint.contact, value);
+                    }
+                    let spatial = matches!(joint.kind, LooseKind::Slide(Slide { half_height: Some(_), .. }));
+                    if part == "clearance" && spatial && follows_second {
+                        joint.contact.second_clearance = machine.contact.clearance;
+                    }
                 }
             }
             Access::Machine(field) => (field.set)(self.machine_mut(), value),
             Access::View(field) => (field.set)(&mut self.view, value),
-            Access::Number => {}
+            Access::Number | Access::Joint(_) => {}
         }
     }
 }

@@ -76,9 +76,10 @@ impl Scene {
 impl Scene {
     /// Keys that could be at fault, most likely first.
     pub(super) fn keys_of(&self, conflict: &ContactConflict) -> Vec<String> {
-        let key = |part| match conflict.joint {
-            Some(joint) if self.overrides[joint].contains(&part) => {
-                format!("joint.{}.{part}", self.machine.loose_joints[joint].name)
+        let key = |part: &'static str| match conflict.joint {
+            _ if part == "start" => part.to_owned(),
+            Some(joint) if part.starts_with("play") || self.overrides[joint].contains(&part) => {
+                self.joint_key(joint, part)
             }
             _ => format!("contact.{part}"),
         };
@@ -91,7 +92,7 @@ impl Scene {
     fn conflict_text(&self, conflict: &ContactConflict, key: &str) -> String {
         match conflict.joint.map(|index| &self.machine.loose_joints[index].name) {
             Some(name) if !key.starts_with("joint.") => {
-                format!("{} (in ball joint {name})", conflict.fault)
+                format!("{} (in joint {name})", conflict.fault)
             }
             _ => conflict.fault.to_string(),
         }

@@ -311,7 +311,9 @@ impl<'d> Node<'d> {
 
     /// A boolean.
     pub fn flag(&self) -> Result<bool, SceneError> {
-        self.value.get_ref().as_bool().ok_or_else(|| self.wrong_type("true or false"))
+        // A change is a text.
+        let changed = self.value.get_ref().as_str().filter(|_| self.changed).and_then(|text| text.parse().ok());
+        self.value.get_ref().as_bool().or(changed).ok_or_else(|| self.wrong_type("true or false"))
     }
 
     /// A finite quantity, SI: a number with its unit, or an expression. It is recorded as a number of the scene under this key.

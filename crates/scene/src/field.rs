@@ -3,7 +3,7 @@
 use super::ViewSettings;
 use super::value::Value;
 use jointplay_physics::contact;
-use jointplay_physics::machine::Machine;
+use jointplay_physics::machine::{LooseJoint, Machine};
 use jointplay_physics::words::Words;
 
 /// Reads and writes one field of a `T`. Values written have already passed the row's range check.
@@ -33,6 +33,8 @@ pub enum Access {
     View(Field<ViewSettings>),
     /// In the scene's text; a change reads the scene again.
     Number,
+    /// In the scene's text, as part of a joint with play.
+    Joint(fn(&LooseJoint) -> Value),
 }
 
 /// A type that a field can hold.

@@ -8,6 +8,7 @@ use super::drives::DRIVE;
 use super::elements::ELEMENTS;
 use super::key::{FileKey, FileTable, ListLimit, ValueType, Variants, at_most, key, number, positive, vector};
 use super::placement::{ATTACHMENT, ROTATION};
+use super::play::{DISPLACEMENT, TABLES as PLAY};
 use super::read_bodies::{Form, MAX_DENSITY, MAX_MASS};
 use super::table::{contact_rows, find};
 use super::*;
@@ -372,15 +373,16 @@ fn of_shape(name: &'static str, head: &'static str, help: &'static str) -> FileT
 static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
     const MOVES: &[&str] = &["prismatic", "revolute"];
     const TURNS: &[&str] = &["prismatic", "revolute", "cylindrical", "universal"];
-    const PLACED: &[&str] = &["fixed", "prismatic", "revolute", "cylindrical", "universal"];
-    let keys = [
+    const PLACED: &[&str] = &["fixed", "prismatic", "revolute", "cylindrical", "universal", "spherical"];
+    const LOOSE: &[&str] = &["prismatic", "revolute", "cylindrical", "spherical"];
+    let own = [
         key("name", ValueType::Name, "\"P1\"", "its name, different from those of force elements"),
         key(
             "kind",
-            ValueType::Word(JointKind::WORDS),
+            ValueType::Word(JOINT_KINDS),
             "\"revolute\"",
             "how it moves, in this order: not at all, along `axis`, about `axis`, in every way, along and about \
-             `axis`, about two axes",
+             `axis`, about two axes, about its point in every way",
         ),
         key("parent", ValueType::Body, "\"world\"", "the body that carries it").default_text("the world"),
         key("child", ValueType::Body, "\"rod\"", "the body that it carries; each body is carried by exactly one joint"),
@@ -472,6 +474,10 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         )
         .of(&["universal"])
         .default_text("0, at rest"),
+        key("start", ValueType::Table(&SPHERICAL_START), "{ tilt = \"0 10 0 deg\" }", "where the child starts")
+            .of(&["spherical"])
+            .default_text("0, at rest"),
+        opening().of(&["spherical"]),
         key(
             "drawn",
             ValueType::Flag,
@@ -489,35 +495,53 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         )
         .default_text("false"),
     ];
-    FileTable::new("joint", "[[joint]]", "a joint that carries a body", keys.to_vec().leak())
+    let play = PLAY.iter().map(|(kind, table)| {
+        let example = match *kind {
+            "prismatic" => "{ y = \"0.1 mm\", half_length = \"25 mm\", half_y = \"20 mm\", planar = true }",
+            "spherical" => "{ radial = \"0.1 mm\", radius = \"10 mm\" }",
+            _ => "{ radial = \"0.1 mm\", length = \"24 mm\", radius = \"10 mm\" }",
+        };
+        key("play", ValueType::Table(table), example, table.help)
+            .of(std::slice::from_ref(kind))
+            .default_text("none: it is ideal")
+    });
+    let contact = contact_keys().into_iter().filter(|key| !["clearance", "ball_radius"].contains(&key.name));
+    let contact = contact.map(|key| key.of(LOOSE));
+    let keys: Vec<FileKey> = own.into_iter().chain(play).chain(contact).collect();
+    FileTable::new("joint", "[[joint]]", "a joint that carries a body", keys.leak())
         .by(Variants::Word("kind", "{} joint"))
 });
 
-static START: FileTable = FileTable::new(
-    "start",
-    "`start` of a slide or a hinge",
-    "where it starts",
-    &[
+/// Kinds of `[[joint]]`: those of tree joints, and the ball joint, which is always cut.
+const JOINT_KINDS: &[&str] = &["fixed", "prismatic", "revolute", "free", "cylindrical", "universal", "spherical"];
+
+static START: LazyLock<FileTable> = LazyLock::new(|| {
+    let own = [
         key("position", number(D::Length), "\"10 mm\"", "its coordinate")
             .on_hinge(D::Angle, "\"10 deg\"")
             .default_zero(),
         key("velocity", number(D::Speed), "\"10 mm/s\"", "its rate")
             .on_hinge(D::AngularSpeed, "\"6 rad/s\"")
             .default_zero(),
-    ],
-);
+    ];
+    let help = "where it starts; with play, also how far off its place without play";
+    FileTable::new("start", "`start` of a slide or a hinge", help, concatenated(&[&own, &DISPLACEMENT]))
+});
 
-static CYLINDRICAL_START: FileTable = FileTable::new(
-    "cylindrical_start",
-    "start of a cylindrical joint",
-    "where it starts, along its axis and about it",
-    &[
+static SPHERICAL_START: FileTable =
+    FileTable::new("spherical_start", "start of a spherical joint", "where the ball starts", &DISPLACEMENT);
+
+static CYLINDRICAL_START: LazyLock<FileTable> = LazyLock::new(|| {
+    let own = [
         key("position", number(D::Length), "\"10 mm\"", "along it").default_zero(),
         key("angle", number(D::Angle), "\"30 deg\"", "about it").default_zero(),
         key("velocity", number(D::Speed), "\"10 mm/s\"", "along it").default_zero(),
         key("angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about it").default_zero(),
-    ],
-);
+    ];
+    let help = "where it starts, along its axis and about it; with play, also how far off its place without play";
+    let keys = concatenated(&[&own, &DISPLACEMENT]);
+    FileTable::new("cylindrical_start", "start of a cylindrical joint", help, keys)
+});
 
 /// Row of the drive of one of two coordinates.
 fn motion(freedom: Freedom, example: &'static str, help: &'static str) -> FileKey {
@@ -586,6 +610,14 @@ static FREE_START: FileTable = FileTable::new(
     ],
 );
 
+/// Row of the side on which a socket is drawn open.
+fn opening() -> FileKey {
+    let help = "side on which the socket is drawn open; no effect on the motion";
+    key("opening", ValueType::Direction, "[0, 0, 1]", help)
+        .default_text("`view.down`")
+        .frame("that of the socket's body")
+}
+
 static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
     let end = |name, help| {
         let example = "{ body = \"rod\", at = \"0 0 100 mm\" }";
@@ -595,14 +627,7 @@ static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         key("name", ValueType::Name, "\"S1\"", "its name, different from those of other joints"),
         end("socket", "the socket's centre"),
         end("ball", "the ball's centre, on another body"),
-        key(
-            "opening",
-            ValueType::Direction,
-            "[0, 0, 1]",
-            "side on which the socket is drawn open; no effect on the motion",
-        )
-        .default_text("`view.down`")
-        .frame("that of the socket's body"),
+        opening(),
     ];
     FileTable::new(
         "ball_joint",

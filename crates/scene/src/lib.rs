@@ -55,6 +55,7 @@ mod numbers;
 mod parameters;
 mod pattern;
 mod placement;
+mod play;
 mod points;
 mod provenance;
 mod quantity;
@@ -71,7 +72,7 @@ mod value;
 mod visible;
 mod write;
 
-pub use access::{check_solver_changes, contact_parts};
+pub use access::check_solver_changes;
 pub use assets::{MAX_FILE_SIZE, MAX_MESH_SIZE, file_bytes, max_file_size};
 pub use drives::{DRIVE_LAWS, DriveLaw};
 pub use elements::is_element;

@@ -52,6 +52,8 @@ pub enum Scope {
     Every,
     /// In every scene, and as `joint.<name>.<last part>` for one joint.
     Contact,
+    /// Only as `joint.<name>.<key>`, for a joint of a kind that has it.
+    Joint,
     /// Only in the scene whose file defines it.
     Own,
 }
@@ -62,6 +64,7 @@ impl Scope {
         match self {
             Self::Every => "every scene",
             Self::Contact => "every scene; also `joint.<name>.<key>` for one ball joint",
+            Self::Joint => "`joint.<name>.<key>` for one joint with a table `play`",
             Self::Own => "scenes whose file gives it",
         }
     }

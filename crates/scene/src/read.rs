@@ -6,12 +6,14 @@ use super::closed_form::read_closed_form;
 use super::document::{Document, Node, Section, lists};
 use super::elements::{ELEMENTS, read_element};
 use super::error::{no_ball_joint, no_body};
+use super::field::Access;
 use super::format::FILE;
 use super::include::{self, read_includes};
 use super::instance::{Group, Instance};
 use super::model::AsRead;
 use super::pattern::{Pattern, read_patterns};
 use super::placement::read_placement;
+use super::play::{loose_joint, own_part, place_cut_bodies};
 use super::read_bodies::{read_body, read_shape};
 use super::read_joints::{JointText, LooseJointText, read_ball_joint, read_joint, read_own_contact, sort_forest};
 use super::reading::Reading;
@@ -177,7 +179,11 @@ fn read_scene_instance<'d>(top: &Section<'_>) -> Result<Option<Instance<'d>>, Sc
 /// Whether a change of a key replaces a value of the text, which is read again: a number of the text, or the parameter that places
 /// bodies. Other parameters of the table are changed in the machine.
 pub(super) fn replaces_text(key: &str) -> bool {
-    let in_table = |(_, part): (&str, &str)| find(&format!("contact.{part}")).is_some();
+    let is_live = |key: String| find(&key).is_some_and(|row| matches!(row.access, Access::Contact(_)));
+    let in_table = |(name, part): (&str, &str)| {
+        let of_play = name.ends_with(".play") && is_live(format!("play.{part}"));
+        of_play || is_live(format!("contact.{part}"))
+    };
     find(key).is_none() && !joint_part(key).is_some_and(in_table) && !is_fixed_in_file(key)
 }
 
@@ -331,18 +337,35 @@ fn read_mechanism<'d>(
         }
         joints.push(joint);
     }
-    let (closing, joints): (Vec<_>, Vec<_>) = joints.into_iter().partition(|text| text.closes_loop);
+    let tree: Vec<&JointText<'_>> = joints.iter().filter(|text| !text.closes_loop).collect();
     let machine = scene.machine_mut();
-    (machine.bodies, machine.joints) = sort_forest(bodies, joints, &body_sections)?;
+    (machine.bodies, machine.joints) = sort_forest(bodies, &tree, &body_sections)?;
     let by_name = indices_by_name(&scene.machine.bodies);
-    for JointText { joint, .. } in closing {
+    let gives_speed = places.contains_key("contact.approach_speed");
+    let mut add_loose = |scene: &mut Scene, joint: LooseJoint, own: BTreeMap<&'static str, Node<'d>>| {
+        Arc::make_mut(&mut scene.overrides).push(own.keys().copied().collect());
+        let key = |part| format!("joint.{}.{}", joint.name, own_part(&joint.kind, part));
+        places.extend(own.into_iter().map(|(part, node)| (key(part), node)));
+        scene.machine_mut().loose_joints.push(joint);
+    };
+    let mut displaced = BTreeMap::new();
+    for text in &joints {
         let sorted = |body: usize| by_name[&file_order[body]];
-        scene.machine_mut().closing_joints.push(Joint {
-            parent: joint.parent.map(sorted),
-            child: sorted(joint.child),
-            ..joint
-        });
+        let (parent, child) = (text.joint.parent.map(sorted), sorted(text.joint.child));
+        let joint = Joint { parent, child, ..text.joint.clone() };
+        match &text.play {
+            Some(play) => {
+                let (loose, own) = loose_joint(&joint, (&text.section, play), scene, gives_speed)?;
+                add_loose(scene, loose, own);
+                if !text.closes_loop {
+                    displaced.insert(child, play.displaced);
+                }
+            }
+            None if text.closes_loop => scene.machine_mut().closing_joints.push(joint),
+            None => {}
+        }
     }
+    place_cut_bodies(scene.machine_mut(), &displaced);
     for node in list("ball_joint")? {
         let LooseJointText { joint, section, places: own } = read_ball_joint(&node, scene, &by_name)?;
         joint_names.add(&section, "joint", &joint.name)?;
@@ -350,9 +373,7 @@ fn read_mechanism<'d>(
         if section.document.include.is_none() {
             Arc::make_mut(&mut scene.source).places.insert(title, section.offset());
         }
-        Arc::make_mut(&mut scene.overrides).push(own.keys().copied().collect());
-        places.extend(own.into_iter().map(|(part, node)| (format!("joint.{}.{part}", joint.name), node)));
-        scene.machine_mut().loose_joints.push(joint);
+        add_loose(scene, joint, own);
     }
     for node in list("fixed_shape")? {
         let shape = read_shape(&node, true)?;
@@ -401,7 +422,7 @@ fn read_joint_contacts<'d>(top: &Section<'d>, scene: &mut Scene, places: &mut Pl
         };
         for (part, node) in read_own_contact(&section, &mut joints[index])? {
             scene.add_override(index, part);
-            places.insert(format!("joint.{name}.{part}"), node);
+            places.insert(scene.joint_key(index, part), node);
         }
     }
     Ok(())

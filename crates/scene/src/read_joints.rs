@@ -5,13 +5,15 @@ use super::drives::read_drive;
 use super::error::no_body;
 use super::instance::Instance;
 use super::placement::{read_attachment, read_rotation};
+use super::play::{PlayText, read_play};
 use super::table::contact_rows;
 use super::*;
 use jointplay_physics::suggest::nearest;
+use jointplay_physics::words::Words;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Tolerance on the cosine of the angle between the axes of a universal joint: axes are typed with few digits.
-const SQUARE: f64 = 1e-4;
+pub(super) const SQUARE: f64 = 1e-4;
 
 /// A joint whose bodies are still indices in file order.
 pub(super) struct JointText<'d> {
@@ -21,6 +23,8 @@ pub(super) struct JointText<'d> {
     pub joint: Joint,
     /// Whether it closes a loop: its child hangs on another joint.
     pub closes_loop: bool,
+    /// Its play, if it has any: it is then cut.
+    pub play: Option<PlayText<'d>>,
 }
 
 /// A ball joint with the positions of its contact keys.
@@ -38,7 +42,9 @@ pub(super) fn read_joint<'d>(
 ) -> Result<JointText<'d>, SceneError> {
     let section = node.section_as(node.title("joint"))?;
     let name = section.require("name")?.name()?.into_owned();
-    let kind: JointKind = section.require("kind")?.word()?;
+    // Where it starts, a ball joint is as if fixed.
+    let kind = JointKind::of_word(section.require("kind")?.choice()?).unwrap_or(JointKind::Fixed);
+    let play = read_play(&section)?;
     let child_node = section.require("child")?;
     let place = |node: &Node<'_>, also| {
         let name = &*node.body()?;
@@ -88,7 +94,7 @@ pub(super) fn read_joint<'d>(
             place_child_side(&mut joint, instance, &bodies[child]);
         }
     }
-    Ok(JointText { name, section, joint, closes_loop })
+    Ok(JointText { name, section, joint, closes_loop, play })
 }
 
 /// Checks the keys of a loop-closing joint.
@@ -213,13 +219,13 @@ fn read_two_degrees(section: &Section<'_>, joint: &mut Joint) -> Result<(), Scen
 /// Sorts bodies parents first, otherwise in file order, and joints in the same order with `parent` and `child` renumbered.
 pub(super) fn sort_forest(
     bodies: Vec<Body>,
-    joints: Vec<JointText<'_>>,
+    joints: &[&JointText<'_>],
     sections: &[Section<'_>],
 ) -> Result<(Vec<Body>, Vec<Joint>), SceneError> {
     let closing = "each body hangs on exactly one joint; close loops with a [[ball_joint]], or with a joint that has \
                    `closes_loop = true`";
     let mut of_child: Vec<Option<&JointText<'_>>> = vec![None; bodies.len()];
-    for text in &joints {
+    for &text in joints {
         let child = text.joint.child;
         if let Some(first) = of_child[child].replace(text) {
             let node = text.section.require("child")?;
@@ -258,7 +264,7 @@ pub(super) fn sort_forest(
         let node = text.section.require("parent")?;
         return Err(node.error(format!("these joints form a cycle that does not reach the world: {closing}")));
     }
-    let mut sorted_joints: Vec<Joint> = joints.into_iter().map(|text| text.joint).collect();
+    let mut sorted_joints: Vec<Joint> = joints.iter().map(|text| text.joint.clone()).collect();
     for joint in &mut sorted_joints {
         joint.child = place[joint.child];
         joint.parent = joint.parent.map(|parent| place[parent]);
@@ -348,7 +354,7 @@ pub(super) fn read_own_contact<'d>(
     joint: &mut LooseJoint,
 ) -> Result<BTreeMap<&'static str, Node<'d>>, SceneError> {
     let mut places = BTreeMap::new();
-    for (part, field) in contact_rows() {
+    for (part, field) in contact_rows().filter(|(part, _)| section.rows.key(part, None).is_some()) {
         if let Some(node) = section.get(part) {
             let value = node.parameter()?;
             (field.set)(&mut joint.contact, &value);

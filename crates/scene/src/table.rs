@@ -1,7 +1,7 @@
 //! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
 
 use super::field::{Access, Field, FieldValue, SWITCH, field, word_field, word_of};
-use super::{Formulation, Kind, Machine, Parameter, Preset, Scope, SignedAxis, StartRule, Value};
+use super::{Formulation, Kind, Machine, Parameter, Preset, Scope, SignedAxis, StartRule, Value, play};
 use jointplay_physics::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
 use jointplay_physics::integrate::Method;
 use jointplay_physics::units::Dimension as D;
@@ -356,10 +356,13 @@ pub fn reference_page() -> String {
          | Key | Name | Default | Range | Unit | Where | Takes effect | Meaning | Equation \
          |\n|---|---|---|---|---|---|---|---|---|\n",
     );
-    for parameter in table() {
+    for parameter in table().iter().chain(play::rows()) {
         let effect = if parameter.at_reset { "at reset" } else { "at once" };
         let cells = [
-            format!("`{}`", parameter.key),
+            match parameter.scope {
+                Scope::Joint => format!("`joint.<name>.{}`", parameter.key),
+                _ => format!("`{}`", parameter.key),
+            },
             parameter.label.to_owned(),
             parameter.show(&parameter.default),
             parameter.range(),
@@ -376,7 +379,7 @@ pub fn reference_page() -> String {
 
 /// The row of a key (without a joint's name).
 pub fn find(key: &str) -> Option<&'static Parameter> {
-    TABLE.iter().find(|parameter| parameter.key == key)
+    TABLE.iter().chain(play::rows()).find(|parameter| parameter.key == key)
 }
 
 /// Name and rest of a key that begins with `joint.`: `("S1", "friction")`.
@@ -384,10 +387,10 @@ pub(super) fn joint_part(key: &str) -> Option<(&str, &str)> {
     key.strip_prefix("joint.")?.rsplit_once('.')
 }
 
-/// Last part of a contact key: `clearance` of `contact.clearance`.
+/// The contact parameter that a row sets: `clearance` for `contact.clearance`, and for `play.radial`.
 pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str> {
     match parameter.access {
-        Access::Contact(_) => parameter.key.strip_prefix("contact."),
+        Access::Contact(_) => parameter.key.strip_prefix("contact.").or_else(|| play::part_of(parameter)),
         _ => None,
     }
 }

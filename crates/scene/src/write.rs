@@ -7,8 +7,7 @@ use std::collections::BTreeMap;
 use super::access::sets_solver;
 use super::file_number::{FileNumber, Place};
 use super::model::PRESET;
-use super::table::joint_part;
-use super::{SOLVER_KEYS, Scene, SceneError, Value};
+use super::{SOLVER_KEYS, Scene, SceneError, Value, play};
 use jointplay_physics::units::exact_quantity;
 
 /// Maximum number of components in a vector.
@@ -96,9 +95,23 @@ impl Scene {
     fn write_change(&self, document: &mut DocumentMut, key: &str) -> Result<(), SceneError> {
         let parameter = self.parameter(key)?;
         let item = self.item(key)?;
-        if let Some((name, part)) = joint_part(key) {
-            let mut lists = ["joint_contact", "ball_joint"].into_iter();
-            if !lists.any(|list| set_joint_value(document.get_mut(list), name, part, &item)) {
+        if let Some((joint, part)) = self.loose_joint_of(key) {
+            let (name, kind) = (&*joint.name, &joint.kind);
+            // A `[[joint]]` has its play in a table.
+            if let Some(own) = play::name_of(kind, &part)
+                && set_joint_value(document.get_mut("joint"), name, |joint| set_play(joint, own, &item))
+            {
+                return Ok(());
+            }
+            let part = play::contact_part(kind, &part);
+            let mut lists = ["joint_contact", "ball_joint", "joint"].into_iter();
+            let mut set = |list| {
+                set_joint_value(document.get_mut(list), name, |joint| {
+                    set_value(joint, part, item.clone());
+                    true
+                })
+            };
+            if !lists.any(&mut set) {
                 add_joint_contact(document, name, part, item);
             }
             return Ok(());
@@ -136,8 +149,14 @@ fn toml_of(text: &str) -> Toml {
     text.parse().unwrap_or_else(|_| text.into())
 }
 
-/// Writes `item` to the entry named `name` in a list of joints, if there is one.
-fn set_joint_value(joints: Option<&mut Item>, name: &str, part: &str, item: &Item) -> bool {
+/// Writes `item` to the key `name` of the table `play` of a joint, if it has one.
+fn set_play(joint: &mut dyn TableLike, name: &str, item: &Item) -> bool {
+    let play = joint.get_mut("play").and_then(Item::as_table_like_mut);
+    play.map(|play| set_value(play, name, item.clone())).is_some()
+}
+
+/// Changes the entry named `name` in a list of joints by `set`, which says whether it did, if there is one.
+fn set_joint_value(joints: Option<&mut Item>, name: &str, set: impl FnOnce(&mut dyn TableLike) -> bool) -> bool {
     let mut entries: Vec<&mut dyn TableLike> = match joints {
         Some(Item::ArrayOfTables(tables)) => tables.iter_mut().map(|table| table as _).collect(),
         Some(Item::Value(Toml::Array(array))) => {
@@ -146,7 +165,7 @@ fn set_joint_value(joints: Option<&mut Item>, name: &str, part: &str, item: &Ite
         _ => Vec::new(),
     };
     let named = entries.iter_mut().find(|entry| entry.get("name").and_then(Item::as_str) == Some(name));
-    named.map(|entry| set_value(*entry, part, item.clone())).is_some()
+    named.is_some_and(|entry| set(*entry))
 }
 
 /// Adds a `[[joint_contact]]` with `item` for the ball joint `name`.

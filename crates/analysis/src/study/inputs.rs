@@ -4,7 +4,7 @@ use super::StudyError;
 use jointplay_physics::simulate::matches_pattern;
 use jointplay_physics::suggest::nearest;
 use jointplay_physics::units::{QuantityError, parse_quantity};
-use jointplay_scene::{Kind, Parameter, Scene, Value, ValueError, ValueFault, contact_parts};
+use jointplay_scene::{Kind, Parameter, Scene, Value, ValueError, ValueFault};
 
 /// Largest number of varied parameters.
 const MAX_INPUTS: usize = 64;
@@ -49,7 +49,10 @@ pub fn matching(scene: &Scene, pattern: &str) -> Result<Vec<String>, StudyError>
         if !pattern.contains(['*', '?']) {
             scene.parameter(pattern)?;
         }
-        let of_all_joints = contact_parts().map(|part| format!("joint.*.{part}"));
+        let of_all_joints = (0..scene.machine.loose_joints.len()).flat_map(|joint| {
+            let own = format!("joint.{}.", scene.machine.loose_joints[joint].name);
+            scene.joint_keys(joint).map(move |key| key.replacen(&own, "joint.*.", 1))
+        });
         let known: Vec<String> = of_all_joints.chain(parameters).chain(numbers()).collect();
         let nearest = nearest(pattern, known.iter().map(String::as_str));
         return Err(StudyError::NoMatch { pattern: pattern.to_owned(), nearest });
@@ -79,8 +82,7 @@ pub fn read_unchecked(scene: &Scene, key: &str, text: &str) -> Result<f64, Study
 fn real_keys(scene: &Scene) -> Vec<String> {
     let own = scene.parameters().into_iter();
     let own = own.filter(|parameter| matches!(parameter.kind, Kind::Number { .. })).map(|p| p.key.to_owned());
-    let joints = scene.machine.loose_joints.iter();
-    let of_joints = joints.flat_map(|joint| contact_parts().map(move |part| format!("joint.{}.{part}", joint.name)));
+    let of_joints = (0..scene.machine.loose_joints.len()).flat_map(|joint| scene.joint_keys(joint));
     let all = own.chain(of_joints);
     all.filter(|key| matches!(scene.get(key), Ok(Value::Number(_)))).collect()
 }

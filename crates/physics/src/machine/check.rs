@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::{Characteristic, Doubt, Drive, JointCoordinate, JointKind, LooseJoint, Machine, Warning};
+use super::{Characteristic, Doubt, Drive, JointCoordinate, JointKind, LooseFault, LooseJoint, Machine, Warning};
 use crate::contact::{self, FrictionLaw, NormalLaw};
 use crate::integrate::StepControl;
 use crate::interpolate::{Ends, Interpolant, Interpolation, Overshoot};
@@ -97,14 +97,6 @@ pub enum MachineFault {
         /// Index of the function.
         function: usize,
     },
-    /// A joint with play with impossible dimensions or settings.
-    #[error("{joint}: {fault}")]
-    Loose {
-        /// Name of the joint.
-        joint: String,
-        /// What is wrong.
-        fault: super::LooseFault,
-    },
     /// Contact parameters contradict one another.
     #[error("{joint}: {fault}")]
     Contact {
@@ -189,7 +181,6 @@ impl Machine {
         }
         for joint in &self.loose_joints {
             exists(&joint.name, joint.carrier().body.max(joint.carried().body))?;
-            joint.check(self.start).map_err(|fault| MachineFault::Loose { joint: joint.name.clone(), fault })?;
         }
         for element in &self.elements {
             let has = |on: JointCoordinate| {
@@ -313,9 +304,13 @@ impl Machine {
     /// Checks the contact parameters of each joint for consistency.
     pub fn check_contacts(&self) -> Result<(), ContactConflict> {
         let joints = self.loose_joints.iter().enumerate();
-        let own = joints.map(|(index, joint)| (Some(index), &joint.contact));
+        let own = joints.clone().map(|(index, joint)| (Some(index), &joint.contact));
         for (joint, contact) in std::iter::once((None, &self.contact)).chain(own) {
             check_contact(contact).map_err(|fault| ContactConflict { joint, fault })?;
+        }
+        for (index, joint) in joints {
+            let fault = |fault| ContactConflict { joint: Some(index), fault: ContactFault::Loose(fault) };
+            joint.check(self.start).map_err(fault)?;
         }
         Ok(())
     }
@@ -523,6 +518,9 @@ pub enum ContactFault {
     /// A restitution of 0 under a law that divides by it.
     #[error("the law {0} divides by the restitution; allowed above 0 to 1; a pure number, no unit")]
     DividesByRestitution(NormalLaw),
+    /// Impossible dimensions or settings of a joint with play.
+    #[error("{0}")]
+    Loose(#[from] LooseFault),
 }
 
 impl ContactFault {
@@ -532,6 +530,7 @@ impl ContactFault {
             Self::Clearance { .. } => ["clearance", "ball_radius"],
             Self::SlipSpeeds { .. } => ["slip_speed_low", "slip_speed_high"],
             Self::DividesByRestitution(_) => ["restitution", "normal_law"],
+            Self::Loose(fault) => fault.parts(),
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use super::{Attachment, Quat, StartRule, Vec3};
 use crate::contact;
+use crate::units::format_quantity;
+use crate::words::words;
 
 /// A joint with play: contacts between two bodies in place of constraints, unless its clearance is 0.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +33,33 @@ pub enum LooseKind {
     Slide(Slide),
 }
 
+impl LooseKind {
+    /// Name of its kind of joint in files.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Ball => "spherical",
+            Self::Pin(pin) if pin.kept => "revolute",
+            Self::Pin(_) => "cylindrical",
+            Self::Slide(_) => "prismatic",
+        }
+    }
+
+    /// Names of the places where it can touch; empty if there is only one. Of a pin the ends of the axis, at -L/2 and +L/2, and the
+    /// faces of its collars, towards +axis and -axis; of a block its corners, 1 for - - - to 8 for + + + of x, y, z, each with the
+    /// axis across its wall.
+    pub fn site_names(&self) -> &'static [&'static str] {
+        match self {
+            Self::Ball | Self::Pin(Pin { length: None, .. }) => &[],
+            Self::Pin(Pin { kept: true, .. }) => &["a", "b", "front", "back"],
+            Self::Pin(_) => &["a", "b"],
+            Self::Slide(Slide { half_height: None, .. }) => &["1y", "3y", "5y", "7y"],
+            Self::Slide(_) => {
+                &["1y", "1z", "2y", "2z", "3y", "3z", "4y", "4z", "5y", "5z", "6y", "6z", "7y", "7z", "8y", "8z"]
+            }
+        }
+    }
+}
+
 /// A round pin in a bearing. The ball radius of the contact parameters is the radius r of the pin, the clearance R - r.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pin {
@@ -43,6 +72,9 @@ pub struct Pin {
     pub kept: bool,
     /// Radius of the collars' faces, m. `None`: they touch on the axis, and exert no torque.
     pub face_radius: Option<f64>,
+    /// How far the longer of pin and bearing reaches beyond the other, to each side, m: displaced farther, an end touches nothing.
+    /// `None` if that is not known.
+    pub travel: Option<f64>,
 }
 
 /// The part of a pin joint whose ends touch the other.
@@ -54,6 +86,11 @@ pub enum EndsOn {
     /// The pin, shorter than the bore, such as a piston: forces travel with it.
     Pin,
 }
+
+words!(EndsOn {
+    Bearing => "bearing",
+    Pin => "pin",
+});
 
 /// A rectangular block between the walls y = +-(half_width + c) and z = +-(half_height + second clearance) of its guide. It touches
 /// with its corners.
@@ -86,19 +123,25 @@ impl From<Attachment> for JointFrame {
 }
 
 /// Why a joint with play cannot have its dimensions or settings.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LooseFault {
     /// A dimension that is not a length.
-    #[error("{what} = {value:e} m: must be above 0 m")]
+    #[error("{} is no dimension; allowed above 0 mm; units m, cm, mm, um", format_quantity(*.value, "mm"))]
     Length {
-        /// Which.
-        what: &'static str,
+        /// Its key in files.
+        key: &'static str,
         /// m.
         value: f64,
     },
     /// Play so large that the geometry, which is linear in it, is wrong.
-    #[error("the play, {play:e} m, is above {part}, {most:e} m")]
+    #[error(
+        "the play {} is above {part}; allowed 0 mm to {}; units m, cm, mm, um",
+        format_quantity(*.play, "mm"),
+        format_quantity(*.most, "mm")
+    )]
     Play {
+        /// Its key in files.
+        key: &'static str,
         /// m.
         play: f64,
         /// The part of a dimension that bounds it.
@@ -108,56 +151,73 @@ pub enum LooseFault {
     },
     /// Play in a direction in which the joint has none to have.
     #[error(
-        "it has one play: a ball, a pin that does not tilt or slides freely, and a block in a plane have no second"
+        "has no second play: a ball, a pin that slides freely, and a pin or a block that stays in a plane have one"
     )]
-    SecondPlay,
+    SecondPlay {
+        /// Its key in files.
+        key: &'static str,
+    },
     /// Friction that follows the centres, which have no meaning for a pin.
-    #[error("friction follows the velocity of the surfaces in joints other than ball joints")]
+    #[error("friction follows the velocity of the surfaces in joints other than ball joints; allowed surface")]
     FrictionVelocity,
     /// A start that only ball joints have.
-    #[error("start = \"settled\" places balls in their sockets; with other joints with play, use \"equilibrium\"")]
+    #[error("settled places balls in their sockets; with other joints with play, allowed as-given, ideal, equilibrium")]
     Settled,
+}
+
+impl LooseFault {
+    /// Last parts of the keys involved, the likelier cause first.
+    pub(super) fn parts(&self) -> [&'static str; 2] {
+        match *self {
+            Self::Length { key, .. } | Self::SecondPlay { key } => [key, "play"],
+            Self::Play { key, part, .. } => [key, if part.ends_with("radius") { "play.radius" } else { "play.length" }],
+            Self::FrictionVelocity => ["friction_velocity", "friction_velocity"],
+            Self::Settled => ["start", "start"],
+        }
+    }
 }
 
 impl LooseJoint {
     /// Checks the dimensions of its kind against its play.
     pub(super) fn check(&self, start: StartRule) -> Result<(), LooseFault> {
-        let positive = |what, value: f64| {
-            if value > 0.0 && value.is_finite() { Ok(()) } else { Err(LooseFault::Length { what, value }) }
+        let positive = |key, value: f64| {
+            if value > 0.0 && value.is_finite() { Ok(()) } else { Err(LooseFault::Length { key, value }) }
         };
         let [radial, second] = self.contact.clearances();
-        let limit = |play: f64, part, most: f64| {
-            if play <= most { Ok(()) } else { Err(LooseFault::Play { play, part, most }) }
+        let limit = |key, play: f64, part, most: f64| {
+            if play <= most { Ok(()) } else { Err(LooseFault::Play { key, play, part, most }) }
         };
         match self.kind {
-            LooseKind::Ball if second > 0.0 => return Err(LooseFault::SecondPlay),
+            LooseKind::Ball if second > 0.0 => return Err(LooseFault::SecondPlay { key: "play" }),
             LooseKind::Ball => return Ok(()),
-            LooseKind::Pin(Pin { length, kept, face_radius, .. }) => {
-                positive("the radius", self.contact.ball_radius)?;
-                limit(radial, "a tenth of the radius", 0.1 * self.contact.ball_radius)?;
+            LooseKind::Pin(Pin { length, kept, face_radius, travel, .. }) => {
+                positive("play.radius", self.contact.ball_radius)?;
+                limit("play.radial", radial, "a tenth of the radius", 0.1 * self.contact.ball_radius)?;
                 if let Some(length) = length {
-                    positive("the length", length)?;
-                    limit(radial, "a tenth of the length", 0.1 * length)?;
+                    positive("play.length", length)?;
+                    limit("play.radial", radial, "a tenth of the length", 0.1 * length)?;
                     // Farther out, the ends no longer face each other.
-                    limit(second, "a quarter of the length", 0.25 * length)?;
+                    limit("play.axial", second, "a quarter of the length", 0.25 * length)?;
                 }
-                face_radius.map_or(Ok(()), |radius| positive("the radius of the faces", radius))?;
+                face_radius.map_or(Ok(()), |radius| positive("play.face_radius", radius))?;
+                travel.map_or(Ok(()), |travel| positive("play.travel", travel))?;
                 if second > 0.0 && !(kept && length.is_some()) {
-                    return Err(LooseFault::SecondPlay);
+                    return Err(LooseFault::SecondPlay { key: "play.axial" });
                 }
             }
             LooseKind::Slide(Slide { half_length, half_width, half_height, corner_radius }) => {
-                positive("the half length", half_length)?;
-                positive("the half width", half_width)?;
-                positive("the corner radius", corner_radius)?;
-                limit(radial.max(second), "a tenth of the half length", 0.1 * half_length)?;
-                limit(radial, "a tenth of the half width", 0.1 * half_width)?;
+                positive("play.half_length", half_length)?;
+                positive("play.half_y", half_width)?;
+                positive("play.corner_radius", corner_radius)?;
+                limit("play.y", radial, "a tenth of the half length", 0.1 * half_length)?;
+                limit("play.z", second, "a tenth of the half length", 0.1 * half_length)?;
+                limit("play.y", radial, "a tenth of half_y", 0.1 * half_width)?;
                 match half_height {
                     Some(height) => {
-                        positive("the half height", height)?;
-                        limit(second, "a tenth of the half height", 0.1 * height)?;
+                        positive("play.half_z", height)?;
+                        limit("play.z", second, "a tenth of half_z", 0.1 * height)?;
                     }
-                    None if second > 0.0 => return Err(LooseFault::SecondPlay),
+                    None if second > 0.0 => return Err(LooseFault::SecondPlay { key: "play.z" }),
                     None => {}
                 }
             }
@@ -183,6 +243,14 @@ impl LooseJoint {
     pub fn with_clearance(mut self, clearance: f64) -> Self {
         self.contact.clearance = clearance;
         self
+    }
+
+    /// Name of its site `place`: that of the joint, then that of the site if it has several.
+    pub fn site_name(&self, place: u8) -> String {
+        match self.kind.site_names().get(usize::from(place)) {
+            Some(site) => format!("{}.{site}", self.name),
+            None => self.name.clone(),
+        }
     }
 
     /// Origin of the carrier's frame: the socket's centre Z_i.

@@ -122,6 +122,11 @@ impl Contacts {
         self.contacts[c].site.joint
     }
 
+    /// Place of contact `c` among the sites of its joint.
+    pub(crate) fn place(&self, c: ContactId) -> u8 {
+        self.contacts[c].site.place
+    }
+
     /// Whether the forces of contacts `c` and `d` act on one another: their bodies are connected, however far, other than through
     /// the world and driven bodies.
     pub fn interact(&self, c: ContactId, d: ContactId) -> bool {

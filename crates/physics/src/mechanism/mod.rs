@@ -56,7 +56,7 @@ pub use held::{HeldError, HeldMachine, drive_positions};
 pub use kinematics::{Kinematics, Wrench};
 pub use pairs::Opening;
 pub use reachable::{Farthest, TipFreedoms};
-pub use start::OFF_PATH;
+pub use start::{OFF_PATH, poses_as_given};
 pub use summary::Summary;
 pub use systems::Evaluator;
 

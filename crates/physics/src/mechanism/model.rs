@@ -140,6 +140,8 @@ pub struct Site {
     pub stiffness: Stiffness,
     /// Whether the wall belongs to the carried part of the joint.
     pub is_reversed: bool,
+    /// Index among [`LooseKind::site_names`](crate::machine::LooseKind::site_names); 0 for a kind with one site.
+    pub place: u8,
 }
 
 /// A joint between two bodies, in the tree or closing a loop.

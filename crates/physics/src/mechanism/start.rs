@@ -8,7 +8,7 @@ use super::model::{self, Model, Motion};
 use super::pairs::Opening;
 use super::tree::Tree;
 use super::{MAX_GIVEN_ANGLE, MAX_GIVEN_GAP, Mechanism, MechanismError, OpenJoint};
-use crate::machine::{StartRule, Vec3};
+use crate::machine::{JointStart, Machine, StartRule, Vec3};
 
 /// Smallest pivot ratio at which the start velocities still have three correct digits.
 const DEPENDENT_ROWS: f64 = 1e-13;
@@ -23,6 +23,23 @@ const NEIGHBOUR_STEP: f64 = 0.01;
 pub const OFF_PATH: f64 = 1e-6;
 /// Assembly has converged once it moves by less than this fraction of the scales.
 const AT_REST: f64 = 1e-9;
+
+/// Pose and motion of the frame of each body at t = 0, as start values and drives of the tree joints say.
+pub fn poses_as_given(machine: &Machine) -> Vec<JointStart> {
+    let model = Model::new(machine);
+    let mut tree = Tree::without_masses(&model);
+    tree.update_kinematics(&model, 0.0, &model.start_state);
+    let pose = |(body, m): (&model::Body, &Kinematics)| {
+        let arm = m.rotation * body.origin;
+        JointStart::Pose {
+            position: m.position + arm,
+            rotation: kinematics::quaternion_of(&m.rotation),
+            velocity: m.point_velocity(&arm),
+            angular_velocity: m.angular_velocity,
+        }
+    };
+    model.bodies.iter().zip(&tree.motion).map(pose).collect()
+}
 
 impl Mechanism {
     /// Changes to the scene's values made by [`Self::start`]; none before.

@@ -8,7 +8,8 @@ pub use table::Quantity;
 use table::TIME;
 
 use super::Frame;
-use crate::machine::{Freedom, Joint, JointKind, Machine, Place};
+use crate::machine::{Freedom, Joint, JointKind, LooseJoint, LooseKind, Machine, Place};
+use std::borrow::Cow;
 use table::{Repetition, Signal, SignalSource, TABLE};
 
 /// Largest number of ball joints and drives that are recorded: in a longer chain the rest is not worth the memory.
@@ -180,8 +181,8 @@ fn lay_out(
             for signal in group.iter().filter(exists) {
                 let source = signal.source;
                 for (component, &(symbol, word)) in source.components().iter().enumerate() {
-                    let members = [source.member(), symbol, name];
-                    let named = |pattern: &str| pattern.replace('#', word).replace('@', name);
+                    let members = [source.member(), symbol, &*name];
+                    let named = |pattern: &str| pattern.replace('#', word).replace('@', &name);
                     add(SignalValue {
                         signal,
                         name: named(signal.name),
@@ -196,27 +197,32 @@ fn lay_out(
 }
 
 /// Names of the parts for which a signal is repeated; for a joint coordinate also the freedom that it measures.
-fn parts_of(machine: &Machine, repetition: Repetition) -> Vec<(&str, Option<Freedom>)> {
-    let joints = machine.loose_joints.iter().map(|joint| joint.name.as_str());
+fn parts_of(machine: &Machine, repetition: Repetition) -> Vec<(Cow<'_, str>, Option<Freedom>)> {
     let elements = machine.elements.iter().map(|element| element.name.as_str());
     let coordinates = |joint: &'_ Joint| joint.kind.freedoms().iter().map(|freedom| Some(*freedom));
     let holding = machine.joints.iter().filter(|j| j.kind != JointKind::Free);
     let bodies = machine.bodies.iter().map(|body| body.name.as_str());
     match repetition {
-        Repetition::Once => vec![("", None)],
-        Repetition::Output => vec![(machine.bodies[machine.output.body].name.as_str(), None)],
-        Repetition::Body => bodies.map(|name| (name, None)).collect(),
-        Repetition::Coordinate => {
-            machine.kinematic_joints().flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom))).collect()
-        }
-        Repetition::Reacting => holding.map(|j| (j.name.as_str(), None)).collect(),
+        Repetition::Once => vec![("".into(), None)],
+        Repetition::Output => vec![(machine.bodies[machine.output.body].name.as_str().into(), None)],
+        Repetition::Body => bodies.map(|name| (name.into(), None)).collect(),
+        Repetition::Coordinate => machine
+            .kinematic_joints()
+            .flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str().into(), freedom)))
+            .collect(),
+        Repetition::Reacting => holding.map(|j| (j.name.as_str().into(), None)).collect(),
         Repetition::Closing => {
             let closing = machine.closing_joints.iter();
-            closing.map(|joint| (joint.name.as_str(), None)).collect()
+            closing.map(|joint| (joint.name.as_str().into(), None)).collect()
         }
-        Repetition::Joint => joints.map(|name| (name, None)).collect(),
-        Repetition::Drive => machine.driven().map(|(j, freedom)| (j.name.as_str(), Some(freedom))).collect(),
-        Repetition::Element => elements.map(|name| (name, None)).collect(),
+        Repetition::Joint => machine.loose_joints.iter().map(|joint| (joint.name.as_str().into(), None)).collect(),
+        Repetition::Site => {
+            let sites = |joint: &'_ LooseJoint| 0..joint.kind.site_names().len() as u8;
+            let names = machine.loose_joints.iter().flat_map(|j| sites(j).map(|place| j.site_name(place)));
+            names.map(|name| (name.into(), None)).collect()
+        }
+        Repetition::Drive => machine.driven().map(|(j, freedom)| (j.name.as_str().into(), Some(freedom))).collect(),
+        Repetition::Element => elements.map(|name| (name.into(), None)).collect(),
     }
 }
 
@@ -244,6 +250,7 @@ fn has_signal(
             known(machine.solver.energy_ledger) && (!signal.of_elements || !machine.elements.is_empty())
         }
         SignalSource::ProbeError | SignalSource::ProbeDistance => known(machine.output.probe.is_some()),
+        SignalSource::Displacement(_) => machine.loose_joints[part].kind != LooseKind::Ball,
         SignalSource::Element(_) => known(true),
         SignalSource::ElementValue(_) => matches!(machine.elements[part].describe().place, Place::Between(_)),
         _ => true,

@@ -15,8 +15,11 @@ pub struct Frame {
     pub origin: Vec3,
     /// Bodies in scene order.
     pub bodies: Vec<BodyMotion>,
-    /// Ball joints in scene order.
+    /// Joints with play in scene order.
     pub joints: Vec<JointReport>,
+    /// Places where joints with several can touch: by joint, each in the order of
+    /// [`LooseKind::site_names`](crate::machine::LooseKind::site_names).
+    pub sites: Vec<SiteReport>,
     /// Joints that close loops in scene order: force, N, at the child's point and torque, N m, on the child.
     pub closing: Vec<[Vec3; 2]>,
     /// Force elements in scene order.
@@ -102,8 +105,12 @@ pub struct JointReport {
     pub socket_centre: Vec3,
     /// Z_j, m.
     pub ball_centre: Vec3,
-    /// e = Z_j - Z_i, m (5).
+    /// e = Z_j - Z_i, m (5); of a pin and of a slide its part across the axis.
     pub eccentricity: Vec3,
+    /// The part along the axis of the carrier, m; 0 for a ball.
+    pub axial: f64,
+    /// Angle by which a pin's axis is tilted in its bearing, or a block in its guide, rad; 0 for a ball.
+    pub tilt: f64,
     /// Current clearance (a live change ramps it at a bounded rate), m.
     pub clearance: f64,
     /// delta = |e| - c, m (10); 0 for an ideal joint.
@@ -120,6 +127,21 @@ pub struct JointReport {
     pub slip_speed: f64,
     /// Contact state.
     pub state: ContactMode,
+}
+
+/// One place where the bodies of a joint can touch, at one instant. SI units, world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SiteReport {
+    /// Joint, by its index in the scene.
+    pub joint: usize,
+    /// Distance to the wall, m; negative where they touch, infinite where the joint has no play.
+    pub gap: f64,
+    /// Normal force on the carried part, N.
+    pub normal_force: Vec3,
+    /// Friction force on the carried part, N.
+    pub friction_force: Vec3,
+    /// Where the forces act, m.
+    pub contact_point: Vec3,
 }
 
 /// The largest force on a ball joint since the peaks were last taken.

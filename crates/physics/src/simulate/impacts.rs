@@ -21,8 +21,10 @@ const MAX_WORK_IN_REBOUND: f64 = 0.5;
 /// start, or that a live change ended, does not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Impact {
-    /// Ball joint, by its index in the scene.
+    /// Joint with play, by its index in the scene.
     pub joint: usize,
+    /// Where in it, among [`LooseKind::site_names`](crate::machine::LooseKind::site_names).
+    pub place: u8,
     /// When it began, s.
     pub start: f64,
     /// When it ended, s.
@@ -180,6 +182,7 @@ struct Contacting {
 pub(super) struct Onset {
     pub contact: ContactId,
     pub joint: usize,
+    pub place: u8,
     /// s.
     pub time: f64,
     /// Penetration rate, m/s, and its rate of change before, m/s^2.
@@ -260,6 +263,7 @@ impl Impacts {
         }
         let impact = Impact {
             joint: onset.joint,
+            place: onset.place,
             start: onset.time,
             approach_speed: onset.speed,
             requested: onset.requested,

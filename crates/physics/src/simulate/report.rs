@@ -1,9 +1,9 @@
 //! Fills a [`Frame`] from the latest evaluation of the equations.
 
 use super::angles::pose_of;
-use super::frame::{BodyMotion, ContactMode, Frame, JointReport};
+use super::frame::{BodyMotion, ContactMode, Frame, JointReport, SiteReport};
 use crate::contact::ContactState;
-use crate::machine::{Attachment, LooseJoint, Machine, Vec3};
+use crate::machine::{Attachment, LooseJoint, LooseKind, Machine, Vec3};
 use crate::mechanism::{ContactId, Mechanism};
 
 /// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at (`time`, `y`), with the
@@ -30,8 +30,10 @@ pub(super) fn fill(
     }
     out.pose = pose_of(&out.bodies[machine.output.body]);
     out.joints.clear();
+    out.sites.clear();
     for (j, joint) in machine.loose_joints.iter().enumerate() {
         out.joints.push(joint_report(mechanism, joint, contact_states, j));
+        report_sites(mechanism, joint, j, &mut out.sites);
     }
     out.closing.clear();
     out.closing.extend(mechanism.closing_loads());
@@ -63,10 +65,13 @@ fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_states: &[Con
     };
     let contacts = &mechanism.contacts;
     let ball_centre = centre(&joint.carried());
+    let (eccentricity, axial, tilt) = displacement(mechanism, joint, j);
     let report = JointReport {
         socket_centre: centre(&joint.carrier()),
         ball_centre,
-        eccentricity: mechanism.separation(j),
+        eccentricity,
+        axial,
+        tilt,
         clearance: contacts.joint_clearance(j),
         ..JointReport::default()
     };
@@ -94,6 +99,54 @@ fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_states: &[Con
             ContactMode::Slip
         },
         ..report
+    }
+}
+
+/// Of the carried part from its place without play: across the axis, along it (m), and the angle (rad).
+fn displacement(mechanism: &Mechanism, joint: &LooseJoint, j: usize) -> (Vec3, f64, f64) {
+    let e = mechanism.separation(j);
+    if joint.kind == LooseKind::Ball {
+        return (e, 0.0, 0.0);
+    }
+    let motion = mechanism.motion();
+    let [carrier, carried] = joint.frames.map(|frame| {
+        let own = frame.rotation.to_rotation_matrix().into_inner();
+        frame.origin.body.map_or(own, |body| motion[body].rotation * own)
+    });
+    let [axis, own] = [carrier.column(0), carried.column(0)];
+    let along = axis.dot(&e);
+    let tilt = match joint.kind {
+        LooseKind::Slide(_) => {
+            let turn = carrier.tr_mul(&carried);
+            let sine = Vec3::new(turn[(2, 1)] - turn[(1, 2)], turn[(0, 2)] - turn[(2, 0)], turn[(1, 0)] - turn[(0, 1)]);
+            libm::atan2(sine.norm(), turn.trace() - 1.0)
+        }
+        _ => libm::atan2(axis.cross(&own).norm(), axis.dot(&own)),
+    };
+    (e - axis * along, along, tilt)
+}
+
+/// Appends the reports of the sites of joint `j`.
+fn report_sites(mechanism: &Mechanism, joint: &LooseJoint, j: usize, out: &mut Vec<SiteReport>) {
+    let first = out.len();
+    let zero = Vec3::zeros();
+    let nothing =
+        SiteReport { joint: j, gap: f64::INFINITY, normal_force: zero, friction_force: zero, contact_point: zero };
+    out.extend(joint.kind.site_names().iter().map(|_| nothing));
+    if out.len() == first {
+        return;
+    }
+    let contacts = &mechanism.contacts;
+    for c in contacts.of_joint(j) {
+        let site = &mut out[first + usize::from(contacts.place(c))];
+        let gap = contacts.gap(c);
+        site.normal_force += contacts.push(c) * gap.normal_force;
+        site.friction_force += contacts.on_carried(c, &gap.friction);
+        // Of the points of a rim, the one that is deepest.
+        if -gap.separation.penetration < site.gap {
+            site.gap = -gap.separation.penetration;
+            site.contact_point = mechanism.contact_point(c);
+        }
     }
 }
 

@@ -8,6 +8,6 @@ pub(super) fn compile(joint: usize, frames: &[Frame; 2]) -> Compiled {
     Compiled {
         closed: Cut::point(carried, carrier),
         lasting: None,
-        sites: vec![Site { joint, carrier, carried, wall, play: 0, stiffness, is_reversed: false }],
+        sites: vec![Site { joint, carrier, carried, wall, play: 0, stiffness, is_reversed: false, place: 0 }],
     }
 }

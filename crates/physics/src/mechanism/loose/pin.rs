@@ -32,7 +32,7 @@ fn ends(pin: &Pin, joint: usize, [bearing, carried]: &[Frame; 2]) -> Vec<Site> {
         Some(length) => (vec![-0.5 * length, 0.5 * length], 0.5),
         None => (vec![0.0], 1.0),
     };
-    let site = |offset: f64| Site {
+    let site = |(place, offset): (usize, f64)| Site {
         joint,
         carrier: wall.origin,
         carried: Anchor { offset: edge.origin.offset + edge.axes[0] * offset, ..edge.origin },
@@ -40,17 +40,21 @@ fn ends(pin: &Pin, joint: usize, [bearing, carried]: &[Frame; 2]) -> Vec<Site> {
         play: 0,
         stiffness: Stiffness::Sphere(share),
         is_reversed,
+        place: place as u8,
     };
-    offsets.into_iter().map(site).collect()
+    offsets.into_iter().enumerate().map(site).collect()
 }
+
+/// Places of the front and of the back face among the names of the sites.
+const FACES: [u8; 2] = [2, 3];
 
 /// Where the collars touch the faces of the bearing: on the axis, or at four points on the rim of each, which belong to the bearing, so
 /// that a spin moves none of them. The back comes first.
 fn faces(pin: &Pin, joint: usize, [bearing, carried]: &[Frame; 2]) -> Vec<Site> {
     let [x, y, z] = bearing.axes;
     match pin.face_radius {
-        None => [-1.0, 1.0]
-            .map(|side| Site {
+        None => [(-1.0, FACES[1]), (1.0, FACES[0])]
+            .map(|(side, place)| Site {
                 joint,
                 carrier: bearing.origin,
                 carried: carried.origin,
@@ -58,13 +62,14 @@ fn faces(pin: &Pin, joint: usize, [bearing, carried]: &[Frame; 2]) -> Vec<Site> 
                 play: 1,
                 stiffness: Stiffness::Face(1.0),
                 is_reversed: false,
+                place,
             })
             .to_vec(),
         Some(radius) => {
             let rim = [y, z, -y, -z].map(|direction| bearing.origin.offset + direction * radius);
             // Seen from the pin, whose axis the directions follow, the bearing moves the other way.
-            let of_side = |side: f64| {
-                rim.map(|offset| Site {
+            let of_side = |(side, place): (f64, u8)| {
+                rim.map(move |offset| Site {
                     joint,
                     carrier: carried.origin,
                     carried: Anchor { offset, ..bearing.origin },
@@ -72,9 +77,10 @@ fn faces(pin: &Pin, joint: usize, [bearing, carried]: &[Frame; 2]) -> Vec<Site> 
                     play: 1,
                     stiffness: Stiffness::Face(0.25),
                     is_reversed: true,
+                    place,
                 })
             };
-            [-1.0, 1.0].into_iter().flat_map(of_side).collect()
+            [(-1.0, FACES[1]), (1.0, FACES[0])].into_iter().flat_map(of_side).collect()
         }
     }
 }

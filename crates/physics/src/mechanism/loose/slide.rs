@@ -10,10 +10,10 @@ pub(super) fn compile(slide: &Slide, joint: usize, frames: &[Frame; 2], [across,
     // In a plane two corners are one.
     let heights = if slide.half_height.is_some() { vec![-1.0, 1.0] } else { vec![0.0] };
     let mut sites = Vec::new();
-    for (sx, sy) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
-        for &sz in &heights {
-            let corner = block.axes[0] * (sx * x) + block.axes[1] * (sy * y) + block.axes[2] * (sz * z);
-            let carried = Anchor { offset: block.origin.offset + corner, ..block.origin };
+    for (corner, (sx, sy)) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)].into_iter().enumerate() {
+        for (upper, &sz) in heights.iter().enumerate() {
+            let offset = block.axes[0] * (sx * x) + block.axes[1] * (sy * y) + block.axes[2] * (sz * z);
+            let carried = Anchor { offset: block.origin.offset + offset, ..block.origin };
             for (play, side, axis, half) in [(0, sy, 1, y), (1, sz, 2, z)] {
                 let normal = guide.axes[axis] * side;
                 if [across, second][play] && side != 0.0 {
@@ -25,6 +25,7 @@ pub(super) fn compile(slide: &Slide, joint: usize, frames: &[Frame; 2], [across,
                         play,
                         stiffness: Stiffness::Corner(slide.corner_radius),
                         is_reversed: false,
+                        place: (heights.len() * (heights.len() * corner + upper) + play) as u8,
                     });
                 }
             }

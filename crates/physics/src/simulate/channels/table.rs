@@ -3,14 +3,14 @@
 
 use Quantity as Q;
 use SignalSource::{
-    Angles, Axes, BodyAxes, ChildTurn, Closing, Consumed, Element, ElementValue, FirstTurn, Hinge, HingeCoordinate,
-    Joint, JointAxes, OtherAngles, OtherAxes, ProbeDistance, ProbeError, Reaction, Scalar, SecondTurn, Slide,
-    SlideCoordinate, Supplied, Turn, TurnRate,
+    Angles, Axes, BodyAxes, ChildTurn, Closing, Consumed, Displacement, Element, ElementValue, FirstTurn, Hinge,
+    HingeCoordinate, Joint, JointAxes, OtherAngles, OtherAxes, ProbeDistance, ProbeError, Reaction, Scalar, SecondTurn,
+    Site, SiteAxes, Slide, SlideCoordinate, Supplied, Turn, TurnRate,
 };
 
 use crate::machine::Vec3;
 use crate::simulate::angles::pose_of;
-use crate::simulate::{BodyMotion, ContactMode, ElementReport, Frame, JointReport, Ledger, Pose};
+use crate::simulate::{BodyMotion, ContactMode, ElementReport, Frame, JointReport, Ledger, Pose, SiteReport};
 use crate::words::words;
 
 /// A physical quantity that a plot shows; its channels share one axis.
@@ -89,10 +89,16 @@ pub(super) enum SignalSource {
     Reaction(usize),
     /// Vector of each loop-closing joint, from force and torque on its child: x, y, z.
     Closing(fn(&[Vec3; 2]) -> Vec3),
-    /// Value of each ball joint.
+    /// Value of each joint with play.
     Joint(fn(&JointReport) -> f64),
-    /// Vector of each ball joint: x, y, z.
+    /// Vector of each joint with play: x, y, z.
     JointAxes(fn(&JointReport) -> Vec3),
+    /// Value of each joint with play that has an axis.
+    Displacement(fn(&JointReport) -> f64),
+    /// Value of each place where a joint with several can touch.
+    Site(fn(&SiteReport) -> f64),
+    /// Vector of each of them: x, y, z.
+    SiteAxes(fn(&SiteReport) -> Vec3),
     /// Actuator force of each driven slide.
     Slide,
     /// Actuator torque of each driven hinge.
@@ -129,8 +135,10 @@ pub(super) enum Repetition {
     Reacting,
     /// Joints that close loops.
     Closing,
-    /// Ball joints.
+    /// Joints with play.
     Joint,
+    /// Places where joints with several can touch.
+    Site,
     /// Driven joints.
     Drive,
     /// Force elements.
@@ -143,7 +151,8 @@ pub(super) type Components = &'static [(&'static str, &'static str)];
 impl SignalSource {
     pub(super) fn repetition(&self) -> Repetition {
         match self {
-            Joint(_) | JointAxes(_) => Repetition::Joint,
+            Joint(_) | JointAxes(_) | Displacement(_) => Repetition::Joint,
+            Site(_) | SiteAxes(_) => Repetition::Site,
             Closing(_) => Repetition::Closing,
             Slide | Hinge | Turn | ChildTurn => Repetition::Drive,
             Element(_) | ElementValue(_) => Repetition::Element,
@@ -157,8 +166,8 @@ impl SignalSource {
 
     pub(super) fn components(&self) -> Components {
         match self {
-            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | Reaction(_) | Closing(_) | ProbeError
-            | Element(_) => &[("x", "x"), ("y", "y"), ("z", "z")],
+            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | SiteAxes(_) | Reaction(_) | Closing(_)
+            | ProbeError | Element(_) => &[("x", "x"), ("y", "y"), ("z", "z")],
             Angles(_) | OtherAngles(_) => &[("α", "alpha"), ("β", "beta"), ("γ", "gamma")],
             _ => &[("", "")],
         }
@@ -192,7 +201,9 @@ impl SignalSource {
                 Some(of_part[*which][component])
             }
             Closing(of) => frame.closing.get(part).map(|load| of(load)[component]),
-            Joint(of) => frame.joints.get(part).map(of),
+            Joint(of) | Displacement(of) => frame.joints.get(part).map(of),
+            Site(of) => frame.sites.get(part).map(of),
+            SiteAxes(of) => frame.sites.get(part).map(|site| of(site)[component]),
             JointAxes(of) => frame.joints.get(part).map(|joint| of(joint)[component]),
             Slide | Hinge | Turn | ChildTurn => frame.actuators.get(part).copied(),
             Supplied(_, of) | Consumed(_, of) => frame.ledger.as_ref().map(of),
@@ -327,6 +338,13 @@ pub(super) const TABLE: &[Signal] = &[
     on_request("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap between ball and socket wall; negative in contact"),
     on_request("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),
     on_request("@.slip_speed", "@_slip_speed_m_s", Joint(|joint| joint.slip_speed), "sliding speed that the friction law uses"),
+
+    on_request("@.axial", "@_axial_m", Displacement(|joint| joint.axial), "displacement of the carried part along the joint's axis"),
+    on_request("@.tilt", "@_tilt_rad", Displacement(|joint| joint.tilt), "angle between pin and bearing, or block and guide"),
+    on_request("@.normal", "@_normal_N", Site(|site| site.normal_force.norm()), "size of the normal force there on the carried part"),
+    on_request("@.friction.size", "@_friction_N", Site(|site| site.friction_force.norm()), "size of the friction force there on the carried part"),
+    on_request("@.gap", "@_gap_m", Site(|site| site.gap), "distance to the wall; negative in contact, infinite where the joint has no play"),
+    on_request("@.force.#", "@_force_#_N", SiteAxes(|site| site.normal_force + site.friction_force), "force there on the carried part"),
 
     on_request("@.length", "@_length_m", ElementValue(|element| (element.points[1] - element.points[0]).norm()), "distance of the element's points"),
 

@@ -42,7 +42,8 @@ impl State {
         let interacts = |other: ContactId| contacts.interact(c, other);
         let mut active = self.now.contact_states.iter().enumerate().filter(|(_, m)| m.active);
         let among_others = active.any(|(other, _)| interacts(other));
-        let onset = Onset { contact: c, joint: j, time, speed: rate, push, requested, among_others };
+        let place = contacts.place(c);
+        let onset = Onset { contact: c, joint: j, place, time, speed: rate, push, requested, among_others };
         self.record.impacts.begin(&onset, coefficients, interacts, events);
         let contact_state = ContactState::at_onset(coefficients, rate);
         self.record.statistics.joints[j].impacts += 1;
