@@ -46,6 +46,8 @@ impl Advice {
     /// Whether it is about the value of `key`.
     pub fn concerns(&self, key: &str) -> bool {
         let last = key.strip_prefix("contact.").or_else(|| key.strip_prefix("joint.")?.rsplit('.').next());
+        // A pin's clearance is its radial play.
+        let last = last.map(|last| if last == "radial" { "clearance" } else { last });
         self.key.is_some_and(|own| own == last.unwrap_or(key))
     }
 
@@ -64,6 +66,7 @@ impl Advice {
                 (format!("gives {gives}"), words, remedy)
             }
             Warning::Doubt(Doubt::Clearance { .. }) => ("very small".to_owned(), text.clone(), None),
+            Warning::Doubt(Doubt::ShortPin { .. }) => ("very large".to_owned(), text.clone(), None),
             Warning::Doubt(Doubt::Step { joint, step, duration, sliding, recommended }) => {
                 let time = |seconds: f64| format_quantity_digits(seconds, "us", 3);
                 let what = if *sliding { "friction reverses the sliding" } else { "an impact is over" };

@@ -186,7 +186,7 @@ fn a_state_of_another_scene_is_refused_with_the_reason() {
         check_refused(same, 2, &["--from-state s: "]);
     }
     for (text, words) in [
-        (good.replace("\"state_format\":7", "\"state_format\":8"), "format 7"),
+        (good.replace("\"state_format\":8", "\"state_format\":9"), "format 8"),
         ("{}".to_owned(), "not a state"),
         ("[1, 2]".to_owned(), "not a state"),
         ("\u{0}\u{1b}[31m".to_owned(), "not a state"),

@@ -328,3 +328,28 @@ fn the_written_start_is_that_of_the_body() {
     assert_eq!(velocity, nalgebra::Vector3::new(0.05, 0.1, -0.2));
     assert_eq!(angular_velocity, nalgebra::Vector3::new(20.0, 3.0, -2.0));
 }
+
+#[test]
+fn doubtful_pins_are_named() {
+    let doubts = |text: &str, changes: &[(&str, &str)]| -> Vec<String> {
+        let mut simulation = Simulation::new(&machine(text, changes)).unwrap();
+        simulation.advance_to(0.02).unwrap();
+        simulation.doubts().iter().map(ToString::to_string).collect()
+    };
+    let short = |list: &[String]| list.iter().any(|doubt| doubt.contains("its rim is farther"));
+    // L^2/(80 r) of r 10 mm: 0.1 mm for L 8.944 mm.
+    assert!(!short(&doubts(THROWN, &[("joint.J.play.length", "9 mm"), ("joint.J.play.axial", "0.1 mm")])));
+    assert!(short(&doubts(THROWN, &[("joint.J.play.length", "8.9 mm"), ("joint.J.play.axial", "0.1 mm")])));
+    // Thrown along its axis at 0.05 m/s: 1 mm in 20 ms without collars.
+    let free = THROWN
+        .replace("kind = \"revolute\"", "kind = \"cylindrical\"")
+        .replace("axial = \"0.2 mm\", ", "travel = \"0.5 mm\", ")
+        .replace("velocity = \"20 rad/s\"", "angular_velocity = \"20 rad/s\"");
+    let own = doubts(&free, &[("joint.J.friction", "0")]);
+    assert!(own.iter().any(|doubt| doubt.contains("more than its travel of 0.5 mm")), "{own:?}");
+    assert!(
+        !doubts(&free, &[("joint.J.friction", "0"), ("joint.J.play.travel", "2 mm")])
+            .iter()
+            .any(|doubt| doubt.contains("travel"))
+    );
+}

@@ -357,6 +357,7 @@ impl Machine {
                 });
             }
         }
+        doubts.extend(self.loose_joints.iter().filter_map(LooseJoint::short_pin).take(MAX_LISTED));
         doubts.extend(self.step_warning());
         doubts.extend(self.tolerance_warning());
         doubts.extend(self.overshoot_warning());

@@ -39,14 +39,35 @@ pub enum Doubt {
         /// Ball radius, m.
         ball_radius: f64,
     },
+    /// A pin whose play is not small against its length: tilted, its rim reaches less far than its axis says.
+    #[error(
+        "{joint}: play {} is large for a pin of radius {} and length {}: when it tilts, its rim is farther from the bearing than \
+         its axis says, by more than a fortieth of the play; above {} this is noticeable.",
+        format_quantity(*.play, "mm"),
+        format_quantity(*.radius, "mm"),
+        format_quantity(*.length, "mm"),
+        format_quantity_digits(*.most, "mm", 3)
+    )]
+    ShortPin {
+        /// Name of the joint.
+        joint: String,
+        /// Radial play c, m.
+        play: f64,
+        /// Radius r of the pin, m.
+        radius: f64,
+        /// Length L, m.
+        length: f64,
+        /// L^2/(80 r), m.
+        most: f64,
+    },
     /// A fixed step too long for the shortest expected impact.
     #[error(
         "solver.step {}: {} {}, which a fixed step this long does not resolve; use {} or less, or solver.method = automatic.",
         format_quantity(*.step, "us"),
         if *.sliding {
-            format!("friction at ball joint {joint} is estimated to reverse the sliding in")
+            format!("friction at joint {joint} is estimated to reverse the sliding in")
         } else {
-            format!("an impact at ball joint {joint} is estimated to last")
+            format!("an impact at joint {joint} is estimated to last")
         },
         format_quantity(libm::round(.duration * 1e8) * 1e-8, "us"),
         format_quantity(*.recommended, "us")
@@ -91,8 +112,8 @@ pub enum Doubt {
         /// Units of abscissas and values; "" for pure numbers.
         units: [&'static str; 2],
     },
-    /// The list of ball joints with distinct settings is incomplete.
-    #[error("Further ball joints have settings of their own; warnings about them are not listed.")]
+    /// The list of joints with distinct settings is incomplete.
+    #[error("Further joints have settings of their own; warnings about them are not listed.")]
     MoreJoints,
 }
 
@@ -159,7 +180,7 @@ impl Warning {
     pub fn key(&self) -> Option<&'static str> {
         match self {
             Self::Doubt(Doubt::Restitution { .. }) => Some("restitution"),
-            Self::Doubt(Doubt::Clearance { .. }) => Some("clearance"),
+            Self::Doubt(Doubt::Clearance { .. } | Doubt::ShortPin { .. }) => Some("clearance"),
             Self::Doubt(Doubt::Step { .. }) => Some("solver.step"),
             Self::Doubt(Doubt::Tolerance { .. }) => Some("solver.tolerance"),
             Self::StiffFriction { .. } => Some("slip_speed_high"),

@@ -1,6 +1,6 @@
 //! Joints with play.
 
-use super::{Attachment, Quat, StartRule, Vec3};
+use super::{Attachment, Doubt, Quat, StartRule, Vec3};
 use crate::contact;
 use crate::units::format_quantity;
 use crate::words::words;
@@ -226,6 +226,14 @@ impl LooseJoint {
             return Err(LooseFault::FrictionVelocity);
         }
         if start == StartRule::Settled { Err(LooseFault::Settled) } else { Ok(()) }
+    }
+
+    /// The doubt about a pin whose play is not small against its length: the error of its gap is 2 r c/L^2 of the play c.
+    pub(super) fn short_pin(&self) -> Option<Doubt> {
+        let LooseKind::Pin(Pin { length: Some(length), .. }) = self.kind else { return None };
+        let (play, radius) = (self.contact.clearance, self.contact.ball_radius);
+        let most = length * length / (80.0 * radius);
+        (play > most).then(|| Doubt::ShortPin { joint: self.name.clone(), play, radius, length, most })
     }
 
     /// Ball joint with default contact parameters and the drawn socket open towards -z.

@@ -593,6 +593,14 @@ impl Mechanism {
         pairs::separation([&joint.carried, &joint.carrier], self.motion(), 0)
     }
 
+    /// Displacement along the axis of each pin with a travel, by its joint, at the latest evaluation, m.
+    pub(crate) fn travelled(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.model.travelling.iter().map(|&(j, axis)| {
+            let axis = self.motion()[self.model.joints[j].carrier.body].rotation * axis;
+            (j, axis.dot(&self.separation(j)).abs())
+        })
+    }
+
     /// Where contact `c` acts at the latest evaluation, m.
     pub fn contact_point(&self, c: ContactId) -> Vec3 {
         let contact = self.contacts.contact(c);

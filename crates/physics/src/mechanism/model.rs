@@ -14,7 +14,7 @@ use super::pairs::{Cut, Opening};
 use crate::expression::Tape;
 use crate::jet::Jet;
 use crate::machine::{
-    Attachment, ClosedForm, Joint, JointKind, JointStart, Machine, Mat3, Path, Quat, StartRule, Vec3,
+    Attachment, ClosedForm, Joint, JointKind, JointStart, LooseKind, Machine, Mat3, Path, Pin, Quat, StartRule, Vec3,
 };
 use bodies::BodyTrees;
 
@@ -216,6 +216,8 @@ pub struct Model {
     pub sites: Vec<Site>,
     /// What loose joints with play do not leave free, each with the index of its joint.
     pub lasting: Vec<(usize, Cut)>,
+    /// Pins with a travel, by their joints, each with its axis in the carrier's body.
+    pub travelling: Vec<(usize, Vec3)>,
     pub drives: Vec<DriveLaw>,
     pub closed_form: Option<ClosedForm>,
     /// Functions of the closed form, for evaluation at every instant.
@@ -284,6 +286,7 @@ impl Model {
             ideal_joints: Vec::new(),
             sites: Vec::new(),
             lasting: Vec::new(),
+            travelling: Vec::new(),
             drives,
             closed_form: machine.closed_form.clone(),
             required_values,
@@ -329,6 +332,9 @@ impl Model {
             }
             let contacts = first..self.sites.len();
             let [carrier, carried] = frames.map(|frame| frame.origin);
+            if matches!(joint.kind, LooseKind::Pin(Pin { travel: Some(_), .. })) {
+                self.travelling.push((index, frames[0].axes[0]));
+            }
             self.joints.push(LooseJoint { carrier, carried, closed, ideal, contacts });
         }
         for joint in &machine.closing_joints {

@@ -119,13 +119,29 @@ pub enum Doubt {
         /// N or N m.
         force: f64,
     },
-    /// A contact patch that is not small compared with its ball.
-    #[error("{joints}: the contact patch reached {radii:.2} ball radii; Hertz's theory assumes that it is small.")]
+    /// A contact patch that is not small compared with its ball, pin or corner.
+    #[error(
+        "{joints}: the contact patch reached {radii:.2} radii of the ball, pin or corner; Hertz's theory assumes that it is small."
+    )]
     Patch {
         /// Affected joints.
         joints: AffectedJoints,
-        /// Radius of the patch over that of the ball.
+        /// Radius of the patch over that of the ball, pin or corner.
         radii: f64,
+    },
+    /// A pin displaced so far along its axis that an end of it, or of its bearing, touches nothing.
+    #[error(
+        "{joints}: it moved {} along its axis, more than its travel of {}: beyond, an end of the shorter part touches nothing.",
+        format_quantity_digits(*.distance, "mm", 4),
+        format_quantity_digits(*.travel, "mm", 4)
+    )]
+    Travel {
+        /// Affected joints.
+        joints: AffectedJoints,
+        /// Largest displacement, m.
+        distance: f64,
+        /// Travel of the worst joint, m.
+        travel: f64,
     },
     /// More damping than in an undisturbed impact under the same law.
     #[error(
@@ -205,7 +221,7 @@ pub enum Doubt {
 
 impl Doubt {
     /// Short names of the kinds of doubt for files, indexed by [`Self::kind`].
-    pub const KINDS: [&str; 12] = [
+    pub const KINDS: [&str; 13] = [
         "settings",
         "unresolved impacts",
         "late contact",
@@ -218,6 +234,7 @@ impl Doubt {
         "energy",
         "works",
         "stability",
+        "travel",
     ];
 
     /// Its kind, an index into [`Self::KINDS`].
@@ -235,6 +252,7 @@ impl Doubt {
             Self::Energy { .. } => 9,
             Self::Gain { .. } | Self::Work { .. } => 10,
             Self::StabilityLimited { .. } => 11,
+            Self::Travel { .. } => 12,
         }
     }
 }

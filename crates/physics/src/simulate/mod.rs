@@ -114,6 +114,8 @@ pub struct JointStatistics {
     pub damping: f64,
     /// When it occurred, s.
     pub damping_time: f64,
+    /// Largest displacement along the axis of a pin with a travel, m.
+    pub axial: f64,
 }
 
 impl Statistics {

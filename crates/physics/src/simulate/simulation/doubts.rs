@@ -1,9 +1,9 @@
 //! Reasons to doubt a result, from the scene's settings and from the course of the run.
 
 use super::{Model, State};
-use crate::contact::{Coefficients, FrictionVelocity};
+use crate::contact::{Coefficients, ElasticLaw, FrictionVelocity};
 use crate::integrate::Method;
-use crate::machine::{LooseJoint, MIN_IMPACT_STEPS, Machine};
+use crate::machine::{LooseJoint, LooseKind, MIN_IMPACT_STEPS, Machine, Pin, Slide};
 use crate::simulate::{AffectedJoints, Doubt, Ledger, LedgerTerm};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
@@ -77,6 +77,16 @@ impl DoubtContext<'_> {
         }));
         let patch = self.worst(MAX_PATCH, |j| self.largest_patch(j));
         doubts.extend(patch.map(|(joints, j)| Doubt::Patch { joints, radii: self.largest_patch(j) }));
+        let travel = |j: usize| match self.machine.loose_joints[j].kind {
+            LooseKind::Pin(Pin { travel, .. }) => travel.unwrap_or(f64::INFINITY),
+            LooseKind::Ball | LooseKind::Slide(_) => f64::INFINITY,
+        };
+        let travelled = self.worst(1.0, |j| statistics.joints[j].axial / travel(j));
+        doubts.extend(travelled.map(|(joints, j)| Doubt::Travel {
+            joints,
+            distance: statistics.joints[j].axial,
+            travel: travel(j),
+        }));
         let usual = |j: usize| self.coefficients(j).damping;
         let damping = self.worst(MAX_DAMPING, |j| statistics.joints[j].damping - usual(j));
         doubts.extend(damping.map(|(joints, j)| Doubt::Damping {
@@ -171,13 +181,25 @@ impl DoubtContext<'_> {
         Coefficients::new(&self.machine.loose_joints[j].contact, self.state.clearance(j))
     }
 
-    /// Radius of the contact patch at the largest force so far, in ball radii; 0 for an ideal joint and without contact.
+    /// Radius of the contact patch at the largest force so far, in radii of the ball, the pin or the corner; 0 for an ideal joint and
+    /// without contact.
     fn largest_patch(&self, j: usize) -> f64 {
-        if self.machine.loose_joints[j].contact.is_ideal() {
+        let joint = &self.machine.loose_joints[j];
+        if joint.contact.is_ideal() {
             return 0.0;
         }
-        let c = self.coefficients(j);
-        let depth = c.elastic.depth(self.state.statistics().joints[j].peak_normal);
+        let mut c = self.coefficients(j);
+        let force = self.state.statistics().joints[j].peak_normal;
+        match joint.kind {
+            LooseKind::Slide(Slide { corner_radius, .. }) => {
+                // A sphere on a plane.
+                let depth = ElasticLaw::of_corner(&joint.contact, corner_radius).depth(force);
+                return libm::sqrt(depth / corner_radius);
+            }
+            LooseKind::Pin(Pin { length: Some(_), .. }) => c.elastic.stiffness *= 0.5,
+            LooseKind::Ball | LooseKind::Pin(_) => {}
+        }
+        let depth = c.elastic.depth(force);
         c.elastic.patch(c.ball_radius, c.clearance, depth).map_or(0.0, |patch| patch / c.ball_radius)
     }
 }

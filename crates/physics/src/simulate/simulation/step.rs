@@ -293,6 +293,9 @@ impl Stepping<'_> {
         statistics.steps += 1;
         let drift = self.mechanism.constraint_drift();
         statistics.constraint_drift = statistics.constraint_drift.max(drift);
+        for (j, axial) in self.mechanism.travelled() {
+            statistics.joints[j].axial = statistics.joints[j].axial.max(axial);
+        }
         let located = self.locates();
         if located {
             self.track_reactions();
