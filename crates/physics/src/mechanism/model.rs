@@ -9,7 +9,7 @@ use super::assembly::{Assembled, Settled};
 use super::drives::{Law, Trajectory};
 use super::factor::{NONE, Pattern};
 use super::kinematics::Kinematics;
-use super::loose::{Compiled, Stiffness, Wall};
+use super::loose::{Compiled, Stiffness, Wall, drop_implied};
 use super::pairs::{Cut, Opening};
 use crate::expression::Tape;
 use crate::jet::Jet;
@@ -306,6 +306,7 @@ impl Model {
         };
         model.number_coordinates(machine, &root);
         model.cut_joints(machine);
+        drop_implied(&mut model, machine);
         let own_reaches = model.own_reaches(machine, |_| Vec3::zeros());
         model.spin_scales = own_reaches[..massive].iter().map(|reach| model.angle_scale(*reach)).collect();
         model.extent = model.distances().fold(0.0, f64::max);

@@ -1,10 +1,12 @@
 //! Kinds of joints with play, one file each.
 
 mod ball;
+mod implied;
 mod pin;
 mod slide;
 mod wall;
 
+pub use implied::drop_implied;
 pub use wall::{Edge, Stiffness, Wall};
 
 use super::model::{Anchor, Frame, Pair, Site};
