@@ -191,19 +191,27 @@ def resolve(scene: Scene, request: Request) -> dict[str, Distribution]:
         return found
 
 
+#: Ends of the keys of a clearance and of the radius that it is about: of balls, and of pins.
+_FITTED = ((".clearance", ".ball_radius"), (".play.radial", ".play.radius"))
+
+
 def _diameters(scene: Scene, key: str) -> dict[str, float | None]:
-    """Diameter of the ball with the clearance `key`, m; None if it is no clearance.
+    """Diameter of the ball or pin with the clearance `key`, m; None if it is no clearance.
 
     A clearance that balls of different size share has another fit at each of them: its place is taken by those of the joints.
     """
     if key != SHARED:
-        joint = re.fullmatch(r"joint\.(.*)\.clearance", key)
-        return {key: 2.0 * _number(scene, f"joint.{joint[1]}.ball_radius") if joint else None}
+        for play, radius in _FITTED:
+            if key.endswith(play):
+                return {key: 2.0 * _number(scene, key.removesuffix(play) + radius)}
+        return {key: None}
     other = scene.set({SHARED: 2e-6 if scene[SHARED] == 1e-6 else 1e-6})
+    keys = list(scene.parameters)
+    fitted = [(key, key.removesuffix(play) + radius) for key in keys for play, radius in _FITTED if key.endswith(play)]
     sizes = {
-        f"joint.{name}.clearance": 2.0 * _number(scene, f"joint.{name}.ball_radius")
-        for name in scene.ball_joints
-        if other[f"joint.{name}.clearance"] != scene[f"joint.{name}.clearance"]
+        key: 2.0 * _number(scene, radius)
+        for key, radius in fitted
+        if key.startswith("joint.") and other[key] != scene[key]
     }
     common = set(sizes.values()) or {2.0 * _number(scene, "contact.ball_radius")}
     return {SHARED: common.pop()} if len(common) == 1 else dict(sizes)

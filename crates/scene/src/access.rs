@@ -57,8 +57,9 @@ impl Scene {
         play::parts_of(joint).map(|part| format!("joint.{}.{part}", joint.name))
     }
 
-    /// Key of the contact parameter `part` of joint with play `joint`: `joint.J.play.radial` for the clearance of a pin.
-    pub(super) fn joint_key(&self, joint: usize, part: &str) -> String {
+    /// Key of the contact parameter `part` of joint with play `joint`: `joint.J.play.radial` for the `clearance` of a pin, and its
+    /// `play.axial` for the `second_clearance`.
+    pub fn joint_key(&self, joint: usize, part: &str) -> String {
         let joint = &self.machine.loose_joints[joint];
         format!("joint.{}.{}", joint.name, play::own_part(&joint.kind, part))
     }

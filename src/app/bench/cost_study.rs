@@ -78,10 +78,15 @@ impl CostSettings {
         if let Some(VariedParameter { parameter, .. }) = self.varied.iter().find(reversed) {
             return Err(format!("{}: the first value must be below the second", parameter.label));
         }
-        for joint in &scene.machine.loose_joints {
-            for VariedParameter { parameter, range, .. } in self.varied.iter().filter(|varied| varied.on) {
-                let last = parameter.key.rsplit('.').next().unwrap_or_default();
-                let key = format!("joint.{}.{last}", joint.name);
+        for joint in 0..scene.machine.loose_joints.len() {
+            let varied = self.varied.iter().filter(|varied| varied.on).flat_map(|varied| {
+                let last = varied.parameter.key.rsplit('.').next().unwrap_or_default();
+                // A pin and a block may have two plays.
+                let second = (last == "clearance").then_some("second_clearance");
+                [Some(last), second].into_iter().flatten().map(move |part| (varied, part))
+            });
+            for (VariedParameter { parameter, range, .. }, part) in varied {
+                let key = scene.joint_key(joint, part);
                 let (Ok(Value::Number(now)), Kind::Number { min, max, display, .. }) =
                     (scene.get(&key), parameter.kind)
                 else {
@@ -105,6 +110,12 @@ impl CostSettings {
         let outputs = NAMED.iter().map(|named| named.name.to_owned()).collect();
         Ok(OneAtATimeTask { scene: SceneSource::of(scene), over, outputs, span: self.span })
     }
+}
+
+/// Joint of a parameter's key: `J` of `joint.J.play.radial`.
+pub fn joint_of(key: &str) -> Option<&str> {
+    let (joint, _) = key.strip_prefix("joint.")?.rsplit_once('.')?;
+    Some(joint.strip_suffix(".play").unwrap_or(joint))
 }
 
 /// A started study and its results so far.
@@ -193,8 +204,7 @@ impl CostStudy {
         }
         let name = |input: usize| {
             let key = &self.task.over[input].0;
-            let joint =
-                key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')).map_or(&**key, |(joint, _)| joint);
+            let joint = joint_of(key).unwrap_or(key);
             self.parameter(input)
                 .map_or_else(|| joint.to_owned(), |parameter| format!("{} of {joint}", parameter.label))
         };

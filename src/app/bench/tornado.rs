@@ -7,7 +7,7 @@ use eframe::egui::{
 };
 use egui_plot::GridInput;
 
-use super::cost_study::CostStudy;
+use super::cost_study::{CostStudy, joint_of};
 use crate::analysis::study::NAMED;
 use crate::app::player::Player;
 use crate::app::{plots, theme, value};
@@ -272,8 +272,7 @@ impl End {
 
 /// Joint and parameter of a key.
 fn name(key: &str) -> [&str; 2] {
-    let (joint, part) = key.strip_prefix("joint.").unwrap_or(key).rsplit_once('.').unwrap_or((key, ""));
-    [joint, part]
+    [joint_of(key).unwrap_or(key), key.rsplit_once('.').map_or("", |(_, part)| part)]
 }
 
 /// What the two colours stand for; pale if the bars are of an `earlier` setting.
