@@ -269,3 +269,62 @@ fn unreachable_drive_positions_report_the_reached_fraction() {
         other => panic!("{other:?}"),
     }
 }
+
+/// A pin or a block held in the world, with the tip at `tip` (mm) of it.
+fn held_part(joint: &str, tip: &str) -> HeldMachine {
+    let text = format!(
+        "[gravity]\nz = 0\n[output]\nbody = \"part\"\nprobe = \"{tip} mm\"\n[[body]]\nname = \"part\"\nmass = \"0.1 kg\"\n\
+         inertia = \"1e-5 1e-5 1e-5 kg m^2\"\n[[joint]]\nname = \"J\"\nchild = \"part\"\naxis = [1, 0, 0]\n{joint}\n"
+    );
+    held_machine(&parse(&text, &[]), &[])
+}
+
+/// The support along `u` and the pose that reaches it.
+fn farthest_along(joint: &str, tip: &str, u: [f64; 3]) -> f64 {
+    let u = Vec3::from(u);
+    let farthest = held_part(joint, tip).farthest(&u);
+    let reached = u.dot(&error(&farthest));
+    assert!((reached / farthest.support - 1.0).abs() < 1e-2, "{joint} {tip}: {reached} {farthest:?}");
+    assert!((farthest.shares[0] / farthest.support - 1.0).abs() < 1e-9);
+    farthest.support
+}
+
+#[test]
+fn a_pin_lets_its_tip_wander_as_the_lever_of_its_ends_says() {
+    const C: f64 = 1e-4;
+    let pin = |more: &str| format!("kind = \"revolute\"\nplay = {{ radial = \"0.1 mm\", length = \"24 mm\"{more} }}");
+    let near = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-7, "{found} {expected}");
+    for ends in ["bearing", "pin"] {
+        let pin = pin(&format!(", axial = \"0.2 mm\", ends = \"{ends}\""));
+        // Beyond the end both ends touch, on opposite sides: 2 a/L of the play; between them the play itself.
+        for u in [[0.0, 1.0, 0.0], [0.0, 0.6, -0.8]] {
+            near(farthest_along(&pin, "60 0 0", u), C * 2.0 * 60.0 / 24.0);
+            near(farthest_along(&pin, "6 0 0", u), C);
+        }
+        near(farthest_along(&pin, "60 0 0", [1.0, 0.0, 0.0]), 2e-4);
+        // Beside the axis, tilt moves it along: 2 b/L.
+        near(farthest_along(&pin, "0 0 30", [1.0, 0.0, 0.0]), 2e-4 + C * 2.0 * 30.0 / 24.0);
+    }
+    // Collars bound the tilt to c_a/r_f where that is less than 2 c/L; the ends still carry the force.
+    let collars = pin(", axial = \"0.05 mm\", face_radius = \"20 mm\"");
+    near(farthest_along(&collars, "60 0 0", [0.0, 1.0, 0.0]), C + 48e-3 * 0.05 / 20.0);
+    let wide = pin(", axial = \"0.5 mm\", face_radius = \"20 mm\"");
+    near(farthest_along(&wide, "60 0 0", [0.0, 0.0, 1.0]), C * 2.0 * 60.0 / 24.0);
+    // A pin that does not tilt moves as a whole.
+    let planar = "kind = \"revolute\"\nplay = { radial = \"0.1 mm\", planar = true }";
+    near(farthest_along(planar, "60 0 0", [0.0, 1.0, 0.0]), C);
+}
+
+#[test]
+fn a_block_lets_its_tip_wander_as_the_lever_of_its_corners_says() {
+    let near = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-7, "{found} {expected}");
+    let size = "half_length = \"25 mm\", half_y = \"20 mm\"";
+    // The joint is held along its guide by a drive of another body: along it nothing bounds the tip.
+    let planar = format!("kind = \"prismatic\"\nplay = {{ y = \"0.1 mm\", {size}, planar = true }}");
+    near(farthest_along(&planar, "100 0 0", [0.0, 1.0, 0.0]), 1e-4 * 100.0 / 25.0);
+    let spatial =
+        format!("kind = \"prismatic\"\nplay = {{ y = \"0.1 mm\", z = \"0.2 mm\", {size}, half_z = \"20 mm\" }}");
+    near(farthest_along(&spatial, "100 0 0", [0.0, 1.0, 0.0]), 1e-4 * 100.0 / 25.0);
+    near(farthest_along(&spatial, "100 0 0", [0.0, 0.0, 1.0]), 2e-4 * 100.0 / 25.0);
+    near(farthest_along(&spatial, "10 0 0", [0.0, 0.0, 1.0]), 2e-4);
+}

@@ -3,12 +3,13 @@
 use super::assembly::Settled;
 use super::constraints::Constraints;
 use super::equilibrium::{rest_near, rest_state, with_constant_laws};
+use super::members::Members;
 use super::model::Model;
 use super::settled::without_play;
 use super::start::{CLOSED, factor_at};
 use super::tree::Tree;
 use super::{Mechanism, MechanismError};
-use crate::machine::{Drive, LooseKind, Machine, Mat3, StartRule, Vec3};
+use crate::machine::{Drive, Machine, Mat3, StartRule, Vec3};
 
 /// Time at which the drives have reached their positions; they move from those at t = 0 at constant rates.
 pub(super) const DRIVE_END: f64 = 1.0;
@@ -36,12 +37,6 @@ pub enum HeldError {
         /// Fraction of the straight path of the drives, 0 to 1.
         part: f64,
     },
-    /// Joints whose play is not that of a point.
-    #[error("joint {joint} has play other than that of a ball: the reachable set is known for ball joints only")]
-    Kind {
-        /// Name of the joint.
-        joint: String,
-    },
     /// The loops do not determine the pose.
     #[error("singular pose: without play the loops no longer determine it")]
     Singular,
@@ -50,13 +45,13 @@ pub enum HeldError {
 /// A machine with drives that stand still.
 pub struct HeldMachine {
     /// With play.
-    machine: Machine,
+    pub(super) machine: Machine,
     /// Without.
     pub(super) model: Model,
     pub(super) tree: Tree,
     pub(super) constraints: Constraints,
-    /// Radial clearance of each ball joint, m.
-    pub(super) play: Vec<f64>,
+    /// What has play in each joint.
+    pub(super) members: Members,
     /// Tree coordinates of the pose without play, and velocities of zero.
     pub(super) ideal: Vec<f64>,
     pub(super) ideal_tip: Vec3,
@@ -73,9 +68,6 @@ impl HeldMachine {
     /// The machine does not start, the drives do not reach their positions, the pose is singular, or no position of rest is
     /// found.
     pub fn new(machine: &Machine, held: &[Option<f64>]) -> Result<Self, HeldError> {
-        if let Some(joint) = machine.loose_joints.iter().find(|joint| joint.kind != LooseKind::Ball) {
-            return Err(HeldError::Kind { joint: joint.name.clone() });
-        }
         let mut mechanism = Mechanism::new(&without_play(machine))?;
         // The pose is assembled from the joints; a path in closed form is no more than a first guess.
         let mut y = mechanism.start_off_path()?;
@@ -111,7 +103,7 @@ impl HeldMachine {
                 start: StartRule::Equilibrium,
                 ..stationary.clone()
             },
-            play: machine.loose_joints.iter().map(|joint| joint.contact.clearance).collect(),
+            members: Members::new(&machine.loose_joints, &model),
             model,
             tree,
             constraints,

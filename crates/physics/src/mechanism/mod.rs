@@ -26,6 +26,7 @@ mod lagrange;
 mod loose;
 mod lu;
 mod massless;
+mod members;
 mod model;
 mod norm_sum;
 mod pairs;

@@ -1,4 +1,4 @@
-//! The set of tip errors that are reachable with every ball anywhere in its play and the drives held: its farthest point in a
+//! The set of tip errors that are reachable with every part anywhere in its play and the drives held: its farthest point in a
 //! direction. Contact between bodies, springs and inertia play no part.
 //!
 //! A unit force u at the tip of the mechanism without play presses its balls on their sockets with forces l_k, and does the
@@ -13,7 +13,7 @@
 
 use super::constraints::Constraints;
 use super::held::{DRIVE_END, HeldMachine, IMMOBILE};
-use super::norm_sum::minimise;
+use super::model::Model;
 use super::start::factor_at;
 use super::tree::Tree;
 use crate::machine::{Mat3, Vec3};
@@ -57,8 +57,8 @@ impl HeldMachine {
     pub fn freedoms(&mut self) -> TipFreedoms {
         self.factor(&self.ideal.clone());
         let unconstrained = self.mobility(|_| {}).trace();
-        let without_play: Vec<usize> = (0..self.play.len()).filter(|&k| self.play[k] == 0.0).collect();
-        let mut constraints = Constraints::new(&self.model, &without_play);
+        let loose = Model::new(&self.machine);
+        let mut constraints = Constraints::new(&loose, &loose.ideal_joints);
         if constraints.rows() > 0 {
             // The rows of all joints may be dependent, and then some of these are, too.
             constraints.treat_as_dependent(constraints.rows());
@@ -79,10 +79,10 @@ impl HeldMachine {
     /// The farthest error along the unit vector `direction`, one of those that [`TipFreedoms::bounded`] span.
     pub fn farthest(&mut self, direction: &Vec3) -> Farthest {
         let rows = self.constraints.rows();
-        let most = self.play.iter().copied().fold(0.0, f64::max);
+        let most = self.members.largest_play();
         let mut y = self.ideal.clone();
         let (mut openings, mut targets, mut step) = (vec![0.0; rows], vec![0.0; rows], vec![0.0; self.model.nv]);
-        let (mut support, mut shares, mut error) = (0.0, vec![0.0; self.play.len()], None);
+        let (mut support, mut shares, mut error) = (0.0, Vec::new(), None);
         let mut tip = self.ideal_tip;
         for pose in 0..MAX_POSES {
             self.factor(&y);
@@ -92,12 +92,10 @@ impl HeldMachine {
             self.constraints.balance_loads(&self.model, &mut vdot, &mut loads);
             self.constraints.openings(&self.tree.motion, &mut openings);
             let null: Vec<Vec<f64>> = self.constraints.system().null_multipliers().map(<[f64]>::to_vec).collect();
-            let displaced = minimise(&self.play, &null, &openings, &mut loads);
+            let (displaced, work) = self.members.displace(&self.model, &self.tree.motion, &null, &openings, &loads);
             if pose == 0 {
-                for ((share, load), play) in shares.iter_mut().zip(loads.chunks_exact(3)).zip(&self.play) {
-                    *share = play * load.iter().map(|x| x * x).sum::<f64>().sqrt();
-                }
-                support = shares.iter().sum();
+                support = work.iter().sum();
+                shares = work;
             }
             let weight = match pose {
                 ..FIRST_AVERAGED => 1.0,
