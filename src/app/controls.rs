@@ -15,7 +15,7 @@ use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::{equations, keys, layout, spoken, theme, value};
 use crate::scene::{Kind, OWN_GROUP, Parameter, SceneError, Scope, SetError, Value};
-use crate::simulate::Effect;
+use crate::simulate::{CLEARANCE_SPEED, Effect};
 use crate::units::{format_quantity_digits, from_display, to_display};
 
 /// Shown with its resulting accuracy.
@@ -256,13 +256,22 @@ impl Controls {
     fn note(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
         let waits = player.is_pending(row.key);
         let advice = player.warning(row.key).cloned();
-        let brief = match &advice {
+        let moving = player.moving_play(row.key).map(|play| {
+            let now = value::typeset(&format_quantity_digits(play, "mm", 3));
+            let rate = value::typeset(&format_quantity_digits(CLEARANCE_SPEED, "mm/s", 3));
+            (format!("now {now}"), format!("It moves to this value at {rate}, so that no wall strikes what is in its way."))
+        });
+        let brief = match (&advice, &moving) {
             _ if waits => "at restart",
-            Some(advice) => &*advice.brief,
-            None => return,
+            (_, Some((now, _))) => now,
+            (Some(advice), None) => &*advice.brief,
+            (None, None) => return,
         };
         let said: Vec<&str> =
-            waits.then_some(WAITS).into_iter().chain(advice.as_ref().map(|own| &*own.words)).collect();
+            (waits.then_some(WAITS).into_iter())
+                .chain(moving.as_ref().map(|(_, words)| &**words))
+                .chain(advice.as_ref().map(|own| &*own.words))
+                .collect();
         let said = said.join(" ");
         let colour = ui.visuals().warn_fg_color;
         let text = |words: &str| RichText::new(words).small().strong().color(colour);
@@ -286,7 +295,7 @@ impl Controls {
         popup.show(|ui| {
             ui.set_max_width(NOTE_WIDTH);
             ui.label(&said);
-            if waits && ui.button("Restart now").clicked() {
+            if (waits || moving.is_some()) && ui.button("Restart now").clicked() {
                 self.asks_restart = true;
                 ui.close();
             }

@@ -94,6 +94,9 @@ fn changed_value(changes: &[(String, String)], key: &str) -> Option<String> {
     changes.iter().rev().find(|(other, _)| other == key).map(|(_, text)| text.clone())
 }
 
+/// Distance of a play from its setting below which it is not said, m.
+const NOTICEABLE: f64 = 5e-7;
+
 /// Viewing time covered by the automatic plot window, s.
 const VIEWING_TIME: f64 = 5.0;
 
@@ -581,6 +584,19 @@ impl Player {
     /// Whether `key` was changed and waits for a reset.
     pub fn is_pending(&self, key: &str) -> bool {
         self.pending().get(key).ok() != self.running().get(key).ok()
+    }
+
+    /// The play of the displayed instant, m, where it is still on its way to the value of `key`: a live change moves it at a bounded
+    /// rate, so that a wall pushes no ball at a blow. Of several joints, the one that has farthest to go.
+    pub fn moving_play(&self, key: &str) -> Option<f64> {
+        let joints = self.running().machine.loose_joints.iter().zip(&self.frame.joints).enumerate();
+        let moving = joints.filter(|(j, (joint, now))| {
+            let sets = key == "contact.clearance" || self.running().joint_key(*j, "clearance") == key;
+            sets && (now.clearance - joint.contact.clearance).abs() > NOTICEABLE
+        });
+        let far = |play: &f64, to: f64| (play - to).abs();
+        let moving = moving.map(|(_, (joint, now))| (now.clearance, joint.contact.clearance));
+        moving.max_by(|a, b| far(&a.0, a.1).total_cmp(&far(&b.0, b.1))).map(|(now, _)| now)
     }
 
     /// Whether any change waits for a reset.
