@@ -19,10 +19,10 @@ pub fn law(key: &str, scene: &Scene) -> Option<ShownLaw> {
 fn law_of(last: &str, contact: &Parameters) -> Option<ShownLaw> {
     let [friction, correction] = contact.friction_law.shown();
     Some(match last {
-        "clearance" | "ball_radius" | "youngs_modulus" | "poisson_ratio" => ElasticLaw::shown(contact.normal_law),
+        "clearance" | "ball_radius" | "youngs_modulus" | "poisson_ratio" => ElasticLaw::shown(contact.elasticity),
         "friction" | "friction_law" => friction,
         "slip_speed_low" | "slip_speed_high" => correction,
-        "restitution" | "normal_law" => contact.normal_law.shown(),
+        "restitution" | "normal_law" => contact.normal_law.shown(contact.elasticity),
         _ => return None,
     })
 }
@@ -30,7 +30,7 @@ fn law_of(last: &str, contact: &Parameters) -> Option<ShownLaw> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::NormalLaw;
+    use crate::contact::{Elasticity, NormalLaw};
     use crate::scene::{Quantity, evaluate};
     use crate::units::Dimension;
 
@@ -40,7 +40,7 @@ mod tests {
         let changes = changes.map(|(key, value)| (key.to_owned(), value.to_owned()));
         let scene = Scene::load("spcmm", &changes).expect("built in");
         assert_eq!(law("joint.S1.restitution", &scene), law("contact.restitution", &scene));
-        assert_eq!(law("joint.S2.restitution", &scene), Some(NormalLaw::Hertz.shown()));
+        assert_eq!(law("joint.S2.restitution", &scene), Some(NormalLaw::Hertz.shown(Elasticity::Sphere)));
         assert_eq!(law("contact.friction", &scene).expect("stated").formula, "F = 0");
         assert_eq!(law("spcmm.frequency", &scene), None);
     }

@@ -1,7 +1,7 @@
 //! Joints with play.
 
 use super::{Attachment, Quat, StartRule, Vec3};
-use crate::contact;
+use crate::contact::{self, ElasticLaw, Elasticity};
 
 /// A joint with play: contacts between two bodies in place of constraints, unless its clearance is 0.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +29,16 @@ pub enum LooseKind {
     Pin(Pin),
     /// A block, the carried part, in a guide along the x axes of their frames.
     Slide(Slide),
+}
+
+impl LooseKind {
+    /// Part of the joint's stiffness that each contact across it has.
+    pub(crate) fn share(&self) -> f64 {
+        match self {
+            Self::Pin(Pin { length: Some(_), .. }) => 0.5,
+            Self::Ball | Self::Pin(_) | Self::Slide(_) => 1.0,
+        }
+    }
 }
 
 /// A round pin in a bearing. The ball radius of the contact parameters is the radius r of the pin, the clearance R - r.
@@ -114,6 +124,22 @@ pub enum LooseFault {
     /// Friction that follows the centres, which have no meaning for a pin.
     #[error("friction follows the velocity of the surfaces in joints other than ball joints")]
     FrictionVelocity,
+    /// Line contact of a part that is no pin.
+    #[error(
+        "only a pin in its bearing has a line contact: elastic = \"line\" and stiffness_at are for revolute and cylindrical joints"
+    )]
+    LineContact,
+    /// A stiffness that is none.
+    #[error("stiffness = {0:e} N/m^1.5: must be above 0 N/m^1.5")]
+    Stiffness(f64),
+    /// A force at which the line contact has no depth.
+    #[error("stiffness_at = {force:e} N: must be above 0 N and below {most:e} N, 4 pi E* L c / e^2")]
+    StiffnessAt {
+        /// N.
+        force: f64,
+        /// N.
+        most: f64,
+    },
     /// A start that only ball joints have.
     #[error("start = \"settled\" places balls in their sockets; with other joints with play, use \"equilibrium\"")]
     Settled,
@@ -129,6 +155,7 @@ impl LooseJoint {
         let limit = |play: f64, part, most: f64| {
             if play <= most { Ok(()) } else { Err(LooseFault::Play { play, part, most }) }
         };
+        self.check_elasticity()?;
         match self.kind {
             LooseKind::Ball if second > 0.0 => return Err(LooseFault::SecondPlay),
             LooseKind::Ball => return Ok(()),
@@ -166,6 +193,36 @@ impl LooseJoint {
             return Err(LooseFault::FrictionVelocity);
         }
         if start == StartRule::Settled { Err(LooseFault::Settled) } else { Ok(()) }
+    }
+
+    /// Checks the elastic law against the kind and the play.
+    fn check_elasticity(&self) -> Result<(), LooseFault> {
+        let is_pin = matches!(self.kind, LooseKind::Pin(_));
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let of_length = |length: f64| {
+            if !is_pin {
+                Err(LooseFault::LineContact)
+            } else if positive(length) {
+                Ok(())
+            } else {
+                Err(LooseFault::Length { what: "the length of the line contact", value: length })
+            }
+        };
+        match self.contact.elasticity {
+            Elasticity::Sphere => Ok(()),
+            Elasticity::Stiffness(stiffness) if positive(stiffness) => Ok(()),
+            Elasticity::Stiffness(stiffness) => Err(LooseFault::Stiffness(stiffness)),
+            Elasticity::Line { length } => of_length(length),
+            Elasticity::StiffnessAt { force, length } => {
+                of_length(length)?;
+                // Without play there is no contact.
+                let most = match self.contact.clearance {
+                    0.0 => f64::INFINITY,
+                    clearance => ElasticLaw::largest_line_force(&self.contact, length, clearance),
+                };
+                if force > 0.0 && force < most { Ok(()) } else { Err(LooseFault::StiffnessAt { force, most }) }
+            }
+        }
     }
 
     /// Ball joint with default contact parameters and the drawn socket open towards -z.

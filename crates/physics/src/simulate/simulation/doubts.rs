@@ -177,7 +177,8 @@ impl DoubtContext<'_> {
             return 0.0;
         }
         let c = self.coefficients(j);
-        let depth = c.elastic.depth(self.state.statistics().joints[j].peak_normal);
+        let depth =
+            c.elastic.depth(self.state.statistics().joints[j].peak_normal / self.machine.loose_joints[j].kind.share());
         c.elastic.patch(c.ball_radius, c.clearance, depth).map_or(0.0, |patch| patch / c.ball_radius)
     }
 }
