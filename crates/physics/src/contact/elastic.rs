@@ -127,7 +127,7 @@ impl ElasticLaw {
     pub fn force(&self, d: f64) -> f64 {
         match self.form {
             Form::Sphere { .. } => self.stiffness * d * d.abs().sqrt(),
-            Form::Line(line) => self.of_line(d, |d| d.signum() * line.force(d.abs())),
+            Form::Line(line) => self.of_line(line, d, Line::force).copysign(d),
         }
     }
 
@@ -136,7 +136,7 @@ impl ElasticLaw {
     pub fn slope(&self, d: f64) -> f64 {
         match self.form {
             Form::Sphere { .. } => 1.5 * self.stiffness * d.abs().sqrt(),
-            Form::Line(line) => self.of_line(d, |d| line.slope(d.abs())),
+            Form::Line(line) => self.of_line(line, d, Line::slope),
         }
     }
 
@@ -148,23 +148,24 @@ impl ElasticLaw {
         }
         match self.form {
             Form::Sphere { .. } => 0.4 * self.stiffness * d * d * d.sqrt(),
-            Form::Line(line) => self.of_line(d, |d| line.energy(d)),
+            Form::Line(line) => self.of_line(line, d, Line::energy),
         }
     }
 
     /// Derivative of the energy with respect to the clearance at the same penetration `d` > 0 (m), N.
+    #[inline(never)]
     pub(crate) fn energy_by_clearance(&self, d: f64) -> f64 {
         match self.form {
             Form::Sphere { stiffening } => stiffening * self.energy(d),
-            Form::Line(line) => self.of_line(d, |d| line.energy_by_clearance(d)),
+            Form::Line(line) => self.of_line(line, d, Line::energy_by_clearance),
         }
     }
 
-    /// A value of the line contact, which has a limit of 0 at the penetration 0. Apart, so that the sphere's stays short.
+    /// A value of the line contact at the distance |`d`| (m) from 0, where it has a limit of 0. Apart, so that the sphere's stays short.
     #[cold]
     #[inline(never)]
-    fn of_line(&self, d: f64, value: impl Fn(f64) -> f64) -> f64 {
-        if d == 0.0 { 0.0 } else { self.stiffness * value(d) }
+    fn of_line(&self, line: Line, d: f64, value: fn(&Line, f64) -> f64) -> f64 {
+        if d == 0.0 { 0.0 } else { self.stiffness * value(&line, d.abs()) }
     }
 
     /// d F'(d) / F(d) at the penetration `d` > 0, m: the power with which the force grows.
@@ -172,7 +173,7 @@ impl ElasticLaw {
     pub fn exponent(&self, d: f64) -> f64 {
         match self.form {
             Form::Sphere { .. } => 1.5,
-            Form::Line(_) => d * self.slope(d) / self.force(d),
+            Form::Line(line) => d * self.of_line(line, d, Line::slope) / self.of_line(line, d, Line::force),
         }
     }
 
