@@ -48,9 +48,14 @@ mod tests {
     #[test]
     fn the_displayed_normal_force_is_that_of_the_active_law() {
         let ce = 0.7;
-        for normal_law in NormalLaw::ALL {
-            let contact = Parameters { normal_law, ..Parameters::default() };
+        let laws = [Elasticity::Sphere, Elasticity::Line { length: 0.02 }]
+            .into_iter()
+            .flat_map(|elasticity| NormalLaw::ALL.into_iter().map(move |normal_law| (elasticity, normal_law)));
+        for (elasticity, normal_law) in laws {
+            let contact = Parameters { normal_law, elasticity, ..Parameters::default() };
             let stated = law_of("restitution", &contact).expect("stated");
+            let on_spheres = elasticity == Elasticity::Sphere;
+            assert!(stated.formula.starts_with(if on_spheres { "N = K d^1.5" } else { "N = F" }), "{stated:?}");
             let chi = normal_law.damping_factor(ce);
             let factor = stated.formula.split_once("(1 + ").and_then(|(_, rest)| rest.split_once("d' / d'0"));
             let Some((factor, _)) = factor else {
