@@ -372,6 +372,29 @@ fn without_play_the_pin_is_ideal() {
     }
 }
 
+/// A pin that plays along its axis alone touches with its collars, which have no line contact: 0.1 kg between two faces.
+#[test]
+fn collars_keep_the_stiffness_of_a_sphere() {
+    for elasticity in [Elasticity::Sphere, LINE, Elasticity::StiffnessAt { force: 1e3, length: LENGTH }] {
+        for method in [Method::DormandPrince5, Method::DiscreteGradient] {
+            let mut machine = elastic_throw(elasticity, KEPT, 0.2);
+            let contact = &mut machine.loose_joints[0].contact;
+            (contact.clearance, contact.second_clearance) = (0.0, PLAY);
+            if let JointStart::Pose { velocity, .. } = &mut machine.joints[0].start {
+                *velocity = Vec3::new(0.2, 0.0, 0.0);
+            }
+            machine.solver.method = method;
+            let (impacts, simulation) = impacts(&machine, 0.8e-3);
+            let steps = simulation.statistics().steps;
+            println!("{elasticity:?} {method}: {} N, {steps} steps", impacts[0].peak);
+            let stiffness = law(Elasticity::Sphere).stiffness;
+            let expected = stiffness * libm::pow(1.25 * 0.1 * 0.04 / stiffness, 0.6);
+            let most = if method == Method::DiscreteGradient { 0.02 } else { 1e-7 };
+            assert!((impacts[0].peak / expected - 1.0).abs() < most && steps < 500, "{elasticity:?} {method}: {steps}");
+        }
+    }
+}
+
 /// 5 um of play under 0.1 kg at 0.5 and 4 m/s: half of the width of the contact is no longer small against the pin, and the second impact
 /// goes beyond the largest force of the theory.
 #[test]

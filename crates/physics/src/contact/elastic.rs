@@ -43,9 +43,10 @@ impl ElasticLaw {
     }
 
     /// Law of a joint as a whole, both parts of the material of `parameters`, for a clearance c > 0, m: a ball of radius r in a socket of
-    /// radius r + c, s = (1 - nu^2) / E, or what its parameters choose in its place.
+    /// radius r + c, s = (1 - nu^2) / E, or what its parameters choose in its place. For c = 0 that of the collars, which alone can touch.
     pub fn of_joint(parameters: &Parameters, clearance: f64) -> Self {
         match parameters.elasticity {
+            _ if clearance == 0.0 => Self::of_faces(parameters),
             Elasticity::Sphere => Self::of_ball(parameters, clearance),
             Elasticity::Stiffness(stiffness) => Self::constant(stiffness),
             Elasticity::StiffnessAt { force, length } => {
