@@ -259,7 +259,10 @@ impl Controls {
         let moving = player.moving_play(row.key).map(|play| {
             let now = value::typeset(&format_quantity_digits(play, "mm", 3));
             let rate = value::typeset(&format_quantity_digits(CLEARANCE_SPEED, "mm/s", 3));
-            (format!("now {now}"), format!("It moves to this value at {rate}, so that no wall strikes what is in its way."))
+            (
+                format!("now {now}"),
+                format!("It moves to this value at {rate}, so that no wall strikes what is in its way."),
+            )
         });
         let brief = match (&advice, &moving) {
             _ if waits => "at restart",
@@ -267,11 +270,10 @@ impl Controls {
             (Some(advice), None) => &*advice.brief,
             (None, None) => return,
         };
-        let said: Vec<&str> =
-            (waits.then_some(WAITS).into_iter())
-                .chain(moving.as_ref().map(|(_, words)| &**words))
-                .chain(advice.as_ref().map(|own| &*own.words))
-                .collect();
+        let said: Vec<&str> = (waits.then_some(WAITS).into_iter())
+            .chain(moving.as_ref().map(|(_, words)| &**words))
+            .chain(advice.as_ref().map(|own| &*own.words))
+            .collect();
         let said = said.join(" ");
         let colour = ui.visuals().warn_fg_color;
         let text = |words: &str| RichText::new(words).small().strong().color(colour);

@@ -19,10 +19,10 @@ pub fn law(key: &str, scene: &Scene) -> Option<ShownLaw> {
 fn law_of(last: &str, contact: &Parameters) -> Option<ShownLaw> {
     let [friction, correction] = contact.friction_law.shown();
     Some(match last {
-        "clearance" | "ball_radius" | "youngs_modulus" | "poisson_ratio" => ElasticLaw::shown(contact.normal_law),
+        "clearance" | "ball_radius" | "youngs_modulus" | "poisson_ratio" => ElasticLaw::shown(contact.elasticity),
         "friction" | "friction_law" => friction,
         "slip_speed_low" | "slip_speed_high" => correction,
-        "restitution" | "normal_law" => contact.normal_law.shown(),
+        "restitution" | "normal_law" => contact.normal_law.shown(contact.elasticity),
         _ => return None,
     })
 }
@@ -30,7 +30,7 @@ fn law_of(last: &str, contact: &Parameters) -> Option<ShownLaw> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::NormalLaw;
+    use crate::contact::{Elasticity, NormalLaw};
     use crate::scene::{Quantity, evaluate};
     use crate::units::Dimension;
 
@@ -40,7 +40,7 @@ mod tests {
         let changes = changes.map(|(key, value)| (key.to_owned(), value.to_owned()));
         let scene = Scene::load("spcmm", &changes).expect("built in");
         assert_eq!(law("joint.S1.restitution", &scene), law("contact.restitution", &scene));
-        assert_eq!(law("joint.S2.restitution", &scene), Some(NormalLaw::Hertz.shown()));
+        assert_eq!(law("joint.S2.restitution", &scene), Some(NormalLaw::Hertz.shown(Elasticity::Sphere)));
         assert_eq!(law("contact.friction", &scene).expect("stated").formula, "F = 0");
         assert_eq!(law("spcmm.frequency", &scene), None);
     }
@@ -48,9 +48,14 @@ mod tests {
     #[test]
     fn the_displayed_normal_force_is_that_of_the_active_law() {
         let ce = 0.7;
-        for normal_law in NormalLaw::ALL {
-            let contact = Parameters { normal_law, ..Parameters::default() };
+        let laws = [Elasticity::Sphere, Elasticity::Line { length: 0.02 }]
+            .into_iter()
+            .flat_map(|elasticity| NormalLaw::ALL.into_iter().map(move |normal_law| (elasticity, normal_law)));
+        for (elasticity, normal_law) in laws {
+            let contact = Parameters { normal_law, elasticity, ..Parameters::default() };
             let stated = law_of("restitution", &contact).expect("stated");
+            let on_spheres = elasticity == Elasticity::Sphere;
+            assert!(stated.formula.starts_with(if on_spheres { "N = K d^1.5" } else { "N = F" }), "{stated:?}");
             let chi = normal_law.damping_factor(ce);
             let factor = stated.formula.split_once("(1 + ").and_then(|(_, rest)| rest.split_once("d' / d'0"));
             let Some((factor, _)) = factor else {

@@ -101,7 +101,7 @@ fn clicks_during_playback_are_the_impacts_of_the_run_at_any_speed() {
                 let pitch = (0.5 / (impact.end - impact.start)).clamp(PITCHES.0, PITCHES.1);
                 assert!((click.pitch / pitch - 1.0).abs() < 1e-9);
                 // By Hertz, the elastic energy of the impact is 2/5 K d^2.5.
-                let stiffness = ElasticLaw::of_ball(&machine.contact, machine.contact.clearance).stiffness;
+                let stiffness = ElasticLaw::of_joint(&machine.contact, machine.contact.clearance).stiffness;
                 let effective_mass = 0.8 * stiffness * impact.deepest.powf(2.5) / impact.approach_speed.powi(2);
                 let impulse = effective_mass.min(mass) * (impact.approach_speed + impact.separation_speed);
                 let loudness = (impulse / mass / 0.1).powf(0.4).min(1.0);

@@ -125,7 +125,7 @@ fn elastic_impacts_have_the_peak_force_of_hertz() {
     let speed = 0.1;
     let (_, simulation) = rebound(speed, &[("contact.normal_law", "hertz")]);
     let contact = simulation.machine().contact;
-    let k = ElasticLaw::of_ball(&contact, CLEARANCE).stiffness;
+    let k = ElasticLaw::of_joint(&contact, CLEARANCE).stiffness;
     // m v^2 / 2 = 2/5 K delta^2.5.
     let deepest = (1.25 * MASS * speed * speed / k).powf(0.4);
     let expected = k * deepest.powf(1.5);
@@ -159,7 +159,7 @@ fn slow_impacts_use_the_speed_floor_and_rebound_higher() {
 fn pressed(velocity: Vec3, spin: Vec3, changes: &[(&str, &str)]) -> (Simulation, Frame) {
     let parameters = jointplay_physics::contact::Parameters::default();
     let load = MASS * 9.81;
-    let depth = ElasticLaw::of_ball(&parameters, CLEARANCE).depth(load);
+    let depth = ElasticLaw::of_joint(&parameters, CLEARANCE).depth(load);
     let position = Vec3::x() * (CLEARANCE + depth);
     let mut simulation = ball(position, velocity, spin, 9.81, changes);
     let frame = frame_now(&mut simulation);

@@ -20,7 +20,7 @@ fn ball_on_wall(angle: f64, start: &str, changes: &Changes) -> Simulation {
     let law = ("contact.friction_law", "modified-coulomb");
     let changes = [&[law], changes].concat();
     let parameters = Parameters::default();
-    let elastic = ElasticLaw::of_ball(&parameters, parameters.clearance);
+    let elastic = ElasticLaw::of_joint(&parameters, parameters.clearance);
     let depth = elastic.depth(0.1 * 9.81 * angle.cos());
     let distance = 1e3 * (parameters.clearance + depth);
     let from = "position = \"0 0 0 mm\", velocity = \"0 0 0 m/s\"";
@@ -156,7 +156,7 @@ fn contact_laws_and_patch_radii_have_the_documented_values() {
     let contact = &simulation.machine().loose_joints[0].contact;
     let (r, c) = (contact.ball_radius, contact.clearance);
     let force = (0..3).map(|j| simulation.peak(j).0).fold(0.0, f64::max);
-    let depth = ElasticLaw::of_ball(contact, c).depth(force);
+    let depth = ElasticLaw::of_joint(contact, c).depth(force);
     let patch = (depth * (r + c) * r / c).sqrt() / r;
     assert_documented(&format!("reaches {patch:.2} ball radii in the hardest impact of `spcmm`, of {force:.0} N"));
     let first = &impacts[0];

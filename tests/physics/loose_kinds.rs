@@ -40,7 +40,7 @@ fn upright() -> Quat {
 }
 
 /// Steps `machine` up to `end`, s; its impacts in the order in which they began.
-fn impacts(machine: &Machine, end: f64) -> (Vec<Impact>, Simulation) {
+pub fn impacts(machine: &Machine, end: f64) -> (Vec<Impact>, Simulation) {
     let mut simulation = Simulation::new(machine).unwrap();
     let mut impacts = Vec::new();
     while simulation.time() < end {
@@ -51,7 +51,7 @@ fn impacts(machine: &Machine, end: f64) -> (Vec<Impact>, Simulation) {
     (impacts, simulation)
 }
 
-fn accurately(mut machine: Machine) -> Machine {
+pub fn accurately(mut machine: Machine) -> Machine {
     (machine.solver.method, machine.solver.tolerance) = (Method::DormandPrince5, 1e-11);
     machine
 }
@@ -87,7 +87,7 @@ pub(super) fn compare(name: &str, machine: Machine, csv: &str, end: f64) {
 }
 
 /// A pin of 0.1 kg, r 10, L 24 mm, in a fixed bearing with 0.1 mm of play along x, thrown down at 0.2 m/s, tilted by `tilt` (rad).
-fn thrown_pin(tilt: f64, pin: Pin) -> Machine {
+pub fn thrown_pin(tilt: f64, pin: Pin) -> Machine {
     let mut machine = Machine::default();
     let body = Body::new("pin", 0.1, diagonal(5e-6, 1.583_333_333_333_333_3e-5, 1.583_333_333_333_333_3e-5));
     let tilted = Quat::from_axis_angle(&Vec3::y_axis(), tilt);
@@ -98,7 +98,7 @@ fn thrown_pin(tilt: f64, pin: Pin) -> Machine {
     machine
 }
 
-fn pin(ends: EndsOn) -> Pin {
+pub fn pin(ends: EndsOn) -> Pin {
     Pin { length: Some(0.024), ends, kept: false, face_radius: None, travel: None }
 }
 
@@ -121,7 +121,7 @@ fn a_thrown_pin_strikes_with_the_forces_of_the_closed_form() {
 }
 
 /// The pin thrown into the bearing with spin and tilt, with 0.2 mm of axial play.
-fn spinning_pin(ends: EndsOn, friction: f64) -> Machine {
+pub fn spinning_pin(ends: EndsOn, friction: f64) -> Machine {
     let mut machine = thrown_pin(0.0, Pin { kept: true, ..pin(ends) });
     machine.loose_joints[0].contact.second_clearance = 2e-4;
     machine.gravity = Vec3::new(0.0, 0.0, -9.81);
@@ -139,7 +139,7 @@ fn spinning_pin(ends: EndsOn, friction: f64) -> Machine {
 }
 
 /// A pin in a housing, both free, without gravity, with friction 0.2.
-fn free_pair() -> Machine {
+pub fn free_pair() -> Machine {
     let mut machine = Machine::default();
     let housing = Body::new("housing", 0.5, diagonal(3e-4, 4e-4, 5e-4));
     let housing = machine.add_body(
@@ -290,7 +290,7 @@ fn a_loaded_pin_rests_as_deep_as_the_closed_form_says() {
 
 /// The slider-crank of Flores with a loose crank pin: 5000 rpm, 0.5 mm, L 20 mm; the rod hangs on an ideal ball at the slider and could
 /// tilt.
-fn crank_pin(friction: f64, kind: Pin) -> Machine {
+pub fn crank_pin(friction: f64, kind: Pin) -> Machine {
     let mut machine = Machine { gravity: Vec3::new(0.0, -9.81, 0.0), ..Machine::default() };
     let turning = Drive::Constant { position: 0.0, velocity: 5000.0 / 60.0 * std::f64::consts::TAU };
     let crank = machine.add_body(

@@ -330,6 +330,46 @@ fn the_written_start_is_that_of_the_body() {
 }
 
 #[test]
+fn the_elastic_law_stands_on_the_joint() {
+    let peak = |more: &str| {
+        let text = THROWN
+            .replace("ends = \"pin\"", &format!("ends = \"pin\"{more}"))
+            .replace("friction = 0.15", "friction = 0\nnormal_law = \"hertz\"")
+            .replace("axial = \"0.2 mm\", ", "");
+        // Parallel, 0.1 kg at 0.2 m/s: sphere 1235 N, line 2438 N, half at each end.
+        let start = text.find("[joint.start]").unwrap();
+        let text = format!("{}[joint.start]\noffset_velocity = \"0 0 -0.2 m/s\"\n", &text[..start]);
+        let mut machine = machine(&text, &[("solver.method", "dopri5"), ("solver.tolerance", "1e-10")]);
+        machine.gravity = nalgebra::Vector3::zeros();
+        let mut simulation = Simulation::new(&machine).unwrap();
+        simulation.advance_to(0.8e-3).unwrap();
+        2.0 * simulation.statistics().joints[0].peak_normal
+    };
+    for (more, expected) in [
+        ("", 1235.2),
+        (", elastic = \"sphere\"", 1235.2),
+        (", elastic = \"line\"", 2437.7),
+        (", stiffness_at = \"1 kN\"", 2924.0),
+        (", stiffness = \"1.516684525971360e11 N/m^1.5\"", 1235.2),
+    ] {
+        let found = peak(more);
+        assert!((found / expected - 1.0).abs() < 3e-4, "{more}: {found}");
+    }
+    let refused = |more: &str| {
+        let text = THROWN.replace("ends = \"pin\"", &format!("ends = \"pin\"{more}"));
+        Scene::parse(&text, Some("file.toml"), &[]).expect_err(more).to_string()
+    };
+    let both = refused(", elastic = \"line\", stiffness = \"1e11 N/m^1.5\"");
+    assert!(both.contains("one of three ways"), "{both}");
+    let much = refused(", stiffness_at = \"10 GN\"");
+    assert!(much.contains("units"), "{much}");
+    let much = refused(", stiffness_at = \"1000 MN\"");
+    assert!(much.contains("play.stiffness_at") && much.contains("allowed above 0 N to below"), "{much}");
+    let changed = scene(THROWN, &[("joint.J.play.elastic", "line")]);
+    assert_eq!(changed.get("joint.J.play.elastic"), Ok(Value::Choice("line")));
+}
+
+#[test]
 fn doubtful_pins_are_named() {
     let doubts = |text: &str, changes: &[(&str, &str)]| -> Vec<String> {
         let mut simulation = Simulation::new(&machine(text, changes)).unwrap();

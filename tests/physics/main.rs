@@ -40,6 +40,7 @@ mod known_systems;
 mod laws;
 mod ledger;
 mod limits;
+mod line_contact;
 mod live_changes;
 mod loads;
 mod loop_joints;

@@ -38,6 +38,8 @@ pub enum Dimension {
     Torque,
     /// N/m
     Stiffness,
+    /// Of a contact whose force grows with the power 1.5 of its depth; SI: N/m^1.5.
+    ContactStiffness,
     /// N s/m
     Damping,
     /// N m/rad
@@ -86,7 +88,7 @@ use Scale::{Decimal, Ratio};
 type Unit = (&'static str, Scale);
 
 /// Every dimension with its name and its units; the first unit is the SI one.
-const UNITS: [(Dimension, &str, &[Unit]); 18] = [
+const UNITS: [(Dimension, &str, &[Unit]); 19] = [
     (
         Dimension::Length,
         "length",
@@ -157,6 +159,7 @@ const UNITS: [(Dimension, &str, &[Unit]); 18] = [
         "stiffness",
         &[("N/m", Decimal(0)), ("N/mm", Decimal(3)), ("kN/m", Decimal(3)), ("kN/mm", Decimal(6))],
     ),
+    (Dimension::ContactStiffness, "contact stiffness", &[("N/m^1.5", Decimal(0))]),
     (Dimension::Damping, "damping", &[("N s/m", Decimal(0)), ("N s/mm", Decimal(3)), ("kN s/m", Decimal(3))]),
     (
         Dimension::TurningStiffness,
@@ -264,6 +267,8 @@ pub fn powers(dimension: Dimension) -> [i8; 4] {
         Dimension::Force => [1, 1, -2, 0],
         Dimension::Torque => [1, 2, -2, 0],
         Dimension::Stiffness => [1, 0, -2, 0],
+        // In place of kg m^-0.5 s^-2, which has no whole powers: what no product of the others gives.
+        Dimension::ContactStiffness => [1, 0, -2, 8],
         Dimension::Damping => [1, 0, -1, 0],
         Dimension::TurningStiffness => [1, 2, -2, -1],
         Dimension::TurningDamping => [1, 2, -1, -1],

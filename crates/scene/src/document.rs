@@ -670,6 +670,7 @@ fn enters_squared(dimension: Dimension) -> bool {
             | Dimension::Force
             | Dimension::Torque
             | Dimension::Stiffness
+            | Dimension::ContactStiffness
             | Dimension::Damping
             | Dimension::TurningStiffness
             | Dimension::TurningDamping

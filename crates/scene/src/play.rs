@@ -6,7 +6,7 @@ use super::key::{ABOVE_ZERO, DefaultRule, FileKey, FileTable, ValueType, key};
 use super::read_joints::{SQUARE, read_own_contact};
 use super::table::contact_rows;
 use super::*;
-use jointplay_physics::contact::{self, ApproachSpeed, FrictionVelocity};
+use jointplay_physics::contact::{self, ApproachSpeed, Elasticity, FrictionVelocity};
 use jointplay_physics::machine::{EndsOn, LooseKind, Pin, Slide};
 use jointplay_physics::mechanism::poses_as_given;
 use jointplay_physics::units::Dimension as D;
@@ -16,6 +16,11 @@ use std::sync::LazyLock;
 
 /// Largest dimension of a joint, m.
 const MAX_LENGTH: f64 = 1.0;
+/// Largest stiffness of a contact, N/m^1.5, and force at which it is matched, N.
+const MAX_STIFFNESS: f64 = 1e13;
+const MAX_FORCE: f64 = 1e12;
+/// Laws of a pin's contact.
+const ELASTIC: [&str; 2] = ["sphere", "line"];
 /// Words of a key that is true or false.
 const TRUTH: [&str; 2] = ["true", "false"];
 
@@ -99,19 +104,26 @@ fn length(
     name: &'static str,
     kinds: &'static [&'static str],
     label: &'static str,
+    example: (&'static str, DefaultRule),
+    help: &'static str,
+    get: fn(&LooseJoint) -> Value,
+) -> Row {
+    quantity(name, kinds, label, (D::Length, MAX_LENGTH, "mm"), example, help, get)
+}
+
+/// A quantity above 0 up to `most`, SI.
+fn quantity(
+    name: &'static str,
+    kinds: &'static [&'static str],
+    label: &'static str,
+    (dimension, most, display): (D, f64, &'static str),
     (example, default): (&'static str, DefaultRule),
     help: &'static str,
     get: fn(&LooseJoint) -> Value,
 ) -> Row {
-    let in_file = key(name, ValueType::Number(D::Length, (ABOVE_ZERO, MAX_LENGTH)), example, help);
-    let kind = Kind::Number {
-        dimension: D::Length,
-        min: ABOVE_ZERO,
-        max: MAX_LENGTH,
-        display: "mm",
-        slider: (1e-3, 0.1),
-        logarithmic: true,
-    };
+    let in_file = key(name, ValueType::Number(dimension, (ABOVE_ZERO, most)), example, help);
+    let slider = (1e-3 * most, 0.1 * most);
+    let kind = Kind::Number { dimension, min: ABOVE_ZERO, max: most, display, slider, logarithmic: true };
     fixed(FileKey { default, ..in_file }, kinds, label, kind, get)
 }
 
@@ -233,6 +245,46 @@ static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
             ("\"1 mm\"", DefaultRule::Number(1e-3)),
             "radius of curvature of its corners, which sets their stiffness",
             |joint| number(slide(joint).map(|slide| slide.corner_radius)),
+        ),
+        quantity(
+            "stiffness",
+            &[REVOLUTE, CYLINDRICAL, PRISMATIC, SPHERICAL],
+            "Stiffness",
+            (D::ContactStiffness, MAX_STIFFNESS, "N/m^1.5"),
+            ("\"1.5e11 N/m^1.5\"", words("from radii and materials")),
+            "K of the joint, which the ends of a pin share, or of each corner of a block, whatever the play",
+            |joint| match joint.contact.elasticity {
+                Elasticity::Stiffness(stiffness) => Value::Number(stiffness),
+                _ => Value::Unset,
+            },
+        ),
+        quantity(
+            "stiffness_at",
+            PINS,
+            "Stiffness at",
+            (D::Force, MAX_FORCE, "N"),
+            ("\"1 kN\"", words("from radii and materials")),
+            "the force at which a pin is as deep in its bearing as in Johnson's line contact; right there only",
+            |joint| match joint.contact.elasticity {
+                Elasticity::StiffnessAt { force, .. } => Value::Number(force),
+                _ => Value::Unset,
+            },
+        ),
+        fixed(
+            key(
+                "elastic",
+                ValueType::Word(&ELASTIC),
+                "\"line\"",
+                "the law of its contacts: spheres after Hertz, which the books use for pins, too, or Johnson's line contact",
+            )
+            .default_text("`sphere`"),
+            PINS,
+            "Elastic law",
+            Kind::Choice(&ELASTIC),
+            |joint| {
+                let is_line = matches!(joint.contact.elasticity, Elasticity::Line { .. });
+                Value::Choice(ELASTIC[usize::from(is_line)])
+            },
         ),
         fixed(
             key("planar", ValueType::Flag, "true", "whether it neither tilts nor leaves its plane: cheaper to compute")
@@ -431,10 +483,11 @@ pub(super) fn loose_joint<'d>(
         _ => LooseKind::Ball,
     };
     let [carrier, carried] = joint.points();
+    let elasticity = read_elasticity(kind, table)?;
     let mut loose = LooseJoint {
         kind,
         opening: scene.view.down.unit(),
-        contact: scene.machine.contact,
+        contact: contact::Parameters { elasticity, ..scene.machine.contact },
         ..LooseJoint::ball(&joint.name, carrier, carried)
     };
     if let Some(node) = section.rows.key("opening", section.word).and_then(|_| section.get("opening")) {
@@ -472,6 +525,29 @@ pub(super) fn loose_joint<'d>(
         }
     }
     Ok((loose, places))
+}
+
+/// The elastic law that the table `play` gives.
+fn read_elasticity(kind: LooseKind, table: Option<&Section<'_>>) -> Result<Elasticity, SceneError> {
+    let Some(table) = table else { return Ok(Elasticity::Sphere) };
+    let given = |name: &str| table.rows.key(name, None).and_then(|_| table.get(name));
+    let [stiffness, at, elastic] = ["stiffness", "stiffness_at", "elastic"].map(given);
+    let elastic = elastic.map(|node| Ok::<_, SceneError>((node.choice()?, node))).transpose()?;
+    let line = elastic.filter(|(word, _)| *word == ELASTIC[1]).map(|(_, node)| node);
+    let mut all = [&stiffness, &at, &line].into_iter().flatten();
+    if let (Some(_), Some(second)) = (all.next(), all.next()) {
+        return Err(
+            second.error("is one of three ways to say how stiff it is: give `stiffness`, `stiffness_at` or `elastic`")
+        );
+    }
+    // Also of a planar pin, which has no ends.
+    let length = || if matches!(kind, LooseKind::Pin(_)) { table.require("length")?.number() } else { Ok(0.0) };
+    Ok(match (&stiffness, &at, &line) {
+        (Some(stiffness), ..) => Elasticity::Stiffness(stiffness.number()?),
+        (_, Some(at), _) => Elasticity::StiffnessAt { force: at.number()?, length: length()? },
+        (.., Some(_)) => Elasticity::Line { length: length()? },
+        _ => Elasticity::Sphere,
+    })
 }
 
 /// Axes of a joint in its parent: x along its axis, y along its second axis.

@@ -79,7 +79,7 @@ impl MagnifiedJoint {
         let patch = (!ideal && clearance > 0.0).then(|| ContactPatch {
             effective_radius: ElasticLaw::effective_radius(radius, clearance),
             penetration: report.penetration,
-            radius: ElasticLaw::of_ball(&spec.contact, clearance).patch(radius, clearance, report.penetration),
+            radius: ElasticLaw::of_joint(&spec.contact, clearance).patch(radius, clearance, report.penetration),
             deepest: impact.map_or(0.0, |impact| impact.deepest),
         });
         Some(Self {

@@ -219,13 +219,7 @@ impl Coefficients {
         if self.clearance_rate == 0.0 {
             return 0.0;
         }
-        let stiffening = match self.is_stiffened_by_clearance {
-            true => {
-                let by_clearance = self.elastic.relative_stiffening(self.ball_radius, self.clearance);
-                by_clearance * self.elastic.energy(gap.penetration)
-            }
-            false => 0.0,
-        };
+        let stiffening = self.elastic.energy_by_clearance(gap.penetration);
         (stiffening - force) * self.clearance_rate
     }
 }

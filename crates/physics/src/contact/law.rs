@@ -1,10 +1,11 @@
 //! Normal-force and friction laws.
 //!
 //! Every normal law here has the form F_N = F(delta) (1 + chi delta_dot / delta_dot0), cut off below 0, with the elastic law F of
-//! `elastic.rs`: they differ only in the damping factor chi(ce) and the power of F, so the force itself is one kernel.
+//! `elastic.rs`: they differ only in the damping factor chi(ce), so the force itself is one kernel. Whatever F is, an undisturbed impact
+//! loses the same part of its energy: the work of the damping, the integral of F chi delta_dot / delta_dot0 over the penetration, follows
+//! from the energies alone.
 
-use super::elastic::{Power, on_spheres};
-use super::{ApproachSpeed, ElasticLaw, FrictionLaw, FrictionVelocity, NormalLaw, Parameters};
+use super::{ApproachSpeed, ElasticLaw, Elasticity, FrictionLaw, FrictionVelocity, NormalLaw, Parameters};
 
 /// A law as a tooltip shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,15 +18,20 @@ pub struct ShownLaw {
     pub elsewhere: Option<&'static str>,
 }
 
+/// A normal law as it is shown on spheres, and on line contact: what follows the elastic force.
+macro_rules! on_elastic {
+    ($rest:literal) => {
+        [concat!("N = K d^1.5", $rest), concat!("N = F", $rest, ", F: elastic force")]
+    };
+}
+
 /// What distinguishes a normal law from the others.
 struct Entry {
     law: &'static str,
-    formula: &'static str,
+    formulas: [&'static str; 2],
     elsewhere: Option<&'static str>,
     /// Damping factor chi for the requested restitution ce.
     damping: fn(f64) -> f64,
-    /// Power of the penetration with which the elastic force grows.
-    power: Power,
 }
 
 impl NormalLaw {
@@ -36,59 +42,49 @@ impl NormalLaw {
         match self {
             Self::LankaraniNikravesh => Entry {
                 law: "Lankarani–Nikravesh normal force",
-                formula: on_spheres!(" (1 + ¾ (1 - e²) d' / d'0), d: penetration, d'0: approach speed"),
+                formulas: on_elastic!(" (1 + ¾ (1 - e²) d' / d'0), d: penetration, d'0: approach speed"),
                 elsewhere: None,
                 damping: |ce| 0.75 * (1.0 - ce * ce),
-                power: Power::Spheres,
             },
             Self::Hertz => Entry {
                 law: "Hertz normal force, without damping",
-                formula: on_spheres!(", d: penetration"),
+                formulas: on_elastic!(", d: penetration"),
                 elsewhere: Some("Hertz (1882)"),
                 damping: |_| 0.0,
-                power: Power::Spheres,
             },
             Self::HuntCrossley => Entry {
                 law: "Hunt–Crossley normal force",
-                formula: on_spheres!(" (1 + 1.5 (1 - e) d' / d'0), d: penetration, d'0: approach speed"),
+                formulas: on_elastic!(" (1 + 1.5 (1 - e) d' / d'0), d: penetration, d'0: approach speed"),
                 elsewhere: Some("Hunt & Crossley (1975)"),
                 damping: |ce| 1.5 * (1.0 - ce),
-                power: Power::Spheres,
             },
             Self::Flores => Entry {
                 law: "Normal force of Flores et al.",
-                formula: on_spheres!(" (1 + 1.6 (1 - e) / e · d' / d'0), d: penetration, d'0: approach speed"),
+                formulas: on_elastic!(" (1 + 1.6 (1 - e) / e · d' / d'0), d: penetration, d'0: approach speed"),
                 elsewhere: Some("Flores et al. (2011)"),
                 damping: |ce| 8.0 * (1.0 - ce) / (5.0 * ce),
-                power: Power::Spheres,
             },
             Self::Gonthier => Entry {
                 law: "Normal force of Gonthier et al.",
-                formula: on_spheres!(
+                formulas: on_elastic!(
                     " (1 + χ d' / d'0), χ (1 + e) = ln((1 + χ) / (1 - e χ)), d: penetration, d'0: approach speed"
                 ),
                 elsewhere: Some("Gonthier et al. (2004)"),
                 damping: exact_damping_factor,
-                power: Power::Spheres,
             },
         }
     }
 
-    /// The law as a tooltip shows it.
-    pub fn shown(self) -> ShownLaw {
-        let Entry { law, formula, elsewhere, .. } = self.entry();
+    /// The law as a tooltip shows it, on this elastic law.
+    pub fn shown(self, elasticity: Elasticity) -> ShownLaw {
+        let Entry { law, formulas: [on_spheres, on_line], elsewhere, .. } = self.entry();
+        let formula = if matches!(elasticity, Elasticity::Line { .. }) { on_line } else { on_spheres };
         ShownLaw { law, formula, elsewhere }
     }
 
     /// Damping factor chi for the requested restitution; infinite for 0 in a law that divides by it.
     pub fn damping_factor(self, restitution: f64) -> f64 {
         (self.entry().damping)(restitution)
-    }
-
-    /// Power of the penetration with which its elastic force grows.
-    #[inline]
-    pub(super) fn power(self) -> Power {
-        self.entry().power
     }
 }
 
@@ -161,8 +157,6 @@ pub struct Coefficients {
     pub clearance: f64,
     /// Rate of the clearance while it ramps, m/s.
     pub(crate) clearance_rate: f64,
-    /// Whether the stiffness depends on the clearance.
-    pub(crate) is_stiffened_by_clearance: bool,
     /// Whether the damping term divides by the contact's largest rate so far instead of its rate at the start.
     pub(crate) uses_largest_rate: bool,
 }
@@ -171,7 +165,7 @@ impl Coefficients {
     /// Coefficients of a joint whose current clearance is `clearance` > 0, m.
     pub fn new(parameters: &Parameters, clearance: f64) -> Self {
         Self {
-            elastic: ElasticLaw::of_ball(parameters, clearance),
+            elastic: ElasticLaw::of_joint(parameters, clearance),
             damping: parameters.normal_law.damping_factor(parameters.restitution),
             friction: match parameters.friction_law {
                 FrictionLaw::ModifiedCoulomb => parameters.friction,
@@ -184,14 +178,13 @@ impl Coefficients {
             friction_velocity: parameters.friction_velocity,
             clearance,
             clearance_rate: 0.0,
-            is_stiffened_by_clearance: true,
             uses_largest_rate: parameters.approach_speed == ApproachSpeed::Largest,
         }
     }
 
     /// Sets the current clearance of a ramp (m), its rate (m/s), and the corresponding elastic law.
     pub(crate) fn set_clearance(&mut self, parameters: &Parameters, clearance: f64, rate: f64) {
-        self.elastic = ElasticLaw::of_ball(parameters, clearance);
+        self.elastic = ElasticLaw::of_joint(parameters, clearance);
         (self.clearance, self.clearance_rate) = (clearance, rate);
     }
 
@@ -232,8 +225,8 @@ mod tests {
     use super::*;
 
     /// Rebound speed over approach speed of a unit mass, integrated with Runge-Kutta 4 in small steps.
-    fn simulated_restitution(law: NormalLaw, ce: f64) -> f64 {
-        let parameters = Parameters { normal_law: law, restitution: ce, ..Parameters::default() };
+    fn simulated_restitution(law: NormalLaw, ce: f64, elasticity: Elasticity) -> f64 {
+        let parameters = Parameters { normal_law: law, restitution: ce, elasticity, ..Parameters::default() };
         let c = Coefficients::new(&parameters, 3e-4);
         let v0 = 0.1;
         let force = |x: f64, v: f64| -c.normal_force(x, v, v0);
@@ -253,12 +246,14 @@ mod tests {
 
     #[test]
     fn the_closed_integral_agrees_with_a_simulated_impact() {
-        for law in NormalLaw::ALL {
-            for ce in [0.3, 0.6, 0.9] {
-                let chi = law.damping_factor(ce);
-                let expected = undisturbed_restitution(chi);
-                let got = simulated_restitution(law, ce);
-                assert!((got - expected).abs() < 2e-5, "{law:?} ce {ce}: {got} against {expected}");
+        for elasticity in [Elasticity::Sphere, Elasticity::Line { length: 0.024 }] {
+            for law in NormalLaw::ALL {
+                for ce in [0.3, 0.6, 0.9] {
+                    let chi = law.damping_factor(ce);
+                    let expected = undisturbed_restitution(chi);
+                    let got = simulated_restitution(law, ce, elasticity);
+                    assert!((got - expected).abs() < 2e-5, "{elasticity:?} {law:?} ce {ce}: {got} against {expected}");
+                }
             }
         }
     }

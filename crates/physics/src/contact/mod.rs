@@ -5,6 +5,7 @@ mod discrete;
 mod elastic;
 mod force;
 mod law;
+mod line;
 mod slip;
 mod state;
 
@@ -88,6 +89,30 @@ words!(ApproachSpeed {
     Largest => "largest",
 });
 
+/// Elastic law of a joint's contacts. A length is that of the pin in its bearing, or of the part of it that bears, m; both parts are of the
+/// same material.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd, Serialize, Deserialize)]
+pub enum Elasticity {
+    /// F = K d^1.5, spheres after Hertz, K from radii and material: `elastic = "sphere"`. Used for pins, too, which it makes too soft.
+    #[default]
+    Sphere,
+    /// F = K d^1.5 with this K > 0, N/m^1.5, whatever the play: `stiffness`. Of a ball, of a pin, whose ends have half of it each, or of
+    /// each corner of a block.
+    Stiffness(f64),
+    /// F = K d^1.5 with the K at which a pin under this force is as deep as in line contact: `stiffness_at`.
+    StiffnessAt {
+        /// N; below [`ElasticLaw::largest_line_force`].
+        force: f64,
+        /// L, m.
+        length: f64,
+    },
+    /// Johnson's line contact of a pin: `elastic = "line"`. Each end has half of it.
+    Line {
+        /// L, m.
+        length: f64,
+    },
+}
+
 /// Contact parameters of a ball joint. SI units.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
 pub struct Parameters {
@@ -105,6 +130,8 @@ pub struct Parameters {
     pub poisson_ratio: f64,
     /// Ball radius r, m.
     pub ball_radius: f64,
+    /// Elastic law.
+    pub elasticity: Elasticity,
     /// Sliding velocity used by the friction law.
     pub friction_velocity: FrictionVelocity,
     /// v_a, m/s: no friction below it.
@@ -146,6 +173,7 @@ impl Parameters {
         youngs_modulus: 206e9,
         poisson_ratio: 0.3,
         ball_radius: 0.010,
+        elasticity: Elasticity::Sphere,
         friction_velocity: FrictionVelocity::Surface,
         slip_speed_low: 1e-6,
         slip_speed_high: 1e-4,

@@ -1,8 +1,8 @@
 //! Joints with play.
 
 use super::{Attachment, Doubt, Quat, StartRule, Vec3};
-use crate::contact;
-use crate::units::format_quantity;
+use crate::contact::{self, ElasticLaw, Elasticity};
+use crate::units::{format_quantity, format_quantity_digits};
 use crate::words::words;
 
 /// A joint with play: contacts between two bodies in place of constraints, unless its clearance is 0.
@@ -56,6 +56,14 @@ impl LooseKind {
             Self::Slide(_) => {
                 &["1y", "1z", "2y", "2z", "3y", "3z", "4y", "4z", "5y", "5z", "6y", "6z", "7y", "7z", "8y", "8z"]
             }
+        }
+    }
+
+    /// Part of the joint's stiffness that each contact across it has.
+    pub(crate) fn share(&self) -> f64 {
+        match self {
+            Self::Pin(Pin { length: Some(_), .. }) => 0.5,
+            Self::Ball | Self::Pin(_) | Self::Slide(_) => 1.0,
         }
     }
 }
@@ -160,6 +168,26 @@ pub enum LooseFault {
     /// Friction that follows the centres, which have no meaning for a pin.
     #[error("friction follows the velocity of the surfaces in joints other than ball joints; allowed surface")]
     FrictionVelocity,
+    /// Line contact of a part that is no pin.
+    #[error(
+        "only a pin in its bearing has a line contact: elastic = \"line\" and stiffness_at are for revolute and cylindrical joints"
+    )]
+    LineContact,
+    /// A stiffness that is none.
+    #[error("{0:e} N/m^1.5 is no stiffness; allowed above 0 N/m^1.5")]
+    Stiffness(f64),
+    /// A force at which the line contact has no depth.
+    #[error(
+        "a line contact has no depth at {}; allowed above 0 N to below {}, 4 pi E* L c/e^2; units N, kN",
+        format_quantity(*.force, "N"),
+        format_quantity_digits(*.most, "N", 4)
+    )]
+    StiffnessAt {
+        /// N.
+        force: f64,
+        /// N.
+        most: f64,
+    },
     /// A start that only ball joints have.
     #[error("settled places balls in their sockets; with other joints with play, allowed as-given, ideal, equilibrium")]
     Settled,
@@ -173,6 +201,9 @@ impl LooseFault {
             Self::Play { key, part, .. } => [key, if part.ends_with("radius") { "play.radius" } else { "play.length" }],
             Self::FrictionVelocity => ["friction_velocity", "friction_velocity"],
             Self::Settled => ["start", "start"],
+            Self::LineContact => ["play.elastic", "play.stiffness_at"],
+            Self::Stiffness(_) => ["play.stiffness", "play.stiffness"],
+            Self::StiffnessAt { .. } => ["play.stiffness_at", "play.radial"],
         }
     }
 }
@@ -187,6 +218,7 @@ impl LooseJoint {
         let limit = |key, play: f64, part, most: f64| {
             if play <= most { Ok(()) } else { Err(LooseFault::Play { key, play, part, most }) }
         };
+        self.check_elasticity()?;
         match self.kind {
             LooseKind::Ball if second > 0.0 => return Err(LooseFault::SecondPlay { key: "play" }),
             LooseKind::Ball => return Ok(()),
@@ -234,6 +266,36 @@ impl LooseJoint {
         let (play, radius) = (self.contact.clearance, self.contact.ball_radius);
         let most = length * length / (80.0 * radius);
         (play > most).then(|| Doubt::ShortPin { joint: self.name.clone(), play, radius, length, most })
+    }
+
+    /// Checks the elastic law against the kind and the play.
+    fn check_elasticity(&self) -> Result<(), LooseFault> {
+        let is_pin = matches!(self.kind, LooseKind::Pin(_));
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let of_length = |length: f64| {
+            if !is_pin {
+                Err(LooseFault::LineContact)
+            } else if positive(length) {
+                Ok(())
+            } else {
+                Err(LooseFault::Length { key: "play.length", value: length })
+            }
+        };
+        match self.contact.elasticity {
+            Elasticity::Sphere => Ok(()),
+            Elasticity::Stiffness(stiffness) if positive(stiffness) => Ok(()),
+            Elasticity::Stiffness(stiffness) => Err(LooseFault::Stiffness(stiffness)),
+            Elasticity::Line { length } => of_length(length),
+            Elasticity::StiffnessAt { force, length } => {
+                of_length(length)?;
+                // Without play there is no contact.
+                let most = match self.contact.clearance {
+                    0.0 => f64::INFINITY,
+                    clearance => ElasticLaw::largest_line_force(&self.contact, length, clearance),
+                };
+                if force > 0.0 && force < most { Ok(()) } else { Err(LooseFault::StiffnessAt { force, most }) }
+            }
+        }
     }
 
     /// Ball joint with default contact parameters and the drawn socket open towards -z.

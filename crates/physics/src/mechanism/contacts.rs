@@ -211,9 +211,14 @@ impl Contacts {
     /// Updates ramped clearances to `t`.
     #[inline]
     fn update_ramps(&mut self, t: f64) {
-        if !self.has_ramps {
-            return;
+        if self.has_ramps {
+            self.follow_ramps(t);
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn follow_ramps(&mut self, t: f64) {
         for joint in &self.joints {
             for contact in &mut self.contacts[joint.contacts.clone()] {
                 let Contact { site, law, .. } = contact;

@@ -160,14 +160,14 @@ impl PenetrationCubic {
             let (p, v, _) = self.at(theta);
             c.normal_force(p, v, contact_state.approach(c, v))
         };
-        // Sign of dF/dt, F = f(p) (1 + chi v / v0), f ~ p^n: n v (1 + chi v / v0) + p chi a / v0; where v0 is v, the sign of v.
+        // Sign of dF/dt, F = f(p) (1 + chi v / v0), f ~ p^n there: n v (1 + chi v / v0) + p chi a / v0; where v0 is v, the sign of v.
         let slope = |theta: f64| {
             let (p, v, a) = self.at(theta);
             if p <= 0.0 || contact_state.approach_follows_rate(c, v) {
                 return v;
             }
             let chi = c.damping / contact_state.approach(c, v);
-            c.elastic.exponent() * v * (1.0 + chi * v) + p * chi * a
+            c.elastic.exponent(p) * v * (1.0 + chi * v) + p * chi * a
         };
         let (f0, f1) = (force(0.0), force(1.0));
         let ends = if f1 >= f0 { (f1, 1.0) } else { (f0, 0.0) };

@@ -4,7 +4,7 @@ use super::{Compiled, Cut, Frame, Site, Stiffness, Wall};
 
 pub(super) fn compile(joint: usize, frames: &[Frame; 2]) -> Compiled {
     let [carrier, carried] = frames.map(|frame| frame.origin);
-    let (wall, stiffness) = (Wall::Socket, Stiffness::Sphere(1.0));
+    let (wall, stiffness) = (Wall::Socket, Stiffness::Joint(1.0));
     Compiled {
         closed: Cut::point(carried, carrier),
         lasting: None,

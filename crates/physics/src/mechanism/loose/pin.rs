@@ -1,7 +1,7 @@
 //! A pin in a bearing: contacts at both ends of the shorter part, or one in the middle of a joint that does not tilt, and those of its
 //! collars (Ambrosio & Pombo 2018, Multibody System Dynamics 42, for the unified joint; the ends share the stiffness of the joint).
 
-use super::{Anchor, Compiled, Edge, Frame, JointKind, Pair, Site, Stiffness, Wall};
+use super::{Anchor, Compiled, Edge, Frame, JointKind, LooseKind, Pair, Site, Stiffness, Wall};
 use crate::machine::{EndsOn, Pin};
 
 pub(super) fn compile(pin: &Pin, joint: usize, frames: &[Frame; 2], [radial, axial]: [bool; 2]) -> Compiled {
@@ -28,17 +28,15 @@ fn ends(pin: &Pin, joint: usize, [bearing, carried]: &[Frame; 2]) -> Vec<Site> {
         EndsOn::Bearing if pin.length.is_some() => (carried, bearing, Edge::Bearing, true),
         EndsOn::Pin | EndsOn::Bearing => (bearing, carried, Edge::Pin, false),
     };
-    let (offsets, share) = match pin.length {
-        Some(length) => (vec![-0.5 * length, 0.5 * length], 0.5),
-        None => (vec![0.0], 1.0),
-    };
+    let offsets = pin.length.map_or(vec![0.0], |length| vec![-0.5 * length, 0.5 * length]);
+    let share = LooseKind::Pin(*pin).share();
     let site = |(place, offset): (usize, f64)| Site {
         joint,
         carrier: wall.origin,
         carried: Anchor { offset: edge.origin.offset + edge.axes[0] * offset, ..edge.origin },
         wall: Wall::Bore(wall.axes[0], at_edge),
         play: 0,
-        stiffness: Stiffness::Sphere(share),
+        stiffness: Stiffness::Joint(share),
         is_reversed,
         place: place as u8,
     };

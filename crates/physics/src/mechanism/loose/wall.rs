@@ -29,11 +29,11 @@ pub enum Edge {
 /// How stiff a contact is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stiffness {
-    /// This share of a ball's in its socket.
-    Sphere(f64),
+    /// This share of the joint's.
+    Joint(f64),
     /// That of a sphere of this radius on a plane, m.
     Corner(f64),
-    /// This share of a ball's, whatever the play along the axis.
+    /// This share of the collars', whatever the play along the axis.
     Face(f64),
 }
 
@@ -54,16 +54,11 @@ impl Stiffness {
     #[inline]
     fn set_elastic(self, law: &mut Coefficients, parameters: &Parameters) {
         match self {
-            Self::Sphere(share) => law.elastic.stiffness *= share,
-            Self::Corner(radius) => {
-                law.elastic = ElasticLaw::of_corner(parameters, radius);
-                law.is_stiffened_by_clearance = false;
-            }
+            Self::Joint(share) => law.elastic.stiffness *= share,
+            Self::Corner(radius) => law.elastic = ElasticLaw::of_corner(parameters, radius),
             Self::Face(share) => {
-                let [radial, axial] = parameters.clearances();
-                law.elastic = ElasticLaw::of_ball(parameters, if radial > 0.0 { radial } else { axial });
+                law.elastic = ElasticLaw::of_faces(parameters);
                 law.elastic.stiffness *= share;
-                law.is_stiffened_by_clearance = false;
             }
         }
     }

@@ -76,7 +76,7 @@ impl DiscreteControl {
 /// Elastic law of contact `c`. Samples leave the mechanism at other instants, so that its own may be another.
 fn elastic(state: &State, mechanism: &Mechanism, c: ContactId) -> ElasticLaw {
     let j = mechanism.contacts.joint_of(c);
-    ElasticLaw::of_ball(&state.conditions.joints[j], state.clearance(j))
+    ElasticLaw::of_joint(&state.conditions.joints[j], state.clearance(j))
 }
 
 /// Longest step in an impact of contact `c` at `speed`, m/s, in s: a part of the Hertz time.

@@ -188,18 +188,14 @@ impl DoubtContext<'_> {
         if joint.contact.is_ideal() {
             return 0.0;
         }
-        let mut c = self.coefficients(j);
+        let c = self.coefficients(j);
         let force = self.state.statistics().joints[j].peak_normal;
-        match joint.kind {
-            LooseKind::Slide(Slide { corner_radius, .. }) => {
-                // A sphere on a plane.
-                let depth = ElasticLaw::of_corner(&joint.contact, corner_radius).depth(force);
-                return libm::sqrt(depth / corner_radius);
-            }
-            LooseKind::Pin(Pin { length: Some(_), .. }) => c.elastic.stiffness *= 0.5,
-            LooseKind::Ball | LooseKind::Pin(_) => {}
+        if let LooseKind::Slide(Slide { corner_radius, .. }) = joint.kind {
+            // A sphere on a plane.
+            let depth = ElasticLaw::of_corner(&joint.contact, corner_radius).depth(force);
+            return libm::sqrt(depth / corner_radius);
         }
-        let depth = c.elastic.depth(force);
+        let depth = c.elastic.depth(force / joint.kind.share());
         c.elastic.patch(c.ball_radius, c.clearance, depth).map_or(0.0, |patch| patch / c.ball_radius)
     }
 }
