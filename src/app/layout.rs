@@ -85,6 +85,12 @@ pub(super) fn menu(ui: &mut Ui, name: &str, stays: bool, add: impl FnOnce(&mut U
     response
 }
 
+/// Labels and options in a menu, which begin where the names of its entries do.
+pub(super) fn aligned<R>(ui: &mut Ui, add: impl FnOnce(&mut Ui) -> R) -> R {
+    let left = ui.spacing().button_padding.x as i8;
+    Frame::new().inner_margin(egui::Margin { left, ..egui::Margin::ZERO }).show(ui, add).inner
+}
+
 /// Closes the menu around `ui`, if any: entries may also be shown outside a menu.
 pub(super) fn close_menu(ui: &Ui) {
     if egui::containers::menu::is_in_menu(ui) {
@@ -560,9 +566,11 @@ impl App {
                 ui.separator();
             }
             action = self.run.undo.camera_buttons(ui);
-            action = action.or(self.run.instruments(ui, self.sound.is_on()));
-            ui.add_space(4.0);
-            self.run.viewport.options_ui(ui);
+            aligned(ui, |ui| {
+                action = action.or(self.run.instruments(ui, self.sound.is_on()));
+                ui.add_space(4.0);
+                self.run.viewport.options_ui(ui);
+            });
         });
         if !narrow {
             self.run.viewport.camera_buttons(ui, true);

@@ -175,3 +175,24 @@ fn a_menu_opens_at_the_first_click_after_a_slider_drag() {
         assert!(Popup::is_any_open(&harness.ctx), "{menu}");
     }
 }
+
+#[test]
+fn the_names_labels_and_options_of_a_menu_begin_on_one_line() {
+    let mut harness = sized("spcmm", WIDE, egui::Theme::Light);
+    press_on(&mut harness, Role::Button, "Save");
+    let left = |role, label: &str| harness.get_by_role_and_label(role, label).rect().left();
+    // The highlight of an entry under the pointer begins before its name.
+    let padding = 2.0;
+    let name = left(Role::Button, "Film…") + padding;
+    assert_eq!(left(Role::Button, "Scene…") + padding, name);
+    for (role, label) in [
+        (Role::RadioButton, "View only"),
+        (Role::RadioButton, "Whole window"),
+        (Role::RadioButton, "1×"),
+        (Role::Label, "Width"),
+    ] {
+        assert_eq!(left(role, label), name, "{label}");
+    }
+    let plots = harness.get_all_by_role_and_label(Role::Label, "Plots").map(|label| label.rect().left());
+    assert!(plots.into_iter().any(|left| left == name));
+}
