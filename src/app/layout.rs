@@ -352,11 +352,11 @@ impl App {
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
                 ui.add_enabled_ui(free, |ui| self.run.timeline_ui(ui));
-                let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player));
+                let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player, false));
                 ui.horizontal(|ui| {
                     self.panels.tabs(ui, self.course.is_running(), false);
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
-                    ui.with_layout(backwards, |ui| transport::achieved_pace_below(ui, &self.run.player));
+                    ui.with_layout(backwards, |ui| transport::limit_below(ui, &self.run.player));
                 });
                 asked.inner
             })
@@ -383,7 +383,7 @@ impl App {
                     let room = ui.available_width() - tabs;
                     let asked = ui
                         .allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| {
-                            ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player)).inner
+                            ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player, true)).inner
                         })
                         .inner;
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);

@@ -230,6 +230,13 @@ pub fn time_scale(scale: f64) -> String {
     }
 }
 
+/// A measured time scale as a ratio with two digits.
+pub fn rounded_time_scale(scale: f64) -> String {
+    let size = libm::pow(10.0, libm::floor(libm::log10(1.0 / scale)) - 1.0);
+    let slower = libm::round(1.0 / scale / size) * size;
+    time_scale(if slower.is_finite() { 1.0 / slower } else { 0.0 })
+}
+
 /// A count with a thin space between thousands, if it has five digits or more.
 fn grouped(count: u64) -> String {
     let digits = count.to_string();
@@ -350,6 +357,9 @@ mod tests {
         assert_eq!(time_scale(0.4), "1:2.5");
         assert_eq!(time_scale(0.02), "1:50");
         assert_eq!(time_scale(1e-4), "1:10\u{202f}000");
+        for (scale, words) in [(1.0 / 1.63, "1:1.6"), (1.0 / 138.0, "1:140"), (1.0 / 99.7, "1:100"), (0.0, "1:∞")] {
+            assert_eq!(rounded_time_scale(scale), words);
+        }
     }
 
     #[test]
