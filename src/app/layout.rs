@@ -547,7 +547,8 @@ impl App {
         } else if !has_messages && around != Surroundings::Lecture && overlay::fits_labels(area) {
             // A caption answers a question, and takes the place of the sentence that the scene opens with.
             let taken = if below && has_buttons { buttons.x } else { 0.0 };
-            self.hint.ui(ui, strips.words.with_max_x(strips.words.right() - taken));
+            let place = strips.sentence();
+            self.hint.ui(ui, place.with_max_x(place.right() - taken));
         }
         drop_hint(ui, whole);
         let refused = self.messages.is_refused(&self.run.player);

@@ -1015,7 +1015,7 @@ fn a_link_from_the_window_opens_in_every_form_and_restores_the_camera() {
     phone.run_steps(320);
     phone.run();
     let fitted = camera(&phone).expect("a camera");
-    assert!(fitted.fitted.is_some_and(|aspect| aspect < 3.0), "{fitted:?}");
+    assert!(fitted.fitted.is_some_and(|aspect| aspect < 2.0), "{fitted:?}");
     assert_ne!(Some(fitted), here.1);
 }
 
