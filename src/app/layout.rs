@@ -512,6 +512,7 @@ impl App {
         viewport.bare = self.panels.embedded.is_some() && area.width() < MIN_WIDTH_WITH_CONTROLS;
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
         let strips = viewport.ui(&mut place, &self.run.player, plain, room);
+        self.run.follow_names(ui.ctx());
         ui.advance_cursor_after_rect(whole);
         if let Some(joint) = self.run.viewport.take_clicked() {
             self.run.focus(joint);
