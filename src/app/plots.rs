@@ -226,6 +226,11 @@ impl Plots {
         Self { chosen: opening::plots(scene), ..Self::default() }
     }
 
+    /// Whether the distance from the ideal motion is chosen, which needs that motion alongside.
+    pub fn has_tip_error(&self) -> bool {
+        self.chosen.contains(&Quantity::TipError)
+    }
+
     /// Restores the initial plots of a window on `scene`; picked channels stay.
     pub fn restore_initial(&mut self, scene: &Scene) {
         let picked = std::mem::take(&mut self.picked);

@@ -1054,7 +1054,7 @@ fn another_scene_brings_its_own_time_scale_and_plots_and_reopening_keeps_them() 
     app.open("press").expect("built in");
     assert_eq!(app.player().pacer.scale(), 0.125);
     assert_eq!(app.plots_mut().window, PlotWindow::Automatic);
-    assert_eq!(app.plots_mut().chosen, [Quantity::NormalForce, Quantity::Acceleration]);
+    assert_eq!(app.plots_mut().chosen, [Quantity::TipError, Quantity::NormalForce]);
     // A link without plots selects the scene's own, too.
     assert_eq!(app.link().plots, None);
     app.plots_mut().window = PlotWindow::Everything;
