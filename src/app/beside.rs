@@ -92,4 +92,11 @@ impl Run {
             viewport.fit();
         }
     }
+
+    /// Asks for another frame if the names of the picture have moved, which those of the picture before the change follow.
+    pub(super) fn follow_names(&self, ctx: &egui::Context) {
+        if self.beside.as_ref().is_some_and(|(_, picture)| picture.lags_behind_names_of(&self.viewport)) {
+            ctx.request_repaint();
+        }
+    }
 }

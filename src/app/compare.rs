@@ -184,6 +184,9 @@ impl Comparison {
         for earlier in &mut self.runs {
             let run = &mut earlier.run;
             run.plotted = player.plotted;
+            if run.records_tip_error() != player.records_tip_error() {
+                run.record_tip_error(player.records_tip_error());
+            }
             run.pick(player.picks());
             run.pacer.set_scale(player.pacer.scale());
             if run.ideal().is_some() != player.ideal().is_some() {

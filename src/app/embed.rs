@@ -31,7 +31,7 @@ impl App {
                 if panels.contains(Part::Timeline) {
                     ui.add_enabled_ui(free, |ui| self.run.timeline_ui(ui));
                 }
-                ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player)).inner
+                ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player, true)).inner
             })
             .inner;
         if panels.contains(Part::Controls) {

@@ -65,7 +65,7 @@ impl Run {
         let mut on = self.player.ideal().is_some();
         let help = "The same machine with ideal ball joints, the same drives and gravity, drawn pale over the run. An \
                     arrow from its tip to that of the run shows the tip error (key G), which the plot Tip error \
-                    records. The run itself is not affected.";
+                    records, with or without the ghost. The run itself is not affected.";
         let toggled = ui.checkbox(&mut on, "Ideal ghost").on_hover_text(help).changed();
         if let Some(fault) = self.ideal_fault() {
             theme::warning(ui, fault);

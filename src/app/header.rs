@@ -223,7 +223,7 @@ impl Header<'_> {
             self.lessons_button(ui);
         }
         ui.separator();
-        ui.label(RichText::new("Save").small().weak());
+        layout::aligned(ui, |ui| ui.label(RichText::new("Save").small().weak()));
         self.save_menu(ui);
         ui.separator();
         let undone = self.run.undo.entries(ui, !self.is_busy);

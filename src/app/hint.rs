@@ -2,12 +2,16 @@
 
 use std::time::Duration;
 
-use eframe::egui::{Align, Event, Label, Layout, Rect, RichText, Ui, UiBuilder};
+use eframe::egui::{Align, Color32, Event, FontId, Label, Layout, Rect, RichText, Ui, UiBuilder};
 
+use super::overlay;
 use crate::scene::Scene;
+use crate::view::{Palette, Theme};
 
 /// Display time of an empty sentence, and of each character, s.
 const READING_TIME: [f64; 2] = [4.0, 0.06];
+/// Font sizes where its place is high enough, and otherwise, points.
+const FONT_SIZES: [f32; 2] = [14.0, 12.0];
 /// Length of the fade after it, s.
 const FADE_TIME: f64 = 1.5;
 /// Interval between pictures of the fade, s.
@@ -56,10 +60,20 @@ impl Hint {
         }
         let wait = if left > 0.0 { left } else { FADE_INTERVAL };
         ui.ctx().request_repaint_after(Duration::from_secs_f64(wait));
+        let opacity = if left > 0.0 { 1.0 } else { (1.0 + left / fade) as f32 };
+        // In a narrow picture the legend gives way.
+        let theme = if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light };
+        let ground = overlay::colour(Palette::of(theme).sky).gamma_multiply(opacity);
+        ui.painter().rect_filled(place, 0.0, ground);
+        let height = |size: f32| {
+            let font = FontId::proportional(size);
+            ui.painter().layout(self.text.clone(), font, Color32::PLACEHOLDER, place.width()).size().y
+        };
+        let size = FONT_SIZES.into_iter().find(|size| height(*size) <= place.height()).unwrap_or(FONT_SIZES[1]);
         let inside = UiBuilder::new().max_rect(place).layout(Layout::left_to_right(Align::Center));
         ui.scope_builder(inside, |ui| {
-            ui.set_opacity(if left > 0.0 { 1.0 } else { (1.0 + left / fade) as f32 });
-            ui.add(Label::new(RichText::new(&self.text).strong()).selectable(false).wrap());
+            ui.set_opacity(opacity);
+            ui.add(Label::new(RichText::new(&self.text).size(size).strong()).selectable(false).wrap());
         });
     }
 }

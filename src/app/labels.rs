@@ -72,7 +72,11 @@ type Place = (usize, usize);
 
 /// Label positions of a picture, reused in the next.
 #[derive(Clone, Debug, Default)]
-pub struct LabelPositions(pub(super) HashMap<LabelKind, Place>);
+pub struct LabelPositions {
+    pub(super) own: HashMap<LabelKind, Place>,
+    /// Those of the picture beside it, which come first, so that both look alike.
+    pub(super) beside: HashMap<LabelKind, Place>,
+}
 
 /// A label to place.
 struct LabelRequest<'a> {
@@ -129,7 +133,7 @@ pub(super) fn paint(
     mut occupied: Vec<Rect>,
     places: &mut LabelPositions,
 ) {
-    let before = std::mem::take(&mut places.0);
+    let before = std::mem::take(&mut places.own);
     let halo = colour(list.background.bottom);
     for label in list.labels.iter().filter(|label| matches!(label.kind, LabelKind::Axis | LabelKind::Gravity)) {
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
@@ -172,7 +176,8 @@ pub(super) fn paint(
             };
             clear.then(|| (cost(place) + if crosses() { CROSSING_COST } else { 0.0 }, place, plate))
         };
-        let previous = before.get(&label.kind).and_then(|place| free(*place, 0.0));
+        let places_before = [&places.beside, &before].map(|places| places.get(&label.kind));
+        let previous = places_before.into_iter().flatten().find_map(|place| free(*place, 0.0));
         let all = || (0..GAPS.len()).flat_map(|gap| (0..DIRECTIONS.len()).map(move |turn| (gap, turn)));
         let best_at =
             |clearance: f32| all().filter_map(|place| free(place, clearance)).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -189,7 +194,7 @@ pub(super) fn paint(
             failures_left -= 1;
             continue;
         };
-        places.0.insert(label.kind, place);
+        places.own.insert(label.kind, place);
         occupied.push(plate);
         if let Some(line) = leader(at, plate) {
             leaders.push(line);
@@ -246,7 +251,7 @@ mod tests {
         });
         // No texture is uploaded.
         output.textures_delta.clear();
-        places.0[&LabelKind::Joint(0)]
+        places.own[&LabelKind::Joint(0)]
     }
 
     #[test]
@@ -270,6 +275,11 @@ mod tests {
         assert_eq!(places_seen[0], free);
         assert!((2..=3).contains(&places_seen.len()), "{places_seen:?}");
         assert_eq!(differing.len(), places_seen.len(), "it returns nowhere: {places_seen:?}");
+        // The picture beside decides where both have room.
+        let mut places = LabelPositions { beside: [(LabelKind::Joint(0), (2, 6))].into(), ..LabelPositions::default() };
+        assert_eq!(place(&list(name, [60.0, 60.0]), &mut places), (2, 6));
+        places.own = [(LabelKind::Joint(0), free)].into();
+        assert_eq!(place(&list(name, [60.0, 60.0]), &mut places), (2, 6));
         // The same pictures give the same places.
         assert_eq!(place(&over, &mut LabelPositions::default()), beside);
     }

@@ -85,6 +85,12 @@ pub(super) fn menu(ui: &mut Ui, name: &str, stays: bool, add: impl FnOnce(&mut U
     response
 }
 
+/// Labels and options in a menu, which begin where the names of its entries do.
+pub(super) fn aligned<R>(ui: &mut Ui, add: impl FnOnce(&mut Ui) -> R) -> R {
+    let left = ui.spacing().button_padding.x as i8;
+    Frame::new().inner_margin(egui::Margin { left, ..egui::Margin::ZERO }).show(ui, add).inner
+}
+
 /// Closes the menu around `ui`, if any: entries may also be shown outside a menu.
 pub(super) fn close_menu(ui: &Ui) {
     if egui::containers::menu::is_in_menu(ui) {
@@ -346,11 +352,11 @@ impl App {
             .show(ui, |ui| {
                 present = present::double_tapped(ui);
                 ui.add_enabled_ui(free, |ui| self.run.timeline_ui(ui));
-                let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player));
+                let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player, false));
                 ui.horizontal(|ui| {
                     self.panels.tabs(ui, self.course.is_running(), false);
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
-                    ui.with_layout(backwards, |ui| transport::achieved_pace_below(ui, &self.run.player));
+                    ui.with_layout(backwards, |ui| transport::limit_below(ui, &self.run.player));
                 });
                 asked.inner
             })
@@ -377,7 +383,7 @@ impl App {
                     let room = ui.available_width() - tabs;
                     let asked = ui
                         .allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| {
-                            ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player)).inner
+                            ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player, true)).inner
                         })
                         .inner;
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
@@ -506,6 +512,7 @@ impl App {
         viewport.bare = self.panels.embedded.is_some() && area.width() < MIN_WIDTH_WITH_CONTROLS;
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
         let strips = viewport.ui(&mut place, &self.run.player, plain, room);
+        self.run.follow_names(ui.ctx());
         ui.advance_cursor_after_rect(whole);
         if let Some(joint) = self.run.viewport.take_clicked() {
             self.run.focus(joint);
@@ -541,7 +548,8 @@ impl App {
         } else if !has_messages && around != Surroundings::Lecture && overlay::fits_labels(area) {
             // A caption answers a question, and takes the place of the sentence that the scene opens with.
             let taken = if below && has_buttons { buttons.x } else { 0.0 };
-            self.hint.ui(ui, strips.words.with_max_x(strips.words.right() - taken));
+            let place = strips.sentence();
+            self.hint.ui(ui, place.with_max_x(place.right() - taken));
         }
         drop_hint(ui, whole);
         let refused = self.messages.is_refused(&self.run.player);
@@ -560,9 +568,11 @@ impl App {
                 ui.separator();
             }
             action = self.run.undo.camera_buttons(ui);
-            action = action.or(self.run.instruments(ui, self.sound.is_on()));
-            ui.add_space(4.0);
-            self.run.viewport.options_ui(ui);
+            aligned(ui, |ui| {
+                action = action.or(self.run.instruments(ui, self.sound.is_on()));
+                ui.add_space(4.0);
+                self.run.viewport.options_ui(ui);
+            });
         });
         if !narrow {
             self.run.viewport.camera_buttons(ui, true);

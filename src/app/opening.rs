@@ -34,14 +34,14 @@ fn round(scale: f64) -> f64 {
     1.0 / (nearest.unwrap_or(1.0) * decade)
 }
 
-/// Initial plots of a window on `scene`.
+/// Initial plots of a window on `scene`, in the order of its file.
 pub fn plots(scene: &Scene) -> Vec<Quantity> {
     let words = scene.view.plots;
     if words[0].is_none() {
         return vec![Quantity::NormalForce, Quantity::Eccentricity];
     }
-    let all = Quantity::ALL.into_iter();
-    all.filter(|quantity| words.contains(&Some(quantity.word()))).collect()
+    let of_word = |word: &str| Quantity::ALL.into_iter().find(|quantity| quantity.word() == word);
+    words.into_iter().flatten().filter_map(of_word).collect()
 }
 
 #[cfg(test)]
@@ -62,7 +62,10 @@ mod tests {
                 Ok(period) => assert!((3.0..6.0).contains(&(period / scale)), "{name}: {period} s at {scale}"),
                 Err(_) => assert!(scene.view.time_scale.is_some(), "{name}"),
             }
-            assert!(!plots(&scene).is_empty(), "{name}");
+            let first = plots(&scene)[0];
+            let is_error = matches!(first, Quantity::ProbeError | Quantity::TipError);
+            // The paper's machine has the plots of the paper.
+            assert_eq!(is_error, scene.machine.output.probe.is_some() && name != "spcmm", "{name}");
         }
     }
 

@@ -90,6 +90,12 @@ impl Strips {
         let (top, bottom) = (rect.with_max_y(rect.top()), rect.with_min_y(rect.bottom()));
         Self { top, scene: rect, bottom, words: bottom, legend: bottom, scale: bottom }
     }
+
+    /// Place for a sentence that leaves by itself: that of the words, and in a narrow picture that of the legend, too.
+    pub fn sentence(&self) -> Rect {
+        let covers = self.words.intersects(self.legend) && self.legend.left() < self.words.right();
+        if covers { self.words.union(self.legend) } else { self.words }
+    }
 }
 
 /// Whether `rect` has room for a legend, as an index of the sizes.

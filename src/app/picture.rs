@@ -113,6 +113,12 @@ impl Picture {
     /// Options and save button of a picture of the window with the 3D view in `view`; returns whether to save it.
     pub fn menu(&mut self, ui: &mut Ui, view: Rect) -> bool {
         let asked = layout::entry(ui, "Picture…", "A picture as chosen below, PNG");
+        layout::aligned(ui, |ui| self.choices(ui, view));
+        asked
+    }
+
+    /// What a picture shows, and its size.
+    fn choices(&mut self, ui: &mut Ui, view: Rect) {
         let (points, screen) = (self.points(ui.ctx(), view), ui.ctx().pixels_per_point());
         // Options have round marks, unlike the actions around them.
         ui.horizontal_wrapped(|ui| {
@@ -139,7 +145,6 @@ impl Picture {
         });
         let ([width, height], _) = self.size(points, screen);
         ui.label(RichText::new(format!("{width} × {height} pixels")).small().weak());
-        asked
     }
 
     /// Screen size of the contents, points, with the 3D view in `view`.

@@ -226,6 +226,11 @@ impl Plots {
         Self { chosen: opening::plots(scene), ..Self::default() }
     }
 
+    /// Whether the distance from the ideal motion is chosen, which needs that motion alongside.
+    pub fn has_tip_error(&self) -> bool {
+        self.chosen.contains(&Quantity::TipError)
+    }
+
     /// Restores the initial plots of a window on `scene`; picked channels stay.
     pub fn restore_initial(&mut self, scene: &Scene) {
         let picked = std::mem::take(&mut self.picked);
@@ -964,28 +969,12 @@ fn time_axis_until(length: f64, to: f64) -> (&'static str, f64) {
 
 /// Label of a mark on an axis up to `most` with mark distance `step`: enough digits to distinguish neighbours.
 pub(super) fn tick(mark: f64, step: f64, most: f64) -> String {
-    format_mark(mark, step, (1e-4..1e9).contains(&most))
+    value::mark(mark, step, (1e-4..1e9).contains(&most))
 }
 
-/// The same beside a plot, with room for four digits: `2e4`. More digits would move the plot at a high peak.
+/// The same beside a plot, with room for six digits. More would move the plot at a high peak.
 fn short_tick(mark: f64, step: f64, most: f64) -> String {
-    format_mark(mark, step, (1e-4..1e4).contains(&most))
-}
-
-/// A mark's label in plain digits or with a power of ten.
-fn format_mark(mark: f64, step: f64, in_digits: bool) -> String {
-    if mark.abs() < 1e-6 * step {
-        return "0".to_owned();
-    }
-    // A step of 2.5 needs one digit more than a step of 2.
-    let power = step.log10().floor() as i32;
-    let mantissa = step / 10_f64.powi(power);
-    let last = power - i32::from((mantissa - mantissa.round()).abs() > 1e-6);
-    if in_digits {
-        return format!("{mark:.*}", (-last).max(0) as usize);
-    }
-    let digits = mark.abs().log10().floor() as i32 - last;
-    format!("{mark:.*e}", digits.max(0) as usize)
+    value::mark(mark, step, (1e-4..1e6).contains(&most))
 }
 
 #[cfg(test)]
@@ -1006,12 +995,10 @@ mod tests {
     }
 
     #[test]
-    fn labels_beside_a_plot_have_four_digits_at_most() {
-        assert_eq!(short_tick(8000.0, 2000.0, 9900.0), "8000");
-        assert_eq!(short_tick(0.0, 2e4, 9.3e4), "0");
-        assert_eq!(short_tick(8e4, 2e4, 9.3e4), "8e4");
-        assert_eq!(short_tick(7.5e4, 2.5e4, 9.3e4), "7.5e4");
-        assert_eq!(short_tick(1e5, 2e4, 1.1e5), "1.0e5");
+    fn labels_beside_a_plot_have_six_digits_at_most() {
+        assert_eq!(short_tick(7.5e4, 2.5e4, 9.3e4), "75\u{202f}000");
+        assert_eq!(short_tick(8e5, 2e5, 9.9e5), "800\u{202f}000");
+        assert_eq!(short_tick(1e6, 2e5, 1.1e6), "1.0×10^6");
     }
 
     #[test]
@@ -1019,7 +1006,7 @@ mod tests {
         assert_eq!(words(0.0, 871.0, 120.0), ["0", "200", "400", "600", "800"]);
         assert_eq!(words(-0.015, 0.315, 120.0), ["0", "0.1", "0.2", "0.3"]);
         assert_eq!(words(203.44080, 203.44120, 120.0), ["203.4408", "203.4409", "203.4410", "203.4411", "203.4412"]);
-        assert_eq!(words(-1e-7, 2e-7, 120.0), ["-1e-7", "0", "1e-7", "2e-7"]);
+        assert_eq!(words(-1e-7, 2e-7, 120.0), ["-1×10^-7", "0", "1×10^-7", "2×10^-7"]);
         for height in [36.0, 45.0, 60.0, 200.0] {
             for (least, greatest) in [
                 (0.0, 100.0),

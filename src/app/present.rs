@@ -203,7 +203,7 @@ impl App {
                 let backwards = egui::Layout::right_to_left(egui::Align::Center);
                 let width = ui.available_width();
                 if width < transport::MIN_WIDTH + BUTTONS_WIDTH {
-                    let reset = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player)).inner;
+                    let reset = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.run.player, true)).inner;
                     let size = vec2(width, ui.spacing().interact_size.y);
                     ui.allocate_ui_with_layout(size, backwards, |ui| leave |= self.presentation_buttons(ui));
                     return reset;
@@ -214,7 +214,7 @@ impl App {
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                         ui.add_enabled_ui(free, |ui| {
                             if !in_lesson || width < MIN_BAR_WIDTH {
-                                return transport::row(ui, &mut self.run.player);
+                                return transport::row(ui, &mut self.run.player, true);
                             }
                             ui.horizontal(|ui| {
                                 let reset = transport::minimal(ui, &mut self.run.player);

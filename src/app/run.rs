@@ -32,11 +32,13 @@ pub struct Run {
 
 impl Run {
     /// `player` seen with `options`.
-    pub fn new(player: Player, options: ViewOptions) -> Self {
+    pub fn new(mut player: Player, options: ViewOptions) -> Self {
+        let plots = Plots::of(player.running());
+        player.record_tip_error(plots.has_tip_error());
         Self {
             viewport: Viewport::new(&player, options),
             beside: None,
-            plots: Plots::of(player.running()),
+            plots,
             timeline: Timeline::default(),
             controls: Controls::default(),
             microscope: Microscope::default(),
@@ -62,6 +64,7 @@ impl Run {
         if is_other_scene {
             self.plots.restore_initial(scene);
         }
+        self.player.record_tip_error(self.plots.has_tip_error());
         self.controls.clear();
         self.undo.clear();
         before
@@ -160,6 +163,7 @@ impl Run {
     /// Advances by `dt` seconds, the player by `step`; returns whether the state is still changing.
     pub fn advance(&mut self, dt: f64, step: impl FnOnce(&mut Player, f64)) -> bool {
         self.player.plotted = self.plots.length(&self.player);
+        self.player.record_tip_error(self.plots.has_tip_error());
         let was_seeking = self.player.is_seeking();
         // Two machines side by side show the same instant: the current one waits for the other.
         let waits = self.plots.comparison.is_behind(&self.player);

@@ -1,4 +1,4 @@
-//! Transport bar: play, step, reset, time scale, and the time scale actually achieved.
+//! Transport bar: play, step, reset, time scale, and what keeps the run below it.
 
 use eframe::egui::{
     self, ComboBox, FocusDirection, Id, Key, RichText, Sense, Slider, TextStyle, TextWrapMode, Ui, Vec2, WidgetText,
@@ -15,8 +15,8 @@ pub const SCALES: [f64; 8] = [1.0, 0.5, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4];
 
 /// Width of the list of time scales, points: fits the longest entry.
 const SCALES_WIDTH: f32 = 94.0;
-/// Width of the display of the achieved time scale, points.
-const PACE_WIDTH: f32 = 120.0;
+/// Width of the achieved time scale without its limit, points.
+const LIMIT_WIDTH: f32 = 120.0;
 /// Drag distance from one time scale to the next, points.
 const SCALE_DISTANCE: f32 = 20.0;
 
@@ -64,15 +64,16 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Action> {
     asked
 }
 
-/// The bar in one row, without items that do not fit; the time is above the picture. Returns as [`ui`].
-pub fn row(ui: &mut Ui, player: &mut Player) -> Option<Action> {
+/// The bar in one row, without items that do not fit; the time is above the picture, and the limit possibly [below](limit_below).
+/// Returns as [`ui`].
+pub fn row(ui: &mut Ui, player: &mut Player, has_limit: bool) -> Option<Action> {
     ui.horizontal(|ui| {
         let asked = buttons(ui, player);
         if ui.available_width() >= SCALES_WIDTH {
             scales(ui, player);
         }
-        if ui.available_width() > PACE_WIDTH {
-            achieved_scale(ui, player);
+        if has_limit && ui.available_width() > LIMIT_WIDTH {
+            limit(ui, player);
         }
         settled_hint(ui, player);
         asked
@@ -198,7 +199,7 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     spoken::value(&response, &value::time_scale(scale).replace(':', " to "));
     response.accessible_name("Time scale");
     scales(ui, player);
-    achieved_scale(ui, player);
+    limit(ui, player);
 }
 
 /// Selection of the time scale: the list, or a drag across it.
@@ -235,51 +236,91 @@ fn scales(ui: &mut Ui, player: &mut Player) {
     ui.data_mut(|data| data.insert_temp(drag.id, used));
 }
 
-/// The achieved time scale, in the rest of the row below a narrow [`row`], which has no space for it.
-pub fn achieved_pace_below(ui: &mut Ui, player: &Player) {
-    if ui.available_width() < PACE_WIDTH {
+/// What limits the run, in the rest of the row below a narrow [`row`].
+pub fn limit_below(ui: &mut Ui, player: &Player) {
+    if ui.available_width() < LIMIT_WIDTH {
         // Smaller text beside an additional tab.
         let styles = &mut ui.style_mut().text_styles;
         if let Some(small) = styles.get(&egui::TextStyle::Small).cloned() {
             styles.insert(egui::TextStyle::Body, small);
         }
     }
-    achieved_scale(ui, player);
+    limit(ui, player);
 }
 
-/// The achieved time scale, and the cause if it is below the requested one.
-fn achieved_scale(ui: &mut Ui, player: &Player) {
+/// What the window says of a run that does not keep up with its time scale. It changes rarely enough to be read, and says nothing
+/// while the run keeps up: the list beside it shows the time scale then.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct ShownLimit {
+    /// Requested time scale that it refers to.
+    requested: f64,
+    /// Instant of the next reading, s.
+    next: f64,
+    /// Achieved time scale, and its limit.
+    shown: Option<(f64, Limit)>,
+    /// Successive readings that contradict it.
+    contradictions: u32,
+}
+
+impl ShownLimit {
+    /// Time between two readings, s.
+    const READING: f64 = 0.5;
+    /// Number of successive readings that replace one limit by another or by none.
+    const REPLACED_AFTER: u32 = 4;
+
+    /// Takes what limits a run with the time scale `requested` at `now`, s, if a reading is due.
+    fn read(&mut self, now: f64, requested: f64, limit: Option<(f64, Limit)>) {
+        if self.requested != requested {
+            *self = Self { requested, next: now + Self::READING, ..Self::default() };
+        }
+        if now < self.next {
+            return;
+        }
+        self.next = now + Self::READING;
+        let kind = |limit: Option<(f64, Limit)>| limit.map(|(_, kind)| kind);
+        let agrees = kind(limit) == kind(self.shown);
+        self.contradictions = if agrees { 0 } else { self.contradictions + 1 };
+        if agrees || self.shown.is_none() || self.contradictions >= Self::REPLACED_AFTER {
+            (self.shown, self.contradictions) = (limit, 0);
+        }
+    }
+}
+
+/// The achieved time scale and what limits it, if it is below the requested one.
+fn limit(ui: &mut Ui, player: &Player) {
+    let key = Id::unique("shown limit");
     if !player.is_playing() {
+        ui.data_mut(|data| data.remove::<ShownLimit>(key));
         return;
     }
-    let Some(achieved) = player.pacer.reached_scale() else {
-        return;
-    };
-    let words = format!("reached {}", value::time_scale(achieved));
-    let Some(limit) = player.limit() else {
-        ui.label(RichText::new(words).weak()).on_hover_text("Simulated time over real time, as measured");
+    let (now, requested) = (ui.input(|input| input.time), player.pacer.scale());
+    let mut shown: ShownLimit = ui.data(|data| data.get_temp(key)).unwrap_or_default();
+    shown.read(now, requested, player.pacer.reached_scale().zip(player.limit()));
+    ui.data_mut(|data| data.insert_temp(key, shown));
+    let Some((achieved, limit)) = shown.shown else {
         return;
     };
     let (by, help) = match limit {
         Limit::Computing => (
-            "limited by computing",
+            "computing",
             "This computer cannot step as fast as the time scale asks. The simulation runs slower and skips nothing. \
              A looser tolerance or the preset preview helps.",
         ),
         Limit::Drawing => (
-            "limited by drawing",
+            "drawing",
             "Drawing takes too much time for the time scale. The simulation runs slower and skips nothing. A smaller \
              window, fewer plots and fewer instruments help.",
         ),
     };
+    let achieved = value::rounded_time_scale(achieved);
+    // Without room, only the tooltip says what limits it.
+    let words = [format!("{by} allows only {achieved}"), format!("only {achieved}")];
     let colour = ui.visuals().warn_fg_color;
-    ui.label(RichText::new(words).color(colour)).on_hover_text(help);
-    let by = RichText::new(by).small().color(colour);
-    let by = WidgetText::from(by).into_galley(ui, Some(TextWrapMode::Extend), f32::INFINITY, TextStyle::Body);
-    // Without room, only the tooltip says it.
-    if by.size().x < ui.available_width() {
-        ui.label(by).on_hover_text(help);
-    }
+    let [long, short] = words.map(|words| {
+        let words = WidgetText::from(RichText::new(words).color(colour));
+        words.into_galley(ui, Some(TextWrapMode::Extend), f32::INFINITY, TextStyle::Body)
+    });
+    ui.label(if long.size().x <= ui.available_width() { long } else { short }).on_hover_text(help);
 }
 
 /// Banner of a run that the divergence guard stopped. Returns whether the user asked for a restart.
@@ -308,6 +349,30 @@ pub fn banner(ui: &mut Ui, player: &Player) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_limit_is_read_twice_a_second_and_replaced_only_after_two_seconds() {
+        let mut shown = ShownLimit::default();
+        let (slow, fast) = ((0.3, Limit::Drawing), (0.31, Limit::Drawing));
+        let mut at = |ticks: u32, limit| {
+            shown.read(f64::from(ticks) * 0.1, 0.5, limit);
+            shown.shown
+        };
+        assert_eq!(at(0, Some(slow)), None, "the first half second measures");
+        assert_eq!(at(5, Some(slow)), Some(slow));
+        assert_eq!(at(9, Some(fast)), Some(slow));
+        assert_eq!(at(10, Some(fast)), Some(fast));
+        // At the threshold, and between two causes, the words stand still.
+        let others = [None, Some((0.3, Limit::Computing)), None];
+        for (count, other) in others.into_iter().enumerate() {
+            assert_eq!(at(15 + 5 * count as u32, other), Some(fast));
+        }
+        assert_eq!(at(30, Some(slow)), Some(slow));
+        for ticks in [35, 40, 45] {
+            assert_eq!(at(ticks, None), Some(slow));
+        }
+        assert_eq!(at(50, None), None);
+    }
 
     #[test]
     fn the_scale_keys_walk_the_list_both_ways_and_stop_at_its_ends() {

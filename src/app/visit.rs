@@ -98,7 +98,20 @@ impl App {
         };
         let panel = panel.frame(frame).resizable(false).show(ui, |ui| {
             layout::show_bar(ui);
-            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| self.visit_panel(ui)).inner
+            // A lying phone is too low for everything: the sliders scroll above the ways on.
+            let is_low = self.panels.is_compact() && size.x > size.y;
+            let below = is_low.then(|| {
+                let frame = egui::Frame::new().inner_margin(egui::Margin { top: 6, ..egui::Margin::ZERO });
+                Panel::bottom("ways on").frame(frame).show(ui, |ui| self.ways_on(ui)).inner
+            });
+            ScrollArea::vertical()
+                .auto_shrink(false)
+                .show(ui, |ui| {
+                    self.visit_panel(ui);
+                    if is_low { None } else { self.ways_on(ui) }
+                })
+                .inner
+                .or(below.flatten())
         });
         let is_press = |event: &Event| {
             matches!(event, Event::PointerButton { pressed: true, .. } | Event::Key { pressed: true, .. })
@@ -147,8 +160,8 @@ impl App {
         })
     }
 
-    /// Sentence, sliders, and ways on; returns the command chosen.
-    fn visit_panel(&mut self, ui: &mut Ui) -> Option<Command> {
+    /// Sentence and sliders.
+    fn visit_panel(&mut self, ui: &mut Ui) {
         // Space for the scroll bar.
         ui.set_max_width(ui.available_width() - 10.0);
         spoken::landmark(ui, "First visit");
@@ -187,7 +200,6 @@ impl App {
             }
         });
         ui.add_space(gap);
-        self.ways_on(ui)
     }
 
     /// The three ways on; returns the command of the one chosen.

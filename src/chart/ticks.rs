@@ -1,6 +1,7 @@
 //! Ranges and ticks of an axis, and the tick labels.
 
 use super::Axis;
+use crate::session::value;
 
 /// An axis as drawn.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,10 +42,8 @@ impl Ruler {
 
     /// Label of a tick.
     pub(super) fn label(&self, tick: f64) -> String {
-        let decimals = (-self.step.log10().floor()).clamp(0.0, 12.0) as usize;
-        let tick = if tick.abs() < 1e-9 * self.step { 0.0 } else { tick };
-        let text = format!("{tick:.decimals$}");
-        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text };
+        let most = self.from.abs().max(self.to.abs());
+        let text = value::mark(tick, self.step, (1e-4..1e9).contains(&most));
         // A true minus sign is as wide as a digit.
         text.replace('-', "\u{2212}")
     }
@@ -81,6 +80,14 @@ mod tests {
         let linear = Axis::default();
         assert_eq!(words(&linear, &[0.0, 0.7]), ["0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7"]);
         assert_eq!(words(&linear, &[-300.0, 500.0]), ["\u{2212}200", "0", "200", "400"]);
+    }
+
+    #[test]
+    fn large_and_small_ticks_are_read_without_counting_zeros() {
+        let linear = Axis::default();
+        let thousands = ["0", "5000", "10\u{202f}000", "15\u{202f}000"];
+        assert_eq!(words(&linear, &[0.0, 17_000.0])[..4], thousands);
+        assert_eq!(words(&linear, &[0.0, 3e-7])[..3], ["0", "5×10^\u{2212}8", "1.0×10^\u{2212}7"]);
     }
 
     #[test]

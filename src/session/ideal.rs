@@ -189,6 +189,30 @@ mod tests {
     }
 
     #[test]
+    fn the_tip_error_is_recorded_with_and_without_the_picture_of_the_ideal_motion() {
+        let scene = scene("four-bar", &[]);
+        let [mut shown, mut hidden] = [(); 2].map(|()| Player::new(&scene).expect("starts"));
+        shown.set_ideal(true);
+        hidden.record_tip_error(true);
+        let channel = shown.channels().tip_error();
+        for time in [0.02, 0.05, 0.07] {
+            for player in [&mut shown, &mut hidden] {
+                player.run_to(time);
+                player.update_ghosts();
+            }
+            assert!(hidden.ideal().is_none(), "not shown");
+            let [recorded, expected] = [&hidden, &shown].map(|player| {
+                let mut bins = Vec::new();
+                player.history().bins(channel, 0.0, time, 4000, &mut bins);
+                bins
+            });
+            assert!(recorded.iter().filter(|bin| bin.greatest > 0.0).count() > 50, "{time} s");
+            assert_eq!(recorded, expected);
+        }
+        assert_eq!(hidden.simulation().state_hash(), shown.simulation().state_hash());
+    }
+
+    #[test]
     fn the_output_error_equals_that_of_two_separate_runs_and_the_run_is_unchanged() {
         for name in BUILT_IN {
             let scene = scene(name, &[]);

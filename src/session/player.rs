@@ -72,7 +72,10 @@ pub struct Player {
     twin: Option<Box<Twin>>,
     /// Gravity since the start, for the ideal motion.
     gravity: Gravity,
+    /// The ideal motion, while it is shown or its distance from the run is recorded.
     ideal: Option<Box<Ideal>>,
+    shows_ideal: bool,
+    records_tip_error: bool,
     /// Simulated time and stepping time, s, as exponentially decaying sums.
     stepped: f64,
     stepping: f64,
@@ -148,6 +151,8 @@ impl Player {
             twin: None,
             gravity: Gravity::new(scene.machine.gravity),
             ideal: None,
+            shows_ideal: false,
+            records_tip_error: false,
             simulation,
         }
     }
@@ -264,13 +269,15 @@ impl Player {
             twin.move_to(self.pacer.shown());
         }
         if let Some(ideal) = &mut self.ideal {
-            ideal.catch_up(self.pacer.shown(), &self.gravity, self.clock);
+            // The record has sampled it at its end, unless it lags behind.
+            let time = if self.shows_ideal { self.pacer.shown() } else { self.record.recorded_to };
+            ideal.catch_up(time, &self.gravity, self.clock);
         }
     }
 
-    /// The ideal motion, if it is switched on.
+    /// The ideal motion, if it is shown.
     pub fn ideal(&self) -> Option<&Ideal> {
-        self.ideal.as_deref()
+        self.ideal.as_deref().filter(|_| self.shows_ideal)
     }
 
     /// Whether the ideal motion still has to reach the displayed instant.
@@ -279,9 +286,29 @@ impl Player {
         self.ideal().is_some_and(|ideal| ideal.is_behind(shown))
     }
 
-    /// Switches the ideal motion on or off. This never affects the run itself.
+    /// Shows the ideal motion or hides it. This never affects the run itself.
     pub fn set_ideal(&mut self, on: bool) {
-        self.ideal = on.then(|| Box::new(Ideal::new(&self.simulation.running().machine)));
+        self.shows_ideal = on;
+        self.run_ideal();
+    }
+
+    /// Records the distance of the output point from its ideal motion, or stops. This never affects the run itself.
+    pub fn record_tip_error(&mut self, on: bool) {
+        self.records_tip_error = on;
+        self.run_ideal();
+    }
+
+    /// Whether [`Self::record_tip_error`] is on.
+    pub fn records_tip_error(&self) -> bool {
+        self.records_tip_error
+    }
+
+    fn run_ideal(&mut self) {
+        if !(self.shows_ideal || self.records_tip_error) {
+            self.ideal = None;
+        } else if self.ideal.is_none() {
+            self.ideal = Some(Box::new(Ideal::new(&self.simulation.running().machine)));
+        }
     }
 
     /// Starts a twin run from the current state, or ends it. This never affects the run itself.
@@ -471,7 +498,8 @@ impl Player {
             ..Self::with_simulation(simulation, self.original.clone())
         };
         run.record.watch.set_phase(self.record.watch.phase(), 0.0);
-        run.set_ideal(self.ideal.is_some());
+        run.set_ideal(self.shows_ideal);
+        run.record_tip_error(self.records_tip_error);
         run.set_twin(self.twin.is_some());
         run.start();
         run.pick(&self.record.picks);

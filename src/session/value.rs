@@ -230,9 +230,48 @@ pub fn time_scale(scale: f64) -> String {
     }
 }
 
-/// A count with a thin space between thousands.
+/// A measured time scale as a ratio with two digits.
+pub fn rounded_time_scale(scale: f64) -> String {
+    let size = libm::pow(10.0, libm::floor(libm::log10(1.0 / scale)) - 1.0);
+    let slower = libm::round(1.0 / scale / size) * size;
+    time_scale(if slower.is_finite() { 1.0 / slower } else { 0.0 })
+}
+
+/// A count with a thin space between thousands, if it has five digits or more.
 fn grouped(count: u64) -> String {
-    if count < 10_000 { count.to_string() } else { format!("{}\u{202f}{:03}", count / 1000, count % 1000) }
+    let digits = count.to_string();
+    if count < 10_000 {
+        return digits;
+    }
+    let first = (digits.len() - 1) % 3 + 1;
+    let mut text = digits[..first].to_owned();
+    for from in (first..digits.len()).step_by(3) {
+        text.push('\u{202f}');
+        text.push_str(&digits[from..from + 3]);
+    }
+    text
+}
+
+/// Label of a mark on an axis with mark distance `step`, with enough digits to distinguish neighbours: in digits with thin spaces
+/// between thousands, or otherwise with a power of ten.
+pub fn mark(mark: f64, step: f64, in_digits: bool) -> String {
+    if mark.abs() < 1e-6 * step {
+        return "0".to_owned();
+    }
+    // A step of 2.5 needs one digit more than a step of 2.
+    let power = libm::floor(libm::log10(step)) as i32;
+    let mantissa = step / libm::pow(10.0, f64::from(power));
+    let last = power - i32::from((mantissa - libm::round(mantissa)).abs() > 1e-6);
+    if in_digits {
+        let text = format!("{:.*}", (-last).max(0) as usize, mark.abs());
+        let whole = text.split('.').next().unwrap_or_default();
+        let sign = if mark < 0.0 { "-" } else { "" };
+        let grouped = whole.parse().map_or_else(|_| whole.to_owned(), grouped);
+        return format!("{sign}{grouped}{}", &text[whole.len()..]);
+    }
+    let digits = libm::floor(libm::log10(mark.abs())) as i32 - last;
+    // The font of the window has no raised minus sign.
+    format!("{mark:.*e}", digits.max(0) as usize).replace('e', "×10^")
 }
 
 #[cfg(test)]
@@ -318,5 +357,19 @@ mod tests {
         assert_eq!(time_scale(0.4), "1:2.5");
         assert_eq!(time_scale(0.02), "1:50");
         assert_eq!(time_scale(1e-4), "1:10\u{202f}000");
+        for (scale, words) in [(1.0 / 1.63, "1:1.6"), (1.0 / 138.0, "1:140"), (1.0 / 99.7, "1:100"), (0.0, "1:∞")] {
+            assert_eq!(rounded_time_scale(scale), words);
+        }
+    }
+
+    #[test]
+    fn marks_are_written_as_people_read_them() {
+        assert_eq!(mark(8000.0, 2000.0, true), "8000");
+        assert_eq!(mark(0.0, 2e4, true), "0");
+        assert_eq!(mark(1.5e4, 5e3, true), "15\u{202f}000");
+        assert_eq!(mark(-7.5e4, 2.5e4, true), "-75\u{202f}000");
+        assert_eq!(mark(1_234_567.5, 0.5, true), "1\u{202f}234\u{202f}567.5");
+        assert_eq!(mark(2e6, 5e5, false), "2.0×10^6");
+        assert_eq!(mark(-2e-7, 1e-7, false), "-2×10^-7");
     }
 }

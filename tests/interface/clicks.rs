@@ -1,6 +1,6 @@
 //! Clicks every control with a pointer at its position, since an accessibility action also reaches covered controls.
 
-use eframe::egui::{self, Key, Popup, Pos2, Rect, accesskit::Role, vec2};
+use eframe::egui::{self, Key, Popup, Pos2, Rect, Shape, accesskit::Role, vec2};
 use egui_kittest::{
     Harness,
     kittest::{NodeT as _, Queryable as _},
@@ -173,5 +173,87 @@ fn a_menu_opens_at_the_first_click_after_a_slider_drag() {
         harness.run_steps(45);
         press_on(&mut harness, Role::Button, menu);
         assert!(Popup::is_any_open(&harness.ctx), "{menu}");
+    }
+}
+
+#[test]
+fn the_names_labels_and_options_of_a_menu_begin_on_one_line() {
+    let mut harness = sized("spcmm", WIDE, egui::Theme::Light);
+    press_on(&mut harness, Role::Button, "Save");
+    let left = |role, label: &str| harness.get_by_role_and_label(role, label).rect().left();
+    // The highlight of an entry under the pointer begins before its name.
+    let padding = 2.0;
+    let name = left(Role::Button, "Film…") + padding;
+    assert_eq!(left(Role::Button, "Scene…") + padding, name);
+    for (role, label) in [
+        (Role::RadioButton, "View only"),
+        (Role::RadioButton, "Whole window"),
+        (Role::RadioButton, "1×"),
+        (Role::Label, "Width"),
+    ] {
+        assert_eq!(left(role, label), name, "{label}");
+    }
+    let plots = harness.get_all_by_role_and_label(Role::Label, "Plots").map(|label| label.rect().left());
+    assert!(plots.into_iter().any(|left| left == name));
+}
+
+#[test]
+fn a_click_puts_the_caret_between_the_letters_nearest_to_it() {
+    for size in [WIDE, PORTRAIT] {
+        let mut harness = sized("spcmm", size, egui::Theme::Light);
+        let field = harness.get_by_role_and_label(Role::TextInput, "Clearance").rect();
+        let click = |harness: &mut Harness<'_, App>, at: Pos2| {
+            harness.hover_at(at);
+            harness.step();
+            harness.drag_at(at);
+            harness.step();
+            harness.drop_at(at);
+            // Longer than between two clicks of a double click.
+            harness.run_steps(40);
+        };
+        // The first click selects everything.
+        click(&mut harness, field.center());
+        let shapes: Vec<Shape> = harness.output().shapes.iter().map(|part| part.shape.clone()).collect();
+        let text = shapes.iter().find_map(|shape| match shape {
+            Shape::Text(text)
+                if text.galley.text() == "0.3 mm" && field.contains(text.visual_bounding_rect().center()) =>
+            {
+                Some(text.clone())
+            }
+            _ => None,
+        });
+        let text = text.expect("the value");
+        let row = &text.galley.rows[0];
+        let letters: Vec<[f32; 2]> = row
+            .row
+            .glyphs
+            .iter()
+            .map(|glyph| {
+                let left = text.pos.x + row.pos.x + glyph.pos.x;
+                [left, left + glyph.advance_width]
+            })
+            .collect();
+        assert_eq!(letters.len(), 6);
+        for (index, [left, right]) in letters.iter().enumerate() {
+            for (share, expected) in [(0.25, index), (0.75, index + 1)] {
+                click(&mut harness, egui::pos2(egui::lerp(*left..=*right, share), field.center().y));
+                let id = harness.ctx.memory(|memory| memory.focused()).expect("the field");
+                let state = egui::TextEdit::load_state(&harness.ctx, id).expect("is edited");
+                let caret = state.cursor.char_range().expect("a caret").primary.index;
+                assert_eq!(usize::from(caret), expected, "{size:?}: letter {index} at {share}");
+                let drawn = harness.output().shapes.iter().find_map(|part| match &part.shape {
+                    Shape::LineSegment { points: [from, to], .. }
+                        if from.x == to.x && field.contains(*from) && field.contains(*to) =>
+                    {
+                        Some(from.x)
+                    }
+                    _ => None,
+                });
+                let boundary = letters.get(expected).map_or(letters[5][1], |letter| letter[0]);
+                // It is drawn on whole pixels.
+                let drawn = drawn.expect("a caret");
+                assert!((drawn - boundary).abs() <= 1.0, "{size:?}: {drawn} beside {boundary}");
+            }
+        }
     }
 }

@@ -1015,7 +1015,7 @@ fn a_link_from_the_window_opens_in_every_form_and_restores_the_camera() {
     phone.run_steps(320);
     phone.run();
     let fitted = camera(&phone).expect("a camera");
-    assert!(fitted.fitted.is_some_and(|aspect| aspect < 3.0), "{fitted:?}");
+    assert!(fitted.fitted.is_some_and(|aspect| aspect < 2.0), "{fitted:?}");
     assert_ne!(Some(fitted), here.1);
 }
 
@@ -1054,7 +1054,7 @@ fn another_scene_brings_its_own_time_scale_and_plots_and_reopening_keeps_them() 
     app.open("press").expect("built in");
     assert_eq!(app.player().pacer.scale(), 0.125);
     assert_eq!(app.plots_mut().window, PlotWindow::Automatic);
-    assert_eq!(app.plots_mut().chosen, [Quantity::NormalForce, Quantity::Acceleration]);
+    assert_eq!(app.plots_mut().chosen, [Quantity::TipError, Quantity::NormalForce]);
     // A link without plots selects the scene's own, too.
     assert_eq!(app.link().plots, None);
     app.plots_mut().window = PlotWindow::Everything;

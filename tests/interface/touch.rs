@@ -4,8 +4,8 @@ use eframe::egui::{self, Pos2, Rect, accesskit::Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, AppOptions};
 
-use crate::hands::fingers;
 use crate::hands::page::{click, label, open, window};
+use crate::hands::{fingers, paced};
 
 const PORTRAIT: [f32; 2] = [390.0, 844.0];
 const LANDSCAPE: [f32; 2] = [844.0, 390.0];
@@ -200,12 +200,20 @@ fn in_a_small_window_the_panels_are_behind_one_button() {
 }
 
 #[test]
-fn a_phone_in_portrait_shows_the_achieved_speed() {
-    let (mut harness, _) = window("spcmm", PORTRAIT);
+fn a_phone_in_portrait_shows_once_that_the_run_does_not_keep_up() {
+    let slow = crate::common::ticking_clock::<4000>;
+    for width in [PORTRAIT[0], 700.0] {
+        let mut harness = paced("spcmm", &[], [width, PORTRAIT[1]], egui::Theme::Light, slow, 1.0 / 60.0);
+        harness.state_mut().player_mut().pacer.set_scale(1.0);
+        click(&mut harness, "Play");
+        harness.run_steps(90);
+        assert_eq!(harness.query_all_by_label_contains("only 1:").count(), 1, "{width}");
+    }
+    let mut harness = paced("spcmm", &[], PORTRAIT, egui::Theme::Light, slow, 1.0 / 60.0);
+    harness.state_mut().player_mut().pacer.set_scale(1.0);
     click(&mut harness, "Play");
     harness.run_steps(90);
-    assert!(label(&harness, "reached 1:"));
-    let words = harness.get_by_label_contains("reached 1:").rect();
+    let words = harness.get_by_label_contains("only 1:").rect();
     let bench = rect(&harness, Role::Button, "Experiments");
     assert!(words.left() >= bench.right() && words.right() <= PORTRAIT[0], "{words:?}");
     assert!((words.center().y - bench.center().y).abs() < 4.0);

@@ -90,7 +90,7 @@ pub fn distance(ui: &mut Ui, player: &Player, twin: &Twin, height: f32) {
                 .min_thickness(46.0)
                 .tick_label_color(ink)
                 .tick_label_font(eframe::egui::TextStyle::Small.resolve(ui.style()))
-                .formatter(|mark, _| format!("1e{}", mark.value)),
+                .formatter(|mark, _| if mark.value == 0.0 { "1".to_owned() } else { format!("10^{}", mark.value) }),
         ])
         .show(ui, |plot| {
             plot.add(Path::line("Distance", &points, theme::series(5, dark), 1.4));

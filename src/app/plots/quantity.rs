@@ -47,7 +47,7 @@ pub(in crate::app) fn plot_of(quantity: Quantity) -> QuantityPlot {
         Quantity::Energy => ("Energy", ("mJ", 1e-3), Curves, "Kinetic, potential and elastic energy of the whole mechanism."),
         Quantity::EnergyBalance => ("Energy balance", ("mJ", 1e-3), Bands, "Since the start: work of drives, gravity, moving clearances, changed parameters and loads from outside, loss by restitution, friction and dampers, change of kinetic and elastic energy, and the residual, which is the error of the integration."),
         Quantity::ProbeError => ("Tip error by axis", ("mm", 1e-3), Curves, "Position of the probe tip less that of the ideal mechanism at the same time, by world axis."),
-        Quantity::TipError => ("Tip error", ("µm", 1e-6), FromZero, "Distance of the output point (the probe tip, or the output body's origin) from where ideal joints have it at the same time. Recorded while the ideal ghost is on (key G)."),
+        Quantity::TipError => ("Tip error", ("µm", 1e-6), FromZero, "Distance of the output point (the probe tip, or the output body's origin) from where ideal joints have it at the same time. While this is chosen, the machine with ideal joints runs alongside; key G shows it."),
     };
     QuantityPlot { label, unit, kind, help }
 }

@@ -41,7 +41,7 @@ impl PlotFormat {
 pub fn format_buttons(ui: &mut Ui) -> Option<PlotFormat> {
     let mut chosen = None;
     ui.horizontal(|ui| {
-        ui.label("Plots");
+        layout::aligned(ui, |ui| ui.label("Plots"));
         for (format, name, ..) in PlotFormat::ALL {
             let button = ui.button(format!("{name}…")).on_hover_text(format!("The plots on show, {name}"));
             if button.accessible_name(format!("Plots as {name}")).clicked() {
