@@ -550,6 +550,15 @@ fn read_elasticity(kind: LooseKind, table: Option<&Section<'_>>) -> Result<Elast
     })
 }
 
+/// Nodes of the dimensions in the table `play`, by the last part of the joint's key.
+pub(super) fn dimensions<'d>(play: &PlayText<'d>) -> impl Iterator<Item = (&'static str, Node<'d>)> {
+    let rows = ROWS.iter().filter(|row| row.part.is_none());
+    rows.filter_map(|Row { parameter, in_file, .. }| {
+        let table = play.table.as_ref().filter(|table| table.rows.key(in_file.name, None).is_some())?;
+        Some((parameter.key, table.get(in_file.name)?))
+    })
+}
+
 /// Axes of a joint in its parent: x along its axis, y along its second axis.
 fn axes_of(joint: &Joint, section: &Section<'_>, table: Option<&Section<'_>>) -> Result<Quat, SceneError> {
     let x = joint.axis;

@@ -13,7 +13,7 @@ use super::instance::{Group, Instance};
 use super::model::AsRead;
 use super::pattern::{Pattern, read_patterns};
 use super::placement::read_placement;
-use super::play::{loose_joint, own_part, place_cut_bodies};
+use super::play::{dimensions, loose_joint, own_part, place_cut_bodies};
 use super::read_bodies::{read_body, read_shape};
 use super::read_joints::{JointText, LooseJointText, read_ball_joint, read_joint, read_own_contact, sort_forest};
 use super::reading::Reading;
@@ -348,7 +348,7 @@ fn read_mechanism<'d>(
         places.extend(own.into_iter().map(|(part, node)| (key(part), node)));
         scene.machine_mut().loose_joints.push(joint);
     };
-    let mut displaced = BTreeMap::new();
+    let (mut displaced, mut dimension_places) = (BTreeMap::new(), Vec::new());
     for text in &joints {
         let sorted = |body: usize| by_name[&file_order[body]];
         let (parent, child) = (text.joint.parent.map(sorted), sorted(text.joint.child));
@@ -357,6 +357,8 @@ fn read_mechanism<'d>(
             Some(play) => {
                 let (loose, own) = loose_joint(&joint, (&text.section, play), scene, gives_speed)?;
                 add_loose(scene, loose, own);
+                let key = |part| format!("joint.{}.{part}", joint.name);
+                dimension_places.extend(dimensions(play).map(|(part, node)| (key(part), node)));
                 if !text.closes_loop {
                     displaced.insert(child, play.displaced);
                 }
@@ -375,6 +377,7 @@ fn read_mechanism<'d>(
         }
         add_loose(scene, joint, own);
     }
+    places.extend(dimension_places);
     for node in list("fixed_shape")? {
         let shape = read_shape(&node, true)?;
         scene.machine_mut().fixed_shapes.push(shape);
