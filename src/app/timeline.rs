@@ -1,5 +1,5 @@
-//! Timeline of the whole run. A lane per ball joint shows free flight, sliding, creep and contact onsets; flags mark user
-//! actions. A click or a drag displays any instant.
+//! Timeline of the whole run. A lane per joint with play shows free flight, sliding, creep and contact onsets, each at the height of
+//! the end or wall that touches; flags mark user actions. A click or a drag displays any instant.
 
 use eframe::egui::{
     self, Color32, EventFilter, Key, Mesh, Pos2, Rect, Response, Sense, Shape, Stroke, Ui, WidgetInfo,
@@ -12,6 +12,7 @@ use super::player::contact_history::ContactHistory;
 use super::player::{Flag, Player};
 use super::zoom::{self, Zoom};
 use super::{spoken, theme, value};
+use crate::machine::{LooseKind, Pin, Slide};
 use crate::simulate::{ContactMode, RECORDED_JOINTS};
 
 /// Height of the row of flags, and total height of the lanes, points.
@@ -44,7 +45,7 @@ impl Timeline {
         self.zoomed = None;
     }
 
-    /// The row: buttons for previous impact, next impact and reverse playback, and the strip. `focus`: the ball joint whose
+    /// The row: buttons for previous impact, next impact and reverse playback, and the strip. `focus`: the joint whose
     /// impacts are visited. Returns whether the displayed instant changed.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, focus: Option<usize>) -> bool {
         if ui.ctx().content_rect().height() < MIN_WINDOW_HEIGHT {
@@ -55,7 +56,7 @@ impl Timeline {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             let target = focus.and_then(|joint| player.running().machine.loose_joints.get(joint));
-            let target = target.map_or("any ball joint".to_owned(), |joint| joint.name.clone());
+            let target = target.map_or("any joint".to_owned(), |joint| joint.name.clone());
             let past = player.pacer.shown() > 0.0;
             ui.add_enabled_ui(past, |ui| {
                 let help = format!("To the peak of the previous impact of {target} (key ,)");
@@ -84,7 +85,10 @@ impl Timeline {
                 }
             });
             let joints = player.contact_history().joints().min(RECORDED_JOINTS);
-            let lanes = (LANE_HEIGHT * joints as f32).clamp(LANES_HEIGHT, MAX_LANES_HEIGHT);
+            let loose = player.running().machine.loose_joints.iter().take(joints);
+            let heights =
+                loose.map(|joint| if joint.kind.site_names().is_empty() { LANE_HEIGHT } else { 2.0 * LANE_HEIGHT });
+            let lanes = heights.sum::<f32>().clamp(LANES_HEIGHT, MAX_LANES_HEIGHT);
             moved |= self.strip(ui, player, side.max(FLAGS_HEIGHT + lanes));
         });
         moved
@@ -205,13 +209,30 @@ impl Scale {
         self.rect.with_min_y(self.rect.top() + FLAGS_HEIGHT)
     }
 
-    /// The lane of ball joint `joint` out of `joints`.
+    /// The lane of joint `joint` out of `joints`.
     fn lane(&self, joint: usize, joints: usize) -> Rect {
         let lanes = self.lanes();
         let height = lanes.height() / joints.max(1) as f32;
         let top = lanes.top() + joint as f32 * height;
         let gap = if height >= LANE_HEIGHT { 1.0 } else { 0.0 };
         Rect::from_x_y_ranges(lanes.x_range(), top..=top + height - gap)
+    }
+}
+
+/// Part of a lane, from its top, in which the contacts at a place are marked: of a pin its end a above, b below, the faces of its
+/// collars between them; of a block the walls at +y, -y, +z and -z below each other.
+fn band(kind: &LooseKind, place: u8) -> [f32; 2] {
+    let part = |index: u8, of: u8| [index, index + 1].map(|edge| f32::from(edge) / f32::from(of));
+    match kind {
+        LooseKind::Ball | LooseKind::Pin(Pin { length: None, .. }) => [0.0, 1.0],
+        LooseKind::Pin(Pin { kept: false, .. }) => part(place, 2),
+        LooseKind::Pin(_) => part([0, 3, 1, 2][usize::from(place.min(3))], 4),
+        LooseKind::Slide(Slide { half_height: None, .. }) => part(1 - place % 2, 2),
+        LooseKind::Slide(_) => {
+            let (corner, across) = (place / 2, place % 2);
+            let is_upper = if across == 0 { corner & 2 != 0 } else { corner & 1 != 0 };
+            part(2 * across + u8::from(!is_upper), 4)
+        }
     }
 }
 
@@ -223,10 +244,10 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     let shown = player.pacer.shown();
     let (_, end) = scale.range;
     if let Some(abandoned) = player.abandoned_future() {
-        contact_lanes(ui, &abandoned.contact_history, scale, (player.reached(), end), PALE_OPACITY);
+        contact_lanes(ui, player, &abandoned.contact_history, scale, (player.reached(), end), PALE_OPACITY);
     }
-    contact_lanes(ui, player.contact_history(), scale, (0.0, shown), 1.0);
-    contact_lanes(ui, player.contact_history(), scale, (shown, player.reached()), PALE_OPACITY);
+    contact_lanes(ui, player, player.contact_history(), scale, (0.0, shown), 1.0);
+    contact_lanes(ui, player, player.contact_history(), scale, (shown, player.reached()), PALE_OPACITY);
     let flags = |flags: &mut dyn Iterator<Item = Flag>, pale: bool| {
         for flag in flags {
             let later = pale || flag.time > shown;
@@ -252,7 +273,14 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
 
 /// The lanes between two times, s: sliding in half the joint's colour, creep in full colour, and a mark at each contact onset.
 /// The colour of a pixel column is proportional to the time in each state.
-fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f64, f64), opacity: f32) {
+fn contact_lanes(
+    ui: &Ui,
+    player: &Player,
+    contacts: &ContactHistory,
+    scale: &Scale,
+    between: (f64, f64),
+    opacity: f32,
+) {
     let dark = ui.visuals().dark_mode;
     let pixel = 1.0 / ui.ctx().pixels_per_point();
     let from = between.0.max(scale.range.0);
@@ -299,6 +327,19 @@ fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f6
             }
             start += count.max(1);
         }
+        let kind = player.running().machine.loose_joints.get(joint).map(|joint| joint.kind);
+        if let Some(kind) = kind.filter(|kind| !kind.site_names().is_empty()) {
+            let mut last_marks = [f32::NEG_INFINITY; 16];
+            for (time, place) in contacts.place_touches(joint, from, to) {
+                let (x, last) = (scale.x(time), &mut last_marks[usize::from(place)]);
+                if x - *last >= pixel {
+                    let [top, low] = band(&kind, place).map(|share| lane.top() + share * lane.height());
+                    mesh.add_colored_rect(Rect::from_x_y_ranges(x..=x + 1.0, top..=low), colour);
+                    *last = x;
+                }
+            }
+            continue;
+        }
         let mut last_mark = f32::NEG_INFINITY;
         for time in contacts.touches(joint, from, to) {
             let x = scale.x(time);
@@ -336,9 +377,8 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
     } else {
         Some(player.contact_history())
     };
-    if let (Some(joint), Some(contacts)) = (pointed_joint, contacts) {
-        let name = &player.running().machine.loose_joints[joint].name;
-        let state = contacts.states(joint, time, time + MIN_RANGE).next();
+    if let (Some(index), Some(contacts)) = (pointed_joint, contacts) {
+        let state = contacts.states(index, time, time + MIN_RANGE).next();
         let words = match state {
             None => "not recorded",
             Some((.., ContactMode::Free)) => "free",
@@ -346,7 +386,12 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
             Some((.., ContactMode::Creep)) => "creeping",
             Some((.., ContactMode::Ideal)) => "ideal",
         };
-        ui.label(format!("{name}: {words}"));
+        let joint = &player.running().machine.loose_joints[index];
+        let sites = joint.kind.site_names();
+        let at: Vec<&str> =
+            contacts.places_at(index, time).filter_map(|place| sites.get(usize::from(place)).copied()).collect();
+        let at = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
+        ui.label(format!("{}: {words}{at}", joint.name));
     }
     let abandoned = player.abandoned_future().into_iter().flat_map(|abandoned| abandoned.flags.iter().cloned());
     for flag in player.flags().chain(abandoned) {
@@ -360,11 +405,50 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         ui.label(words);
     }
     let help = "Click or drag to go to an instant; wheel or pinch to zoom; double-click to show the whole run. Half \
-                colour: sliding; full colour: creeping, too slow for full friction; mark: contact begins; pale: not \
-                yet replayed, or abandoned.";
+                colour: sliding; full colour: creeping, too slow for full friction; mark: contact begins, of a pin above at its \
+                end a and below at b, of a block at its walls +y, −y, +z, −z from above; pale: not yet replayed, or abandoned.";
     ui.label(egui::RichText::new(help).small().color(faint(ui)));
 }
 
 fn faint(ui: &Ui) -> Color32 {
     ui.visuals().weak_text_color()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::EndsOn;
+
+    #[test]
+    fn places_of_a_joint_have_bands_of_their_own_that_fill_its_lane() {
+        let pin = |kept| {
+            LooseKind::Pin(Pin { length: Some(0.02), ends: EndsOn::Bearing, kept, face_radius: None, travel: None })
+        };
+        let slide = |half_height| {
+            LooseKind::Slide(Slide { half_length: 0.02, half_width: 0.01, half_height, corner_radius: 1e-3 })
+        };
+        for (kind, bands) in [(pin(false), 2), (pin(true), 4), (slide(None), 2), (slide(Some(0.01)), 4)] {
+            let names = kind.site_names();
+            let mut all: Vec<[f32; 2]> = (0..names.len() as u8).map(|place| band(&kind, place)).collect();
+            all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            all.dedup();
+            assert_eq!(all.len(), bands, "{names:?}");
+            assert_eq!((all[0][0], all[bands - 1][1]), (0.0, 1.0));
+            assert!(all.windows(2).all(|pair| pair[0][1] == pair[1][0]), "{all:?}");
+        }
+        let at = |kind: LooseKind, name: &str| {
+            let place = kind.site_names().iter().position(|own| *own == name).expect("a place") as u8;
+            band(&kind, place)
+        };
+        assert_eq!([at(pin(true), "a"), at(pin(true), "b")], [[0.0, 0.25], [0.75, 1.0]]);
+        // 3 and 7 are the corners at +y.
+        assert_eq!(at(slide(None), "3y"), at(slide(None), "7y"));
+        assert_eq!([at(slide(None), "7y"), at(slide(None), "1y")], [[0.0, 0.5], [0.5, 1.0]]);
+        let spatial = slide(Some(0.01));
+        // 2 and 4 are at +z, 3 and 4 at +y.
+        assert_eq!(
+            [at(spatial, "4y"), at(spatial, "2y"), at(spatial, "4z"), at(spatial, "3z")].map(|band| band[0]),
+            [0.0, 0.25, 0.5, 0.75]
+        );
+    }
 }

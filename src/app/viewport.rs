@@ -298,7 +298,7 @@ impl Viewport {
             self.view.add_motion(&mut self.motion, player.running(), player.frame(), &self.options);
         }
         if let Some(picked) = self.followed {
-            let anchor = self.view.anchor(player.frame(), picked);
+            let anchor = self.view.anchor(player.running(), player.frame(), picked);
             self.camera.follow(anchor);
             if let Some(goal) = &mut self.goal {
                 goal.follow(anchor);
@@ -367,7 +367,7 @@ impl Viewport {
 
     /// Centres the view on ball joint `joint` and follows it.
     pub fn centre(&mut self, player: &Player, joint: usize) {
-        if let Some(centre) = self.view.anchor(player.frame(), ScenePart::Joint(joint)) {
+        if let Some(centre) = self.view.anchor(player.running(), player.frame(), ScenePart::Joint(joint)) {
             let mut goal = self.goal.unwrap_or(self.camera);
             goal.target = centre;
             self.move_and_follow(player, goal, joint);
@@ -380,7 +380,7 @@ impl Viewport {
         (self.fit_pending, self.fits, self.moved) = (false, false, true);
         let picked = ScenePart::Joint(joint);
         self.follow(Some(picked));
-        let anchor = self.view.anchor(player.frame(), picked);
+        let anchor = self.view.anchor(player.running(), player.frame(), picked);
         self.camera.follow(anchor);
         if let Some(goal) = &mut self.goal {
             goal.follow(anchor);

@@ -1,9 +1,21 @@
 //! Values as text for the screen: the words of files and the command line, with typeset units.
 
 use crate::integrate::StepControl;
+use crate::machine::{LooseKind, Machine};
 use crate::scene::{Kind, Scene, Value};
 use crate::simulate::ContactMode;
 use crate::units::{format_quantity, format_quantity_digits};
+
+/// What the joints with play of a machine are called.
+pub fn joints(machine: &Machine) -> &'static str {
+    let are_balls = machine.loose_joints.iter().all(|joint| joint.kind == LooseKind::Ball);
+    if are_balls { "ball joints" } else { "joints with play" }
+}
+
+/// Name of place `place` of joint `joint` of `scene`: that of the joint, if it touches at one place only.
+pub fn site(scene: &Scene, joint: usize, place: u8) -> String {
+    scene.machine.loose_joints.get(joint).map_or_else(String::new, |joint| joint.site_name(place))
+}
 
 /// Description of a contact state.
 pub fn contact(state: ContactMode) -> &'static str {

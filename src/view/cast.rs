@@ -5,7 +5,8 @@ use parry3d::math::Pose as ParryPose;
 use parry3d::query::{Ray, RayCast};
 use parry3d::shape::{Ball, Capsule, Cone, Cuboid, Cylinder, Shape};
 
-use super::drawn::{BarKind, DrawnJoint, DrawnShape, Pose, Solid};
+use super::drawn::{BarKind, DrawnShape, Pose, Solid};
+use super::joint::DrawnJoint;
 use crate::scene::Scene;
 use crate::simulate::Frame;
 
@@ -58,7 +59,7 @@ pub(super) fn cast_ball(centre: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
     Ball::new(radius).cast_ray(&ParryPose::from_translation(centre), ray, f32::MAX, true)
 }
 
-/// Outer radius, m, to which the socket of each ball joint may grow before it intersects the part that carries it, with
+/// Outer radius, m, to which the socket or bearing of each joint may grow before it intersects the part that carries it, with
 /// `joints` drawn without magnification. Parts that it already touches, or that end at its outer face, do not limit it.
 pub(super) fn max_outer_radii(scene: &Scene, parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<f32> {
     let max_outer_radius = |(i, joint): (usize, &DrawnJoint)| {

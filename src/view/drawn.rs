@@ -1,14 +1,14 @@
 //! Positions of everything drawn at one instant: the single source for drawing, picking and bounds.
 //!
-//! With a magnification m of the play, the ball of a joint is drawn at Z_i + m e in a socket of inner radius r + m c, so
-//! that it touches the drawn wall exactly when it touches the real one. Bodies are drawn in place; only the end of a bar
-//! that carries a ball moves with the ball, so that no gap opens between them.
+//! Bodies are drawn in place, joints with their play magnified; only the end of a bar that carries a ball, a pin or a block moves
+//! with it, so that no gap opens between them.
 
 use std::sync::Arc;
 
 use glam::{Mat3, Vec3};
 use parry3d::shape::SharedShape;
 
+use super::joint::{self, DrawnJoint};
 use super::sticks::sticks;
 use super::surface::surface;
 use super::theme::Material;
@@ -17,13 +17,6 @@ use crate::machine::{self, Geometry, Role, Shape};
 use crate::mesh;
 use crate::scene::Scene;
 use crate::simulate::{BodyMotion, Frame};
-
-/// Largest drawn inner radius of a socket, in ball radii: it limits the magnification.
-const MAX_SOCKET_RADIUS: f32 = 4.2;
-/// Thickness of a drawn socket, in ball radii.
-const WALL_THICKNESS: f32 = 0.26;
-/// Gap drawn in an ideal joint, in ball radii: ball and socket must not coincide.
-const IDEAL_GAP: f32 = 0.02;
 
 /// A shape of the scene, in its body's frame.
 pub(super) struct DrawnShape {
@@ -61,7 +54,7 @@ pub(super) enum BarKind {
     Cone,
 }
 
-/// End of a bar, and the ball joint it reaches into.
+/// End of a bar, and the joint with play it reaches into.
 struct End {
     point: Vec3,
     joint: Option<JointEnd>,
@@ -69,31 +62,10 @@ struct End {
 
 #[derive(Clone, Copy)]
 enum JointEnd {
-    /// The joint's ball is on this end.
+    /// The joint's ball, pin or block is on this end.
     Ball(usize),
-    /// The joint's socket is in front of this end.
+    /// The joint's socket or bearing is in front of this end.
     Socket(usize),
-}
-
-/// A ball joint as drawn, world axes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct DrawnJoint {
-    pub socket_centre: Vec3,
-    pub ball_centre: Vec3,
-    /// Drawn minus real position of the ball.
-    pub shift: Vec3,
-    pub ball_radius: f32,
-    pub inner: f32,
-    pub outer: f32,
-    /// Unit vector.
-    pub opening: Vec3,
-}
-
-impl DrawnJoint {
-    /// Vector from the ball's centre to the socket's, m.
-    pub fn ball_to_socket(&self) -> Vec3 {
-        self.socket_centre - self.ball_centre
-    }
 }
 
 /// A placed part, world axes.
@@ -196,6 +168,10 @@ pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
 }
 
 fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) -> Option<Form> {
+    // A joint draws its own ball, pin or block.
+    if scene.machine.loose_joints.iter().any(|own| joint::replaces(own, body, &shape.geometry)) {
+        return None;
+    }
     let bar = |from, to, radius: f64, kind| {
         let ends = [from, to].map(|point| {
             let point = to_f32(point);
@@ -208,14 +184,7 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
         Geometry::Cylinder { from, to, radius } => bar(from, to, *radius, BarKind::Cylinder),
         Geometry::Cone { from, to, radius } => bar(from, to, *radius, BarKind::Cone),
         Geometry::Box { centre, size } => Some(Form::Box { centre: to_f32(centre), size: to_f32(size) }),
-        Geometry::Sphere { centre, radius } => {
-            // The joint draws its own ball.
-            let is_joint_ball =
-                scene.machine.loose_joints.iter().any(|j| {
-                    j.carried().body == body && (j.carried().point - centre).norm() < 0.1 * j.contact.ball_radius
-                });
-            (!is_joint_ball).then(|| Form::Ball { centre: to_f32(centre), radius: *radius as f32 })
-        }
+        Geometry::Sphere { centre, radius } => Some(Form::Ball { centre: to_f32(centre), radius: *radius as f32 }),
         Geometry::Plate { corners, triangles, thickness } => {
             let corners: Vec<Vec3> = corners.iter().map(to_f32).collect();
             let mesh = plate(&corners, triangles, *thickness as f32)?;
@@ -273,16 +242,13 @@ impl Meshes {
     }
 }
 
-/// The ball joint that a bar's end reaches into, if any.
+/// The joint with play that a bar's end reaches into, if any.
 fn joint_at_end(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<JointEnd> {
-    for (i, joint) in scene.machine.loose_joints.iter().enumerate() {
-        let radius = joint.contact.ball_radius as f32;
-        if joint.carried().body == body && to_f32(&joint.carried().point).distance(end) < 1.3 * radius {
+    for (i, own) in scene.machine.loose_joints.iter().enumerate() {
+        if own.carried().body == body && joint::holds_end(own, end) {
             return Some(JointEnd::Ball(i));
         }
-        if joint.carrier().body == body
-            && to_f32(&joint.carrier().point).distance(end) < (MAX_SOCKET_RADIUS + WALL_THICKNESS) * radius
-        {
+        if own.carrier().body == body && to_f32(&own.carrier().point).distance(end) < joint::wall_reach(own) {
             return Some(JointEnd::Socket(i));
         }
     }
@@ -321,40 +287,6 @@ fn plate(corners: &[Vec3], triangles: &[[usize; 3]], thickness: f32) -> Option<M
     Some(mesh)
 }
 
-/// Magnification as drawn, at most `requested`: no socket exceeds [`MAX_SOCKET_RADIUS`] ball radii, or its limit in
-/// `max_outer_radii`, m.
-pub(super) fn magnification(scene: &Scene, frame: &Frame, max_outer_radii: &[f32], requested: f32) -> f32 {
-    let requested = if requested.is_finite() { requested.clamp(1.0, 100.0) } else { 1.0 };
-    let limits = scene.machine.loose_joints.iter().zip(&frame.joints).enumerate().map(|(i, (joint, now))| {
-        let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
-        let radius = joint.contact.ball_radius as f32;
-        let room = max_outer_radii.get(i).copied().unwrap_or(f32::INFINITY) - WALL_THICKNESS * radius;
-        if gap > 0.0 { (room.min(MAX_SOCKET_RADIUS * radius) - radius) / gap } else { f32::INFINITY }
-    });
-    limits.fold(requested, f32::min).max(1.0)
-}
-
-/// Every ball joint as drawn at magnification `m`.
-pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
-    let drawn = scene.machine.loose_joints.iter().zip(&frame.joints).map(|(joint, now)| {
-        let socket_centre = to_f32(&now.socket_centre);
-        let ball_radius = joint.contact.ball_radius as f32;
-        let eccentricity = to_f32(&now.eccentricity);
-        let gap = if now.clearance > 0.0 { m * now.clearance as f32 } else { IDEAL_GAP * ball_radius };
-        let opening = Pose::in_frame(frame, joint.carrier().body).rotation * to_f32(&joint.opening);
-        DrawnJoint {
-            socket_centre,
-            ball_centre: socket_centre + m * eccentricity,
-            shift: (m - 1.0) * eccentricity,
-            ball_radius,
-            inner: ball_radius + gap,
-            outer: ball_radius + gap + WALL_THICKNESS * ball_radius,
-            opening: opening.normalize_or(Vec3::Z),
-        }
-    });
-    drawn.collect()
-}
-
 impl DrawnShape {
     /// Its colour and finish.
     pub fn material(&self, palette: &Palette) -> Material {
@@ -367,7 +299,7 @@ impl DrawnShape {
         matches!(self.form, Form::Bar { .. })
     }
 
-    /// Whether it ends at the outer face of the socket of ball joint `joint`.
+    /// Whether it ends at the outer face of the socket or bearing of joint `joint`.
     pub fn reaches_socket(&self, joint: usize) -> bool {
         match &self.form {
             Form::Bar { ends, .. } => {
@@ -412,7 +344,7 @@ impl DrawnShape {
     }
 }
 
-/// New end of a bar from `start` to `end` that reaches into a drawn socket: on the outer face.
+/// New end of a bar from `start` to `end` that reaches into a drawn socket or bearing: on the outer face.
 fn end_at_socket(start: Vec3, end: Vec3, joint: &DrawnJoint) -> Option<Vec3> {
     let radius = 0.99 * joint.outer;
     let to_end = end - joint.socket_centre;

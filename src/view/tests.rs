@@ -230,7 +230,7 @@ fn the_picked_part_is_the_one_drawn_under_the_cursor() {
     assert_eq!(view.pick(&shot, Vec2::new(2.0, 2.0)), None, "the background");
     let pixel = camera.project(to_f32(&frame.joints[1].socket_centre), SIZE).expect("before the eye");
     let hit = view.pick(&shot, pixel).expect("a socket");
-    assert_eq!(view.anchor(&frame, hit.what), Some(to_f32(&frame.joints[1].socket_centre)));
+    assert_eq!(view.anchor(&scene, &frame, hit.what), Some(to_f32(&frame.joints[1].socket_centre)));
 }
 
 #[test]
