@@ -125,12 +125,6 @@ fn measured(player: &Player, preset: Option<Preset>) -> [AccuracyLine; 2] {
     ]
 }
 
-/// Name of a joint.
-fn joint(player: &Player, index: usize) -> &str {
-    let joints = &player.running().machine.loose_joints;
-    joints.get(index).map_or("", |joint| &joint.name)
-}
-
 fn solver(player: &Player, preset: Option<Preset>) -> AccuracyLine {
     let name = preset.map_or_else(|| "no preset".to_owned(), |preset| format!("those of the preset {}", preset.word()));
     AccuracyLine {

@@ -246,10 +246,10 @@ fn section(ui: &mut Ui, magnified: &MagnifiedJoint, height: f32) {
 fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3; 2]) {
     const NONE: &str = "—";
     let report = &magnified.report;
-    ui.label(RichText::new(value::contact(magnified.report.state)).strong());
+    ui.label(RichText::new(value::contact(report.state, magnified.kind.parts()[0])).strong());
     let speed = |si: f64| value::quantity(si, "m/s", 3);
     let towards = crate::view::to_f32(&report.eccentricity).dot(axes[0].cross(axes[1]));
-    let [part, wall] = magnified.parts();
+    let [part, wall] = magnified.kind.parts();
     let (gap, indentation) = match magnified.penetration() {
         Some(depth) if depth > 0.0 => (NONE.to_owned(), value::quantity(depth, "um", 3)),
         Some(depth) => (draw::length(-depth, 3), NONE.to_owned()),

@@ -101,7 +101,7 @@ pub struct Viewport {
     grip_changed: bool,
     /// Whether there was more than one finger since the last time there was none.
     pinched: bool,
-    /// The clicked ball joint, until it is taken.
+    /// The clicked joint, until it is taken.
     clicked: Option<usize>,
     /// Quality control by frame time; `None` always uses the quality of the options.
     pace: Option<Pace>,
@@ -248,7 +248,7 @@ impl Viewport {
         self.trail.clear();
     }
 
-    /// Ball joint, force in N and age in s of every mark.
+    /// Joint, force in N and age in s of every mark.
     pub fn peak_marks(&self, player: &Player) -> Vec<(usize, f32, f64)> {
         let marks = self.marks.marks(player.frame());
         marks.map(|mark| (mark.joint, mark.force.length(), mark.age)).collect()
@@ -336,7 +336,7 @@ impl Viewport {
         self.fit_pending = true;
     }
 
-    /// Moves close to ball joint `joint`.
+    /// Moves close to joint `joint`.
     pub fn show_close_up(&mut self, player: &Player, joint: usize) {
         if joint < player.frame().joints.len() {
             let mut goal = self.camera;
@@ -346,7 +346,7 @@ impl Viewport {
         }
     }
 
-    /// Shows ball joint `joint` from close up at once, larger than [`Self::show_close_up`].
+    /// Shows joint `joint` from close up at once, larger than [`Self::show_close_up`].
     pub fn begin_close_up(&mut self, player: &Player, joint: usize) {
         self.show_close_up(player, joint);
         if let Some(mut goal) = self.goal.take() {
@@ -365,7 +365,7 @@ impl Viewport {
         (self.fit_pending, self.moved) = (true, false);
     }
 
-    /// Centres the view on ball joint `joint` and follows it.
+    /// Centres the view on joint `joint` and follows it.
     pub fn centre(&mut self, player: &Player, joint: usize) {
         if let Some(centre) = self.view.anchor(player.running(), player.frame(), ScenePart::Joint(joint)) {
             let mut goal = self.goal.unwrap_or(self.camera);
@@ -374,7 +374,7 @@ impl Viewport {
         }
     }
 
-    /// Moves to `goal` and follows ball joint `joint`.
+    /// Moves to `goal` and follows joint `joint`.
     fn move_and_follow(&mut self, player: &Player, goal: Camera, joint: usize) {
         self.goal = Some(goal);
         (self.fit_pending, self.fits, self.moved) = (false, false, true);
@@ -403,7 +403,7 @@ impl Viewport {
         [right, up]
     }
 
-    /// The ball joint clicked since the last call.
+    /// The joint clicked since the last call.
     pub fn take_clicked(&mut self) -> Option<usize> {
         self.clicked.take()
     }
@@ -423,7 +423,7 @@ impl Viewport {
         changed.then(|| self.grip.as_ref().map(Grip::pull))
     }
 
-    /// The ball joint in focus, i.e. the followed one.
+    /// The joint in focus, i.e. the followed one.
     pub fn focus(&self) -> Option<usize> {
         match self.followed {
             Some(ScenePart::Joint(joint)) => Some(joint),
@@ -906,7 +906,7 @@ impl Viewport {
         ui.label("Show");
         ui.checkbox(&mut options.flash, "Flash joints on impact")
             .on_hover_text("A ring of light about a joint when its ball has struck, brighter for a harder blow");
-        ui.checkbox(&mut options.joint_names, "Joint names").on_hover_text("Names beside the ball joints");
+        ui.checkbox(&mut options.joint_names, "Joint names").on_hover_text("Names beside the joints with play");
         ui.horizontal(|ui| {
             ui.checkbox(&mut options.sockets, "Sockets").on_hover_text("The sockets, cut open");
             ui.checkbox(&mut options.hinges, "Hinges and slides")
@@ -1053,8 +1053,10 @@ fn describe(ui: &mut Ui, player: &Player, picked: ScenePart) {
             }
         }
         ScenePart::Joint(index) => {
-            if let Some(joint) = frame.joints.get(index) {
-                ui.label(value::contact(joint.state));
+            if let (Some(spec), Some(joint)) =
+                (player.running().machine.loose_joints.get(index), frame.joints.get(index))
+            {
+                ui.label(value::contact(joint.state, spec.kind.parts()[0]));
                 row(ui, "Normal force", joint.normal_force.norm(), "N");
                 row(ui, "Friction force", joint.friction_force.norm(), "N");
                 if joint.state != ContactMode::Ideal {

@@ -17,14 +17,15 @@ pub fn site(scene: &Scene, joint: usize, place: u8) -> String {
     scene.machine.loose_joints.get(joint).map_or_else(String::new, |joint| joint.site_name(place))
 }
 
-/// Description of a contact state.
-pub fn contact(state: ContactMode) -> &'static str {
-    match state {
-        ContactMode::Free => "The ball touches nothing",
+/// Description of the contact state of a ball, a pin or a block, `part`.
+pub fn contact(state: ContactMode, part: &str) -> String {
+    let words = match state {
+        ContactMode::Free => return format!("The {part} touches nothing"),
         ContactMode::Creep => "In contact, creeping",
         ContactMode::Slip => "In contact, sliding",
         ContactMode::Ideal => "Ideal joint: no clearance",
-    }
+    };
+    words.to_owned()
 }
 
 /// `text` with typeset units, `µm` and `m/s²`. Files and the command line write `um` and `m/s^2`, and read both.

@@ -216,7 +216,9 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         force: mark * reference,
         fraction: arrow_length(mark * reference, reference, options.scaling).0,
     };
+    let are_balls = joints.iter().all(DrawnJoint::is_ball);
     out.legend = Some(Legend {
+        on: if are_balls { "ball" } else { "carried part" },
         reference,
         pixels: ARROW_LENGTH * height,
         scaling: options.scaling,

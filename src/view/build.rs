@@ -335,7 +335,7 @@ impl SceneView {
                         (name, largest) = (place, contact.normal.length());
                     }
                 });
-                let anchor = joint.socket_centre + up * (1.15 * joint.reach);
+                let anchor = joint.socket_centre + up * (1.15 * joint.beside());
                 push_label(out, name, LabelKind::Joint(i), anchor, palette.text);
             }
         }

@@ -1,4 +1,4 @@
-//! Marks the hardest impact of each ball joint for some time: an impact lasts a hundredth of a frame, too short to be seen.
+//! Marks the hardest impact of each joint with play for some time: an impact lasts a hundredth of a frame, too short to be seen.
 //!
 //! A mark is never an arrow: arrows are the current forces. It fades with simulated time alone; the rate follows from the time
 //! scale, so that a mark stays visible equally long at any scale.
@@ -11,7 +11,7 @@ use crate::simulate::{Frame, Peak};
 /// A past peak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mark {
-    /// Ball joint.
+    /// Joint with play.
     pub joint: usize,
     /// Normal force on the ball at the peak, N, world axes.
     pub force: Vec3,
@@ -99,7 +99,7 @@ impl PeakMarks {
         }
     }
 
-    /// Processes the displayed instant and the `peaks` since the previous one (one per ball joint, or empty). An impact expires
+    /// Processes the displayed instant and the `peaks` since the previous one (one per joint, or empty). An impact expires
     /// `fade` seconds of simulated time after its peak. If time has gone back, all impacts are dropped.
     pub fn update(&mut self, frame: &Frame, peaks: &[Peak], fade: f64) {
         if frame.time < self.now {
@@ -183,7 +183,7 @@ impl PeakMarks {
         self.joints.iter().zip(&frame.joints).enumerate().filter_map(mark)
     }
 
-    /// Brightness of the flash of ball joint `joint`, 0..=1.
+    /// Brightness of the flash of joint `joint`, 0..=1.
     pub fn flash(&self, joint: usize) -> f32 {
         let impact = self.joints.get(joint).and_then(|joint| joint.impact);
         impact.map_or(0.0, |impact| {

@@ -98,7 +98,7 @@ impl Costs {
             *self = Self { scene: scene.source.text.clone(), output, ..Self::default() };
         }
         if scene.machine.loose_joints.is_empty() {
-            ui.label(RichText::new("This scene has no ball joint").weak());
+            ui.label(RichText::new("This scene has no joint with play").weak());
             return None;
         }
         ui.scope(|ui| {
@@ -141,7 +141,7 @@ impl Costs {
         ui.horizontal_wrapped(|ui| {
             ui.label("Vary");
             for VariedParameter { parameter, on, .. } in &mut settings.varied {
-                let help = format!("Of each ball joint alone. {}", value::typeset(parameter.help));
+                let help = format!("Of each joint alone. {}", value::typeset(parameter.help));
                 ui.checkbox(on, parameter.label).on_hover_text(help);
             }
         });

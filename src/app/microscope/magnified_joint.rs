@@ -114,15 +114,6 @@ impl MagnifiedJoint {
         })
     }
 
-    /// Words for the carried part and its carrier.
-    pub fn parts(&self) -> [&'static str; 2] {
-        match self.kind {
-            LooseKind::Ball => ["ball", "socket"],
-            LooseKind::Pin(_) => ["pin", "bearing"],
-            LooseKind::Slide(_) => ["block", "guide"],
-        }
-    }
-
     /// Whether it can tilt.
     pub fn tilts(&self) -> bool {
         !self.places.is_empty()
@@ -142,9 +133,10 @@ impl MagnifiedJoint {
     /// The play in a sentence or two.
     pub fn in_words(&self) -> String {
         let Self { name, report, .. } = self;
-        let state = value::contact(report.state);
+
         let [off, play] = [report.eccentricity.norm(), report.clearance].map(|length| draw::length(length, 3));
-        let [part, wall] = self.parts();
+        let [part, wall] = self.kind.parts();
+        let state = value::contact(report.state, part);
         if self.kind == LooseKind::Ball {
             return format!(
                 "Ball joint {name} under the microscope. {state}. Ball's centre {off} from the socket's, clearance {play}."

@@ -152,3 +152,43 @@ fn faces(sheet: &Sheet<'_>) {
     let share = (magnified.report.axial / magnified.report.second_clearance) as f32;
     painter.circle_filled(centre + vec2(share.clamp(-1.2, 1.2) * half, 0.0), MARK, sheet.ink);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::player::Player;
+    use crate::machine::LooseKind;
+    use crate::scene::Scene;
+
+    #[test]
+    fn each_end_is_drawn_at_its_own_distance_from_the_wall() {
+        for ends_on in ["pin", "bearing"] {
+            let text = std::fs::read_to_string("tests/physics/joints/a.toml").expect("a scene");
+            let text = text.replace("ends = \"pin\"", &format!("ends = \"{ends_on}\""));
+            let scene = Scene::parse(&text, None, &[]).expect("a scene");
+            let mut player = Player::new(&scene).expect("starts");
+            let (mut touched, mut apart) = ([0; 2], 0);
+            for _ in 0..600 {
+                player.single_step();
+                let magnified = MagnifiedJoint::of(&player, 0).expect("a joint");
+                let LooseKind::Pin(kind) = magnified.kind else {
+                    panic!("a pin");
+                };
+                for (place, axis) in ends(&magnified, &kind).iter().enumerate() {
+                    let site = magnified.places[place].1;
+                    // The gap neglects nothing but the square of the tilt: (2 c / L)^2 of c.
+                    let gap = magnified.report.clearance - axis.norm();
+                    assert!((gap - site.gap).abs() < 1e-8, "{place}: {gap} {}", site.gap);
+                    touched[place] += u32::from(site.gap < 0.0);
+                }
+                let [a, b] = [0, 1].map(|place| magnified.places[place].1.gap < 0.0);
+                apart += u32::from(a != b);
+                let words = magnified.in_words();
+                assert!(words.starts_with("Pin J under the microscope. ") && words.contains(", tilt "), "{words}");
+                assert_eq!(words.contains("J.a"), a, "{words}");
+                assert_eq!(words.contains("J.b"), b, "{words}");
+            }
+            assert!(touched[0] > 3 && touched[1] > 3 && apart > 3, "{touched:?} {apart}");
+        }
+    }
+}

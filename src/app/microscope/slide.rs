@@ -126,3 +126,33 @@ fn one_view(sheet: &Sheet<'_>, rect: Rect, view: usize, (play, half): (f64, f64)
         sheet.words(beyond, align, &words, ink);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::LooseKind;
+
+    #[test]
+    fn each_corner_of_a_view_shows_the_places_that_lie_there() {
+        for half_height in [None, Some(0.01)] {
+            let kind =
+                LooseKind::Slide(Slide { half_length: 0.02, half_width: 0.01, half_height, corner_radius: 1e-3 });
+            let names = kind.site_names();
+            let mut seen = vec![0; names.len()];
+            for view in 0..if half_height.is_some() { 2 } else { 1 } {
+                for signs in CORNERS {
+                    for place in places(half_height.is_none(), view, signs) {
+                        seen[place] += 1;
+                        // 1 is - - -, 2 - - +, 3 - + -: in the order of the signs of x, y, z.
+                        let corner = names[place][..1].parse::<usize>().expect("a digit") - 1;
+                        let across = if view == 0 { corner >> 1 & 1 } else { corner & 1 };
+                        assert_eq!([corner >> 2, across], signs, "{}", names[place]);
+                        assert!(names[place].ends_with(["y", "z"][view]));
+                    }
+                }
+            }
+            assert!(seen.iter().all(|count| *count == 1), "{seen:?}");
+        }
+        assert_eq!(nearest(&[3e-4, -1e-6, 2e-4], &[0, 1]), Some(1));
+    }
+}

@@ -22,8 +22,9 @@ const ROUNDING: f64 = 1e-12;
 pub struct RecordedImpact {
     /// Its number in [`ImpactEvent`].
     id: u64,
-    /// Joint with play, and where in it: [`Impact::place`].
+    /// Joint with play.
     pub joint: usize,
+    /// Where in it: [`Impact::place`].
     pub place: u8,
     /// Start, s.
     pub start: f64,

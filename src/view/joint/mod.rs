@@ -7,6 +7,8 @@
 mod ball;
 mod pin;
 mod slide;
+#[cfg(test)]
+mod tests;
 
 use glam::Vec3;
 use parry3d::query::Ray;
@@ -177,6 +179,14 @@ impl DrawnJoint {
     /// Whether it is a ball in a socket.
     pub fn is_ball(&self) -> bool {
         matches!(self.shape, DrawnKind::Ball)
+    }
+
+    /// Distance from its centre at which its name is beside it, m.
+    pub fn beside(&self) -> f32 {
+        match &self.shape {
+            DrawnKind::Ball | DrawnKind::Pin(_) => self.outer,
+            DrawnKind::Slide(_) => self.ball_radius,
+        }
     }
 
     /// Vector from the centre of the carried part to where it is without play, m.
