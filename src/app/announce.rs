@@ -238,4 +238,26 @@ mod tests {
         let all_free = "Of 8 ball joints 8 are free and 0 in contact.";
         assert!(announcer.text().ends_with(all_free), "{}", announcer.text());
     }
+
+    #[test]
+    fn of_a_pin_the_ends_that_touch_and_its_tilt_are_told() {
+        let scene = Scene::load("tests/physics/joints/a.toml", &[]).expect("a scene");
+        let mut player = Player::new(&scene).expect("starts");
+        let mut told = [false; 3];
+        for _ in 0..600 {
+            player.single_step();
+            let text = joints(&player).expect("a joint");
+            let touches = |place: usize| player.frame().sites[place].gap < 0.0;
+            let expected = match [touches(0), touches(1)] {
+                [true, true] => "J in contact at a and b",
+                [true, false] => "J in contact at a,",
+                [false, true] => "J in contact at b,",
+                [false, false] => continue,
+            };
+            assert!(touches(2) || touches(3) || text.starts_with(expected), "{text}");
+            assert!(text.contains(", tilt ") && text.contains(" degrees, "), "{text}");
+            told[usize::from(touches(0)) + 2 * usize::from(touches(1)) - 1] = true;
+        }
+        assert!(told[0] && told[1], "{told:?}");
+    }
 }

@@ -271,8 +271,8 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     painter.rect_stroke(lanes, 3.0, edge, egui::StrokeKind::Outside);
 }
 
-/// The lanes between two times, s: sliding in half the joint's colour, creep in full colour, and a mark at each contact onset.
-/// The colour of a pixel column is proportional to the time in each state.
+/// The lanes between two times, s: sliding in half the joint's colour, creep in full colour, and a mark at each contact onset; of a
+/// joint that can touch at several places in the band of each.
 fn contact_lanes(
     ui: &Ui,
     player: &Player,
@@ -289,25 +289,89 @@ fn contact_lanes(
         return;
     }
     let joints = contacts.joints().min(RECORDED_JOINTS);
-    let columns = (scale.rect.width() / pixel).ceil() as usize;
-    let per_second = columns as f64 / (scale.range.1 - scale.range.0);
-    let mut coverage = vec![0.0_f32; columns + 1];
-    let mut mesh = Mesh::default();
+    let mut bars = Bars::new(scale, pixel, (from, to));
     for joint in 0..joints {
         let lane = scale.lane(joint, joints);
         let colour = theme::series(joint, dark).gamma_multiply(opacity);
-        coverage.fill(0.0);
-        for (begins, ends, state) in contacts.states(joint, from, to) {
-            let weight = match state {
-                ContactMode::Free => continue,
-                ContactMode::Slip => 0.5,
-                ContactMode::Creep | ContactMode::Ideal => 1.0,
-            };
-            let a = (begins.max(from) - scale.range.0) * per_second;
-            let b = (ends.min(to) - scale.range.0) * per_second;
+        let kind = player.running().machine.loose_joints.get(joint).map(|joint| joint.kind);
+        let Some(kind) = kind.filter(|kind| !kind.site_names().is_empty()) else {
+            bars.add(
+                contacts.states(joint, from, to).map(|(begins, ends, state)| (begins, ends, weight(state))),
+                lane,
+                colour,
+            );
+            bars.mark(contacts.touches(joint, from, to), lane, colour);
+            continue;
+        };
+        for ([top, low], places) in bands(&kind) {
+            let part = Rect::from_x_y_ranges(
+                lane.x_range(),
+                lane.top() + top * lane.height()..=lane.top() + low * lane.height(),
+            );
+            let during = contacts.place_contacts(joint, places, from, to);
+            let weighted = during.flat_map(|(begins, ends)| {
+                let states = contacts.states(joint, begins, ends);
+                states.map(move |(a, b, state)| (a.max(begins), b.min(ends), weight(state)))
+            });
+            bars.add(weighted, part, colour);
+            let begun = contacts.place_touches(joint, from, to).filter(|(_, place)| places >> place & 1 == 1);
+            bars.mark(begun.map(|(time, _)| time), part, colour);
+        }
+    }
+    ui.painter().add(Shape::mesh(bars.mesh));
+}
+
+/// Share of the colour of a joint in this state.
+fn weight(state: ContactMode) -> f32 {
+    match state {
+        ContactMode::Free => 0.0,
+        ContactMode::Slip => 0.5,
+        ContactMode::Creep | ContactMode::Ideal => 1.0,
+    }
+}
+
+/// The bands of a lane, with the places marked in each, a bit for each place.
+fn bands(kind: &LooseKind) -> Vec<([f32; 2], u16)> {
+    let mut all: Vec<([f32; 2], u16)> = Vec::new();
+    for place in 0..kind.site_names().len() as u8 {
+        let own = band(kind, place);
+        match all.iter_mut().find(|(known, _)| *known == own) {
+            Some((_, places)) => *places |= 1 << place,
+            None => all.push((own, 1 << place)),
+        }
+    }
+    all
+}
+
+/// Bars whose colour, in a pixel column, is proportional to the time in each state.
+struct Bars<'a> {
+    scale: &'a Scale,
+    pixel: f32,
+    /// Times drawn, s.
+    between: (f64, f64),
+    coverage: Vec<f32>,
+    mesh: Mesh,
+}
+
+impl<'a> Bars<'a> {
+    fn new(scale: &'a Scale, pixel: f32, between: (f64, f64)) -> Self {
+        let columns = (scale.rect.width() / pixel).ceil() as usize;
+        Self { scale, pixel, between, coverage: vec![0.0; columns + 1], mesh: Mesh::default() }
+    }
+
+    /// Adds bars from and to these times, s, with these shares of `colour`, in `part` of the lanes.
+    fn add(&mut self, states: impl Iterator<Item = (f64, f64, f32)>, part: Rect, colour: Color32) {
+        let columns = self.coverage.len() - 1;
+        let (start, end) = self.scale.range;
+        let per_second = columns as f64 / (end - start);
+        let (from, to) = self.between;
+        self.coverage.fill(0.0);
+        for (begins, ends, weight) in states.filter(|(.., weight)| *weight > 0.0) {
+            let a = (begins.max(from) - start) * per_second;
+            let b = (ends.min(to) - start) * per_second;
             let last = (b.floor() as usize).min(columns);
             let first = (a.floor() as usize).min(last);
-            for (index, covered_part) in coverage[first..=last].iter_mut().enumerate() {
+            for (index, covered_part) in self.coverage[first..=last].iter_mut().enumerate() {
                 let left = (first + index) as f64;
                 let covered = b.min(left + 1.0) - a.max(left);
                 *covered_part += weight * covered.max(0.0) as f32;
@@ -316,41 +380,31 @@ fn contact_lanes(
         // Adjacent columns of one colour are merged.
         let mut start = 0;
         while start < columns {
-            let covered_part = coverage[start];
-            let same = coverage[start..columns].iter();
+            let covered_part = self.coverage[start];
+            let same = self.coverage[start..columns].iter();
             let count = same.take_while(|other| (*other - covered_part).abs() < 0.01).count();
             if covered_part > 0.0 {
-                let left = scale.rect.left() + start as f32 * pixel;
-                let place = Rect::from_x_y_ranges(left..=left + count as f32 * pixel, lane.y_range());
+                let left = self.scale.rect.left() + start as f32 * self.pixel;
+                let place = Rect::from_x_y_ranges(left..=left + count as f32 * self.pixel, part.y_range());
                 // Even the shortest contact stays visible.
-                mesh.add_colored_rect(place, colour.gamma_multiply(covered_part.clamp(0.12, 1.0)));
+                self.mesh.add_colored_rect(place, colour.gamma_multiply(covered_part.clamp(0.12, 1.0)));
             }
             start += count.max(1);
         }
-        let kind = player.running().machine.loose_joints.get(joint).map(|joint| joint.kind);
-        if let Some(kind) = kind.filter(|kind| !kind.site_names().is_empty()) {
-            let mut last_marks = [f32::NEG_INFINITY; 16];
-            for (time, place) in contacts.place_touches(joint, from, to) {
-                let (x, last) = (scale.x(time), &mut last_marks[usize::from(place)]);
-                if x - *last >= pixel {
-                    let [top, low] = band(&kind, place).map(|share| lane.top() + share * lane.height());
-                    mesh.add_colored_rect(Rect::from_x_y_ranges(x..=x + 1.0, top..=low), colour);
-                    *last = x;
-                }
-            }
-            continue;
-        }
+    }
+
+    /// Marks these times in `part` of the lanes.
+    fn mark(&mut self, times: impl Iterator<Item = f64>, part: Rect, colour: Color32) {
         let mut last_mark = f32::NEG_INFINITY;
-        for time in contacts.touches(joint, from, to) {
-            let x = scale.x(time);
-            if x - last_mark >= pixel {
-                let mark = Rect::from_min_size(pos2(x, lane.top()), vec2(1.0, lane.height()));
-                mesh.add_colored_rect(mark, colour);
+        for time in times {
+            let x = self.scale.x(time);
+            if x - last_mark >= self.pixel {
+                let mark = Rect::from_min_size(pos2(x, part.top()), vec2(1.0, part.height()));
+                self.mesh.add_colored_rect(mark, colour);
                 last_mark = x;
             }
         }
     }
-    ui.painter().add(Shape::mesh(mesh));
 }
 
 fn flag_at(ui: &Ui, scale: &Scale, time: f64, opacity: f32) {
@@ -427,13 +481,15 @@ mod tests {
         let slide = |half_height| {
             LooseKind::Slide(Slide { half_length: 0.02, half_width: 0.01, half_height, corner_radius: 1e-3 })
         };
-        for (kind, bands) in [(pin(false), 2), (pin(true), 4), (slide(None), 2), (slide(Some(0.01)), 4)] {
+        for (kind, count) in [(pin(false), 2), (pin(true), 4), (slide(None), 2), (slide(Some(0.01)), 4)] {
             let names = kind.site_names();
             let mut all: Vec<[f32; 2]> = (0..names.len() as u8).map(|place| band(&kind, place)).collect();
             all.sort_by(|a, b| a[0].total_cmp(&b[0]));
             all.dedup();
-            assert_eq!(all.len(), bands, "{names:?}");
-            assert_eq!((all[0][0], all[bands - 1][1]), (0.0, 1.0));
+            assert_eq!(all.len(), count, "{names:?}");
+            assert_eq!((all[0][0], all[count - 1][1]), (0.0, 1.0));
+            let places = bands(&kind).into_iter().map(|(_, places)| places);
+            assert_eq!(places.fold(0, |all, places| all | places), ((1_u32 << names.len()) - 1) as u16);
             assert!(all.windows(2).all(|pair| pair[0][1] == pair[1][0]), "{all:?}");
         }
         let at = |kind: LooseKind, name: &str| {

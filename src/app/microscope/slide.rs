@@ -74,12 +74,13 @@ fn one_view(sheet: &Sheet<'_>, rect: Rect, view: usize, (play, half): (f64, f64)
     let [long, wide, gap] = [HALF_LENGTH * rect.width(), HALF_WIDTH * rect.height(), PLAY * rect.height()];
     let axis = ["y", "z"][view];
     let left = pos2(rect.left() + 6.0, centre.y);
+    let mut scale = String::new();
     if play <= 0.0 {
         sheet.words(left, Align2::LEFT_CENTER, &format!("{axis}: no play"), sheet.faint);
     } else {
         let factor = (gap / wide) as f64 * half / play;
         let words = format!("{axis}, play {}, drawn ×{}", draw::length(play, 3), value::number(factor, 2));
-        sheet.words(centre, Align2::CENTER_CENTER, &words, sheet.faint);
+        scale = words;
     }
     let reach = vec2(0.46 * rect.width(), 0.0);
     for side in [-1.0, 1.0] {
@@ -101,6 +102,9 @@ fn one_view(sheet: &Sheet<'_>, rect: Rect, view: usize, (play, half): (f64, f64)
     if play <= 0.0 {
         return;
     }
+    // In the block, which moves.
+    let middle = outline[0].lerp(outline[2], 0.5);
+    sheet.words(middle, Align2::CENTER_CENTER, &scale, sheet.faint);
     for signs in CORNERS {
         let (Some(place), at) = corner(signs) else {
             continue;

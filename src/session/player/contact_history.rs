@@ -130,6 +130,15 @@ impl ContactHistory {
         })
     }
 
+    /// Times between two given ones, s, during which joint `joint` touches at one of `wanted`, a bit for each place: start, end.
+    pub fn place_contacts(&self, joint: usize, wanted: u16, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
+        let places = self.places.get(joint).map_or(&[][..], Vec::as_slice);
+        let first = places.partition_point(|(time, _)| *time <= from).saturating_sub(1);
+        let touching = (first..places.len()).take_while(move |at| places[*at].0 < to);
+        let touching = touching.filter(move |at| places[*at].1 & wanted != 0);
+        touching.map(move |at| (places[at].0, places.get(at + 1).map_or(self.to, |next| next.0)))
+    }
+
     /// The places at which joint `joint` touches at `time`, s.
     pub fn places_at(&self, joint: usize, time: f64) -> impl Iterator<Item = u8> {
         let places = self.places.get(joint).map_or(&[][..], Vec::as_slice);
@@ -230,6 +239,10 @@ mod tests {
         assert_eq!(history.place_touches(0, 0.0, 9.0).count(), 0);
         let at = |time| history.places_at(1, time).collect::<Vec<_>>();
         assert_eq!([at(0.5), at(1.5), at(2.5), at(3.5)], [vec![], vec![0], vec![0, 1], vec![1]]);
+        let during = |wanted| history.place_contacts(1, wanted, 0.0, 9.0).collect::<Vec<_>>();
+        assert_eq!(during(0b01), [(1.0, 2.0), (2.0, 3.0), (5.0, 5.0)]);
+        assert_eq!(during(0b10), [(2.0, 3.0), (3.0, 4.0), (5.0, 5.0)]);
+        assert_eq!(history.place_contacts(1, 0b10, 2.5, 2.8).collect::<Vec<_>>(), [(2.0, 3.0)]);
         history.truncate(3.5);
         assert_eq!(touches(&history), [(1.0, 0), (2.0, 1)]);
     }
