@@ -236,7 +236,7 @@ fn section(ui: &mut Ui, magnified: &MagnifiedJoint, height: f32) {
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));
     draw::section(&Sheet::new(ui, rect, magnified), patch);
     response.on_hover_text(
-        "Ball and wall as they would lie without pressing each other, about the point of contact: the gap grows as x²/2R, \
+        "Both parts as they would lie without pressing each other, about the point of contact: the gap grows as x²/2R, \
          R = (r + c) r / c. The overlap is taken up elastically over the contact patch, the thick line, of radius \
          a = √(R δ) by Hertz. The scale follows the latest impact's depth.",
     );

@@ -20,6 +20,8 @@ const FLAGS_HEIGHT: f32 = 9.0;
 const LANES_HEIGHT: f32 = 24.0;
 /// Height of a lane among many, and largest height of all lanes, points.
 const LANE_HEIGHT: f32 = 4.0;
+/// Height of a lane of a joint that can touch at several places, points.
+const PLACES_LANE_HEIGHT: f32 = 12.0;
 const MAX_LANES_HEIGHT: f32 = 56.0;
 /// Window height below which only a low strip is shown, points.
 const MIN_WINDOW_HEIGHT: f32 = 360.0;
@@ -87,7 +89,7 @@ impl Timeline {
             let joints = player.contact_history().joints().min(RECORDED_JOINTS);
             let loose = player.running().machine.loose_joints.iter().take(joints);
             let heights =
-                loose.map(|joint| if joint.kind.site_names().is_empty() { LANE_HEIGHT } else { 2.0 * LANE_HEIGHT });
+                loose.map(|joint| if joint.kind.site_names().is_empty() { LANE_HEIGHT } else { PLACES_LANE_HEIGHT });
             let lanes = heights.sum::<f32>().clamp(LANES_HEIGHT, MAX_LANES_HEIGHT);
             moved |= self.strip(ui, player, side.max(FLAGS_HEIGHT + lanes));
         });

@@ -266,6 +266,16 @@ impl Viewport {
         let peaks = player.impact_record().peaks(shown - fade, shown);
         let blows = peaks.map(|(joint, top)| (joint, crate::view::to_f32(&top.force), top.time));
         self.marks.recall(player.frame(), blows, fade);
+        self.locate_marks(player);
+    }
+
+    /// Marks past impacts at the end or corner that was hit.
+    fn locate_marks(&mut self, player: &Player) {
+        let joints = &player.running().machine.loose_joints;
+        self.marks.locate(|joint, time| {
+            joints.get(joint).filter(|joint| !joint.kind.site_names().is_empty())?;
+            player.impact_record().place_of_peak(joint, time)
+        });
     }
 
     /// Shows another scene, or the same one after a reset that changed its shapes; user settings stay.
@@ -287,6 +297,7 @@ impl Viewport {
         let shown = player.pacer.shown();
         let fade = MARK_DURATION * player.pacer.scale();
         self.marks.update(player.frame(), player.peaks(), fade);
+        self.locate_marks(player);
         if shown != self.time || player.is_playing() {
             if shown < self.time {
                 // Blows after the displayed instant are dropped, those before it restored.

@@ -196,7 +196,7 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
             continue;
         };
         // On the wall that was hit.
-        let contact = joint.wall_point(mark.force);
+        let contact = joint.wall_point(mark.force, mark.place.map(usize::from));
         if let Some(arrow) = arrow(mark.force, contact) {
             let [colour, ink] = [palette.normal, palette.text].map(|colour| colour.with_opacity(mark.strength.sqrt()));
             let width = OUTLINE_WIDTH * shot.options.arrows.thickness * shot.pixels_per_point;
@@ -335,7 +335,7 @@ mod tests {
 
     #[test]
     fn a_peak_is_told_with_three_digits_and_its_age_in_a_fitting_unit() {
-        let mark = |age: f64| Mark { joint: 0, force: Vec3::new(0.0, 870.6, 0.0), age, strength: 1.0 };
+        let mark = |age: f64| Mark { joint: 0, place: None, force: Vec3::new(0.0, 870.6, 0.0), age, strength: 1.0 };
         assert_eq!(peak_label(&mark(2.14e-3)), "peak 871 N, 2.1 ms ago");
         assert_eq!(peak_label(&mark(38.4e-6)), "peak 871 N, 38 µs ago");
         assert_eq!(peak_label(&mark(0.312)), "peak 871 N, 310 ms ago");

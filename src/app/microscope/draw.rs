@@ -296,7 +296,7 @@ pub fn section(sheet: &Sheet<'_>, patch: &ContactPatch) {
         painter.line_segment([centre - reach, centre + reach], stroke);
     }
     let above = pos2(rect.center().x, rect.top() + 5.0);
-    sheet.words(above, Align2::CENTER_TOP, "ball", sheet.ink);
+    sheet.words(above, Align2::CENTER_TOP, sheet.magnified.kind.parts()[0], sheet.ink);
     let below = pos2(rect.left() + 8.0, wall + 3.0);
     sheet.words(below, Align2::LEFT_TOP, "wall", sheet.ink);
     let times = value::number(depth_scale / width_scale, 2);

@@ -221,6 +221,16 @@ impl ImpactRecord {
             .filter(move |(_, force_peak)| within(force_peak))
     }
 
+    /// Where joint `joint` was hit by the impact that peaks at `time`, s; otherwise by the latest in progress then.
+    pub fn place_of_peak(&self, joint: usize, time: f64) -> Option<u8> {
+        let touching = || {
+            let own = self.all.iter().rev().take(MAX_SEARCHED).filter(move |own| own.joint == joint);
+            own.filter(move |own| own.has_begun(time) && own.end >= time)
+        };
+        let peaks = |own: &&RecordedImpact| own.force_peak.time == time || own.largest.time == time;
+        touching().find(peaks).or_else(|| touching().next()).map(|own| own.place)
+    }
+
     /// Number of impacts dropped.
     pub fn dropped(&self) -> u64 {
         self.dropped

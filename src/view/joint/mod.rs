@@ -290,13 +290,13 @@ impl DrawnJoint {
         }
     }
 
-    /// Point of the wall that a force in this direction on the carried part comes from.
-    pub fn wall_point(&self, force: Vec3) -> Vec3 {
+    /// Point of the wall that a force in this direction on the carried part comes from, at place `place` if that is known.
+    pub fn wall_point(&self, force: Vec3, place: Option<usize>) -> Vec3 {
         let out = -force.normalize_or_zero();
         match &self.shape {
             DrawnKind::Ball => self.socket_centre + out * self.inner,
-            DrawnKind::Pin(pin) => pin.wall_point(self, out),
-            DrawnKind::Slide(slide) => slide.wall_point(self, out),
+            DrawnKind::Pin(pin) => pin.wall_point(self, out, place),
+            DrawnKind::Slide(slide) => slide.wall_point(self, out, place),
         }
     }
 

@@ -232,12 +232,17 @@ impl DrawnPin {
         [self.at - half, self.at + half].map(|x| self.axis_at(joint, x))
     }
 
+    /// Where along the bearing's axis the end `a` (`place` 0) or `b` is, m.
+    fn end_at(&self, place: usize) -> f32 {
+        let side = if place == 0 { -self.end } else { self.end };
+        side + if self.ends == EndsOn::Pin { self.at } else { 0.0 }
+    }
+
     /// Where it touches, or would: of the ends `a` and `b`, of the collars `front` and `back`.
     pub fn site_point(&self, joint: &DrawnJoint, place: usize, site: &SiteReport) -> Vec3 {
         match place {
             0 | 1 => {
-                let side = if place == 0 { -self.end } else { self.end };
-                let x = side + if self.ends == EndsOn::Pin { self.at } else { 0.0 };
+                let x = self.end_at(place);
                 let centre = self.axis_at(joint, x);
                 let out = centre - (joint.socket_centre + self.axis * x);
                 centre + out.normalize_or_zero() * joint.ball_radius
@@ -260,14 +265,15 @@ impl DrawnPin {
         }
     }
 
-    /// Point of the wall, or of a face, in the direction `out`.
-    pub fn wall_point(&self, joint: &DrawnJoint, out: Vec3) -> Vec3 {
+    /// Point of the wall, or of a face, in the direction `out`, at place `place`.
+    pub fn wall_point(&self, joint: &DrawnJoint, out: Vec3, place: Option<usize>) -> Vec3 {
         let along = out.dot(self.axis);
         if self.collars.is_some() && along.abs() > 0.9 {
             // Pushed against the collar from the other side.
             return joint.socket_centre - self.axis * (self.bearing * along.signum());
         }
-        joint.socket_centre + out.reject_from_normalized(self.axis).normalize_or_zero() * joint.inner
+        let end = place.filter(|place| *place < 2).map_or(0.0, |place| self.end_at(place));
+        joint.socket_centre + self.axis * end + out.reject_from_normalized(self.axis).normalize_or_zero() * joint.inner
     }
 
     pub fn extent(&self, joint: &DrawnJoint, mut visit: impl FnMut(Vec3, f32)) {

@@ -146,16 +146,20 @@ impl DrawnSlide {
         0.06 * self.half.x.min(self.half.y)
     }
 
-    /// The corner of place `place` among the names of the sites. In a plane it is the middle of an edge.
+    /// The corner of place `place` among the names of the sites.
     pub fn corner_of(&self, place: usize) -> Vec3 {
+        self.point(self.edges_of(place))
+    }
+
+    /// That corner in half edges. In a plane it is the middle of an edge.
+    fn edges_of(&self, place: usize) -> Vec3 {
         let sign = |bit: usize| if bit != 0 { 1.0 } else { -1.0 };
-        let edges = if self.is_planar {
+        if self.is_planar {
             Vec3::new(sign(place & 2), sign(place & 1), 0.0)
         } else {
             let corner = place / 2;
             Vec3::new(sign(corner & 4), sign(corner & 2), sign(corner & 1))
-        };
-        self.point(edges)
+        }
     }
 
     pub fn push_block(&self, layer: &mut Layer, material: Material) {
@@ -186,13 +190,14 @@ impl DrawnSlide {
         }
     }
 
-    /// Point of a wall in the direction `out`, beside the middle of the block.
-    pub fn wall_point(&self, joint: &DrawnJoint, out: Vec3) -> Vec3 {
+    /// Point of a wall in the direction `out`, beside the corner of place `place`, or beside the middle of the block.
+    pub fn wall_point(&self, joint: &DrawnJoint, out: Vec3, place: Option<usize>) -> Vec3 {
+        let beside = place.map_or(Vec3::ZERO, |place| self.edges_of(place) * self.half);
         let local = self.guide.transpose() * out;
         let at = if local.y.abs() >= local.z.abs() {
-            Vec3::Y * ((self.half.y + self.play[0]) * local.y.signum())
+            Vec3::new(beside.x, (self.half.y + self.play[0]) * local.y.signum(), beside.z)
         } else {
-            Vec3::Z * ((self.half.z + self.play[1]) * local.z.signum())
+            Vec3::new(beside.x, beside.y, (self.half.z + self.play[1]) * local.z.signum())
         };
         joint.socket_centre + self.guide * at
     }

@@ -288,3 +288,22 @@ fn arrows_start_where_the_drawn_parts_touch_and_the_label_names_the_place_of_the
         assert!(compared > 3, "{compared}");
     }
 }
+
+#[test]
+fn a_past_peak_is_marked_at_the_end_that_was_hit() {
+    let scene = scene(&pin("ends = \"bearing\""));
+    let mut simulation = Simulation::new(&scene.machine).expect("starts");
+    let mut frame = Frame::default();
+    simulation.sample_now(&mut frame);
+    let drawn = super::joints(&scene, &frame, MAGNIFICATION)[0];
+    let axis = frame.axes_of(&scene.machine.loose_joints[0].frames[0]);
+    let [x, y] = [0, 1].map(|k| super::column(&axis, k));
+    // The bearing is 24 mm long, its inner radius 10 mm and 15 times 0.1 mm; the force pushes away from +y.
+    for (place, along) in [(Some(0), -0.012), (Some(1), 0.012), (None, 0.0)] {
+        let point = drawn.wall_point(-y * 3.0, place) - drawn.socket_centre;
+        assert!(point.distance(x * along + y * 0.0115) < 1e-6, "{place:?}: {point}");
+    }
+    // Displaced towards -axis, the pin is pushed back by the collar in front of the bearing's end at +axis.
+    let point = drawn.wall_point(x * 3.0, Some(3)) - drawn.socket_centre;
+    assert!(point.distance(x * 0.012) < 1e-6, "{point}");
+}
