@@ -7,10 +7,10 @@ use parry3d::query::Ray;
 
 use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
 use super::attachments::{Style, push_bushing, push_motor, push_stop};
-use super::cast::{cast, max_outer_radii};
+use super::cast::cast;
 use super::coil::push_coil;
 use super::cover::{Cover, CoverKind};
-use super::drawn::{self, DrawnShape};
+use super::drawn::{self, DrawnShape, max_outer_radii};
 use super::ground::push_ground;
 use super::instances::{self, bar, push_label};
 use super::joint::{self, DrawnJoint, Fittings, push_sockets};

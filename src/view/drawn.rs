@@ -5,18 +5,20 @@
 
 use std::sync::Arc;
 
-use glam::{Mat3, Vec3};
+use glam::Vec3;
 use parry3d::shape::SharedShape;
 
+use super::cast::distance;
 use super::joint::{self, DrawnJoint};
+use super::solids::{BarKind, Pose, Solid};
 use super::sticks::sticks;
 use super::surface::surface;
 use super::theme::Material;
 use super::{Colour, Mesh, MeshData, Palette, to_f32, zones};
-use crate::machine::{self, Geometry, Role, Shape};
+use crate::machine::{Geometry, Role, Shape};
 use crate::mesh;
 use crate::scene::Scene;
-use crate::simulate::{BodyMotion, Frame};
+use crate::simulate::Frame;
 
 /// A shape of the scene, in its body's frame.
 pub(super) struct DrawnShape {
@@ -47,13 +49,6 @@ struct SceneMesh {
     points: Arc<[Vec3]>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum BarKind {
-    Capsule,
-    Cylinder,
-    Cone,
-}
-
 /// End of a bar, and the joint with play it reaches into.
 struct End {
     point: Vec3,
@@ -66,67 +61,6 @@ enum JointEnd {
     Ball(usize),
     /// The joint's socket or bearing is in front of this end.
     Socket(usize),
-}
-
-/// A placed part, world axes.
-pub(super) enum Solid<'a> {
-    /// `has_cap[i]`: whether end i of a capsule shows its hemisphere.
-    Bar {
-        from: Vec3,
-        to: Vec3,
-        radius: f32,
-        kind: BarKind,
-        has_cap: [bool; 2],
-    },
-    Box {
-        centre: Vec3,
-        size: Vec3,
-        rotation: Mat3,
-    },
-    Ball {
-        centre: Vec3,
-        radius: f32,
-    },
-    Mesh {
-        mesh: Mesh,
-        shape: Option<&'a SharedShape>,
-        points: &'a [Vec3],
-        pose: Pose,
-    },
-}
-
-/// Pose of a body frame.
-#[derive(Clone, Copy)]
-pub(super) struct Pose {
-    pub position: Vec3,
-    pub rotation: Mat3,
-}
-
-impl Pose {
-    pub const WORLD: Self = Self { position: Vec3::ZERO, rotation: Mat3::IDENTITY };
-
-    fn new(position: &machine::Vec3, rotation: &machine::Mat3) -> Self {
-        let column = |i: usize| to_f32(&rotation.column(i).into_owned());
-        Self { position: to_f32(position), rotation: Mat3::from_cols(column(0), column(1), column(2)) }
-    }
-
-    fn of_body(motion: &BodyMotion) -> Self {
-        Self::new(&motion.position, &motion.rotation)
-    }
-
-    /// World pose of `inner`, which is given in this frame.
-    fn compose(&self, inner: &Self) -> Self {
-        Self { position: self.apply(inner.position), rotation: self.rotation * inner.rotation }
-    }
-
-    pub fn in_frame(frame: &Frame, body: Option<usize>) -> Self {
-        let world = Self { position: -to_f32(&frame.origin), ..Self::WORLD };
-        body.and_then(|b| frame.bodies.get(b)).map_or(world, Self::of_body)
-    }
-
-    pub fn apply(&self, point: Vec3) -> Vec3 {
-        self.position + self.rotation * point
-    }
 }
 
 /// Shapes of `scene`, and the meshes that are not shared: the zones of wear maps, then its plates and the
@@ -362,19 +296,17 @@ fn end_at_socket(start: Vec3, end: Vec3, joint: &DrawnJoint) -> Option<Vec3> {
     Some(end + along * s)
 }
 
-impl Solid<'_> {
-    /// Calls `visit` with spheres (centre, radius) whose convex hull contains the solid: for bounds.
-    pub fn extent(&self, mut visit: impl FnMut(Vec3, f32)) {
-        match self {
-            Solid::Bar { from, to, radius, .. } => [from, to].into_iter().for_each(|&p| visit(p, *radius)),
-            Solid::Box { centre, size, rotation } => {
-                for i in 0..8 {
-                    let sign = |bit: u32| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
-                    visit(*centre + *rotation * (*size * Vec3::new(sign(0), sign(1), sign(2))), 0.0);
-                }
-            }
-            Solid::Ball { centre, radius } => visit(*centre, *radius),
-            Solid::Mesh { points, pose, .. } => points.iter().for_each(|&p| visit(pose.apply(p), 0.0)),
-        }
-    }
+/// Outer radius, m, to which the socket or bearing of each joint may grow before it intersects the part that carries it, with
+/// `joints` drawn without magnification. Parts that it already touches, or that end at its outer face, do not limit it.
+pub(super) fn max_outer_radii(scene: &Scene, parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<f32> {
+    let max_outer_radius = |(i, joint): (usize, &DrawnJoint)| {
+        let body = scene.machine.loose_joints[i].carrier().body;
+        parts
+            .iter()
+            .filter(|part| part.body == body && !part.reaches_socket(i))
+            .filter_map(|part| distance(&part.place(frame, joints), joint.socket_centre))
+            .filter(|&distance| distance > joint.outer)
+            .fold(f32::INFINITY, f32::min)
+    };
+    joints.iter().enumerate().map(max_outer_radius).collect()
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use super::drawn::Pose;
+use super::solids::Pose;
 use super::*;
 use super::{fixture, joint};
 use crate::scene::Scene;

@@ -2,10 +2,10 @@
 
 use glam::{Mat3, Vec3};
 
-use super::drawn::Pose;
 use super::instances::placed;
 use super::joint;
 use super::relative::RelativeShot;
+use super::solids::Pose;
 use super::theme::Material;
 use super::{Colour, DrawList, Mesh, SceneView, Shot, WearMap, WearScale};
 use crate::machine::LooseKind;

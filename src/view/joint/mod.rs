@@ -13,7 +13,7 @@ mod tests;
 use glam::Vec3;
 use parry3d::query::Ray;
 
-use super::drawn::Pose;
+use super::solids::Pose;
 use super::theme::Material;
 use super::{DrawList, Layer, Mesh, MeshData, Palette, ViewOptions, to_f32};
 use crate::machine::{self, Geometry, LooseJoint, LooseKind};

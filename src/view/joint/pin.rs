@@ -13,8 +13,8 @@ use super::{DrawnJoint, DrawnKind, IDEAL_GAP, MAX_SINE, column, ratio};
 use crate::machine::{EndsOn, Geometry, LooseJoint, Pin, Role};
 use crate::simulate::{Frame, JointReport, SiteReport};
 use crate::view::cast::cast as cast_solid;
-use crate::view::drawn::{BarKind, Solid};
 use crate::view::instances::placed;
+use crate::view::solids::{BarKind, Solid};
 use crate::view::theme::Material;
 use crate::view::{DrawList, Layer, Mesh, MeshData, Palette, to_f32};
 

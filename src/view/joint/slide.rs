@@ -10,8 +10,8 @@ use super::{DrawnJoint, DrawnKind, IDEAL_GAP, MAX_SINE, column, ratio};
 use crate::machine::{Geometry, LooseJoint, Mat3 as Matrix, Slide, Vec3 as Vector};
 use crate::simulate::{Frame, JointReport};
 use crate::view::cast::cast as cast_solid;
-use crate::view::drawn::Solid;
 use crate::view::instances::placed;
+use crate::view::solids::Solid;
 use crate::view::theme::Material;
 use crate::view::{Layer, Mesh, Palette, to_f32};
 
