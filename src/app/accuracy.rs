@@ -125,12 +125,6 @@ fn measured(player: &Player, preset: Option<Preset>) -> [AccuracyLine; 2] {
     ]
 }
 
-/// Name of a ball joint.
-fn joint(player: &Player, index: usize) -> &str {
-    let joints = &player.running().machine.loose_joints;
-    joints.get(index).map_or("", |joint| &joint.name)
-}
-
 fn solver(player: &Player, preset: Option<Preset>) -> AccuracyLine {
     let name = preset.map_or_else(|| "no preset".to_owned(), |preset| format!("those of the preset {}", preset.word()));
     AccuracyLine {
@@ -159,7 +153,7 @@ fn capacity(player: &Player) -> AccuracyLine {
     }
 }
 
-/// The latest impact: ball joint, resolution, and restitution.
+/// The latest impact: joint, resolution, and restitution.
 fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
     let impact = player.impact_record().last_ended(player.pacer.shown(), f64::INFINITY);
     let row = |label, value: Option<String>, doubtful, help: String| AccuracyLine {
@@ -168,8 +162,10 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
         doubtful,
         help,
     };
-    let what = impact
-        .map_or_else(|| "none yet".to_owned(), |impact| format!("{}, {}", joint(player, impact.joint), kind(impact)));
+    let what = impact.map_or_else(
+        || "none yet".to_owned(),
+        |impact| format!("{}, {}", value::site(player.running(), impact.joint, impact.place), kind(impact)),
+    );
     let ratio = |impact: &Impact| {
         let [measured, requested] = [impact.achieved(), impact.requested].map(|ratio| value::number(ratio, 3));
         // Only an undisturbed impact is comparable with the requested value.
@@ -183,7 +179,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
             "Latest impact",
             Some(what),
             false,
-            "Ball joint of the latest impact that has ended. Disturbed: another joint was in contact meanwhile, or \
+            "Joint of the latest impact that has ended. Disturbed: another joint was in contact meanwhile, or \
              the parameters of the \
              contact changed, so that the ratio of the speeds is not the law's alone. Slow: it began below the impact speed \
              floor, so it rebounds higher than asked. Soft: weight and drives did more than a hundredth of its energy as work \

@@ -7,7 +7,7 @@ use crate::units::format_quantity_digits;
 
 /// Least time between two reports without an event, s.
 const MIN_INTERVAL: f64 = 1.0;
-/// Most ball joints reported individually; beyond that, only counts are reported.
+/// Most joints reported individually; beyond that, only counts are reported.
 const MAX_JOINTS: usize = 6;
 
 /// Reports about once a second, and immediately after an event.
@@ -23,7 +23,7 @@ pub struct Announcer {
     reported: f64,
     /// Whether the latest report is about an event.
     event: bool,
-    /// Strongest impact since the last report: ball joint, N, s.
+    /// Strongest impact since the last report: joint, N, s.
     strongest: Option<(usize, f64, f64)>,
 }
 
@@ -116,8 +116,9 @@ fn joints(player: &Player) -> Option<String> {
         let free = reports.iter().filter(|joint| joint.state == ContactMode::Free);
         let free = free.count();
         return Some(format!(
-            "Of {} ball joints {free} are free and {} in contact.",
+            "Of {} {} {free} are free and {} in contact.",
             reports.len(),
+            value::joints(&scene.machine),
             reports.len() - free
         ));
     }
@@ -126,15 +127,24 @@ fn joints(player: &Player) -> Option<String> {
         .loose_joints
         .iter()
         .zip(reports)
-        .map(|(joint, report)| {
+        .enumerate()
+        .map(|(index, (joint, report))| {
+            // Where, of several places, and how it lies.
+            let names = joint.kind.site_names().iter().zip(player.frame().sites_of(index));
+            let places: Vec<&str> = names.filter(|(_, site)| site.gap < 0.0).map(|(name, _)| *name).collect();
+            let at = if places.is_empty() { String::new() } else { format!(" at {}", places.join(" and ")) };
+            let tilt = match joint.kind.site_names() {
+                [] => String::new(),
+                _ => format!(", tilt {} degrees", format_quantity_digits(report.tilt.to_degrees(), "", 2)),
+            };
             let force = newtons(report.normal_force.norm());
             let name = &joint.name;
             match report.state {
-                ContactMode::Free => format!("{name} free"),
+                ContactMode::Free => format!("{name} free{tilt}"),
                 ContactMode::Ideal => format!("{name} ideal, {force}"),
-                _ if settled => format!("{name} settled, {force}"),
-                ContactMode::Creep => format!("{name} in contact, creeping, {force}"),
-                ContactMode::Slip => format!("{name} in contact, sliding, {force}"),
+                _ if settled => format!("{name} settled{at}{tilt}, {force}"),
+                ContactMode::Creep => format!("{name} in contact{at}, creeping{tilt}, {force}"),
+                ContactMode::Slip => format!("{name} in contact{at}, sliding{tilt}, {force}"),
             }
         })
         .collect();
@@ -227,5 +237,31 @@ mod tests {
         announcer.update(0.0, &player("chain"), "", "");
         let all_free = "Of 8 ball joints 8 are free and 0 in contact.";
         assert!(announcer.text().ends_with(all_free), "{}", announcer.text());
+    }
+
+    #[test]
+    fn of_a_pin_the_ends_that_touch_and_its_tilt_are_told() {
+        let scene = Scene::load("tests/physics/joints/a.toml", &[]).expect("a scene");
+        let mut player = Player::new(&scene).expect("starts");
+        let mut told = [false; 3];
+        for _ in 0..600 {
+            player.single_step();
+            let text = joints(&player).expect("a joint");
+            let touches = |place: usize| player.frame().sites[place].gap < 0.0;
+            let expected = match [touches(0), touches(1)] {
+                [true, true] => "J in contact at a and b",
+                [true, false] => "J in contact at a,",
+                [false, true] => "J in contact at b,",
+                [false, false] => continue,
+            };
+            // At the very onset.
+            if player.frame().joints[0].state == ContactMode::Free {
+                continue;
+            }
+            assert!(touches(2) || touches(3) || text.starts_with(expected), "{text}");
+            assert!(text.contains(", tilt ") && text.contains(" degrees, "), "{text}");
+            told[usize::from(touches(0)) + 2 * usize::from(touches(1)) - 1] = true;
+        }
+        assert!(told[0] && told[1], "{told:?}");
     }
 }

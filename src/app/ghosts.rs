@@ -63,7 +63,7 @@ impl Run {
     /// Switch for the ideal ghost in the view menu; returns whether to toggle it.
     pub(super) fn ideal_switch(&self, ui: &mut Ui) -> bool {
         let mut on = self.player.ideal().is_some();
-        let help = "The same machine with ideal ball joints, the same drives and gravity, drawn pale over the run. An \
+        let help = "The same machine with all joints ideal, the same drives and gravity, drawn pale over the run. An \
                     arrow from its tip to that of the run shows the tip error (key G), which the plot Tip error \
                     records, with or without the ghost. The run itself is not affected.";
         let toggled = ui.checkbox(&mut on, "Ideal ghost").on_hover_text(help).changed();

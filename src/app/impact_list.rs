@@ -37,7 +37,7 @@ const fn column(heading: &'static str, width: f32, help: &'static str) -> Column
 
 const COLUMNS: [Column; 10] = [
     column("No.", 44.0, "Number of the impact in this run, in the order of their beginnings"),
-    column("Joint", 58.0, "Ball joint"),
+    column("Joint", 58.0, "Joint with play, and where it touched if it can at several places"),
     column("Time", 82.0, "Instant at which it began"),
     column("Duration", 66.0, "From its beginning to its end"),
     column("Peak", 66.0, "Largest normal force"),
@@ -105,7 +105,7 @@ fn remark(impact: &Impact) -> &'static str {
 fn cells(player: &Player, (number, _, impact): Listed<'_>) -> [String; COLUMNS.len()] {
     [
         number.to_string(),
-        joint(player, impact.joint),
+        value::site(player.running(), impact.joint, impact.place),
         value::time(impact.start),
         duration(impact.end - impact.start),
         value::quantity(impact.peak, "N", 3),
@@ -121,7 +121,7 @@ fn cells(player: &Player, (number, _, impact): Listed<'_>) -> [String; COLUMNS.l
 fn sorting_value((number, _, impact): &Listed<'_>, column: usize) -> f64 {
     match column {
         0 => *number as f64,
-        1 => impact.joint as f64,
+        1 => impact.joint as f64 + f64::from(impact.place) / 256.0,
         2 => impact.start,
         3 => impact.end - impact.start,
         4 => impact.peak,
@@ -131,11 +131,6 @@ fn sorting_value((number, _, impact): &Listed<'_>, column: usize) -> f64 {
         8 => impact.law,
         _ => f64::from(u8::from(impact.disturbed) + u8::from(impact.disturbed || impact.below_speed_floor)),
     }
-}
-
-fn joint(player: &Player, joint: usize) -> String {
-    let joints = &player.running().machine.loose_joints;
-    joints.get(joint).map_or_else(String::new, |joint| joint.name.clone())
 }
 
 /// A row of cells with the column widths, `height` points high.
@@ -341,12 +336,13 @@ impl Run {
         }
         let shown = player.pacer.shown();
         let record = player.impact_record();
-        // The impact of the followed ball joint, while that is in contact.
+        // The impact of the followed joint, while that is in contact.
         let touches =
             |joint: &usize| player.frame().joints.get(*joint).is_some_and(|own| own.state != ContactMode::Free);
         let (number, own) = record.in_progress(self.viewport.focus().filter(touches), shown)?;
         let report = player.frame().joints.get(own.joint)?;
-        let onset = format!("Impact {number}, {}: {}", joint(player, own.joint), value::time(own.start));
+        let site = value::site(player.running(), own.joint, own.place);
+        let onset = format!("Impact {number}, {site}: {}", value::time(own.start));
         if shown < own.force_peak.time {
             // What comes is not told.
             let now = value::quantity(report.normal_force.norm(), "N", 3);

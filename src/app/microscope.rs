@@ -1,7 +1,9 @@
-//! The microscope: magnifies one ball joint beside the 3D view until its play is visible.
+//! The microscope: magnifies one joint with play beside the 3D view until its play is visible.
 
 mod draw;
 mod magnified_joint;
+mod pin;
+mod slide;
 
 use eframe::egui::{self, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
 use glam::Vec3;
@@ -10,6 +12,7 @@ use super::keys::Action;
 use super::player::Player;
 use super::run::Run;
 use super::{layout, sound, spoken, theme, value};
+use crate::machine::LooseKind;
 use crate::simulate::ContactMode;
 pub use draw::Circle;
 use draw::{Plane, Sheet};
@@ -56,12 +59,12 @@ impl Microscope {
         self.open = open;
     }
 
-    /// The ball joint in focus, by index.
+    /// The joint in focus, by index.
     pub fn joint(&self) -> usize {
         self.joint
     }
 
-    /// Selects the ball joint in focus.
+    /// Selects the joint in focus.
     pub fn focus(&mut self, joint: usize) {
         self.joint = joint;
     }
@@ -108,9 +111,9 @@ impl Microscope {
             if ui.available_width() > 300.0 {
                 spoken::heading(&ui.label(RichText::new("Microscope").strong()), "Microscope");
             }
-            let help = "Ball joint in focus (a click on it, or keys 5 to 9)";
+            let help = "Joint in focus (a click on it, or keys 5 to 9)";
             let name = |index: usize| joints.get(index).map_or("", |joint| &joint.name);
-            layout::choice(ui, ["Ball joint in focus", help], Some(54.0), &mut joint, 0..joints.len(), name);
+            layout::choice(ui, ["Joint in focus", help], Some(54.0), &mut joint, 0..joints.len(), name);
             if !is_narrow {
                 self.plane_choice(ui);
             }
@@ -122,7 +125,7 @@ impl Microscope {
         let chosen = (joint != self.joint).then_some(joint);
         self.joint = joint;
         let Some(magnified) = MagnifiedJoint::of(player, self.joint) else {
-            ui.label("This scene has no ball joint");
+            ui.label("This scene has no joint with play");
             return chosen;
         };
         let space = ui.available_size();
@@ -130,10 +133,12 @@ impl Microscope {
         if space.x >= MIN_WIDTH_SIDE_BY_SIDE && space.x > space.y {
             ui.horizontal_top(|ui| {
                 let side = (space.x - NUMBERS_WIDTH - 8.0).min(space.y).max(96.0);
-                self.sphere(ui, player, &magnified, axes, vec2(side, side));
+                self.picture(ui, player, &magnified, axes, vec2(side, side));
                 ui.vertical(|ui| {
                     scrolled(ui, |ui| {
-                        section(ui, &magnified, SECTION_HEIGHT);
+                        if magnified.has_section() {
+                            section(ui, &magnified, SECTION_HEIGHT);
+                        }
                         numbers(ui, player, &magnified, axes);
                     });
                 });
@@ -142,12 +147,14 @@ impl Microscope {
             scrolled(ui, |ui| {
                 let width = ui.available_width();
                 let side = if is_narrow { width.min(space.y) } else { draw::side(vec2(width, space.y), 150.0) };
-                self.sphere(ui, player, &magnified, axes, vec2(width, side));
+                self.picture(ui, player, &magnified, axes, vec2(width, side));
                 if is_narrow {
                     self.plane_choice(ui);
                 }
                 let left = space.y - side - ui.spacing().item_spacing.y;
-                section(ui, &magnified, left.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT));
+                if magnified.has_section() {
+                    section(ui, &magnified, left.clamp(MIN_SECTION_HEIGHT, SECTION_HEIGHT));
+                }
                 numbers(ui, player, &magnified, axes);
             });
         }
@@ -160,36 +167,44 @@ impl Microscope {
         layout::choice(ui, names, Some(54.0), &mut self.plane, Plane::ALL, Plane::label);
     }
 
-    /// The picture of the clearance sphere.
-    fn sphere(&mut self, ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3; 2], size: egui::Vec2) {
+    /// The picture of the play.
+    fn picture(&mut self, ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3; 2], size: egui::Vec2) {
         let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
         let report = &magnified.report;
-        let name = player.running().machine.loose_joints.get(self.joint);
-        let words = format!(
-            "Ball joint {} under the microscope. {}. Ball's centre {} from the socket's, clearance {}.",
-            name.map_or("", |joint| &joint.name),
-            value::contact(magnified.report.state),
-            draw::length(report.eccentricity.norm(), 3),
-            draw::length(report.clearance, 3)
-        );
+        let words = magnified.in_words();
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));
-        if report.state == ContactMode::Ideal || report.clearance <= 0.0 {
+        if report.state == ContactMode::Ideal {
             draw::empty(ui, rect, "An ideal joint has no clearance and shows no play");
             return;
         }
+        let sheet = Sheet::new(ui, rect, magnified);
+        let help = match magnified.kind {
+            LooseKind::Pin(kind) if kind.length.is_some() => pin::draw(&sheet, &kind, axes),
+            LooseKind::Slide(kind) => slide::draw(&sheet, &kind),
+            LooseKind::Ball | LooseKind::Pin(_) => self.circle_of(&sheet, player, axes),
+        };
+        response.on_hover_text(help);
+    }
+
+    /// The clearance circle of a joint that touches at one place.
+    fn circle_of(&mut self, sheet: &Sheet<'_>, player: &Player, axes: [Vec3; 2]) -> &'static str {
+        let magnified = sheet.magnified();
         let now = player.pacer.shown();
         let path = player.paths().between(self.joint, magnified.since, now);
         let approach = magnified.impact.map_or(0.0, |impact| impact.approach_speed);
         let fastest = magnified.sliding.unwrap_or(magnified.velocity).norm();
         let speed = draw::round_up(approach.max(fastest).max(MIN_REFERENCE_SPEED));
-        let sheet = Sheet::new(ui, rect, magnified);
-        self.circle = Some(draw::sphere(&sheet, axes, path, now, speed));
-        response.on_hover_text(
-            "The circle is the clearance; the ball's centre leaves it only by the penetration. The path, seen from \
-             the socket, covers the latest six impacts and fades with age (recorded for the first 12 ball joints). In \
-             contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the ball's \
-             centre, in contact the sliding velocity of the friction law.",
-        );
+        if magnified.kind == LooseKind::Ball {
+            self.circle = Some(draw::sphere(sheet, axes, path, now, speed));
+            return "The circle is the clearance; the ball's centre leaves it only by the penetration. The path, seen from \
+                    the socket, covers the latest six impacts and fades with age (recorded for the first 12 joints). In \
+                    contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the ball's \
+                    centre, in contact the sliding velocity of the friction law.";
+        }
+        self.circle = Some(draw::sphere(sheet, pin::across(magnified, axes), path, now, speed));
+        "Section across the pin's axis. The circle is the clearance; the middle of the pin leaves it only by the \
+         penetration. The path covers the latest six impacts and fades with age (recorded for the first 12 joints). In \
+         contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the pin's middle."
     }
 }
 
@@ -221,7 +236,7 @@ fn section(ui: &mut Ui, magnified: &MagnifiedJoint, height: f32) {
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));
     draw::section(&Sheet::new(ui, rect, magnified), patch);
     response.on_hover_text(
-        "Ball and wall as they would lie without pressing each other, about the point of contact: the gap grows as x²/2R, \
+        "Both parts as they would lie without pressing each other, about the point of contact: the gap grows as x²/2R, \
          R = (r + c) r / c. The overlap is taken up elastically over the contact patch, the thick line, of radius \
          a = √(R δ) by Hertz. The scale follows the latest impact's depth.",
     );
@@ -231,49 +246,43 @@ fn section(ui: &mut Ui, magnified: &MagnifiedJoint, height: f32) {
 fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3; 2]) {
     const NONE: &str = "—";
     let report = &magnified.report;
-    ui.label(RichText::new(value::contact(magnified.report.state)).strong());
+    ui.label(RichText::new(value::contact(report.state, magnified.kind.parts()[0])).strong());
     let speed = |si: f64| value::quantity(si, "m/s", 3);
     let towards = crate::view::to_f32(&report.eccentricity).dot(axes[0].cross(axes[1]));
-    let (gap, indentation) = match &magnified.patch {
-        Some(patch) if patch.penetration > 0.0 => (NONE.to_owned(), value::quantity(patch.penetration, "um", 3)),
-        Some(patch) => (draw::length(-patch.penetration, 3), NONE.to_owned()),
+    let [part, wall] = magnified.kind.parts();
+    let (gap, indentation) = match magnified.penetration() {
+        Some(depth) if depth > 0.0 => (NONE.to_owned(), value::quantity(depth, "um", 3)),
+        Some(depth) => (draw::length(-depth, 3), NONE.to_owned()),
         None => (NONE.to_owned(), NONE.to_owned()),
     };
     let radius = magnified.patch.and_then(|patch| patch.radius);
-    let rows = [
-        (
-            "Eccentricity",
-            draw::length(report.eccentricity.norm(), 4),
-            "Distance of the ball's centre from the socket's",
-        ),
-        (
-            "Towards the eye",
-            draw::length(f64::from(towards), 3),
-            "Its component along the line of sight, which the picture does not show",
-        ),
-        ("Gap", gap, "Between ball and wall, where they are nearest"),
-        ("Indentation", indentation, "How deep the ball presses into the wall"),
-        (
-            "Elastic patch",
-            radius.map_or(NONE.to_owned(), |radius| format!("radius {}", draw::length(radius, 3))),
-            "Radius of the contact patch by Hertz, a = √(R δ), R = (r + c) r / c",
-        ),
-        (
-            "Speed of approach",
-            if magnified.normal.is_some() { speed(report.penetration_rate) } else { NONE.to_owned() },
-            "Rate at which the ball approaches the wall now; negative while it recedes",
-        ),
-        (
-            "Sliding",
-            magnified.sliding.map_or(NONE.to_owned(), |v| speed(v.norm())),
-            "Sliding speed in the friction law",
-        ),
-        (
-            "Normal force",
-            value::quantity(report.normal_force.norm(), "N", 4),
-            "On the ball; of an ideal joint the whole reaction",
-        ),
-    ];
+    let eccentricity = draw::length(report.eccentricity.norm(), 4);
+    let mut rows = vec![("Eccentricity", eccentricity, format!("Distance of the {part}'s centre from the {wall}'s"))];
+    if magnified.kind == LooseKind::Ball {
+        let help = "Its component along the line of sight, which the picture does not show";
+        rows.push(("Towards the eye", draw::length(f64::from(towards), 3), help.to_owned()));
+    } else if magnified.tilts() {
+        let help = format!("Angle of the {part}'s axis to the {wall}'s");
+        rows.push(("Tilt", value::quantity(report.tilt, "deg", 3), help));
+        let help = format!("Displacement of the {part} along the {wall}'s axis");
+        rows.push(("Axial position", draw::length(report.axial, 4), help));
+    }
+    rows.push(("Gap", gap, format!("Between {part} and wall, where they are nearest")));
+    rows.push(("Indentation", indentation, format!("How deep the {part} presses into the wall")));
+    if magnified.has_section() {
+        let help = "Radius of the contact patch by Hertz, a = √(R δ), R = (r + c) r / c";
+        let radius = radius.map_or(NONE.to_owned(), |radius| format!("radius {}", draw::length(radius, 3)));
+        rows.push(("Elastic patch", radius, help.to_owned()));
+    }
+    let approach = if magnified.penetration().is_some() { speed(report.penetration_rate) } else { NONE.to_owned() };
+    let help = format!("Rate at which the {part} approaches the wall now; negative while it recedes");
+    rows.push(("Speed of approach", approach, help));
+    if magnified.kind == LooseKind::Ball {
+        let sliding = magnified.sliding.map_or(NONE.to_owned(), |v| speed(v.norm()));
+        rows.push(("Sliding", sliding, "Sliding speed in the friction law".to_owned()));
+    }
+    let help = format!("On the {part}; of an ideal joint the whole reaction");
+    rows.push(("Normal force", value::quantity(report.normal_force.norm(), "N", 4), help));
     let ratio = |number: f64| value::number(number, 4);
     let impact = magnified.impact;
     let formatted = |read: fn(&crate::simulate::Impact) -> String| impact.as_ref().map_or(NONE.to_owned(), read);
@@ -312,6 +321,7 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
         ),
     ];
     Grid::new("numbers under the microscope").num_columns(2).spacing([10.0, 2.0]).min_row_height(16.0).show(ui, |ui| {
+        let latest = latest.map(|(name, number, help)| (name, number, help.to_owned()));
         for (name, number, help) in rows.into_iter().chain(latest) {
             let label = ui.label(RichText::new(name).small().weak());
             label.on_hover_text(help);
@@ -334,7 +344,7 @@ fn numbers(ui: &mut Ui, player: &Player, magnified: &MagnifiedJoint, axes: [Vec3
 }
 
 impl Run {
-    /// Focuses ball joint `joint` if the scene has it: the view follows its centre.
+    /// Focuses joint `joint` if the scene has it: the view follows its centre.
     pub(super) fn focus(&mut self, joint: usize) {
         self.microscope.focus(joint);
         self.viewport.centre(&self.player, joint);
@@ -354,7 +364,7 @@ impl Run {
         ui.label("Instruments");
         ui.horizontal(|ui| {
             ui.checkbox(&mut self.microscope.open, "Microscope")
-                .on_hover_text("The play of the joint in focus, magnified: path of the ball, contact, impacts (key L)");
+                .on_hover_text("The play of the joint in focus, magnified: motion in it, contact, impacts (key L)");
             if sound::switch(ui, sound) {
                 chosen = Some(Action::Sound);
             }

@@ -295,7 +295,7 @@ impl App {
         self.run.impact_badge(self.tasks.filming().is_some())
     }
 
-    /// The last finished impact: ball joint, largest normal force, duration.
+    /// The last finished impact: joint, largest normal force, duration.
     pub fn last_impact(&self) -> Option<String> {
         self.run.last_impact()
     }
@@ -398,7 +398,7 @@ impl App {
         self.run.viewport.place(point)
     }
 
-    /// Ball joint, force in N and age in s of every marked peak.
+    /// Joint, force in N and age in s of every marked peak.
     pub fn peak_marks(&self) -> Vec<(usize, f32, f64)> {
         self.run.viewport.peak_marks(&self.run.player)
     }

@@ -273,7 +273,7 @@ pub fn triad(rect: Rect) -> Rect {
     Align2::LEFT_BOTTOM.align_size_within_rect(vec2(width, 118.0), rect)
 }
 
-/// One line per ball joint: its forces as the step reported them.
+/// One line per joint with play: its forces as the step reported them.
 pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
     let newtons = |force: &crate::machine::Vec3| format_quantity_digits(force.norm(), "N", 4);
     scene
@@ -324,12 +324,12 @@ fn legend(painter: &Painter, place: Rect, scale: f32, legend: &Legend, theme: Th
         }
     }
     let (kind, short) = match legend.scaling {
-        Scaling::Linear => ("Force on the ball, N", "Force, N"),
-        Scaling::Logarithmic => ("Force on the ball, N (logarithmic)", "N (logarithmic)"),
+        Scaling::Linear => (format!("Force on the {}, N", legend.on), "Force, N"),
+        Scaling::Logarithmic => (format!("Force on the {}, N (logarithmic)", legend.on), "N (logarithmic)"),
     };
     let font = FontId::proportional(12.0);
     let broken = [format!("{kind}, broken ones are longer"), format!("{short}, broken: longer")];
-    let whole = [kind.to_owned(), short.to_owned()];
+    let whole = [kind, short.to_owned()];
     let titles = if legend.clipped { broken } else { whole };
     let lay = |title: &String| painter.layout_no_wrap(title.clone(), font.clone(), ink);
     let title = titles.iter().map(lay).find(|words| words.size().x <= reserved + 24.0);
@@ -555,6 +555,7 @@ mod tests {
         let ink = Palette::of(Theme::Light).text;
         let tick = |force: f32| Tick { force, fraction: force / 100.0 };
         Legend {
+            on: "ball",
             reference: 100.0,
             pixels: 120.0,
             scaling: Scaling::Linear,

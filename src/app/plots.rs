@@ -295,7 +295,9 @@ impl Plots {
             }
         }
         if player.running().machine.loose_joints.len() > RECORDED_JOINTS {
-            ui.label(RichText::new(format!("The first {RECORDED_JOINTS} ball joints are recorded")).small().weak());
+            ui.label(
+                RichText::new(format!("The first {RECORDED_JOINTS} joints with play are recorded")).small().weak(),
+            );
         }
         ui.separator();
         self.channels(ui, player);

@@ -286,12 +286,12 @@ impl App {
 }
 
 impl Run {
-    /// The last finished impact: ball joint, largest normal force, duration.
+    /// The last finished impact: joint, largest normal force, duration.
     pub fn last_impact(&self) -> Option<String> {
         let player = &self.player;
         let shown = player.pacer.shown();
         let impact = player.impact_record().last_ended(shown, shown)?;
-        let name = &player.running().machine.loose_joints[impact.joint].name;
+        let name = value::site(player.running(), impact.joint, impact.place);
         let force = value::quantity(impact.peak, "N", 3);
         let duration_ms = (impact.end - impact.start) * 1e3;
         Some(format!("{name}, {force}, {} ms", value::number(duration_ms, 2)))
@@ -301,10 +301,10 @@ impl Run {
     pub(super) fn caption(&self, ui: &Ui, place: Rect, presenting: bool, is_filmed: bool) -> Option<Caption> {
         let badge = self.impact_badge(is_filmed);
         let help = if badge.is_some() {
-            "The impact at this instant: its number and ball joint, when it began, its largest normal force, how long the ball \
+            "The impact at this instant: its number and joint, when it began, its largest normal force, how long the parts \
              touched, approach and rebound speed"
         } else {
-            "The last impact that has ended: its ball joint, its largest normal force, and how long the ball touched"
+            "The last impact that has ended: its joint, its largest normal force, and how long the parts touched"
         };
         let text = badge.or_else(|| self.last_impact().filter(|_| presenting))?;
         Some(Caption::new(ui, place, &text, help, presenting))

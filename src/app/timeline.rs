@@ -1,5 +1,5 @@
-//! Timeline of the whole run. A lane per ball joint shows free flight, sliding, creep and contact onsets; flags mark user
-//! actions. A click or a drag displays any instant.
+//! Timeline of the whole run. A lane per joint with play shows free flight, sliding, creep and contact onsets, each at the height of
+//! the end or wall that touches; flags mark user actions. A click or a drag displays any instant.
 
 use eframe::egui::{
     self, Color32, EventFilter, Key, Mesh, Pos2, Rect, Response, Sense, Shape, Stroke, Ui, WidgetInfo,
@@ -12,6 +12,7 @@ use super::player::contact_history::ContactHistory;
 use super::player::{Flag, Player};
 use super::zoom::{self, Zoom};
 use super::{spoken, theme, value};
+use crate::machine::{LooseKind, Pin, Slide};
 use crate::simulate::{ContactMode, RECORDED_JOINTS};
 
 /// Height of the row of flags, and total height of the lanes, points.
@@ -19,6 +20,8 @@ const FLAGS_HEIGHT: f32 = 9.0;
 const LANES_HEIGHT: f32 = 24.0;
 /// Height of a lane among many, and largest height of all lanes, points.
 const LANE_HEIGHT: f32 = 4.0;
+/// Height of a lane of a joint that can touch at several places, points.
+const PLACES_LANE_HEIGHT: f32 = 12.0;
 const MAX_LANES_HEIGHT: f32 = 56.0;
 /// Window height below which only a low strip is shown, points.
 const MIN_WINDOW_HEIGHT: f32 = 360.0;
@@ -44,7 +47,7 @@ impl Timeline {
         self.zoomed = None;
     }
 
-    /// The row: buttons for previous impact, next impact and reverse playback, and the strip. `focus`: the ball joint whose
+    /// The row: buttons for previous impact, next impact and reverse playback, and the strip. `focus`: the joint whose
     /// impacts are visited. Returns whether the displayed instant changed.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, focus: Option<usize>) -> bool {
         if ui.ctx().content_rect().height() < MIN_WINDOW_HEIGHT {
@@ -55,7 +58,7 @@ impl Timeline {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             let target = focus.and_then(|joint| player.running().machine.loose_joints.get(joint));
-            let target = target.map_or("any ball joint".to_owned(), |joint| joint.name.clone());
+            let target = target.map_or("any joint".to_owned(), |joint| joint.name.clone());
             let past = player.pacer.shown() > 0.0;
             ui.add_enabled_ui(past, |ui| {
                 let help = format!("To the peak of the previous impact of {target} (key ,)");
@@ -84,7 +87,10 @@ impl Timeline {
                 }
             });
             let joints = player.contact_history().joints().min(RECORDED_JOINTS);
-            let lanes = (LANE_HEIGHT * joints as f32).clamp(LANES_HEIGHT, MAX_LANES_HEIGHT);
+            let loose = player.running().machine.loose_joints.iter().take(joints);
+            let heights =
+                loose.map(|joint| if joint.kind.site_names().is_empty() { LANE_HEIGHT } else { PLACES_LANE_HEIGHT });
+            let lanes = heights.sum::<f32>().clamp(LANES_HEIGHT, MAX_LANES_HEIGHT);
             moved |= self.strip(ui, player, side.max(FLAGS_HEIGHT + lanes));
         });
         moved
@@ -205,13 +211,30 @@ impl Scale {
         self.rect.with_min_y(self.rect.top() + FLAGS_HEIGHT)
     }
 
-    /// The lane of ball joint `joint` out of `joints`.
+    /// The lane of joint `joint` out of `joints`.
     fn lane(&self, joint: usize, joints: usize) -> Rect {
         let lanes = self.lanes();
         let height = lanes.height() / joints.max(1) as f32;
         let top = lanes.top() + joint as f32 * height;
         let gap = if height >= LANE_HEIGHT { 1.0 } else { 0.0 };
         Rect::from_x_y_ranges(lanes.x_range(), top..=top + height - gap)
+    }
+}
+
+/// Part of a lane, from its top, in which the contacts at a place are marked: of a pin its end a above, b below, the faces of its
+/// collars between them; of a block the walls at +y, -y, +z and -z below each other.
+fn band(kind: &LooseKind, place: u8) -> [f32; 2] {
+    let part = |index: u8, of: u8| [index, index + 1].map(|edge| f32::from(edge) / f32::from(of));
+    match kind {
+        LooseKind::Ball | LooseKind::Pin(Pin { length: None, .. }) => [0.0, 1.0],
+        LooseKind::Pin(Pin { kept: false, .. }) => part(place, 2),
+        LooseKind::Pin(_) => part([0, 3, 1, 2][usize::from(place.min(3))], 4),
+        LooseKind::Slide(Slide { half_height: None, .. }) => part(1 - place % 2, 2),
+        LooseKind::Slide(_) => {
+            let (corner, across) = (place / 2, place % 2);
+            let is_upper = if across == 0 { corner & 2 != 0 } else { corner & 1 != 0 };
+            part(2 * across + u8::from(!is_upper), 4)
+        }
     }
 }
 
@@ -223,10 +246,10 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     let shown = player.pacer.shown();
     let (_, end) = scale.range;
     if let Some(abandoned) = player.abandoned_future() {
-        contact_lanes(ui, &abandoned.contact_history, scale, (player.reached(), end), PALE_OPACITY);
+        contact_lanes(ui, player, &abandoned.contact_history, scale, (player.reached(), end), PALE_OPACITY);
     }
-    contact_lanes(ui, player.contact_history(), scale, (0.0, shown), 1.0);
-    contact_lanes(ui, player.contact_history(), scale, (shown, player.reached()), PALE_OPACITY);
+    contact_lanes(ui, player, player.contact_history(), scale, (0.0, shown), 1.0);
+    contact_lanes(ui, player, player.contact_history(), scale, (shown, player.reached()), PALE_OPACITY);
     let flags = |flags: &mut dyn Iterator<Item = Flag>, pale: bool| {
         for flag in flags {
             let later = pale || flag.time > shown;
@@ -250,9 +273,16 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     painter.rect_stroke(lanes, 3.0, edge, egui::StrokeKind::Outside);
 }
 
-/// The lanes between two times, s: sliding in half the joint's colour, creep in full colour, and a mark at each contact onset.
-/// The colour of a pixel column is proportional to the time in each state.
-fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f64, f64), opacity: f32) {
+/// The lanes between two times, s: sliding in half the joint's colour, creep in full colour, and a mark at each contact onset; of a
+/// joint that can touch at several places in the band of each.
+fn contact_lanes(
+    ui: &Ui,
+    player: &Player,
+    contacts: &ContactHistory,
+    scale: &Scale,
+    between: (f64, f64),
+    opacity: f32,
+) {
     let dark = ui.visuals().dark_mode;
     let pixel = 1.0 / ui.ctx().pixels_per_point();
     let from = between.0.max(scale.range.0);
@@ -261,25 +291,89 @@ fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f6
         return;
     }
     let joints = contacts.joints().min(RECORDED_JOINTS);
-    let columns = (scale.rect.width() / pixel).ceil() as usize;
-    let per_second = columns as f64 / (scale.range.1 - scale.range.0);
-    let mut coverage = vec![0.0_f32; columns + 1];
-    let mut mesh = Mesh::default();
+    let mut bars = Bars::new(scale, pixel, (from, to));
     for joint in 0..joints {
         let lane = scale.lane(joint, joints);
         let colour = theme::series(joint, dark).gamma_multiply(opacity);
-        coverage.fill(0.0);
-        for (begins, ends, state) in contacts.states(joint, from, to) {
-            let weight = match state {
-                ContactMode::Free => continue,
-                ContactMode::Slip => 0.5,
-                ContactMode::Creep | ContactMode::Ideal => 1.0,
-            };
-            let a = (begins.max(from) - scale.range.0) * per_second;
-            let b = (ends.min(to) - scale.range.0) * per_second;
+        let kind = player.running().machine.loose_joints.get(joint).map(|joint| joint.kind);
+        let Some(kind) = kind.filter(|kind| !kind.site_names().is_empty()) else {
+            bars.add(
+                contacts.states(joint, from, to).map(|(begins, ends, state)| (begins, ends, weight(state))),
+                lane,
+                colour,
+            );
+            bars.mark(contacts.touches(joint, from, to), lane, colour);
+            continue;
+        };
+        for ([top, low], places) in bands(&kind) {
+            let part = Rect::from_x_y_ranges(
+                lane.x_range(),
+                lane.top() + top * lane.height()..=lane.top() + low * lane.height(),
+            );
+            let during = contacts.place_contacts(joint, places, from, to);
+            let weighted = during.flat_map(|(begins, ends)| {
+                let states = contacts.states(joint, begins, ends);
+                states.map(move |(a, b, state)| (a.max(begins), b.min(ends), weight(state)))
+            });
+            bars.add(weighted, part, colour);
+            let begun = contacts.place_touches(joint, from, to).filter(|(_, place)| places >> place & 1 == 1);
+            bars.mark(begun.map(|(time, _)| time), part, colour);
+        }
+    }
+    ui.painter().add(Shape::mesh(bars.mesh));
+}
+
+/// Share of the colour of a joint in this state.
+fn weight(state: ContactMode) -> f32 {
+    match state {
+        ContactMode::Free => 0.0,
+        ContactMode::Slip => 0.5,
+        ContactMode::Creep | ContactMode::Ideal => 1.0,
+    }
+}
+
+/// The bands of a lane, with the places marked in each, a bit for each place.
+fn bands(kind: &LooseKind) -> Vec<([f32; 2], u16)> {
+    let mut all: Vec<([f32; 2], u16)> = Vec::new();
+    for place in 0..kind.site_names().len() as u8 {
+        let own = band(kind, place);
+        match all.iter_mut().find(|(known, _)| *known == own) {
+            Some((_, places)) => *places |= 1 << place,
+            None => all.push((own, 1 << place)),
+        }
+    }
+    all
+}
+
+/// Bars whose colour, in a pixel column, is proportional to the time in each state.
+struct Bars<'a> {
+    scale: &'a Scale,
+    pixel: f32,
+    /// Times drawn, s.
+    between: (f64, f64),
+    coverage: Vec<f32>,
+    mesh: Mesh,
+}
+
+impl<'a> Bars<'a> {
+    fn new(scale: &'a Scale, pixel: f32, between: (f64, f64)) -> Self {
+        let columns = (scale.rect.width() / pixel).ceil() as usize;
+        Self { scale, pixel, between, coverage: vec![0.0; columns + 1], mesh: Mesh::default() }
+    }
+
+    /// Adds bars from and to these times, s, with these shares of `colour`, in `part` of the lanes.
+    fn add(&mut self, states: impl Iterator<Item = (f64, f64, f32)>, part: Rect, colour: Color32) {
+        let columns = self.coverage.len() - 1;
+        let (start, end) = self.scale.range;
+        let per_second = columns as f64 / (end - start);
+        let (from, to) = self.between;
+        self.coverage.fill(0.0);
+        for (begins, ends, weight) in states.filter(|(.., weight)| *weight > 0.0) {
+            let a = (begins.max(from) - start) * per_second;
+            let b = (ends.min(to) - start) * per_second;
             let last = (b.floor() as usize).min(columns);
             let first = (a.floor() as usize).min(last);
-            for (index, covered_part) in coverage[first..=last].iter_mut().enumerate() {
+            for (index, covered_part) in self.coverage[first..=last].iter_mut().enumerate() {
                 let left = (first + index) as f64;
                 let covered = b.min(left + 1.0) - a.max(left);
                 *covered_part += weight * covered.max(0.0) as f32;
@@ -288,28 +382,31 @@ fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f6
         // Adjacent columns of one colour are merged.
         let mut start = 0;
         while start < columns {
-            let covered_part = coverage[start];
-            let same = coverage[start..columns].iter();
+            let covered_part = self.coverage[start];
+            let same = self.coverage[start..columns].iter();
             let count = same.take_while(|other| (*other - covered_part).abs() < 0.01).count();
             if covered_part > 0.0 {
-                let left = scale.rect.left() + start as f32 * pixel;
-                let place = Rect::from_x_y_ranges(left..=left + count as f32 * pixel, lane.y_range());
+                let left = self.scale.rect.left() + start as f32 * self.pixel;
+                let place = Rect::from_x_y_ranges(left..=left + count as f32 * self.pixel, part.y_range());
                 // Even the shortest contact stays visible.
-                mesh.add_colored_rect(place, colour.gamma_multiply(covered_part.clamp(0.12, 1.0)));
+                self.mesh.add_colored_rect(place, colour.gamma_multiply(covered_part.clamp(0.12, 1.0)));
             }
             start += count.max(1);
         }
+    }
+
+    /// Marks these times in `part` of the lanes.
+    fn mark(&mut self, times: impl Iterator<Item = f64>, part: Rect, colour: Color32) {
         let mut last_mark = f32::NEG_INFINITY;
-        for time in contacts.touches(joint, from, to) {
-            let x = scale.x(time);
-            if x - last_mark >= pixel {
-                let mark = Rect::from_min_size(pos2(x, lane.top()), vec2(1.0, lane.height()));
-                mesh.add_colored_rect(mark, colour);
+        for time in times {
+            let x = self.scale.x(time);
+            if x - last_mark >= self.pixel {
+                let mark = Rect::from_min_size(pos2(x, part.top()), vec2(1.0, part.height()));
+                self.mesh.add_colored_rect(mark, colour);
                 last_mark = x;
             }
         }
     }
-    ui.painter().add(Shape::mesh(mesh));
 }
 
 fn flag_at(ui: &Ui, scale: &Scale, time: f64, opacity: f32) {
@@ -336,9 +433,8 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
     } else {
         Some(player.contact_history())
     };
-    if let (Some(joint), Some(contacts)) = (pointed_joint, contacts) {
-        let name = &player.running().machine.loose_joints[joint].name;
-        let state = contacts.states(joint, time, time + MIN_RANGE).next();
+    if let (Some(index), Some(contacts)) = (pointed_joint, contacts) {
+        let state = contacts.states(index, time, time + MIN_RANGE).next();
         let words = match state {
             None => "not recorded",
             Some((.., ContactMode::Free)) => "free",
@@ -346,7 +442,12 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
             Some((.., ContactMode::Creep)) => "creeping",
             Some((.., ContactMode::Ideal)) => "ideal",
         };
-        ui.label(format!("{name}: {words}"));
+        let joint = &player.running().machine.loose_joints[index];
+        let sites = joint.kind.site_names();
+        let at: Vec<&str> =
+            contacts.places_at(index, time).filter_map(|place| sites.get(usize::from(place)).copied()).collect();
+        let at = if at.is_empty() { String::new() } else { format!(" at {}", at.join(", ")) };
+        ui.label(format!("{}: {words}{at}", joint.name));
     }
     let abandoned = player.abandoned_future().into_iter().flat_map(|abandoned| abandoned.flags.iter().cloned());
     for flag in player.flags().chain(abandoned) {
@@ -360,11 +461,52 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         ui.label(words);
     }
     let help = "Click or drag to go to an instant; wheel or pinch to zoom; double-click to show the whole run. Half \
-                colour: sliding; full colour: creeping, too slow for full friction; mark: contact begins; pale: not \
-                yet replayed, or abandoned.";
+                colour: sliding; full colour: creeping, too slow for full friction; mark: contact begins, of a pin above at its \
+                end a and below at b, of a block at its walls +y, −y, +z, −z from above; pale: not yet replayed, or abandoned.";
     ui.label(egui::RichText::new(help).small().color(faint(ui)));
 }
 
 fn faint(ui: &Ui) -> Color32 {
     ui.visuals().weak_text_color()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::EndsOn;
+
+    #[test]
+    fn places_of_a_joint_have_bands_of_their_own_that_fill_its_lane() {
+        let pin = |kept| {
+            LooseKind::Pin(Pin { length: Some(0.02), ends: EndsOn::Bearing, kept, face_radius: None, travel: None })
+        };
+        let slide = |half_height| {
+            LooseKind::Slide(Slide { half_length: 0.02, half_width: 0.01, half_height, corner_radius: 1e-3 })
+        };
+        for (kind, count) in [(pin(false), 2), (pin(true), 4), (slide(None), 2), (slide(Some(0.01)), 4)] {
+            let names = kind.site_names();
+            let mut all: Vec<[f32; 2]> = (0..names.len() as u8).map(|place| band(&kind, place)).collect();
+            all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            all.dedup();
+            assert_eq!(all.len(), count, "{names:?}");
+            assert_eq!((all[0][0], all[count - 1][1]), (0.0, 1.0));
+            let places = bands(&kind).into_iter().map(|(_, places)| places);
+            assert_eq!(places.fold(0, |all, places| all | places), ((1_u32 << names.len()) - 1) as u16);
+            assert!(all.windows(2).all(|pair| pair[0][1] == pair[1][0]), "{all:?}");
+        }
+        let at = |kind: LooseKind, name: &str| {
+            let place = kind.site_names().iter().position(|own| *own == name).expect("a place") as u8;
+            band(&kind, place)
+        };
+        assert_eq!([at(pin(true), "a"), at(pin(true), "b")], [[0.0, 0.25], [0.75, 1.0]]);
+        // 3 and 7 are the corners at +y.
+        assert_eq!(at(slide(None), "3y"), at(slide(None), "7y"));
+        assert_eq!([at(slide(None), "7y"), at(slide(None), "1y")], [[0.0, 0.5], [0.5, 1.0]]);
+        let spatial = slide(Some(0.01));
+        // 2 and 4 are at +z, 3 and 4 at +y.
+        assert_eq!(
+            [at(spatial, "4y"), at(spatial, "2y"), at(spatial, "4z"), at(spatial, "3z")].map(|band| band[0]),
+            [0.0, 0.25, 0.5, 0.75]
+        );
+    }
 }

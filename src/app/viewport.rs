@@ -101,7 +101,7 @@ pub struct Viewport {
     grip_changed: bool,
     /// Whether there was more than one finger since the last time there was none.
     pinched: bool,
-    /// The clicked ball joint, until it is taken.
+    /// The clicked joint, until it is taken.
     clicked: Option<usize>,
     /// Quality control by frame time; `None` always uses the quality of the options.
     pace: Option<Pace>,
@@ -254,7 +254,7 @@ impl Viewport {
         self.trail.clear();
     }
 
-    /// Ball joint, force in N and age in s of every mark.
+    /// Joint, force in N and age in s of every mark.
     pub fn peak_marks(&self, player: &Player) -> Vec<(usize, f32, f64)> {
         let marks = self.marks.marks(player.frame());
         marks.map(|mark| (mark.joint, mark.force.length(), mark.age)).collect()
@@ -272,6 +272,16 @@ impl Viewport {
         let peaks = player.impact_record().peaks(shown - fade, shown);
         let blows = peaks.map(|(joint, top)| (joint, crate::view::to_f32(&top.force), top.time));
         self.marks.recall(player.frame(), blows, fade);
+        self.locate_marks(player);
+    }
+
+    /// Marks past impacts at the end or corner that was hit.
+    fn locate_marks(&mut self, player: &Player) {
+        let joints = &player.running().machine.loose_joints;
+        self.marks.locate(|joint, time| {
+            joints.get(joint).filter(|joint| !joint.kind.site_names().is_empty())?;
+            player.impact_record().place_of_peak(joint, time)
+        });
     }
 
     /// Shows another scene, or the same one after a reset that changed its shapes; user settings stay.
@@ -293,6 +303,7 @@ impl Viewport {
         let shown = player.pacer.shown();
         let fade = MARK_DURATION * player.pacer.scale();
         self.marks.update(player.frame(), player.peaks(), fade);
+        self.locate_marks(player);
         if shown != self.time || player.is_playing() {
             if shown < self.time {
                 // Blows after the displayed instant are dropped, those before it restored.
@@ -304,7 +315,7 @@ impl Viewport {
             self.view.add_motion(&mut self.motion, player.running(), player.frame(), &self.options);
         }
         if let Some(picked) = self.followed {
-            let anchor = self.view.anchor(player.frame(), picked);
+            let anchor = self.view.anchor(player.running(), player.frame(), picked);
             self.camera.follow(anchor);
             if let Some(goal) = &mut self.goal {
                 goal.follow(anchor);
@@ -342,7 +353,7 @@ impl Viewport {
         self.fit_pending = true;
     }
 
-    /// Moves close to ball joint `joint`.
+    /// Moves close to joint `joint`.
     pub fn show_close_up(&mut self, player: &Player, joint: usize) {
         if joint < player.frame().joints.len() {
             let mut goal = self.camera;
@@ -352,7 +363,7 @@ impl Viewport {
         }
     }
 
-    /// Shows ball joint `joint` from close up at once, larger than [`Self::show_close_up`].
+    /// Shows joint `joint` from close up at once, larger than [`Self::show_close_up`].
     pub fn begin_close_up(&mut self, player: &Player, joint: usize) {
         self.show_close_up(player, joint);
         if let Some(mut goal) = self.goal.take() {
@@ -371,22 +382,22 @@ impl Viewport {
         (self.fit_pending, self.moved) = (true, false);
     }
 
-    /// Centres the view on ball joint `joint` and follows it.
+    /// Centres the view on joint `joint` and follows it.
     pub fn centre(&mut self, player: &Player, joint: usize) {
-        if let Some(centre) = self.view.anchor(player.frame(), ScenePart::Joint(joint)) {
+        if let Some(centre) = self.view.anchor(player.running(), player.frame(), ScenePart::Joint(joint)) {
             let mut goal = self.goal.unwrap_or(self.camera);
             goal.target = centre;
             self.move_and_follow(player, goal, joint);
         }
     }
 
-    /// Moves to `goal` and follows ball joint `joint`.
+    /// Moves to `goal` and follows joint `joint`.
     fn move_and_follow(&mut self, player: &Player, goal: Camera, joint: usize) {
         self.goal = Some(goal);
         (self.fit_pending, self.fits, self.moved) = (false, false, true);
         let picked = ScenePart::Joint(joint);
         self.follow(Some(picked));
-        let anchor = self.view.anchor(player.frame(), picked);
+        let anchor = self.view.anchor(player.running(), player.frame(), picked);
         self.camera.follow(anchor);
         if let Some(goal) = &mut self.goal {
             goal.follow(anchor);
@@ -409,7 +420,7 @@ impl Viewport {
         [right, up]
     }
 
-    /// The ball joint clicked since the last call.
+    /// The joint clicked since the last call.
     pub fn take_clicked(&mut self) -> Option<usize> {
         self.clicked.take()
     }
@@ -429,7 +440,7 @@ impl Viewport {
         changed.then(|| self.grip.as_ref().map(Grip::pull))
     }
 
-    /// The ball joint in focus, i.e. the followed one.
+    /// The joint in focus, i.e. the followed one.
     pub fn focus(&self) -> Option<usize> {
         match self.followed {
             Some(ScenePart::Joint(joint)) => Some(joint),
@@ -912,7 +923,7 @@ impl Viewport {
         ui.label("Show");
         ui.checkbox(&mut options.flash, "Flash joints on impact")
             .on_hover_text("A ring of light about a joint when its ball has struck, brighter for a harder blow");
-        ui.checkbox(&mut options.joint_names, "Joint names").on_hover_text("Names beside the ball joints");
+        ui.checkbox(&mut options.joint_names, "Joint names").on_hover_text("Names beside the joints with play");
         ui.horizontal(|ui| {
             ui.checkbox(&mut options.sockets, "Sockets").on_hover_text("The sockets, cut open");
             ui.checkbox(&mut options.hinges, "Hinges and slides")
@@ -1059,8 +1070,10 @@ fn describe(ui: &mut Ui, player: &Player, picked: ScenePart) {
             }
         }
         ScenePart::Joint(index) => {
-            if let Some(joint) = frame.joints.get(index) {
-                ui.label(value::contact(joint.state));
+            if let (Some(spec), Some(joint)) =
+                (player.running().machine.loose_joints.get(index), frame.joints.get(index))
+            {
+                ui.label(value::contact(joint.state, spec.kind.parts()[0]));
                 row(ui, "Normal force", joint.normal_force.norm(), "N");
                 row(ui, "Friction force", joint.friction_force.norm(), "N");
                 if joint.state != ContactMode::Ideal {

@@ -1,18 +1,31 @@
 //! Values as text for the screen: the words of files and the command line, with typeset units.
 
 use crate::integrate::StepControl;
+use crate::machine::{LooseKind, Machine};
 use crate::scene::{Kind, Scene, Value};
 use crate::simulate::ContactMode;
 use crate::units::{format_quantity, format_quantity_digits};
 
-/// Description of a contact state.
-pub fn contact(state: ContactMode) -> &'static str {
-    match state {
-        ContactMode::Free => "The ball touches nothing",
+/// What the joints with play of a machine are called.
+pub fn joints(machine: &Machine) -> &'static str {
+    let are_balls = machine.loose_joints.iter().all(|joint| joint.kind == LooseKind::Ball);
+    if are_balls { "ball joints" } else { "joints with play" }
+}
+
+/// Name of place `place` of joint `joint` of `scene`: that of the joint, if it touches at one place only.
+pub fn site(scene: &Scene, joint: usize, place: u8) -> String {
+    scene.machine.loose_joints.get(joint).map_or_else(String::new, |joint| joint.site_name(place))
+}
+
+/// Description of the contact state of a ball, a pin or a block, `part`.
+pub fn contact(state: ContactMode, part: &str) -> String {
+    let words = match state {
+        ContactMode::Free => return format!("The {part} touches nothing"),
         ContactMode::Creep => "In contact, creeping",
         ContactMode::Slip => "In contact, sliding",
         ContactMode::Ideal => "Ideal joint: no clearance",
-    }
+    };
+    words.to_owned()
 }
 
 /// `text` with typeset units, `µm` and `m/s²`. Files and the command line write `um` and `m/s^2`, and read both.

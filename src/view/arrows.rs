@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::drawn::DrawnJoint;
 use super::instances::{bar, push_label};
+use super::joint::DrawnJoint;
 use super::theme::Material;
 use super::{
     Camera, Colour, DrawList, LabelKind, Layer, Legend, Line, Mark, Mesh, Palette, Scaling, Shot, Tick, to_f32,
@@ -156,19 +156,18 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         clipped |= is_broken;
         Some(Arrow { is_broken, ..Arrow::new(tail, along * length, max_radius * height * pixel) })
     };
-    let reports = joints.iter().zip(&shot.frame.joints);
-    for (joint, report) in reports.filter(|_| draws_joint_forces) {
-        let normal = to_f32(&report.normal_force);
-        // The wall pushes the ball away from the contact point, which therefore lies opposite to the normal force.
-        let contact = joint.ball_centre - normal.normalize_or_zero() * joint.ball_radius;
-        let friction = to_f32(&report.friction_force);
-        for (is_drawn, force, colour) in
-            [(options.normal, normal, palette.normal), (options.friction, friction, palette.friction)]
-        {
-            if let Some(arrow) = is_drawn.then(|| arrow(force, contact)).flatten() {
-                arrow.push(&mut out.arrows, colour);
+    let reports = joints.iter().zip(&shot.frame.joints).enumerate();
+    for (i, (joint, report)) in reports.filter(|_| draws_joint_forces) {
+        joint.contacts(report, shot.frame.sites_of(i), |contact| {
+            for (is_drawn, force, colour) in [
+                (options.normal, contact.normal, palette.normal),
+                (options.friction, contact.friction, palette.friction),
+            ] {
+                if let Some(arrow) = is_drawn.then(|| arrow(force, contact.point)).flatten() {
+                    arrow.push(&mut out.arrows, colour);
+                }
             }
-        }
+        });
     }
     for report in external {
         let point = to_f32(&report.points[1]);
@@ -197,7 +196,7 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
             continue;
         };
         // On the wall that was hit.
-        let contact = joint.socket_centre - mark.force.normalize_or_zero() * joint.inner;
+        let contact = joint.wall_point(mark.force, mark.place.map(usize::from));
         if let Some(arrow) = arrow(mark.force, contact) {
             let [colour, ink] = [palette.normal, palette.text].map(|colour| colour.with_opacity(mark.strength.sqrt()));
             let width = OUTLINE_WIDTH * shot.options.arrows.thickness * shot.pixels_per_point;
@@ -217,7 +216,9 @@ pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Pale
         force: mark * reference,
         fraction: arrow_length(mark * reference, reference, options.scaling).0,
     };
+    let are_balls = joints.iter().all(DrawnJoint::is_ball);
     out.legend = Some(Legend {
+        on: if are_balls { "ball" } else { "carried part" },
         reference,
         pixels: ARROW_LENGTH * height,
         scaling: options.scaling,
@@ -334,7 +335,7 @@ mod tests {
 
     #[test]
     fn a_peak_is_told_with_three_digits_and_its_age_in_a_fitting_unit() {
-        let mark = |age: f64| Mark { joint: 0, force: Vec3::new(0.0, 870.6, 0.0), age, strength: 1.0 };
+        let mark = |age: f64| Mark { joint: 0, place: None, force: Vec3::new(0.0, 870.6, 0.0), age, strength: 1.0 };
         assert_eq!(peak_label(&mark(2.14e-3)), "peak 871 N, 2.1 ms ago");
         assert_eq!(peak_label(&mark(38.4e-6)), "peak 871 N, 38 µs ago");
         assert_eq!(peak_label(&mark(0.312)), "peak 871 N, 310 ms ago");

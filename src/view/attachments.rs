@@ -4,8 +4,7 @@ use std::f32::consts::TAU;
 
 use glam::{Mat3, Quat, Vec3};
 
-use super::drawn::{BarKind, Pose, Solid};
-use super::solids::push_solid;
+use super::solids::{BarKind, Pose, Solid, push_solid};
 use super::theme::Material;
 use super::{Colour, Layer, Line, to_f32};
 use crate::machine::{self, Bushing, Freedom, Joint, JointCoordinate, Motor, Stop};

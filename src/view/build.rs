@@ -2,35 +2,37 @@
 
 use std::sync::Arc;
 
-use glam::{Mat3, Quat, Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 use parry3d::query::Ray;
 
 use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
 use super::attachments::{Style, push_bushing, push_motor, push_stop};
-use super::cast::{cast, max_outer_radii};
+use super::cast::cast;
 use super::coil::push_coil;
 use super::cover::{Cover, CoverKind};
-use super::drawn::{self, DrawnJoint, DrawnShape};
+use super::drawn::{self, DrawnShape, max_outer_radii};
 use super::ground::push_ground;
-use super::instances::{self, bar, placed, push_label};
+use super::instances::{self, bar, push_label};
+use super::joint::{self, DrawnJoint, Fittings, push_sockets};
 use super::relative::RelativeShot;
 use super::solids::push_solid;
 use super::symbols::{Symbol, symbols};
 use super::theme::Material;
 use super::{
     Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh, MeshData, Palette,
-    Shot, Swept, ViewOptions, WearMap, to_f32,
+    Shot, Swept, ViewOptions, to_f32,
 };
-use crate::machine::{Element, ElementKind, Role};
+use crate::machine::{Element, ElementKind, LooseJoint, Role};
 use crate::scene::{Scene, SignedAxis};
-use crate::simulate::{ContactMode, ElementReport, Frame, JointReport};
+use crate::simulate::{ElementReport, Frame};
 
 /// Precomputed view data of a scene: built once per scene, and again when its bodies or shapes change.
 pub struct SceneView {
     pub(super) parts: Vec<DrawnShape>,
     symbols: Vec<Symbol>,
     plates: Arc<[MeshData]>,
-    joint_names: Vec<Arc<str>>,
+    /// Name of each joint with play, and those of its places.
+    joint_names: Vec<(Arc<str>, Vec<Arc<str>>)>,
     axis_names: [Arc<str>; 4],
     bounds: Bounds,
     down: SignedAxis,
@@ -41,8 +43,9 @@ pub struct SceneView {
     pub(super) max_outer_radii: Vec<f32>,
     /// Points of the moving parts at the start, m, for the occlusion test of fixed parts.
     occlusion_points: Vec<Vec3>,
-    /// Ball joints at the start.
+    /// Joints with play at the start.
     initial_joints: Vec<DrawnJoint>,
+    fittings: Fittings,
 }
 
 /// Smallest picture edge that leaves room for the triad, points.
@@ -52,8 +55,6 @@ const MIN_SIZE_WITH_GRAVITY: f32 = 300.0;
 /// Radius of the halo of a joint that was hit, in radii of its socket; and largest width of its ring, points.
 const HALO: f32 = 1.7;
 const WIDEST_HALO: f32 = 22.0;
-/// Opacity of a ball in front of a wear map.
-const WEAR_BALL_OPACITY: f32 = 0.25;
 /// Most points of moving parts tested for occlusion: every frame casts a ray to each.
 const MAX_OCCLUSION_POINTS: usize = 600;
 /// Width of an arrow's outline, points.
@@ -66,8 +67,8 @@ const GROUND: f32 = 0.12;
 impl SceneView {
     /// Prepares the meshes and bounds of `scene`; `frame` is any frame of it, preferably the first.
     pub fn new(scene: &Scene, frame: &Frame) -> Self {
-        let (parts, plates) = drawn::parts(scene);
-        let joints = drawn::joints(scene, frame, 1.0);
+        let (parts, mut plates) = drawn::parts(scene);
+        let joints = joint::joints(scene, frame, 1.0);
         let down = to_f32(&scene.view.down.unit());
         let bounds_without_symbols = bounds(&extents(&parts, &[], frame, &joints));
         let symbols = symbols(scene, &parts, frame, &joints, bounds_without_symbols.radius);
@@ -81,6 +82,7 @@ impl SceneView {
             None => bounds.radius,
         };
         let max_outer_radii = max_outer_radii(scene, &parts, frame, &joints);
+        let fittings = Fittings::new(scene, frame, bounds.centre, &mut plates);
         let moving = parts.iter().filter(|part| part.body.is_some());
         let mut occlusion_points = Vec::new();
         for part in moving {
@@ -99,9 +101,10 @@ impl SceneView {
             occlusion_points,
             symbols,
             initial_joints: joints,
+            fittings,
             parts,
             plates: plates.into(),
-            joint_names: scene.machine.loose_joints.iter().map(|joint| joint.name.as_str().into()).collect(),
+            joint_names: scene.machine.loose_joints.iter().map(names).collect(),
             axis_names: ["X", "Y", "Z", "g"].map(Arc::from),
             bounds,
             down: scene.view.down,
@@ -159,7 +162,8 @@ impl SceneView {
         // Half a reference length of arrows around each joint: they point anywhere, and most are shorter. Included even if
         // not drawn, so that pictures with and without them can be compared.
         let arrow = ARROW_LENGTH * self.bounds.radius;
-        balls.extend(frame.joints.iter().map(|joint| (to_f32(&joint.socket_centre), arrow)));
+        let centres = (0..frame.joints.len()).filter_map(|i| joint::anchor(scene, frame, i));
+        balls.extend(centres.map(|centre| (centre, arrow)));
         balls.extend(motion.spheres());
         balls.retain(|(centre, radius)| centre.is_finite() && radius.is_finite());
         let whole = Vec2::new(size[0] as f32, size[1] as f32);
@@ -212,7 +216,7 @@ impl SceneView {
 
     /// Magnification as drawn; at most the one requested in `options`.
     pub(super) fn magnification(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> f32 {
-        drawn::magnification(scene, frame, &self.max_outer_radii, options.magnification)
+        joint::magnification(scene, frame, &self.max_outer_radii, options.magnification)
     }
 
     /// Opacity of part `index` from `eye`: a fixed part that hides much of the moving parts becomes translucent. It is
@@ -236,7 +240,7 @@ impl SceneView {
 
     /// For each drawn solid, spheres (centre, radius) whose convex hull contains it.
     fn solids(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> Vec<Vec<(Vec3, f32)>> {
-        let joints = drawn::joints(scene, frame, self.magnification(scene, frame, options));
+        let joints = joint::joints(scene, frame, self.magnification(scene, frame, options));
         let palette = Palette::of(options.theme);
         let mut solids = solids(&self.parts, &self.symbols, frame, &joints);
         for (element, report) in scene.machine.elements.iter().zip(&frame.elements) {
@@ -254,17 +258,17 @@ impl SceneView {
         solids
     }
 
-    /// Centre of the ball of joint `joint` as drawn, m.
+    /// Centre of the ball, pin or block of joint `joint` as drawn, m.
     pub fn ball(&self, scene: &Scene, frame: &Frame, options: &ViewOptions, joint: usize) -> Option<Vec3> {
         let m = self.magnification(scene, frame, options);
-        drawn::joints(scene, frame, m).get(joint).map(|drawn| drawn.ball_centre)
+        joint::joints(scene, frame, m).get(joint).map(|drawn| drawn.ball_centre)
     }
 
-    /// Turns `camera` to a close-up of ball joint `joint`, looking into its opening.
+    /// Turns `camera` to a close-up of joint `joint`, looking into its opening.
     pub fn close_up(&self, camera: &mut Camera, joint: usize, scene: &Scene, frame: &Frame, options: &ViewOptions) {
         let m = self.magnification(scene, frame, options);
-        if let Some(drawn) = drawn::joints(scene, frame, m).get(joint) {
-            camera.close_up(drawn.socket_centre, drawn.opening, 2.2 * drawn.outer);
+        if let Some(drawn) = joint::joints(scene, frame, m).get(joint) {
+            camera.close_up(drawn.socket_centre, drawn.opening, 2.2 * drawn.reach);
         }
     }
 
@@ -279,7 +283,7 @@ impl SceneView {
         let m = self.magnification(scene, frame, options);
         out.magnification = m;
         out.magnification_text = magnification_text(m, options.magnification);
-        let joints = drawn::joints(scene, frame, m);
+        let joints = joint::joints(scene, frame, m);
         let eye = camera.eye();
         for (i, part) in self.parts.iter().enumerate() {
             let opacity = self.opacity(i, eye + to_f32(&frame.origin));
@@ -293,28 +297,16 @@ impl SceneView {
             out.solid.push(Mesh::Cylinder, bar(from, to - from, symbol.radius, material));
         }
         for (i, joint) in joints.iter().enumerate() {
-            let wall = if options.sockets { joint.inner } else { 0.0 };
-            let ball = Instance {
-                other: joint.ball_to_socket().extend(wall).to_array(),
-                touch: touch(&frame.joints[i]),
-                ..instances::ball(joint.ball_centre, joint.ball_radius, palette.ball)
-            };
-            if options.wear == WearMap::Off || frame.joints[i].clearance == 0.0 {
-                out.solid.push(Mesh::Sphere, ball);
-            } else {
-                let [r, g, b, _] = ball.colour;
-                let colour = [r, g, b, WEAR_BALL_OPACITY];
-                out.clear_balls.push(Instance { colour, ..ball });
-            }
+            joint.push(i, frame, &self.fittings, (options, &palette), out);
             let flash = shot.marks.flash(i);
             if options.flash && flash > 0.02 {
                 let light = Material { colour: palette.flash.with_opacity(flash), ..palette.ball };
                 // In a close-up, a wider ring would hide the surroundings of the joint.
                 let pixel = (joint.socket_centre - eye).dot(-camera.axes().2) * camera.metres_per_pixel(shot.size)
                     / camera.distance;
-                let ring = ((HALO - 1.0) * joint.outer).min(WIDEST_HALO * shot.pixels_per_point * pixel.max(0.0));
-                let halo = instances::ball(joint.socket_centre, joint.outer + ring, light);
-                out.halos.push(Instance { metal: joint.outer / (joint.outer + ring), ..halo });
+                let ring = ((HALO - 1.0) * joint.reach).min(WIDEST_HALO * shot.pixels_per_point * pixel.max(0.0));
+                let halo = instances::ball(joint.socket_centre, joint.reach + ring, light);
+                out.halos.push(Instance { metal: joint.reach / (joint.reach + ring), ..halo });
             }
         }
         if options.sockets {
@@ -334,8 +326,16 @@ impl SceneView {
         }
         if options.joint_names {
             let up = camera.axes().1;
-            for (i, (joint, name)) in joints.iter().zip(&self.joint_names).enumerate() {
-                let anchor = joint.socket_centre + up * (1.15 * joint.outer);
+            for (i, (joint, (name, places))) in joints.iter().zip(&self.joint_names).enumerate() {
+                // Of several places, the one with the largest force.
+                let (mut name, mut largest) = (name, 0.0);
+                joint.contacts(&frame.joints[i], frame.sites_of(i), |contact| {
+                    let place = contact.place.and_then(|place| places.get(place));
+                    if let Some(place) = place.filter(|_| contact.normal.length() > largest) {
+                        (name, largest) = (place, contact.normal.length());
+                    }
+                });
+                let anchor = joint.socket_centre + up * (1.15 * joint.beside());
                 push_label(out, name, LabelKind::Joint(i), anchor, palette.text);
             }
         }
@@ -485,6 +485,12 @@ impl SceneView {
     }
 }
 
+/// Name of a joint, and those of the places where it can touch if it has several.
+fn names(joint: &LooseJoint) -> (Arc<str>, Vec<Arc<str>>) {
+    let places = 0..joint.kind.site_names().len() as u8;
+    (joint.name.as_str().into(), places.map(|place| joint.site_name(place).into()).collect())
+}
+
 /// Spheres (centre, radius) whose convex hull contains everything drawn.
 fn extents(parts: &[DrawnShape], symbols: &[Symbol], frame: &Frame, joints: &[DrawnJoint]) -> Vec<(Vec3, f32)> {
     solids(parts, symbols, frame, joints).into_iter().flatten().collect()
@@ -498,7 +504,11 @@ fn solids(parts: &[DrawnShape], symbols: &[Symbol], frame: &Frame, joints: &[Dra
         part.place(frame, joints).extent(|centre, radius| spheres.push((centre, radius)));
         spheres
     });
-    let sockets = joints.iter().map(|joint| vec![(joint.socket_centre, joint.outer)]);
+    let sockets = joints.iter().map(|joint| {
+        let mut spheres = Vec::new();
+        joint.extent(|centre, radius| spheres.push((centre, radius)));
+        spheres
+    });
     let springs = frame.elements.iter().map(|element| element.points);
     let springs = springs.filter(|[from, to]| from != to);
     let springs = springs.map(|ends| ends.map(|end| (to_f32(&end), 0.0)).to_vec());
@@ -530,41 +540,6 @@ fn magnification_text(drawn: f32, requested: f32) -> String {
         format!("clearance drawn ×{} (×{} does not fit)", format_factor(drawn), format_factor(requested))
     } else {
         format!("clearance drawn ×{}", format_factor(drawn))
-    }
-}
-
-/// Unit vector from a joint's ball to the contact point, and 1 while in contact.
-fn touch(report: &JointReport) -> [f32; 4] {
-    let is_in_contact = matches!(report.state, ContactMode::Creep | ContactMode::Slip);
-    let outwards = to_f32(&report.eccentricity).normalize_or_zero();
-    outwards.extend(f32::from(u8::from(is_in_contact))).to_array()
-}
-
-/// The halves of all sockets, sorted from far to near as seen from `eye`.
-fn push_sockets(frame: &Frame, joints: &[DrawnJoint], eye: Vec3, glass: Material, out: &mut Vec<Instance>) {
-    // The half that is cut away stays faintly visible: a ball in contact there is still in its socket.
-    let cut_away = glass.with_opacity(0.15 * glass.colour.0[3]);
-    // Of two spheres that do not meet, the one with the shorter tangent from the eye is in front: the eye is on its side of
-    // the plane between them.
-    let tangent = |joint: &DrawnJoint| joint.socket_centre.distance_squared(eye) - joint.outer * joint.outer;
-    let mut far_first: Vec<_> = joints.iter().zip(&frame.joints).collect();
-    far_first.sort_by(|(a, _), (b, _)| tangent(b).total_cmp(&tangent(a)));
-    for (joint, report) in far_first {
-        let half = |opening, material| {
-            let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, opening));
-            Instance {
-                inner_radius: joint.inner / joint.outer,
-                other: (-joint.ball_to_socket()).extend(joint.ball_radius).to_array(),
-                touch: touch(report),
-                ..placed(turn * joint.outer, joint.socket_centre, material)
-            }
-        };
-        let mut halves = [half(joint.opening, glass), half(-joint.opening, cut_away)];
-        // The half on the eye's side of the cut comes last.
-        if (eye - joint.socket_centre).dot(joint.opening) < 0.0 {
-            halves.reverse();
-        }
-        out.extend(halves);
     }
 }
 

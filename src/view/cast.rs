@@ -5,9 +5,7 @@ use parry3d::math::Pose as ParryPose;
 use parry3d::query::{Ray, RayCast};
 use parry3d::shape::{Ball, Capsule, Cone, Cuboid, Cylinder, Shape};
 
-use super::drawn::{BarKind, DrawnJoint, DrawnShape, Pose, Solid};
-use crate::scene::Scene;
-use crate::simulate::Frame;
+use super::solids::{BarKind, Pose, Solid};
 
 /// Distance along `ray` to the solid.
 pub(super) fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
@@ -56,19 +54,4 @@ fn with_shape<T>(solid: &Solid<'_>, query: impl FnOnce(&dyn Shape, &ParryPose) -
 
 pub(super) fn cast_ball(centre: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
     Ball::new(radius).cast_ray(&ParryPose::from_translation(centre), ray, f32::MAX, true)
-}
-
-/// Outer radius, m, to which the socket of each ball joint may grow before it intersects the part that carries it, with
-/// `joints` drawn without magnification. Parts that it already touches, or that end at its outer face, do not limit it.
-pub(super) fn max_outer_radii(scene: &Scene, parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<f32> {
-    let max_outer_radius = |(i, joint): (usize, &DrawnJoint)| {
-        let body = scene.machine.loose_joints[i].carrier().body;
-        parts
-            .iter()
-            .filter(|part| part.body == body && !part.reaches_socket(i))
-            .filter_map(|part| distance(&part.place(frame, joints), joint.socket_centre))
-            .filter(|&distance| distance > joint.outer)
-            .fold(f32::INFINITY, f32::min)
-    };
-    joints.iter().enumerate().map(max_outer_radius).collect()
 }

@@ -201,9 +201,9 @@ pub enum LabelKind {
     Axis,
     /// The gravity arrow.
     Gravity,
-    /// A ball joint, by index.
+    /// A joint with play, by index.
     Joint(usize),
-    /// The mark of a ball joint's peak, by index.
+    /// The mark of a joint's peak, by index.
     Peak(usize),
     /// The arrow of an external force.
     External,
@@ -238,6 +238,8 @@ pub struct Tick {
 /// The arrow legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Legend {
+    /// What the forces act on: balls, or other parts, too.
+    pub on: &'static str,
     /// Force whose arrow has the reference length, N.
     pub reference: f32,
     /// Reference length, pixels: the same for an arrow across the line of sight anywhere in the picture.

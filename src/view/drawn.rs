@@ -1,29 +1,24 @@
 //! Positions of everything drawn at one instant: the single source for drawing, picking and bounds.
 //!
-//! With a magnification m of the play, the ball of a joint is drawn at Z_i + m e in a socket of inner radius r + m c, so
-//! that it touches the drawn wall exactly when it touches the real one. Bodies are drawn in place; only the end of a bar
-//! that carries a ball moves with the ball, so that no gap opens between them.
+//! Bodies are drawn in place, joints with their play magnified; only the end of a bar that carries a ball, a pin or a block moves
+//! with it, so that no gap opens between them.
 
 use std::sync::Arc;
 
-use glam::{Mat3, Vec3};
+use glam::Vec3;
 use parry3d::shape::SharedShape;
 
+use super::cast::distance;
+use super::joint::{self, DrawnJoint};
+use super::solids::{BarKind, Pose, Solid};
 use super::sticks::sticks;
 use super::surface::surface;
 use super::theme::Material;
 use super::{Colour, Mesh, MeshData, Palette, to_f32, zones};
-use crate::machine::{self, Geometry, Role, Shape};
+use crate::machine::{Geometry, Role, Shape};
 use crate::mesh;
 use crate::scene::Scene;
-use crate::simulate::{BodyMotion, Frame};
-
-/// Largest drawn inner radius of a socket, in ball radii: it limits the magnification.
-const MAX_SOCKET_RADIUS: f32 = 4.2;
-/// Thickness of a drawn socket, in ball radii.
-const WALL_THICKNESS: f32 = 0.26;
-/// Gap drawn in an ideal joint, in ball radii: ball and socket must not coincide.
-const IDEAL_GAP: f32 = 0.02;
+use crate::simulate::Frame;
 
 /// A shape of the scene, in its body's frame.
 pub(super) struct DrawnShape {
@@ -54,14 +49,7 @@ struct SceneMesh {
     points: Arc<[Vec3]>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum BarKind {
-    Capsule,
-    Cylinder,
-    Cone,
-}
-
-/// End of a bar, and the ball joint it reaches into.
+/// End of a bar, and the joint with play it reaches into.
 struct End {
     point: Vec3,
     joint: Option<JointEnd>,
@@ -69,92 +57,10 @@ struct End {
 
 #[derive(Clone, Copy)]
 enum JointEnd {
-    /// The joint's ball is on this end.
+    /// The joint's ball, pin or block is on this end.
     Ball(usize),
-    /// The joint's socket is in front of this end.
+    /// The joint's socket or bearing is in front of this end.
     Socket(usize),
-}
-
-/// A ball joint as drawn, world axes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct DrawnJoint {
-    pub socket_centre: Vec3,
-    pub ball_centre: Vec3,
-    /// Drawn minus real position of the ball.
-    pub shift: Vec3,
-    pub ball_radius: f32,
-    pub inner: f32,
-    pub outer: f32,
-    /// Unit vector.
-    pub opening: Vec3,
-}
-
-impl DrawnJoint {
-    /// Vector from the ball's centre to the socket's, m.
-    pub fn ball_to_socket(&self) -> Vec3 {
-        self.socket_centre - self.ball_centre
-    }
-}
-
-/// A placed part, world axes.
-pub(super) enum Solid<'a> {
-    /// `has_cap[i]`: whether end i of a capsule shows its hemisphere.
-    Bar {
-        from: Vec3,
-        to: Vec3,
-        radius: f32,
-        kind: BarKind,
-        has_cap: [bool; 2],
-    },
-    Box {
-        centre: Vec3,
-        size: Vec3,
-        rotation: Mat3,
-    },
-    Ball {
-        centre: Vec3,
-        radius: f32,
-    },
-    Mesh {
-        mesh: Mesh,
-        shape: Option<&'a SharedShape>,
-        points: &'a [Vec3],
-        pose: Pose,
-    },
-}
-
-/// Pose of a body frame.
-#[derive(Clone, Copy)]
-pub(super) struct Pose {
-    pub position: Vec3,
-    pub rotation: Mat3,
-}
-
-impl Pose {
-    pub const WORLD: Self = Self { position: Vec3::ZERO, rotation: Mat3::IDENTITY };
-
-    fn new(position: &machine::Vec3, rotation: &machine::Mat3) -> Self {
-        let column = |i: usize| to_f32(&rotation.column(i).into_owned());
-        Self { position: to_f32(position), rotation: Mat3::from_cols(column(0), column(1), column(2)) }
-    }
-
-    fn of_body(motion: &BodyMotion) -> Self {
-        Self::new(&motion.position, &motion.rotation)
-    }
-
-    /// World pose of `inner`, which is given in this frame.
-    fn compose(&self, inner: &Self) -> Self {
-        Self { position: self.apply(inner.position), rotation: self.rotation * inner.rotation }
-    }
-
-    pub fn in_frame(frame: &Frame, body: Option<usize>) -> Self {
-        let world = Self { position: -to_f32(&frame.origin), ..Self::WORLD };
-        body.and_then(|b| frame.bodies.get(b)).map_or(world, Self::of_body)
-    }
-
-    pub fn apply(&self, point: Vec3) -> Vec3 {
-        self.position + self.rotation * point
-    }
 }
 
 /// Shapes of `scene`, and the meshes that are not shared: the zones of wear maps, then its plates and the
@@ -196,6 +102,10 @@ pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
 }
 
 fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) -> Option<Form> {
+    // A joint draws its own ball, pin or block.
+    if scene.machine.loose_joints.iter().any(|own| joint::replaces(own, body, &shape.geometry)) {
+        return None;
+    }
     let bar = |from, to, radius: f64, kind| {
         let ends = [from, to].map(|point| {
             let point = to_f32(point);
@@ -208,14 +118,7 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
         Geometry::Cylinder { from, to, radius } => bar(from, to, *radius, BarKind::Cylinder),
         Geometry::Cone { from, to, radius } => bar(from, to, *radius, BarKind::Cone),
         Geometry::Box { centre, size } => Some(Form::Box { centre: to_f32(centre), size: to_f32(size) }),
-        Geometry::Sphere { centre, radius } => {
-            // The joint draws its own ball.
-            let is_joint_ball =
-                scene.machine.loose_joints.iter().any(|j| {
-                    j.carried().body == body && (j.carried().point - centre).norm() < 0.1 * j.contact.ball_radius
-                });
-            (!is_joint_ball).then(|| Form::Ball { centre: to_f32(centre), radius: *radius as f32 })
-        }
+        Geometry::Sphere { centre, radius } => Some(Form::Ball { centre: to_f32(centre), radius: *radius as f32 }),
         Geometry::Plate { corners, triangles, thickness } => {
             let corners: Vec<Vec3> = corners.iter().map(to_f32).collect();
             let mesh = plate(&corners, triangles, *thickness as f32)?;
@@ -273,16 +176,13 @@ impl Meshes {
     }
 }
 
-/// The ball joint that a bar's end reaches into, if any.
+/// The joint with play that a bar's end reaches into, if any.
 fn joint_at_end(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<JointEnd> {
-    for (i, joint) in scene.machine.loose_joints.iter().enumerate() {
-        let radius = joint.contact.ball_radius as f32;
-        if joint.carried().body == body && to_f32(&joint.carried().point).distance(end) < 1.3 * radius {
+    for (i, own) in scene.machine.loose_joints.iter().enumerate() {
+        if own.carried().body == body && joint::holds_end(own, end) {
             return Some(JointEnd::Ball(i));
         }
-        if joint.carrier().body == body
-            && to_f32(&joint.carrier().point).distance(end) < (MAX_SOCKET_RADIUS + WALL_THICKNESS) * radius
-        {
+        if own.carrier().body == body && to_f32(&own.carrier().point).distance(end) < joint::wall_reach(own) {
             return Some(JointEnd::Socket(i));
         }
     }
@@ -321,40 +221,6 @@ fn plate(corners: &[Vec3], triangles: &[[usize; 3]], thickness: f32) -> Option<M
     Some(mesh)
 }
 
-/// Magnification as drawn, at most `requested`: no socket exceeds [`MAX_SOCKET_RADIUS`] ball radii, or its limit in
-/// `max_outer_radii`, m.
-pub(super) fn magnification(scene: &Scene, frame: &Frame, max_outer_radii: &[f32], requested: f32) -> f32 {
-    let requested = if requested.is_finite() { requested.clamp(1.0, 100.0) } else { 1.0 };
-    let limits = scene.machine.loose_joints.iter().zip(&frame.joints).enumerate().map(|(i, (joint, now))| {
-        let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
-        let radius = joint.contact.ball_radius as f32;
-        let room = max_outer_radii.get(i).copied().unwrap_or(f32::INFINITY) - WALL_THICKNESS * radius;
-        if gap > 0.0 { (room.min(MAX_SOCKET_RADIUS * radius) - radius) / gap } else { f32::INFINITY }
-    });
-    limits.fold(requested, f32::min).max(1.0)
-}
-
-/// Every ball joint as drawn at magnification `m`.
-pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
-    let drawn = scene.machine.loose_joints.iter().zip(&frame.joints).map(|(joint, now)| {
-        let socket_centre = to_f32(&now.socket_centre);
-        let ball_radius = joint.contact.ball_radius as f32;
-        let eccentricity = to_f32(&now.eccentricity);
-        let gap = if now.clearance > 0.0 { m * now.clearance as f32 } else { IDEAL_GAP * ball_radius };
-        let opening = Pose::in_frame(frame, joint.carrier().body).rotation * to_f32(&joint.opening);
-        DrawnJoint {
-            socket_centre,
-            ball_centre: socket_centre + m * eccentricity,
-            shift: (m - 1.0) * eccentricity,
-            ball_radius,
-            inner: ball_radius + gap,
-            outer: ball_radius + gap + WALL_THICKNESS * ball_radius,
-            opening: opening.normalize_or(Vec3::Z),
-        }
-    });
-    drawn.collect()
-}
-
 impl DrawnShape {
     /// Its colour and finish.
     pub fn material(&self, palette: &Palette) -> Material {
@@ -367,7 +233,7 @@ impl DrawnShape {
         matches!(self.form, Form::Bar { .. })
     }
 
-    /// Whether it ends at the outer face of the socket of ball joint `joint`.
+    /// Whether it ends at the outer face of the socket or bearing of joint `joint`.
     pub fn reaches_socket(&self, joint: usize) -> bool {
         match &self.form {
             Form::Bar { ends, .. } => {
@@ -412,7 +278,7 @@ impl DrawnShape {
     }
 }
 
-/// New end of a bar from `start` to `end` that reaches into a drawn socket: on the outer face.
+/// New end of a bar from `start` to `end` that reaches into a drawn socket or bearing: on the outer face.
 fn end_at_socket(start: Vec3, end: Vec3, joint: &DrawnJoint) -> Option<Vec3> {
     let radius = 0.99 * joint.outer;
     let to_end = end - joint.socket_centre;
@@ -430,19 +296,17 @@ fn end_at_socket(start: Vec3, end: Vec3, joint: &DrawnJoint) -> Option<Vec3> {
     Some(end + along * s)
 }
 
-impl Solid<'_> {
-    /// Calls `visit` with spheres (centre, radius) whose convex hull contains the solid: for bounds.
-    pub fn extent(&self, mut visit: impl FnMut(Vec3, f32)) {
-        match self {
-            Solid::Bar { from, to, radius, .. } => [from, to].into_iter().for_each(|&p| visit(p, *radius)),
-            Solid::Box { centre, size, rotation } => {
-                for i in 0..8 {
-                    let sign = |bit: u32| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
-                    visit(*centre + *rotation * (*size * Vec3::new(sign(0), sign(1), sign(2))), 0.0);
-                }
-            }
-            Solid::Ball { centre, radius } => visit(*centre, *radius),
-            Solid::Mesh { points, pose, .. } => points.iter().for_each(|&p| visit(pose.apply(p), 0.0)),
-        }
-    }
+/// Outer radius, m, to which the socket or bearing of each joint may grow before it intersects the part that carries it, with
+/// `joints` drawn without magnification. Parts that it already touches, or that end at its outer face, do not limit it.
+pub(super) fn max_outer_radii(scene: &Scene, parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<f32> {
+    let max_outer_radius = |(i, joint): (usize, &DrawnJoint)| {
+        let body = scene.machine.loose_joints[i].carrier().body;
+        parts
+            .iter()
+            .filter(|part| part.body == body && !part.reaches_socket(i))
+            .filter_map(|part| distance(&part.place(frame, joints), joint.socket_centre))
+            .filter(|&distance| distance > joint.outer)
+            .fold(f32::INFINITY, f32::min)
+    };
+    joints.iter().enumerate().map(max_outer_radius).collect()
 }

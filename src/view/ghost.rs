@@ -4,11 +4,11 @@ use glam::Vec3;
 
 use super::arrows::push_error;
 use super::build;
-use super::instances::ball;
+use super::joint;
 use super::relative::RelativeShot;
 use super::solids::push_solid;
 use super::theme::{Ghost, GhostLook, Material};
-use super::{Colour, DrawList, Mesh, Palette, SceneView, Shot, drawn, to_f32};
+use super::{Colour, DrawList, Palette, SceneView, Shot, to_f32};
 use crate::session::ideal::output_point;
 use crate::simulate::Frame;
 use crate::units::format_quantity_digits;
@@ -35,7 +35,7 @@ impl SceneView {
         let shot = &relative.as_ref().map_or(*shot, |relative| relative.shot(shot));
         let ghost = relative_ghost.as_ref().unwrap_or(ghost);
         let look = Palette::of(shot.options.theme).ghost(which);
-        let at = |frame| drawn::joints(shot.scene, frame, out.magnification);
+        let at = |frame| joint::joints(shot.scene, frame, out.magnification);
         let (shown_joints, ghost_joints) = (at(shot.frame), at(ghost));
         let (eye, back) = (shot.camera.eye(), shot.camera.axes().2);
         let target = shot.camera.metres_per_pixel(shot.size) / shot.camera.distance;
@@ -65,10 +65,11 @@ impl SceneView {
             }
         }
         for (from, to) in shown_joints.iter().zip(&ghost_joints) {
-            if let Some([fill, edge]) = materials(from.ball_centre, to.ball_centre) {
-                let ball = |material| ball(to.ball_centre, to.ball_radius, material);
-                out.ghost.push(Mesh::Sphere, ball(fill));
-                out.ghost_edges.push(Mesh::Sphere, ball(edge));
+            let points = from.carried_points().into_iter().zip(to.carried_points());
+            let farthest = points.max_by(|(a, b), (c, d)| a.distance(*b).total_cmp(&c.distance(*d)));
+            if let Some([fill, edge]) = farthest.and_then(|(from, to)| materials(from, to)) {
+                to.push_carried(&mut out.ghost, fill);
+                to.push_carried(&mut out.ghost_edges, edge);
                 differs = true;
             }
         }

@@ -24,6 +24,7 @@ pub(crate) mod fixture;
 mod ghost;
 mod ground;
 mod instances;
+mod joint;
 mod options;
 mod peaks;
 mod pick;

@@ -19,7 +19,7 @@ pub struct ViewOptions {
     pub floor: bool,
     /// Axis triad with gravity, in the lower left corner.
     pub triad: bool,
-    /// Names of the ball joints beside them.
+    /// Names of the joints with play beside them.
     pub joint_names: bool,
     /// Pins and rails of hinges and slides that the scene does not draw itself.
     pub hinges: bool,

@@ -1,4 +1,4 @@
-//! Marks the hardest impact of each ball joint for some time: an impact lasts a hundredth of a frame, too short to be seen.
+//! Marks the hardest impact of each joint with play for some time: an impact lasts a hundredth of a frame, too short to be seen.
 //!
 //! A mark is never an arrow: arrows are the current forces. It fades with simulated time alone; the rate follows from the time
 //! scale, so that a mark stays visible equally long at any scale.
@@ -11,8 +11,10 @@ use crate::simulate::{Frame, Peak};
 /// A past peak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mark {
-    /// Ball joint.
+    /// Joint with play.
     pub joint: usize,
+    /// Where in it, if that is known: [`crate::simulate::Impact::place`].
+    pub place: Option<u8>,
     /// Normal force on the ball at the peak, N, world axes.
     pub force: Vec3,
     /// Simulated time since, s.
@@ -47,6 +49,7 @@ struct Joint {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Impact {
     force: Vec3,
+    place: Option<u8>,
     time: f64,
     /// Brightness of its flash.
     flash: f32,
@@ -94,12 +97,12 @@ impl PeakMarks {
             self.largest = self.largest.max(size);
             let flash = (size / self.largest.max(f32::MIN_POSITIVE)).sqrt().clamp(MIN_FLASH, 1.0);
             if let Some(joint) = self.joints.get_mut(joint) {
-                joint.add_impact(Impact { force, time, flash }, self.fade);
+                joint.add_impact(Impact { force, place: None, time, flash }, self.fade);
             }
         }
     }
 
-    /// Processes the displayed instant and the `peaks` since the previous one (one per ball joint, or empty). An impact expires
+    /// Processes the displayed instant and the `peaks` since the previous one (one per joint, or empty). An impact expires
     /// `fade` seconds of simulated time after its peak. If time has gone back, all impacts are dropped.
     pub fn update(&mut self, frame: &Frame, peaks: &[Peak], fade: f64) {
         if frame.time < self.now {
@@ -139,6 +142,7 @@ impl PeakMarks {
             joint.rising = Some(size);
             let impact = |force: Vec3, time: f64| Impact {
                 force,
+                place: None,
                 time,
                 flash: (force.length() / hardest.max(f32::MIN_POSITIVE)).sqrt().clamp(MIN_FLASH, 1.0),
             };
@@ -166,6 +170,15 @@ impl PeakMarks {
             .fold(self.largest * (-half_lives as f32).exp2(), f32::max);
     }
 
+    /// Tells where the impacts of joints with several places happened: `place` of a joint and of the time of a peak, s.
+    pub fn locate(&mut self, place: impl Fn(usize, f64) -> Option<u8>) {
+        for (j, joint) in self.joints.iter_mut().enumerate() {
+            for impact in joint.impact.iter_mut().chain(&mut joint.upcoming).filter(|impact| impact.place.is_none()) {
+                impact.place = place(j, impact.time);
+            }
+        }
+    }
+
     /// The marks to draw beside the forces of `frame`: none for a joint whose current force is as large.
     pub fn marks<'a>(&'a self, frame: &'a Frame) -> impl Iterator<Item = Mark> + 'a {
         let mark = |(joint, (state, report)): (usize, (&Joint, _))| {
@@ -175,6 +188,7 @@ impl PeakMarks {
             let exceeds_current = (report.normal_force.norm() as f32) < CURRENT_FRACTION * impact.force.length();
             exceeds_current.then_some(Mark {
                 joint,
+                place: impact.place,
                 force: impact.force,
                 age,
                 strength: (1.0 - age / self.fade) as f32,
@@ -183,7 +197,7 @@ impl PeakMarks {
         self.joints.iter().zip(&frame.joints).enumerate().filter_map(mark)
     }
 
-    /// Brightness of the flash of ball joint `joint`, 0..=1.
+    /// Brightness of the flash of joint `joint`, 0..=1.
     pub fn flash(&self, joint: usize) -> f32 {
         let impact = self.joints.get(joint).and_then(|joint| joint.impact);
         impact.map_or(0.0, |impact| {

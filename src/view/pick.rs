@@ -3,9 +3,10 @@
 use glam::{Vec2, Vec3};
 use parry3d::query::Ray;
 
-use super::cast::{cast, cast_ball};
-use super::drawn;
+use super::cast::cast;
+use super::joint;
 use super::{ScenePart, SceneView, Shot};
+use crate::scene::Scene;
 use crate::simulate::Frame;
 
 /// Where the cursor's ray first meets the scene.
@@ -23,7 +24,7 @@ impl SceneView {
         let (origin, direction) = shot.camera.ray(pixel, shot.size);
         let ray = Ray::new(origin, direction);
         let m = self.magnification(shot.scene, shot.frame, shot.options);
-        let joints = drawn::joints(shot.scene, shot.frame, m);
+        let joints = joint::joints(shot.scene, shot.frame, m);
         let parts = self.parts.iter().enumerate().filter_map(|(i, part)| {
             let what = part.body.map_or(ScenePart::Fixed(part.index), ScenePart::Body);
             let distance = cast(&part.place(shot.frame, &joints), &ray)?;
@@ -31,22 +32,18 @@ impl SceneView {
             (self.opacity(i, origin) > 0.6).then_some((distance, what))
         });
         let balls = joints.iter().enumerate().filter_map(|(i, joint)| {
-            let ball = cast_ball(joint.ball_centre, joint.ball_radius, &ray);
-            let socket = shot.options.sockets.then(|| cast_ball(joint.socket_centre, joint.outer, &ray)).flatten();
-            // A ray through the cut-away half of the socket continues inside.
-            let socket = socket.filter(|&t| (ray.point_at(t) - joint.socket_centre).dot(joint.opening) <= 0.0);
-            let distance = [ball, socket].into_iter().flatten().min_by(f32::total_cmp)?;
+            let distance = joint.cast(&ray, shot.options.sockets)?;
             Some((distance, ScenePart::Joint(i)))
         });
         let (distance, what) = parts.chain(balls).min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(Hit { what, point: ray.point_at(distance) })
     }
 
-    /// Point to follow: a body's origin or a joint's socket centre, m; `None` for fixed shapes.
-    pub fn anchor(&self, frame: &Frame, part: ScenePart) -> Option<Vec3> {
+    /// Point to follow: a body's origin, a joint's socket or bearing, or where a block is in its guide, m; `None` for fixed shapes.
+    pub fn anchor(&self, scene: &Scene, frame: &Frame, part: ScenePart) -> Option<Vec3> {
         match part {
             ScenePart::Body(i) => frame.bodies.get(i).map(|body| super::to_f32(&body.position)),
-            ScenePart::Joint(i) => frame.joints.get(i).map(|joint| super::to_f32(&joint.socket_centre)),
+            ScenePart::Joint(i) => joint::anchor(scene, frame, i),
             ScenePart::Fixed(_) => None,
         }
     }

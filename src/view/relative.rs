@@ -56,6 +56,9 @@ fn frame_from(frame: &Frame, origin: Vec3) -> Frame {
         joint.ball_centre -= origin;
         joint.contact_point -= origin;
     }
+    for site in &mut relative.sites {
+        site.contact_point -= origin;
+    }
     for report in relative.elements.iter_mut().chain(&mut relative.pull) {
         report.points.iter_mut().for_each(|point| *point -= origin);
     }

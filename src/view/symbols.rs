@@ -4,7 +4,9 @@ use glam::Vec3;
 use parry3d::query::Ray;
 
 use super::cast::cast;
-use super::drawn::{DrawnJoint, DrawnShape, Pose, Solid};
+use super::drawn::DrawnShape;
+use super::joint::DrawnJoint;
+use super::solids::{Pose, Solid};
 use super::to_f32;
 use crate::machine::{Joint, JointKind, Role};
 use crate::scene::Scene;

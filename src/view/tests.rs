@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use super::drawn::{self, Pose};
-use super::fixture;
+use super::solids::Pose;
 use super::*;
+use super::{fixture, joint};
 use crate::scene::Scene;
 use crate::simulate::{Frame, Simulation};
 
@@ -115,7 +115,7 @@ fn a_magnified_socket_does_not_intersect_its_carrier() {
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
         let view = SceneView::new(&scene, &frame);
-        let plain = drawn::joints(&scene, &frame, 1.0);
+        let plain = joint::joints(&scene, &frame, 1.0);
         // Twelve loose joints take long to simulate.
         let later: &[f64] = match scene.machine.loose_joints.len() {
             0..=8 => &[0.1, 0.4],
@@ -126,7 +126,7 @@ fn a_magnified_socket_does_not_intersect_its_carrier() {
             simulation.sample(time, &mut frame);
             let m = view.magnification(&scene, &frame, &options);
             assert!(m > 15.0, "{name}: ×{m}");
-            let joints = drawn::joints(&scene, &frame, m);
+            let joints = joint::joints(&scene, &frame, m);
             for (i, joint) in joints.iter().enumerate() {
                 let ball = scene.machine.loose_joints[i].carried().body;
                 for part in view.parts.iter().filter(|part| part.body != ball) {
@@ -230,7 +230,7 @@ fn the_picked_part_is_the_one_drawn_under_the_cursor() {
     assert_eq!(view.pick(&shot, Vec2::new(2.0, 2.0)), None, "the background");
     let pixel = camera.project(to_f32(&frame.joints[1].socket_centre), SIZE).expect("before the eye");
     let hit = view.pick(&shot, pixel).expect("a socket");
-    assert_eq!(view.anchor(&frame, hit.what), Some(to_f32(&frame.joints[1].socket_centre)));
+    assert_eq!(view.anchor(&scene, &frame, hit.what), Some(to_f32(&frame.joints[1].socket_centre)));
 }
 
 #[test]

@@ -86,7 +86,7 @@ const fn glass(rgb: u32, opacity: f32) -> Material {
 pub enum Ghost {
     /// The neighbouring motion.
     Twin,
-    /// The motion with every ball joint ideal.
+    /// The motion with every joint ideal.
     Ideal,
 }
 

@@ -2,11 +2,13 @@
 
 use glam::{Mat3, Vec3};
 
-use super::drawn::{self, Pose};
 use super::instances::placed;
+use super::joint;
 use super::relative::RelativeShot;
+use super::solids::Pose;
 use super::theme::Material;
 use super::{Colour, DrawList, Mesh, SceneView, Shot, WearMap, WearScale};
+use crate::machine::LooseKind;
 use crate::simulate::{Cell, Wear};
 
 /// Decades of the scale below the largest value.
@@ -70,7 +72,9 @@ impl SceneView {
         }
         let relative = RelativeShot::of(shot);
         let shot = &relative.as_ref().map_or(*shot, |relative| relative.shot(shot));
-        let joints = 0..shot.scene.machine.loose_joints.len().min(shot.frame.joints.len());
+        // The cells are those of sockets.
+        let loose = shot.scene.machine.loose_joints.iter().zip(&shot.frame.joints).enumerate();
+        let joints = loose.filter(|(_, (joint, _))| joint.kind == LooseKind::Ball).map(|(j, _)| j);
         let value = |joint: usize, cell: &Cell| map.value(cell, wear.area(joint));
         let values = joints.clone().flat_map(|j| wear.cells(j).iter().map(move |cell| value(j, cell)));
         let scale = WearScale { map, largest: values.fold(0.0, f32::max) };
@@ -78,7 +82,7 @@ impl SceneView {
         if scale.largest <= 0.0 {
             return;
         }
-        let drawn = drawn::joints(shot.scene, shot.frame, out.magnification);
+        let drawn = joint::joints(shot.scene, shot.frame, out.magnification);
         for j in joints {
             let body = Pose::in_frame(shot.frame, shot.scene.machine.loose_joints[j].carrier().body).rotation;
             let grid = wear.grid_from_body(j);

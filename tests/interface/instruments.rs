@@ -59,7 +59,7 @@ fn the_ball_centre_is_drawn_at_the_scaled_eccentricity() {
     harness.key_press(Key::L);
     harness.run();
     choose(&mut harness, "Plane of the microscope", "XY");
-    choose(&mut harness, "Ball joint in focus", "S2");
+    choose(&mut harness, "Joint in focus", "S2");
     assert_eq!(harness.state().microscope().joint(), 1);
     harness.remove_cursor();
     // In free fall the dot is the only thing in the circle with the text colour.

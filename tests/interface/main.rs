@@ -27,6 +27,7 @@ mod lessons;
 mod pace;
 mod page;
 mod pictures;
+mod places;
 mod present;
 mod readings;
 mod reload;

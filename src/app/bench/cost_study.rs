@@ -11,7 +11,7 @@ use crate::units::{from_display, to_display};
 /// Initial variation of a parameter, percent of its value.
 const INITIAL_VARIATION: f64 = 50.0;
 
-/// A contact parameter that every ball joint has.
+/// A contact parameter that every joint with play has.
 pub struct VariedParameter {
     /// Its row in the table, under the key of the whole scene.
     pub parameter: &'static Parameter,
@@ -47,7 +47,7 @@ pub struct CostSettings {
 }
 
 impl CostSettings {
-    /// The clearances of all ball joints by half of their values.
+    /// The clearances of all joints by half of their values.
     pub fn new(scene: &Scene) -> Self {
         let varied = controls::FIRST.into_iter().filter_map(|key| {
             let (parameter, Ok(Value::Number(now))) = (scene.parameter(key).ok()?, scene.get(key)) else {

@@ -97,11 +97,11 @@ pub fn length(si: f64, digits: usize) -> String {
 
 /// Area of a picture, and its colours.
 pub struct Sheet<'a> {
-    painter: Painter,
-    rect: Rect,
-    palette: Palette,
-    ink: Color32,
-    faint: Color32,
+    pub(super) painter: Painter,
+    pub(super) rect: Rect,
+    pub(super) palette: Palette,
+    pub(super) ink: Color32,
+    pub(super) faint: Color32,
     background: Color32,
     magnified: &'a MagnifiedJoint,
 }
@@ -123,7 +123,12 @@ impl<'a> Sheet<'a> {
         sheet
     }
 
-    fn words(&self, at: Pos2, anchor: Align2, words: &str, ink: Color32) -> Rect {
+    /// The joint that it shows.
+    pub fn magnified(&self) -> &'a MagnifiedJoint {
+        self.magnified
+    }
+
+    pub(super) fn words(&self, at: Pos2, anchor: Align2, words: &str, ink: Color32) -> Rect {
         text(&self.painter, at, anchor, words, 11.0, ink, self.background)
     }
 
@@ -202,7 +207,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
         painter.line_segment([from, ball_centre], Stroke::new(1.8, new_colour));
     }
 
-    let touches = magnified.sliding.is_some();
+    let touches = magnified.touches;
     let contact = colour(palette.normal);
     if let (true, Some(normal)) = (touches, magnified.normal) {
         // The clearance sphere bounds the ball's centre, so contact and normal are drawn there.
@@ -291,7 +296,7 @@ pub fn section(sheet: &Sheet<'_>, patch: &ContactPatch) {
         painter.line_segment([centre - reach, centre + reach], stroke);
     }
     let above = pos2(rect.center().x, rect.top() + 5.0);
-    sheet.words(above, Align2::CENTER_TOP, "ball", sheet.ink);
+    sheet.words(above, Align2::CENTER_TOP, sheet.magnified.kind.parts()[0], sheet.ink);
     let below = pos2(rect.left() + 8.0, wall + 3.0);
     sheet.words(below, Align2::LEFT_TOP, "wall", sheet.ink);
     let times = value::number(depth_scale / width_scale, 2);

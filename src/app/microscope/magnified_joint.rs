@@ -1,16 +1,28 @@
-//! State of one ball joint for the microscope, read from the displayed instant and the record. No force is computed here.
+//! State of one joint with play for the microscope, read from the displayed instant and the record. No force is computed here.
 
+use std::fmt::Write as _;
+
+use super::draw;
 use crate::app::paths::axes_of;
 use crate::app::player::Player;
+use crate::app::value;
 use crate::contact::{Coefficients, ElasticLaw};
-use crate::machine::{Attachment, Mat3, Vec3};
-use crate::simulate::{ContactMode, Frame, Impact, JointReport};
+use crate::machine::{Attachment, LooseKind, Mat3, Vec3};
+use crate::simulate::{ContactMode, Frame, Impact, JointReport, SiteReport};
 
 /// Number of impacts covered by the path.
 pub const IMPACTS: usize = 6;
 
-/// One ball joint at the displayed instant. SI units, world axes.
+/// One joint with play at the displayed instant. SI units, world axes; what is said of a ball holds for a pin and a block, too.
 pub struct MagnifiedJoint {
+    pub name: String,
+    pub kind: LooseKind,
+    /// Places where it can touch, with their names, if there are several.
+    pub places: Vec<(String, SiteReport)>,
+    /// Axes of the frames of the carrier and of the carried part as columns.
+    pub axes: [Mat3; 2],
+    /// Whether it touches, and where it does is known.
+    pub touches: bool,
     /// Joint report of the step.
     pub report: JointReport,
     /// Axes of the socket's body as columns.
@@ -19,9 +31,9 @@ pub struct MagnifiedJoint {
     pub normal: Option<Vec3>,
     /// Velocity of the ball's centre relative to the socket's, de/dt, m/s.
     pub velocity: Vec3,
-    /// Sliding velocity of the ball as used by the friction law, m/s; `None` out of contact.
+    /// Sliding velocity of a ball as used by the friction law, m/s; `None` out of contact, and of other parts.
     pub sliding: Option<Vec3>,
-    /// Geometry of the contact; `None` in an ideal joint.
+    /// Geometry of the contact; `None` in an ideal joint, and in one with several places.
     pub patch: Option<ContactPatch>,
     /// The latest impact whose end is known.
     pub impact: Option<Impact>,
@@ -53,7 +65,7 @@ fn velocity_of(frame: &Frame, at: &Attachment) -> (Vec3, Vec3) {
 }
 
 impl MagnifiedJoint {
-    /// State of ball joint `joint`; `None` if the scene has no such joint.
+    /// State of joint `joint`; `None` if the scene has no such joint.
     pub fn of(player: &Player, joint: usize) -> Option<Self> {
         let (frame, shown) = (player.frame(), player.pacer.shown());
         let spec = player.running().machine.loose_joints.get(joint)?;
@@ -65,7 +77,8 @@ impl MagnifiedJoint {
         let (socket, socket_spin) = velocity_of(frame, &spec.carrier());
         let velocity = ball - socket;
         let touches = matches!(report.state, ContactMode::Creep | ContactMode::Slip);
-        let sliding = normal.filter(|_| touches).map(|normal| {
+        let is_ball = spec.kind == LooseKind::Ball;
+        let sliding = normal.filter(|_| touches && is_ball).map(|normal| {
             let law = Coefficients::new(&spec.contact, report.clearance);
             let gap = law.separation(&report.eccentricity, &velocity);
             let slip_velocity = law.slip_velocity(&normal, &velocity, [&ball_spin, &socket_spin], law.socket_levers());
@@ -76,13 +89,20 @@ impl MagnifiedJoint {
         let first = impacts.nth(IMPACTS - 2);
         let since = first.map_or(f64::NEG_INFINITY, |impact| impact.start);
         let (radius, clearance) = (spec.contact.ball_radius, report.clearance);
-        let patch = (!ideal && clearance > 0.0).then(|| ContactPatch {
+        let places = frame.sites_of(joint).iter().enumerate();
+        let places: Vec<_> = places.map(|(place, site)| (spec.site_name(place as u8), *site)).collect();
+        let patch = (!ideal && clearance > 0.0 && places.is_empty()).then(|| ContactPatch {
             effective_radius: ElasticLaw::effective_radius(radius, clearance),
             penetration: report.penetration,
             radius: ElasticLaw::of_joint(&spec.contact, clearance).patch(radius, clearance, report.penetration),
             deepest: impact.map_or(0.0, |impact| impact.deepest),
         });
         Some(Self {
+            name: spec.name.clone(),
+            kind: spec.kind,
+            places,
+            axes: spec.frames.map(|own| frame.axes_of(&own)),
+            touches: touches && normal.is_some(),
             carrier: axes_of(frame, spec.carrier().body),
             report,
             normal,
@@ -92,6 +112,49 @@ impl MagnifiedJoint {
             impact,
             since,
         })
+    }
+
+    /// Whether it can tilt.
+    pub fn tilts(&self) -> bool {
+        !self.places.is_empty()
+    }
+
+    /// Whether it touches at one place, of which a section can be drawn.
+    pub fn has_section(&self) -> bool {
+        self.places.is_empty()
+    }
+
+    /// Penetration where it is deepest, m, negative for a gap; `None` in an ideal joint.
+    pub fn penetration(&self) -> Option<f64> {
+        (self.patch.is_some() || self.tilts() && self.report.state != ContactMode::Ideal)
+            .then_some(self.report.penetration)
+    }
+
+    /// The play in a sentence or two.
+    pub fn in_words(&self) -> String {
+        let Self { name, report, .. } = self;
+
+        let [off, play] = [report.eccentricity.norm(), report.clearance].map(|length| draw::length(length, 3));
+        let [part, wall] = self.kind.parts();
+        let state = value::contact(report.state, part);
+        if self.kind == LooseKind::Ball {
+            return format!(
+                "Ball joint {name} under the microscope. {state}. Ball's centre {off} from the socket's, clearance {play}."
+            );
+        }
+        let title = if matches!(self.kind, LooseKind::Pin(_)) { "Pin" } else { "Slide" };
+        let mut words = format!("{title} {name} under the microscope. {state}. ");
+        let _ = write!(words, "Middle of the {part} {off} off the {wall}'s axis, clearance {play}");
+        if self.tilts() {
+            let (tilt, axial) = (value::quantity(report.tilt, "deg", 3), draw::length(report.axial, 3));
+            let _ = write!(words, ", tilt {tilt}, axial position {axial}");
+        }
+        let touching: Vec<&str> =
+            self.places.iter().filter(|(_, site)| site.gap < 0.0).map(|(name, _)| name.as_str()).collect();
+        if !touching.is_empty() {
+            let _ = write!(words, "; it touches at {}", touching.join(", "));
+        }
+        words + "."
     }
 }
 

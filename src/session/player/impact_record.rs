@@ -22,8 +22,10 @@ const ROUNDING: f64 = 1e-12;
 pub struct RecordedImpact {
     /// Its number in [`ImpactEvent`].
     id: u64,
-    /// Ball joint.
+    /// Joint with play.
     pub joint: usize,
+    /// Where in it: [`Impact::place`].
+    pub place: u8,
     /// Start, s.
     pub start: f64,
     /// Time at which the ball left its wall, or at which a change removed the wall, s; infinite in contact.
@@ -70,7 +72,7 @@ impl ImpactRecord {
     pub(super) fn begin(&mut self, state: &State) {
         *self = Self::default();
         for (id, impact, _) in state.impacts_under_way() {
-            self.apply(ImpactEvent::Began { id, joint: impact.joint, start: impact.start });
+            self.apply(ImpactEvent::Began { id, joint: impact.joint, place: impact.place, start: impact.start });
         }
     }
 
@@ -85,7 +87,7 @@ impl ImpactRecord {
     /// Records what happened; what is known already changes nothing.
     fn apply(&mut self, event: ImpactEvent) {
         match event {
-            ImpactEvent::Began { id, joint, start } if id >= self.next => {
+            ImpactEvent::Began { id, joint, place, start } if id >= self.next => {
                 self.next = id + 1;
                 if self.all.len() == MAX_IMPACTS {
                     self.all.pop_front();
@@ -93,7 +95,7 @@ impl ImpactRecord {
                 }
                 let force_peak = ForcePeak { time: start, ..ForcePeak::default() };
                 let (end, largest) = (f64::INFINITY, force_peak);
-                let own = RecordedImpact { id, joint, start, end, force_peak, largest, impact: None };
+                let own = RecordedImpact { id, joint, place, start, end, force_peak, largest, impact: None };
                 // Another may have begun later in the same step.
                 let at = self.all.partition_point(|other| other.start <= start);
                 self.all.insert(at, own);
@@ -151,7 +153,7 @@ impl ImpactRecord {
         ended.filter_map(|(number, own)| Some((number, own, own.finished()?)))
     }
 
-    /// The impacts of ball joint `joint`, or of any, that had begun by `time`, s, and whose end is known; the latest first.
+    /// The impacts of joint `joint`, or of any, that had begun by `time`, s, and whose end is known; the latest first.
     pub fn latest(&self, joint: Option<usize>, time: f64) -> impl Iterator<Item = &Impact> {
         let begun = self.all.iter().rev().filter(move |impact| impact.has_begun(time) && is_of(joint, impact));
         begun.filter_map(RecordedImpact::finished)
@@ -170,7 +172,7 @@ impl ImpactRecord {
         peaked.filter(|(_, own)| force(own) > 0.0).max_by(|(_, a), (_, b)| force(a).total_cmp(&force(b)))
     }
 
-    /// The impact in progress at `time`, s, of ball joint `joint`, or of any, once its peak is known; resting balls are
+    /// The impact in progress at `time`, s, of joint `joint`, or of any, once its peak is known; resting parts are
     /// excluded. Among several, the one that peaks at that instant, otherwise the one that began last.
     pub fn in_progress(&self, joint: Option<usize>, time: f64) -> Option<(u64, &RecordedImpact)> {
         let touching = || {
@@ -189,7 +191,7 @@ impl ImpactRecord {
         impact.end.is_infinite() && self.latest_step[1] <= impact.start + MAX_IMPACT_DURATION
     }
 
-    /// The first peak after `time`, s, of an impact of ball joint `joint`, or of any. `None` while an earlier one may still
+    /// The first peak after `time`, s, of an impact of joint `joint`, or of any. `None` while an earlier one may still
     /// come; with `at_once` the first known so far.
     pub fn next_peak(&self, joint: Option<usize>, time: f64, at_once: bool) -> Option<f64> {
         let own = || self.all.iter().filter(|impact| is_of(joint, impact));
@@ -199,7 +201,7 @@ impl ImpactRecord {
         (at_once || !open).then_some(next)
     }
 
-    /// The last peak before `time`, s, of an impact of ball joint `joint`, or of any.
+    /// The last peak before `time`, s, of an impact of joint `joint`, or of any.
     pub fn previous_peak(&self, joint: Option<usize>, time: f64) -> Option<f64> {
         // A force that is largest in the latest step may still rise.
         let may_rise =
@@ -208,7 +210,7 @@ impl ImpactRecord {
         own.map(|impact| impact.force_peak.time).filter(|peak| *peak < time).max_by(f64::total_cmp)
     }
 
-    /// The peaks after `from` and up to `to`, s, with the ball joint of each.
+    /// The peaks after `from` and up to `to`, s, with the joint of each.
     pub fn peaks(&self, from: f64, to: f64) -> impl Iterator<Item = (usize, ForcePeak)> {
         let within = move |force_peak: &ForcePeak| {
             force_peak.time > from && force_peak.time <= to && force_peak.force.norm_squared() > 0.0
@@ -217,6 +219,16 @@ impl ImpactRecord {
             .iter()
             .map(|impact| (impact.joint, impact.force_peak))
             .filter(move |(_, force_peak)| within(force_peak))
+    }
+
+    /// Where joint `joint` was hit by the impact that peaks at `time`, s; otherwise by the latest in progress then.
+    pub fn place_of_peak(&self, joint: usize, time: f64) -> Option<u8> {
+        let touching = || {
+            let own = self.all.iter().rev().take(MAX_SEARCHED).filter(move |own| own.joint == joint);
+            own.filter(move |own| own.has_begun(time) && own.end >= time)
+        };
+        let peaks = |own: &&RecordedImpact| own.force_peak.time == time || own.largest.time == time;
+        touching().find(peaks).or_else(|| touching().next()).map(|own| own.place)
     }
 
     /// Number of impacts dropped.
@@ -252,7 +264,7 @@ mod tests {
         fn begins(&mut self, joint: usize, k: u64) -> u64 {
             self.step(k);
             let id = self.next;
-            self.apply(ImpactEvent::Began { id, joint, start: end(k) });
+            self.apply(ImpactEvent::Began { id, joint, place: 0, start: end(k) });
             id
         }
 
@@ -318,7 +330,7 @@ mod tests {
         let mut retraced = record();
         let again = record();
         for own in &again.all {
-            retraced.apply(ImpactEvent::Began { id: own.id, joint: own.joint, start: own.start });
+            retraced.apply(ImpactEvent::Began { id: own.id, joint: own.joint, place: own.place, start: own.start });
             let peak = ForcePeak { force: own.largest.force * 0.5, ..own.largest };
             retraced.apply(ImpactEvent::Peaked { id: own.id, peak });
             retraced.apply(ImpactEvent::Ended { id: own.id, end: own.end, impact: own.impact });

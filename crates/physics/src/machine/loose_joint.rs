@@ -44,6 +44,15 @@ impl LooseKind {
         }
     }
 
+    /// Words for the carried part and for its carrier.
+    pub fn parts(&self) -> [&'static str; 2] {
+        match self {
+            Self::Ball => ["ball", "socket"],
+            Self::Pin(_) => ["pin", "bearing"],
+            Self::Slide(_) => ["block", "guide"],
+        }
+    }
+
     /// Names of the places where it can touch; empty if there is only one. Of a pin the ends of the axis, at -L/2 and +L/2, and the
     /// faces of its collars, towards +axis and -axis; of a block its corners, 1 for - - - to 8 for + + + of x, y, z, each with the
     /// axis across its wall.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Ledger;
-use crate::machine::{Mat3, Vec3};
+use crate::machine::{JointFrame, Mat3, Vec3};
 pub use crate::mechanism::ElementReport;
 
 /// Everything that is reported about one instant. SI units, world axes.
@@ -49,6 +49,21 @@ pub struct Frame {
     pub ledger: Option<Ledger>,
 }
 
+impl Frame {
+    /// Axes of a frame of a joint as columns, world axes.
+    pub fn axes_of(&self, joint: &JointFrame) -> Mat3 {
+        let own = joint.rotation.to_rotation_matrix().into_inner();
+        joint.origin.body.and_then(|body| self.bodies.get(body)).map_or(own, |body| body.rotation * own)
+    }
+
+    /// Places of joint `joint` where it can touch; empty if there is only one.
+    pub fn sites_of(&self, joint: usize) -> &[SiteReport] {
+        let first = self.sites.partition_point(|site| site.joint < joint);
+        let count = self.sites[first..].partition_point(|site| site.joint == joint);
+        &self.sites[first..first + count]
+    }
+}
+
 /// Motion of a body's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BodyMotion {
@@ -83,10 +98,10 @@ pub struct Pose {
     pub angle_accelerations: Vec3,
 }
 
-/// Contact state of a ball joint.
+/// Contact state of a joint with play.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ContactMode {
-    /// The ball touches nothing.
+    /// It touches nowhere.
     #[default]
     Free,
     /// In contact, sliding slower than `slip_speed_high`, where friction is below its full value: any tangential load makes the
@@ -98,7 +113,7 @@ pub enum ContactMode {
     Ideal,
 }
 
-/// One ball joint at one instant. SI units, world axes.
+/// One joint with play at one instant; what is said of a ball holds for a pin and a block, too. SI units, world axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointReport {
     /// Z_i, m.
@@ -113,7 +128,9 @@ pub struct JointReport {
     pub tilt: f64,
     /// Current clearance (a live change ramps it at a bounded rate), m.
     pub clearance: f64,
-    /// delta = |e| - c, m (10); 0 for an ideal joint.
+    /// Current second play, m: along the axis of a pin, across the second pair of walls of a guide; 0 if it has none.
+    pub second_clearance: f64,
+    /// delta = |e| - c, m (10), where it is deepest; 0 for an ideal joint.
     pub penetration: f64,
     /// d(delta)/dt, m/s.
     pub penetration_rate: f64,

@@ -17,7 +17,7 @@ const MAX_EXTERNAL_WORK: f64 = 0.01;
 /// The same beyond which its law does not determine its rebound.
 const MAX_WORK_IN_REBOUND: f64 = 0.5;
 
-/// A finished impact of one ball joint, from the start of an approaching contact to its end. A contact that existed at the
+/// A finished impact of one joint with play, from the start of an approaching contact to its end. A contact that existed at the
 /// start, or that a live change ended, does not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Impact {
@@ -103,6 +103,8 @@ pub enum ImpactEvent {
         id: u64,
         /// Loose joint, by its index in the scene.
         joint: usize,
+        /// Where in it, as [`Impact::place`].
+        place: u8,
         /// When, s.
         start: f64,
     },
@@ -276,7 +278,7 @@ impl Impacts {
         let (id, peak) = (self.begun, ForcePeak { time: onset.time, force: Vec3::zeros() });
         contact.under_way = Some(UnderWay { id, impact, peak, rises: false, ends: false });
         self.begun += 1;
-        events.push(ImpactEvent::Began { id, joint: onset.joint, start: onset.time });
+        events.push(ImpactEvent::Began { id, joint: onset.joint, place: onset.place, start: onset.time });
     }
 
     /// Updates contact `c` over a step in which it was, or became, active, from its elastic law, its penetration and its largest

@@ -73,6 +73,7 @@ fn joint_report(mechanism: &Mechanism, joint: &LooseJoint, contact_states: &[Con
         axial,
         tilt,
         clearance: contacts.joint_clearance(j),
+        second_clearance: contacts.play(j, 1),
         ..JointReport::default()
     };
     let depth = |&c: &ContactId| contacts.gap(c).separation.penetration;
