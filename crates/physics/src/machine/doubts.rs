@@ -44,9 +44,9 @@ pub enum Doubt {
         "solver.step {}: {} {}, which a fixed step this long does not resolve; use {} or less, or solver.method = automatic.",
         format_quantity(*.step, "us"),
         if *.sliding {
-            format!("friction at ball joint {joint} is estimated to reverse the sliding in")
+            format!("friction at joint {joint} is estimated to reverse the sliding in")
         } else {
-            format!("an impact at ball joint {joint} is estimated to last")
+            format!("an impact at joint {joint} is estimated to last")
         },
         format_quantity(libm::round(.duration * 1e8) * 1e-8, "us"),
         format_quantity(*.recommended, "us")
@@ -92,7 +92,7 @@ pub enum Doubt {
         units: [&'static str; 2],
     },
     /// The list of ball joints with distinct settings is incomplete.
-    #[error("Further ball joints have settings of their own; warnings about them are not listed.")]
+    #[error("Further joints have settings of their own; warnings about them are not listed.")]
     MoreJoints,
 }
 
