@@ -47,7 +47,7 @@ fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
         println!("{name}: {stopped}");
         let text = stopped.to_string();
         let machine = simulation.machine();
-        let joints = machine.loose_joints.iter().map(|j| format!("ball joint {}", j.name));
+        let joints = machine.loose_joints.iter().map(|j| format!("joint {}", j.name));
         let bodies = machine.bodies.iter().map(|b| format!("body {}", b.name));
         assert!(joints.chain(bodies).any(|named| text.contains(&named)), "{text}");
         assert!(
