@@ -6,9 +6,9 @@ use serde_json::Value as Json;
 
 use crate::program::{folder, jointplay};
 
-const THROWN: &str = include_str!("../physics/joints/a.toml");
-const CRANK: &str = include_str!("../physics/joints/c.toml");
-const BLOCK: &str = include_str!("../physics/joints/d1.toml");
+const THROWN: &str = include_str!("../../assets/benchmarks/thrown-pin.toml");
+const CRANK: &str = include_str!("../../assets/benchmarks/crank-pin.toml");
+const BLOCK: &str = include_str!("../../assets/benchmarks/released-slide.toml");
 /// Contacts of the thrown pin from an independent program; its sites are the ends of the axis, at -L/2 and +L/2.
 const CONTACTS: &str = include_str!("../physics/joints/a-contacts.csv");
 
@@ -82,8 +82,8 @@ fn impacts_of_a_pin_name_their_ends() {
             let site = match parts.next().unwrap() {
                 "P-" => "J.a",
                 "P+" => "J.b",
-                "A+" => "J.front",
-                "A-" => "J.back",
+                "Pa+" => "J.front",
+                "Pa-" => "J.back",
                 other => panic!("{other}"),
             };
             (parts.next().unwrap().parse().unwrap(), site.to_owned())
