@@ -132,7 +132,7 @@ fn joints_with_two_degrees_of_freedom_closing_joints_and_every_kind_of_play_allo
                     }
                 });
                 assert_eq!(count, 0, "{method} {form}");
-                assert!(!frame.coordinates.is_empty());
+                assert!(!frame.coordinates.is_empty() || simulation.statistics().impacts() > 0);
             }
         }
     }
