@@ -109,8 +109,15 @@ fn curves_tyres_and_samples_of_reactions_allocate_nothing() {
 }
 
 #[test]
-fn joints_with_two_degrees_of_freedom_and_closing_joints_allocate_nothing() {
-    for text in [include_str!("fuzz/corpus/good-universal.toml"), include_str!("fuzz/corpus/good-loop-joints.toml")] {
+fn joints_with_two_degrees_of_freedom_closing_joints_and_every_kind_of_play_allocate_nothing() {
+    let corpus = [
+        include_str!("fuzz/corpus/good-universal.toml"),
+        include_str!("fuzz/corpus/good-loop-joints.toml"),
+        include_str!("fuzz/corpus/good-pins.toml"),
+        include_str!("fuzz/corpus/good-block.toml"),
+        include_str!("fuzz/corpus/good-planar-play.toml"),
+    ];
+    for text in corpus {
         for method in METHODS {
             for form in ["tree", "lagrange"] {
                 let changes = [("formulation", form), ("solver.method", method)];
@@ -125,7 +132,7 @@ fn joints_with_two_degrees_of_freedom_and_closing_joints_allocate_nothing() {
                     }
                 });
                 assert_eq!(count, 0, "{method} {form}");
-                assert!(!frame.coordinates.is_empty());
+                assert!(!frame.coordinates.is_empty() || simulation.statistics().impacts() > 0);
             }
         }
     }

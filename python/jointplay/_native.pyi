@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _Array = NDArray[np.float64]
-_Impacts = tuple[list[str], list[str], _Array]
+_Impacts = tuple[list[tuple[str, list[str]]], list[str], _Array]
 _Changes = list[tuple[str, str]]
 _Origin = tuple[str, str | None, dict[str, str], _Changes]
 
@@ -38,6 +38,8 @@ class Scene:
     def description(self) -> str: ...
     @property
     def ball_joints(self) -> list[str]: ...
+    @property
+    def sites(self) -> list[tuple[str, list[str]]]: ...
     @property
     def bodies(self) -> list[str]: ...
     def keys(self) -> list[str]: ...

@@ -71,9 +71,9 @@ class Check:
     dependent_rows: int
     """Constraint rows that the others imply."""
     contacts: int
-    """Ball joints with clearance."""
+    """Places where joints with play can touch: one of a ball, several of a pin or a block."""
     ideal_joints: int
-    """Ball joints without clearance."""
+    """Joints whose play is 0."""
     warnings: list[str]
     """Warnings of `jointplay check` about probable mistakes."""
     not_unique: str | None
@@ -191,12 +191,17 @@ class Scene:
 
     @property
     def ball_joints(self) -> list[str]:
-        """Names of the ball joints."""
+        """Names of the joints with play: balls, pins and blocks."""
         return self._native.ball_joints
 
     @property
+    def sites(self) -> dict[str, list[str]]:
+        """Places where each joint with play can touch: `{"J": ["J.a", "J.b"]}`; channels such as `J.a.normal` are theirs."""
+        return dict(self._native.sites)
+
+    @property
     def parameters(self) -> dict[str, Parameter]:
-        """All parameters by key: those of the scene, then those of each ball joint."""
+        """All parameters by key: those of the scene, then those of each joint with play."""
         return {key: self.parameter(key) for key in self._native.keys()}
 
     def parameter(self, key: str) -> Parameter:
@@ -378,12 +383,18 @@ INTEGERS = ("steps",)
 FLAGS = ("floored", "disturbed")
 
 
-def impact_table(ball_joints: list[str], names: list[str], values: NDArray[np.float64]) -> NDArray[Any]:
-    """Structured array of impacts; each row of `values` becomes a column."""
-    joints = np.array(ball_joints or [""])
+def impact_table(joints: list[tuple[str, list[str]]], names: list[str], values: NDArray[np.float64]) -> NDArray[Any]:
+    """Structured array of impacts; each row of `values` becomes a column. `joints` are the joints with play and their sites."""
+    columns = dict(zip(names, values, strict=True))
+    which = [(int(joint), int(site)) for joint, site in zip(columns["joint"], columns["site"], strict=True)]
+    words = {
+        "joint": np.array([joints[joint][0] for joint, _ in which] or [""]),
+        "site": np.array([joints[joint][1][site] for joint, site in which] or [""]),
+    }
     types: dict[str, Any] = {name: float for name in names}
-    types.update({name: int for name in INTEGERS}, joint=joints.dtype, **{name: bool for name in FLAGS})
+    types.update({name: int for name in INTEGERS}, **{name: bool for name in FLAGS})
+    types.update({name: text.dtype for name, text in words.items()})
     table = np.zeros(values.shape[1], dtype=list(types.items()))
-    for name, column in zip(names, values, strict=True):
-        table[name] = joints[column.astype(int)] if name == "joint" else column
+    for name, column in columns.items():
+        table[name] = words[name][: len(table)] if name in words else column
     return table

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Frame:
-    """One instant. SI units, world axes; bodies and ball joints in scene order."""
+    """One instant. SI units, world axes; bodies and joints with play in scene order."""
 
     time: float
     """Simulated time, s."""
@@ -34,11 +34,15 @@ class Frame:
     angular_velocities: NDArray[np.float64]
     """Angular velocities, rad/s: shape (bodies, 3)."""
     eccentricities: NDArray[np.float64]
-    """From the centre of each socket to that of its ball, m: shape (ball joints, 3)."""
+    """From the centre of each socket to that of its ball, m, or across the axis of another joint: shape (joints, 3)."""
     normal_forces: NDArray[np.float64]
-    """Normal force on each ball, N, or the reaction of an ideal joint: shape (ball joints, 3)."""
+    """Normal force on each ball, pin or block, N, or the reaction of an ideal joint: shape (joints, 3)."""
     friction_forces: NDArray[np.float64]
-    """Friction force on each ball, N: shape (ball joints, 3)."""
+    """Friction force on each ball, pin or block, N: shape (joints, 3)."""
+    axial: NDArray[np.float64]
+    """Displacement of each pin or block along the joint's axis, m; 0 for a ball: shape (joints,)."""
+    tilts: NDArray[np.float64]
+    """Angle between each pin and its bearing, or block and guide, rad; 0 for a ball: shape (joints,)."""
     values: NDArray[np.float64] = field(repr=False)
     """All channels, in the order of `Simulation.channels`."""
 

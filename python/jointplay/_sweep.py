@@ -63,7 +63,7 @@ class Sweep:
         - a `duration`, s, observed from `from_`, s, on;
         - `crossings` of `section` (`"crank.angle=90deg:up"`), the first `discard` of them a transient, within `duration`.
 
-        `keep` names statistics of channels (`"A.normal:max"`) to record in place of the forces and impacts of the ball joints.
+        `keep` names statistics of channels (`"A.normal:max"`) to record in place of the forces and impacts of the joints with play.
         `start` is `cold`, `follow-up` or `follow-down`, or several of them.
         """
         self.scene = scene

@@ -19,12 +19,13 @@ pub fn hash_text(hash: u64) -> String {
     format!("{hash:016x}")
 }
 
-/// Impacts: names of the ball joints, to which the first column refers; names of the columns; an array with one row per column.
-pub type Impacts<'py> = (Vec<String>, Vec<&'static str>, Bound<'py, PyArray2<f64>>);
+/// Impacts: names of the joints with play, to which the first column refers, and of the sites of each, to which the last one does;
+/// names of the columns; an array with one row per column.
+pub type Impacts<'py> = (Vec<(String, Vec<String>)>, Vec<&'static str>, Bound<'py, PyArray2<f64>>);
 
 /// The impacts of a simulation.
 pub fn impacts<'py>(py: Python<'py>, simulation: &Simulation, impacts: &[Impact]) -> PyResult<Impacts<'py>> {
-    let joints = simulation.machine().loose_joints.iter().map(|joint| joint.name.clone()).collect();
+    let joints = simulation.machine().loose_joints.iter().map(|joint| (joint.name.clone(), joint.sites())).collect();
     let mut values = Array2::zeros((COLUMNS.len(), impacts.len()));
     for (i, impact) in impacts.iter().enumerate() {
         for (column, value) in row(impact).into_iter().enumerate() {
@@ -51,7 +52,7 @@ pub fn ledger<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Option<
     Ok(Some(all))
 }
 
-/// Counters so far, and for each ball joint its largest normal force, N, when it occurred, s, and the number of contacts begun.
+/// Counters so far, and for each joint with play its largest normal force, N, when it occurred, s, and the number of contacts begun.
 pub fn statistics<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Bound<'py, PyDict>> {
     let statistics = simulation.statistics();
     let all = PyDict::new(py);

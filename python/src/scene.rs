@@ -113,10 +113,16 @@ impl PyScene {
         &self.scene.description
     }
 
-    /// Names of the ball joints, in scene order.
+    /// Names of the joints with play, in scene order.
     #[getter]
     fn ball_joints(&self) -> Vec<&str> {
         self.scene.machine.loose_joints.iter().map(|joint| &joint.name[..]).collect()
+    }
+
+    /// The same, with the names of the sites of each.
+    #[getter]
+    fn sites(&self) -> Vec<(&str, Vec<String>)> {
+        self.scene.machine.loose_joints.iter().map(|joint| (&joint.name[..], joint.sites())).collect()
     }
 
     /// Names of the bodies, in scene order.
@@ -125,7 +131,7 @@ impl PyScene {
         self.scene.machine.bodies.iter().map(|body| &body.name[..]).collect()
     }
 
-    /// Keys of the parameters: those of the scene, then those of each ball joint.
+    /// Keys of the parameters: those of the scene, then those of each joint with play.
     fn keys(&self) -> Vec<String> {
         let own = self.scene.parameters().into_iter().map(|parameter| parameter.key.to_owned());
         let of_joints = (0..self.scene.machine.loose_joints.len()).flat_map(|joint| self.scene.joint_keys(joint));

@@ -194,7 +194,7 @@ pub struct SweepArguments {
     #[arg(long, value_name = "TIME", requires = "duration")]
     pub from: Option<String>,
     /// What to record, as CHANNEL:STATISTIC, e.g. `S1.normal:max,tip_error:rms,*.force:mean`; channels as in `run --channels`;
-    /// statistics: max, min, mean, rms, std, range, end [default: the forces and impacts of the ball joints, and the tip error].
+    /// statistics: max, min, mean, rms, std, range, end [default: the forces and impacts of the joints with play, and the tip error].
     #[arg(long, value_name = "LIST")]
     pub keep: Option<String>,
     /// Where the sections are taken: at one phase of the drive, or where a channel crosses a value, as in
@@ -282,8 +282,8 @@ pub struct RenderArguments {
     /// Zoom in by this factor.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, help_heading = "Picture")]
     pub zoom: f32,
-    /// Close-up of one ball joint.
-    #[arg(long, value_name = "BALL JOINT", help_heading = "Picture", conflicts_with_all = ["camera", "yaw", "pitch"])]
+    /// Close-up of one joint with play.
+    #[arg(long, value_name = "JOINT", help_heading = "Picture", conflicts_with_all = ["camera", "yaw", "pitch"])]
     pub close_up: Option<String>,
     /// Which contact forces to draw.
     #[arg(long, value_enum, value_name = "WHICH", default_value = "both", help_heading = "Picture")]
@@ -407,7 +407,7 @@ pub enum Hideable {
     Floor,
     /// Axis triad with gravity.
     Triad,
-    /// Names of the ball joints.
+    /// Names of the joints with play.
     Names,
     /// Pins and rails of hinges and slides.
     Hinges,

@@ -11,7 +11,7 @@ use crate::analysis::ideal_fault::ideal_fault;
 use crate::analysis::initial_peaks::InitialPeaks;
 use crate::contact::FrictionLaw;
 use crate::integrate::{Method, StepControl};
-use crate::machine::{Body, Element, Joint, JointKind, LooseJoint};
+use crate::machine::{Body, Element, Joint, JointKind, LooseJoint, LooseKind, Pin, Slide};
 use crate::mechanism::{ElementReport, Summary};
 use crate::scene::Scene;
 use crate::simulate::{ChannelInfo, Frame, Peak, channels_of};
@@ -55,7 +55,7 @@ fn channels(all: &[ChannelInfo]) -> String {
 }
 
 fn is_ideal(joint: &LooseJoint) -> bool {
-    joint.contact.clearance == 0.0
+    joint.contact.is_ideal()
 }
 
 fn report(
@@ -85,9 +85,10 @@ fn report(
     for body in scene.machine.bodies.iter().filter(|body| body.density.is_some()) {
         line(&format!("  {}", body.name), &mass_from_shapes(body));
     }
-    line("Joints", &joints(&scene.machine.joints));
+    let loose = &scene.machine.loose_joints;
+    line("Joints", &joints(&scene.machine.joints, loose));
     if !scene.machine.closing_joints.is_empty() {
-        line("Close loops", &joints(&scene.machine.closing_joints));
+        line("Close loops", &joints(&scene.machine.closing_joints, loose));
     }
     for (joint, [force, torque]) in scene.machine.closing_joints.iter().zip(&start.closing) {
         let reaction = format!(
@@ -98,11 +99,11 @@ fn report(
         );
         line(&format!("  {}", joint.name), &reaction);
     }
-    line("Ball joints", &format!("{} with clearance, {} ideal", contents.contacts, contents.ideal_joints));
-    for (joint, report) in scene.machine.loose_joints.iter().zip(&start.joints) {
+    line("Joints with play", &with_and_without_play(loose));
+    for (joint, report) in loose.iter().zip(&start.joints) {
         line(
             &format!("  {}", joint.name),
-            &ball_joint(joint, report.normal_force.norm(), start_report.indeterminate_parts(&joint.name)),
+            &loose_joint(joint, report.normal_force.norm(), start_report.indeterminate_parts(&joint.name)),
         );
     }
     if !scene.machine.elements.is_empty() {
@@ -120,12 +121,13 @@ fn report(
             String::new()
         };
         line("Beginning", &format!("largest contact forces of the first {until}{cut}"));
-        let loose = scene.machine.loose_joints.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
-        for (joint, peak) in loose.take(MAX_LISTED) {
+        let mut peaks = loose.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
+        for (joint, peak) in peaks.by_ref().take(MAX_LISTED) {
             line(&format!("  {}", joint.name), &first_contact(peak));
         }
-        if contents.contacts > MAX_LISTED {
-            line("  …", &format!("and {} more ball joints", contents.contacts - MAX_LISTED));
+        match peaks.count() {
+            0 => {}
+            more => line("  …", &format!("and {}", count(more as u64, "more joint"))),
         }
     }
     line("Degrees of freedom", &freedoms(contents));
@@ -167,7 +169,8 @@ fn mass_from_shapes(body: &Body) -> String {
     )
 }
 
-fn joints(all: &[Joint]) -> String {
+/// Joints by kind, without the free ones of bodies that a joint of `loose` carries.
+fn joints(all: &[Joint], loose: &[LooseJoint]) -> String {
     let kinds = [
         JointKind::Prismatic,
         JointKind::Revolute,
@@ -179,10 +182,10 @@ fn joints(all: &[Joint]) -> String {
     let mut parts = Vec::new();
     for kind in kinds {
         for driven in [true, false] {
-            let of_kind = || {
-                let is_of_kind = |j: &&Joint| j.kind == kind && j.drives().next().is_some() == driven;
-                all.iter().filter(is_of_kind)
-            };
+            let is_of_kind = |j: &&Joint| j.kind == kind && j.drives().next().is_some() == driven;
+            let stands_for_loose =
+                |j: &&Joint| kind == JointKind::Free && loose.iter().any(|loose| loose.name == j.name);
+            let of_kind = || all.iter().filter(is_of_kind).filter(|j| !stands_for_loose(j));
             let count = of_kind().count();
             if count > 0 {
                 let word = kind.word();
@@ -191,7 +194,7 @@ fn joints(all: &[Joint]) -> String {
             }
         }
     }
-    parts.join(", ")
+    if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
 }
 
 /// A note about the indeterminate `parts` of a reaction, if there are any.
@@ -199,22 +202,65 @@ fn not_unique(parts: Option<&str>) -> String {
     parts.map_or_else(String::new, |parts| format!(" (not unique: {parts})"))
 }
 
-fn ball_joint(joint: &LooseJoint, force: f64, indeterminate_parts: Option<&str>) -> String {
+/// Numbers and names of the joints that have play, and of those whose play is 0.
+fn with_and_without_play(loose: &[LooseJoint]) -> String {
+    let of = |ideal: bool| loose.iter().filter(move |joint| is_ideal(joint) == ideal);
+    let part = |ideal: bool, what: &str| match of(ideal).count() {
+        0 => None,
+        number => Some(format!("{number}{what} ({})", names(of(ideal).map(|joint| &joint.name)))),
+    };
+    let parts: Vec<String> = part(false, "").into_iter().chain(part(true, " without")).collect();
+    if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
+}
+
+fn loose_joint(joint: &LooseJoint, force: f64, indeterminate_parts: Option<&str>) -> String {
     let contact = &joint.contact;
+    let kind = match joint.kind {
+        LooseKind::Ball => String::new(),
+        _ => format!("{}, ", joint.kind.word()),
+    };
     if is_ideal(joint) {
-        return format!("ideal; reaction at the start {} N{}", significant(force, 6), not_unique(indeterminate_parts));
+        let reaction = significant(force, 6);
+        return format!("{kind}ideal; reaction at the start {reaction} N{}", not_unique(indeterminate_parts));
     }
     let friction = match contact.friction_law {
         FrictionLaw::None => "no friction".to_owned(),
         law => format!("friction {} ({law}, {})", contact.friction, contact.friction_velocity),
     };
-    format!(
-        "clearance {} mm, ball radius {} mm, {}, restitution {}, {friction}",
-        significant(contact.clearance * 1e3, 6),
-        significant(contact.ball_radius * 1e3, 6),
-        contact.normal_law,
-        contact.restitution,
-    )
+    format!("{kind}{}, {}, restitution {}, {friction}", dimensions(joint), contact.normal_law, contact.restitution,)
+}
+
+/// Plays and dimensions of a joint with play.
+fn dimensions(joint: &LooseJoint) -> String {
+    let mm = |what: &str, value: f64| format!("{what} {} mm", significant(value * 1e3, 6));
+    let radius = joint.contact.ball_radius;
+    let [first, second] = joint.contact.clearances();
+    let parts: Vec<String> = match joint.kind {
+        LooseKind::Ball => vec![mm("clearance", first), mm("ball radius", radius)],
+        LooseKind::Pin(Pin { length, ends, kept, face_radius, travel }) => {
+            let axial = (kept && length.is_some()).then(|| mm("axial play", second));
+            let of_ends = |length| [mm("length", length), format!("ends of the {ends}")];
+            let whole = [mm("radial play", first)].into_iter().chain(axial).chain([mm("pin radius", radius)]);
+            whole
+                .chain(length.map(of_ends).into_iter().flatten())
+                .chain(length.is_none().then(|| "planar".to_owned()))
+                .chain(face_radius.map(|radius| mm("face radius", radius)))
+                .chain(travel.map(|travel| mm("travel", travel)))
+                .collect()
+        }
+        LooseKind::Slide(Slide { half_length, half_width, half_height, corner_radius }) => {
+            let block = [half_length, half_width].into_iter().chain(half_height);
+            let sizes: Vec<String> = block.map(|half| significant(2e3 * half, 6)).collect();
+            [mm("play along y", first)]
+                .into_iter()
+                .chain(half_height.map(|_| mm("along z", second)))
+                .chain([format!("block {} mm", sizes.join(" x "))])
+                .chain(half_height.is_none().then(|| "planar".to_owned()))
+                .chain([mm("corner radius", corner_radius)])
+                .collect()
+        }
+    };
+    parts.join(", ")
 }
 
 /// Kind of a force element, and its force and torque at the start.
@@ -228,7 +274,7 @@ fn force_element(element: &Element, report: &ElementReport) -> String {
 /// Processor time for each part of the check that steps, s.
 const MAX_COST: f64 = 2.0;
 
-/// Largest number of ball joints listed with their first contact forces.
+/// Largest number of joints listed with their first contact forces.
 const MAX_LISTED: usize = 12;
 
 /// Largest contact force, its time and the fastest approach in the first part of a run.
@@ -310,11 +356,7 @@ fn computed_and_skipped(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<
         },
         "differential equations: there is no degree of freedom, the drives prescribe the motion",
     );
-    list(
-        contents.contacts > 0,
-        format!("contact forces at {}", with(false)),
-        "contact forces: no ball joint has clearance",
-    );
+    list(contents.contacts > 0, format!("contact forces at {}", with(false)), "contact forces: no joint has play");
     let has_friction = |joint: &&LooseJoint| {
         !is_ideal(joint) && joint.contact.friction > 0.0 && joint.contact.friction_law != FrictionLaw::None
     };
@@ -325,9 +367,9 @@ fn computed_and_skipped(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<
         "friction: no contact has friction",
     );
     list(
-        contents.ideal_joints > 0,
+        scene.machine.loose_joints.iter().any(is_ideal),
         format!("reactions of the ideal joints at {}", with(true)),
-        "reactions of ideal joints: no ball joint is ideal",
+        "reactions of ideal joints: no joint has a play of 0",
     );
     if contents.closing_joints > 0 {
         let closing = names(scene.machine.closing_joints.iter().map(|joint| &joint.name));

@@ -58,13 +58,15 @@ impl ImpactsFile {
         meta.insert("rows".into(), json!(self.impacts.len()));
         // Indices in the column `joint`, from 0.
         meta.insert("ball_joints".into(), json!(names));
+        // By joint, the names of the indices in the column `site`.
+        meta.insert("sites".into(), scene.machine.loose_joints.iter().map(|joint| json!(joint.sites())).collect());
         let table = Table::of_rows(COLUMNS, self.impacts.iter().map(row));
         let files = self.file.fill(&table, meta)?;
         Ok((self.impacts.len(), files))
     }
 }
 
-/// Summary of the impacts of one ball joint.
+/// Summary of the impacts of one joint with play.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Restitution {
     /// Number of impacts.
@@ -76,7 +78,7 @@ pub struct Restitution {
 }
 
 impl Restitution {
-    /// Summary for ball joint `joint`.
+    /// Summary for joint `joint`.
     pub fn of(impacts: &[Impact], joint: usize) -> Self {
         let own = || impacts.iter().filter(|impact| impact.joint == joint);
         let clean = own().filter(|impact| !impact.disturbed && !impact.below_speed_floor);

@@ -118,7 +118,7 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
     for (i, joint) in scene.machine.loose_joints.iter().enumerate() {
         let (force, at) = simulation.peak(i);
         let peak = format!("peak {} N at {} s", significant(force, 6), significant(at, 6));
-        let description = if joint.contact.clearance == 0.0 {
+        let description = if joint.contact.is_ideal() {
             format!("ideal, {peak}")
         } else if force == 0.0 {
             "no contact".to_owned()

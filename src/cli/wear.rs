@@ -5,6 +5,7 @@ use serde_json::{Map, Value as Json, json};
 use super::Failure;
 use super::output::{RowsFile, Table};
 use crate::files::PendingFile;
+use crate::machine::LooseKind;
 use crate::scene::Scene;
 use crate::simulate::{Edges, Wear};
 
@@ -22,6 +23,21 @@ const COLUMNS: [&str; 12] = [
     "impulse_N_s_m2",
     "friction_work_J_m2",
 ];
+
+/// The joints with play that have no wear map, in words; `None` if all have one.
+///
+/// # Errors
+/// Usage, if none has one.
+pub fn without_map(option: &str, scene: &Scene) -> Result<Option<String>, Failure> {
+    let loose = || scene.machine.loose_joints.iter().filter(|joint| !joint.contact.is_ideal());
+    let others = loose().filter(|joint| joint.kind != LooseKind::Ball);
+    let names: Vec<String> = others.map(|joint| format!("{} ({})", joint.name, joint.kind.word())).collect();
+    if names.is_empty() {
+        return Ok(None);
+    }
+    let words = format!("{option}: only ball joints have a wear map, not {}", names.join(", "));
+    if names.len() == loose().count() { Err(Failure::usage(words)) } else { Ok(Some(words)) }
+}
 
 /// Writes `map` to `file` with its provenance `meta`, under temporary names. Also returns the number of rows.
 ///

@@ -347,6 +347,7 @@ impl Laboratory {
         let impacts = ended.map(|impact| {
             json!({
                 "joint": joints[impact.joint].name,
+                "site": joints[impact.joint].site_name(impact.place),
                 "start_s": impact.start,
                 "end_s": impact.end,
                 "approach_m_s": impact.approach_speed,

@@ -575,16 +575,16 @@ fn scenes_are_listed_and_checked_with_their_contents() {
     let folder = folder();
     let list = jointplay(folder.path(), "scenes").expect(0).stdout;
     for (scene, words) in [
-        ("spcmm", &["7 moving", "3 with clearance", "contact forces at S1, S2, S3", "P1, P2, P3"][..]),
-        ("pendulum", &["1 moving", "1 with clearance"]),
-        ("slider-crank", &["3 moving", "1 with clearance, 1 ideal", "reactions of the ideal joints at B"]),
+        ("spcmm", &["7 moving", "3 (S1, S2, S3)", "contact forces at S1, S2, S3", "P1, P2, P3"][..]),
+        ("pendulum", &["1 moving", "Joints with play      1 (S1)"]),
+        ("slider-crank", &["3 moving", "1 (C), 1 without (B)", "reactions of the ideal joints at B"]),
         ("slider-crank-driven", &["3 moving", "1 driven revolute"]),
-        ("chain", &["8 moving", "8 with clearance"]),
-        ("hexapod", &["13 moving", "12 with clearance", "6 driven"]),
-        ("delta", &["10 moving", "12 with clearance", "3 driven"]),
-        ("four-bar", &["3 moving", "2 with clearance"]),
-        ("suspension", &["5 moving", "4 with clearance"]),
-        ("press", &["5 moving", "2 with clearance"]),
+        ("chain", &["8 moving", "Joints with play      8 ("]),
+        ("hexapod", &["13 moving", "Joints with play      12 (", "6 driven"]),
+        ("delta", &["10 moving", "Joints with play      12 (", "3 driven"]),
+        ("four-bar", &["3 moving", "2 (A, B)"]),
+        ("suspension", &["5 moving", "Joints with play      4 ("]),
+        ("press", &["5 moving", "2 (knee, wrist)"]),
     ] {
         assert!(list.lines().any(|line| line.split_whitespace().next() == Some(scene)), "{list}");
         let report = jointplay(folder.path(), &format!("check {scene}")).expect(0).stdout;

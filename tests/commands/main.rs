@@ -8,6 +8,7 @@ mod chart;
 mod command_line;
 mod ledger_files;
 mod links;
+mod loose;
 mod map;
 mod peaks;
 mod program;

@@ -7,7 +7,7 @@ use serde_json::Value as Json;
 
 use crate::program::{command, folder, jointplay};
 
-const MACHINES: [&str; 5] = ["hexapod", "delta", "four-bar", "suspension", "press"];
+const MACHINES: [&str; 7] = ["hexapod", "delta", "four-bar", "suspension", "press", "slider-crank-worn", "excavator"];
 
 /// Header and rows of a CSV file.
 fn rows(folder: &Path, name: &str) -> Vec<String> {

@@ -28,7 +28,8 @@ pub fn at_random_instants(length: Duration, default_count: u32, mut kill: impl F
 pub const SCENES: [&str; 6] =
     ["measuring-machine", "spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain"];
 /// The other built-in scenes, whose long runs are slow; `tests/physics/machines.rs` checks each of them.
-pub const MACHINES: [&str; 5] = ["hexapod", "delta", "four-bar", "suspension", "press"];
+pub const MACHINES: [&str; 7] =
+    ["hexapod", "delta", "four-bar", "suspension", "press", "slider-crank-worn", "excavator"];
 /// Words of `solver.method`.
 pub const METHODS: [&str; 5] = ["discrete-gradient", "rk4", "dopri5", "radau5", "automatic"];
 

@@ -312,6 +312,12 @@ const CLAIMS: &[Claim] = &[
     ("forces", 5, Ends, "Only the line that the spikes hid remains", |s| {
         s.joints().all(|joint| s.joint(joint).state == ContactMode::Ideal)
     }),
+    ("worn-hinge", 1, Begins, "The boom turns on a pin at its foot", |s| s.joints().len() == 2),
+    ("worn-hinge", 3, Begins, "Play on to where the load is largest", |s| s.time() < 0.5),
+    ("worn-hinge", 3, Ends, "They are a couple", |s| {
+        let [a, b, ..] = &s.app().player().frame().sites[..] else { return false };
+        a.normal_force.dot(&b.normal_force) < -0.9 * a.normal_force.norm() * b.normal_force.norm()
+    }),
     ("twin", 1, Begins, "The violet ghost is a twin", |s| s.app().player().twin().is_some()),
     ("twin", 2, Begins, "The bench plots the distance of the twin against time", |s| plots_twin_distance(s)),
     ("twin", 2, Begins, "So far no ball touches its wall", |s| s.all_free()),

@@ -25,7 +25,7 @@ fn golden_in(folder: &str, name: &str, arguments: &str) {
 const IMPACT: &str = "spcmm --at 7.85ms --size 640x400 --magnification 20 --overlay";
 
 /// Every built-in scene: the instant, and the magnification of its clearances.
-const SCENES: [(&str, &str, u32); 11] = [
+const SCENES: [(&str, &str, u32); 13] = [
     ("measuring-machine", "0.108s", 20),
     ("spcmm", "7.85ms", 20),
     ("pendulum", "0.1s", 1),
@@ -37,6 +37,8 @@ const SCENES: [(&str, &str, u32); 11] = [
     ("four-bar", "0.1s", 10),
     ("suspension", "0.1s", 10),
     ("press", "0.1s", 10),
+    ("slider-crank-worn", "0.1s", 10),
+    ("excavator", "0.3s", 5),
 ];
 
 #[test]

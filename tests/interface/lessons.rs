@@ -287,7 +287,7 @@ fn a_presented_lesson_is_legible_from_the_last_row() {
 }
 
 /// The lessons' stored steps, counted from 0.
-const STORED_STEPS: [(&str, usize); 10] = [
+const STORED_STEPS: [(&str, usize); 11] = [
     ("rattle", 1),
     ("first-impact", 3),
     ("clearance", 2),
@@ -298,6 +298,7 @@ const STORED_STEPS: [(&str, usize); 10] = [
     ("twin", 2),
     ("chaos", 0),
     ("to-the-class", 4),
+    ("worn-hinge", 2),
 ];
 
 #[test]

@@ -5,9 +5,9 @@ use jointplay_physics::machine::{JointStart, LooseKind, Machine};
 use jointplay_physics::simulate::{Effect, Frame, Simulation, channels_of};
 use jointplay_scene::{LiveScene, Scene, Value};
 
-const THROWN: &str = include_str!("joints/a.toml");
-const CRANK: &str = include_str!("joints/c.toml");
-const BLOCK: &str = include_str!("joints/d1.toml");
+const THROWN: &str = include_str!("../../assets/benchmarks/thrown-pin.toml");
+const CRANK: &str = include_str!("../../assets/benchmarks/crank-pin.toml");
+const BLOCK: &str = include_str!("../../assets/benchmarks/released-slide.toml");
 
 fn scene(text: &str, changes: &[(&str, &str)]) -> Scene {
     let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
@@ -27,7 +27,12 @@ fn files_give_the_contacts_of_an_independent_program() {
     compare("b", machine(THROWN, &[("joint.J.friction", "0")]), include_str!("joints/b-contacts.csv"), 5.1e-3);
     compare("c", machine(CRANK, &[]), include_str!("joints/c-contacts.csv"), 2e-3);
     compare("d1", machine(BLOCK, &[]), include_str!("joints/d1-contacts.csv"), 0.02);
-    compare("h", machine(include_str!("joints/h.toml"), &[]), include_str!("joints/h-contacts.csv"), 8e-3);
+    compare(
+        "h",
+        machine(include_str!("../../assets/benchmarks/free-housing.toml"), &[]),
+        include_str!("joints/h-contacts.csv"),
+        8e-3,
+    );
 }
 
 /// A pendulum of three links, the lower two with play, of which the upper is displaced at the start.

@@ -202,6 +202,59 @@ fn play_lifts_the_ram_of_the_press_at_the_bottom() {
     assert!((2.0e-4..2.3e-4).contains(&lift), "{lift:e} m");
 }
 
+#[test]
+fn the_block_of_the_worn_slider_crank_follows_from_crank_and_rod() {
+    for (crank, rod) in [(0.050, 0.120), (0.030, 0.150)] {
+        let text = [crank, rod].map(|length| format!("{length} m"));
+        let changes = [("parameter.crank", &*text[0]), ("parameter.rod", &*text[1])];
+        check_ideal_run("slider-crank-worn", &changes, 0.35, |scene, frame| {
+            // 200 rpm.
+            let (sin, cos) = (TAU * frame.time * 200.0 / 60.0).sin_cos();
+            let (position, axes) = pose(scene, frame, "block");
+            let expected = Vec3::new(crank * cos + (rod * rod - (crank * sin).powi(2)).sqrt(), 0.0, 0.0);
+            let error = (position - expected).norm();
+            assert!(error < 1e-9, "{} s: {error:e} m", frame.time);
+            assert!((axes - Mat3::identity()).norm() < 1e-8, "{} s", frame.time);
+        });
+    }
+}
+
+/// Without play the teeth of the excavator stay in its plane. With it they cannot leave it farther than the pins tilt: each by twice
+/// its play and the depths of its two ends over its length, about the shortest line from its axis to the teeth; and while the load is
+/// largest, they reach this bound but for the part of the play that the weight takes.
+#[test]
+fn the_teeth_of_the_excavator_stray_by_the_tilt_of_its_pins() {
+    const LENGTH: f64 = 0.080;
+    check_ideal_run("excavator", &[], 2.0, |scene, frame| {
+        let across = pose(scene, frame, "bucket").0.y;
+        assert!(across.abs() < 1e-9, "{} s: {across:e} m", frame.time);
+    });
+    for changes in [&[][..], &[("joint.stick-pin.play.radial", "0")], &[("joint.boom-pin.play.radial", "0.2 mm")]] {
+        let mut simulation = simulation("excavator", changes);
+        let machine = simulation.machine().clone();
+        for quarter in 1..8 {
+            run_until(&mut simulation, 0.25 * f64::from(quarter));
+            let frame = frame_now(&mut simulation);
+            let teeth = pose(&machine, &frame, "bucket").0;
+            let bound: f64 = frame
+                .joints
+                .iter()
+                .map(|joint| {
+                    let arm = (teeth - joint.socket_centre).xz().norm();
+                    2.0 * (joint.clearance + joint.penetration.max(0.0)) / LENGTH * arm
+                })
+                .sum();
+            let share = teeth.y.abs() / bound;
+            println!("{changes:?}, {} s: {:.3} mm, {share:.4} of the bound", frame.time, 1e3 * teeth.y);
+            // The bound holds for small angles; their squares are 2e-4.
+            assert!(share < 1.001, "{changes:?}, {} s: {share}", frame.time);
+            if quarter % 4 == 2 {
+                assert!(share > 0.95, "{changes:?}, {} s: {share}", frame.time);
+            }
+        }
+    }
+}
+
 /// Stiffnesses of the suspension's coil spring and tyre, N/m.
 const COIL: f64 = 167_062.0;
 const TYRE: f64 = 326_332.0;

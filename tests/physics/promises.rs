@@ -41,10 +41,11 @@ fn step_into_contact(simulation: &mut Simulation) -> u32 {
 fn change_parameters(simulation: &mut LiveScene) {
     simulation.set("contact.friction", "0.1").unwrap();
     let machine = simulation.machine().clone();
-    let loose = machine.loose_joints.iter().find(|joint| joint.contact.clearance > 0.0);
+    let loose = machine.loose_joints.iter().position(|joint| joint.contact.clearance > 0.0);
     if let Some(joint) = loose {
-        let key = format!("joint.{}.clearance", joint.name);
-        let smaller = format!("{:e} m", 0.9 * joint.contact.clearance);
+        let is_play = |key: &String| [".clearance", ".play.radial", ".play.y"].iter().any(|end| key.ends_with(end));
+        let key = simulation.pending().joint_keys(joint).find(is_play).expect("each kind has a play");
+        let smaller = format!("{:e} m", 0.9 * machine.loose_joints[joint].contact.clearance);
         simulation.set(&key, &smaller).unwrap();
     }
     let other = FORMULATIONS.into_iter().find(|word| *word != machine.formulation.word()).expect("two");

@@ -289,7 +289,7 @@ impl Schema {
 }
 
 /// Bad files of the corpus whose error a schema can detect.
-const WRONG_FORM: [&str; 19] = [
+const WRONG_FORM: [&str; 22] = [
     "axis-of-zero",
     "bad-name",
     "bare-number",
@@ -304,6 +304,9 @@ const WRONG_FORM: [&str; 19] = [
     "out-of-range",
     "pattern-count",
     "pattern-in-pattern",
+    "play-of-a-fixed-joint",
+    "play-of-another-kind",
+    "play-without-length",
     "table-for-value",
     "two-rotations",
     "unknown-key",

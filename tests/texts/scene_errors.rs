@@ -184,8 +184,8 @@ fn every_broken_line_is_reported_with_its_remedy() {
         ("form = \"sphere\"", "form = \"sphere\", bore = \"1 mm\"", &["shapes[0].bore", "unknown key"]),
         (
             "kind = \"free\"",
-            "kind = \"spherical\"\nstiffness = 3",
-            &["joint.free.kind = \"spherical\"", "allowed fixed, prismatic, revolute, free"],
+            "kind = \"planar\"\nstiffness = 3",
+            &["joint.free.kind = \"planar\"", "allowed fixed, prismatic, revolute, free"],
         ),
         ("radius = \"4 mm\"", "radius = \"-4 mm\"", &["body.rod.shapes[0].radius", "above 0"]),
         ("centre = \"0 0 1 mm\"", "size = \"1 1 1 mm\"", &["body.rod.shapes[0].size", "a sphere has centre, radius"]),

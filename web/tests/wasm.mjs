@@ -32,6 +32,6 @@ export async function sameBits(wasm, scene, seconds, changes) {
 }
 
 /** Scenes with many loose joints, which run slowly. */
-export const isSlow = (scene) => ['hexapod', 'delta', 'four-bar', 'suspension', 'press'].includes(scene);
+export const isSlow = (scene) => ['hexapod', 'delta', 'four-bar', 'suspension', 'press', 'slider-crank-worn', 'excavator'].includes(scene);
 /** A fixed step that is stable for light rods on tight balls. */
 export const FINE = 'solver.step=1us';

@@ -3,7 +3,7 @@
 use jointplay_physics::simulate::Impact;
 
 /// Names of the columns.
-pub const COLUMNS: [&str; 14] = [
+pub const COLUMNS: [&str; 15] = [
     "joint",
     "start_s",
     "end_s",
@@ -18,9 +18,11 @@ pub const COLUMNS: [&str; 14] = [
     "deepest_m",
     "peak_N",
     "damping_over_elastic",
+    "site",
 ];
 
-/// Values of `impact` in the order of [`COLUMNS`], SI units; the joint is given by its index from 0.
+/// Values of `impact` in the order of [`COLUMNS`], SI units; the joint is given by its index from 0, the site by
+/// that among the sites of the joint.
 pub fn row(impact: &Impact) -> [f64; COLUMNS.len()] {
     let flag = |set: bool| f64::from(u8::from(set));
     [
@@ -38,5 +40,6 @@ pub fn row(impact: &Impact) -> [f64; COLUMNS.len()] {
         impact.deepest,
         impact.peak,
         impact.damping,
+        f64::from(impact.place),
     ]
 }

@@ -49,8 +49,10 @@ const SEARCH_COST: f64 = 4e6;
 /// The comparison slot of one impact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Slot {
-    /// Index of the ball joint in the scene.
+    /// Index of the joint in the scene.
     joint: usize,
+    /// Of a joint that touches at several places, this one, whose impacts are compared.
+    place: Option<u8>,
     /// From half-way after the joint's previous contact to half-way before its next one, s.
     span: (f64, f64),
     /// Peak in the reference, N: the largest normal force in the slot, or the largest reaction of an ideal joint.
@@ -120,13 +122,16 @@ impl ReferenceSolution {
             settled: None,
         };
         let joints = if first.is_empty() { scene.machine.loose_joints.len() } else { 0 };
-        reference.slots = (0..joints).map(|joint| Slot { joint, span: (0.0, span_s), peak: 0.0 }).collect();
+        reference.slots =
+            (0..joints).map(|joint| Slot { joint, place: None, span: (0.0, span_s), peak: 0.0 }).collect();
         for (index, impact) in first.iter().enumerate() {
-            let same = |other: &&Impact| other.joint == impact.joint;
+            let same = |other: &&Impact| (other.joint, other.place) == (impact.joint, impact.place);
+            let has_places = !scene.machine.loose_joints[impact.joint].kind.site_names().is_empty();
             let before = found[..index].iter().rfind(same).map_or(0.0, |other| 0.5 * (other.end + impact.start));
             let after = found[index + 1..].iter().find(same).map(|other| 0.5 * (impact.end + other.start));
             let span = (before, after.unwrap_or(span_s).min(span_s));
-            reference.slots.push(Slot { joint: impact.joint, span, peak: 0.0 });
+            let place = has_places.then_some(impact.place);
+            reference.slots.push(Slot { joint: impact.joint, place, span, peak: 0.0 });
         }
         let mut simulation = setting.start(scene)?;
         let (end, peaks, position) = reference.observe_impacts(&mut simulation, MAX_COST, &mut context.part(1, 4))?;
@@ -157,7 +162,7 @@ impl ReferenceSolution {
         let mut frame = Frame::default();
         let end = advance_capped(simulation, self.span_s, max_cost, context, |simulation| {
             simulation.take_peaks(&mut peaks);
-            for (slot, largest) in self.slots.iter().zip(&mut largest) {
+            for (slot, largest) in self.slots.iter().zip(&mut largest).filter(|(slot, _)| slot.place.is_none()) {
                 let peak = &peaks[slot.joint];
                 if (slot.span.0..=slot.span.1).contains(&peak.time) {
                     *largest = largest.max(peak.normal);
@@ -169,6 +174,13 @@ impl ReferenceSolution {
             }
             false
         })?;
+        for (slot, largest) in self.slots.iter().zip(&mut largest) {
+            let in_slot = |impact: &&Impact| {
+                (impact.joint, Some(impact.place)) == (slot.joint, slot.place)
+                    && (slot.span.0..=slot.span.1).contains(&impact.start)
+            };
+            *largest = simulation.impacts().filter(in_slot).fold(*largest, |most, impact| most.max(impact.peak));
+        }
         Ok((end, largest, position))
     }
 

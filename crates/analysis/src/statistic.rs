@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use jointplay_physics::machine::Machine;
+use jointplay_physics::machine::{LooseJoint, Machine};
 use jointplay_physics::simulate::{
     ChannelInfo, Frame, Reading, Simulation, StartError, UnknownChannel, channels_of, matching,
 };
@@ -139,10 +139,12 @@ impl ChannelStatistic {
         self.unit
     }
 
-    /// Index of the ball joint, if this is the largest normal force of a ball joint, which is known in continuous time.
+    /// Index of the joint, if this is the largest normal force of one that touches at one place, which is known in continuous time.
+    /// The normal force of others is the sum over their places, of which the largest one alone is known.
     fn peak_of(&self, machine: &Machine) -> Option<usize> {
         let name = self.channel.strip_suffix(".normal").filter(|_| self.statistic == Statistic::Max)?;
-        machine.loose_joints.iter().position(|joint| joint.name == name)
+        let touches_once = |joint: &LooseJoint| joint.kind.site_names().is_empty();
+        machine.loose_joints.iter().position(|joint| joint.name == name && touches_once(joint))
     }
 }
 

@@ -27,11 +27,11 @@ embedded! {
     /// Names of the built-in scenes, which the window lists.
     BUILT_IN in "scenes":
         "measuring-machine", "spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain", "hexapod", "delta", "four-bar",
-        "suspension", "press";
+        "suspension", "press", "slider-crank-worn", "excavator";
     /// Names of the benchmarks, machines with known answers (`docs/validation.md`): known by name alone.
     BENCHMARKS in "benchmarks":
         "simple-pendulum", "n-four-bar", "squeezer", "bricard", "governor", "flores", "flip", "cardan", "backlash", "ball",
-        "scott-russell", "trammel";
+        "scott-russell", "trammel", "level-pin", "thrown-pin", "free-housing", "crank-pin", "driven-slide", "released-slide";
 }
 
 /// The scene opened if none is named.

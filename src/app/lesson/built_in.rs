@@ -16,7 +16,7 @@ macro_rules! lessons {
 }
 
 /// Name and text of each lesson, in the order of a lecture.
-pub const BUILT_IN_LESSONS: [(&str, &str); 10] = lessons![
+pub const BUILT_IN_LESSONS: [(&str, &str); 11] = lessons![
     "rattle",
     "first-impact",
     "clearance",
@@ -24,6 +24,7 @@ pub const BUILT_IN_LESSONS: [(&str, &str); 10] = lessons![
     "slow-motion",
     "ideal",
     "forces",
+    "worn-hinge",
     "twin",
     "chaos",
     "to-the-class",

@@ -45,7 +45,7 @@ pub fn camera(
         Some(name) => {
             let joint = scene.machine.loose_joints.iter().position(|joint| joint.name == *name).ok_or_else(|| {
                 let names: Vec<&str> = scene.machine.loose_joints.iter().map(|joint| joint.name.as_str()).collect();
-                Failure::usage(format!("--close-up {name}: no such ball joint; there are {}", names.join(", ")))
+                Failure::usage(format!("--close-up {name}: no such joint with play; there are {}", names.join(", ")))
             })?;
             view.close_up(&mut camera, joint, scene, frame, options);
         }

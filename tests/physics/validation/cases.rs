@@ -65,6 +65,15 @@ pub enum Measure {
         /// Start of the search, s.
         from: f64,
     },
+    /// Integral of a channel over time, by the trapezoidal rule over steps.
+    Integral {
+        /// Name of the channel.
+        channel: String,
+        /// Start of the first step that counts at the earliest, s.
+        from: f64,
+        /// End of the last one at the latest, s.
+        to: f64,
+    },
     /// Mean interval between upward crossings of a level.
     Period {
         /// Name of the channel.
@@ -232,6 +241,7 @@ impl Run {
 enum Watch {
     At { reading: Reading, time: f64, value: f64 },
     Largest { reading: Reading, from: f64, value: f64 },
+    Integral { reading: Reading, from: f64, to: f64, value: f64 },
     Period { reading: Reading, level: f64, before: f64, first: f64, last: f64, intervals: u32 },
     Impact { number: usize, property: ImpactProperty },
 }
@@ -247,6 +257,9 @@ impl Watch {
             Measure::At { channel, time } => at(run.reading(channel), *time, run),
             Measure::Largest { channel, from } => {
                 Self::Largest { reading: run.reading(channel), from: *from, value: f64::NAN }
+            }
+            Measure::Integral { channel, from, to } => {
+                Self::Integral { reading: run.reading(channel), from: *from, to: *to, value: 0.0 }
             }
             Measure::Period { channel, level } => {
                 let reading = run.reading(channel);
@@ -264,6 +277,9 @@ impl Watch {
             Self::At { reading, time, value } if start < *time && *time <= end => *value = run.read(*reading, *time),
             // The first value replaces NaN.
             Self::Largest { reading, from, value } if *from <= end => *value = value.max(run.read(*reading, end).abs()),
+            Self::Integral { reading, from, to, value } if *from <= start && end <= *to => {
+                *value += 0.5 * (end - start) * (run.read(*reading, start) + run.read(*reading, end));
+            }
             Self::Period { reading, level, before, first, last, intervals } => {
                 let now = run.read(*reading, end);
                 if *before < *level && *level <= now {
@@ -291,7 +307,7 @@ impl Watch {
 
     fn result(&self, impacts: &[Impact]) -> f64 {
         match self {
-            Self::At { value, .. } | Self::Largest { value, .. } => *value,
+            Self::At { value, .. } | Self::Largest { value, .. } | Self::Integral { value, .. } => *value,
             // NaN without an interval.
             Self::Period { first, last, intervals, .. } => (last - first) / f64::from(*intervals),
             Self::Impact { number, property } => impacts.get(number - 1).map_or(f64::NAN, |impact| property.of(impact)),

@@ -332,6 +332,11 @@ impl LooseJoint {
         }
     }
 
+    /// Names of its sites, by place.
+    pub fn sites(&self) -> Vec<String> {
+        (0..self.kind.site_names().len().max(1)).map(|place| self.site_name(place as u8)).collect()
+    }
+
     /// Origin of the carrier's frame: the socket's centre Z_i.
     pub fn carrier(&self) -> Attachment {
         self.frames[0].origin

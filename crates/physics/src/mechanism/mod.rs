@@ -114,18 +114,18 @@ pub enum MechanismError {
         /// The joint, with opening rates in m/s and rad/s.
         rate: OpenJoint,
     },
-    /// A ball that starts implausibly deep in its socket wall.
+    /// A joint that starts implausibly deep in its wall.
     #[error(
-        "ball joint {joint}: ball and socket centres are {} apart as given, \
-         deeper in the wall than the clearance {} plus a hundredth of the ball radius",
+        "joint {joint}: as given it is {} off its middle, deeper in the wall than its play {} plus a hundredth of the radius \
+         there",
         length(*.distance), length(*.clearance)
     )]
     OutsideSocket {
         /// Name of the joint.
         joint: String,
-        /// |Z_j - Z_i|, m.
+        /// Of the site deepest in its wall, from its middle, m.
         distance: f64,
-        /// c, m.
+        /// Its play, m.
         clearance: f64,
     },
     /// Loops that close where the closed form does not have the output body.

@@ -90,24 +90,21 @@ impl Mechanism {
         }
         tree.update_kinematics(model, T, &y);
         let guess = tree.motion.clone();
-        let distance = |j: usize| match all.contains(&j) {
-            true => model.opening(j, &guess).apart.norm(),
-            false => model.sites[model.joints[j].contacts.clone()]
-                .iter()
-                .fold(0.0, |far: f64, site| far.max(site.distance(&guess))),
-        };
-        for j in 0..model.joints.len() {
-            let d = distance(j);
-            let joint = || self.joint_names[j].clone();
-            let clearance = self.contacts.joint_clearance(j);
+        for (j, joint) in model.joints.iter().enumerate() {
             if all.contains(&j) {
                 // An assembled start needs only a rough guess, from which Newton's method closes the joints.
-                if d > MAX_GIVEN_GAP && !assembled {
-                    let given = self.gap(j, model.opening(j, &guess));
-                    return Err(MechanismError::Open { given });
+                let opening = model.opening(j, &guess);
+                if opening.apart.norm() > MAX_GIVEN_GAP && !assembled {
+                    return Err(MechanismError::Open { given: self.gap(j, opening) });
                 }
-            } else if d > clearance + 0.01 * self.contacts.parameters(j).ball_radius {
-                return Err(MechanismError::OutsideSocket { joint: joint(), distance: d, clearance });
+                continue;
+            }
+            for c in joint.contacts.clone() {
+                let (distance, clearance) = (model.sites[c].distance(&guess), self.contacts.clearance(c));
+                if distance > clearance + 0.01 * self.contacts.coefficients(c).ball_radius {
+                    let joint = self.joint_names[j].clone();
+                    return Err(MechanismError::OutsideSocket { joint, distance, clearance });
+                }
             }
         }
         let balls = model.joints.len();
@@ -121,7 +118,7 @@ impl Mechanism {
                 return Err(MechanismError::Open { given });
             }
         }
-        let widest = all.iter().map(|&j| (j, distance(j)));
+        let widest = all.iter().map(|&j| (j, model.opening(j, &guess).apart.norm()));
         let widest = widest.chain(openings.iter().map(|(j, o)| (*j, o.apart.norm())));
         let turned = openings.iter().map(|(j, o)| (*j, o.turned));
         let mut assembly = Assembly {
@@ -205,7 +202,8 @@ impl Mechanism {
 
     /// A cut joint: `joint` counts ball joints, then other joints that close loops.
     fn gap(&self, joint: usize, opening: Opening) -> OpenJoint {
-        OpenJoint { joint: self.joint_names[joint].clone(), ball: joint < self.model.joints.len(), opening }
+        let ball = self.model.joints.get(joint).is_some_and(|joint| !joint.closed.turns());
+        OpenJoint { joint: self.joint_names[joint].clone(), ball, opening }
     }
 
     /// Gaps of the joints that `constraints` closes.

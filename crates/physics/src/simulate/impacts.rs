@@ -146,6 +146,17 @@ impl ImpactEvents {
     }
 
     pub(super) fn push(&mut self, event: ImpactEvent) {
+        // A higher peak replaces that of the same impact: otherwise impacts of many steps would displace those before them.
+        if let ImpactEvent::Peaked { id, .. } = event {
+            let since =
+                |earlier: &&mut ImpactEvent| !matches!(**earlier, ImpactEvent::Began { id: own, .. } if own == id);
+            let lower =
+                |earlier: &&mut ImpactEvent| matches!(**earlier, ImpactEvent::Peaked { id: own, .. } if own == id);
+            if let Some(earlier) = self.latest.iter_mut().rev().take_while(since).find(lower) {
+                *earlier = event;
+                return;
+            }
+        }
         if self.latest.len() == self.latest.capacity() {
             self.latest.pop_front();
         }

@@ -20,7 +20,7 @@ pub struct Stopped {
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum StopFault {
     /// An ideal motion at a pose beyond which its loops could close on another branch.
-    #[error("the loops through the ideal ball joints pass a singular pose")]
+    #[error("the loops through the ideal joints pass a singular pose")]
     SingularLoops,
     /// An ideal motion whose output body has left the path in closed form.
     #[error(
@@ -32,7 +32,7 @@ pub enum StopFault {
         distance: f64,
     },
     /// Loops left open by projection.
-    #[error("the loops through the ideal ball joints came apart by {open:.1e} m")]
+    #[error("the loops through the ideal joints came apart by {open:.1e} m")]
     OpenLoops {
         /// Largest gap, m.
         open: f64,
@@ -46,23 +46,21 @@ pub enum StopFault {
     /// Constraint rows of the `lagrange` form that become dependent.
     #[error("the constraints pass a singular pose")]
     SingularConstraints,
-    /// A ball that has left its socket through the wall.
-    #[error(
-        "ball joint {joint}: the ball is {penetration:.3e} m inside its socket wall, more than a tenth of its radius"
-    )]
+    /// A joint that has come apart through its wall.
+    #[error("joint {joint}: it is {penetration:.3e} m inside its wall, more than a tenth of the radius there")]
     LeftSocket {
-        /// Name.
+        /// Name of the site.
         joint: String,
         /// m.
         penetration: f64,
     },
-    /// A fixed step that stored more energy in a contact than the ball can have brought.
+    /// A fixed step that stored more energy in a contact than the approach can have brought.
     #[error(
-        "ball joint {joint}: one step put the ball {penetration:.3e} m inside its socket wall, with {times:.1} times the energy \
-         that it can have arrived with"
+        "joint {joint}: one step put it {penetration:.3e} m inside its wall, with {times:.1} times the energy that it can have \
+         arrived with"
     )]
     Overshoot {
-        /// Name.
+        /// Name of the site.
         joint: String,
         /// m.
         penetration: f64,

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::machine::{LooseJoint, Machine, Mat3, Vec3};
+use crate::machine::{LooseJoint, LooseKind, Machine, Mat3, Vec3};
 use crate::mechanism::{Mechanism, WallContact};
 
 /// Cells on each socket: about 14 degrees across.
@@ -127,7 +127,7 @@ struct Socket {
     grid_from_body: Mat3,
     /// Radius r + c of the inner face, m.
     radius: f64,
-    /// Empty for an ideal joint. Copies of the map share cells that have not changed since.
+    /// Empty for an ideal joint and for other joints than balls. Copies of the map share cells that have not changed since.
     #[serde(with = "shared")]
     cells: Arc<[Cell]>,
 }
@@ -193,8 +193,8 @@ impl Wear {
         let grid = grid_of_sockets();
         let socket = |joint: &LooseJoint| {
             let contact = &joint.contact;
-            let ideal = contact.is_ideal();
-            let cells = vec![Cell::default(); if ideal { 0 } else { grid.cells() }];
+            let has_map = joint.kind == LooseKind::Ball && !contact.is_ideal();
+            let cells = vec![Cell::default(); if has_map { grid.cells() } else { 0 }];
             Socket {
                 grid_from_body: axes(&joint.opening),
                 radius: contact.ball_radius + contact.clearance,
@@ -224,8 +224,8 @@ impl Wear {
         &self.grid
     }
 
-    /// Cells of ball joint `joint`, without the latest step until [`Simulation::commit_wear`](super::Simulation::commit_wear);
-    /// empty for an ideal joint.
+    /// Cells of joint `joint`, without the latest step until [`Simulation::commit_wear`](super::Simulation::commit_wear); empty
+    /// for an ideal joint and for other joints than balls.
     pub fn cells(&self, joint: usize) -> &[Cell] {
         &self.sockets[joint].cells
     }

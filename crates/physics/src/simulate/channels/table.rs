@@ -263,14 +263,14 @@ const fn of_elements(signal: Signal) -> Signal {
 /// Every signal, in the order of saved records and of the members of a plot.
 #[rustfmt::skip]
 pub(super) const TABLE: &[Signal] = &[
-    in_plot_and_run(Q::NormalForce, 2, on_request("@.normal", "@_normal_N", Joint(|joint| joint.normal_force.norm()), "size of the normal force on the ball; of an ideal joint, of its reaction")),
-    in_plot(Q::FrictionForce, on_request("@.friction.size", "@_friction_N", Joint(|joint| joint.friction_force.norm()), "size of the friction force on the ball")),
-    in_plot_and_run(Q::Eccentricity, 1, on_request("@.eccentricity.size", "@_eccentricity_m", Joint(|joint| joint.eccentricity.norm()), "distance of the ball's centre from the socket's")),
-    in_run(5, on_request("@.eccentricity.#", "@_e#_m", JointAxes(|joint| joint.eccentricity), "ball's centre from the socket's")),
-    in_plot_and_run(Q::Penetration, 5, on_request("@.penetration", "@_penetration_m", Joint(|joint| joint.penetration), "depth of the ball in the socket wall; negative where there is a gap")),
+    in_plot_and_run(Q::NormalForce, 2, on_request("@.normal", "@_normal_N", Joint(|joint| joint.normal_force.norm()), "size of the normal force on the carried part; of an ideal joint, of its reaction")),
+    in_plot(Q::FrictionForce, on_request("@.friction.size", "@_friction_N", Joint(|joint| joint.friction_force.norm()), "size of the friction force on the carried part")),
+    in_plot_and_run(Q::Eccentricity, 1, on_request("@.eccentricity.size", "@_eccentricity_m", Joint(|joint| joint.eccentricity.norm()), "distance of the ball's centre from the socket's; of a pin or a block, across its axis")),
+    in_run(5, on_request("@.eccentricity.#", "@_e#_m", JointAxes(|joint| joint.eccentricity), "ball's centre from the socket's; of a pin or a block, across its axis")),
+    in_plot_and_run(Q::Penetration, 5, on_request("@.penetration", "@_penetration_m", Joint(|joint| joint.penetration), "depth in the wall; negative where there is a gap")),
     in_run(5, on_request("@.penetration_rate", "@_penetration_rate_m_s", Joint(|joint| joint.penetration_rate), "rate of the penetration")),
-    in_run(5, on_request("@.force.#", "@_force_#_N", JointAxes(|joint| joint.normal_force + joint.friction_force), "force on the ball; of an ideal joint, its reaction")),
-    in_run(5, on_request("@.friction.#", "@_friction_#_N", JointAxes(|joint| joint.friction_force), "friction force on the ball")),
+    in_run(5, on_request("@.force.#", "@_force_#_N", JointAxes(|joint| joint.normal_force + joint.friction_force), "force on the carried part; of an ideal joint, its reaction")),
+    in_run(5, on_request("@.friction.#", "@_friction_#_N", JointAxes(|joint| joint.friction_force), "friction force on the carried part")),
     in_run(5, on_request("@.state", "@_state", Joint(|joint| state_code(joint.state)), "0 free, 1 creep (slower than slip_speed_high), 2 slip, 3 ideal")),
 
     in_run(0, on_request(TIME, "t_s", Scalar("time", |frame| frame.time), "simulated time")),
@@ -335,7 +335,7 @@ pub(super) const TABLE: &[Signal] = &[
     on_request("@.reaction.#", "@_reaction_#_N", Closing(|load| load[0]), "force of the joint on its child"),
     on_request("@.reaction_torque.#", "@_reaction_torque_#_Nm", Closing(|load| load[1]), "torque of the joint on its child about its joint point"),
 
-    on_request("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap between ball and socket wall; negative in contact"),
+    on_request("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap to the wall; negative in contact"),
     on_request("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),
     on_request("@.slip_speed", "@_slip_speed_m_s", Joint(|joint| joint.slip_speed), "sliding speed that the friction law uses"),
 

@@ -28,20 +28,17 @@ impl Stepping<'_> {
             return Some(StopFault::SingularConstraints);
         }
         for c in 0..self.attempt.end.gaps.len() {
-            let j = self.mechanism.contacts.joint_of(c);
+            let contacts = &self.mechanism.contacts;
+            let site = || self.machine.loose_joints[contacts.joint_of(c)].site_name(contacts.place(c));
             let penetration = self.attempt.end.gaps[c].penetration;
-            let radius = self.mechanism.contacts.coefficients(c).ball_radius;
+            let radius = contacts.coefficients(c).ball_radius;
             if !(penetration <= LEFT_SOCKET * radius) {
-                return Some(StopFault::LeftSocket { joint: self.machine.loose_joints[j].name.clone(), penetration });
+                return Some(StopFault::LeftSocket { joint: site(), penetration });
             }
             if self.state.conditions.solver.method.control() == StepControl::Fixed
                 && let Some(times) = self.overshoot_energy_ratio(c, h)
             {
-                return Some(StopFault::Overshoot {
-                    joint: self.machine.loose_joints[j].name.clone(),
-                    penetration,
-                    times,
-                });
+                return Some(StopFault::Overshoot { joint: site(), penetration, times });
             }
         }
         for (m, body) in self.mechanism.motion().iter().zip(&self.machine.bodies) {
