@@ -44,7 +44,7 @@ pub enum Command {
     Tradeoff(TradeoffArguments),
     /// Run a scene at many parameter values: statistics of any channel, sections, regimes, exponents.
     Sweep(SweepArguments),
-    /// Map the error of the tip over drive positions and parameters: at rest, and with every ball anywhere in its play.
+    /// Map the error of the tip over drive positions and parameters: at rest, and with every ball, pin and block anywhere in its play.
     Map(MapArguments),
     /// Print the reference page of all parameters (Markdown).
     Parameters,

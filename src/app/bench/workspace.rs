@@ -53,7 +53,7 @@ impl ShownError {
     fn help(self) -> &'static str {
         match self {
             Self::Largest => {
-                "Largest error of the tip with every ball anywhere in its play and the drives held. Contact between bodies, \
+                "Largest error of the tip with every ball, pin and block anywhere in its play and the drives held. Contact between bodies, \
                  springs, loads and inertia are ignored."
             }
             Self::Settled => "Error of the tip at rest, under gravity, springs and loads, without friction.",

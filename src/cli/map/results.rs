@@ -10,7 +10,7 @@ use crate::scene::{Kind, insert_texts};
 use crate::units::si_unit;
 
 /// Label of everything that is computed from the reachable set.
-pub const REACHABLE: &str = "all errors with every ball anywhere in its play and the drives held; contact between bodies, springs, \
+pub const REACHABLE: &str = "all errors with every ball, pin and block anywhere in its play and the drives held; contact between bodies, springs, \
                              loads and inertia are ignored";
 /// Label of the error at rest.
 pub const SETTLED: &str = "static equilibrium with play under gravity, springs and loads, without friction";
