@@ -114,7 +114,7 @@ pub fn draw(sheet: &Sheet<'_>, kind: &Pin, axes: [Vec3; 2]) -> &'static str {
     }
     "Sections across the bearing at both ends. The circles are the clearance; the mark is the pin's axis, which leaves them only by \
      the penetration. In contact mark and wall are orange, and the arrow is the normal force on the pin. The line below is the \
-     play along the axis, with the gaps of the collars."
+     play along the axis, with the gaps of the collars: of a tilted pin they close before the mark reaches the end."
 }
 
 /// The play along the axis: a mark between the faces.

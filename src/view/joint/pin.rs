@@ -104,6 +104,8 @@ pub fn drawn(
     let long = short + beyond + if collars.is_some() { 0.0 } else { (at.abs() - beyond).max(0.0) };
     let (bearing, pin) = match kind.ends {
         EndsOn::Pin if kind.length.is_some() => (long, short),
+        // It carries its collars.
+        EndsOn::Bearing | EndsOn::Pin if collars.is_some() => (short, long.max(short + face_play + COLLAR[1] * radius)),
         EndsOn::Bearing | EndsOn::Pin => (short, long),
     };
     let cut = opening.reject_from_normalized(axis).try_normalize().unwrap_or(axis.any_orthonormal_vector());
