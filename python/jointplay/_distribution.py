@@ -24,7 +24,9 @@ DEFAULT_RANGE = (0.5, 1.5)
 ENDS = (0.025, 0.975)
 """Probabilities whose quantiles stand for the ends of a distribution without limits."""
 SHARED = "contact.clearance"
-"""Clearance of all ball joints that have none of their own."""
+"""Clearance of all joints with play that have none of their own."""
+RADII = {"clearance": "ball_radius", "play.radial": "play.radius"}
+"""Radius of the round part with each play, as last parts of the joint's keys."""
 
 
 def library(name: str) -> ModuleType:
@@ -192,19 +194,22 @@ def resolve(scene: Scene, request: Request) -> dict[str, Distribution]:
 
 
 def _diameters(scene: Scene, key: str) -> dict[str, float | None]:
-    """Diameter of the ball with the clearance `key`, m; None if it is no clearance.
+    """Diameter of the ball or pin with the play `key`, m; None if it is no play of a round part.
 
-    A clearance that balls of different size share has another fit at each of them: its place is taken by those of the joints.
+    A clearance that joints of different size share has another fit at each of them: its place is taken by those of the joints.
     """
     if key != SHARED:
-        joint = re.fullmatch(r"joint\.(.*)\.clearance", key)
-        return {key: 2.0 * _number(scene, f"joint.{joint[1]}.ball_radius") if joint else None}
+        joint = re.fullmatch(r"(joint\..*\.)(clearance|play\.radial)", key)
+        return {key: 2.0 * _number(scene, joint[1] + RADII[joint[2]]) if joint else None}
     other = scene.set({SHARED: 2e-6 if scene[SHARED] == 1e-6 else 1e-6})
-    sizes = {
-        f"joint.{name}.clearance": 2.0 * _number(scene, f"joint.{name}.ball_radius")
+    keys = scene.parameters.keys()
+    round_parts = [
+        (f"joint.{name}.{play}", f"joint.{name}.{radius}")
         for name in scene.ball_joints
-        if other[f"joint.{name}.clearance"] != scene[f"joint.{name}.clearance"]
-    }
+        for play, radius in RADII.items()
+        if f"joint.{name}.{play}" in keys
+    ]
+    sizes = {play: 2.0 * _number(scene, radius) for play, radius in round_parts if other[play] != scene[play]}
     common = set(sizes.values()) or {2.0 * _number(scene, "contact.ball_radius")}
     return {SHARED: common.pop()} if len(common) == 1 else dict(sizes)
 
