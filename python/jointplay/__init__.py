@@ -1,4 +1,4 @@
-"""Multibody dynamics of mechanisms with play in their ball joints.
+"""Multibody dynamics of mechanisms with play in their joints.
 
     >>> import jointplay as jp
     >>> scene = jp.Scene.load("four-bar").set(clearance="0.2 mm")

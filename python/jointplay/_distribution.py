@@ -24,7 +24,9 @@ DEFAULT_RANGE = (0.5, 1.5)
 ENDS = (0.025, 0.975)
 """Probabilities whose quantiles stand for the ends of a distribution without limits."""
 SHARED = "contact.clearance"
-"""Clearance of all ball joints that have none of their own."""
+"""Clearance of all joints with play that have none of their own."""
+RADII = {"clearance": "ball_radius", "play.radial": "play.radius"}
+"""Radius of the round part with each play, as last parts of the joint's keys."""
 
 
 def library(name: str) -> ModuleType:
@@ -191,28 +193,23 @@ def resolve(scene: Scene, request: Request) -> dict[str, Distribution]:
         return found
 
 
-#: Ends of the keys of a clearance and of the radius that it is about: of balls, and of pins.
-_FITTED = ((".clearance", ".ball_radius"), (".play.radial", ".play.radius"))
-
-
 def _diameters(scene: Scene, key: str) -> dict[str, float | None]:
-    """Diameter of the ball or pin with the clearance `key`, m; None if it is no clearance.
+    """Diameter of the ball or pin with the play `key`, m; None if it is no play of a round part.
 
-    A clearance that balls of different size share has another fit at each of them: its place is taken by those of the joints.
+    A clearance that joints of different size share has another fit at each of them: its place is taken by those of the joints.
     """
     if key != SHARED:
-        for play, radius in _FITTED:
-            if key.endswith(play):
-                return {key: 2.0 * _number(scene, key.removesuffix(play) + radius)}
-        return {key: None}
+        joint = re.fullmatch(r"(joint\..*\.)(clearance|play\.radial)", key)
+        return {key: 2.0 * _number(scene, joint[1] + RADII[joint[2]]) if joint else None}
     other = scene.set({SHARED: 2e-6 if scene[SHARED] == 1e-6 else 1e-6})
-    keys = list(scene.parameters)
-    fitted = [(key, key.removesuffix(play) + radius) for key in keys for play, radius in _FITTED if key.endswith(play)]
-    sizes = {
-        key: 2.0 * _number(scene, radius)
-        for key, radius in fitted
-        if key.startswith("joint.") and other[key] != scene[key]
-    }
+    keys = scene.parameters.keys()
+    round_parts = [
+        (f"joint.{name}.{play}", f"joint.{name}.{radius}")
+        for name in scene.ball_joints
+        for play, radius in RADII.items()
+        if f"joint.{name}.{play}" in keys
+    ]
+    sizes = {play: 2.0 * _number(scene, radius) for play, radius in round_parts if other[play] != scene[play]}
     common = set(sizes.values()) or {2.0 * _number(scene, "contact.ball_radius")}
     return {SHARED: common.pop()} if len(common) == 1 else dict(sizes)
 

@@ -108,3 +108,30 @@ def test_a_sweep_keeps_statistics_of_ends():
 def test_corners_of_a_block_are_named():
     sites = jp.Scene.load("slider-crank-worn").sites
     assert sites["guide"] == ["guide.1y", "guide.3y", "guide.5y", "guide.7y"] and sites["crank-pin"] == ["crank-pin"]
+
+
+def test_a_fit_is_that_of_the_pin():
+    # H7/g6 at 20 mm: radial clearances of 3.5 um to 20.5 um (ISO 286-2, tables 2 and 4).
+    shared = PIN.replace('radial = "0.1 mm", ', "")
+    for text, key, name in [
+        (PIN, "joint.J.play.radial", "joint.J.play.radial"),
+        (PIN, "joint.*.play.radial", "joint.J.play.radial"),
+        (shared, "contact.clearance", "contact.clearance"),
+    ]:
+        found = jp.sensitivity(jp.Scene.from_toml(text), {key: "H7/g6"}, "peak-force", rows=0, duration="1 us")
+        study = found.alone["peak-force"][name]
+        assert (1e6 * study.low, 1e6 * study.high) == pytest.approx((3.5, 20.5), rel=1e-12)
+    with pytest.raises(jp.OptionError, match="a fit gives a clearance"):
+        jp.sensitivity(jp.Scene.from_toml(PIN), {"joint.J.play.length": "H7/g6"}, "peak-force", rows=0, duration="1 us")
+
+
+def test_a_study_says_which_pin_costs_most():
+    # Half of the stray of the teeth comes from each pin: see the lesson on worn hinges.
+    scene = jp.Scene.load("excavator")
+    assert {"joint.boom-pin.play.radial", "joint.stick-pin.play.radial"} <= set(scene.parameters)
+    stray = {}
+    for name in ("boom-pin", "stick-pin"):
+        run = scene.set({f"joint.{name}.play.radial": 0.0}).run("1 s", every="5 ms", channels=["bucket.pose.y"], warn=False)
+        stray[name] = abs(run["bucket.pose.y"]).max()
+    whole = abs(scene.run("1 s", every="5 ms", channels=["bucket.pose.y"], warn=False)["bucket.pose.y"]).max()
+    assert sum(stray.values()) == pytest.approx(whole, rel=0.02)
