@@ -8,7 +8,7 @@ use crate::hands::opened;
 use crate::pixels::Picture;
 
 /// A pin thrown into a bearing with spin and tilt.
-const PIN: &str = "tests/physics/joints/a.toml";
+const PIN: &str = "thrown-pin";
 
 fn window(scene: &str) -> Harness<'static, App> {
     opened(scene, &[], [1280.0, 800.0], egui::Theme::Light, crate::common::ticking_clock::<10>)

@@ -457,7 +457,7 @@ fn a_file_that_is_not_a_scene_is_reported_as_such() {
     assert_contains(
         "misspelt benchmark",
         &load("squeezr"),
-        &["did you mean `squeezer`", "built in: measuring-machine, spcmm", "benchmarks: simple-pendulum"],
+        &["did you mean `squeezer`", "built in: measuring-machine, spcmm"],
     );
     assert_contains("misspelt file", &load("slider-crnk.toml"), &["did you mean `slider-crank`", "benchmarks"]);
     // A file of one's own is no slip of a built-in name.

@@ -55,10 +55,11 @@ pub fn too_large() -> String {
     format!("too large for a scene file: more than {} MiB", MAX_FILE_SIZE >> 20)
 }
 
-/// A suggestion of the built-in scene or benchmark nearest to `name`, and the list of all of them.
+/// A suggestion of the built-in scene or benchmark nearest to `name`, and the list of the built-in ones.
 fn known_names(name: &str) -> (String, String) {
     let near = nearest(name, BUILT_IN.into_iter().chain(BENCHMARKS));
-    (near, format!("{}; benchmarks: {}", BUILT_IN.join(", "), BENCHMARKS.join(", ")))
+    // `scenes` lists the benchmarks.
+    (near, BUILT_IN.join(", "))
 }
 
 /// Whether `typed` may be `name` with a letter too many, too few or wrong, after a right beginning.
