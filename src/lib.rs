@@ -1,4 +1,4 @@
-//! Jointplay: a 3D laboratory that shows what play in a ball joint does to a machine.
+//! Jointplay: a 3D laboratory that shows what play in a joint does to a machine.
 //!
 //! Physics, scene files and analysis are separate crates, re-exported here. Above them are the following modules, each using
 //! only those before it (`ARCHITECTURE.md`): [`files`], [`session`], [`chart`], [`film`] and [`view`], [`render`], [`app`], and the

@@ -555,8 +555,22 @@ fn fitting_font(ui: &Ui, text: &str, room: f32) -> FontId {
     FontId::new(size, body.family)
 }
 
+/// Whether a control was pressed and the pointer has not left it since: what it does is then to be seen, with nothing over it.
+fn is_in_use(ui: &Ui, response: &Response) -> bool {
+    let id = response.id.with("in use");
+    if response.is_pointer_button_down_on() {
+        ui.data_mut(|data| data.insert_temp(id, true));
+    } else if !response.contains_pointer() {
+        ui.data_mut(|data| data.remove_temp::<bool>(id));
+    }
+    ui.data(|data| data.get_temp(id)).unwrap_or(false)
+}
+
 /// Tooltip above or below a control within its panel: the control in use and the picture stay visible.
 fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
+    if is_in_use(ui, response) {
+        return;
+    }
     let Row { parameter, key, .. } = row;
     const ABOVE: [RectAlign; 1] = [RectAlign::TOP_START];
     let panel = ui.clip_rect().x_range();

@@ -296,7 +296,7 @@ fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
     if !renderer.is_empty() {
         ui.label(format!("Drawn with {renderer}")).on_hover_text("Graphics interface and adapter");
     }
-    ui.label("A 3D laboratory that shows what play in a ball joint does to a machine.");
+    ui.label("A 3D laboratory that shows what play in a joint does to a machine.");
     #[cfg(target_arch = "wasm32")]
     ui.add(
         egui::Hyperlink::from_label_and_url("Licences of the fonts and libraries", "licences.txt")
@@ -305,7 +305,7 @@ fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
     ui.add_space(6.0);
     let scene = player.running();
     ui.label(RichText::new(&scene.title).strong());
-    ui.label(&scene.description);
+    ui.label(scene.description.replace('`', ""));
     ui.add_space(6.0);
     ui.horizontal_wrapped(|ui| {
         ui.label("State hash");

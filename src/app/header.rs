@@ -18,6 +18,9 @@ const MIN_WIDTH_WITH_NAME: f32 = 900.0;
 /// Window width from which the list of scenes has its full width, points.
 const MIN_WIDTH_WITH_TITLES: f32 = 1080.0;
 
+/// Greatest width of the box with the scene's title, points.
+const MAX_BOX_WIDTH: f32 = 290.0;
+
 /// Room in a small header for its menu and the lessons, points.
 const MIN_WIDTH_WITH_LESSONS: f32 = 150.0;
 
@@ -112,11 +115,12 @@ impl Header<'_> {
     }
 
     fn scene_box(&mut self, ui: &mut Ui, compact: bool) {
-        let is_narrow = ui.ctx().content_rect().width() < MIN_WIDTH_WITH_TITLES;
-        let width = match (compact, is_narrow) {
-            (true, _) => 190.0_f32.min(ui.available_width() - 90.0),
-            (false, true) => 150.0,
-            (false, false) => 190.0,
+        // Of a wider window, half of what it has more, up to the longest title.
+        let more = 0.5 * (ui.ctx().content_rect().width() - MIN_WIDTH_WITH_TITLES);
+        let width = match compact {
+            true => 190.0_f32.min(ui.available_width() - 90.0),
+            false if more < 0.0 => 150.0,
+            false => (190.0 + more).min(MAX_BOX_WIDTH),
         };
         let size = egui::vec2(width, ui.spacing().interact_size.y);
         ui.allocate_ui(size, |ui| self.scene_list(ui, width));

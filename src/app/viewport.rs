@@ -103,6 +103,8 @@ pub struct Viewport {
     pinched: bool,
     /// The clicked joint, until it is taken.
     clicked: Option<usize>,
+    /// What the latest single click hit.
+    tapped: Option<ScenePart>,
     /// Quality control by frame time; `None` always uses the quality of the options.
     pace: Option<Pace>,
     /// Title, if another picture is beside it; common reference force of the arrows in both, N.
@@ -155,6 +157,7 @@ impl Viewport {
             grip_changed: false,
             pinched: false,
             clicked: None,
+            tapped: None,
             pace: None,
             title: None,
             cloud: None,
@@ -573,6 +576,15 @@ impl Viewport {
         let hovered = response.hover_pos().filter(|_| !plain && !response.dragged()).and_then(pick);
         // A lifted finger does not hover.
         let tapped = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(pick).map(|hit| hit.what);
+        // The second click of two is for what the first one hit, which may have moved the picture since.
+        let tapped = match (response.clicked(), response.double_clicked()) {
+            (true, true) => self.tapped.take().or(tapped),
+            (true, false) => {
+                self.tapped = tapped;
+                tapped
+            }
+            (false, _) => tapped,
+        };
         let on_screen = !plain && self.frozen.is_none();
         let follows = self.pace.is_some() && on_screen;
         let ghost_notes = if follows {

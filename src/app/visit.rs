@@ -179,7 +179,8 @@ impl App {
         ui.label(if self.calm && !player.is_playing() {
             "It stands still, because your system asks for reduced motion. Play moves it.".to_owned()
         } else {
-            format!("Slowed down {scale} times. Move a slider, watch the ball and listen.")
+            let listen = if self.sound.is_on() { ", watch the ball and listen" } else { " and watch the ball" };
+            format!("Slowed down {scale} times. Move a slider{listen}.")
         });
         let gap = if self.panels.is_compact() { 0.0 } else { 8.0 };
         ui.add_space(gap);

@@ -13,7 +13,7 @@ use crate::words::Words as _;
 
 pub use self::map::MapArguments;
 
-/// A 3D laboratory that shows what play in a ball joint does to a machine.
+/// A 3D laboratory that shows what play in a joint does to a machine.
 ///
 /// Without a command it opens the window.
 #[derive(Debug, Parser)]
