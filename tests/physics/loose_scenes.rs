@@ -292,6 +292,17 @@ fn bad_play_is_refused_with_file_line_key_and_range() {
             "allowed as-given, ideal, equilibrium",
         ),
         (BLOCK.replace("half_y = \"25 mm\"", "half_y = \"5 mm\""), "play.y", "allowed 0 mm to 0.5 mm"),
+        // What the joint does not give is that of the scene, or else the joint is pointed out.
+        (
+            CRANK.replace("clearance = \"0.5 mm\"", "clearance = \"3 mm\""),
+            "contact.clearance",
+            "a tenth of the radius; allowed 0 mm to 1 mm",
+        ),
+        (
+            THROWN.replace("radial = \"0.1 mm\", axial = \"0.2 mm\", length = \"24 mm\"", "length = \"2 mm\""),
+            "joint.J",
+            "a tenth of the length",
+        ),
         (BLOCK.replace("play = {", "friction_law = \"none\"\nplays = {"), "plays", "unknown key"),
         (
             pendulum("drive = { law = \"constant\", velocity = \"6 rad/s\" }\nPLAY", "")

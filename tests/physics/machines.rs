@@ -204,12 +204,12 @@ fn play_lifts_the_ram_of_the_press_at_the_bottom() {
 
 #[test]
 fn the_block_of_the_worn_slider_crank_follows_from_crank_and_rod() {
-    for (crank, rod) in [(0.050, 0.120), (0.030, 0.150)] {
+    for (crank, rod) in [(0.050, 0.150), (0.030, 0.180)] {
         let text = [crank, rod].map(|length| format!("{length} m"));
         let changes = [("parameter.crank", &*text[0]), ("parameter.rod", &*text[1])];
         check_ideal_run("slider-crank-worn", &changes, 0.35, |scene, frame| {
-            // 200 rpm.
-            let (sin, cos) = (TAU * frame.time * 200.0 / 60.0).sin_cos();
+            // 240 rpm.
+            let (sin, cos) = (TAU * frame.time * 240.0 / 60.0).sin_cos();
             let (position, axes) = pose(scene, frame, "block");
             let expected = Vec3::new(crank * cos + (rod * rod - (crank * sin).powi(2)).sqrt(), 0.0, 0.0);
             let error = (position - expected).norm();

@@ -53,7 +53,7 @@ impl Scene {
 
     /// An error at start about `title` (see [`Source::places`]). It points to that line of the file and names the latest change
     /// of one of `keys`; an entry that ends in a dot is a prefix.
-    fn start_error(&self, title: &str, keys: &[String], message: String) -> SceneError {
+    pub(super) fn start_error(&self, title: &str, keys: &[String], message: String) -> SceneError {
         let concerns =
             |changed: &str| keys.iter().any(|key| changed == key || (key.ends_with('.') && changed.starts_with(key)));
         let change = self.changes.iter().rfind(|(changed, _)| concerns(changed));
@@ -78,10 +78,19 @@ impl Scene {
     pub(super) fn keys_of(&self, conflict: &ContactConflict) -> Vec<String> {
         let key = |part: &'static str| match conflict.joint {
             _ if part == "start" => part.to_owned(),
-            Some(joint) if part.starts_with("play") || self.overrides[joint].contains(&part) => {
-                self.joint_key(joint, part)
+            Some(joint) => {
+                let kind = &self.machine.loose_joints[joint].kind;
+                // A play or a radius may be that of the scene; so may both plays of a block.
+                let of_contact = play::contact_part(kind, part);
+                let is_own = self.overrides[joint].contains(&of_contact);
+                match of_contact {
+                    _ if is_own => self.joint_key(joint, of_contact),
+                    "second_clearance" => "contact.clearance".to_owned(),
+                    _ if of_contact.starts_with("play") => self.joint_key(joint, part),
+                    _ => format!("contact.{of_contact}"),
+                }
             }
-            _ => format!("contact.{part}"),
+            None => format!("contact.{part}"),
         };
         let mut keys: Vec<String> = conflict.fault.parts().into_iter().map(key).collect();
         // A joint's override is more likely at fault than the shared setting.

@@ -154,8 +154,11 @@ impl Scene {
             let message = conflict.fault.to_string();
             let keys = scene.keys_of(&conflict);
             let place = || keys.iter().find_map(|key| places.get(key)).map(|node| node.error(&message));
-            let unplaced =
-                || SceneError { file: file.map(str::to_owned), message: message.clone(), ..Default::default() };
+            // A default that does not fit the dimensions of a joint is not in the text; the joint is.
+            let unplaced = || match conflict.joint.map(|index| &scene.machine.loose_joints[index].name) {
+                Some(name) => scene.start_error(&format!("joint.{name}"), &[], message.clone()),
+                None => SceneError { file: file.map(str::to_owned), message: message.clone(), ..Default::default() },
+            };
             scene.blame_changes(&conflict).or_else(place).unwrap_or_else(unplaced)
         })?;
         Ok(scene)

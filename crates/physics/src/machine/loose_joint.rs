@@ -207,7 +207,16 @@ impl LooseFault {
     pub(super) fn parts(&self) -> [&'static str; 2] {
         match *self {
             Self::Length { key, .. } | Self::SecondPlay { key } => [key, "play"],
-            Self::Play { key, part, .. } => [key, if part.ends_with("radius") { "play.radius" } else { "play.length" }],
+            Self::Play { key, part, .. } => {
+                let dimension = match part.rsplit(' ').next() {
+                    Some("radius") => "play.radius",
+                    Some("half_y") => "play.half_y",
+                    Some("half_z") => "play.half_z",
+                    _ if part.ends_with("half length") => "play.half_length",
+                    _ => "play.length",
+                };
+                [key, dimension]
+            }
             Self::FrictionVelocity => ["friction_velocity", "friction_velocity"],
             Self::Settled => ["start", "start"],
             Self::LineContact => ["play.elastic", "play.stiffness_at"],
