@@ -567,7 +567,10 @@ impl App {
                 ui.horizontal_wrapped(|ui| self.run.viewport.camera_buttons(ui, false));
                 ui.separator();
             }
-            action = self.run.undo.camera_buttons(ui);
+            if entry(ui, "Present", "Picture and transport for a class: large type, thick arrows (F5)") {
+                action = Some(Action::Present);
+            }
+            action = action.or(self.run.undo.camera_buttons(ui));
             aligned(ui, |ui| {
                 action = action.or(self.run.instruments(ui, self.sound.is_on()));
                 ui.add_space(4.0);
