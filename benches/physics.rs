@@ -125,6 +125,38 @@ fn chain(watch: &Stopwatch) {
     }
 }
 
+/// The slider-crank of Flores with its loose joint as a ball, as a pin that does not tilt, and as a pin with two ends: 30 ms, and how many
+/// times a ball each costs.
+fn pins(watch: &Stopwatch) {
+    let text = jointplay::scene::built_in_text("flores").expect("a benchmark");
+    let (machine, _) = text.split_once("[[ball_joint]]").expect("its loose joint is its last part");
+    let pin = |play: &str| {
+        format!(
+            "{machine}[[joint]]\nname = \"S\"\nkind = \"revolute\"\nparent = \"slider\"\nchild = \"rod\"\naxis = [0, 1, 0]\n\
+             child_point = \"120 0 0 mm\"\ncloses_loop = true\napproach_speed = \"start\"\nplay = {{ {play} }}\n"
+        )
+    };
+    let kinds =
+        [("ball", text.to_owned()), ("planar pin", pin("planar = true")), ("pin of 20 mm", pin("length = \"20 mm\""))];
+    for method in ["dopri5", "radau5", "automatic", "discrete-gradient"] {
+        let mut ball = None;
+        for (kind, text) in &kinds {
+            let accuracy = [("solver.method", method), ("solver.tolerance", "1e-6")];
+            let changes: Vec<_> = accuracy.map(|(key, value)| (key.to_owned(), value.to_owned())).to_vec();
+            let scene = Scene::parse(text, None, &changes).expect("a scene");
+            let mut simulation = Simulation::new(&scene.machine).expect("starts");
+            let start = simulation.snapshot();
+            let median = watch.time(&format!("30 ms of a slider-crank, {method}/{kind}"), || {
+                simulation.restore(&start);
+                simulation.advance_to(0.03).expect("runs");
+            });
+            if let Some(median) = median {
+                println!("    {:.2} times a ball", median / *ball.get_or_insert(median));
+            }
+        }
+    }
+}
+
 /// From scene text to a simulation at t = 0, for the largest scene of each kind: `docs/scene-format.md` gives the limits.
 fn set_up(watch: &Stopwatch) {
     for (kind, n, form, clearance) in [
@@ -153,7 +185,7 @@ fn set_up(watch: &Stopwatch) {
 
 fn main() {
     let watch = Stopwatch::new();
-    for part in [evaluations, real_time, snapshots, spans, chain, set_up] {
+    for part in [evaluations, real_time, snapshots, spans, chain, pins, set_up] {
         part(&watch);
     }
 }

@@ -18,8 +18,20 @@ const SESSION_KEY = `jointplay ${location.pathname}`;
 const RELOAD_KEY = `${SESSION_KEY} left`;
 const { focus } = HTMLElement.prototype;
 
-/** Shared with the other scripts and the tests: `page` (src/web/page.rs), its mirror, the compiled code, the outcome of the starts. */
-const laboratory = { page: null, mirror: null, code: null, backend: null, ready: false, trouble: null, starts: 0, losses: [] };
+/** Shared with the other scripts and the tests: `page` (src/web/page.rs), its mirror, the compiled code and its memory, the outcome of the starts. */
+const laboratory = {
+    page: null,
+    mirror: null,
+    code: null,
+    memory: null,
+    /** Size of that memory, which never shrinks, from which on the next scene gets a new one, bytes. */
+    largeMemory: 256 << 20,
+    backend: null,
+    ready: false,
+    trouble: null,
+    starts: 0,
+    losses: [],
+};
 globalThis.jointplay = laboratory;
 
 /** Messages about missing features of the browser. */
@@ -377,7 +389,7 @@ async function main() {
         globalThis.ResizeObserver = canvas.CanvasObserver;
         globalThis.jointplayHost = makeHost(laboratory, graphicsLost);
         laboratory.code = await code;
-        await bindings.default({ module_or_path: laboratory.code });
+        ({ memory: laboratory.memory } = await bindings.default({ module_or_path: laboratory.code }));
     } catch (error) {
         return showTrouble('The laboratory could not be loaded', `${error?.message ?? error}`);
     }
@@ -447,11 +459,23 @@ function recordSession() {
         if (address === location.pathname + location.search + location.hash && unsaved === wasUnsaved()) return;
         history.replaceState({ unsaved }, '', address);
     }
+    let largeScene = null;
+    /** Once a scene has made the memory of the program large, reloads the page into the next one. */
+    function releaseMemory(scene) {
+        if (laboratory.memory.buffer.byteLength < laboratory.largeMemory) return;
+        largeScene ??= scene;
+        // A change that is in no file would raise the browser's question.
+        if (scene !== largeScene && !isUnsaved() && currentSession()) location.reload();
+    }
     function update() {
         const startTime = Date.now();
         record();
         const state = laboratory.ready && laboratory.page.state();
-        if (state) document.title = `${JSON.parse(state).scene} - Jointplay`;
+        if (state) {
+            const { scene } = JSON.parse(state);
+            document.title = `${scene} - Jointplay`;
+            releaseMemory(scene);
+        }
         setTimeout(update, Math.max(SESSION_INTERVAL, IDLE_FACTOR * (Date.now() - startTime)));
     }
     setTimeout(update, SESSION_INTERVAL);

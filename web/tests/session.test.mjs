@@ -92,6 +92,23 @@ async function choose(lab, files) {
     await (await chosen).setFiles(files);
 }
 
+test('after a scene that made the memory large, the next one is opened in a new page', async () => {
+    const lab = await open('scene=spcmm&play=0', { backend });
+    // While it reloads, a page answers nothing.
+    const loaded = () => lab.page.evaluate(() => performance.timeOrigin).catch(() => null);
+    const first = await loaded();
+    await lab.page.evaluate(() => (jointplay.largeMemory = 1));
+    await lab.page.waitForTimeout(2500);
+    assert.equal(await loaded(), first, 'the scene that needs the memory is not reloaded');
+    await lab.page.evaluate(() => (location.hash = '#scene=chain&play=0'));
+    await lab.until(async () => ![first, null].includes(await loaded()), 'the page is not reloaded');
+    await lab.started();
+    assert.equal((await lab.state()).scene, 'chain');
+    const second = await loaded();
+    await lab.page.waitForTimeout(2500);
+    assert.equal(await loaded(), second, 'it is reloaded once');
+});
+
 test('a reload continues from the same state, and the tab stores a state that no address can hold', async () => {
     const lab = await open('scene=spcmm&c=0.5mm&theme=dark&play=0', { backend });
     lab.page.on('dialog', (dialog) => dialog.accept());
