@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn of_a_pin_the_ends_that_touch_and_its_tilt_are_told() {
-        let scene = Scene::load("tests/physics/joints/a.toml", &[]).expect("a scene");
+        let scene = Scene::load("thrown-pin", &[]).expect("a scene");
         let mut player = Player::new(&scene).expect("starts");
         let mut told = [false; 3];
         for _ in 0..600 {

@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn each_end_is_drawn_at_its_own_distance_from_the_wall() {
         for ends_on in ["pin", "bearing"] {
-            let text = std::fs::read_to_string("tests/physics/joints/a.toml").expect("a scene");
+            let text = crate::scene::built_in_text("thrown-pin").expect("a benchmark").to_owned();
             let text = text.replace("ends = \"pin\"", &format!("ends = \"{ends_on}\""));
             let scene = Scene::parse(&text, None, &[]).expect("a scene");
             let mut player = Player::new(&scene).expect("starts");
