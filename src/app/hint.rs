@@ -17,9 +17,6 @@ const FADE_TIME: f64 = 1.5;
 /// Interval between pictures of the fade, s.
 const FADE_INTERVAL: f64 = 1.0 / 30.0;
 
-/// What a first visit offers to change.
-const FIRST_SLIDERS: [&str; 3] = ["contact.clearance", "contact.friction", "contact.restitution"];
-
 /// The sentence of the scene just opened, if it is still shown.
 #[derive(Default)]
 pub struct Hint {
@@ -38,10 +35,13 @@ impl Hint {
 
     /// Begins with the sentence of `scene`. With changed values it need not be true.
     pub fn begin(&mut self, scene: &Scene) {
-        // The three sliders of a first visit leave it true.
-        let is_true = scene.changes.iter().all(|(key, _)| FIRST_SLIDERS.contains(&&**key));
-        let text = if is_true { scene.watch.clone() } else { String::new() };
+        let text = if scene.changes.is_empty() { scene.watch.clone() } else { String::new() };
         *self = Self { text, ..Self::new(self.calm) };
+    }
+
+    /// The same of the scene of a first visit, whose three sliders leave it true.
+    pub fn begin_after_visit(&mut self, scene: &Scene) {
+        *self = Self { text: scene.watch.clone(), ..Self::new(self.calm) };
     }
 
     /// Removes the sentence.

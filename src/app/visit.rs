@@ -66,7 +66,7 @@ impl App {
             let scale = opening::time_scale(self.run.player.running());
             self.run.player.pacer.set_scale(scale);
             self.run.viewport.show_whole();
-            self.hint.begin(self.run.player.pending());
+            self.hint.begin_after_visit(self.run.player.pending());
         }
     }
 
