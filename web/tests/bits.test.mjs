@@ -11,7 +11,7 @@ test('every scene, method and formulation gives the same bits as in the native p
     const wasm = await load(PAGE);
     assert.match(await native('--version'), new RegExp(`\\b${wasm.version().replaceAll('.', '\\.')}\\b`));
     const [scenes, methods] = [wasm.scenes(), wasm.choices('solver.method')];
-    assert.equal(scenes.length, 11);
+    assert.equal(scenes.length, 13);
     assert.equal(methods.length, 5);
     const hashes = new Set();
     for (const [at, scene] of scenes.entries()) {
