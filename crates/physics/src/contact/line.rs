@@ -1,12 +1,16 @@
 //! Line contact of a round pin in its bore after K. L. Johnson, Contact Mechanics, section 5.6: the depth d under the force F of a pin of
 //! the length L in a gap c,
 //!
-//!     d = f (ln(4 c / f) - 1),   f = F / A,   A = pi E* L.
+//! ```text
+//! d = f (ln(4 c / f) - 1),   f = F / A,   A = pi E* L.
+//! ```
 //!
 //! With w = ln(4 c / f) - 1 it is d = f w, so that w exp(-w) = e d / (4 c): w is minus the lower branch of Lambert's function, and
 //! force, slope and energy follow from it in closed form,
 //!
-//!     F / A = d / w,   F' / A = 1 / (w - 1),   U / A = d^2 (2 w - 1) / (4 w^2).
+//! ```text
+//! F / A = d / w,   F' / A = 1 / (w - 1),   U / A = d^2 (2 w - 1) / (4 w^2).
+//! ```
 //!
 //! Force and slope are 0 at d = 0 and continuous there; w grows like ln(4 c / d). At w = 1, F = 4 pi E* L c / e^2, the slope is infinite:
 //! the theory has no meaning long before. From [`LAST`] on the force continues along its tangent.
