@@ -188,7 +188,7 @@ impl Header<'_> {
     }
 
     fn lessons_button(&mut self, ui: &mut Ui) {
-        let help = "Ten lessons on play in joints, step by step, with pictures and in order";
+        let help = "Lessons on play in joints, step by step, with pictures and in order";
         self.entry(ui, "Lessons", help, Command::Ask(Dialog::Lessons { chosen: None }));
     }
 
