@@ -345,6 +345,21 @@ fn the_written_start_is_that_of_the_body() {
     assert_eq!(angular_velocity, nalgebra::Vector3::new(20.0, 3.0, -2.0));
 }
 
+/// A placed group turns its displaced starts, second axes and openings with it, and a change undone under either of its names is gone.
+#[test]
+fn a_turned_scene_starts_turned() {
+    let turned = format!("rotation = {{ axis = [0, 0, 1], angle = \"90 deg\" }}\n{THROWN}");
+    let frames = [THROWN, &turned].map(|text| first_frame(&scene(text, &[])));
+    let [plain, turned] = frames.map(|frame| frame.bodies[0]);
+    let turn = nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
+    assert!((turn * plain.position - turned.position).norm() < 1e-18, "{} {}", plain.position, turned.position);
+    assert!((turn * plain.velocity - turned.velocity).norm() < 1e-15);
+    assert!((turn * plain.angular_velocity - turned.angular_velocity).norm() < 1e-14);
+    let mut open = scene(CRANK, &[("joint.S.play.radial", "0.3 mm")]);
+    open.undo_change("joint.S.play.radial").unwrap();
+    assert!(open.changes.is_empty());
+}
+
 #[test]
 fn the_elastic_law_stands_on_the_joint() {
     let peak = |more: &str| {

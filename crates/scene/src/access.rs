@@ -246,7 +246,8 @@ impl Scene {
     /// # Errors
     /// Same as [`Self::undo_change`].
     pub fn without(&self, key: &str) -> Result<Self, SceneError> {
-        self.parameter(key)?;
+        let own = self.resolve(key)?.key;
+        let key = own.as_deref().unwrap_or(key);
         let mut changes = self.changes.clone();
         changes.retain(|(changed, _)| changed != key);
         self.rebuilt(&changes)

@@ -483,6 +483,7 @@ pub(super) fn loose_joint<'d>(
         _ => LooseKind::Ball,
     };
     let [carrier, carried] = joint.points();
+    let on = joint.parent.map(|parent| &*scene.machine.bodies[parent].name);
     let elasticity = read_elasticity(kind, table)?;
     let mut loose = LooseJoint {
         kind,
@@ -491,10 +492,11 @@ pub(super) fn loose_joint<'d>(
         ..LooseJoint::ball(&joint.name, carrier, carried)
     };
     if let Some(node) = section.rows.key("opening", section.word).and_then(|_| section.get("opening")) {
-        loose.opening = node.direction()?;
+        let own = node.direction()?;
+        loose.opening = section.document.instance.map_or(own, |instance| instance.direction(on, own));
     }
     if kind != LooseKind::Ball {
-        let axes = axes_of(joint, section, table)?;
+        let axes = axes_of(joint, section, table, on)?;
         loose.frames[0].rotation = axes;
         loose.frames[1].rotation = joint.rotation.inverse() * axes;
         loose.contact.friction_velocity = FrictionVelocity::Surface;
@@ -559,15 +561,19 @@ pub(super) fn dimensions<'d>(play: &PlayText<'d>) -> impl Iterator<Item = (&'sta
     })
 }
 
-/// Axes of a joint in its parent: x along its axis, y along its second axis.
-fn axes_of(joint: &Joint, section: &Section<'_>, table: Option<&Section<'_>>) -> Result<Quat, SceneError> {
+/// Axes of a joint in its parent, the body `on` or the world: x along its axis, y along its second axis.
+fn axes_of(
+    joint: &Joint,
+    section: &Section<'_>,
+    table: Option<&Section<'_>>,
+    on: Option<&str>,
+) -> Result<Quat, SceneError> {
     let x = joint.axis;
     let second = table.filter(|table| table.rows.key("second_axis", None).is_some());
     let y = match second.and_then(|table| table.get("second_axis")) {
         Some(node) => {
             let own = node.direction()?;
-            let parent = section.get("parent").map(|node| node.body()).transpose()?.filter(|name| name != "world");
-            let own = section.document.instance.map_or(own, |instance| instance.direction(parent.as_deref(), own));
+            let own = section.document.instance.map_or(own, |instance| instance.direction(on, own));
             if own.dot(&x).abs() > SQUARE {
                 return Err(node.error("must be perpendicular to `axis`"));
             }

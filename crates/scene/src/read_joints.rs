@@ -44,7 +44,7 @@ pub(super) fn read_joint<'d>(
     let name = section.require("name")?.name()?.into_owned();
     // Where it starts, a ball joint is as if fixed.
     let kind = JointKind::of_word(section.require("kind")?.choice()?).unwrap_or(JointKind::Fixed);
-    let play = read_play(&section)?;
+    let mut play = read_play(&section)?;
     let child_node = section.require("child")?;
     let place = |node: &Node<'_>, also| {
         let name = &*node.body()?;
@@ -89,7 +89,11 @@ pub(super) fn read_joint<'d>(
         }
     }
     if let Some(instance) = node.document.instance {
-        place_parent_side(&mut joint, instance, parent.map(|parent| &*bodies[parent]));
+        let on = parent.map(|parent| &*bodies[parent]);
+        place_parent_side(&mut joint, instance, on);
+        if let Some(PlayText { displaced, .. }) = &mut play {
+            *displaced = displaced.map(|by| instance.direction(on, by));
+        }
         if closes_loop {
             place_child_side(&mut joint, instance, &bodies[child]);
         }

@@ -140,6 +140,13 @@ pub fn normalise_quaternion(q: &mut [f64]) {
     }
 }
 
+/// Angle of a rotation, 0 to pi, rad.
+pub(crate) fn angle_of(turn: &Mat3) -> f64 {
+    // From sine and cosine: the cosine alone does not resolve small angles.
+    let sine = Vec3::new(turn[(2, 1)] - turn[(1, 2)], turn[(0, 2)] - turn[(2, 0)], turn[(1, 0)] - turn[(0, 1)]);
+    libm::atan2(sine.norm(), turn.trace() - 1.0)
+}
+
 /// Unit quaternion of a rotation matrix.
 pub fn quaternion_of(rotation: &Mat3) -> Quat {
     Quat::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(*rotation))

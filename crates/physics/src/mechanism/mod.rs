@@ -54,6 +54,7 @@ pub use elements::{ActiveSet, Counts, EdgeIndicator, ElementReport, Gap, Powers,
 use flight::ActiveRanges;
 pub use flight::{Flight, FreeFlightBody};
 pub use held::{HeldError, HeldMachine, drive_positions};
+pub(crate) use kinematics::angle_of;
 pub use kinematics::{Kinematics, Wrench};
 pub use pairs::Opening;
 pub use reachable::{Farthest, TipFreedoms};

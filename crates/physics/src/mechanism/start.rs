@@ -348,9 +348,7 @@ fn is_other_mode(model: &Model, constraints: &mut Constraints, tree: &mut Tree, 
 fn placement(body: &model::Body, from: &Kinematics, to: &Kinematics) -> Placement {
     let origin = |m: &Kinematics| m.position + m.rotation * body.origin;
     let turn = from.rotation.tr_mul(&to.rotation);
-    // Sine and cosine of the angle: the cosine alone does not resolve small angles.
-    let sine = Vec3::new(turn[(2, 1)] - turn[(1, 2)], turn[(0, 2)] - turn[(2, 0)], turn[(1, 0)] - turn[(0, 1)]);
-    Placement { moved: (origin(to) - origin(from)).norm(), turned: libm::atan2(sine.norm(), turn.trace() - 1.0) }
+    Placement { moved: (origin(to) - origin(from)).norm(), turned: kinematics::angle_of(&turn) }
 }
 
 /// Places the free output body as in the ideal mechanism at t = 0, close to the assembled pose.

@@ -4,7 +4,7 @@ use super::angles::pose_of;
 use super::frame::{BodyMotion, ContactMode, Frame, JointReport, SiteReport};
 use crate::contact::ContactState;
 use crate::machine::{Attachment, LooseJoint, LooseKind, Machine, Vec3};
-use crate::mechanism::{ContactId, Mechanism};
+use crate::mechanism::{ContactId, Mechanism, angle_of};
 
 /// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at (`time`, `y`), with the
 /// contact states `contact_states`.
@@ -117,11 +117,7 @@ fn displacement(mechanism: &Mechanism, joint: &LooseJoint, j: usize) -> (Vec3, f
     let [axis, own] = [carrier.column(0), carried.column(0)];
     let along = axis.dot(&e);
     let tilt = match joint.kind {
-        LooseKind::Slide(_) => {
-            let turn = carrier.tr_mul(&carried);
-            let sine = Vec3::new(turn[(2, 1)] - turn[(1, 2)], turn[(0, 2)] - turn[(2, 0)], turn[(1, 0)] - turn[(0, 1)]);
-            libm::atan2(sine.norm(), turn.trace() - 1.0)
-        }
+        LooseKind::Slide(_) => angle_of(&carrier.tr_mul(&carried)),
         _ => libm::atan2(axis.cross(&own).norm(), axis.dot(&own)),
     };
     (e - axis * along, along, tilt)
