@@ -9,18 +9,31 @@ Quantities are floats in SI units, or text with a unit ("0.5 mm"). The same scen
 program `jointplay`: compare `Run.hash` with the state hash that `jointplay run` prints.
 """
 
+from ._geometry import Shape
+from ._native import State, __version__
 from ._render import render
-from ._scene import Check, Parameter, Run, Scene
+from ._scene import Channel, Check, Parameter, Quantity, Run, Scene
 from ._sensitivity import Changes, Effects, Ends, Indices, Sensitivity, Target, sensitivity
 from ._simulation import Frame, Simulation
 from ._study import Estimate, Runs, Study
 from ._sweep import Sweep, SweepResult, sweep
 from ._tolerance import FitChoice, Fits, Quality, RejectDriver, Tolerance, tolerance
 from ._tradeoff import Tradeoff, TradeoffRow, tradeoff
-from .errors import ChannelError, DoubtWarning, InternalError, JointplayError, OmissionWarning, OptionError, SceneError, Stopped
+from .errors import (
+    ChannelError,
+    DoubtWarning,
+    InternalError,
+    InUseError,
+    JointplayError,
+    OmissionWarning,
+    OptionError,
+    SceneError,
+    Stopped,
+)
 
 __all__ = [
     "Changes",
+    "Channel",
     "ChannelError",
     "Check",
     "DoubtWarning",
@@ -30,6 +43,7 @@ __all__ = [
     "FitChoice",
     "Fits",
     "Frame",
+    "InUseError",
     "Indices",
     "InternalError",
     "JointplayError",
@@ -37,13 +51,16 @@ __all__ = [
     "OptionError",
     "Parameter",
     "Quality",
+    "Quantity",
     "RejectDriver",
     "Run",
     "Runs",
     "Scene",
     "SceneError",
     "Sensitivity",
+    "Shape",
     "Simulation",
+    "State",
     "Stopped",
     "Study",
     "Sweep",
@@ -52,6 +69,7 @@ __all__ = [
     "Tolerance",
     "Tradeoff",
     "TradeoffRow",
+    "__version__",
     "render",
     "sensitivity",
     "sweep",

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from importlib import import_module
-from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _iso286, _native
+from ._options import library
 from ._scene import Scene
 from .errors import JointplayError, OptionError
 
@@ -27,15 +26,6 @@ SHARED = "contact.clearance"
 """Clearance of all joints with play that have none of their own."""
 RADII = {"clearance": "ball_radius", "play.radial": "play.radius"}
 """Radius of the round part with each play, as last parts of the joint's keys."""
-
-
-def library(name: str) -> ModuleType:
-    """A library of the extra `studies`."""
-    try:
-        return import_module(name)
-    except ModuleNotFoundError as error:
-        missing = str(error.name).partition(".")[0]
-        raise OptionError(f"needs {missing}: pip install 'jointplay[studies]'") from error
 
 
 class At:
@@ -179,7 +169,7 @@ def resolve(scene: Scene, request: Request) -> dict[str, Distribution]:
     with At(request.place):
         keys = _native.matching_keys(scene._native, request.pattern)
         diameters = {}
-        if request.text is not None and re.fullmatch(r"\s*[A-Za-z]+\d+\s*/.*", request.text):
+        if isinstance(request.text, str) and re.fullmatch(r"\s*[A-Za-z]+\d+\s*/.*", request.text):
             diameters = {key: size for name in keys for key, size in _diameters(scene, name).items()}
             keys = list(diameters)
         found = {}
@@ -224,6 +214,8 @@ def _of_parameter(scene: Scene, key: str, text: str | None, diameter: float | No
     parameter = scene.parameter(key)
     if not isinstance(parameter.value, float) or parameter.range is None:
         raise OptionError("its values are not real numbers")
+    if text is not None and not isinstance(text, str):
+        raise OptionError(f"{text!r} is not a distribution: expected text, {FORMS}")
     if text is None:
         low, high = sorted(float(np.clip(part * parameter.value, *parameter.range)) for part in DEFAULT_RANGE)
         _check(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from ._simulation import in_one_thread
 
 if TYPE_CHECKING:
     from ._simulation import Simulation
@@ -27,5 +28,5 @@ def render(simulation: Simulation, size: tuple[int, int] = (960, 540)) -> NDArra
     draw = getattr(_native, "render", None)
     if draw is None:
         raise ImportError(NO_GRAPHICS)
-    pixels: NDArray[np.uint8] = draw(simulation, *size)
+    pixels: NDArray[np.uint8] = in_one_thread(draw)(simulation, *size)
     return pixels

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
+from ._options import write
 from .errors import OptionError, SceneError
 
 if TYPE_CHECKING:
@@ -586,14 +587,3 @@ class Writer:
 
 def _end(body: str, at: ArrayLike) -> _Keys:
     return {"body": body, "at": _metres(at)}
-
-
-def write(path: Path, content: bytes) -> None:
-    """Writes a file, which appears whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        beside.write_bytes(content)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)

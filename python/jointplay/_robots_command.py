@@ -6,7 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from ._robots import scene_of, write
+from ._options import write
+from ._robots import scene_of
 from ._scene import Scene
 from .errors import OptionError
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import json
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,12 +16,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _native
+from . import _native, _show
+from ._geometry import Shape, matrices, rotations_of, shapes_of
 from ._link import frame_of
+from ._options import library, whole, write
 from .errors import ChannelError, DoubtWarning, OmissionWarning, OptionError, Stopped
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
 
 Quantity = float | int | str
 """A number in SI units, or text with a unit."""
@@ -40,6 +44,8 @@ class Parameter:
     """Value, SI; a word for a choice."""
     text: str
     """Value with its unit."""
+    unit: str
+    """SI unit; empty for a number without one and for a choice."""
     default: float | int | str | None
     """Value if the scene gives none, SI."""
     allowed: str
@@ -156,7 +162,8 @@ class Scene:
     @property
     def notes(self) -> list[str]:
         """Comments at the head of its text: of an imported robot, what the scene does not have."""
-        head = takewhile(lambda line: line.startswith("#"), self.toml.splitlines())
+        text = self._native.origin()[0]
+        head = takewhile(lambda line: line.startswith("#"), text.splitlines())
         return [line.lstrip("# ") for line in head]
 
     @property
@@ -176,8 +183,26 @@ class Scene:
 
     @property
     def toml(self) -> str:
-        """Text of its file, without the changes."""
-        return self._native.origin()[0]
+        """Text of a scene file of this machine: that of its file, with the changes in it."""
+        return self._native.text()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The sections and keys of `toml`, from which `Scene.from_dict` makes the same machine."""
+        sections: dict[str, Any] = json.loads(self._native.sections())
+        return sections
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes `toml` into a file, from which `Scene.load` reads the same machine, and beside it the files that it names.
+
+        The scene file replaces an earlier one; of the others, one with a different content is refused.
+        """
+        out = Path(path)
+        files = {out.parent / name: content for name, content in self._native.files()}
+        for file, content in files.items():
+            if file.exists() and file.read_bytes() != content:
+                raise OptionError(f"{file} exists already, and has not what the scene {self.name} reads from a file of this name")
+        for file, content in {**files, out: self.toml.encode()}.items():
+            write(file, content)
 
     @property
     def changes(self) -> dict[str, str]:
@@ -212,6 +237,7 @@ class Scene:
         """Value of the parameter `key`, SI."""
         return self.parameter(key).value
 
+    @property
     def channels(self) -> list[Channel]:
         """Channels that a run can record."""
         return [Channel(*row) for row in self._native.channels()]
@@ -231,6 +257,10 @@ class Scene:
         if len(found) > 1:
             raise OptionError(f"{name}: several parameters have this name: {', '.join(found)}; give a mapping with the whole key")
         return found[0] if found else name
+
+    def geometry(self) -> list[Shape]:
+        """Drawn shapes of the world, then of each body, in body axes; a body without any has bars to its joints."""
+        return shapes_of(self._native)
 
     def check(self) -> Check:
         """Assembles the machine, counts its bodies, degrees of freedom and constraints, and collects warnings."""
@@ -289,8 +319,8 @@ def _unpickle(origin: Any) -> Scene:
     return Scene(_native.Scene.read_again(origin))
 
 
-class Run:
-    """Results of `Scene.run`. Arrays share the memory of the run, are read-only, and outlive it."""
+class Run(Mapping[str, NDArray[np.float64]]):
+    """Results of `Scene.run`: a mapping of channels to arrays, which share the memory of the run, are read-only, and outlive it."""
 
     def __init__(self, scene: Scene, results: dict[str, Any]) -> None:
         self.scene = scene
@@ -338,21 +368,25 @@ class Run:
 
         A name without its component (`A.force`) gives all three of a vector: shape (rows, 3).
         """
+        return self._values[self._place(channel), : self._rows].T
+
+    def _place(self, channel: str) -> int | slice:
+        """Row of a channel among the values, or the rows of a vector."""
         index = self._indices.get(channel)
         if index is not None:
-            return self._values[index, : self._rows]
+            return index
         parts = [name.rsplit(".", 1) for name in self.channels]
         components = {part[1]: i for i, part in enumerate(parts) if part[0] == channel and part[1:] not in ([], ["size"])}
         first = components.get("x")
         if first is not None and components == {"x": first, "y": first + 1, "z": first + 2}:
-            return self._values[first : first + 3, : self._rows].T
+            return slice(first, first + 3)
         raise ChannelError(self._explain(channel))
 
     def _explain(self, channel: str) -> str:
         members = [name for name in self.channels if name.startswith(f"{channel}.")]
         if members:
             return f"`{channel}` stands for several channels: {', '.join(members)}"
-        if any(channel in (known.name, known.column) for known in self.scene.channels()):
+        if any(channel in (known.name, known.column) for known in self.scene.channels):
             return f"`{channel}` was not recorded: pass channels=[{channel!r}, …] to Scene.run"
         near = get_close_matches(channel, self._indices, n=1)
         hint = f" (did you mean `{near[0]}`?)" if near else ""
@@ -362,11 +396,72 @@ class Run:
         return iter(self.channels)
 
     def __len__(self) -> int:
-        """Number of rows."""
-        return self._rows
+        """Number of channels."""
+        return len(self._channels)
+
+    # A comparison of arrays has no single answer.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """The rows as a structured array with a field for each channel."""
+        if copy is False:
+            raise ValueError("a structured array of a run is a copy; run[channel] shares its memory")
+        table = np.empty(self._rows, dtype=[(name, float) for name in self])
+        for name in self:
+            table[name] = self[name]
+        return table if dtype is None else table.astype(dtype)
+
+    @property
+    def transforms(self) -> NDArray[np.float64]:
+        """Poses of the bodies, in scene order, in each row, body to world: shape (rows, bodies, 4, 4). They need the channels
+        `*.pose.*`."""
+        poses = [[self[f"{body}.pose.{part}"] for part in _POSE] for body in self.scene.bodies]
+        table = np.moveaxis(np.array(poses).reshape(-1, 6, self._rows), -1, 0)
+        return matrices(table[..., :3], rotations_of(table[..., 3:]))
+
+    def plot(self, *channels: str, axes: Any = None) -> Any:
+        """Draws channels over time into Matplotlib's `axes`, by default new ones, which it returns."""
+        places = [place for channel in channels for place in np.atleast_1d(np.arange(len(self))[self._place(channel)])]
+        curves = [(self._channels[i][0], self._channels[i][2], self._values[i, : self._rows]) for i in places]
+        return _show.plot(axes, self.time, curves)
+
+    def animate(self, frames: int = 60, *, slower: float | None = None) -> Any:
+        """The moving machine, a Matplotlib animation that a notebook shows with controls, and `save` writes as a film.
+
+        `frames` instants are shown, `slower` times slower than they passed, by default within four seconds. A run that has not
+        recorded the poses of its bodies is repeated for them, with the same bits.
+        """
+        whole("frames", frames, 2, 10_000)
+        poses = [f"{body}.pose.{part}" for body in self.scene.bodies for part in _POSE]
+        run = self
+        if not set(poses) <= set(self.channels):
+            run = self.scene.run(self.end, self.end / (frames - 1) if self.end else None, channels=poses, warn=False)
+        rows = np.unique(np.linspace(0, run._rows - 1, frames).round().astype(int))
+        span = 4.0 if slower is None else slower * self.end
+        shapes, names = self.scene.geometry(), self.scene.bodies
+        return _show.animate(self.scene.name, shapes, names, run.time[rows], run.transforms[rows], 1e3 * span / len(rows))
+
+    def impacts_to_pandas(self) -> pandas.DataFrame:
+        """The impacts as a data frame, one row per impact."""
+        library("pandas", "pandas")
+        import pandas
+
+        return pandas.DataFrame(self.impacts)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The channels over the coordinate `time`, with their units."""
+        library("xarray", "xarray")
+        import xarray
+
+        about = {name: {"units": unit, "long_name": text} for name, _, unit, text in self._channels}
+        data = {name: ("time", self[name], about[name]) for name in self if name != "time"}
+        coordinates = {"time": ("time", self.time, about["time"])}
+        return xarray.Dataset(data, coordinates, {"scene": self.scene.name, "hash": self.hash})
 
     def to_pandas(self) -> pandas.DataFrame:
         """The rows as a data frame, with the columns of `jointplay run --out`."""
+        library("pandas", "pandas")
         import pandas
 
         columns = [column for _, column, _, _ in self._channels]
@@ -379,6 +474,7 @@ class Run:
         return frame_of(self.scene._native, self.end) or html.escape(repr(self))
 
 
+_POSE = ("x", "y", "z", "alpha", "beta", "gamma")
 INTEGERS = ("steps",)
 FLAGS = ("floored", "disturbed")
 

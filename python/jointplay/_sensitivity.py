@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._distribution import At, library
-from ._study import DIVERGED, NOT_STARTED, Estimate, Over, Progress, Runs, Stages, Study, read_quantity, sample, whole
+from ._distribution import At
+from ._options import library, whole
+from ._study import DIVERGED, NOT_STARTED, Estimate, Over, Progress, Runs, Stages, Study, read_quantity, sample
 
 if TYPE_CHECKING:
     import pandas
@@ -147,6 +148,7 @@ class Sensitivity:
 
     def to_pandas(self) -> pandas.DataFrame:
         """One row per output and parameter, SI: the columns of `sensitivity.csv`."""
+        library("pandas", "pandas")
         import pandas
 
         rows = []

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _study_command as common
-from ._distribution import library
+from ._options import library
 from ._scene import Scene
 from ._sensitivity import Indices, Sensitivity, Target, sensitivity
 from ._study import Estimate

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from functools import wraps
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from ._geometry import matrices
 from ._link import frame_of
 from ._scene import impact_table
+from .errors import InUseError
 
 if TYPE_CHECKING:
     from typing import Self
 
     from ._scene import Quantity, Scene
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -46,8 +53,40 @@ class Frame:
     values: NDArray[np.float64] = field(repr=False)
     """All channels, in the order of `Simulation.channels`."""
 
+    @property
+    def transforms(self) -> NDArray[np.float64]:
+        """Poses of the bodies, body to world: shape (bodies, 4, 4)."""
+        return matrices(self.positions, self.rotations)
 
-class Simulation(_native.Simulation):
+
+def in_one_thread(use: Callable[P, T]) -> Callable[P, T]:
+    """A method of a simulation that says so when another thread is using it."""
+
+    @wraps(use)
+    def guarded(*arguments: P.args, **named: P.kwargs) -> T:
+        try:
+            return use(*arguments, **named)
+        except RuntimeError as error:
+            # Of PyO3: "Already borrowed", "Already mutably borrowed".
+            if type(error) is not RuntimeError or "borrowed" not in str(error):
+                raise
+            raise InUseError("this simulation is in use in another thread; give each thread its own") from None
+
+    return guarded
+
+
+class _Guarded(_native.Simulation):
+    """Its methods and properties are refused while another thread uses it."""
+
+
+for _name, _member in vars(_native.Simulation).items():
+    if callable(_member) and not _name.startswith("__"):
+        setattr(_Guarded, _name, in_one_thread(_member))
+    elif hasattr(_member, "__set__"):
+        setattr(_Guarded, _name, property(in_one_thread(_member.__get__), doc=_member.__doc__))
+
+
+class Simulation(_Guarded):
     """A running simulation. Simulations in different threads step at the same time; each belongs to one thread at a time."""
 
     scene: Scene
@@ -74,6 +113,9 @@ class Simulation(_native.Simulation):
         # The state may contain changes.
         self._is_plain = False
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _resumed, (self.scene, self.state, self._is_plain)
+
     def frame(self) -> Frame:
         """The machine at this instant."""
         return Frame(**self._instant())
@@ -93,3 +135,10 @@ class Simulation(_native.Simulation):
 
     def __repr__(self) -> str:
         return f"<jointplay.Simulation {self.scene.name} at {self.time:g} s>"
+
+
+def _resumed(scene: Scene, state: _native.State, is_plain: bool) -> Simulation:
+    simulation = Simulation(scene)
+    simulation.restore(state)
+    simulation._is_plain = is_plain
+    return simulation

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -12,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
-from ._distribution import Distribution, Request, library, resolve
-from .errors import OptionError
+from ._distribution import Distribution, Request, resolve
+from ._options import library, workers
+from .errors import DoubtWarning, OptionError
 
 if TYPE_CHECKING:
     from ._scene import Quantity, Scene
@@ -72,7 +74,10 @@ class Study:
         self.scene = scene
         """The scene."""
         self._over = requests(over)
-        self._entries = [entry.strip() for entry in (output.split(",") if isinstance(output, str) else output)]
+        names = output.split(",") if isinstance(output, str) else output
+        if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+            raise OptionError(f"output = {output!r}: expected text such as \"tip-error\", or a list of texts")
+        self._entries = [entry.strip() for entry in names]
         self._span = duration, from_
         # Raises errors here, not at the first use. The ends of all distributions are checked.
         self._native.alone([one.ends for one in self._distributions.values()])
@@ -126,22 +131,51 @@ class Study:
         progress: Progress | None = None,
         record: str | os.PathLike[str] | None = None,
     ) -> NDArray[np.float64]:
-        """Outputs, SI, at `values`, one row per run and one column per parameter, SI; NaN for a run that fails.
+        """Outputs, SI, at `values`, one row per run and one column per parameter, SI.
 
-        With `record`, finished runs are kept in this file, and an interrupted call resumes when it is repeated. The file stays.
+        A flat list is one run, or with one parameter one run per value. A row with a value that is not finite, or whose run fails,
+        gives NaN, and a `jp.DoubtWarning` names it. With `record`, finished runs are kept in this file, and an interrupted call resumes when it is repeated. The file stays.
         """
-        return self._run(values, threads, progress, None if record is None else Path(record)).results
+        runs = self._run(values, threads, progress, None if record is None else Path(record))
+        if failed := [f"values[{i}] {self._why(runs, i)}" for i in np.flatnonzero(runs.status).tolist()]:
+            more = f" and {len(failed) - 8} more" if len(failed) > 8 else ""
+            warnings.warn(f"{self.scene.name}: no result: {', '.join(failed[:8])}{more}", DoubtWarning, stacklevel=2)
+        return runs.results
+
+    def _why(self, runs: Runs, row: int) -> str:
+        if not np.isfinite(runs.values[row]).all():
+            return f"= {runs.values[row].tolist()} is not finite"
+        return "diverged" if runs.status[row] == DIVERGED else "did not start"
 
     def _run(self, values: Any, threads: int | None, progress: Progress | None, record: Path | None) -> Runs:
-        table = np.atleast_2d(np.asarray(values, dtype=float))
-        workers = (os.cpu_count() or 1) if threads is None else whole("threads", threads, 1, 1024)
-        if len(table) and table.shape[1] == len(self._distributions):
-            # All values are allowed if the extremes are.
-            self._native.alone(list(zip(table.min(0).tolist(), table.max(0).tolist(), strict=True)))
-        finished = self._native.run(table.tolist(), workers, progress, record)
-        status = finished[:, -1].astype(np.int64)
-        results = np.where(status[:, None] == 0, finished[:, :-1], np.nan)
+        table, count = self._table(values), workers(threads)
+        finite = np.isfinite(table).all(axis=1)
+        given = table[finite]
+        status = np.full(len(table), NOT_STARTED, dtype=np.int64)
+        results = np.full((len(table), len(self.outputs)), np.nan)
+        if len(given) or not len(table):
+            if len(given):
+                # All values are allowed if the extremes are.
+                self._native.alone(list(zip(given.min(0).tolist(), given.max(0).tolist(), strict=True)))
+            finished = self._native.run(given.tolist(), count, progress, record)
+            status[finite] = finished[:, -1]
+            results[finite] = np.where(finished[:, -1:] == 0, finished[:, :-1], np.nan)
         return Runs(table, results, status)
+
+    def _table(self, values: Any) -> NDArray[np.float64]:
+        """Values with one row per run."""
+        keys = list(self._distributions)
+        expected = f"expected numbers in SI units, one row per run and one column for each of {', '.join(keys)}"
+        try:
+            table = np.asarray(values, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise OptionError(f"values: {expected}: {error}") from None
+        if table.ndim < 2:
+            table = table.reshape(-1, 1) if len(keys) == 1 else table.reshape(1, -1)
+        if table.ndim != 2 or table.shape[1] != len(keys):
+            given = f"{table.shape[1]} numbers are given for {len(keys)} parameters" if table.ndim == 2 else f"shape {table.shape}"
+            raise OptionError(f"values: {given}: {expected}")
+        return table
 
     def __repr__(self) -> str:
         return f"<jointplay.Study of {self.scene.name}: {', '.join(self.outputs)} over {len(self._distributions)} parameters>"
@@ -151,9 +185,10 @@ def requests(over: Over) -> list[Request]:
     """`over` in its general form."""
     if isinstance(over, Mapping):
         return [Request("over", key, text) for key, text in over.items()]
-    return [
-        one if isinstance(one, Request) else Request("over", one, None) for one in ([over] if isinstance(over, str) else over)
-    ]
+    entries: Sequence[Any] = [over] if isinstance(over, str) else over
+    if not isinstance(entries, Sequence) or not all(isinstance(one, (str, Request)) for one in entries):
+        raise OptionError(f"over = {over!r}: expected a mapping of keys to distributions, or a list of keys")
+    return [one if isinstance(one, Request) else Request("over", one, None) for one in entries]
 
 
 def record_of(path: str | os.PathLike[str], stage: str) -> Path:
@@ -212,13 +247,6 @@ def sample(sampling: str, dimensions: int, points: int, seed: int) -> NDArray[np
     else:
         unit = library("scipy.stats.qmc").LatinHypercube(dimensions, rng=seed).random(points)
     return np.clip(unit, 2.0**-31, 1.0 - 2.0**-31)
-
-
-def whole(name: str, value: int, least: int, most: int, more: str = "") -> int:
-    """A whole number within its range."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= most:
-        raise OptionError(f"{name} = {value!r}: allowed whole numbers from {least} to {most}{more}")
-    return int(value)
 
 
 def read_quantity(study: Study, o: int, value: Quantity) -> float:

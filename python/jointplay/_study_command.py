@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _native
-from ._distribution import Request, library
+from ._distribution import Request
 from ._folder import check_replaceable, result_folder
+from ._options import library
 from ._scene import Quantity, Scene
 from ._study import Estimate, Runs, record_of
 from .errors import OptionError

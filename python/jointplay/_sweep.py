@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from ._options import library, workers
 from .errors import ChannelError, OptionError
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
 
     from ._scene import Quantity, Scene
 
@@ -134,16 +136,37 @@ class Sweep:
         *,
         record: str | os.PathLike[str] | None = None,
     ) -> SweepResult:
-        """Computes all blocks on `threads` threads (by default one per core), which do not affect the result.
+        """Computes all blocks on `threads` threads (by default or with -1 one per core), which do not affect the result.
 
         `progress` is called with the fraction done, from 0 to 1. The file `record` has the finished blocks; a sweep that was
         interrupted resumes from it, with the same bits.
         """
         path = None if record is None else os.fspath(record)
-        return SweepResult(self, self._native.run(threads or os.cpu_count() or 1, progress, path))
+        return SweepResult(self, self._native.run(workers(threads), progress, path))
 
     def __repr__(self) -> str:
         return f"<jointplay.Sweep of {self.scene.name}: {self.points} points in {self.blocks} blocks>"
+
+
+UNITS = {
+    "m_s2": "m/s^2",
+    "rad_s2": "rad/s^2",
+    "m_s": "m/s",
+    "rad_s": "rad/s",
+    "per_s": "1/s",
+    "Nm": "N m",
+    "N": "N",
+    "J": "J",
+    "rad": "rad",
+    "m": "m",
+    "s": "s",
+}
+"""SI units by the ends of names of columns; the longer ones first."""
+
+
+def unit_of(column: str) -> str:
+    """SI unit of a column, by its name; empty for a number or a code."""
+    return next((unit for end, unit in UNITS.items() if column.endswith(f"_{end}")), "")
 
 
 class SweepResult(Mapping[str, NDArray[Any]]):
@@ -181,10 +204,34 @@ class SweepResult(Mapping[str, NDArray[Any]]):
 
     def to_pandas(self) -> pandas.DataFrame:
         """One row per point: its parameters, SI, and its results without a section axis."""
+        library("pandas", "pandas")
         import pandas
 
         settings = pandas.DataFrame([dict(self.sweep._native.settings(point)) for point in range(self.sweep.points)])
         return settings.join(pandas.DataFrame({name: self._arrays[name].ravel() for name in self._single}))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """All arrays over named axes with their units: one dimension per varied parameter, or `point` for a table of points; `start`
+        if there are several; `section` where a point has several values."""
+        library("xarray", "xarray")
+        import xarray
+
+        sweep = self.sweep
+        shape = tuple(sweep._native.shape)
+        keys = ["point"] if sweep._is_table else list(self.axes)
+        start = ["start"] if len(shape) > len(keys) else []
+        dims = start + keys
+        coordinates: dict[str, Any] = {
+            key: ("point" if sweep._is_table else key, values, {"units": sweep.scene.parameter(key).unit})
+            for key, values in self.axes.items()
+        }
+        coordinates |= {"start": sweep._options["start"]} if start else {}
+        variables = {
+            name: (dims if name in self._single else [*dims, "section"], values, {"units": unit_of(name)})
+            for name, values in self._arrays.items()
+            if name not in self.axes
+        }
+        return xarray.Dataset(variables, coordinates, {"scene": sweep.scene.name})
 
     def __repr__(self) -> str:
         return f"<jointplay.SweepResult: {self.sweep.points} points, {len(self)} arrays>"

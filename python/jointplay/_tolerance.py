@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._distribution import At, Distribution, Request, library, resolve
+from ._distribution import At, Distribution, Request, resolve
 from ._fits import Search
-from ._study import DIVERGED, NOT_STARTED, Estimate, Over, Progress, Runs, Stages, Study, read_quantity, sample, whole
+from ._options import library, whole
+from ._study import DIVERGED, NOT_STARTED, Estimate, Over, Progress, Runs, Stages, Study, read_quantity, sample
 from .errors import OptionError
 
 if TYPE_CHECKING:
@@ -140,6 +141,7 @@ class Tolerance:
 
     def to_pandas(self) -> pandas.DataFrame:
         """One row per output and statistic, SI: the columns of `tolerance.csv`."""
+        library("pandas", "pandas")
         import pandas
 
         rows: list[tuple[Any, ...]] = [("all", "", None, None, "yield", *self.yield_)]
@@ -211,9 +213,9 @@ def tolerance(
     whole("runs", runs, 2, 1_000_000)
     whole("evaluations", evaluations, 1, 10_000)
     whole("seed", seed, 0, 2**63 - 1)
-    if not 0.0 < yield_ <= 1.0:
-        raise OptionError(f"yield = {yield_}: allowed above 0 up to 1")
-    if not limits:
+    if not isinstance(yield_, (int, float)) or not 0.0 < yield_ <= 1.0:
+        raise OptionError(f"yield_ = {yield_!r}: allowed above 0 up to 1")
+    if not isinstance(limits, Mapping) or not limits:
         raise OptionError("limits: give a limit for at least one output")
     study = Study(scene, over, list(limits), duration=duration, from_=from_)
     given = list(limits.items())
@@ -265,7 +267,9 @@ def _read_limits(study: Study, o: int, name: str, given: Any) -> Limits:
         if isinstance(given, str):
             low, dots, high = given.partition("..")
             given = (low.strip() or None, high.strip() or None) if dots else (None, given)
-        pair = given if isinstance(given, tuple) else (None, given)
+        pair = tuple(given) if isinstance(given, (tuple, list)) else (None, given)
+        if len(pair) != 2:
+            raise OptionError(f"{given!r}: expected an upper limit, or a lower and an upper one")
         lower, upper = (None if end is None else read_quantity(study, o, end) for end in pair)
         if lower is None and upper is None:
             raise OptionError("expected a value, or LOW..HIGH")

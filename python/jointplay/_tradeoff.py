@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from . import _native
+from ._options import library
 
 if TYPE_CHECKING:
     import pandas
@@ -65,6 +66,7 @@ class Tradeoff:
 
     def to_pandas(self) -> pandas.DataFrame:
         """One line per row."""
+        library("pandas", "pandas")
         import pandas
 
         return pandas.DataFrame([asdict(row) for row in self.rows])
@@ -73,10 +75,10 @@ class Tradeoff:
         return f"<jointplay.Tradeoff: {len(self.rows)} rows>"
 
 
-def tradeoff(scene: Scene, *, quick: bool = True, progress: Callable[[float], object] | None = None) -> Tradeoff:
+def tradeoff(scene: Scene, *, quick: bool = False, progress: Callable[[float], object] | None = None) -> Tradeoff:
     """Runs every method on `scene` over its steps or tolerances, and measures cost and error, as `jointplay tradeoff` does.
 
-    A `quick` measurement uses a coarse grid over a tenth of a second and takes seconds; a full one takes a minute. Times are
+    A `quick` measurement uses a coarse grid over a tenth of a second and takes seconds; a full one, the default, takes a minute. Times are
     processor times of the calling thread. `progress` is called with the fraction done, from 0 to 1.
     """
     rows = json.loads(_native.tradeoff(scene._native, quick, time.thread_time, progress))

@@ -59,6 +59,10 @@ class Stopped(JointplayError, RuntimeError):
     run: Any = None
 
 
+class InUseError(JointplayError, RuntimeError):
+    """A simulation that another thread is using."""
+
+
 class InternalError(JointplayError, RuntimeError):
     """A bug in jointplay."""
 

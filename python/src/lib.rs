@@ -5,6 +5,7 @@
 //! `jointplay.errors`.
 
 mod errors;
+mod geometry;
 mod interpreter;
 mod machine;
 mod quantity;
@@ -26,6 +27,9 @@ const WRITER: [&str; 2] = ["jointplay", env!("CARGO_PKG_VERSION")];
 /// The parts of `jointplay` that are written in Rust.
 #[pymodule]
 mod _native {
+    use pyo3::prelude::*;
+
+    use super::WRITER;
     #[cfg(feature = "render")]
     #[pymodule_export]
     use super::render::render;
@@ -41,4 +45,10 @@ mod _native {
     use super::sweep::PySweep;
     #[pymodule_export]
     use super::tradeoff::tradeoff;
+
+    /// Its version is that of the program.
+    #[pymodule_init]
+    fn version(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", WRITER[1])
+    }
 }

@@ -35,7 +35,7 @@ pub fn duration(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
 }
 
 /// `value` as messages show it.
-fn repr_of(value: &Bound<'_, PyAny>) -> String {
+pub fn repr_of(value: &Bound<'_, PyAny>) -> String {
     value.repr().map_or_else(|_| "?".to_owned(), |text| text.to_string())
 }
 

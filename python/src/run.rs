@@ -71,7 +71,15 @@ pub fn run<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let duration = read_duration("duration", duration)?;
     let every = match every {
-        Some(every) => read_duration("every", every)?,
+        Some(every) => {
+            let interval = read_duration("every", every)?;
+            if interval > duration && duration > 0.0 {
+                let message =
+                    format!("every = {interval} s is longer than duration = {duration} s: there would be one row only");
+                return Err(option_error(py, &message));
+            }
+            interval
+        }
         None if duration > 0.0 => duration / INTERVALS,
         None => 1.0,
     };
@@ -79,7 +87,7 @@ pub fn run<'py>(
     let times = RowTimes::new(duration, every).ok_or_else(positive)?;
     let mut live = scene.start(py)?;
     let (all, _) = detached(py, || channels_at_start(&mut live))?;
-    let failed = |error| option_error(py, &format!("channels: {error}; Scene.channels() lists them"));
+    let failed = |error| option_error(py, &format!("channels: {error}; Scene.channels lists them"));
     let channels = chosen_channels(all, &channels).map_err(failed)?;
     let capacity = usize::try_from(times.last()).unwrap_or(usize::MAX).saturating_add(1);
     let values = allocate(capacity, channels.len())?;

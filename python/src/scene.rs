@@ -8,11 +8,15 @@ use std::time::{Duration, Instant};
 use jointplay_analysis::assembly::StartReport;
 use jointplay_analysis::ideal_fault::ideal_fault;
 use jointplay_physics::simulate::{ChannelInfo, Frame, Simulation, channels_of};
-use jointplay_scene::{BENCHMARKS, BUILT_IN, Kind, LiveScene, Scene, SceneError, Texts, check_solver_changes};
+use jointplay_physics::units::si_unit;
+use jointplay_scene::{
+    BENCHMARKS, BUILT_IN, Kind, LiveScene, Scene, SceneError, Texts, check_solver_changes, file_bytes,
+};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyBytes, PyDict, PyList};
 
 use crate::errors::scene_error;
+use crate::geometry::{DrawnShape, shapes};
 use crate::interpreter::detached;
 use crate::machine::text_of;
 use crate::quantity::{to_python, to_text};
@@ -95,6 +99,32 @@ impl PyScene {
         (source.text.to_string(), source.file.clone(), references, self.scene.changes.clone())
     }
 
+    /// Text of a scene file that reads back to the scene with its changes.
+    fn text(&self, py: Python<'_>) -> PyResult<String> {
+        let text = detached(py, || self.scene.to_toml())?;
+        text.map_err(|error| scene_error(py, Some(&self.scene), &error))
+    }
+
+    /// The sections and keys of [`Self::text`], in JSON.
+    fn sections(&self, py: Python<'_>) -> PyResult<String> {
+        let sections: serde_json::Value = toml::from_str(&self.text(py)?).map_err(|error| {
+            let error = SceneError { message: error.to_string(), ..SceneError::default() };
+            scene_error(py, Some(&self.scene), &error)
+        })?;
+        Ok(sections.to_string())
+    }
+
+    /// Names and content of the files that it references.
+    fn files<'py>(&self, py: Python<'py>) -> Vec<(&str, Bound<'py, PyBytes>)> {
+        let files = self.scene.source.beside.iter();
+        files.map(|(name, text)| (&name[..], PyBytes::new(py, &file_bytes(text)))).collect()
+    }
+
+    /// Drawn shapes: body (`None` for the world), kind, and dimensions by name, m, in body axes.
+    fn shapes<'py>(&self, py: Python<'py>) -> PyResult<Vec<DrawnShape<'py, '_>>> {
+        shapes(py, &self.scene)
+    }
+
     /// Short name.
     #[getter]
     fn name(&self) -> &str {
@@ -151,6 +181,11 @@ impl PyScene {
         all.set_item("text", parameter.show(&value))?;
         all.set_item("default", to_python(py, &parameter.default)?)?;
         all.set_item("allowed", parameter.allowed())?;
+        let unit = match parameter.kind {
+            Kind::Number { dimension, .. } => si_unit(dimension),
+            Kind::Count { .. } | Kind::Choice(_) => "",
+        };
+        all.set_item("unit", unit)?;
         let range = match parameter.kind {
             Kind::Number { min, max, .. } => Some((min, max)),
             Kind::Count { min, max } => Some((min as f64, max as f64)),

@@ -23,7 +23,7 @@ use serde_json::Value as Json;
 use crate::WRITER;
 use crate::errors::{option_error, scene_error};
 use crate::interpreter::{STEPS_BETWEEN_CHECKS, detached, report_progress};
-use crate::quantity::{duration, to_python, to_text};
+use crate::quantity::{duration, repr_of, to_python, to_text};
 use crate::report::constant;
 use crate::scene::PyScene;
 
@@ -39,7 +39,11 @@ fn option<'py>(options: &Bound<'py, PyDict>, name: &str) -> PyResult<Option<Boun
 }
 
 fn count(options: &Bound<'_, PyDict>, name: &str) -> PyResult<Option<usize>> {
-    option(options, name)?.map(|value| value.extract()).transpose()
+    let whole = |value: Bound<'_, PyAny>| {
+        let wrong = |_| option_error(value.py(), &format!("{name} = {}: expected a whole number", repr_of(&value)));
+        value.extract().map_err(wrong)
+    };
+    option(options, name)?.map(whole).transpose()
 }
 
 fn time(options: &Bound<'_, PyDict>, name: &str) -> PyResult<Option<f64>> {
@@ -54,7 +58,11 @@ fn axis(scene: &Scene, key: &str, values: &Bound<'_, PyAny>) -> PyResult<Axis> {
     }
     let parameter = scene.parameter(key).map_err(|error| scene_error(py, Some(scene), &error))?;
     let mut listed = Vec::new();
-    for value in values.try_iter()? {
+    let entries = values.try_iter().map_err(|_| {
+        let given = repr_of(values);
+        invalid(format!("{key} = {given}: expected a list of numbers or texts, or text such as \"0.1mm..1mm:10\""))
+    })?;
+    for value in entries {
         let value = value?;
         let text = to_text(parameter, key, &value)?;
         let text = text.ok_or_else(|| invalid(format!("{key} = None: a varied parameter needs values")))?;
@@ -112,7 +120,7 @@ impl PySweep {
             Some(keep) => {
                 let text: String = keep.extract()?;
                 let list = ChannelStatistic::parse_list(scene, &text);
-                list.map_err(|error| invalid(format!("keep: {error}; Scene.channels() lists the channels")))?
+                list.map_err(|error| invalid(format!("keep: {error}; Scene.channels lists the channels")))?
             }
         };
         let protocol = Protocol { span: span(py, scene, options)?, keep, joints: false };

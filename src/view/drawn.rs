@@ -11,13 +11,12 @@ use parry3d::shape::SharedShape;
 use super::cast::distance;
 use super::joint::{self, DrawnJoint};
 use super::solids::{BarKind, Pose, Solid};
-use super::sticks::sticks;
 use super::surface::surface;
 use super::theme::Material;
 use super::{Colour, Mesh, MeshData, Palette, to_f32, zones};
 use crate::machine::{Geometry, Role, Shape};
 use crate::mesh;
-use crate::scene::Scene;
+use crate::scene::{Scene, sticks};
 use crate::simulate::Frame;
 
 /// A shape of the scene, in its body's frame.

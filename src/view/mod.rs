@@ -31,7 +31,6 @@ mod pick;
 mod relative;
 mod shot;
 mod solids;
-mod sticks;
 mod surface;
 mod swept;
 mod symbols;

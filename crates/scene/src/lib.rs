@@ -64,6 +64,7 @@ mod read_bodies;
 mod read_joints;
 mod reading;
 mod saved;
+mod sticks;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -90,6 +91,7 @@ pub use parameters::*;
 pub use provenance::{insert_texts, provenance};
 pub use quantity::{DimensionError, Quantity, evaluate};
 pub use saved::{SavedState, SavedStateError};
+pub use sticks::sticks;
 pub use table::{find, reference_page, table};
 pub use value::Value;
 pub use visible::{visible, visible_line};

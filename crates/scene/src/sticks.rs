@@ -2,15 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use crate::machine::{Geometry, JointKind, Shape, Vec3};
-use crate::scene::Scene;
+use jointplay_physics::machine::{Geometry, JointKind, Shape, Vec3};
+
+use super::Scene;
 
 /// Radii of the bars and of the ball at the centroid, relative to the length of the longest bar.
 const BAR: f64 = 0.03;
 const BALL: f64 = 0.08;
 
 /// Default shapes of all bodies without shapes, by body index.
-pub(super) fn sticks(scene: &Scene) -> BTreeMap<usize, Vec<Shape>> {
+pub fn sticks(scene: &Scene) -> BTreeMap<usize, Vec<Shape>> {
     let bodies_without_shapes = scene.machine.bodies.iter().enumerate();
     let bodies_without_shapes = bodies_without_shapes.filter(|(_, body)| body.shapes.is_empty());
     let mut points: BTreeMap<usize, Vec<Vec3>> = bodies_without_shapes.map(|(i, _)| (i, Vec::new())).collect();
