@@ -9,6 +9,7 @@ Quantities are floats in SI units, or text with a unit ("0.5 mm"). The same scen
 program `jointplay`: compare `Run.hash` with the state hash that `jointplay run` prints.
 """
 
+from ._control import Elements, Linearisation, Load, Motor, Spring
 from ._geometry import Shape
 from ._native import State, __version__
 from ._render import render
@@ -38,6 +39,7 @@ __all__ = [
     "Check",
     "DoubtWarning",
     "Effects",
+    "Elements",
     "Ends",
     "Estimate",
     "FitChoice",
@@ -47,6 +49,9 @@ __all__ = [
     "Indices",
     "InternalError",
     "JointplayError",
+    "Linearisation",
+    "Load",
+    "Motor",
     "OmissionWarning",
     "OptionError",
     "Parameter",
@@ -60,6 +65,7 @@ __all__ = [
     "Sensitivity",
     "Shape",
     "Simulation",
+    "Spring",
     "State",
     "Stopped",
     "Study",

@@ -210,13 +210,13 @@ impl ElementNumber {
 
 impl Element {
     /// Whether a running machine can continue with `next` in its place: the same kind at the same place, with other forces. The
-    /// depth of a stop is a scale of the steps.
+    /// depth of a stop is a scale of the steps, and at another frequency a law would jump to another phase: both wait for a reset.
     pub(super) fn can_become(&self, next: &Self) -> bool {
-        let of = |element: &Self| {
-            let description = element.describe();
-            (description.word, description.place, description.stop_depth)
-        };
-        self.name == next.name && of(self) == of(next)
+        let (own, other) = (self.describe(), next.describe());
+        let is_constant = |law: Option<(_, &Drive)>| matches!(law, None | Some((_, Drive::Constant { .. })));
+        self.name == next.name
+            && (own.word, own.place, own.stop_depth) == (other.word, other.place, other.stop_depth)
+            && (own.law == other.law || (is_constant(own.law) && is_constant(other.law)))
     }
 
     /// A number of the element as it stands; `None` if the kind does not have it. A target becomes one at a constant rate.

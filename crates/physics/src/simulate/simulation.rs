@@ -38,7 +38,7 @@ use super::{
 };
 use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::{Controller, Polynomial};
-use crate::machine::{AppliedForces, Conditions, ElementNumber, LiveElements, Machine, Vec3};
+use crate::machine::{AppliedForces, Conditions, ControlFault, ElementNumber, LiveElements, Machine, Vec3};
 use crate::mechanism::{self, ContactId, Counts, EdgeIndicator, ElementReport, Flight, Mechanism, Pull, Ramp};
 use adaptive::FullStep;
 use automatic::SchemeSelector;
@@ -605,6 +605,14 @@ impl Simulation {
         self.run().control(numbers)?;
         self.tell_ideal(&before);
         Ok(())
+    }
+
+    /// Checks whether [`Self::control`] could set a number.
+    ///
+    /// # Errors
+    /// An element or number that does not exist, or a value out of range.
+    pub fn check_control(&self, i: usize, number: ElementNumber, value: f64) -> Result<(), ControlFault> {
+        live::check_control(self.machine(), &self.state.elements, (i, number, value))
     }
 
     /// Value now of a number of element `i`, SI, as [`Self::control`] sets it; `None` if it does not have that number.

@@ -6,7 +6,7 @@ use super::{CLEARANCE_SPEED, Stepping};
 use crate::contact::ContactState;
 use crate::integrate::Polynomial;
 use crate::jet::Jet;
-use crate::machine::{AppliedForces, ControlFault, Drive, Element, ElementKind, ElementNumber, LooseJoint, Machine};
+use crate::machine::{AppliedForces, ControlFault, Drive, Element, ElementKind, ElementNumber, LiveElements, LooseJoint, Machine};
 use crate::mechanism::{ContactId, MechanismError, Pull, Ramp, law_of};
 use crate::simulate::Effect;
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
@@ -50,6 +50,18 @@ pub(in crate::simulate) fn check_pull(machine: &Machine, pull: &Pull) -> Result<
     } else {
         Ok(())
     }
+}
+
+/// As [`Simulation::check_control`](crate::simulate::Simulation::check_control).
+pub(super) fn check_control(
+    machine: &Machine,
+    elements: &LiveElements,
+    (i, number, value): (usize, ElementNumber, f64),
+) -> Result<(), ControlFault> {
+    if i >= machine.elements.len() {
+        return Err(ControlFault::NoElement { element: i, elements: machine.elements.len() });
+    }
+    elements.element(machine, i).check_number(number, value)
 }
 
 /// A motor's target at `time`, s; at rest at 0 if it has none.
@@ -122,11 +134,8 @@ impl Stepping<'_> {
         let (time, machine) = (self.state.now.t, self.machine);
         let mut elements = self.state.elements.clone();
         for &(i, number, value) in numbers {
-            if i >= machine.elements.len() {
-                return Err(ControlFault::NoElement { element: i, elements: machine.elements.len() }.into());
-            }
+            check_control(machine, &elements, (i, number, value))?;
             let element = elements.element(machine, i);
-            element.check_number(number, value)?;
             if let (ElementKind::Motor(motor), ElementNumber::Target | ElementNumber::TargetRate) =
                 (&element.kind, number)
             {
