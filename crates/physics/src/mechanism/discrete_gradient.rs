@@ -606,15 +606,14 @@ impl Mechanism {
         self.discrete.as_ref().map_or(&[], |discrete| &discrete.rate[positions..])
     }
 
-    /// The balls that touched in the latest such step, with the means over it; directions are those of the latest
+    /// What touched in the latest such step, with the means over it; directions are those of the latest
     /// evaluation.
     pub(crate) fn discrete_contacts(&self) -> impl Iterator<Item = (ContactId, elements::WallContact)> {
         let rows = self.discrete.iter().flat_map(|discrete| &discrete.rows);
         let contacts = rows.filter_map(|row| Some((row.contact()?.0, row)));
-        contacts.filter(|(_, row)| row.normal_force > 0.0).filter_map(|(contact, row)| {
+        contacts.filter(|(_, row)| row.normal_force > 0.0).map(|(contact, row)| {
             let (normal_force, friction_power) = (row.normal_force, row.friction_power);
-            let direction = self.wall_direction(contact)?;
-            Some((contact, elements::WallContact { direction, normal_force, friction_power }))
+            (contact, elements::WallContact { spot: self.spot(contact), normal_force, friction_power })
         })
     }
 

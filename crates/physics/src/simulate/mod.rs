@@ -26,13 +26,13 @@ pub use simulation::{
     CLEARANCE_SPEED, ChangeError, Model, ProbeFault, Simulation, Snapshot, State, StateMismatch, Workspace, closed,
 };
 pub use stopped::{StopAdvice, StopFault, Stopped};
-pub use wear::{Cell, Edges, Grid, Wear};
+pub use wear::{Cell, Wear};
 
 use serde::{Deserialize, Serialize};
 
 use crate::machine::Vec3;
-pub use crate::mechanism::Pull;
 use crate::mechanism::{Counts, MechanismError};
+pub use crate::mechanism::{Division, Edges, Grid, Part, Pull, Shape, Spot};
 
 /// The longest run, s: at its end a double still resolves 0.1 ns.
 pub const MAX_RUN_DURATION: f64 = 1e6;

@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use super::drives::law_of;
 use super::kinematics::{Kinematics, Wrench};
+use super::loose::Spot;
 use super::model::{Anchor, Model};
 use crate::contact::{ContactState, Stiffness};
 use crate::machine::{self, Attachment, Element, ElementKind, JointCoordinate, LoadAxes, Machine, Mat3, Vec3};
@@ -246,11 +247,11 @@ pub struct Powers {
     pub external: f64,
 }
 
-/// A ball that presses against the wall of its socket.
+/// A part that presses against a wall of its joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WallContact {
-    /// Unit vector from the socket's centre to the point of contact, in the axes of the socket's body.
-    pub direction: Vec3,
+    /// Where.
+    pub spot: Spot,
     /// F_N, N.
     pub normal_force: f64,
     /// Power dissipated by friction, W.
