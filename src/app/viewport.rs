@@ -947,12 +947,12 @@ impl Viewport {
         ui.checkbox(&mut options.trail, "Trail of the tip").on_hover_text("Where the probe tip has been");
         ui.add_space(4.0);
         ui.label("Wear map").on_hover_text(
-            "Colours the inner faces of the sockets by impulse or friction work since the reset, in cells of equal \
-             area; the balls become translucent. The scale is logarithmic and follows the largest value.",
+            "Colours the walls of joints with play by impulse or friction work per area since the reset; balls, pins and \
+             blocks become translucent. The scale is logarithmic and follows the largest value.",
         );
         ui.horizontal(|ui| {
             for (map, name, help) in [
-                (WearMap::Off, "Off", "Sockets as they are"),
+                (WearMap::Off, "Off", "Walls as they are"),
                 (WearMap::Impulse, "Impulse", "How often and how hard: time integral of the normal force, N s/mm²"),
                 (WearMap::FrictionWork, "Friction work", "Magnitude of the friction work, mJ/mm²"),
             ] {
