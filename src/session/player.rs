@@ -233,7 +233,7 @@ impl Player {
         &self.record.history
     }
 
-    /// The recent paths of the balls.
+    /// The recent paths of the parts of joints with play.
     pub fn paths(&self) -> &Paths {
         &self.record.paths
     }

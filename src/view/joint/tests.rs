@@ -320,12 +320,12 @@ fn a_past_peak_is_marked_at_the_end_that_was_hit() {
 #[test]
 fn cells_of_a_wear_map_are_on_the_walls_where_the_parts_touch_and_are_seen_through_them() {
     let cases = [
-        (pin("ends = \"bearing\", face_radius = \"13 mm\""), 1e-4, 2),
-        (pin("ends = \"pin\""), 1e-4, 2),
-        (block("planar = true"), 2e-4, 4),
-        (block("z = \"0.3 mm\", half_z = \"9 mm\""), 2e-4, 16),
+        (pin("ends = \"bearing\", face_radius = \"13 mm\""), 1e-4, 2, 1e-4),
+        (pin("ends = \"pin\""), 1e-4, 2, 1e-4),
+        (block("planar = true"), 2e-4, 4, MAGNIFICATION * 2e-4),
+        (block("z = \"0.3 mm\", half_z = \"9 mm\""), 2e-4, 16, MAGNIFICATION * 3e-4),
     ];
-    for (text, play, walls) in cases {
+    for (text, play, walls, slack) in cases {
         let scene = scene(&text);
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
         simulation.track_wear();
@@ -346,14 +346,16 @@ fn cells_of_a_wear_map_are_on_the_walls_where_the_parts_touch_and_are_seen_throu
                 if site.normal_force.norm() < 1.0 {
                     continue;
                 }
-                // On the wall, which is at x = 0 of one of the squares, to the depth and the gap in front of the wall.
+                // On the wall, which is behind x = 0 of one of the squares by a hundredth of the wall's distance, to the depth.
+                let in_front = 0.01 * 0.0165;
                 let point = drawn[0].site_point(place, site);
                 let holds = |cell: &Instance| {
-                    let at = in_mesh(cell, point);
-                    let off = at.x.abs() * linear(cell).x_axis.length();
-                    off < 0.02 * drawn[0].ball_radius.max(0.012) + tolerance(play)
-                        && at.y.abs() < 0.51
-                        && at.z.abs() < 0.51
+                    let (at, linear) = (in_mesh(cell, point), linear(cell));
+                    let off = at.x.abs() * linear.x_axis.length();
+                    // Tilt moves a corner along its wall by no more than the play across the others.
+                    let beyond = |share: f32, edge: Vec3| (share.abs() - 0.5) * edge.length();
+                    off < in_front - MAGNIFICATION * site.gap as f32 + tolerance(play)
+                        && beyond(at.y, linear.y_axis).max(beyond(at.z, linear.z_axis)) < slack
                 };
                 assert!(cells.iter().any(holds), "{text}, place {place} at {} s", frame.time);
                 found += 1;
