@@ -182,7 +182,7 @@ impl Player {
         &self.frame
     }
 
-    /// Largest forces since the previous frame, per ball joint.
+    /// Largest forces since the previous frame, per joint with play.
     pub fn peaks(&self) -> &[Peak] {
         &self.record.peaks
     }
@@ -192,7 +192,7 @@ impl Player {
         &self.record.channels
     }
 
-    /// Record channels that hold the clearances of the ball joints over time.
+    /// Record channels that hold the clearances of the joints with play over time.
     pub fn clearances(&self) -> std::ops::Range<usize> {
         self.record.channels.len()..self.record.history.channels() - self.record.channels.picked().len()
     }
@@ -643,7 +643,7 @@ impl Player {
     }
 
     /// Value of `key` after [`Self::set_original`]: that of the scene file, or what it follows there, such as the common value of the
-    /// ball joints.
+    /// joints with play.
     pub fn original(&self, key: &str) -> Option<Value> {
         self.pending().value_without_change(&self.original, key)
     }

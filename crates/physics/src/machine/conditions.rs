@@ -12,7 +12,7 @@ pub struct Conditions {
     pub gravity: Vec3,
     /// As [`Machine::contact`].
     pub contact: contact::Parameters,
-    /// Contact parameters of each ball joint.
+    /// Contact parameters of each joint with play.
     pub joints: Vec<contact::Parameters>,
     /// As [`Machine::solver`].
     pub solver: Solver,
@@ -29,7 +29,7 @@ impl Machine {
         }
     }
 
-    /// This machine under other conditions, given for as many ball joints.
+    /// This machine under other conditions, given for as many joints with play.
     pub(crate) fn with_conditions(&self, conditions: &Conditions) -> Self {
         let mut machine = self.clone();
         machine.gravity = conditions.gravity;

@@ -46,10 +46,10 @@ enum Law {
     Element(Mat3),
 }
 
-/// A row that is solved for: a ball joint that is or may come into contact within the step, or an element that is stepped
+/// A row that is solved for: a contact that touches or may within the step, or an element that is stepped
 /// implicitly.
 struct SolvedRow {
-    /// Ball joints by index, then two rows per element, for its force and its torque.
+    /// Contacts by index, then two rows per element, for its force and its torque.
     index: usize,
     law: Law,
     step: ContactStep,
@@ -99,7 +99,7 @@ impl SolvedRow {
         }
     }
 
-    /// The law of a ball joint, with its row's number.
+    /// The law of a contact, with its row's number.
     fn contact(&self) -> Option<(usize, &Coefficients)> {
         match &self.law {
             Law::Contact(law) => Some((self.index, law)),
@@ -157,7 +157,7 @@ pub struct DiscreteGradient {
     powers: Powers,
 }
 
-/// A ball joint at the start of the step.
+/// A contact at the start of the step.
 #[derive(Clone, Copy, Default)]
 struct ContactStart {
     /// e, m.
@@ -184,7 +184,7 @@ pub struct StepStart<'a> {
     pub k: &'a [f64],
     /// Contact states.
     pub contact_states: &'a [ContactState],
-    /// [`ContactStep::rebound`] of each ball joint.
+    /// [`ContactStep::rebound`] of each contact.
     pub rebounds: &'a [Option<f64>],
 }
 

@@ -1,4 +1,4 @@
-//! Contact of a loose joint, between a ball and the wall of its socket, by the laws in `contact`.
+//! A contact of a joint with play, between a part and a wall, by the laws in `contact`.
 
 use super::{ActiveSet, At, Coupling, ForceElement, Loads};
 use crate::contact::{Coefficients, Force, Separation};

@@ -129,7 +129,7 @@ impl State {
         &self.conditions
     }
 
-    /// Clearance of ball joint `j`, m.
+    /// Clearance of joint with play `j`, m.
     pub fn clearance(&self, j: usize) -> f64 {
         self.plays(j)[0]
     }
