@@ -333,7 +333,8 @@ fn cells_of_a_wear_map_are_on_the_walls_where_the_parts_touch_and_are_seen_throu
         while simulation.time() < 20e-3 {
             simulation.step().expect("runs");
             simulation.sample_now(&mut frame);
-            if frame.sites.iter().all(|site| site.normal_force.norm() == 0.0) || simulation.statistics().steps % 10 > 0
+            if frame.sites.iter().all(|site| site.normal_force.norm() == 0.0)
+                || !simulation.statistics().steps.is_multiple_of(10)
             {
                 continue;
             }
